@@ -1,0 +1,81 @@
+# `make run` is enough on a bare machine: each stage does only what is still missing.
+#
+#   make run         sets up and runs the paper's scene (SCENE=name for another)
+#   make test        sets up and runs the quick tests   (ARGS='-k name' for some of them)
+#   make test-all    the slow ones too
+#   make setup       sets up: system packages, .venv from the hashed lock, the FMU
+#   make check       ruff and pyright
+#   make lock        remakes requirements.lock with uv  (ARGS=--upgrade for newer versions)
+#   make clean       removes .venv and everything built
+#
+# PYTHON=/path/to/python3 chooses the interpreter that .venv is made with.
+
+SHELL := /bin/sh
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+MAKEFLAGS += --no-print-directory
+
+SCENE ?= paper
+ARGS ?=
+UV ?= uv
+
+VENV := .venv
+PY := $(VENV)/bin/python
+PIP := $(PY) -m pip --disable-pip-version-check --no-input -q
+
+# An environment that was moved, or whose Python is gone, counts as not made.
+VENV_READY := $(shell test -x $(PY) && test "$$(cat $(VENV)/.created 2>/dev/null)" = "$$(pwd)" && echo yes)
+
+# What the FMU is built from, and what builds it.
+FMU_SOURCES := $(shell find fmu -name build -prune -o -type f \
+	\( -name '*.[ch]' -o -name '*.xml' -o -name '*.def' -o -name '*.py' -o -name '*.toml' \) -print) \
+	$(wildcard cosim/fmu*.py cosim/fmu*/*.py)
+
+.PHONY: help run test test-all setup check lock clean FORCE
+
+help:
+	@sed -n 's/^#  \( .*\)/\1/p' Makefile
+
+run: setup
+	@$(VENV)/bin/cosim run $(SCENE) $(ARGS)
+
+test: setup
+	@$(PY) -m pytest -m "not slow" $(ARGS)
+
+test-all: setup
+	@$(PY) -m pytest $(ARGS)
+
+setup: $(VENV)/.fmu
+	@:
+
+# The machine: Python, libngspice, a C compiler; and an empty .venv.
+$(VENV)/.created: .ci/setup-system.sh $(if $(VENV_READY),,FORCE)
+	@PYTHON='$(PYTHON)' sh .ci/setup-system.sh
+
+# The Python packages, at the versions and hashes of the lock; then this project, in place.
+$(VENV)/.installed: $(VENV)/.created requirements.lock pyproject.toml setup.py
+	@echo "Installing the Python packages of requirements.lock into $(VENV)"
+	@$(PIP) install --require-hashes -r requirements.lock && \
+		$(PIP) install --no-build-isolation --no-deps -e . || \
+		{ echo "cosim set-up: pip could not install the Python packages (see above); try again." >&2; exit 1; }
+	@touch $@
+
+$(VENV)/.fmu: $(VENV)/.installed $(FMU_SOURCES)
+	@echo "Building the FMU"
+	@$(VENV)/bin/cosim fmu build
+	@touch $@
+
+check: $(VENV)/.installed
+	@$(VENV)/bin/ruff check
+	@$(VENV)/bin/ruff format --check
+	@$(VENV)/bin/pyright
+
+lock:
+	@command -v $(UV) >/dev/null || { echo "make lock needs uv: install it (pip install uv) or name it with UV=/path/to/uv." >&2; exit 1; }
+	@$(UV) pip compile --quiet --universal --fork-strategy fewest --generate-hashes --no-emit-index-url --python-version 3.11 \
+		--custom-compile-command "make lock" \
+		pyproject.toml --extra test --extra dev -o requirements.lock $(ARGS)
+
+clean:
+	@rm -rf $(VENV) build dist *.egg-info fmu/build .pytest_cache .hypothesis .ruff_cache
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

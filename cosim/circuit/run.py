@@ -1,0 +1,111 @@
+"""One run of a circuit in ngspice, coupled to whatever gives it a back-EMF."""
+
+from array import array
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.circuit.netlist import LIMITS, prepare
+from cosim.circuit.ngspice import engine
+from cosim.coupling import Coupling
+from cosim.drive import Command
+from cosim.errors import SimulationFailed
+from cosim.scene import Scene
+
+ELECTRICAL = ("i(vemf)", "v(v1)", "v(out)", "v(sense)")
+"""Vectors that every netlist has: the coils' total current, the command at the power amplifier's
+input, its output, the top of the sense resistor."""
+
+_FIRST_STEP = 1e-9
+"""s; V1 leaves 0 at once, and ngspice takes its first step unchecked."""
+
+_ON_TIME = 1e-13
+"""s; ngspice's own sums of steps reach a time of ours only within rounding."""
+
+
+class CircuitRun:
+    """ngspice leads; the coupling follows each step that it accepts.
+
+    Steps end on the jumps of the command, where ngspice is told to begin anew.
+    """
+
+    def __init__(self, scene: Scene, command: Command, coupling: Coupling) -> None:
+        self._scene = scene
+        self._command = command
+        self._coupling = coupling
+        self._count = scene.coil.count
+        self._jump = command.next_jump(0.0)
+        self._time = 0.0
+        self._saved = ELECTRICAL + LIMITS[scene.circuit.model]
+        self._log = array("d")
+        self.attempts = 0
+        """Steps that ngspice tried."""
+
+    @property
+    def steps(self) -> int:
+        """Steps that ngspice accepted."""
+        return max(0, len(self._log) // (1 + len(self._saved)) - 1)
+
+    @property
+    def ngspice(self) -> str:
+        """Version of ngspice."""
+        return str(engine().ngspice_version)
+
+    def log(self) -> dict[str, npt.NDArray[np.float64]]:
+        """Time (s) and the saved vectors (A, V) at the accepted points."""
+        table = np.array(self._log).reshape(-1, 1 + len(self._saved))
+        return dict(zip(("time", *self._saved), table.T, strict=True))
+
+    def run(self) -> None:
+        """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
+        duration = self._scene.run.duration
+        engine().run_transient(prepare(self._scene, self._saved), self._saved, self)
+        if self._time < duration * (1 - 1e-9):
+            raise SimulationFailed(
+                f"ngspice stopped at t = {self._time:.6g} s of {duration:g} s: {engine().said()} "
+                "A smaller circuit.max_step or another circuit.reltol may help."
+            )
+
+    # What ngspice asks for (see cosim.circuit.ngspice.Leader).
+
+    def source(self, name: str) -> Callable[[float], float]:
+        if name == "vemf":
+            return self._coupling.back_emf
+        if name == "vcommand":
+            return self._held(self._command.value, self._command.value_before, 0.0)
+        if name == "vdac":
+            # At the start, where V1 = 0.
+            offset = self._command.v_offset
+            return self._held(self._command.v_dac, self._command.v_dac_before, offset)
+        if name == "voffset":
+            return lambda time: self._command.v_offset
+        raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
+
+    def _held(
+        self, value: Callable[[float], float], before: Callable[[float], float], start: float
+    ) -> Callable[[float], float]:
+        """A source that keeps its left limit until a step has ended on the jump."""
+
+        def source(time: float) -> float:
+            if time <= 0.0:
+                return start
+            if time >= self._jump - _ON_TIME:
+                return before(self._jump)
+            return value(time)
+
+        return source
+
+    def attempted(self) -> None:
+        self.attempts += 1
+
+    def accepted(self, time: float, values: Sequence[float], next_step: float) -> float:
+        self._log.append(time)
+        self._log.extend(values)
+        self._time = time
+        if time <= 0.0:
+            return _FIRST_STEP
+        longest = self._coupling.accepted(time, values[0] / self._count)
+        if time >= self._jump - _ON_TIME:
+            self._jump = self._command.next_jump(self._jump)
+        return min(next_step, longest, self._jump - time)

@@ -1,0 +1,85 @@
+"""The command ``cosim``.
+
+Exit codes: 0 done; 2 bad input, told in one sentence; 3 the simulation failed; 130 interrupted.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import NoReturn
+
+from cosim import __version__
+from cosim.errors import BadInput, CosimError
+
+INTERRUPTED = 130
+
+
+class _Parser(argparse.ArgumentParser):
+    """Tells a wrong command line in one sentence, like any other bad input."""
+
+    def error(self, message: str) -> NoReturn:
+        raise BadInput(f"{message} (see {self.prog} --help).")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="cosim",
+        description="Runs a vibrating gripper: its circuit in ngspice, its mechanics in an FMU.",
+    )
+    parser.add_argument("--version", action="version", version=f"cosim {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    commands.add_parser("scenes", help="list the built-in scenes")
+
+    run = commands.add_parser(
+        "run", help="run a scene; write waveforms, summary and figure", allow_abbrev=False
+    )
+    run.add_argument("scene", metavar="SCENE", help="a built-in scene or a TOML file")
+    run.add_argument(
+        "--set",
+        dest="overrides",
+        metavar="TABLE.KEY=VALUE",
+        action="append",
+        default=[],
+        help="replace a value of the scene; repeatable",
+    )
+    run.add_argument(
+        "--out", type=Path, metavar="DIR", help="where to write (default: results/<scene>)"
+    )
+
+    fmu = commands.add_parser("fmu", help="build or check the FMU files of the mechanics")
+    actions = fmu.add_subparsers(dest="action", required=True, metavar="build|check")
+    build = actions.add_parser("build", help="build stickslip-fmi2.fmu and stickslip-fmi3.fmu")
+    build.add_argument("--force", action="store_true", help="build even if they are up to date")
+    actions.add_parser("check", help="validate the FMU files and run them")
+    return parser
+
+
+def _dispatch(arguments: argparse.Namespace) -> int:
+    from cosim import commands
+
+    if arguments.command == "scenes":
+        commands.scenes()
+    elif arguments.command == "run":
+        commands.run(arguments.scene, arguments.overrides, arguments.out)
+    elif arguments.action == "build":
+        commands.fmu_build(arguments.force)
+    else:
+        return commands.fmu_check()
+    return 0
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    try:
+        return _dispatch(_parser().parse_args(argv))
+    except CosimError as error:
+        print(f"cosim: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("cosim: interrupted.", file=sys.stderr)
+        return INTERRUPTED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

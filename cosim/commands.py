@@ -1,0 +1,86 @@
+"""What each command does, apart from reading its options."""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+from cosim.report import table
+from cosim.scene import list_scenes, load, to_toml
+
+
+def scenes() -> None:
+    """List the built-in scenes."""
+    found = list_scenes()
+    width = max(len(name) for name, _ in found)
+    for name, description in found:
+        print(f"{name:<{width}}  {description}")
+
+
+def run(source: str, overrides: list[str], out: Path | None) -> None:
+    """Run a scene and write its files."""
+    scene = load(source, overrides)
+    folder = out or Path("results") / scene.name
+    _writable(folder)
+    # From here on with the heavy libraries.
+    from tqdm import tqdm
+
+    from cosim.simulate import simulate
+
+    def progress(time: float) -> None:
+        bar.update(time - bar.n)
+
+    with tqdm(
+        total=scene.run.duration,
+        desc=scene.name,
+        unit="s",
+        delay=1.0,
+        leave=False,
+        file=sys.stderr,
+        disable=None,
+        bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.2f} of {total:g} s, {remaining} left",
+    ) as bar:
+        result = simulate(scene, progress=progress)
+    from cosim import figure
+    from cosim.simulate import UNITS
+    from cosim.waveforms import whole, write_csv, write_netcdf
+
+    write_csv(folder / "waveforms.csv", result.waveforms, UNITS)
+    attributes = {"title": scene.description or scene.name, "scene": to_toml(scene)}
+    write_netcdf(folder / "waveforms.nc", result.waveforms, UNITS, attributes)
+    for name, text in (
+        ("scene.toml", to_toml(scene)),
+        ("summary.json", json.dumps(result.summary, indent=2, allow_nan=False) + "\n"),
+    ):
+        with whole(folder / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    with whole(folder / "figure.png") as temporary:
+        figure.draw(result, temporary)
+    print(f"{scene.name}: {scene.description}" if scene.description else scene.name)
+    print(table(scene, result.summary))
+    print(f"Written to {folder}: waveforms.csv, waveforms.nc, summary.json, scene.toml")
+    print(f"Figure: {folder / 'figure.png'}")
+
+
+def _writable(folder: Path) -> None:
+    """Refuse a folder that cannot be written to before a long run, not after it."""
+    from cosim.waveforms import whole
+
+    with whole(folder / ".probe"):
+        pass
+    os.unlink(folder / ".probe")
+
+
+def fmu_build(force: bool) -> None:
+    """Build the FMU files."""
+    from cosim import fmu
+
+    for path in fmu.build(force=force).values():
+        print(path)
+
+
+def fmu_check() -> int:
+    """Validate and run the FMU files; 1 if they have problems."""
+    from cosim import fmu
+
+    return 1 if fmu.check() else 0

@@ -1,0 +1,19 @@
+"""The errors that a user can cause or meet; each is told in one sentence, never as a traceback."""
+
+
+class CosimError(Exception):
+    """An error told to the user in one sentence; ``exit_code`` ends the command."""
+
+    exit_code = 1
+
+
+class BadInput(CosimError):
+    """The scene, an option or a file cannot be used."""
+
+    exit_code = 2
+
+
+class SimulationFailed(CosimError):
+    """The simulation could not be finished."""
+
+    exit_code = 3

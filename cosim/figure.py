@@ -1,0 +1,200 @@
+"""The figure of a run: what the circuit did, and what the mechanics made of it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from cosim.recorder import FRAME_RATE
+from cosim.simulate import Result
+
+Array = npt.NDArray[np.float64]
+
+SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
+PERIODS_SHOWN = 3
+
+
+def draw(result: Result, path: Path) -> None:
+    """Draw the run into ``path`` (a PNG)."""
+    figure = Figure(figsize=(13.0, 8.2), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(3, 2)
+    waves = result.waveforms
+    shown = _last_periods(result)
+    time = waves["time"][shown] * 1e3
+    cut = {name: values[shown] for name, values in waves.items()}
+
+    _whole_run(axes[0, 0], result)
+    _command(axes[1, 0], result, time, cut)
+    _voltages(axes[2, 0], time, cut)
+    _positions(axes[0, 1], time, cut)
+    _velocities(axes[1, 1], time, cut)
+    _acceleration(axes[2, 1], result, shown)
+    for axis in (*axes[1:, 0], *axes[:, 1]):
+        axis.set_xlim(time[0], time[-1])
+        axis.set_xlabel("time [ms]")
+    for axis in axes.flat:
+        axis.grid(alpha=0.25)
+    figure.suptitle(_title(result), fontsize=12)
+    figure.savefig(path, format="png")
+
+
+def _last_periods(result: Result) -> slice:
+    """The rows of the last few periods; of the last part of the run where nothing is driven."""
+    time = result.waveforms["time"]
+    run, driven = result.scene.run, result.scene.circuit.model != "none"
+    span = PERIODS_SHOWN / result.scene.drive.frequency if driven else run.duration / 10
+    first = int(np.searchsorted(time, time[-1] - span))
+    return slice(min(first, max(0, len(time) - 2)), None)
+
+
+def _title(result: Result) -> str:
+    scene, numbers = result.scene, result.summary
+    drive = scene.drive
+    words = f"{scene.name}: part moves at {numbers['v_average'] * 1e3:+.2f} mm/s"  # pyright: ignore
+    if scene.circuit.model == "none":
+        return f"{words}; no drive"
+    return (
+        f"{words}; {drive.waveform} {drive.frequency:.4g} Hz, {drive.amplitude:.3g} V "
+        f"peak-to-peak, offset {drive.offset:+.3g} V, circuit “{scene.circuit.model}”"
+    )
+
+
+def _whole_run(axis: Axes, result: Result) -> None:
+    waves = result.waveforms
+    axis.plot(waves["time"], waves["z_surface"] * 1e3, color=SURFACE, lw=0.5, label="surface")
+    axis.plot(waves["time"], waves["z_part"] * 1e3, color=PART, lw=1.2, label="part")
+    if result.scene.run.settle > 0:
+        axis.axvspan(0, result.scene.run.settle, color="0.93", zorder=0, label="settling")
+    axis.set_xlim(0, result.scene.run.duration)
+    axis.set(xlabel="time [s]", ylabel="height [mm]")
+    _at_least(axis, 0.01)
+    _head(axis, "Whole run")
+
+
+def _head(axis: Axes, title: str, handles: Sequence[Artist] | None = None) -> None:
+    """The title on the left, and the legend above the axes, where it covers no curve."""
+    axis.set_title(title, loc="left", fontsize=10.5)
+    if handles is None:
+        handles, _ = axis.get_legend_handles_labels()
+    if handles:
+        axis.legend(
+            handles=handles,
+            loc="lower right",
+            bbox_to_anchor=(1.0, 0.99),
+            ncols=len(handles),
+            fontsize=8,
+            frameon=False,
+            borderpad=0.1,
+            columnspacing=1.2,
+        )
+
+
+def _at_least(axis: Axes, span: float) -> None:
+    """Widen the vertical range to ``span``: what stands still is not to show its rounding."""
+    low, high = axis.get_ylim()
+    if high - low < span:
+        middle = 0.5 * (low + high)
+        axis.set_ylim(middle - span / 2, middle + span / 2)
+
+
+def _no_drive(axis: Axes, title: str, unit: str) -> None:
+    axis.text(0.5, 0.5, "no drive", transform=axis.transAxes, ha="center", color="0.4")
+    axis.set(ylabel=unit, yticks=[])
+    _head(axis, title)
+
+
+def _command(axis: Axes, result: Result, time: Array, cut: dict[str, Array]) -> None:
+    title = "Command and current"
+    if "command" not in cut:
+        _no_drive(axis, title, "current [A]")
+        return
+    axis.plot(time, cut["current"], color=DRIVE, lw=1.3, label="current of one coil (left)")
+    axis.set(ylabel="current [A]")
+    right = axis.twinx()
+    right.plot(time, cut["command"], color="0.45", lw=0.9, ls="--", label="command V1 (right)")
+    right.set_ylabel("V1 [V]")
+    # On these scales the two curves coincide where the source does what it is told.
+    scale = result.scene.circuit.sense_resistance * result.scene.coil.count
+    both = np.concatenate([cut["current"], cut["command"] / scale])
+    edge = 0.05 * max(np.ptp(both), 1e-9)
+    low, high = both.min() - edge, both.max() + edge
+    axis.set_ylim(low, high)
+    right.set_ylim(low * scale, high * scale)
+    _head(axis, title, [*axis.get_lines(), *right.get_lines()])
+
+
+def _voltages(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
+    title = "Coil voltage and back-EMF"
+    if "coil_voltage" not in cut:
+        _no_drive(axis, title, "voltage [V]")
+        return
+    axis.plot(time, cut["coil_voltage"], color="0.35", lw=0.9, label="coil voltage")
+    axis.plot(time, cut["back_emf"], color=EMF, lw=1.2, label="back-EMF")
+    axis.set(ylabel="voltage [V]")
+    _head(axis, title)
+
+
+def _positions(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
+    for name, color, width in (("surface", SURFACE, 1.2), ("part", PART, 1.6)):
+        height = cut[f"z_{name}"]
+        axis.plot(time, (height - height[0]) * 1e3, color=color, lw=width, label=name)
+    axis.set(ylabel="height [mm]")
+    _shade_sticking(axis, time, cut["sticking"])
+    _at_least(axis, 0.01)
+    _head(axis, "Heights, each from its first")
+
+
+def _velocities(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
+    relative = (cut["v_ram"] - cut["v_surface"]) * 1e3
+    axis.plot(time, relative, color=RAM, lw=0.8, label="ram in the actuator")
+    axis.plot(time, cut["v_surface"] * 1e3, color=SURFACE, lw=1.2, label="surface")
+    axis.plot(time, cut["v_part"] * 1e3, color=PART, lw=1.6, label="part")
+    axis.set(ylabel="velocity [mm/s]")
+    _at_least(axis, 1.0)
+    _shade_sticking(axis, time, cut["sticking"])
+    _head(axis, "Velocities")
+
+
+def _shade_sticking(axis: Axes, time: Array, sticking: Array) -> None:
+    axis.fill_between(
+        time,
+        0,
+        1,
+        where=sticking > 0.5,
+        transform=axis.get_xaxis_transform(),
+        color="#f4e3c1",
+        alpha=0.6,
+        lw=0,
+        zorder=0,
+        label="sticking",
+    )
+
+
+def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
+    waves = result.waveforms
+    time = waves["time"]
+    axis.plot(time[shown] * 1e3, waves["a_surface"][shown], color=SURFACE, lw=0.8, label="true")
+    frames = np.arange(np.ceil(time[shown][0] * FRAME_RATE), time[-1] * FRAME_RATE) / FRAME_RATE
+    heights = np.interp(frames, time, waves["z_surface"])
+    if len(frames) > 2:
+        read = np.diff(heights, 2) * FRAME_RATE**2
+        axis.plot(
+            frames[1:-1] * 1e3,
+            read,
+            color="0.2",
+            lw=0.9,
+            marker=".",
+            ms=4,
+            label=f"read from {FRAME_RATE:.0f} frames/s",
+        )
+    axis.set_yscale("symlog", linthresh=100.0)
+    _at_least(axis, 2.0)
+    axis.set(ylabel="acceleration [m/s²]")
+    rigid = result.scene.mechanics.contact == "rigid"
+    _head(axis, "Acceleration of the surface" + (", without its jumps" if rigid else ""))

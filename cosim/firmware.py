@@ -1,0 +1,70 @@
+"""The sawtooth source of the device: a Teensy 3.6 and the difference amplifier behind it.
+
+Sources: the driver's schematic (rev 1.0), its firmware, and the Teensy core library, which writes
+a 10-bit code into the upper bits of the 12-bit DAC and compares a 10-bit PWM value with 1024; so a
+code c stands for 3.3 V · c/1024 at either pin.
+
+The firmware keeps its counter in floating point: it starts at the maximum code, falls every 50 µs
+by ``maximum · f · 50 µs``, is truncated when written, and starts again in the step in which it has
+reached zero or less. So the period is 1/f rounded **up** to whole steps. Assumed here: steps of
+exactly 50 µs (the real ones are longer by part of the loop's run time) and exact arithmetic (the
+real counter is of single precision: now and then a code or one step differs). The code 0 that the
+firmware writes for one pass of its loop before the maximum is left out.
+"""
+
+from fractions import Fraction
+
+V_REFERENCE = 3.3
+"""Full scale of the DAC and of the offset pin, V."""
+COUNTS = 1024
+"""Counts of a 10-bit converter; codes run from 0 to ``COUNTS - 1``."""
+STEPS_PER_SECOND = 20_000
+"""The firmware's decrements a second: one every 50 µs."""
+GAIN = 15.0 / 4.7
+"""Difference amplifier: V1 = GAIN (V_offset - V_DAC), from R2 = R3 = 4.7 kΩ, R4 = R5 = 15 kΩ."""
+
+
+def reading(pot: float) -> int:
+    """The 10-bit reading, 0…1023, of a linear potentiometer at ``pot`` in 0…1."""
+    return min(COUNTS - 1, int(pot * COUNTS))
+
+
+def volts(code: int) -> float:
+    """Voltage of a 10-bit code at the DAC or, as a mean, at the offset pin, V."""
+    return V_REFERENCE * code / COUNTS
+
+
+def nearest_code(voltage: float) -> int:
+    """The 10-bit code nearest to ``voltage`` in V, within 0…1023."""
+    return max(0, min(COUNTS - 1, round(voltage / V_REFERENCE * COUNTS)))
+
+
+def knob_amplitude(pot_max: float) -> float:
+    """Peak-to-peak voltage at V1, V, of the first knob, which sets the DAC's maximum code."""
+    return GAIN * volts(reading(pot_max))
+
+
+def knob_frequency(pot_frequency: float) -> float:
+    """Commanded frequency, Hz, of the second knob: 100 Hz at 0, just above 1 Hz at 1."""
+    return (1 - reading(pot_frequency) / COUNTS) * 99 + 1
+
+
+def knob_offset(pot_offset: float, amplitude: float) -> float:
+    """Mean of V1, V, of the third knob at a peak-to-peak ``amplitude`` in V.
+
+    The knob sets the voltage of the offset pin, which is where the ramp ends (V_DAC = 0).
+    """
+    return GAIN * volts(reading(pot_offset)) - amplitude / 2
+
+
+def offset_pin(offset: float, amplitude: float) -> float:
+    """Voltage at the offset pin, V, for a mean ``offset`` and peak-to-peak ``amplitude`` at V1."""
+    return (offset + amplitude / 2) / GAIN
+
+
+def staircase(maximum: int, frequency: float) -> tuple[int, ...]:
+    """The DAC codes of one period, one each 50 µs, for a commanded ``frequency`` in Hz."""
+    ratio = Fraction(frequency) / STEPS_PER_SECOND
+    p, q = ratio.numerator, ratio.denominator
+    steps = -(-q // p)
+    return tuple(maximum * (q - k * p) // q for k in range(steps))

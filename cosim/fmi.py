@@ -1,0 +1,144 @@
+"""The FMU's calls under FMI 2.0 and FMI 3.0, alike for the caller, without copies of their arrays.
+
+Both go through fmpy's own functions, which check every return code.
+"""
+
+from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_uint, c_void_p
+from functools import cache
+from typing import Any, Protocol
+
+import fmpy
+from fmpy import fmi2, fmi3
+
+from cosim.fmu import MODEL, token, unpacked
+
+
+class Interface(Protocol):
+    """One instance of the FMU. Places and values are ctypes arrays of equal length."""
+
+    messages: list[str]
+    """What the FMU has said, the newest last."""
+
+    def initialise(self) -> None:
+        """End the initialisation, in which parameters could be set."""
+        ...
+
+    def do_step(self, time: float, step: float) -> None:
+        """Advance by ``step`` from ``time``, s."""
+        ...
+
+    def set_reals(self, places: Any, values: Any) -> None: ...
+    def get_reals(self, places: Any, values: Any) -> None: ...
+    def set_integers(self, places: Any, values: Any) -> None: ...
+    def get_integers(self, places: Any, values: Any) -> None: ...
+
+    def close(self) -> None:
+        """Free the instance."""
+        ...
+
+
+@cache
+def references(version: int) -> dict[str, int]:
+    """Value reference of each variable."""
+    description = fmpy.read_model_description(str(unpacked(version)), validate=False)
+    return {v.name: v.valueReference for v in description.modelVariables}
+
+
+def places(version: int, names: Any) -> Any:
+    """The value references of variables as an array for the calls."""
+    known = references(version)
+    return (c_uint * len(names))(*(known[name] for name in names))
+
+
+def _arguments(version: int) -> dict[str, Any]:
+    return {
+        "instanceName": "cosim",
+        "guid": token(),
+        "modelIdentifier": MODEL,
+        "unzipDirectory": str(unpacked(version)),
+    }
+
+
+class Fmi2:
+    """The FMU through FMI 2.0 for co-simulation."""
+
+    def __init__(self) -> None:
+        self.messages: list[str] = []
+        self._fmu = fmi2.FMU2Slave(**_arguments(2))
+        self._logger = _LOGGER_2(lambda *a: self.messages.append(_text(a[4])))
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = self._logger
+        callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
+        callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
+        self._fmu.instantiate(callbacks=callbacks)
+        self._fmu.setupExperiment()
+        self._fmu.enterInitializationMode()
+        self._component = self._fmu.component
+
+    def initialise(self) -> None:
+        self._fmu.exitInitializationMode()
+
+    def do_step(self, time: float, step: float) -> None:
+        self._fmu.fmi2DoStep(self._component, time, step, 1)
+
+    def set_reals(self, places: Any, values: Any) -> None:
+        self._fmu.fmi2SetReal(self._component, places, len(places), values)
+
+    def get_reals(self, places: Any, values: Any) -> None:
+        self._fmu.fmi2GetReal(self._component, places, len(places), values)
+
+    def set_integers(self, places: Any, values: Any) -> None:
+        self._fmu.fmi2SetInteger(self._component, places, len(places), values)
+
+    def get_integers(self, places: Any, values: Any) -> None:
+        self._fmu.fmi2GetInteger(self._component, places, len(places), values)
+
+    def close(self) -> None:
+        self._fmu.terminate()
+        self._fmu.freeInstance()
+
+
+class Fmi3:
+    """The FMU through FMI 3.0 for co-simulation."""
+
+    def __init__(self) -> None:
+        self.messages: list[str] = []
+        self._fmu = fmi3.FMU3Slave(**_arguments(3))
+        self._logger = fmi3.fmi3LogMessageCallback(lambda *a: self.messages.append(_text(a[3])))
+        self._fmu.instantiate(logMessage=self._logger)
+        self._fmu.enterInitializationMode()
+        self._component = self._fmu.component
+        self._unused: Any = (*(byref(fmi3.fmi3Boolean()) for _ in range(3)), byref(c_double()))
+
+    def initialise(self) -> None:
+        self._fmu.exitInitializationMode()
+
+    def do_step(self, time: float, step: float) -> None:
+        self._fmu.fmi3DoStep(self._component, time, step, True, *self._unused)
+
+    def set_reals(self, places: Any, values: Any) -> None:
+        self._fmu.fmi3SetFloat64(self._component, places, len(places), values, len(values))
+
+    def get_reals(self, places: Any, values: Any) -> None:
+        self._fmu.fmi3GetFloat64(self._component, places, len(places), values, len(values))
+
+    def set_integers(self, places: Any, values: Any) -> None:
+        self._fmu.fmi3SetInt32(self._component, places, len(places), values, len(values))
+
+    def get_integers(self, places: Any, values: Any) -> None:
+        self._fmu.fmi3GetInt32(self._component, places, len(places), values, len(values))
+
+    def close(self) -> None:
+        self._fmu.terminate()
+        self._fmu.freeInstance()
+
+
+_LOGGER_2 = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+"""FMI 2.0's logger without its variable arguments: this FMU's messages use none."""
+
+
+def _text(message: bytes | None) -> str:
+    return (message or b"").decode(errors="replace")
+
+
+INTERFACES: dict[int, type[Fmi2] | type[Fmi3]] = {2: Fmi2, 3: Fmi3}

@@ -1,0 +1,133 @@
+"""The mechanical participant: the FMU with the scene's parameters.
+
+Names of parameters and outputs are those of ``fmu/src/variables.def``. The current is linear within
+a step: its value at the start and its slope are set before each step.
+"""
+
+from collections.abc import Sequence
+from ctypes import c_double, c_int
+from typing import Any
+
+from cosim.errors import SimulationFailed
+from cosim.fmi import INTERFACES, places
+from cosim.scene import Scene
+
+STEP_OUTPUTS = (
+    "back_emf",
+    "back_emf_slope",
+    "a_surface_max",
+    "a_surface_min",
+    "v_surface_max",
+    "v_surface_min",
+)
+"""What is read after every step: back-EMF of one coil (V, V/s), extremes within the step."""
+
+SAMPLE_OUTPUTS = (
+    "back_emf",
+    "z_surface",
+    "v_surface",
+    "a_surface",
+    "z_ram",
+    "v_ram",
+    "z_part",
+    "v_part",
+    "friction_force",
+)
+"""What a row of the waveforms takes, SI; ``sticking`` follows them."""
+
+TOTALS = (
+    "z_part",
+    "stick_time",
+    "energy_in",
+    "energy_friction",
+    "energy_impact",
+    "energy_damping",
+    "energy_stored",
+)
+COUNTERS = ("impacts", "stick_slip_events", "internal_steps", "internal_rejected")
+
+CONTACT_LAWS = {"compliant": 1, "rigid": 2}
+
+
+class Mechanics:
+    """One instance of the FMU, initialised in static equilibrium at time 0 without current."""
+
+    def __init__(self, scene: Scene, fmi_version: int = 3) -> None:
+        self.time = 0.0
+        """Time that the mechanics have reached, s."""
+        self.steps = 0
+        """Number of steps so far."""
+        self._fmi = INTERFACES[fmi_version]()
+        self._input_places = places(fmi_version, ("current", "current_slope"))
+        self._input = (c_double * 2)()
+        self._step_places = places(fmi_version, STEP_OUTPUTS)
+        self.step_outputs = (c_double * len(STEP_OUTPUTS))()
+        """Values of STEP_OUTPUTS after the last step."""
+        self._sample_places = places(fmi_version, SAMPLE_OUTPUTS)
+        self._sample = (c_double * len(SAMPLE_OUTPUTS))()
+        self._sticking_place = places(fmi_version, ("sticking",))
+        self._sticking = (c_int * 1)()
+        self._totals_places = places(fmi_version, TOTALS)
+        self._counters_places = places(fmi_version, COUNTERS)
+        reals, integers = _parameters(scene)
+        try:
+            self._fmi.set_reals(
+                places(fmi_version, tuple(reals)), (c_double * len(reals))(*reals.values())
+            )
+            self._fmi.set_integers(
+                places(fmi_version, tuple(integers)), (c_int * len(integers))(*integers.values())
+            )
+            self._fmi.initialise()
+            self._fmi.get_reals(self._step_places, self.step_outputs)
+        except Exception as error:
+            raise self._failed(error) from error
+
+    def step_to(self, time: float, current: float = 0.0, slope: float = 0.0) -> None:
+        """Advance to ``time`` (s) with one coil's current (A) at the start and its slope (A/s).
+
+        Raises SimulationFailed with the FMU's sentence.
+        """
+        self._input[0] = current
+        self._input[1] = slope
+        try:
+            self._fmi.set_reals(self._input_places, self._input)
+            self._fmi.do_step(self.time, time - self.time)
+            self._fmi.get_reals(self._step_places, self.step_outputs)
+        except Exception as error:
+            raise self._failed(error) from error
+        self.time = time
+        self.steps += 1
+
+    def sample(self) -> Sequence[float]:
+        """Values of SAMPLE_OUTPUTS now, and 1 for sticking or 0 for slipping."""
+        self._fmi.get_reals(self._sample_places, self._sample)
+        self._fmi.get_integers(self._sticking_place, self._sticking)
+        return [*self._sample, *self._sticking]
+
+    def totals(self) -> dict[str, float]:
+        """Values of TOTALS and COUNTERS now, counted from the start."""
+        reals = (c_double * len(TOTALS))()
+        self._fmi.get_reals(self._totals_places, reals)
+        integers = (c_int * len(COUNTERS))()
+        self._fmi.get_integers(self._counters_places, integers)
+        return dict(zip((*TOTALS, *COUNTERS), (*reals, *integers), strict=True))
+
+    def close(self) -> None:
+        """Free the instance."""
+        self._fmi.close()
+
+    def _failed(self, error: Exception) -> SimulationFailed:
+        said = self._fmi.messages[-1] if self._fmi.messages else str(error)
+        return SimulationFailed(f"The mechanics failed at t = {self.time:.6g} s: {said}")
+
+
+def _parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
+    """Real and integer parameters of the FMU, with the scene's normal force."""
+    table: dict[str, Any] = scene.mechanics.model_dump()
+    integers = {
+        "contact": CONTACT_LAWS[table.pop("contact")],
+        "n_surfaces": table.pop("n_surfaces"),
+    }
+    friction = scene.friction.model_dump(exclude={"law"})
+    coil = scene.coil.model_dump(include={"force_factor", "b1", "b2"})
+    return {**table, **friction, **coil}, integers

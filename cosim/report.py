@@ -1,0 +1,50 @@
+"""A run's numbers for a reader: the table that is printed."""
+
+from typing import Any
+
+from cosim.scene import Scene
+
+
+def table(scene: Scene, summary: dict[str, Any]) -> str:
+    """The summary in a few lines, in the units of the bench."""
+    rows = [
+        ("part's mean velocity", _scaled(summary["v_average"], 1e3, "mm/s", "+.3f")),
+        ("transport per cycle", _scaled(summary["transport_per_cycle"], 1e6, "µm", "+.1f")),
+        ("sticking", _scaled(summary["stick_fraction"], 100, "% of the time", ".1f")),
+        ("surface, peak-to-peak", _scaled(summary["z_surface_pp"], 1e3, "mm", ".3f")),
+        ("surface velocity", _range(summary, "v_surface", 1e3, "mm/s", "+.0f")),
+        ("surface acceleration", _acceleration(scene, summary)),
+        ("  as a camera reads it", _range(summary, "a_camera", 1, "m/s²", "+.0f")),
+    ]
+    if "current_max" in summary:
+        rows += [
+            ("coil current", _range(summary, "current", 1, "A", "+.3f")),
+            (
+                "output at its limit",
+                _scaled(summary["saturated_fraction"], 100, "% of the time", ".2f"),
+            ),
+        ]
+    rows += [
+        ("impacts", f"{summary['impacts']}"),
+        ("stick-slip events", f"{summary['stick_slip_events']}"),
+        ("energy unaccounted for", f"{summary['energy_residual']:.1e} of the total"),
+        ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
+    ]
+    return "\n".join(f"  {name:<24}{value}" for name, value in rows if value)
+
+
+def _scaled(value: float | None, factor: float, unit: str, form: str) -> str:
+    return "" if value is None else f"{value * factor:{form}} {unit}"
+
+
+def _range(summary: dict[str, Any], name: str, factor: float, unit: str, form: str) -> str:
+    low, high = summary[f"{name}_min"], summary[f"{name}_max"]
+    if low is None or high is None:
+        return ""
+    return f"{low * factor:{form}} … {high * factor:{form}} {unit}"
+
+
+def _acceleration(scene: Scene, summary: dict[str, Any]) -> str:
+    if scene.mechanics.contact == "rigid":
+        return 'without bound at a rigid impact (mechanics.contact = "compliant" has a peak)'
+    return _range(summary, "a_surface", 1, "m/s²", "+.0f")

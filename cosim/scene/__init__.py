@@ -1,0 +1,27 @@
+"""Scenes: what a run simulates, read from TOML and checked.
+
+>>> scene = load("paper", ["run.duration=0.5", "mechanics.contact=rigid"])
+>>> scene.drive.frequency
+20.0
+"""
+
+from cosim.scene.describe import Key, keys
+from cosim.scene.loading import list_scenes, load
+from cosim.scene.model import Scene, to_toml
+from cosim.scene.tables import Circuit, Coil, Coupling, Drive, Friction, Mechanics, Run
+
+__all__ = [
+    "Circuit",
+    "Coil",
+    "Coupling",
+    "Drive",
+    "Friction",
+    "Key",
+    "Mechanics",
+    "Run",
+    "Scene",
+    "keys",
+    "list_scenes",
+    "load",
+    "to_toml",
+]

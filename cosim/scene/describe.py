@@ -1,0 +1,69 @@
+"""What the tables say about their keys, for messages, documentation and units."""
+
+from dataclasses import dataclass
+from types import UnionType
+from typing import Literal, Union, get_args, get_origin
+
+from cosim.scene.tables import TABLES
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a scene. ``choices`` is None for numbers; ``low`` and ``high`` otherwise."""
+
+    table: str
+    name: str
+    unit: str
+    default: float | int | bool | str | None
+    kind: type
+    choices: tuple[str, ...] | None
+    low: float | None
+    high: float | None
+    text: str
+
+    @property
+    def full(self) -> str:
+        """The key as an override spells it: ``table.key``."""
+        return f"{self.table}.{self.name}"
+
+    @property
+    def allowed(self) -> str:
+        """What may stand there, as the end of "… must be …"."""
+        if self.choices:
+            quoted = [f'"{choice}"' for choice in self.choices]
+            return quoted[0] if len(quoted) == 1 else f"one of {', '.join(quoted)}"
+        if self.kind is bool:
+            return "true or false"
+        number = "a whole number" if self.kind is int else "a number"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{number} from {self.low:g} to {self.high:g}{unit}"
+
+
+def _key(table: str, name: str) -> Key:
+    field = TABLES[table].model_fields[name]
+    kind = field.annotation
+    if get_origin(kind) in (UnionType, Union):
+        kind = next(arg for arg in get_args(kind) if arg is not type(None))
+    choices = get_args(kind) if get_origin(kind) is Literal else None
+    limits = {k: getattr(m, k) for m in field.metadata for k in ("ge", "le") if hasattr(m, k)}
+    extra = field.json_schema_extra
+    assert isinstance(extra, dict)
+    return Key(
+        table=table,
+        name=name,
+        unit=str(extra["unit"]),
+        default=field.default,
+        kind=str if choices else kind if isinstance(kind, type) else str,
+        choices=choices,
+        low=limits.get("ge"),
+        high=limits.get("le"),
+        text=field.description or "",
+    )
+
+
+_KEYS = tuple(_key(table, name) for table, model in TABLES.items() for name in model.model_fields)
+
+
+def keys() -> tuple[Key, ...]:
+    """Every key of every table, in order."""
+    return _KEYS

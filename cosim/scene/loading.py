@@ -1,0 +1,202 @@
+"""Loading of scenes: a built-in one or a TOML file, its base, and overrides on top."""
+
+import os
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from stat import S_ISDIR, S_ISREG
+from typing import Any
+
+from pydantic import ValidationError
+
+from cosim.errors import BadInput
+from cosim.scene import messages
+from cosim.scene.describe import keys
+from cosim.scene.model import Scene
+from cosim.scene.tables import KNOBS, TABLES
+
+MAX_BYTES = 1 << 20
+"""Largest scene file; far above any honest one."""
+
+
+@dataclass(frozen=True)
+class _Layer:
+    origin: str
+    """The file or option, as messages name it."""
+    tables: dict[str, Any]
+
+
+def list_scenes() -> list[tuple[str, str]]:
+    """Name and description of every built-in scene, the paper's first."""
+    found = []
+    for entry in (resources.files("cosim") / "scenes").iterdir():
+        if entry.name.endswith(".toml"):
+            data = tomllib.loads(entry.read_text(encoding="utf-8"))
+            found.append((entry.name.removesuffix(".toml"), str(data.get("description", ""))))
+    return sorted(found, key=lambda scene: (not scene[0].startswith("paper"), scene[0]))
+
+
+def load(source: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scene:
+    """The checked scene of a built-in name or TOML file, with ``table.key=value`` overrides.
+
+    A file may name a built-in scene as its ``base``; each layer changes only the keys that it
+    gives. A knob of the device replaces its value from the layers below, and the other way round.
+    Raises :class:`BadInput` with one sentence on the first thing that is wrong.
+    """
+    layers = _layers(os.fspath(source))
+    if changes := _overrides(overrides):
+        layers.append(_Layer("--set", changes))
+    merged, origins = _merge(layers)
+    try:
+        return Scene.model_validate(merged)
+    except ValidationError as error:
+        base = layers[-2] if changes else layers[-1]
+        raise BadInput(messages.explain(error, origins, base.origin)) from None
+
+
+def _layers(source: str) -> list[_Layer]:
+    """The file of ``source`` on top of the built-in scenes that it starts from."""
+    builtin = [name for name, _ in list_scenes()]
+    if source in builtin:
+        origin = f"scene {source}"
+        entry = resources.files("cosim") / "scenes" / f"{source}.toml"
+        data = tomllib.loads(entry.read_text(encoding="utf-8"))
+        data.setdefault("name", source)
+    else:
+        origin = messages.plain(source)
+        data = _read(source, origin, builtin)
+        stem = re.sub(r"[^\w.+-]+", "-", Path(source).stem).strip("-.+")[:64]
+        data.setdefault("name", stem or "scene")
+    _check_names(data, origin)
+    base = data.pop("base", None)
+    if base is None:
+        return [_Layer(origin, data)]
+    if base not in builtin:
+        hint = messages.suggestion(str(base), builtin)
+        raise BadInput(
+            messages.ended(
+                f"{origin}: base = {messages.shown(base)} must be a built-in scene"
+                + (hint or f" ({', '.join(builtin)})")
+            )
+        )
+    below = _layers(base)
+    below[-1].tables.pop("description", None)
+    return [*below, _Layer(origin, data)]
+
+
+def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
+    """The content of a scene file."""
+    try:
+        mode = os.stat(source).st_mode
+        if S_ISDIR(mode):
+            raise BadInput(f"{origin}: this is a directory, not a scene file.")
+        if not S_ISREG(mode):  # a pipe would wait for ever
+            raise BadInput(f"{origin}: this is not a regular file.")
+        with open(source, "rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        hint = messages.suggestion(Path(source).stem, builtin, "the built-in scene ")
+        if source.endswith(".toml") or os.sep in source:
+            raise BadInput(messages.ended(f"{origin}: there is no such file{hint}")) from None
+        raise BadInput(
+            messages.ended(
+                f'there is no built-in scene and no file "{origin}"'
+                + (hint or f" (built-in: {', '.join(builtin)})")
+            )
+        ) from None
+    except OSError as error:
+        raise BadInput(f"{origin}: cannot be read ({error.strerror}).") from None
+    except ValueError:  # a NUL or a lone surrogate in the path
+        raise BadInput(f"{origin}: this is not a possible file name.") from None
+    if len(raw) > MAX_BYTES:
+        raise BadInput(f"{origin}: this is larger than a scene file may be ({MAX_BYTES} bytes).")
+    try:
+        text = raw.decode("utf-8-sig")  # editors on Windows like to add the mark
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise BadInput(f"{origin}, line {line}: this is not UTF-8 text.") from None
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BadInput(_syntax(error, text, origin)) from None
+
+
+def _syntax(error: Exception, text: str, origin: str) -> str:
+    """A sentence on broken TOML: file, line, column."""
+    message = "too deeply nested" if isinstance(error, RecursionError) else str(error)
+    place = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", message)
+    if place is None:
+        return f"{origin}: this is not TOML: {messages.plain(message)}."
+    line, column = place[1], place[2]
+    if line is None:
+        lines = text.splitlines() or [""]
+        line, column = len(lines), len(lines[-1]) + 1
+    message = messages.plain(message[: place.start()])
+    return f"{origin}, line {line}, column {column}: this is not TOML: {message}."
+
+
+def _check_names(data: dict[str, Any], origin: str) -> None:
+    for name, content in data.items():
+        if name in ("name", "description", "base"):
+            continue
+        if name not in TABLES:
+            raise BadInput(messages.ended(f"{origin}: {messages.unknown_table(name)}"))
+        if not isinstance(content, dict):
+            raise BadInput(f"{origin}: {name} = {messages.shown(content)} must be a table.")
+        known = TABLES[name].model_fields
+        for key in content:
+            if key not in known:
+                raise BadInput(messages.ended(f"{origin}: {messages.unknown_key(name, key)}"))
+
+
+def _overrides(overrides: Iterable[str]) -> dict[str, Any]:
+    """The tables that ``table.key=value`` options give."""
+    tables: dict[str, Any] = {}
+    for text in overrides:
+        left, equals, right = text.partition("=")
+        table, dot, key = left.strip().partition(".")
+        if not (equals and dot and table and key):
+            bare = left.strip()
+            full = next((k.full for k in keys() if k.name == bare), None)
+            hint = f"; did you mean {full}?" if full else ""
+            raise BadInput(
+                messages.ended(f"--set {messages.plain(text)}: must be table.key=value{hint}")
+            )
+        if not right.strip():
+            raise BadInput(f"--set {messages.plain(text)}: has no value.")
+        _check_names({table: {key: None}}, "--set")
+        tables.setdefault(table, {})[key] = _value(right.strip())
+    return tables
+
+
+def _value(text: str) -> Any:
+    """A TOML value; what is none, as a bare word, is a string."""
+    try:
+        data = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return data["value"] if data.keys() == {"value"} else text
+
+
+def _merge(layers: list[_Layer]) -> tuple[dict[str, Any], dict[str, tuple[int, str]]]:
+    """The layers as one, and for each key the rank and origin of the layer that gave it."""
+    merged: dict[str, Any] = {}
+    origins: dict[str, tuple[int, str]] = {}
+    twins = KNOBS | {key: knob for knob, key in KNOBS.items()}
+    for rank, layer in enumerate(layers):
+        for table, content in layer.tables.items():
+            if table not in TABLES:
+                merged[table] = content
+                origins[table] = (rank, layer.origin)
+                continue
+            below = merged.setdefault(table, {})
+            for key in content:
+                if table == "drive" and key in twins:
+                    below.pop(twins[key], None)
+            for key, value in content.items():
+                below[key] = value
+                origins[f"{table}.{key}"] = (rank, layer.origin)
+    return merged, origins

@@ -1,0 +1,85 @@
+"""One sentence for everything that can be wrong with a scene."""
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from cosim.scene.describe import keys
+from cosim.scene.model import toml_value
+from cosim.scene.tables import TABLES
+
+ALLOWED_TOP = {
+    "name": "at most 64 letters, digits, blanks and ._+- that begin with a letter or digit",
+    "description": "one line of at most 200 characters",
+}
+
+
+def shown(value: object, limit: int = 60) -> str:
+    """A value as its user wrote it, on one line and not too long."""
+    try:
+        text = toml_value(value) if isinstance(value, bool | int | float | str) else str(value)
+    except ValueError:  # an int too long for str()
+        text = "an endless number"
+    text = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+    return text if len(text) <= limit else text[: limit - 1] + "…"
+
+
+def plain(text: str, limit: int = 200) -> str:
+    """A name or path on one line, without the quotes of :func:`shown`."""
+    return shown(text, limit + 2).removeprefix('"').removesuffix('"')
+
+
+def suggestion(word: str, known: Iterable[str], what: str = "") -> str:
+    """``; did you mean …?`` if something known looks like ``word``, else the empty string."""
+    near = difflib.get_close_matches(word, list(known), n=1)
+    return f"; did you mean {what}{near[0]}?" if near else ""
+
+
+def ended(sentence: str) -> str:
+    """The sentence with its final mark."""
+    return sentence if sentence.endswith("?") else sentence + "."
+
+
+def unknown_table(name: str) -> str:
+    """A sentence on a table that no scene has, or a key that stands outside its table."""
+    holders = [key.full for key in keys() if key.name == name]
+    hint = f"; did you mean {holders[0]}?" if holders else suggestion(name, TABLES)
+    return f'there is no table "{plain(name)}"' + (hint or f" (tables: {', '.join(TABLES)})")
+
+
+def unknown_key(table: str, name: str) -> str:
+    """A sentence on a key that its table does not have."""
+    here = [key.name for key in keys() if key.table == table]
+    elsewhere = [key.full for key in keys() if key.name == name]
+    full = f"{table}.{name}"
+    hint = (
+        f"; did you mean {elsewhere[0]}?"
+        if elsewhere
+        else suggestion(name, here, f"{table}.")
+        or suggestion(full, [key.full for key in keys()])
+        or f" (keys of {table}: {', '.join(here)})"
+    )
+    return f'there is no key "{plain(full)}"' + hint
+
+
+def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], default: str) -> str:
+    """The first error in one sentence, with the layer (file or option) that brought it in.
+
+    ``origins`` gives, for each "table.key" that was set, the rank and the name of its layer.
+    """
+    first: Any = error.errors(include_url=False)[0]
+    if first["type"] == "check":
+        layers = [origins[key] for key in first["ctx"]["keys"] if key in origins]
+        origin = max(layers)[1] if layers else default
+        return f"{origin}: {ended(first['ctx']['sentence'])}"
+    full = ".".join(str(part) for part in first["loc"])
+    allowed = next((key.allowed for key in keys() if key.full == full), None)
+    origin = origins.get(full, (0, default))[1]
+    value = shown(first["input"])
+    if allowed is None:
+        return f"{origin}: {full} = {value} must be {ALLOWED_TOP.get(full, 'a table')}."
+    choices = next(key.choices for key in keys() if key.full == full) or ()
+    hint = suggestion(str(first["input"]), choices)
+    return ended(f"{origin}: {full} = {value} must be {allowed}{hint}")

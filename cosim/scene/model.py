@@ -1,0 +1,125 @@
+"""A whole scene, and its text."""
+
+import json
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from cosim import firmware
+from cosim.scene.describe import keys
+from cosim.scene.tables import (
+    KNOBS,
+    TABLES,
+    Circuit,
+    Coil,
+    Coupling,
+    Drive,
+    Friction,
+    Mechanics,
+    Run,
+    fault,
+)
+
+
+class Scene(BaseModel):
+    """Everything that a run needs to know, checked; frozen and comparable."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    name: str = Field("scene", pattern=r"^\w[\w .+-]*$", max_length=64)
+    description: str = Field("", pattern=r"^[^\x00-\x1f\x7f]*$", max_length=200)
+    drive: Drive = Drive()
+    circuit: Circuit = Circuit()
+    coil: Coil = Coil()
+    mechanics: Mechanics = Mechanics()
+    friction: Friction = Friction()
+    coupling: Coupling = Coupling()
+    run: Run = Run()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill(cls, data: Any) -> Any:
+        """Make models of the tables, with the staircase where the firmware is in the circuit."""
+        if not isinstance(data, dict):
+            return data
+        data = dict(data)
+        drive, circuit = data.get("drive", {}), data.get("circuit", {})
+        if (
+            isinstance(drive, dict)
+            and isinstance(circuit, dict)
+            and circuit.get("model") == "full"
+            and drive.get("waveform", "sawtooth") == "sawtooth"
+            and not drive.get("reset_time")
+        ):
+            data["drive"] = {"quantised": True} | drive
+        return data
+
+    @model_validator(mode="after")
+    def _check_reach(self) -> "Scene":
+        drive = self.drive
+        if self.circuit.model == "none":
+            return self
+        if self.circuit.model == "full":
+            why = 'with circuit.model = "full"'
+        elif drive.quantised:
+            why = "with drive.quantised = true"
+        else:
+            return self
+        reach = firmware.GAIN * firmware.V_REFERENCE
+        if drive.amplitude > reach:
+            raise fault(
+                f"drive.amplitude = {drive.amplitude:g} V must be a number from 0 to "
+                f"{reach:.4g} V {why}, whose DAC ends at {firmware.V_REFERENCE} V",
+                "drive.amplitude",
+                "drive.pot_max",
+                "circuit.model",
+                "drive.quantised",
+            )
+        pin = firmware.offset_pin(drive.offset, drive.amplitude)
+        # a knob at its end may come out a rounding error outside
+        if not -1e-9 <= pin <= firmware.V_REFERENCE + 1e-9:
+            half = drive.amplitude / 2
+            raise fault(
+                f"drive.offset = {drive.offset:g} V must be a number from {-half:.4g} to "
+                f"{reach - half:.4g} V {why} and drive.amplitude = {drive.amplitude:g} V, "
+                f"for its offset pin gives 0 to {firmware.V_REFERENCE} V",
+                "drive.offset",
+                "drive.amplitude",
+                "drive.pot_max",
+                "circuit.model",
+                "drive.quantised",
+            )
+        return self
+
+    def as_dict(self) -> dict[str, Any]:
+        """The scene as plain tables that make an equal scene: nothing absent or said twice."""
+        data: dict[str, Any] = {"name": self.name, "description": self.description}
+        for table in TABLES:
+            values = getattr(self, table).model_dump(exclude_none=True)
+            for knob, key in KNOBS.items():
+                if table == "drive" and knob in values:
+                    del values[key]
+            data[table] = values
+        return data
+
+
+def toml_value(value: bool | float | int | str) -> str:
+    """A value as TOML spells it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        # JSON's escapes are TOML's, but for DEL
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)
+
+
+def to_toml(scene: Scene) -> str:
+    """The resolved scene as TOML with every key and its unit; loads to an equal scene."""
+    data = scene.as_dict()
+    lines = [f"{key} = {toml_value(data[key])}" for key in ("name", "description")]
+    for table in TABLES:
+        lines += ["", f"[{table}]"]
+        for key in (key for key in keys() if key.table == table and key.name in data[table]):
+            unit = "" if key.unit in ("", "1") else f"  # {key.unit}"
+            lines.append(f"{key.name} = {toml_value(data[table][key.name])}{unit}")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,132 @@
+"""Runs a scene: picks the participants that its rung has, couples them, and gathers the result."""
+
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim import electrics
+from cosim.coupling.step_locked import StepLocked
+from cosim.drive import Command, command
+from cosim.mechanics import Mechanics
+from cosim.recorder import COLUMNS, Recorder
+from cosim.scene import Scene
+from cosim.summary import summarise
+
+Array = npt.NDArray[np.float64]
+
+UNITS = {
+    "time": "s",
+    "command": "V",
+    "current": "A",
+    "coil_voltage": "V",
+    "back_emf": "V",
+    "z_surface": "m",
+    "v_surface": "m/s",
+    "a_surface": "m/s2",
+    "z_ram": "m",
+    "v_ram": "m/s",
+    "z_part": "m",
+    "v_part": "m/s",
+    "friction_force": "N",
+    "sticking": "1",
+}
+"""The columns of the waveforms, in order, and their units. Absent participants have none."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A finished run: the scene, its waveforms (arrays of equal length, SI) and its summary."""
+
+    scene: Scene
+    waveforms: dict[str, Array]
+    summary: dict[str, object]
+
+
+def simulate(
+    scene: Scene, progress: Callable[[float], None] = lambda _: None, fmi_version: int = 3
+) -> Result:
+    """Run a scene. ``progress`` is told the simulated time (s) now and then.
+
+    Raises SimulationFailed with where, when, and what to try.
+    """
+    began = time.perf_counter()
+    drive = command(scene)
+    mechanics = Mechanics(scene, fmi_version)
+    try:
+        recorder = Recorder(scene, mechanics, progress)
+        electric, circuit = None, None
+        if scene.circuit.model == "none":
+            recorder.advance(scene.run.duration, 0.0, 0.0)
+        elif scene.circuit.model == "ideal":
+            log = _prescribe(scene, drive, recorder)
+            emf = recorder.rows[:, COLUMNS.index("back_emf")]
+            motion = mechanics.totals()["energy_in"]
+            electric = electrics.from_command(scene, drive, log, recorder.time, emf, motion)
+        else:
+            # PySpice and ngspice are loaded only for those who run a circuit.
+            from cosim.circuit.netlist import at_limit
+            from cosim.circuit.run import CircuitRun
+
+            circuit = CircuitRun(scene, drive, StepLocked(recorder))
+            circuit.run()
+            log = circuit.log()
+            over = at_limit(scene, log)
+            electric = electrics.from_circuit(scene, drive, log, recorder.time, over)
+        totals = mechanics.totals()
+        steps = mechanics.steps
+    finally:
+        mechanics.close()
+    summary = summarise(scene, recorder, totals, electric)
+    summary |= {
+        "circuit_steps": circuit.steps if circuit else 0,
+        "circuit_rejected": circuit.attempts - circuit.steps if circuit else 0,
+        "fmu_steps": steps,
+        "wall_time": time.perf_counter() - began,
+        "method": scene.coupling.method if circuit else "uncoupled",
+        "versions": _versions() | ({"ngspice": circuit.ngspice} if circuit else {}),
+    }
+    return Result(scene, _waveforms(recorder, electric), summary)
+
+
+def _prescribe(scene: Scene, drive: Command, recorder: Recorder) -> dict[str, Array]:
+    """The rung ``ideal``: the coil carries the commanded current, whatever voltage that takes."""
+    share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
+    duration = scene.run.duration
+    edges, start, end = [0.0], [], []
+    while edges[-1] < duration:
+        begin = edges[-1]
+        stop = min(drive.next_corner(begin), begin + drive.longest_straight, duration)
+        edges.append(stop)
+        start.append(share * drive.value(begin))
+        end.append(share * drive.value_before(stop))
+        recorder.advance(stop, start[-1], end[-1])
+    return {"time": np.array(edges), "start": np.array(start), "end": np.array(end)}
+
+
+def _waveforms(recorder: Recorder, electric: electrics.Electrics | None) -> dict[str, Array]:
+    n = recorder.n_rows
+    known = {"time": recorder.time[:n]}
+    if electric is not None:
+        known["command"] = electric.command
+        known["current"] = electric.current
+        known["coil_voltage"] = electric.coil_voltage
+    known |= {name: recorder.rows[:n, k] for k, name in enumerate(COLUMNS)}
+    if electric is None:
+        del known["back_emf"]
+    return {name: known[name] for name in UNITS if name in known}
+
+
+def _versions() -> dict[str, str]:
+    """What made the result."""
+    found = {"python": platform.python_version()}
+    for package in ("cosim", "fmpy", "PySpice", "numpy"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return found

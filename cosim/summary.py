@@ -1,0 +1,78 @@
+"""The numbers of a run: what ``summary.json`` holds and the table that is printed."""
+
+from typing import Any
+
+import numpy as np
+
+from cosim.electrics import Electrics
+from cosim.recorder import COLUMNS, FRAME_RATE, Recorder
+from cosim.scene import Scene
+
+
+def summarise(
+    scene: Scene, recorder: Recorder, totals: dict[str, float], electric: Electrics | None
+) -> dict[str, Any]:
+    """Averages, extremes and counts after ``run.settle``; energies over the whole run. SI.
+
+    A rigid impact changes velocities in no time: there ``a_surface_max`` and ``a_surface_min`` are
+    None. The camera's reading is of the true surface at each frame, through three-point second
+    differences.
+    """
+    run, before = scene.run, recorder.at_settle
+    span = run.duration - run.settle
+    v_average = (totals["z_part"] - before["z_part"]) / span
+    after = recorder.time >= run.settle
+    z_surface = recorder.rows[after, COLUMNS.index("z_surface")]
+    camera = np.diff(recorder.frames, 2) * FRAME_RATE**2
+    rigid = scene.mechanics.contact == "rigid"
+    a_max, a_min, v_max, v_min = recorder.extremes
+    driven = scene.circuit.model != "none"
+    result: dict[str, Any] = {
+        "v_average": v_average,
+        "transport_per_cycle": v_average / scene.drive.frequency if driven else None,
+        "stick_fraction": (totals["stick_time"] - before["stick_time"]) / span,
+        "a_surface_max": None if rigid else a_max,
+        "a_surface_min": None if rigid else a_min,
+        "a_camera_max": float(camera.max()) if camera.size else None,
+        "a_camera_min": float(camera.min()) if camera.size else None,
+        "v_surface_max": v_max,
+        "v_surface_min": v_min,
+        "z_surface_pp": float(np.ptp(z_surface)),
+    }
+    if electric is not None:
+        current = electric.current[after]
+        result["current_max"] = float(current.max())
+        result["current_min"] = float(current.min())
+        result["saturated_fraction"] = electric.saturated_fraction
+    for counter in ("impacts", "stick_slip_events"):
+        result[counter] = totals[counter] - before[counter]
+    return result | _energies(scene, totals, electric)
+
+
+def _energies(
+    scene: Scene, totals: dict[str, float], electric: Electrics | None
+) -> dict[str, float]:
+    """The account of the whole run, J, of all ``coil.count`` actuators."""
+    count = scene.coil.count
+    lost = {
+        f"energy_{kind}": count * totals[f"energy_{kind}"]
+        for kind in ("friction", "impact", "damping")
+    }
+    stored = count * totals["energy_stored"]
+    energy_in, copper = 0.0, 0.0
+    if electric is not None:
+        energy_in, copper = electric.energy_in, electric.energy_copper
+        stored += electric.energy_magnetic
+    missing = energy_in - copper - sum(lost.values()) - stored
+    mechanics = scene.mechanics
+    mass = mechanics.ram_mass + mechanics.surface_mass + mechanics.part_mass / mechanics.n_surfaces
+    # In the flexures from the start: what a scene without a drive is measured against.
+    hanging = count * (mass * mechanics.gravity) ** 2 / (2.0 * mechanics.flexure_stiffness)
+    scale = max(abs(energy_in), copper + sum(lost.values()), abs(stored), hanging)
+    return {
+        "energy_in": energy_in,
+        "energy_copper": copper,
+        **lost,
+        "energy_stored": stored,
+        "energy_residual": abs(missing) / scale if scale > 0.0 else 0.0,
+    }

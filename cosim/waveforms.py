@@ -1,0 +1,64 @@
+"""Waveforms as files: CSV and netCDF, each written whole or not at all."""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.errors import BadInput
+
+Array = npt.NDArray[np.float64]
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """A temporary path beside ``path`` that takes its place when the block ends well."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=path.suffix)
+        os.close(handle)
+        os.chmod(name, 0o666 & ~_umask())
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written ({error.strerror}).") from error
+    temporary = Path(name)
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written ({error.strerror}).") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def write_csv(path: Path, waveforms: dict[str, Array], units: dict[str, str]) -> None:
+    """Comma-separated values: a header row ``name [unit]``, then a row for each time."""
+    header = ",".join(f"{name} [{units[name]}]" for name in waveforms)
+    table = np.column_stack(list(waveforms.values()))
+    with whole(path) as temporary:
+        np.savetxt(temporary, table, fmt="%.10g", delimiter=",", header=header, comments="")
+
+
+def write_netcdf(
+    path: Path, waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
+) -> None:
+    """NetCDF (classic format) with the dimension ``time``; each variable has its ``units``."""
+    from scipy.io import netcdf_file
+
+    with whole(path) as temporary, netcdf_file(str(temporary), "w", version=2) as file:
+        for name, text in attributes.items():
+            setattr(file, name, text)
+        file.createDimension("time", len(waveforms["time"]))
+        for name, values in waveforms.items():
+            variable = file.createVariable(name, "f8", ("time",))
+            variable[:] = values
+            variable.units = units[name]

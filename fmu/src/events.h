@@ -1,0 +1,42 @@
+/* Modes and the events that change them. */
+#ifndef STICKSLIP_EVENTS_H
+#define STICKSLIP_EVENTS_H
+
+#include "mechanics.h"
+
+typedef enum {
+    EVENT_WALL_ABOVE, /* the ram reaches the upper wall */
+    EVENT_WALL_BELOW,
+    EVENT_WALL_LEFT,    /* a touched wall is left */
+    EVENT_WALL_PARTING, /* the compliant force vanishes or comes back within the wall */
+    EVENT_SLIP_ENDS,
+    EVENT_SLIP_DOWN, /* the part can no longer keep up: w becomes negative */
+    EVENT_SLIP_UP,
+    EVENT_PLATE_STOPS,
+    EVENT_PLATE_DOWN, /* the part breaks away from the springed plate */
+    EVENT_PLATE_UP,
+    N_EVENTS
+} EventKind;
+
+/* An event happens where its value falls through zero. */
+typedef struct {
+    EventKind kind;
+    double value, rate; /* rate: d(value)/dt */
+    double noise;       /* values above -noise are rounding, not an event */
+} EventFunction;
+
+enum { MAX_EVENT_FUNCTIONS = 6 };
+
+/* The event functions of the present mode at state y. Returns their number; the order is the same
+ * for the same mode. */
+int event_functions(const Model *m, const double y[N_STATES], double tau,
+                    EventFunction functions[MAX_EVENT_FUNCTIONS]);
+
+/* Apply one event to state and mode, then settle. */
+void apply_event(Model *m, double tau, EventKind kind);
+
+/* Make the mode agree with state and inputs: after a jump of either, several conditions can be
+ * violated at once (impact and slip, release and stick, ...). */
+void settle_mode(Model *m, double tau);
+
+#endif

@@ -1,0 +1,61 @@
+#include "integrator.h"
+
+#include <math.h>
+
+#include "mechanics.h"
+
+/* Errors are relative to |y| plus these: what counts as large for this machine, m and m/s. */
+static const double POSITION_SCALE = 1e-3, VELOCITY_SCALE = 0.1;
+
+double trial_step(const Model *m, double tau, double h, const double y0[N_STATES],
+                  const double dy0[N_STATES], double y1[N_STATES], double dy1[N_STATES])
+{
+    static const double A[6][6] = {
+        {1.0 / 5.0},
+        {3.0 / 40.0, 9.0 / 40.0},
+        {44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0},
+        {19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0},
+        {9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0},
+        {35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0}};
+    static const double C[6] = {1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0};
+    static const double E[7] = {71.0 / 57600.0,     0.0,           -71.0 / 16695.0, 71.0 / 1920.0,
+                                -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0};
+    double k[7][N_STATES];
+
+    for (int j = 0; j < N_STATES; j++)
+        k[0][j] = dy0[j];
+    for (int s = 0; s < 6; s++) {
+        for (int j = 0; j < N_STATES; j++) {
+            double sum = 0.0;
+            for (int l = 0; l <= s; l++)
+                sum += A[s][l] * k[l][j];
+            y1[j] = y0[j] + h * sum;
+        }
+        state_rates(m, &m->mode, y1, tau + C[s] * h, k[s + 1]);
+    }
+    for (int j = 0; j < N_STATES; j++)
+        dy1[j] = k[6][j];
+
+    double worst = 0.0;
+    for (int j = Z; j <= W; j++) {
+        double sum = 0.0;
+        for (int s = 0; s < 7; s++)
+            sum += E[s] * k[s][j];
+        double scale = (j == V || j == U || j == W) ? VELOCITY_SCALE : POSITION_SCALE;
+        double error = fabs(h * sum) / (m->r.tolerance * (scale + fabs(y0[j])));
+        if (!(error <= worst))
+            worst = error; /* so that a NaN stays */
+    }
+    return worst;
+}
+
+double step_factor(double error)
+{
+    /* The fifth root belongs here. Square roots are exact on every platform where pow is not, and
+     * the fourth root below 1 and the eighth above err on the safe side. */
+    if (!(error < 1e30))
+        return 0.1;
+    double root = sqrt(sqrt(error > 1e-30 ? error : 1e-30));
+    double factor = 0.9 / (error > 1.0 ? root : sqrt(root));
+    return factor < 0.1 ? 0.1 : factor > 8.0 ? 8.0 : factor;
+}

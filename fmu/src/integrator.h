@@ -1,0 +1,17 @@
+/* One step of the Runge-Kutta pair of Dormand and Prince, 5(4).
+ * Dormand, Prince: A family of embedded Runge-Kutta formulae, J. Comput. Appl. Math. 6 (1980). */
+#ifndef STICKSLIP_INTEGRATOR_H
+#define STICKSLIP_INTEGRATOR_H
+
+#include "model.h"
+
+/* Step from y0 (time tau, rates dy0) over h in the model's present mode, to y1 with rates dy1.
+ * Returns the local error over the model's tolerance: accept up to 1. NaN or infinity where the
+ * trial left the range of numbers. */
+double trial_step(const Model *m, double tau, double h, const double y0[N_STATES],
+                  const double dy0[N_STATES], double y1[N_STATES], double dy1[N_STATES]);
+
+/* The factor by which the next step may differ, for an error as trial_step returns it. */
+double step_factor(double error);
+
+#endif

@@ -1,0 +1,173 @@
+#include "mechanics.h"
+
+#include <math.h>
+
+double force_factor_at(const Model *m, double q)
+{
+    return m->r.force_factor * (1.0 + q * (m->r.b1 + q * m->r.b2));
+}
+
+static double force_factor_rate(const Model *m, double q, double u)
+{
+    return m->r.force_factor * (m->r.b1 + 2.0 * m->r.b2 * q) * u;
+}
+
+double part_mass_per_surface(const Model *m)
+{
+    return m->r.part_mass / m->n.n_surfaces;
+}
+
+double back_emf_slope(const Model *m, const double y[N_STATES], double a_q)
+{
+    return force_factor_at(m, y[Q]) * a_q + force_factor_rate(m, y[Q], y[U]) * y[U];
+}
+
+/* Penetration of the touched wall. Clamped at 0: trial points of a step may lie beyond the event. */
+static double penetration(const Model *m, const Mode *mode, const double y[N_STATES])
+{
+    double depth = mode->side * y[Q] - m->r.travel;
+    return depth > 0.0 ? depth : 0.0;
+}
+
+void forces(const Model *m, const Mode *mode, const double y[N_STATES], double tau, Forces *f)
+{
+    const Reals *p = &m->r;
+    const double q = y[Q], u = y[U];
+    const double part = part_mass_per_surface(m);
+    const double suspension =
+        -q * (p->suspension_k1 + q * (p->suspension_k2 + q * p->suspension_k3)) -
+        p->suspension_damping * u;
+
+    f->drive = force_factor_at(m, q) * (p->current + p->current_slope * tau);
+    f->normal = fmax(0.0, p->normal_force + p->normal_force_slope * tau);
+    f->wall = 0.0;
+    if (mode->wall == WALL_TOUCH) {
+        double depth = penetration(m, mode, y);
+        f->wall = -mode->side * p->contact_stiffness * depth * sqrt(depth) *
+                  (1.0 + p->contact_damping * mode->side * u);
+    }
+
+    /* What moves as one with the surface, and the force on it without friction. */
+    const int rest = mode->wall == WALL_REST;
+    const double on_ram = f->drive + suspension + f->wall;
+    const double body = rest ? p->surface_mass + p->ram_mass : p->surface_mass;
+    const double load = -p->flexure_stiffness * y[Z] - p->flexure_damping * y[V] -
+                        body * p->gravity - (rest ? 0.0 : on_ram);
+    const int held = mode->plate == 0 && p->mu_plate > 0.0;
+
+    f->plate = -p->mu_plate * f->normal * mode->plate;
+    if (mode->slip == 0) {
+        if (held) {
+            f->a_surface = 0.0;
+            f->friction = load;
+            f->plate = part * p->gravity - f->friction;
+        } else {
+            f->a_surface = (load - part * p->gravity + f->plate) / (body + part);
+            f->friction = part * (f->a_surface + p->gravity) - f->plate;
+        }
+        f->a_slip = 0.0;
+    } else {
+        f->friction = -p->mu_k * f->normal * mode->slip;
+        f->a_surface = (load - f->friction) / body;
+        if (held) {
+            f->plate = part * p->gravity - f->friction;
+            f->a_slip = -f->a_surface;
+        } else {
+            f->a_slip = (f->friction + f->plate) / part - p->gravity - f->a_surface;
+        }
+    }
+    if (rest) {
+        f->a_q = 0.0;
+        f->wall = p->ram_mass * (f->a_surface + p->gravity) - f->drive - suspension;
+    } else {
+        f->a_q = on_ram / p->ram_mass - p->gravity - f->a_surface;
+    }
+}
+
+void force_rates(const Model *m, const Mode *mode, const double y[N_STATES], double tau,
+                 const Forces *f, ForceRates *rate)
+{
+    const Reals *p = &m->r;
+    const double q = y[Q], u = y[U];
+    const double part = part_mass_per_surface(m);
+    const int rest = mode->wall == WALL_REST;
+    const int held = mode->plate == 0 && p->mu_plate > 0.0;
+
+    double own = force_factor_rate(m, q, u) * (p->current + p->current_slope * tau) +
+                 force_factor_at(m, q) * p->current_slope -
+                 (p->suspension_k1 + q * (2.0 * p->suspension_k2 + q * 3.0 * p->suspension_k3)) * u -
+                 p->suspension_damping * f->a_q;
+    rate->wall = 0.0;
+    if (mode->wall == WALL_TOUCH) {
+        double depth = penetration(m, mode, y), speed = mode->side * u;
+        rate->wall = -mode->side * p->contact_stiffness * sqrt(depth) *
+                     (1.5 * speed * (1.0 + p->contact_damping * speed) +
+                      depth * p->contact_damping * mode->side * f->a_q);
+    }
+    const double load = -p->flexure_stiffness * y[V] - p->flexure_damping * f->a_surface -
+                        (rest ? 0.0 : own + rate->wall);
+    const double body = rest ? p->surface_mass + p->ram_mass : p->surface_mass;
+    double jerk = 0.0;
+
+    rate->normal = f->normal > 0.0 ? p->normal_force_slope : 0.0;
+    rate->plate = -p->mu_plate * rate->normal * mode->plate;
+    if (mode->slip == 0) {
+        if (held) {
+            rate->friction = load;
+            rate->plate = -load;
+        } else {
+            jerk = (load + rate->plate) / (body + part);
+            rate->friction = part * jerk - rate->plate;
+        }
+    } else {
+        rate->friction = -p->mu_k * rate->normal * mode->slip;
+        jerk = (load - rate->friction) / body;
+        if (held)
+            rate->plate = -rate->friction;
+    }
+    if (rest)
+        rate->wall = p->ram_mass * jerk - own;
+}
+
+void state_rates(const Model *m, const Mode *mode, const double y[N_STATES], double tau,
+                 double dy[N_STATES])
+{
+    const Reals *p = &m->r;
+    Forces f;
+    forces(m, mode, y, tau, &f);
+    dy[Z] = y[V];
+    dy[V] = f.a_surface;
+    dy[Q] = y[U];
+    dy[U] = f.a_q;
+    dy[D] = y[W];
+    dy[W] = f.a_slip;
+    dy[E_IN] = f.drive * y[U];
+    dy[E_FRICTION] = -f.friction * y[W] - f.plate * (y[V] + y[W]);
+    dy[E_DAMPING] = p->flexure_damping * y[V] * y[V] + p->suspension_damping * y[U] * y[U];
+    dy[E_IMPACT] = 0.0;
+    if (mode->wall == WALL_TOUCH || mode->wall == WALL_PARTING) {
+        /* What the wall takes, less what its spring stores. */
+        double depth = penetration(m, mode, y);
+        double spring = p->contact_stiffness * depth * sqrt(depth);
+        dy[E_IMPACT] = -(f.wall * mode->side + spring) * mode->side * y[U];
+    }
+}
+
+double energy_stored(const Model *m, const double y[N_STATES])
+{
+    const Reals *p = &m->r;
+    const double part = part_mass_per_surface(m);
+    const double q = y[Q], v_ram = y[V] + y[U], v_part = y[V] + y[W];
+    double kinetic = 0.5 * (p->ram_mass * v_ram * v_ram + p->surface_mass * y[V] * y[V] +
+                            part * v_part * v_part);
+    double weight = p->gravity * (p->ram_mass * (y[Z] + q) + p->surface_mass * y[Z] +
+                                  part * (y[Z] + y[D]));
+    double springs = 0.5 * p->flexure_stiffness * y[Z] * y[Z] +
+                     q * q * (p->suspension_k1 / 2.0 +
+                              q * (p->suspension_k2 / 3.0 + q * p->suspension_k3 / 4.0));
+    if (m->mode.wall == WALL_TOUCH || m->mode.wall == WALL_PARTING) {
+        double depth = penetration(m, &m->mode, y);
+        springs += 0.4 * p->contact_stiffness * depth * depth * sqrt(depth);
+    }
+    return kinetic + weight + springs;
+}

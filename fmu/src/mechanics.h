@@ -1,0 +1,31 @@
+/* Forces, accelerations and their rates in a given mode. No time stepping, no events. */
+#ifndef STICKSLIP_MECHANICS_H
+#define STICKSLIP_MECHANICS_H
+
+#include "model.h"
+
+typedef struct {
+    double a_surface, a_q, a_slip; /* d2 z_s/dt2, d2 q/dt2, dw/dt, m/s2 */
+    double friction, plate, wall;  /* on the part, on the part, on the ram, N */
+    double drive;                  /* coil's force on the ram, N */
+    double normal;                 /* normal force, N */
+} Forces;
+
+typedef struct {
+    double friction, plate, wall; /* N/s */
+    double normal;                /* N/s */
+} ForceRates;
+
+/* tau is the time since the inputs were brought up to date (the start of the step), s. */
+void forces(const Model *m, const Mode *mode, const double y[N_STATES], double tau, Forces *f);
+void force_rates(const Model *m, const Mode *mode, const double y[N_STATES], double tau,
+                 const Forces *f, ForceRates *rate);
+void state_rates(const Model *m, const Mode *mode, const double y[N_STATES], double tau,
+                 double dy[N_STATES]);
+
+double back_emf_slope(const Model *m, const double y[N_STATES], double a_q);
+double force_factor_at(const Model *m, double q);
+double part_mass_per_surface(const Model *m);
+double energy_stored(const Model *m, const double y[N_STATES]);
+
+#endif

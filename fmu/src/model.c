@@ -1,0 +1,236 @@
+#include "model.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "advance.h"
+#include "events.h"
+#include "mechanics.h"
+
+#define PARAMETER(name, unit, start, min, max, text) {#name, unit, text, KIND_PARAMETER, start, min, max},
+#define INPUT(name, unit, start, min, max, text) {#name, unit, text, KIND_INPUT, start, min, max},
+#define OUTPUT(name, unit, text) {#name, unit, text, KIND_OUTPUT, 0.0, 0.0, 0.0},
+#define INT_PARAMETER(name, start, min, max, text)
+#define INT_OUTPUT(name, text)
+const VariableInfo REAL_INFO[N_REALS] = {
+#include "variables.def"
+};
+#undef PARAMETER
+#undef INPUT
+#undef OUTPUT
+#undef INT_PARAMETER
+#undef INT_OUTPUT
+
+#define PARAMETER(name, unit, start, min, max, text)
+#define INPUT(name, unit, start, min, max, text)
+#define OUTPUT(name, unit, text)
+#define INT_PARAMETER(name, start, min, max, text) {#name, "1", text, KIND_PARAMETER, start, min, max},
+#define INT_OUTPUT(name, text) {#name, "1", text, KIND_OUTPUT, 0.0, 0.0, 0.0},
+const VariableInfo INTEGER_INFO[N_INTEGERS] = {
+#include "variables.def"
+};
+
+_Static_assert(sizeof(Reals) == N_REALS * sizeof(double), "reals must be contiguous");
+_Static_assert(sizeof(Integers) == N_INTEGERS * sizeof(int), "integers must be contiguous");
+
+static int say(char *message, const char *sentence)
+{
+    snprintf(message, MODEL_MESSAGE_SIZE, "%s", sentence);
+    return -1;
+}
+
+void model_defaults(Model *m)
+{
+    memset(m, 0, sizeof *m);
+    for (size_t i = 0; i < N_REALS; i++)
+        ((double *)&m->r)[i] = REAL_INFO[i].start;
+    for (size_t i = 0; i < N_INTEGERS; i++)
+        ((int *)&m->n)[i] = (int)INTEGER_INFO[i].start;
+}
+
+static int check(const Model *m, const VariableInfo *info, double value, char *message)
+{
+    if (info->kind == KIND_OUTPUT || (info->kind == KIND_PARAMETER && m->initialised)) {
+        snprintf(message, MODEL_MESSAGE_SIZE, "%s cannot be set: it is %s", info->name,
+                 info->kind == KIND_OUTPUT ? "an output" : "fixed after initialisation");
+        return -1;
+    }
+    if (!(value >= info->min && value <= info->max)) {
+        snprintf(message, MODEL_MESSAGE_SIZE, "%s = %g %s is outside %g ... %g", info->name, value,
+                 info->unit, info->min, info->max);
+        return -1;
+    }
+    return 0;
+}
+
+int model_set_real(Model *m, size_t place, double value, char *message)
+{
+    if (place >= N_REALS)
+        return say(message, "no real variable has this value reference");
+    if (check(m, &REAL_INFO[place], value, message))
+        return -1;
+    ((double *)&m->r)[place] = value;
+    return 0;
+}
+
+int model_set_integer(Model *m, size_t place, int value, char *message)
+{
+    if (place >= N_INTEGERS)
+        return say(message, "no integer variable has this value reference");
+    if (check(m, &INTEGER_INFO[place], value, message))
+        return -1;
+    ((int *)&m->n)[place] = value;
+    return 0;
+}
+
+/* Force on the ram at rest at q, less its weight. */
+static double ram_balance(const Model *m, double q)
+{
+    const Reals *p = &m->r;
+    double depth = -p->travel - q;
+    double force = -q * (p->suspension_k1 + q * (p->suspension_k2 + q * p->suspension_k3)) -
+                   p->ram_mass * p->gravity;
+    return depth > 0.0 ? force + p->contact_stiffness * depth * sqrt(depth) : force;
+}
+
+static void hang_ram(Model *m)
+{
+    double low = -m->r.travel, high = 0.0;
+    m->mode.wall = WALL_FREE;
+    m->mode.side = 0;
+    if (ram_balance(m, low) < 0.0) {
+        m->mode.side = -1;
+        m->mode.wall = m->n.contact == 1 ? WALL_TOUCH : WALL_REST;
+        if (m->mode.wall == WALL_REST) {
+            m->y[Q] = low;
+            return;
+        }
+        high = low;
+        while (ram_balance(m, low) < 0.0)
+            low *= 2.0;
+    }
+    for (int i = 0; i < 200 && high > low; i++) {
+        double middle = 0.5 * (low + high);
+        if (middle == low || middle == high)
+            break;
+        if (ram_balance(m, middle) > 0.0)
+            low = middle;
+        else
+            high = middle;
+    }
+    m->y[Q] = fabs(ram_balance(m, low)) < fabs(ram_balance(m, high)) ? low : high;
+}
+
+int model_initialise(Model *m, char *message)
+{
+    if (m->r.mu_k > m->r.mu_s) {
+        snprintf(message, MODEL_MESSAGE_SIZE, "mu_k = %g is larger than mu_s = %g", m->r.mu_k,
+                 m->r.mu_s);
+        return -1;
+    }
+    memset(m->y, 0, sizeof m->y);
+    hang_ram(m);
+    m->y[Z] = -(m->r.ram_mass + m->r.surface_mass + part_mass_per_surface(m)) * m->r.gravity /
+              m->r.flexure_stiffness;
+    m->mode.slip = 0;
+    m->mode.plate = 0;
+    if (!isfinite(m->y[Q]))
+        return say(message, "the ram has no static equilibrium: the suspension is too weak");
+    m->step = 1e-6;
+    m->energy_at_start = energy_stored(m, m->y);
+    settle_mode(m, 0.0);
+    m->r.stick_time = 0.0;
+    m->n.impacts = m->n.stick_slip_events = m->n.internal_steps = m->n.internal_rejected = 0;
+    m->initialised = 1;
+    model_outputs(m);
+    m->r.a_surface_max = m->r.a_surface_min = m->r.a_surface;
+    m->r.v_surface_max = m->r.v_surface_min = m->r.v_surface;
+    return 0;
+}
+
+int model_step(Model *m, double h, char *message)
+{
+    if (!m->initialised)
+        return say(message, "a step before initialisation");
+    if (!(h > 0.0) || !isfinite(h))
+        return say(message, "the step must be a positive number of seconds");
+    const double current = m->r.current + m->r.current_slope * h;
+    const double normal = m->r.normal_force + m->r.normal_force_slope * h;
+    if (normal < -1e-12 * m->r.normal_force)
+        return say(message, "normal_force falls below 0 N within the step; its slope is too steep");
+    if (advance(m, h, message))
+        return -1;
+    m->r.current = current;
+    m->r.normal_force = normal > 0.0 ? normal : 0.0;
+    return 0;
+}
+
+void model_outputs(Model *m)
+{
+    Forces f;
+    const double *y = m->y;
+    Reals *r = &m->r;
+    forces(m, &m->mode, y, 0.0, &f);
+    r->z_surface = y[Z];
+    r->v_surface = y[V];
+    r->a_surface = f.a_surface;
+    r->z_ram = y[Z] + y[Q];
+    r->v_ram = y[V] + y[U];
+    r->a_ram = f.a_surface + f.a_q;
+    r->z_part = y[Z] + y[D];
+    r->v_part = y[V] + y[W];
+    r->a_part = f.a_surface + f.a_slip;
+    r->slip = y[D];
+    r->q = y[Q];
+    r->q_rate = y[U];
+    r->back_emf = force_factor_at(m, y[Q]) * y[U];
+    r->back_emf_slope = back_emf_slope(m, y, f.a_q);
+    r->friction_force = f.friction;
+    r->plate_force = f.plate;
+    r->wall_force = f.wall;
+    r->energy_in = y[E_IN];
+    r->energy_friction = y[E_FRICTION];
+    r->energy_impact = y[E_IMPACT];
+    r->energy_damping = y[E_DAMPING];
+    r->energy_stored = energy_stored(m, y) - m->energy_at_start;
+    m->n.sticking = m->mode.slip == 0;
+    m->n.wall_contact = m->mode.side;
+}
+
+double model_derivative(const Model *m, size_t output, size_t input)
+{
+    Model a = *m;
+    double *inputs[] = {&a.r.current, &a.r.normal_force};
+    const size_t places[] = {offsetof(Reals, current) / sizeof(double),
+                             offsetof(Reals, normal_force) / sizeof(double)};
+    Forces low, high;
+
+    for (int i = 0; i < 2; i++) {
+        if (input != places[i])
+            continue;
+        *inputs[i] = 0.0;
+        forces(&a, &a.mode, a.y, 0.0, &low);
+        *inputs[i] = 1.0;
+        forces(&a, &a.mode, a.y, 0.0, &high);
+        switch (output) {
+#define PLACE(name) offsetof(Reals, name) / sizeof(double)
+        case PLACE(a_surface):
+            return high.a_surface - low.a_surface;
+        case PLACE(a_ram):
+            return (high.a_surface + high.a_q) - (low.a_surface + low.a_q);
+        case PLACE(a_part):
+            return (high.a_surface + high.a_slip) - (low.a_surface + low.a_slip);
+        case PLACE(back_emf_slope):
+            return force_factor_at(m, m->y[Q]) * (high.a_q - low.a_q);
+        case PLACE(friction_force):
+            return high.friction - low.friction;
+        case PLACE(plate_force):
+            return high.plate - low.plate;
+        case PLACE(wall_force):
+            return high.wall - low.wall;
+#undef PLACE
+        }
+    }
+    return 0.0;
+}

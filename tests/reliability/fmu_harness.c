@@ -1,0 +1,256 @@
+/* Drives the FMU's two interfaces with much random and some senseless input. Built together with
+ * the FMU's sources under the sanitizers; complains through them or by a failed check. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi2Functions.h"
+#include "fmi3Functions.h"
+#include "references.h"
+#include "model.h"
+
+#define CHECK(condition)                                                                           \
+    do {                                                                                           \
+        if (!(condition)) {                                                                        \
+            fprintf(stderr, "%s:%d: not so: %s\n", __FILE__, __LINE__, #condition);                \
+            exit(1);                                                                               \
+        }                                                                                          \
+    } while (0)
+
+static unsigned long long seed = 88172645463325252ull;
+static int refusals, messages;
+
+static unsigned long long draw(void)
+{
+    seed ^= seed << 13;
+    seed ^= seed >> 7;
+    return seed ^= seed << 17;
+}
+
+static double uniform(double low, double high)
+{
+    return low + (high - low) * ((double)(draw() >> 11) / 9007199254740992.0);
+}
+
+static double senseless(void)
+{
+    static const double VALUES[] = {NAN, INFINITY, -INFINITY, 0.0, -0.0, 1e308, -1e308, 5e-324};
+    return VALUES[draw() % 8];
+}
+
+static void logger2(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
+                    fmi2String category, fmi2String message, ...)
+{
+    (void)environment;
+    CHECK(strcmp(name, "a%s#1#") == 0);
+    CHECK(category && message && strlen(message) > 10);
+    messages += status == fmi2Error;
+}
+
+static void logger3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
+                    fmi3String message)
+{
+    (void)environment;
+    CHECK(category && message && strlen(message) > 10);
+    messages += status == fmi3Error;
+}
+
+static const fmi2CallbackFunctions CALLBACKS = {logger2, NULL, NULL, NULL, NULL};
+
+static fmi2Component new2(const char *token)
+{
+    return fmi2Instantiate("a%s#1#", fmi2CoSimulation, token, NULL, &CALLBACKS, 0, draw() % 2);
+}
+
+static fmi3Instance new3(const char *token)
+{
+    return fmi3InstantiateCoSimulation("a", token, NULL, 0, draw() % 2, 0, 0, NULL, 0, NULL,
+                                       logger3, NULL);
+}
+
+/* A call succeeds or is refused with a message and leaves the state as it was. */
+static int attempt(fmi2Component c, int (*call)(fmi2Component c))
+{
+    static fmi2Byte before[4096], after[4096];
+    fmi2FMUstate state = NULL;
+    size_t size;
+    CHECK(fmi2GetFMUstate(c, &state) == fmi2OK);
+    CHECK(fmi2SerializedFMUstateSize(c, state, &size) == fmi2OK && size <= sizeof before);
+    CHECK(fmi2SerializeFMUstate(c, state, before, size) == fmi2OK);
+    const int told = messages, done = call(c);
+    if (!done) {
+        CHECK(fmi2GetFMUstate(c, &state) == fmi2OK);
+        CHECK(fmi2SerializeFMUstate(c, state, after, size) == fmi2OK);
+        CHECK(memcmp(before, after, size) == 0);
+        CHECK(messages > told);
+        refusals++;
+    }
+    CHECK(fmi2FreeFMUstate(c, &state) == fmi2OK && state == NULL);
+    return done;
+}
+
+static int set_anything(fmi2Component c)
+{
+    fmi2ValueReference vr[3];
+    double values[3];
+    int integers[3];
+    for (int i = 0; i < 3; i++) {
+        vr[i] = draw() % 8 ? (unsigned)(draw() % (N_REALS + 3)) : (unsigned)draw();
+        values[i] = draw() % 4 ? uniform(-2.0, 2.0) : senseless();
+        integers[i] = (int)(draw() % 4) - 1;
+    }
+    if (draw() % 4)
+        return fmi2SetReal(c, vr, draw() % 4, values) == fmi2OK;
+    for (int i = 0; i < 3; i++)
+        vr[i] = REFERENCE_INTEGERS + (unsigned)(draw() % (N_INTEGERS + 2)) - 1;
+    return fmi2SetInteger(c, vr, draw() % 4, integers) == fmi2OK;
+}
+
+static int get_anything(fmi2Component c)
+{
+    fmi2ValueReference vr = (unsigned)(draw() % 60);
+    double value;
+    return fmi2GetReal(c, &vr, 1, &value) == fmi2OK;
+}
+
+static int differentiate(fmi2Component c)
+{
+    fmi2ValueReference unknowns[] = {(unsigned)(draw() % 60), (unsigned)(draw() % 60)};
+    fmi2ValueReference knowns[] = {22 + (unsigned)(draw() % 5), 24};
+    double given[] = {uniform(-1, 1), draw() % 8 ? 1.0 : senseless()}, found[2];
+    return fmi2GetDirectionalDerivative(c, unknowns, 2, knowns, 2, given, found) == fmi2OK;
+}
+
+static int restore_damaged(fmi2Component c)
+{
+    fmi2Byte bytes[4096];
+    fmi2FMUstate state = NULL, again = NULL;
+    size_t size;
+    CHECK(fmi2GetFMUstate(c, &state) == fmi2OK);
+    CHECK(fmi2SerializedFMUstateSize(c, state, &size) == fmi2OK);
+    CHECK(fmi2SerializeFMUstate(c, state, bytes, size - 1) == fmi2Error);
+    CHECK(fmi2SerializeFMUstate(c, state, bytes, size) == fmi2OK);
+    CHECK(fmi2FreeFMUstate(c, &state) == fmi2OK);
+    const size_t at = draw() % size;
+    bytes[at] = (fmi2Byte)(bytes[at] ^ (1 << draw() % 8));
+    return fmi2DeSerializeFMUstate(c, bytes, draw() % 4 ? size : draw() % size, &again) == fmi2OK;
+}
+
+static int call_out_of_turn(fmi2Component c)
+{
+    const double h = senseless(), endless = 1e300;
+    switch (draw() % 6) {
+    case 0:
+        return fmi2DoStep(c, senseless(), h < endless ? h : NAN, 1) == fmi2OK;
+    case 1:
+        return fmi2SetupExperiment(c, 1, senseless(), senseless(), 1, senseless()) == fmi2OK;
+    case 2:
+        return fmi2GetReal(c, NULL, 3, NULL) == fmi2OK;
+    case 3:
+        return fmi2CancelStep(c) == fmi2OK;
+    case 4:
+        return fmi2SetFMUstate(c, NULL) == fmi2OK;
+    default:
+        return fmi2GetRealOutputDerivatives(c, NULL, 0, NULL, NULL) == fmi2OK;
+    }
+}
+
+static int (*const CALLS[])(fmi2Component) = {set_anything, get_anything, differentiate,
+                                              restore_damaged, call_out_of_turn};
+
+static void abuse(fmi2Component c, int n)
+{
+    for (int i = 0; i < n; i++)
+        attempt(c, CALLS[draw() % 5]);
+}
+
+/* Parameters near their defaults, so that the steps stay cheap. */
+static void choose_parameters(fmi2Component c3, fmi2Component c2)
+{
+    for (unsigned i = 0; i < N_REALS; i++) {
+        const fmi2ValueReference vr = REFERENCE_REALS + i;
+        const double value = REAL_INFO[i].start * uniform(0.7, 1.3);
+        if (REAL_INFO[i].kind != KIND_PARAMETER || strncmp(REAL_INFO[i].name, "mu_", 3) == 0)
+            continue;
+        CHECK(fmi2SetReal(c2, &vr, 1, &value) == fmi2OK);
+        CHECK(fmi3SetFloat64(c3, &vr, 1, &value, 1) == fmi3OK);
+    }
+    const fmi2ValueReference contact = REFERENCE_INTEGERS;
+    const int law = 1 + (int)(draw() % 2);
+    CHECK(fmi2SetInteger(c2, &contact, 1, &law) == fmi2OK);
+    CHECK(fmi3SetInt32(c3, &contact, 1, &law, 1) == fmi3OK);
+}
+
+static void compare(fmi2Component c2, fmi3Instance c3)
+{
+    for (unsigned i = 0; i < N_REALS; i++) {
+        const fmi2ValueReference vr = REFERENCE_REALS + i;
+        double a, b;
+        CHECK(fmi2GetReal(c2, &vr, 1, &a) == fmi2OK);
+        CHECK(fmi3GetFloat64(c3, &vr, 1, &b, 1) == fmi3OK);
+        CHECK(a == b && isfinite(a));
+    }
+}
+
+static void simulate(int steps)
+{
+    fmi2Component c2 = new2(TOKEN_TEXT);
+    fmi3Instance c3 = new3(TOKEN_TEXT);
+    CHECK(c2 && c3);
+    abuse(c2, 200);
+    CHECK(fmi2Reset(c2) == fmi2OK);
+    choose_parameters(c3, c2);
+    CHECK(fmi2SetupExperiment(c2, 0, 0.0, 0.0, 0, 0.0) == fmi2OK);
+    CHECK(fmi2EnterInitializationMode(c2) == fmi2OK);
+    CHECK(fmi2ExitInitializationMode(c2) == fmi2OK);
+    CHECK(fmi3EnterInitializationMode(c3, 0, 0.0, 0.0, 0, 0.0) == fmi3OK);
+    CHECK(fmi3ExitInitializationMode(c3) == fmi3OK);
+
+    const fmi2ValueReference inputs[] = {22, 23, 24, 25};
+    double time = 0.0;
+    for (int i = 0; i < steps; i++) {
+        const double h = pow(10.0, uniform(-6.0, -3.0));
+        double values[] = {uniform(-1.5, 1.5), uniform(-1.0, 1.0) / h, uniform(0.1, 1.0),
+                           uniform(-0.1, 0.1) / h};
+        double last;
+        fmi3Boolean event, terminate, early;
+        fmi2FMUstate before = NULL;
+        CHECK(fmi2GetFMUstate(c2, &before) == fmi2OK);
+        abuse(c2, 2);
+        CHECK(fmi2SetFMUstate(c2, before) == fmi2OK);
+        CHECK(fmi2FreeFMUstate(c2, &before) == fmi2OK);
+        CHECK(fmi2SetReal(c2, inputs, 4, values) == fmi2OK);
+        CHECK(fmi3SetFloat64(c3, inputs, 4, values, 4) == fmi3OK);
+        CHECK(fmi2DoStep(c2, time, h, 1) == fmi2OK);
+        CHECK(fmi3DoStep(c3, time, h, 1, &event, &terminate, &early, &last) == fmi3OK);
+        CHECK(!event && !terminate && !early && last == time + h);
+        time = last;
+        compare(c2, c3);
+    }
+    CHECK(fmi2Terminate(c2) == fmi2OK);
+    abuse(c2, 20);
+    fmi2FreeInstance(c2);
+    fmi3FreeInstance(c3);
+}
+
+int main(void)
+{
+    for (int i = 0; i < 1000; i++) {
+        fmi2FreeInstance(new2(TOKEN_TEXT));
+        fmi3FreeInstance(new3(TOKEN_TEXT));
+        CHECK(!new2(i % 2 ? "other" : NULL));
+        CHECK(!new3("%n%s%x"));
+    }
+    CHECK(!fmi2Instantiate("", fmi2CoSimulation, TOKEN_TEXT, NULL, NULL, 0, 0));
+    CHECK(!fmi2Instantiate("a%s#1#", fmi2ModelExchange, TOKEN_TEXT, NULL, &CALLBACKS, 0, 0));
+    CHECK(!fmi3InstantiateModelExchange("a", TOKEN_TEXT, NULL, 0, 0, NULL, logger3));
+    CHECK(fmi2DoStep(NULL, 0.0, 1.0, 1) == fmi2Error && fmi3GetFloat64(NULL, NULL, 0, NULL, 0));
+    fmi2FreeInstance(NULL);
+    fmi3FreeInstance(NULL);
+    for (int i = 0; i < 20; i++)
+        simulate(100);
+    CHECK(refusals > 1000);
+    printf("%d refusals\n", refusals);
+    return 0;
+}

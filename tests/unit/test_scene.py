@@ -1,0 +1,261 @@
+"""Scenes: defaults, layers, overrides, knobs, and the way to text and back."""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cosim.errors import BadInput
+from cosim.scene import Key, Scene, keys, list_scenes, load, to_toml
+
+# The table of the design, written down once more: an accidental change of a default shows here.
+DEFAULTS: dict[str, dict[str, Any]] = {
+    "drive": {
+        "waveform": "sawtooth",
+        "frequency": 20,
+        "amplitude": 8.0,
+        "offset": -1.2,
+        "reset_time": 0,
+        "quantised": False,
+        "pot_max": None,
+        "pot_frequency": None,
+        "pot_offset": None,
+    },
+    "circuit": {
+        "model": "amplifier",
+        "supply": 18,
+        "sense_resistance": 4,
+        "current_limit": 2.504,
+        "gain_bandwidth": 1e6,
+        "open_loop_gain": 98,
+        "slew_rate": 10e6,
+        "swing_loss_high": 4.0,
+        "swing_loss_low": 4.0,
+        "reltol": 1e-5,
+        "max_step": 1e-5,
+    },
+    "coil": {
+        "resistance": 7.1,
+        "inductance": 1.2e-3,
+        "eddy_inductance": None,
+        "eddy_resistance": None,
+        "force_factor": 0.6,
+        "b1": 0,
+        "b2": 0,
+        "count": 1,
+    },
+    "mechanics": {
+        "ram_mass": 0.004,
+        "surface_mass": 0.0145,
+        "part_mass": 0.009,
+        "flexure_stiffness": 560,
+        "flexure_damping": 0.84,
+        "suspension_k1": 40,
+        "suspension_k2": 0,
+        "suspension_k3": 1.5e7,
+        "suspension_damping": 0.02,
+        "travel": 1.9e-3,
+        "contact": "compliant",
+        "restitution": 0.75,
+        "contact_stiffness": 1e8,
+        "contact_damping": 0.38,
+        "n_surfaces": 1,
+        "gravity": 9.81,
+    },
+    "friction": {"law": "coulomb", "mu_s": 0.72, "mu_k": 0.59, "normal_force": 0.5, "mu_plate": 0},
+    "coupling": {"method": "step-locked"},
+    "run": {"duration": 2.0, "settle": 1.0, "output_step": 5e-5},
+}
+
+
+def written(directory: Path, text: str, name: str = "mine.toml") -> Path:
+    path = directory / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_paper_is_the_defaults() -> None:
+    scene = load("paper")
+    assert {table: getattr(scene, table).model_dump() for table in DEFAULTS} == DEFAULTS
+    bare = {"name": scene.name, "description": scene.description}
+    assert scene == Scene.model_validate(bare)
+
+
+def test_every_key_is_described() -> None:
+    assert {(key.table, key.name) for key in keys()} == {
+        (table, name) for table, names in DEFAULTS.items() for name in names
+    }
+    for key in keys():
+        assert key.text and "\n" not in key.text
+        assert key.default == DEFAULTS[key.table][key.name]
+        numeric = key.kind in (int, float)
+        assert bool(key.unit) == numeric, key.full
+        if numeric:
+            assert key.low is not None and key.high is not None and key.low < key.high
+            assert key.default is None or key.low <= float(key.default) <= key.high
+        else:
+            assert key.kind is bool or (key.choices and key.default in key.choices)
+
+
+def test_built_in_scenes() -> None:
+    scenes = dict(list_scenes())
+    assert next(iter(scenes)) == "paper"
+    assert set(scenes) == {"paper", "paper-full", "gripper", "ideal-current", "held"}
+    for name, description in scenes.items():
+        scene = load(name)
+        assert (scene.name, scene.description) == (name, description)
+        assert description
+    assert load("paper-full").circuit.model == "full"
+    assert load("ideal-current").circuit.model == "ideal"
+    assert load("held").circuit.model == "none"
+    gripper = load("gripper")
+    assert (gripper.coil.count, gripper.mechanics.n_surfaces) == (2, 2)
+    weight = gripper.mechanics.part_mass / 2 * gripper.mechanics.gravity
+    assert weight < gripper.friction.mu_s * gripper.friction.normal_force
+
+
+def test_staircase_is_the_default_of_the_full_circuit_only(tmp_path: Path) -> None:
+    assert load("paper-full").drive.quantised
+    assert load("paper", ["circuit.model=full"]).drive.quantised
+    assert not load("paper-full", ["circuit.model=amplifier"]).drive.quantised
+    assert not load("paper-full", ["drive.quantised=false"]).drive.quantised
+    assert load("paper", ["drive.quantised=true"]).drive.quantised
+    # where there is no staircase, none is assumed
+    assert not load("paper-full", ["drive.waveform=sine"]).drive.quantised
+    assert not load("paper-full", ["drive.reset_time=1e-3"]).drive.quantised
+    resolved = written(tmp_path, to_toml(load("paper", ["circuit.model=full"])))
+    assert load(resolved).drive.quantised
+
+
+def test_file_changes_only_its_keys(tmp_path: Path) -> None:
+    path = written(tmp_path, "[mechanics]\ntravel = 2e-3\n[coil]\nforce_factor = 1\n")
+    scene = load(str(path))
+    assert scene.name == "mine"
+    assert scene.mechanics.travel == 2e-3
+    assert scene.coil.force_factor == 1.0 and isinstance(scene.coil.force_factor, float)
+    assert scene.mechanics.model_copy(update={"travel": 1.9e-3}) == load("paper").mechanics
+
+
+def test_file_on_a_base(tmp_path: Path) -> None:
+    path = written(tmp_path, 'base = "gripper"\n[drive]\nfrequency = 30\n', "my scene.toml")
+    scene, gripper = load(path), load("gripper")
+    assert scene.name == "my-scene"
+    assert scene.description == ""
+    assert scene.drive.frequency == 30.0
+    assert scene.drive.amplitude == gripper.drive.amplitude
+    assert scene.mechanics == gripper.mechanics
+
+
+@pytest.mark.parametrize(
+    ("option", "table", "key", "value"),
+    [
+        ("run.duration=3", "run", "duration", 3.0),
+        ("run.duration = 3e0", "run", "duration", 3.0),
+        ("circuit.model=ideal", "circuit", "model", "ideal"),
+        ('circuit.model="ideal"', "circuit", "model", "ideal"),
+        ("mechanics.contact='rigid'", "mechanics", "contact", "rigid"),
+        ("drive.quantised=true", "drive", "quantised", True),
+        ("drive.offset=-0.5", "drive", "offset", -0.5),
+        ("coil.count=2", "coil", "count", 2),
+        ("mechanics.suspension_k3=1_000_000", "mechanics", "suspension_k3", 1e6),
+    ],
+)
+def test_override(option: str, table: str, key: str, value: object) -> None:
+    assert getattr(getattr(load("paper", [option]), table), key) == value
+
+
+def test_last_override_wins() -> None:
+    assert load("paper", ["run.duration=3", "run.duration=4"]).run.duration == 4.0
+
+
+def test_settle_is_half_of_the_duration_unless_given() -> None:
+    assert load("paper", ["run.duration=0.5"]).run.settle == 0.25
+    assert load("paper", ["run.duration=0.5", "run.settle=0.1"]).run.settle == 0.1
+
+
+def test_knobs_stand_for_values() -> None:
+    scene = load("paper", ["drive.pot_max=0.75", "drive.pot_frequency=0.5", "drive.pot_offset=0.3"])
+    # by hand: readings 768, 512 and 307 of 1024; 3.3 V full scale; 15/4.7 of gain
+    assert scene.drive.amplitude == pytest.approx(0.75 * 3.3 * 15 / 4.7)
+    assert scene.drive.frequency == 50.5
+    top = 307 / 1024 * 3.3 * 15 / 4.7
+    assert scene.drive.offset == pytest.approx(top - scene.drive.amplitude / 2)
+
+
+@pytest.mark.parametrize(
+    ("pot", "frequency"), [(0.0, 100.0), (0.25, 75.25), (0.9999, 1.0966796875), (1, 1.0966796875)]
+)
+def test_frequency_knob(pot: float, frequency: float) -> None:
+    assert load("paper", [f"drive.pot_frequency={pot}"]).drive.frequency == frequency
+
+
+def test_knob_and_value_replace_each_other_between_layers(tmp_path: Path) -> None:
+    path = written(tmp_path, "[drive]\npot_max = 0.5\n")
+    assert load(path).drive.amplitude == pytest.approx(5.266, abs=1e-3)
+    scene = load(path, ["drive.amplitude=3"])
+    assert (scene.drive.amplitude, scene.drive.pot_max) == (3.0, None)
+    with pytest.raises(BadInput, match=r"drive\.pot_max and drive\.amplitude"):
+        load("paper", ["drive.pot_max=0.5", "drive.amplitude=3"])
+
+
+def test_text_is_deterministic_and_complete() -> None:
+    text = to_toml(load("paper"))
+    assert text == to_toml(load("paper"))
+    for key in keys():
+        assert (f"\n{key.name} = " in text) == (key.default is not None), key.full
+    assert "\nfrequency = 20.0  # Hz\n" in text
+
+
+@pytest.mark.parametrize("name", [name for name, _ in list_scenes()])
+def test_built_in_scenes_come_back(name: str, tmp_path: Path) -> None:
+    scene = load(name)
+    assert load(written(tmp_path, to_toml(scene))) == scene
+
+
+def _values(key: Key) -> st.SearchStrategy[Any]:
+    if key.choices:
+        return st.sampled_from(key.choices)
+    if key.kind is bool:
+        return st.booleans()
+    if key.kind is int:
+        return st.integers(int(key.low or 0), int(key.high or 0))
+    assert key.low is not None and key.high is not None
+    return st.floats(key.low, key.high)
+
+
+TEXT = st.text(st.characters(exclude_categories=["Cc", "Cs"]), max_size=50)
+SOME_KEYS = st.lists(st.sampled_from(keys()), max_size=6, unique=True)
+
+
+@settings(max_examples=150, deadline=None)
+@given(chosen=SOME_KEYS, description=TEXT, data=st.data())
+def test_any_scene_comes_back(chosen: list[Key], description: str, data: st.DataObject) -> None:
+    tables: dict[str, Any] = {"name": "any", "description": description}
+    for key in chosen:
+        tables.setdefault(key.table, {})[key.name] = data.draw(_values(key), label=key.full)
+    try:
+        scene = Scene.model_validate(tables)
+    except ValueError:
+        return  # values that do not go together
+    with tempfile.TemporaryDirectory() as directory:
+        assert load(written(Path(directory), to_toml(scene))) == scene
+    assert Scene.model_validate(scene.as_dict()) == scene
+
+
+def test_scenes_are_frozen() -> None:
+    with pytest.raises(ValueError):
+        load("paper").run.duration = 3.0  # type: ignore[misc]
+
+
+def test_nothing_heavy_is_imported() -> None:
+    code = (
+        "import sys, cosim.scene, cosim.drive\n"
+        "print(*{'matplotlib', 'scipy', 'fmpy', 'PySpice'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
