@@ -19,6 +19,8 @@ STEP_OUTPUTS = (
     "a_surface_min",
     "v_surface_max",
     "v_surface_min",
+    "z_surface_max",
+    "z_surface_min",
 )
 """What is read after every step: back-EMF of one coil (V, V/s), extremes within the step."""
 

@@ -26,7 +26,7 @@ class Recorder:
 
     ``time`` are the times of the rows (s), ``rows`` their values (one column each of COLUMNS),
     ``frames`` the surface's height (m) at each frame of the camera after settling, ``extremes`` the
-    largest and smallest acceleration (m/s²) and velocity (m/s) of the surface after settling.
+    largest and smallest acceleration (m/s²), velocity (m/s) and height (m) of the surface after it.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Recorder:
         self._n_frames = 0
         self._agenda = _agenda(self.time, frame_times, run.settle, run.duration)
         self._next = 0
-        self.extremes = [-np.inf, np.inf, -np.inf, np.inf]
+        self.extremes = [-np.inf, np.inf] * 3
         self.at_settle: dict[str, float] = {}
         """Totals of the mechanics when settling ends."""
         self._visit()
@@ -67,7 +67,7 @@ class Recorder:
     def _step(self, time: float, current: float, slope: float) -> None:
         self.mechanics.step_to(time, current, slope)
         if time > self._settle:
-            _, _, a_max, a_min, v_max, v_min = self.mechanics.step_outputs
+            _, _, a_max, a_min, v_max, v_min, z_max, z_min = self.mechanics.step_outputs
             most = self.extremes
             if a_max > most[0]:
                 most[0] = a_max
@@ -77,6 +77,10 @@ class Recorder:
                 most[2] = v_max
             if v_min < most[3]:
                 most[3] = v_min
+            if z_max > most[4]:
+                most[4] = z_max
+            if z_min < most[5]:
+                most[5] = z_min
 
     def _visit(self) -> None:
         """Write down what the agenda has for this time."""

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from cosim.electrics import Electrics
-from cosim.recorder import COLUMNS, FRAME_RATE, Recorder
+from cosim.recorder import FRAME_RATE, Recorder
 from cosim.scene import Scene
 
 
@@ -22,10 +22,9 @@ def summarise(
     span = run.duration - run.settle
     v_average = (totals["z_part"] - before["z_part"]) / span
     after = recorder.time >= run.settle
-    z_surface = recorder.rows[after, COLUMNS.index("z_surface")]
     camera = np.diff(recorder.frames, 2) * FRAME_RATE**2
     rigid = scene.mechanics.contact == "rigid"
-    a_max, a_min, v_max, v_min = recorder.extremes
+    a_max, a_min, v_max, v_min, z_max, z_min = recorder.extremes
     driven = scene.circuit.model != "none"
     result: dict[str, Any] = {
         "v_average": v_average,
@@ -37,7 +36,7 @@ def summarise(
         "a_camera_min": float(camera.min()) if camera.size else None,
         "v_surface_max": v_max,
         "v_surface_min": v_min,
-        "z_surface_pp": float(np.ptp(z_surface)),
+        "z_surface_pp": z_max - z_min,
     }
     if electric is not None:
         current = electric.current[after]

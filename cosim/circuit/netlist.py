@@ -1,8 +1,8 @@
 """A netlist made ready for co-simulation.
 
 Every netlist in ``circuits/`` also runs in plain ngspice. Here the values of its ``.param`` lines
-are replaced by the scene's, its agreed sources become external ones, and its analysis and options
-give way to the host's.
+are replaced by the scene's, its agreed sources become external ones, and its analysis gives way to
+the host's. Its options stay, but for the tolerance, which is the scene's.
 """
 
 import re
@@ -27,7 +27,7 @@ LIMITS: dict[str, tuple[str, ...]] = {
 """Vectors that tell of an output at its limit, swing or current, while their magnitude is at least
 0.5."""
 
-_OWN_COMMANDS = (".tran", ".options", ".option", ".opt", ".end", ".save", ".print", ".plot")
+_OWN_COMMANDS = (".tran", ".end", ".save", ".print", ".plot")
 
 
 def parameters(scene: Scene) -> dict[str, float]:

@@ -17,8 +17,9 @@ ELECTRICAL = ("i(vemf)", "v(v1)", "v(out)", "v(sense)")
 """Vectors that every netlist has: the coils' total current, the command at the power amplifier's
 input, its output, the top of the sense resistor."""
 
-_FIRST_STEP = 1e-9
-"""s; V1 leaves 0 at once, and ngspice takes its first step unchecked."""
+_AFTER_JUMP = 1e-7
+"""s; longest step after a jump of the command: what ngspice remembers of the slopes before it
+misleads its choice of the step. The start is one too: V1 leaves 0 at once."""
 
 _ON_TIME = 1e-13
 """s; ngspice's own sums of steps reach a time of ours only within rounding."""
@@ -104,8 +105,9 @@ class CircuitRun:
         self._log.extend(values)
         self._time = time
         if time <= 0.0:
-            return _FIRST_STEP
+            return _AFTER_JUMP
         longest = self._coupling.accepted(time, values[0] / self._count)
         if time >= self._jump - _ON_TIME:
             self._jump = self._command.next_jump(self._jump)
+            longest = min(longest, _AFTER_JUMP)
         return min(next_step, longest, self._jump - time)

@@ -117,7 +117,7 @@ static double first_event(const Model *m, const Point *start, const Point *end, 
 static void note_extremes(Model *m, const Point *point)
 {
     Reals *r = &m->r;
-    double a = point->dy[V], v = point->y[V];
+    double a = point->dy[V], v = point->y[V], z = point->y[Z];
     if (a > r->a_surface_max)
         r->a_surface_max = a;
     if (a < r->a_surface_min)
@@ -126,6 +126,10 @@ static void note_extremes(Model *m, const Point *point)
         r->v_surface_max = v;
     if (v < r->v_surface_min)
         r->v_surface_min = v;
+    if (z > r->z_surface_max)
+        r->z_surface_max = z;
+    if (z < r->z_surface_min)
+        r->z_surface_min = z;
 }
 
 static void take_up(Model *m, const Point *point)
@@ -151,6 +155,7 @@ int advance(Model *m, double h, char *message)
     start_from(m, 0.0, &now);
     m->r.a_surface_max = m->r.a_surface_min = now.dy[V];
     m->r.v_surface_max = m->r.v_surface_min = now.y[V];
+    m->r.z_surface_max = m->r.z_surface_min = now.y[Z];
 
     for (int trials = 0; now.tau < h; trials++) {
         if (events > MAX_EVENTS_PER_STEP) {

@@ -146,6 +146,7 @@ int model_initialise(Model *m, char *message)
     model_outputs(m);
     m->r.a_surface_max = m->r.a_surface_min = m->r.a_surface;
     m->r.v_surface_max = m->r.v_surface_min = m->r.v_surface;
+    m->r.z_surface_max = m->r.z_surface_min = m->r.z_surface;
     return 0;
 }
 
