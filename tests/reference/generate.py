@@ -95,8 +95,9 @@ CASES = (
     case("lively-rigid", "rigid", "ideal", restitution=0.77, frequency=12.0, amplitude=7.0),
     case("strong", "compliant", "amplifier", force_factor=1.2, frequency=30.0, amplitude=9.0),
     case("strong-rigid", "rigid", "amplifier", force_factor=1.2, frequency=20.0, amplitude=10.0),
-    case("no-walls", "compliant", "amplifier", travel=4e-3, frequency=35.0, amplitude=6.0),
+    case("wide", "compliant", "amplifier", travel=4e-3, frequency=35.0, amplitude=6.0),
     case("low-swing", "compliant", "amplifier", swing_loss_high=8.0, swing_loss_low=6.0),
+    case("no-walls", "compliant", "amplifier", travel=1e-2, frequency=35.0, amplitude=6.0),
 )
 
 
