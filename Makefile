@@ -4,6 +4,7 @@
 #   make test        sets up and runs the quick tests   (ARGS='-k name' for some of them)
 #   make test-all    the slow ones too
 #   make setup       sets up: system packages, .venv from the hashed lock, the FMU
+#   make charts      remakes what the README shows, into results/
 #   make check       ruff and pyright
 #   make lock        remakes requirements.lock with uv  (ARGS=--upgrade for newer versions)
 #   make clean       removes .venv and everything built
@@ -31,7 +32,7 @@ FMU_SOURCES := $(shell find fmu -name build -prune -o -type f \
 	\( -name '*.[ch]' -o -name '*.xml' -o -name '*.def' -o -name '*.py' -o -name '*.toml' \) -print) \
 	$(wildcard cosim/fmu*.py cosim/fmu*/*.py)
 
-.PHONY: help run test test-all setup check lock clean FORCE
+.PHONY: help run test test-all setup charts check lock clean FORCE
 
 help:
 	@sed -n 's/^#  \( .*\)/\1/p' Makefile
@@ -64,6 +65,10 @@ $(VENV)/.fmu: $(VENV)/.installed $(FMU_SOURCES)
 	@echo "Building the FMU"
 	@$(VENV)/bin/cosim fmu build
 	@touch $@
+
+charts: setup
+	@$(VENV)/bin/cosim run paper
+	@cp results/paper/figure.png results/paper.png
 
 check: $(VENV)/.installed
 	@$(VENV)/bin/ruff check
