@@ -91,6 +91,8 @@ static double first_event(const Model *m, const Point *start, const Point *end, 
         }
         if (high < 0.0)
             continue;
+        if (h < STEP_MIN && a->value < 0.0 && a->rate > 0.0)
+            continue; /* on its way back, and another event is due within the same instant */
         *which = i;
         if (a->value <= 0.0) {
             if (a->rate < 0.0)

@@ -25,6 +25,12 @@ static int sign(double x)
     return (x > 0.0) - (x < 0.0);
 }
 
+/* What rounding makes of a friction force, N. */
+static double force_noise(const Forces *f)
+{
+    return 1e-13 * (fabs(f->friction) + f->normal);
+}
+
 int event_functions(const Model *m, const double y[N_STATES], double tau,
                     EventFunction functions[MAX_EVENT_FUNCTIONS])
 {
@@ -36,7 +42,7 @@ int event_functions(const Model *m, const double y[N_STATES], double tau,
     forces(m, mode, y, tau, &f);
     force_rates(m, mode, y, tau, &f, &rate);
 
-    const double length = 1e-15 * p->travel, force = 1e-13 * (fabs(f.friction) + f.normal);
+    const double length = 1e-15 * p->travel, force = force_noise(&f);
     const double speed = 1e-16;
 #define ADD(k, v, r, e) functions[n++] = (EventFunction){.kind = k, .value = v, .rate = r, .noise = e}
     switch (mode->wall) {
@@ -94,6 +100,21 @@ static void jump_to(Model *m, double u)
         m->y[W] -= dv;
 }
 
+/* The ram comes to rest in the actuator, so gently that a sticking part goes along. */
+static void stop_ram(Model *m)
+{
+    if (m->mode.slip != 0) {
+        jump_to(m, 0.0);
+        return;
+    }
+    const double ram = m->r.ram_mass, body = m->r.surface_mass + part_mass_per_surface(m);
+    const int held = m->mode.plate == 0 && plate_acts(m); /* then nothing moves but the ram */
+    const double share = held ? 0.0 : ram / (ram + body);
+    m->y[E_IMPACT] += 0.5 * ram * (1.0 - share) * m->y[U] * m->y[U];
+    m->y[V] += share * m->y[U];
+    m->y[U] = 0.0;
+}
+
 /* Acceleration with which a free ram would press into the wall of the given side. */
 static double pressing(const Model *m, double tau, int side)
 {
@@ -128,9 +149,10 @@ static void impact(Model *m, double tau, int side)
     }
     const double closing = side * m->y[U], before = pressing(m, tau, side);
     if (2.0 * closing <= fmax(ZENO_FLIGHT * before, 2.0 * STILL)) {
-        /* Too slow to bounce, and to tear a sticking part off. */
-        m->y[U] = 0.0;
-        if (before > 0.0)
+        /* A ram at rest that is said to meet the wall left it and came back unseen: it rests. */
+        const int unseen = closing == 0.0;
+        stop_ram(m);
+        if (before > 0.0 || unseen)
             set_wall(m, WALL_REST, side);
         return;
     }
@@ -180,9 +202,10 @@ static int consistent(const Model *m, double tau, int slip, int plate, double sl
     forces(m, &mode, m->y, tau, &f);
     const double w = m->y[W], v_part = m->y[V] + m->y[W];
     const double scale = fabs(f.a_surface) + m->r.gravity;
+    const double noise = force_noise(&f);
 
     if (slip == 0) {
-        if (w != 0.0 || fabs(f.friction) > m->r.mu_s * f.normal)
+        if (w != 0.0 || fabs(f.friction) > m->r.mu_s * f.normal + noise)
             return 0;
     } else if (w != 0.0 ? slip != sign(w) : !starts(slip * f.a_slip, scale, slack)) {
         return 0;
@@ -190,7 +213,7 @@ static int consistent(const Model *m, double tau, int slip, int plate, double sl
     if (!plate_acts(m))
         return 1;
     if (plate == 0)
-        return v_part == 0.0 && fabs(f.plate) <= m->r.mu_plate * f.normal;
+        return v_part == 0.0 && fabs(f.plate) <= m->r.mu_plate * f.normal + noise;
     return v_part != 0.0 ? plate == sign(v_part)
                          : starts(plate * (f.a_surface + f.a_slip), scale, slack);
 }
@@ -262,6 +285,8 @@ void settle_mode(Model *m, double tau)
 
 void apply_event(Model *m, double tau, EventKind kind)
 {
+    const Mode before = m->mode;
+    const int no_slip = m->y[W] == 0.0, no_travel = m->y[V] + m->y[W] == 0.0;
     int keep = 1;
     switch (kind) {
     case EVENT_WALL_ABOVE:
@@ -275,7 +300,15 @@ void apply_event(Model *m, double tau, EventKind kind)
         settle_friction(m, tau, 1);
         return;
     case EVENT_WALL_PARTING:
-        m->mode.wall = m->mode.wall == WALL_TOUCH ? WALL_PARTING : WALL_TOUCH;
+        /* While parted, E_IMPACT counts all that the spring holds as lost; model_outputs takes off
+         * what it still holds. */
+        if (m->mode.wall == WALL_TOUCH) {
+            m->mode.wall = WALL_PARTING;
+            m->y[E_IMPACT] += wall_energy(m, m->y);
+        } else {
+            m->y[E_IMPACT] -= wall_energy(m, m->y);
+            m->mode.wall = WALL_TOUCH;
+        }
         break;
     case EVENT_SLIP_ENDS:
         m->y[W] = 0.0;
@@ -306,4 +339,9 @@ void apply_event(Model *m, double tau, EventKind kind)
         break;
     }
     settle(m, tau, keep);
+    /* A motion that ends at the instant of its start, and would start again, is none. */
+    if (kind == EVENT_SLIP_ENDS && no_slip && m->mode.slip == before.slip)
+        set_friction(m, 0, m->mode.plate);
+    if (kind == EVENT_PLATE_STOPS && no_travel && m->mode.plate == before.plate)
+        set_friction(m, m->mode.slip, 0);
 }

@@ -145,12 +145,20 @@ void state_rates(const Model *m, const Mode *mode, const double y[N_STATES], dou
     dy[E_FRICTION] = -f.friction * y[W] - f.plate * (y[V] + y[W]);
     dy[E_DAMPING] = p->flexure_damping * y[V] * y[V] + p->suspension_damping * y[U] * y[U];
     dy[E_IMPACT] = 0.0;
-    if (mode->wall == WALL_TOUCH || mode->wall == WALL_PARTING) {
+    if (mode->wall == WALL_TOUCH) {
         /* What the wall takes, less what its spring stores. */
         double depth = penetration(m, mode, y);
         double spring = p->contact_stiffness * depth * sqrt(depth);
         dy[E_IMPACT] = -(f.wall * mode->side + spring) * mode->side * y[U];
     }
+}
+
+double wall_energy(const Model *m, const double y[N_STATES])
+{
+    if (m->mode.wall != WALL_TOUCH && m->mode.wall != WALL_PARTING)
+        return 0.0;
+    double depth = penetration(m, &m->mode, y);
+    return 0.4 * m->r.contact_stiffness * depth * depth * sqrt(depth);
 }
 
 double energy_stored(const Model *m, const double y[N_STATES])
@@ -165,9 +173,5 @@ double energy_stored(const Model *m, const double y[N_STATES])
     double springs = 0.5 * p->flexure_stiffness * y[Z] * y[Z] +
                      q * q * (p->suspension_k1 / 2.0 +
                               q * (p->suspension_k2 / 3.0 + q * p->suspension_k3 / 4.0));
-    if (m->mode.wall == WALL_TOUCH || m->mode.wall == WALL_PARTING) {
-        double depth = penetration(m, &m->mode, y);
-        springs += 0.4 * p->contact_stiffness * depth * depth * sqrt(depth);
-    }
-    return kinetic + weight + springs;
+    return kinetic + weight + springs + wall_energy(m, y);
 }

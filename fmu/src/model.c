@@ -193,6 +193,8 @@ void model_outputs(Model *m)
     r->energy_in = y[E_IN];
     r->energy_friction = y[E_FRICTION];
     r->energy_impact = y[E_IMPACT];
+    if (m->mode.wall == WALL_PARTING)
+        r->energy_impact -= wall_energy(m, y);
     r->energy_damping = y[E_DAMPING];
     r->energy_stored = energy_stored(m, y) - m->energy_at_start;
     m->n.sticking = m->mode.slip == 0;
