@@ -4,7 +4,9 @@ Exit codes: 0 done; 2 bad input, told in one sentence; 3 the simulation failed; 
 """
 
 import argparse
+import os
 import sys
+from io import TextIOWrapper
 from pathlib import Path
 from typing import NoReturn
 
@@ -71,14 +73,38 @@ def _dispatch(arguments: argparse.Namespace) -> int:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # rather a question mark than no result
     try:
-        return _dispatch(_parser().parse_args(argv))
+        code = _dispatch(_parser().parse_args(argv))
+        sys.stdout.flush()
+        return code
     except CosimError as error:
-        print(f"cosim: {error}", file=sys.stderr)
-        return error.exit_code
+        return _told(str(error), error.exit_code)
+    except BrokenPipeError:  # whoever read the output has seen enough
+        _discard_output()
+        return 0
+    except OSError as error:
+        if error.filename is None:
+            _discard_output()
+        where = f"{error.filename}: " if error.filename else "The output cannot be written: "
+        return _told(f"{where}{error.strerror or error}.", BadInput.exit_code)
     except KeyboardInterrupt:
-        print("cosim: interrupted.", file=sys.stderr)
-        return INTERRUPTED
+        return _told("interrupted.", INTERRUPTED)
+
+
+def _told(sentence: str, code: int) -> int:
+    """Print the sentence on one line; returns the exit code."""
+    words = " ".join(sentence.split())
+    print(f"cosim: {words}" + ("" if words.endswith((".", "?")) else "."), file=sys.stderr)
+    return code
+
+
+def _discard_output() -> None:
+    """Keep Python from trying at its end to write what could not be written."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, sys.stdout.fileno())
+    os.close(null)
 
 
 if __name__ == "__main__":

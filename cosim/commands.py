@@ -1,12 +1,16 @@
 """What each command does, apart from reading its options."""
 
 import json
-import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 
+from cosim.errors import BadInput
 from cosim.report import table
-from cosim.scene import list_scenes, load, to_toml
+from cosim.scene import Scene, list_scenes, load, to_toml
+from cosim.scene.messages import plain
 
 
 def scenes() -> None:
@@ -21,7 +25,11 @@ def run(source: str, overrides: list[str], out: Path | None) -> None:
     """Run a scene and write its files."""
     scene = load(source, overrides)
     folder = out or Path("results") / scene.name
-    _writable(folder)
+    with _writable(folder):
+        _run(scene, folder)
+
+
+def _run(scene: Scene, folder: Path) -> None:
     # From here on with the heavy libraries.
     from tqdm import tqdm
 
@@ -62,13 +70,30 @@ def run(source: str, overrides: list[str], out: Path | None) -> None:
     print(f"Figure: {folder / 'figure.png'}")
 
 
-def _writable(folder: Path) -> None:
-    """Refuse a folder that cannot be written to before a long run, not after it."""
-    from cosim.waveforms import whole
+@contextmanager
+def _writable(folder: Path) -> Iterator[None]:
+    """Refuse a folder that cannot be written to before a long run, not after it.
 
-    with whole(folder / ".probe"):
-        pass
-    os.unlink(folder / ".probe")
+    Folders that were made for a run that then fails go again, unless something is in them.
+    """
+    made: list[Path] = []
+    try:
+        try:
+            made = [path for path in (folder, *folder.parents) if not path.exists()]
+            folder.mkdir(parents=True, exist_ok=True)
+            with TemporaryFile(dir=folder):
+                pass
+        except FileExistsError as error:
+            raise BadInput(f"{plain(str(folder))}: this is a file, not a directory.") from error
+        except OSError as error:
+            reason = error.strerror
+            raise BadInput(f"{plain(str(folder))}: cannot be written to ({reason}).") from error
+        yield
+    except BaseException:
+        for path in made:
+            with suppress(OSError):
+                path.rmdir()
+        raise
 
 
 def fmu_build(force: bool) -> None:

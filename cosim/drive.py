@@ -7,7 +7,7 @@ and a solver that lands on a time from ``next_jump`` sees the jump exactly there
 
 All commands also stand behind the difference amplifier of the full circuit, whose netlist takes
 the voltages of the DAC and of the offset pin: V1 = GAIN (v_offset - v_dac). The offset pin is held
-where the highest command needs V_DAC = 0.
+where the highest command needs V_DAC = 0. In truth it is a PWM, of which ``v_offset`` is the mean.
 """
 
 from abc import ABC, abstractmethod
@@ -20,9 +20,12 @@ import numpy.typing as npt
 
 from cosim.firmware import (
     GAIN,
+    PWM_FREQUENCY,
     STEPS_PER_SECOND,
+    V_REFERENCE,
     nearest_code,
     offset_pin,
+    passes,
     staircase,
     volts,
 )
@@ -33,7 +36,7 @@ class Command(ABC):
     """V1 in V over time in s; continued periodically to times before 0."""
 
     v_offset: float
-    """Voltage of the offset pin, V."""
+    """Mean voltage of the offset pin, V."""
 
     longest_straight: float = inf
     """Between corners the command is a straight line, or near enough over this time, s."""
@@ -52,10 +55,10 @@ class Command(ABC):
 
     @abstractmethod
     def next_jump(self, t: float) -> float:
-        """Time of the first discontinuity strictly after ``t``, s; inf if there is none."""
+        """Time of the first discontinuity of V1 or of a pin strictly after ``t``, s, or inf."""
 
     def next_corner(self, t: float) -> float:
-        """Time of the first jump of V1 or of its slope strictly after ``t``, s."""
+        """Time of the first such jump or jump of V1's slope strictly after ``t``, s."""
         return self.next_jump(t)
 
     def values(self, times: Iterable[float]) -> npt.NDArray[np.float64]:
@@ -70,6 +73,14 @@ class Command(ABC):
     def v_dac_before(self, t: float) -> float:
         """Left limit of the DAC's voltage at ``t``, V."""
         return self.v_offset - self.value_before(t) / GAIN
+
+    def v_offset_at(self, t: float) -> float:
+        """Voltage of the offset pin at ``t``, V; at a jump the voltage after it."""
+        return self.v_offset
+
+    def v_offset_before(self, t: float) -> float:
+        """Left limit of the offset pin's voltage at ``t``, V."""
+        return self.v_offset
 
 
 def _edge_before(t: float, rate: float) -> int:
@@ -208,26 +219,29 @@ class Square(Command):
 
 
 class Staircase(Command):
-    """The firmware's sawtooth: a DAC code each 50 us, and a 10-bit code at the offset pin.
+    """The firmware's sawtooth: ``rate`` DAC codes a second, and a 10-bit code at the offset pin.
 
     ``codes`` is one period of DAC codes, ``v_offset`` the offset pin in V; see
     :mod:`cosim.firmware` for where they come from.
     """
 
-    def __init__(self, codes: tuple[int, ...], v_offset: float) -> None:
+    def __init__(
+        self, codes: tuple[int, ...], v_offset: float, rate: float = STEPS_PER_SECOND
+    ) -> None:
         self.codes = codes
         self.v_offset = v_offset
-        self.period = len(codes) / STEPS_PER_SECOND
+        self._rate = rate
+        self.period = len(codes) / rate
         """What the period has become, s."""
         self._levels = tuple(GAIN * (v_offset - volts(code)) for code in codes)
         self._edges = [k for k in range(len(codes)) if codes[k] != codes[k - 1]]
 
     def value(self, t: float) -> float:
-        return self._levels[_edge_before(t, STEPS_PER_SECOND) % len(self._levels)]
+        return self._levels[_edge_before(t, self._rate) % len(self._levels)]
 
     def _step_before(self, t: float) -> int:
-        step = _edge_before(t, STEPS_PER_SECOND)
-        return step - 1 if t == step / STEPS_PER_SECOND else step
+        step = _edge_before(t, self._rate)
+        return step - 1 if t == step / self._rate else step
 
     def value_before(self, t: float) -> float:
         return self._levels[self._step_before(t) % len(self._levels)]
@@ -239,28 +253,115 @@ class Staircase(Command):
         if not self._edges:
             return inf
         count = len(self.codes)
-        period, step = divmod(_edge_before(t, STEPS_PER_SECOND), count)
+        period, step = divmod(_edge_before(t, self._rate), count)
         place = bisect_right(self._edges, step)
         if place == len(self._edges):
             period, place = period + 1, 0
-        return (period * count + self._edges[place]) / STEPS_PER_SECOND
+        return (period * count + self._edges[place]) / self._rate
 
     def v_dac(self, t: float) -> float:
-        return volts(self.codes[_edge_before(t, STEPS_PER_SECOND) % len(self.codes)])
+        return volts(self.codes[_edge_before(t, self._rate) % len(self.codes)])
 
     def v_dac_before(self, t: float) -> float:
         return volts(self.codes[self._step_before(t) % len(self.codes)])
 
 
+class WithPwm(Command):
+    """Another command, with the offset pin as its PWM: 0 or 3.3 V, its duty the mean's share.
+
+    Times count from the middle of a pulse, which is where the filter behind the pin, settled at the
+    mean, has its mean; how the real PWM lies to the sawtooth is left to chance. Before 0 there is
+    the mean itself, so that all begins settled. Edges within a nanosecond of a jump of the command
+    are moved onto it.
+    """
+
+    _SAME = 1e-9  # s
+
+    def __init__(self, command: Command) -> None:
+        self._command = command
+        self.v_offset = command.v_offset
+        self.longest_straight = command.longest_straight
+        duty = command.v_offset / V_REFERENCE
+        self._half = 0.5 * duty
+        self._still = not 1e-5 < duty < 1 - 1e-5  # pulses or gaps not wider than _SAME
+        self._span = (0.0, 0.0)  # of the level last asked for
+        self._level = self.v_offset
+
+    def _edge(self, k: int) -> float:
+        """Time of the PWM's edge k >= 0, s: even ones fall, odd ones rise."""
+        place = 1 - self._half if k % 2 else self._half
+        time = (k // 2 + place) / PWM_FREQUENCY
+        jump = self._command.next_jump(time - self._SAME)
+        return jump if jump <= time + self._SAME else time
+
+    def _last_edge(self, t: float) -> int:
+        """The last edge at or before ``t`` >= 0; -1 if there is none."""
+        k = 2 * floor(t * PWM_FREQUENCY) + 2
+        while k >= 0 and self._edge(k) > t:
+            k -= 1
+        return k
+
+    def v_offset_at(self, t: float) -> float:
+        if self._still or t < 0:
+            return self.v_offset
+        start, end = self._span
+        if not start <= t < end:
+            k = self._last_edge(t)
+            self._span = (self._edge(k) if k >= 0 else 0.0, self._edge(k + 1))
+            self._level = V_REFERENCE if k % 2 else 0.0
+        return self._level
+
+    def v_offset_before(self, t: float) -> float:
+        if self._still or t <= 0:
+            return self.v_offset
+        k = self._last_edge(t)
+        if k >= 0 and self._edge(k) == t:
+            k -= 1
+        return V_REFERENCE if k % 2 else 0.0
+
+    def _next_edge(self, t: float) -> float:
+        if self._still:
+            return inf
+        return 0.0 if t < 0 else self._edge(self._last_edge(t) + 1)
+
+    def next_jump(self, t: float) -> float:
+        return min(self._command.next_jump(t), self._next_edge(t))
+
+    def next_corner(self, t: float) -> float:
+        return min(self._command.next_corner(t), self._next_edge(t))
+
+    def value(self, t: float) -> float:
+        return self._command.value(t)
+
+    def value_before(self, t: float) -> float:
+        return self._command.value_before(t)
+
+    def slope(self, t: float) -> float:
+        return self._command.slope(t)
+
+    def v_dac(self, t: float) -> float:
+        return self._command.v_dac(t)
+
+    def v_dac_before(self, t: float) -> float:
+        return self._command.v_dac_before(t)
+
+
 def command(scene: Scene) -> Command:
     """The command of a scene; 0 V for ever where its circuit is "none"."""
-    drive = scene.drive
     if scene.circuit.model == "none":
         return Constant()
+    made = _shape(scene)
+    return WithPwm(made) if scene.drive.pwm_ripple else made
+
+
+def _shape(scene: Scene) -> Command:
+    drive = scene.drive
     if drive.quantised:
         codes = staircase(nearest_code(drive.amplitude / GAIN), drive.frequency)
-        pin = nearest_code(offset_pin(drive.offset, drive.amplitude))
-        return Staircase(codes, volts(pin))
+        pin = volts(nearest_code(offset_pin(drive.offset, drive.amplitude)))
+        if drive.loop_time:
+            return Staircase(passes(codes, drive.loop_time), pin, 1 / drive.loop_time)
+        return Staircase(codes, pin)
     if drive.waveform == "sawtooth":
         return Sawtooth(drive.frequency, drive.amplitude, drive.offset, drive.reset_time)
     shape = {"sine": Sine, "square": Square}[drive.waveform]

@@ -30,14 +30,23 @@ class Electrics:
     """Turned into heat in coils (copper and eddy currents) and sense resistor, J."""
     energy_magnetic: float
     """In the coils' inductances at the end, J."""
-    saturated_fraction: float
-    """Share of the time after settling in which the amplifier's output was at a limit."""
+    current_max: float
+    """Largest current of one coil after settling, A."""
+    current_min: float
+    """Smallest current of one coil after settling, A."""
+    limited: dict[str, float]
+    """Share of the time after settling in which each limit of the amplifier acted, by name, and
+    ``output`` for its output being at any."""
 
 
 def from_circuit(
-    scene: Scene, command: Command, log: dict[str, Array], rows: Array, over_limit: Array
+    scene: Scene,
+    command: Command,
+    log: dict[str, Array],
+    rows: Array,
+    limits: dict[str, npt.NDArray[np.bool_]],
 ) -> Electrics:
-    """From the vectors at the accepted points of a circuit.
+    """From the vectors at the accepted points of a circuit, and which limits acted there.
 
     Energies are sums of step times means over the step: for them the trapezoidal companion of an
     inductance, which ngspice integrates with, balances exactly.
@@ -47,23 +56,36 @@ def from_circuit(
     current = total / coil.count
     h = np.diff(time)
     mean = 0.5 * (total[1:] + total[:-1])
-    mean_out = 0.5 * (out[1:] + out[:-1])
-    copper = coil.resistance / coil.count + circuit.sense_resistance
+    copper = coil.resistance / coil.count
+    delivered = out
+    if circuit.netlist is None:
+        copper += circuit.sense_resistance
+    else:
+        # What lies beyond the coil's ends is the netlist's own affair.
+        delivered = out - sense
+    mean_delivered = 0.5 * (delivered[1:] + delivered[:-1])
     eddy_heat, eddy_current = 0.0, 0.0
     if coil.eddy_inductance and coil.eddy_resistance:
         eddy_heat, eddy_current = _eddy(
             coil.eddy_inductance, coil.eddy_resistance, h, current[:-1], current[1:]
         )
-    after = time[1:] > scene.run.settle
-    limited = np.dot(h[after], over_limit[1:][after]) / max(h[after].sum(), 1e-300)
+    spent = h * (time[1:] > scene.run.settle)
+    limited = {name: float(np.dot(spent, acts[1:]) / spent.sum()) for name, acts in limits.items()}
+    at_limit = [acts for name, acts in limits.items() if name != "slew"]
+    if at_limit:
+        limited["output"] = float(np.dot(spent, np.any(at_limit, axis=0)[1:]) / spent.sum())
+    made = "v(v1)" in log and circuit.model != "amplifier"  # by the circuit, not given to it
+    settled = current[time >= scene.run.settle]
     return Electrics(
-        command=np.interp(rows, time, log["v(v1)"]),
+        command=np.interp(rows, time, log["v(v1)"]) if made else command.values(rows),
         current=np.interp(rows, time, current),
         coil_voltage=np.interp(rows, time, out - sense),
-        energy_in=float(np.dot(h, mean * mean_out)),
+        energy_in=float(np.dot(h, mean * mean_delivered)),
         energy_copper=float(copper * np.dot(h, mean**2)) + coil.count * eddy_heat,
         energy_magnetic=_magnetic(scene, float(current[-1]), eddy_current),
-        saturated_fraction=float(limited),
+        current_max=float(settled.max()),
+        current_min=float(settled.min()),
+        limited=limited,
     )
 
 
@@ -97,6 +119,10 @@ def from_command(
     heat = (coil.resistance + coil.count * scene.circuit.sense_resistance) * squares
     copper = coil.count * (heat + eddy_heat)
     magnetic = _magnetic(scene, float(end[-1]), eddy_current)
+    # At the corners, and where settling ends.
+    settled = max(0, int(np.searchsorted(edges, scene.run.settle, side="right")) - 1)
+    at_settle = start[settled] + slope[settled] * (scene.run.settle - edges[settled])
+    after = np.concatenate([[at_settle], end[settled:], start[settled + 1 :]])
     return Electrics(
         command=command.values(rows),
         current=current,
@@ -104,7 +130,9 @@ def from_command(
         energy_in=copper + magnetic + coil.count * motion,
         energy_copper=copper,
         energy_magnetic=magnetic,
-        saturated_fraction=0.0,
+        current_max=float(after.max()),
+        current_min=float(after.min()),
+        limited={"output": 0.0},
     )
 
 

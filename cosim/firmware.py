@@ -7,12 +7,23 @@ code c stands for 3.3 V · c/1024 at either pin.
 The firmware keeps its counter in floating point: it starts at the maximum code, falls every 50 µs
 by ``maximum · f · 50 µs``, is truncated when written, and starts again in the step in which it has
 reached zero or less. So the period is 1/f rounded **up** to whole steps. Assumed here: steps of
-exactly 50 µs (the real ones are longer by part of the loop's run time) and exact arithmetic (the
-real counter is of single precision: now and then a code or one step differs). The code 0 that the
-firmware writes for one pass of its loop before the maximum is left out.
+exactly 50 µs and exact arithmetic (the real counter is of single precision: now and then a code or
+one step differs). The code 0 that the firmware writes for one pass of its loop before the maximum
+is left out.
+
+The real steps are longer. The firmware looks at its clock once a pass of ``loop()``, so a step is
+the first multiple of the loop's time that is not below 50 µs, and the reset takes further passes:
+one at code 0 and at least two at the maximum (:func:`passes`). A pass reads three potentiometers.
+Each reading is four conversions of 20 + 2 cycles and 3 more at 15 MHz, 6.2 µs by the core library's
+settings; at 12 bits, where the same sum gives 7.2 µs, 8 µs were measured with the call
+(forum.pjrc.com, thread 57683). With 1 to 2 µs assumed for the rest of the loop a pass takes about
+22 µs, a step three of them, 66 µs, and the real frequency is three quarters of the commanded one.
+Nobody has published a measurement, and from 25 µs on it would be two passes; hence a parameter,
+and the plain 50 µs without it.
 """
 
 from fractions import Fraction
+from math import ceil
 
 V_REFERENCE = 3.3
 """Full scale of the DAC and of the offset pin, V."""
@@ -20,6 +31,8 @@ COUNTS = 1024
 """Counts of a 10-bit converter; codes run from 0 to ``COUNTS - 1``."""
 STEPS_PER_SECOND = 20_000
 """The firmware's decrements a second: one every 50 µs."""
+PWM_FREQUENCY = 488.28125
+"""The offset pin's PWM, Hz: 60 MHz / 2 / 61440, what analogWrite sets up at 180 MHz."""
 GAIN = 15.0 / 4.7
 """Difference amplifier: V1 = GAIN (V_offset - V_DAC), from R2 = R3 = 4.7 kΩ, R4 = R5 = 15 kΩ."""
 
@@ -68,3 +81,15 @@ def staircase(maximum: int, frequency: float) -> tuple[int, ...]:
     p, q = ratio.numerator, ratio.denominator
     steps = -(-q // p)
     return tuple(maximum * (q - k * p) // q for k in range(steps))
+
+
+def passes(codes: tuple[int, ...], loop_time: float) -> tuple[int, ...]:
+    """The DAC codes of one period, one each pass of a loop of ``loop_time`` in s.
+
+    ``codes`` are those of :func:`staircase`. The maximum is written one pass after the code 0, the
+    counter set to it in the next, and the first decrement made from the one after that on, once a
+    step has passed since the code 0.
+    """
+    each = ceil(round(1 / (STEPS_PER_SECOND * loop_time), 9))
+    falling = (code for code in codes[1:] for _ in range(each))
+    return (*(codes[0],) * max(2, each - 1), *falling, 0)

@@ -64,6 +64,7 @@ class Fmi2:
 
     def __init__(self) -> None:
         self.messages: list[str] = []
+        self._running = False
         self._fmu = fmi2.FMU2Slave(**_arguments(2))
         self._logger = _LOGGER_2(lambda *a: self.messages.append(_text(a[4])))
         callbacks = fmi2.fmi2CallbackFunctions()
@@ -77,6 +78,7 @@ class Fmi2:
 
     def initialise(self) -> None:
         self._fmu.exitInitializationMode()
+        self._running = True
 
     def do_step(self, time: float, step: float) -> None:
         self._fmu.fmi2DoStep(self._component, time, step, 1)
@@ -94,7 +96,8 @@ class Fmi2:
         self._fmu.fmi2GetInteger(self._component, places, len(places), values)
 
     def close(self) -> None:
-        self._fmu.terminate()
+        if self._running:
+            self._fmu.terminate()
         self._fmu.freeInstance()
 
 
@@ -103,6 +106,7 @@ class Fmi3:
 
     def __init__(self) -> None:
         self.messages: list[str] = []
+        self._running = False
         self._fmu = fmi3.FMU3Slave(**_arguments(3))
         self._logger = fmi3.fmi3LogMessageCallback(lambda *a: self.messages.append(_text(a[3])))
         self._fmu.instantiate(logMessage=self._logger)
@@ -112,6 +116,7 @@ class Fmi3:
 
     def initialise(self) -> None:
         self._fmu.exitInitializationMode()
+        self._running = True
 
     def do_step(self, time: float, step: float) -> None:
         self._fmu.fmi3DoStep(self._component, time, step, True, *self._unused)
@@ -129,7 +134,8 @@ class Fmi3:
         self._fmu.fmi3GetInt32(self._component, places, len(places), values, len(values))
 
     def close(self) -> None:
-        self._fmu.terminate()
+        if self._running:
+            self._fmu.terminate()
         self._fmu.freeInstance()
 
 

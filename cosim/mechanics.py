@@ -82,6 +82,7 @@ class Mechanics:
             self._fmi.initialise()
             self._fmi.get_reals(self._step_places, self.step_outputs)
         except Exception as error:
+            self._fmi.close()
             raise self._failed(error) from error
 
     def step_to(self, time: float, current: float = 0.0, slope: float = 0.0) -> None:

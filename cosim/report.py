@@ -19,10 +19,7 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
     if "current_max" in summary:
         rows += [
             ("coil current", _range(summary, "current", 1, "A", "+.3f")),
-            (
-                "output at its limit",
-                _scaled(summary["saturated_fraction"], 100, "% of the time", ".2f"),
-            ),
+            ("amplifier at a limit", _limits(summary)),
         ]
     rows += [
         ("impacts", f"{summary['impacts']}"),
@@ -42,6 +39,22 @@ def _range(summary: dict[str, Any], name: str, factor: float, unit: str, form: s
     if low is None or high is None:
         return ""
     return f"{low * factor:{form}} … {high * factor:{form}} {unit}"
+
+
+LIMITS = {
+    "swing_high_fraction": "swing, high",
+    "swing_low_fraction": "swing, low",
+    "current_limit_fraction": "current limit",
+    "slew_fraction": "slew rate",
+}
+
+
+def _limits(summary: dict[str, Any]) -> str:
+    """Which limits of the amplifier acted, and for which share of the time."""
+    acted = [
+        f"{name} {summary[key] * 100:.2g} %" for key, name in LIMITS.items() if summary.get(key)
+    ]
+    return f"{', '.join(acted)} of the time" if acted else "never"
 
 
 def _acceleration(scene: Scene, summary: dict[str, Any]) -> str:

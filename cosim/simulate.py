@@ -12,6 +12,7 @@ import numpy.typing as npt
 from cosim import electrics
 from cosim.coupling.step_locked import StepLocked
 from cosim.drive import Command, command
+from cosim.isolation import isolated
 from cosim.mechanics import Mechanics
 from cosim.recorder import COLUMNS, Recorder
 from cosim.scene import Scene
@@ -52,8 +53,26 @@ def simulate(
 ) -> Result:
     """Run a scene. ``progress`` is told the simulated time (s) now and then.
 
-    Raises SimulationFailed with where, when, and what to try.
+    A netlist of the user's own runs in a process of its own, as does every circuit after ngspice
+    has given up in this one. Raises BadInput for a netlist that cannot be used, SimulationFailed
+    with where, when, and what to try.
     """
+    if _needs_own_process(scene):
+        return isolated(_simulate, scene, progress, fmi_version=fmi_version)
+    return _simulate(scene, progress, fmi_version)
+
+
+def _needs_own_process(scene: Scene) -> bool:
+    model = scene.circuit.model
+    if model in ("none", "ideal", "file"):
+        return model == "file"
+    # PySpice and ngspice are loaded only for those who run a circuit.
+    from cosim.circuit.ngspice import spoilt
+
+    return spoilt()
+
+
+def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int) -> Result:
     began = time.perf_counter()
     drive = command(scene)
     mechanics = Mechanics(scene, fmi_version)
@@ -68,15 +87,16 @@ def simulate(
             motion = mechanics.totals()["energy_in"]
             electric = electrics.from_command(scene, drive, log, recorder.time, emf, motion)
         else:
-            # PySpice and ngspice are loaded only for those who run a circuit.
-            from cosim.circuit.netlist import at_limit
+            from cosim.circuit.limit_cycle import refuse_false
+            from cosim.circuit.netlist import limits_at_work
             from cosim.circuit.run import CircuitRun
 
             circuit = CircuitRun(scene, drive, StepLocked(recorder))
             circuit.run()
             log = circuit.log()
-            over = at_limit(scene, log)
-            electric = electrics.from_circuit(scene, drive, log, recorder.time, over)
+            refuse_false(scene, log, lambda finer: _circuit_log(finer, fmi_version))
+            limits = limits_at_work(log)
+            electric = electrics.from_circuit(scene, drive, log, recorder.time, limits)
         totals = mechanics.totals()
         steps = mechanics.steps
     finally:
@@ -91,6 +111,20 @@ def simulate(
         "versions": _versions() | ({"ngspice": circuit.ngspice} if circuit else {}),
     }
     return Result(scene, _waveforms(recorder, electric), summary)
+
+
+def _circuit_log(scene: Scene, fmi_version: int) -> dict[str, Array]:
+    """The circuit's waveforms of a run of which nothing else is wanted."""
+    from cosim.circuit.run import CircuitRun
+
+    mechanics = Mechanics(scene, fmi_version)
+    try:
+        recorder = Recorder(scene, mechanics, lambda _: None)
+        circuit = CircuitRun(scene, command(scene), StepLocked(recorder))
+        circuit.run()
+        return circuit.log()
+    finally:
+        mechanics.close()
 
 
 def _prescribe(scene: Scene, drive: Command, recorder: Recorder) -> dict[str, Array]:

@@ -21,7 +21,6 @@ def summarise(
     run, before = scene.run, recorder.at_settle
     span = run.duration - run.settle
     v_average = (totals["z_part"] - before["z_part"]) / span
-    after = recorder.time >= run.settle
     camera = np.diff(recorder.frames, 2) * FRAME_RATE**2
     rigid = scene.mechanics.contact == "rigid"
     a_max, a_min, v_max, v_min, z_max, z_min = recorder.extremes
@@ -39,10 +38,10 @@ def summarise(
         "z_surface_pp": z_max - z_min,
     }
     if electric is not None:
-        current = electric.current[after]
-        result["current_max"] = float(current.max())
-        result["current_min"] = float(current.min())
-        result["saturated_fraction"] = electric.saturated_fraction
+        result["current_max"] = electric.current_max
+        result["current_min"] = electric.current_min
+        for name, share in electric.limited.items():
+            result["saturated_fraction" if name == "output" else f"{name}_fraction"] = share
     for counter in ("impacts", "stick_slip_events"):
         result[counter] = totals[counter] - before[counter]
     return result | _energies(scene, totals, electric)

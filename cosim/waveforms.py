@@ -4,6 +4,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +55,9 @@ def write_netcdf(
     """NetCDF (classic format) with the dimension ``time``; each variable has its ``units``."""
     from scipy.io import netcdf_file
 
-    with whole(path) as temporary, netcdf_file(str(temporary), "w", version=2) as file:
+    # By way of memory: scipy's file tries again, and complains, when a full disk has failed it.
+    content = BytesIO()
+    with netcdf_file(content, "w", version=2) as file:
         for name, text in attributes.items():
             setattr(file, name, text)
         file.createDimension("time", len(waveforms["time"]))
@@ -62,3 +65,6 @@ def write_netcdf(
             variable = file.createVariable(name, "f8", ("time",))
             variable[:] = values
             variable.units = units[name]
+        file.flush()
+        with whole(path) as temporary:
+            temporary.write_bytes(content.getbuffer())

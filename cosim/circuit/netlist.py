@@ -1,33 +1,32 @@
-"""A netlist made ready for co-simulation.
+"""A netlist made ready for co-simulation, and what may be read from its nodes.
 
 Every netlist in ``circuits/`` also runs in plain ngspice. Here the values of its ``.param`` lines
 are replaced by the scene's, its agreed sources become external ones, and its analysis gives way to
-the host's. Its options stay, but for the tolerance, which is the scene's.
+the host's. Its options stay, but for the tolerance, which is the scene's. A user's own netlist goes
+the same way; ``circuits/README.md`` says what is agreed.
 """
 
-import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.errors import BadInput
+from cosim.circuit.checks import REQUIRED as AGREED
+from cosim.circuit.checks import check
+from cosim.circuit.deck import Line, read, refuse
+from cosim.circuit.elements import Element, parse
+from cosim.circuit.words import definitions
 from cosim.resources import circuits
 from cosim.scene import Scene
 
-EMF_SOURCE = "vemf"
-"""Source of the back-EMF, in series with the coil: the coils' total current is that through it."""
-COMMAND_SOURCES = ("vcommand", "vdac", "voffset")
-"""Sources of the command: V1 itself, or the DAC's voltage and the offset pin's."""
+Array = npt.NDArray[np.float64]
 
-LIMITS: dict[str, tuple[str, ...]] = {
-    "amplifier": ("v(swing)",),
-    "full": ("v(swing)", "v(climit)"),
-}
-"""Vectors that tell of an output at its limit, swing or current, while their magnitude is at least
-0.5."""
-
-_OWN_COMMANDS = (".tran", ".end", ".save", ".print", ".plot")
+REQUIRED = ("i(vemf)", "v(out)", "v(sense)")
+"""What every netlist has: the coils' total current, and the two ends of the coil."""
+OPTIONAL = ("v1", "swing", "climit", "slewing")
+"""Nodes that are read where a netlist has them: the command at the power amplifier's input, and
+limits at work, each while its magnitude is at least 0.5."""
 
 
 def parameters(scene: Scene) -> dict[str, float]:
@@ -42,6 +41,9 @@ def parameters(scene: Scene) -> dict[str, float]:
         "slew_rate": circuit.slew_rate,
         "swing_loss_high": circuit.swing_loss_high,
         "swing_loss_low": circuit.swing_loss_low,
+        "output_resistance": circuit.output_resistance,
+        "snubber_resistance": circuit.snubber_resistance or 1.0,
+        "snubber_capacitance": circuit.snubber_capacitance or 0.0,
         "coil_resistance": coil.resistance,
         "coil_inductance": coil.inductance,
         "eddy_inductance": coil.eddy_inductance or 0.0,
@@ -50,59 +52,74 @@ def parameters(scene: Scene) -> dict[str, float]:
     }
 
 
-def prepare(scene: Scene, save: tuple[str, ...]) -> str:
-    """The deck of the scene's circuit model, for ``ngSpice_Circ``.
+def path_of(scene: Scene) -> Path:
+    """The netlist of the scene's circuit."""
+    circuit = scene.circuit
+    if circuit.netlist is not None:
+        return Path(circuit.netlist)
+    return circuits() / f"{circuit.model}.cir"
 
-    ``save`` are the vectors to keep. The run goes to ``run.duration`` with steps of at most
-    ``circuit.max_step``.
+
+def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
+    """The deck of the scene's circuit, for ``ngSpice_Circ``, and the vectors that it saves.
+
+    The run goes to ``run.duration`` with steps of at most ``circuit.max_step``. Raises BadInput,
+    beginning with the netlist's file and line, for what is wrong with it or might do harm.
     """
-    path = circuits() / f"{scene.circuit.model}.cir"
-    lines = _inlined(path)
+    lines = read(path_of(scene))
+    check(lines)
+    elements = parse(lines).elements
+    external = _external_sources(elements)
     values = parameters(scene)
-    title, body = lines[0], lines[1:]
-    deck = [title]
+    deck = [lines[0].text]
     depth = 0
-    for line in body:
-        words = line.lower().split()
-        if not words or words[0].startswith("*") or words[0] in _OWN_COMMANDS:
-            continue
-        depth += (words[0] == ".subckt") - (words[0] == ".ends")
-        if words[0] in (*COMMAND_SOURCES, EMF_SOURCE):
-            name, plus, minus = line.split()[:3]
-            line = f"{name} {plus} {minus} external"
-        elif depth == 0 and (match := re.fullmatch(r"\.param\s+(\w+)\s*=.*", line, re.IGNORECASE)):
-            name = match[1].lower()
-            if name in values:
-                line = f".param {name}={values[name]!r}"
-        deck.append(line)
+    for line in lines[1:]:
+        first = line.text.split()[0].lower()
+        depth += (first == ".subckt") - (first == ".ends")
+        if line in external:
+            deck.append(external[line])
+        elif first == ".param" and depth == 0:
+            for (name, formal), expression in definitions(line.text):
+                value = repr(values[name]) if name in values else expression
+                deck.append(f".param {name}{formal or ''}={value}")
+        else:
+            deck.append(line.text)
+    present = {node for element in elements for node in element.nodes}
+    for node in ("out", "sense"):
+        if node not in present:
+            refuse(lines[0], f"the netlist must have a node {node}, one of the coil's two ends")
+    saved = REQUIRED + tuple(f"v({name})" for name in OPTIONAL if name in present)
     run, circuit = scene.run, scene.circuit
     deck += [
         f".options reltol={circuit.reltol!r}",
-        f".save {' '.join(save)}",
+        f".save {' '.join(saved)}",
         f".tran {circuit.max_step!r} {run.duration!r} 0 {circuit.max_step!r}",
         ".end",
     ]
-    return "\n".join(deck)
+    return "\n".join(deck), saved
 
 
-def _inlined(path: Path) -> list[str]:
-    """The lines of a netlist with its includes, which lie in the same folder, in their places."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise BadInput(f"{path}: the netlist cannot be read ({error.strerror}).") from error
-    lines: list[str] = []
-    for line in text.splitlines():
-        words = line.split()
-        if words and words[0].lower() in (".include", ".inc"):
-            # The first line of an included file is no title.
-            lines += _inlined(path.parent / Path(words[1].strip("\"'")).name)
-        else:
-            lines.append(line)
-    return lines
+def _external_sources(elements: Sequence[Element]) -> dict[Line, str]:
+    """The lines of the agreed sources, as external ones."""
+    agreed = next(names for names in AGREED if {element.name for element in elements} >= set(names))
+    return {
+        element.line: " ".join([element.name, *element.nodes, "external"])
+        for element in elements
+        if element.name in agreed
+    }
 
 
-def at_limit(scene: Scene, log: dict[str, npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
-    """1 at the points of the log where the output is at its swing or current limit, else 0."""
-    beyond = [np.abs(log[vector]) >= 0.5 for vector in LIMITS[scene.circuit.model]]
-    return np.any(beyond, axis=0).astype(float)
+def limits_at_work(log: dict[str, Array]) -> dict[str, npt.NDArray[np.bool_]]:
+    """Which limits of the amplifier act, at each point of the log, by name; only those known."""
+    nothing = np.zeros(len(log["time"]))
+    known: dict[str, npt.NDArray[np.bool_]] = {}
+    limited = np.abs(log.get("v(climit)", nothing)) >= 0.5
+    swing = log.get("v(swing)", nothing)
+    if "v(swing)" in log:
+        known["swing_high"] = (swing >= 0.5) & ~limited
+        known["swing_low"] = (swing <= -0.5) & ~limited
+    if "v(climit)" in log:
+        known["current_limit"] = limited
+    if "v(slewing)" in log:
+        known["slew"] = (np.abs(log["v(slewing)"]) >= 0.5) & (np.abs(swing) < 0.5) & ~limited
+    return known

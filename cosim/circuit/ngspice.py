@@ -9,11 +9,17 @@ Importing this module loads PySpice, which takes a while: only runs with a circu
 
 import logging
 import os
+import re
+import signal
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from ctypes.util import find_library
 from functools import cache
 from math import nan
+from tempfile import TemporaryDirectory
+from types import FrameType
 from typing import Any, Protocol
 
 from PySpice.Spice.NgSpice import Shared
@@ -27,6 +33,16 @@ _ffi: Any = Shared.ffi
 
 # It warns of versions newer than itself, and of words on stderr that are no errors.
 logging.getLogger(Shared.__name__).setLevel(logging.CRITICAL)
+
+
+_TROUBLE = re.compile(
+    r"error|too small|singular|converge|failed|abort|can.t|cannot|could not|unknown|undefined|not ",
+    re.IGNORECASE,
+)
+_NOISE = re.compile(
+    r"^Note|init|ngspice.dll|circuits? loaded|is ignored|No compatibility", re.IGNORECASE
+)
+"""What it says of itself, and what only follows from an earlier word."""
 
 
 class Leader(Protocol):
@@ -63,6 +79,11 @@ def engine() -> "Engine":
         raise BadInput(f"{name}: this ngspice library cannot be loaded ({error}).") from error
 
 
+def spoilt() -> bool:
+    """Whether ngspice has given up in this process: then another process must run the circuit."""
+    return engine.cache_info().currsize > 0 and engine().poisoned
+
+
 def _find_library() -> str | None:
     """libngspice as the loader finds it: Debian's runtime package has only the versioned name."""
     found = find_library("ngspice")
@@ -73,6 +94,27 @@ def _find_library() -> str | None:
     return found
 
 
+@contextmanager
+def _caught_signals(fail: Callable[[BaseException], None]) -> Iterator[None]:
+    """Hand what Ctrl-C raises to ``fail``: raised outside a callback's try, C would swallow it."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+
+    def interrupted(number: int, frame: FrameType | None) -> None:
+        try:
+            before(number, frame)
+        except BaseException as failure:
+            fail(failure)
+
+    signal.signal(signal.SIGINT, interrupted)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 class Engine(Shared.NgSpiceShared):
     """One ngspice library, with the callbacks of the run under way.
 
@@ -80,7 +122,10 @@ class Engine(Shared.NgSpiceShared):
     """
 
     def __init__(self, library: str) -> None:
-        self.LIBRARY_PATH = library
+        # A path is made absolute, since it is opened from another folder; a bare name is not.
+        self.LIBRARY_PATH = os.path.abspath(library) if os.sep in library else library
+        self.poisoned = False
+        """ngspice has given up for good: nothing runs in this process's library any more."""
         self._leader: Leader | None = None
         self._failure: BaseException | None = None
         self._sources: dict[bytes, Callable[[float], float]] = {}
@@ -89,13 +134,16 @@ class Engine(Shared.NgSpiceShared):
         self._values: list[float] = []
         self._time_place = -1
         self._time = self._told = 0.0
-        super().__init__(ngspice_id=0, send_data=True)
-        self._library: Any = self._ngspice_shared
-        # PySpice leaves GetSyncData out; a second call puts it in beside its own.
-        self._sync_c = _ffi.callback("GetSyncData", self._get_sync_data)
-        self._library.ngSpice_Init_Sync(
-            self._get_vsrc_data_c, self._get_isrc_data_c, self._sync_c, _ffi.NULL, self._self_c
-        )
+        with _caught_signals(self._fail), _nowhere():
+            super().__init__(ngspice_id=0, send_data=True)
+            self._library: Any = self._ngspice_shared
+            # PySpice leaves GetSyncData out; a second call puts it in beside its own.
+            self._sync_c = _ffi.callback("GetSyncData", self._get_sync_data)
+            self._library.ngSpice_Init_Sync(
+                self._get_vsrc_data_c, self._get_isrc_data_c, self._sync_c, _ffi.NULL, self._self_c
+            )
+        if self._failure is not None:
+            raise self._failure
 
     def run_transient(self, deck: str, save: tuple[str, ...], leader: Leader) -> None:
         """Run the transient analysis of ``deck``; ``save`` are its saved vectors, in this order.
@@ -105,33 +153,46 @@ class Engine(Shared.NgSpiceShared):
         self._leader, self._failure = leader, None
         self._sources, self._save = {}, save
         self._time, self._told = 0.0, 0.0
+        self.clear_output()
         try:
-            self.load_circuit(deck)
-            self.clear_output()
-            # Not PySpice's run: it takes any word on stderr for a failure.
-            self._library.ngSpice_Command(b"run")
+            with _caught_signals(self._fail):
+                # Not PySpice's load_circuit and run: they take any word on stderr, and any node
+                # with "error" in its name, for a failure. What fails is known by what is missing.
+                self._load(deck)
+                if not self.poisoned:
+                    self._library.ngSpice_Command(b"run")
             if self._failure is not None:
                 raise self._failure
             if self._time > self._told:
                 leader.accepted(self._time, self._values, 0.0)
-        except (Shared.NgSpiceCircuitError, NameError) as error:
-            raise SimulationFailed(f"ngspice cannot load the netlist: {self.said()}") from error
         finally:
             self._leader = None
-            for command in (b"destroy all", b"remcirc"):
-                self._library.ngSpice_Command(command)
+            if not self.poisoned:
+                for command in (b"destroy all", b"remcirc"):
+                    self._library.ngSpice_Command(command)
+
+    def _load(self, deck: str) -> None:
+        lines = [_ffi.new("char[]", line.encode()) for line in (*deck.splitlines(), "")]
+        self._library.ngSpice_Circ(_ffi.new("char *[]", [*lines, _ffi.NULL]))
 
     def said(self) -> str:
-        """ngspice's last words of trouble, as the end of a message."""
-        words = [*self._stderr, *self._stdout]
-        telling = [w for w in words if "rror" in w or "too small" in w or "arning" in w]
-        return "; ".join(w.strip() for w in (telling or words)[:3]) or "it gave no reason."
+        """ngspice's own words of trouble, as the end of a message."""
+        words = [" ".join(word.split()) for word in (*self._stderr, *self._stdout)]
+        telling = [word for word in words if _TROUBLE.search(word) and not _NOISE.search(word)]
+        return "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
 
     def _fail(self, failure: BaseException) -> None:
         # An exception cannot pass through C. ngspice is made to give up (its sources become NaN,
         # no step can succeed), and run_transient() raises it then.
         if self._failure is None:
             self._failure = failure
+
+    @staticmethod
+    def _exit(
+        exit_status: int, immediate_unloding: bool, quit_exit: bool, ngspice_id: int, user_data: Any
+    ) -> int:
+        _ffi.from_handle(user_data).poisoned = True
+        return exit_status
 
     @staticmethod
     def _send_init_data(data: Any, ngspice_id: int, user_data: Any) -> int:
@@ -196,6 +257,23 @@ class Engine(Shared.NgSpiceShared):
         except BaseException as failure:
             self._fail(failure)
         return 0
+
+
+@contextmanager
+def _nowhere() -> Iterator[None]:
+    """In an empty folder that is also home: ngspice runs the .spiceinit that it finds in either."""
+    here, home = os.getcwd(), os.environ.get("HOME")
+    with TemporaryDirectory() as empty:
+        os.chdir(empty)
+        os.environ["HOME"] = empty
+        try:
+            yield
+        finally:
+            os.chdir(here)
+            if home is None:
+                del os.environ["HOME"]
+            else:
+                os.environ["HOME"] = home
 
 
 def _vector(name: str) -> str:

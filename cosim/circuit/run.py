@@ -2,20 +2,17 @@
 
 from array import array
 from collections.abc import Callable, Sequence
+from math import isfinite
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.circuit.netlist import LIMITS, prepare
+from cosim.circuit.netlist import prepare
 from cosim.circuit.ngspice import engine
 from cosim.coupling import Coupling
 from cosim.drive import Command
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene
-
-ELECTRICAL = ("i(vemf)", "v(v1)", "v(out)", "v(sense)")
-"""Vectors that every netlist has: the coils' total current, the command at the power amplifier's
-input, its output, the top of the sense resistor."""
 
 _AFTER_JUMP = 1e-7
 """s; longest step after a jump of the command: what ngspice remembers of the slopes before it
@@ -38,7 +35,7 @@ class CircuitRun:
         self._count = scene.coil.count
         self._jump = command.next_jump(0.0)
         self._time = 0.0
-        self._saved = ELECTRICAL + LIMITS[scene.circuit.model]
+        self._deck, self._saved = prepare(scene)
         self._log = array("d")
         self.attempts = 0
         """Steps that ngspice tried."""
@@ -61,11 +58,12 @@ class CircuitRun:
     def run(self) -> None:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         duration = self._scene.run.duration
-        engine().run_transient(prepare(self._scene, self._saved), self._saved, self)
+        engine().run_transient(self._deck, self._saved, self)
         if self._time < duration * (1 - 1e-9):
             raise SimulationFailed(
-                f"ngspice stopped at t = {self._time:.6g} s of {duration:g} s: {engine().said()} "
-                "A smaller circuit.max_step or another circuit.reltol may help."
+                f"ngspice stopped at t = {self._time:.6g} s of {duration:g} s: {engine().said()}. "
+                "If the circuit is right, a smaller circuit.max_step or another circuit.reltol may "
+                "help."
             )
 
     # What ngspice asks for (see cosim.circuit.ngspice.Leader).
@@ -80,7 +78,8 @@ class CircuitRun:
             offset = self._command.v_offset
             return self._held(self._command.v_dac, self._command.v_dac_before, offset)
         if name == "voffset":
-            return lambda time: self._command.v_offset
+            offset = self._command.v_offset
+            return self._held(self._command.v_offset_at, self._command.v_offset_before, offset)
         raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
 
     def _held(
@@ -101,6 +100,8 @@ class CircuitRun:
         self.attempts += 1
 
     def accepted(self, time: float, values: Sequence[float], next_step: float) -> float:
+        if not isfinite(sum(values)):
+            raise SimulationFailed(f"The circuit left the range of numbers at t = {time:.6g} s.")
         self._log.append(time)
         self._log.extend(values)
         self._time = time

@@ -32,6 +32,8 @@ class Key:
         if self.choices:
             quoted = [f'"{choice}"' for choice in self.choices]
             return quoted[0] if len(quoted) == 1 else f"one of {', '.join(quoted)}"
+        if self.kind is str:
+            return "the path of a file"
         if self.kind is bool:
             return "true or false"
         number = "a whole number" if self.kind is int else "a number"

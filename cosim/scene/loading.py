@@ -71,6 +71,7 @@ def _layers(source: str) -> list[_Layer]:
         stem = re.sub(r"[^\w.+-]+", "-", Path(source).stem).strip("-.+")[:64]
         data.setdefault("name", stem or "scene")
     _check_names(data, origin)
+    _find_netlist(data, Path(source).parent)
     base = data.pop("base", None)
     if base is None:
         return [_Layer(origin, data)]
@@ -169,7 +170,15 @@ def _overrides(overrides: Iterable[str]) -> dict[str, Any]:
             raise BadInput(f"--set {messages.plain(text)}: has no value.")
         _check_names({table: {key: None}}, "--set")
         tables.setdefault(table, {})[key] = _value(right.strip())
+    _find_netlist(tables, Path())
     return tables
+
+
+def _find_netlist(tables: dict[str, Any], folder: Path) -> None:
+    """Make the netlist's path, seen from ``folder``, one that means the same everywhere."""
+    netlist = tables.get("circuit", {}).get("netlist")
+    if isinstance(netlist, str):
+        tables["circuit"]["netlist"] = os.path.abspath(folder / netlist)
 
 
 def _value(text: str) -> Any:

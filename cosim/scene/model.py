@@ -57,6 +57,13 @@ class Scene(BaseModel):
     @model_validator(mode="after")
     def _check_reach(self) -> "Scene":
         drive = self.drive
+        if drive.pwm_ripple and self.circuit.model != "full":
+            raise fault(
+                'drive.pwm_ripple = true needs circuit.model = "full", which has the filter of '
+                "the offset pin",
+                "drive.pwm_ripple",
+                "circuit.model",
+            )
         if self.circuit.model == "none":
             return self
         if self.circuit.model == "full":

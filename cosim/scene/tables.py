@@ -28,6 +28,13 @@ def fault(sentence: str, *keys: str) -> PydanticCustomError:
     return PydanticCustomError("check", "{sentence}", {"sentence": sentence, "keys": keys})
 
 
+def _both_or_neither(table: str, values: BaseModel, *pair: str) -> None:
+    missing = [key for key in pair if getattr(values, key) is None]
+    if len(missing) == 1:
+        (there,) = set(pair) - set(missing)
+        raise fault(f"{table}.{there} needs {table}.{missing[0]} beside it", f"{table}.{there}")
+
+
 def is_number(value: object) -> bool:
     """Whether a value that is not validated yet can be calculated with: no huge int, no NaN."""
     return isinstance(value, int | float) and not isinstance(value, bool) and -1e9 < value < 1e9
@@ -62,6 +69,19 @@ class Drive(Table):
         False,
         "Firmware's staircase of 10-bit codes every 50 us; true for a sharp sawtooth "
         'with circuit.model = "full" unless given',
+    )
+    loop_time: float = _number(
+        0.0,
+        "s",
+        0.0,
+        1e-3,
+        "Time of one pass of the firmware's loop, which lengthens the staircase's steps; "
+        "0 makes each 50 us, the device needs about 22 us",
+    )
+    pwm_ripple: bool = _choice(
+        False,
+        "Offset pin as the 488.28 Hz PWM that it is, not as its mean; "
+        'with circuit.model = "full" only',
     )
     pot_max: float | None = _number(
         None, "1", 0.0, 1.0, "Knob that sets the DAC's maximum, instead of amplitude"
@@ -104,7 +124,7 @@ class Drive(Table):
     @model_validator(mode="after")
     def _check(self) -> "Drive":
         if self.waveform != "sawtooth":
-            for key in ("quantised", "reset_time", *KNOBS):
+            for key in ("quantised", "reset_time", "loop_time", *KNOBS):
                 if getattr(self, key):
                     raise fault(
                         f'drive.{key} is for drive.waveform = "sawtooth" only, '
@@ -128,6 +148,13 @@ class Drive(Table):
                 "drive.reset_time",
                 "drive.quantised",
             )
+        if self.loop_time and not (self.quantised and self.loop_time >= 5e-6):
+            raise fault(
+                f"drive.loop_time = {self.loop_time:g} s must be 0, or at least 5e-06 s with "
+                "drive.quantised = true",
+                "drive.loop_time",
+                "drive.quantised",
+            )
         if self.quantised and not 0.1 <= self.frequency <= 1e4:
             raise fault(
                 f"drive.frequency = {self.frequency:g} Hz must be a number from 0.1 to 10000 Hz "
@@ -141,11 +168,12 @@ class Drive(Table):
 class Circuit(Table):
     """What turns V1 into current."""
 
-    model: Literal["full", "amplifier", "ideal", "none"] = _choice(
+    model: Literal["full", "amplifier", "ideal", "none", "file"] = _choice(
         "amplifier",
         "Schematic with its difference amplifier, behavioural current source, "
-        "current = command, or no drive at all",
+        "current = command, no drive at all, or the netlist named in circuit.netlist",
     )
+    netlist: str | None = _choice(None, "A netlist of one's own, seen from the scene's file")
     supply: float = _number(18.0, "V", 0.1, 1e3, "Supply voltage, both signs")
     sense_resistance: float = _number(
         4.0, "Ohm", 1e-3, 1e6, "Sense resistor: current = V1 / sense_resistance"
@@ -164,6 +192,15 @@ class Circuit(Table):
     swing_loss_low: float = _number(
         4.0, "V", 0.0, 1e3, "Output's least distance to the negative supply"
     )
+    output_resistance: float = _number(
+        0.0, "Ohm", 0.0, 1e3, "Open-loop output resistance of the power amplifier"
+    )
+    snubber_resistance: float | None = _number(
+        None, "Ohm", 1e-3, 1e6, "Resistance of a snubber from the output to ground"
+    )
+    snubber_capacitance: float | None = _number(
+        None, "F", 1e-12, 1.0, "Capacitance in series with it; both or neither are given"
+    )
     reltol: float = _number(1e-5, "1", 1e-9, 1e-2, "Relative tolerance of ngspice")
     max_step: float = _number(1e-5, "s", 1e-9, 1e-2, "Largest time step of ngspice")
 
@@ -176,6 +213,13 @@ class Circuit(Table):
                     f"circuit.{key}",
                     "circuit.supply",
                 )
+        _both_or_neither("circuit", self, "snubber_resistance", "snubber_capacitance")
+        if (self.model == "file") != (self.netlist is not None):
+            raise fault(
+                'circuit.model = "file" and circuit.netlist must be given together',
+                "circuit.netlist",
+                "circuit.model",
+            )
         return self
 
 
@@ -197,11 +241,7 @@ class Coil(Table):
 
     @model_validator(mode="after")
     def _check(self) -> "Coil":
-        given = {"eddy_inductance": self.eddy_inductance, "eddy_resistance": self.eddy_resistance}
-        missing = [key for key, value in given.items() if value is None]
-        if len(missing) == 1:
-            (there,) = given.keys() - missing
-            raise fault(f"coil.{there} needs coil.{missing[0]} beside it", f"coil.{there}")
+        _both_or_neither("coil", self, "eddy_inductance", "eddy_resistance")
         return self
 
 

@@ -1,15 +1,15 @@
 """The command V1(t): shapes, exact jumps, no drift, and the firmware's staircase."""
 
 from fractions import Fraction
-from math import inf, nextafter, pi
+from math import floor, inf, nextafter, pi
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from cosim.drive import Command, Constant, Sawtooth, Sine, Square, Staircase, command
-from cosim.firmware import staircase
+from cosim.drive import Command, Constant, Sawtooth, Sine, Square, Staircase, WithPwm, command
+from cosim.firmware import passes, staircase
 from cosim.scene import load
 
 GAIN = 15 / 4.7
@@ -108,6 +108,34 @@ def firmware(maximum: int, frequency: float, number: type, steps: int) -> list[i
     return codes
 
 
+def device(maximum: int, frequency: float, loop_time: Fraction, count: int) -> list[int]:
+    """The same rules with passes of ``loop_time`` s: the DAC code after each, from a reset on.
+
+    A timer is read in whole microseconds. The code written is truncated and never below 0.
+    """
+    counter, dac, high = Fraction(0), 0, False
+    decremented = raised = Fraction(0)
+    codes: list[int] = []
+    before = 0
+    for n in range(1, 10**6):
+        now = n * loop_time
+        if floor((now - decremented) * 10**6) >= 50 and counter > 0:
+            counter -= maximum * Fraction(frequency) / 20_000
+            dac, decremented = max(0, int(counter)), now
+        elif counter <= 0:
+            if not high:
+                high, raised, dac = True, now, maximum
+            if floor((now - raised) * 10**6) >= 1:
+                high, counter = False, Fraction(maximum)
+        # the first reset after the start is like all later ones
+        if codes or (dac == maximum and n > 10 and before == 0):
+            codes.append(dac)
+        if len(codes) == count:
+            return codes
+        before = dac
+    raise AssertionError
+
+
 CASES = [(778, 20.0), (1023, 50.8), (100, 99.5), (1, 30.0), (512, 7.3)]
 
 
@@ -125,6 +153,29 @@ def test_staircase_is_close_to_single_precision(maximum: int, frequency: float) 
     assert max(abs(a - b) for a, b in zip(codes, there, strict=False)) <= 1
     # one step more, should the counter end just above zero
     assert there[len(codes)] in (maximum, 0)
+
+
+@pytest.mark.parametrize("loop_time", [5e-6, 22e-6, 25e-6, 32e-6, 60e-6])
+@pytest.mark.parametrize(("maximum", "frequency"), [(778, 20.0), (1023, 50.8), (100, 99.5)])
+def test_loop_time_is_the_firmware(maximum: int, frequency: float, loop_time: float) -> None:
+    codes = passes(staircase(maximum, frequency), loop_time)
+    exact = Fraction(round(loop_time * 1e6), 10**6)
+    there = device(maximum, frequency, exact, 2 * len(codes) + 5)
+    assert there == [codes[k % len(codes)] for k in range(len(there))]
+
+
+def test_loop_time_lowers_the_frequency() -> None:
+    drive = made("drive.loop_time=22e-6", scene="paper-full")
+    assert isinstance(drive, Staircase)
+    # by hand: 50 us are reached at the third pass; 999 steps of three passes, the maximum for two
+    # passes and 0 for one
+    assert drive.period == pytest.approx((999 * 3 + 2 + 1) * 22e-6)
+    assert drive.v_dac(0.0) == pytest.approx(778 / 1024 * 3.3)
+    assert drive.next_jump(0.0) == pytest.approx(44e-6)
+    assert drive.next_jump(44e-6 + 1e-9) == pytest.approx(110e-6)
+    reset = drive.period
+    assert drive.v_dac(reset - 11e-6) == 0.0
+    assert drive.v_dac(reset + 11e-6) == drive.v_dac(0.0)
 
 
 @pytest.mark.parametrize(
@@ -177,6 +228,85 @@ def test_knobs_reach_the_pins() -> None:
     drive = made("drive.pot_max=0.7", "drive.pot_offset=0.4", scene="paper-full")
     assert drive.v_dac(0.0) == pytest.approx(716 / 1024 * 3.3)
     assert drive.v_offset == pytest.approx(409 / 1024 * 3.3)
+
+
+# --- the offset pin's PWM ---------------------------------------------------------------------
+
+PWM = 488.28125
+
+
+def test_pwm_of_the_paper() -> None:
+    drive = made("drive.pwm_ripple=true", scene="paper-full")
+    # by hand: code 272 of 1024, a period of 2048 us; a pulse is 544 us wide, its middle at 0
+    mean = 272 / 1024 * 3.3
+    assert drive.v_offset == pytest.approx(mean)
+    assert drive.v_offset_at(-1.0) == drive.v_offset_before(0.0) == drive.v_offset
+    levels = [drive.v_offset_at(t * 1e-6) for t in (0, 271, 273, 1775, 1777, 2319, 2321)]
+    assert levels == [3.3, 3.3, 0.0, 0.0, 3.3, 3.3, 0.0]
+    edges, t = [], 0.0
+    while t < 0.1:
+        t = drive.next_jump(t)
+        if drive.v_offset_before(t) != drive.v_offset_at(t):
+            edges.append(t)
+    expected = [272e-6, *((k * 2048 + s * 272) * 1e-6 for k in range(1, 49) for s in (-1, 1))]
+    assert edges[: len(expected)] == pytest.approx(expected, abs=1e-12)
+
+
+def test_pwm_changes_nothing_else() -> None:
+    plain, drive = made(scene="paper-full"), made("drive.pwm_ripple=true", scene="paper-full")
+    times = np.linspace(0, 0.2, 7001)
+    assert list(drive.values(times)) == list(plain.values(times))
+    for t in map(float, times[:300]):
+        for name in ("value_before", "slope", "v_dac", "v_dac_before"):
+            assert getattr(drive, name)(t) == getattr(plain, name)(t)
+
+
+@pytest.mark.parametrize("pot", [0, 1])
+def test_pwm_without_edges(pot: int) -> None:
+    drive = made("drive.pwm_ripple=true", "drive.pot_max=0", f"drive.pot_offset={pot}",
+                 scene="paper-full")  # fmt: skip
+    assert drive.next_jump(0.0) == (inf if pot == 0 else 1023 / 1024 / 2 / PWM)
+    assert drive.v_offset_at(0.3) in (0.0, 3.3)
+
+
+def test_pwm_edges_do_not_stand_beside_those_of_the_staircase() -> None:
+    # every 25 periods an edge meets one of the 50 us steps, within rounding
+    drive = made("drive.pwm_ripple=true", "drive.pot_max=1", "drive.pot_offset=0.2442",
+                 "drive.frequency=20", scene="paper-full")  # fmt: skip
+    gaps, both, t = [], 0, 0.0
+    while t < 3.0:
+        before, t = t, drive.next_jump(t)
+        gaps.append(t - before)
+        both += drive.v_offset_before(t) != drive.v_offset_at(t) and (
+            drive.v_dac_before(t) != drive.v_dac(t)
+        )
+    assert min(gaps) > 1e-9
+    assert both > 50
+
+
+@given(code=st.integers(1, 1023), inner=st.sampled_from(["sawtooth", "square", "staircase"]),
+       t=st.floats(0, 1e4))  # fmt: skip
+def test_pwm_edges_are_exact(code: int, inner: str, t: float) -> None:
+    pin = code / 1024 * 3.3
+    command: Command = {
+        "sawtooth": Sawtooth(20.0, 8.0, -1.2),
+        "square": Square(31.7, 8.0, -1.2),
+        "staircase": Staircase(staircase(778, 20.0), pin),
+    }[inner]
+    command.v_offset = pin
+    drive, fresh = WithPwm(command), WithPwm(command)
+    for _ in range(5):
+        jump = drive.next_jump(t)
+        assert jump > t
+        old, new = drive.v_offset_before(jump), drive.v_offset_at(jump)
+        assert old != new or drive.value_before(jump) != drive.value(jump)
+        left, right = nextafter(jump, -inf), nextafter(jump, inf)
+        assert drive.v_offset_at(left) == drive.v_offset_before(left) == old
+        assert drive.v_offset_at(right) == drive.v_offset_before(right) == new
+        assert {old, new} <= {0.0, 3.3}
+        assert drive.next_jump(left) == jump
+        assert fresh.v_offset_at(t) == drive.v_offset_at(t)  # whatever was asked before
+        t = jump
 
 
 # --- everything at once -----------------------------------------------------------------------

@@ -22,6 +22,8 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "offset": -1.2,
         "reset_time": 0,
         "quantised": False,
+        "loop_time": 0,
+        "pwm_ripple": False,
         "pot_max": None,
         "pot_frequency": None,
         "pot_offset": None,
@@ -29,6 +31,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "circuit": {
         "model": "amplifier",
         "supply": 18,
+        "netlist": None,
         "sense_resistance": 4,
         "current_limit": 2.504,
         "gain_bandwidth": 1e6,
@@ -36,6 +39,9 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "slew_rate": 10e6,
         "swing_loss_high": 4.0,
         "swing_loss_low": 4.0,
+        "output_resistance": 0,
+        "snubber_resistance": None,
+        "snubber_capacitance": None,
         "reltol": 1e-5,
         "max_step": 1e-5,
     },
@@ -99,7 +105,8 @@ def test_every_key_is_described() -> None:
             assert key.low is not None and key.high is not None and key.low < key.high
             assert key.default is None or key.low <= float(key.default) <= key.high
         else:
-            assert key.kind is bool or (key.choices and key.default in key.choices)
+            free = key.kind is bool or key.full == "circuit.netlist"
+            assert free or (key.choices and key.default in key.choices)
 
 
 def test_built_in_scenes() -> None:
@@ -222,6 +229,8 @@ def _values(key: Key) -> st.SearchStrategy[Any]:
         return st.sampled_from(key.choices)
     if key.kind is bool:
         return st.booleans()
+    if key.kind is str:
+        return st.just("/somewhere/own.cir")
     if key.kind is int:
         return st.integers(int(key.low or 0), int(key.high or 0))
     assert key.low is not None and key.high is not None
@@ -245,6 +254,18 @@ def test_any_scene_comes_back(chosen: list[Key], description: str, data: st.Data
     with tempfile.TemporaryDirectory() as directory:
         assert load(written(Path(directory), to_toml(scene))) == scene
     assert Scene.model_validate(scene.as_dict()) == scene
+
+
+def test_netlist_is_seen_from_the_file_that_names_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "deep").mkdir()
+    monkeypatch.chdir(tmp_path)
+    text = '[circuit]\nmodel = "file"\nnetlist = "my.cir"\n'
+    (tmp_path / "deep" / "rig.toml").write_text(text, encoding="utf-8")
+    assert load("deep/rig.toml").circuit.netlist == str(tmp_path / "deep" / "my.cir")
+    given = load("paper", ["circuit.model=file", "circuit.netlist=my.cir"])
+    assert given.circuit.netlist == str(tmp_path / "my.cir")
 
 
 def test_scenes_are_frozen() -> None:

@@ -1,0 +1,332 @@
+"""The one door by which a netlist's text reaches ngspice.
+
+A netlist can run commands, write files and read files while ngspice merely loads it: ``.control``,
+``*#`` comments, a ``*ng_script`` title, code models, several device models and options. Hence
+nothing is searched for what is bad. Files are read and put together here, and only the lines, words
+and characters known to be needed for a circuit pass; ngspice sees neither comments nor file names.
+"""
+
+import re
+import stat
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn
+from unicodedata import category
+
+from cosim.errors import BadInput
+
+
+@dataclass(frozen=True)
+class Line:
+    """A logical line: comments stripped, continuations joined, where it began."""
+
+    text: str
+    file: str
+    number: int
+
+
+MAX_BYTES = 4_000_000
+MAX_LINES = 100_000
+MAX_LINE = 200_000
+MAX_WORD = 4_000
+MAX_DEPTH = 10
+
+
+def word_set(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+KEPT = word_set(
+    ".param .func .subckt .ends .model .ic .nodeset .global .options .option .opt .temp "
+    ".if .elseif .else .endif"
+)
+DROPPED = word_set(
+    ".tran .op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .meas .measure .save .print "
+    ".plot .probe .width .title .csparam .backanno .prot .unprot .protect .unprotect"
+)
+"""Analyses, output and remarks: a host sets its own."""
+ELEMENTS = frozenset("bcdefghijklmoqrstvwxz")
+"""First letters of elements. Not A (code models start processes and read files), N (compiled
+Verilog-A), U (translated to code models), P and Y (lossy lines, of no use here)."""
+
+NUMERIC_OPTIONS = word_set(
+    "abstol bypass chgtol convabs convlimit convstep cshunt defad defas defl defw gmin gminsteps "
+    "itl1 itl2 itl3 itl4 itl5 itl6 keepopinfo klu maxord method minbreak noopiter pivrel pivtol "
+    "ramptime reltol rshunt scale seed sparse srcsteps temp tnom trtol trytocompact vntol "
+    "xmu"
+)
+DROPPED_OPTIONS = word_set(
+    "acct autostop brief cptime filetype ingold interp limpts limtim list lvltim measdgt noacct "
+    "noinit nomod nopage node numdgt opts plotwinsize post probe savecurrents warn wnflag"
+)
+"""Options of output, which a host sets itself (``interp`` gives wrong waveforms)."""
+
+MODELS = word_set("r res c l d npn pnp nmos pmos vdmos njf pjf nmf pmf sw csw ltra")
+"""Not numd, nbjt, numos, whose cards name files, and no code models."""
+MOS_LEVELS = frozenset("123469")
+"""The BSIM models write a log into the working folder."""
+
+_INLINED = (".include", ".inc", ".lib")
+_TEXT = re.compile(r"[ -~]*")
+_UNSAFE = re.compile(r'["`\\]')
+_FILE_WORD = re.compile(r"\b(?:\w*_)?(?:file|filename|wavefile)\b", re.IGNORECASE)
+_COMMAND_COMMENT = re.compile(r"\*\s*(?:#\s*[\w!/.]|ng_script)", re.IGNORECASE)
+_TRAILING = re.compile(r";|//|(?:^|(?<=[\s,]))\$")
+_OPTION = re.compile(r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+))?\s*", re.IGNORECASE)
+_MODEL = re.compile(r"\.model\s+([^\s=(){}']+)\s+([a-z]\w*)(?![\w:])", re.IGNORECASE)
+_LEVEL = re.compile(r"(?<![\w.])level\s*(=?)\s*([^\s,()]*)", re.IGNORECASE)
+_PATH = re.compile(r"""\s*(?:"([^"]*)"|'([^']*)'|([^\s"']+))\s*([^\s"']*)\s*""")
+
+
+def refuse(line: Line, reason: str) -> NoReturn:
+    """Raise the one sentence that tells what is wrong with ``line``."""
+    raise BadInput(f"{line.file}:{line.number}: {reason}.")
+
+
+def shown(text: str) -> str:
+    """A piece of a netlist as it may stand in a message: short and printable."""
+    return ascii(text if len(text) <= 40 else f"{text[:37]}...")[1:-1]
+
+
+def read(path: Path) -> list[Line]:
+    """The netlist with its includes inlined: a harmless title, then the lines that ngspice needs.
+
+    The text ends at ``.end``, which is not among the lines. Raises BadInput, beginning with
+    ``file:line:``, for anything that is not plainly part of a circuit.
+    """
+    return _Reader(path).deck()
+
+
+@dataclass
+class _Reader:
+    """State of one ``read``: the folder it may not leave and what it has used of its limits."""
+
+    path: Path
+    lines: list[Line] = field(default_factory=list)
+    bytes_read: int = 0
+
+    def deck(self) -> list[Line]:
+        top = Line("", shown(self.path.name), 1)
+        try:
+            self.path = self.path.absolute()
+            self.folder = self.path.parent.resolve(strict=True)
+        except (OSError, ValueError, RuntimeError) as error:
+            refuse(top, f"the netlist cannot be read ({type(error).__name__})")
+        text = self._text(self.path, top)
+        title, rest = text.split("\n", 1) if "\n" in text else (text, "")
+        self.lines.append(Line(_title(Line(title, top.file, 1)), top.file, 1))
+        ended = self._take(_logical(rest, top.file, 2), (self.path,))
+        if not ended:
+            last = Line("", top.file, text.rstrip().count("\n") + 1)
+            refuse(last, "the netlist does not end with .end, so it may be cut short")
+        return self.lines
+
+    def _take(
+        self, lines: Iterator[Line], opened: tuple[Path, ...], section: str | None = None
+    ) -> bool:
+        """Take the lines of a file, or of one section of it; whether ``.end`` or the section was
+        met."""
+        inside = section is None
+        found = False
+        for line in lines:
+            word, rest = _directive(line)
+            if section is not None and word in (".lib", ".endl"):
+                name = rest.strip("\"' \t").lower()
+                if word == ".endl" or len(rest.split()) == 1:
+                    inside = word == ".lib" and name == section
+                    found = found or inside
+                    continue
+            if not inside:
+                continue
+            if word in _INLINED:
+                self._inline(line, rest, opened)
+            elif word == ".end" and section is None:
+                for after in lines:
+                    refuse(after, "there is text after .end, which must come last")
+                return True
+            elif (text := _passed(line, word, rest)) is not None:
+                self._add(Line(text, line.file, line.number))
+        return found
+
+    def _add(self, line: Line) -> None:
+        if len(self.lines) >= MAX_LINES:
+            refuse(line, f"the netlist with its includes has more than {MAX_LINES} lines")
+        self.lines.append(line)
+
+    def _inline(self, line: Line, rest: str, opened: tuple[Path, ...]) -> None:
+        match = _PATH.fullmatch(rest)
+        if match is None:
+            refuse(line, f"{shown(line.text)} does not name one file")
+        name = next(group for group in match.groups() if group is not None)
+        section = match[4].lower() or None
+        if section and not line.text.lower().startswith(".lib"):
+            refuse(line, f"{shown(line.text)} names more than one file")
+        path = self._inside(line, name, opened[-1])
+        if path in opened:
+            refuse(line, f"{shown(name)} includes itself")
+        if len(opened) >= MAX_DEPTH:
+            refuse(line, f"files include each other more than {MAX_DEPTH} deep")
+        file = shown(path.relative_to(self.folder).as_posix())
+        lines = _logical(self._text(path, line), file, 1)
+        if not self._take(lines, (*opened, path), section) and section:
+            refuse(line, f"{shown(name)} has no section {shown(section)}")
+
+    def _inside(self, line: Line, name: str, base: Path) -> Path:
+        """The regular file that an include means, if it lies in the netlist's own folder."""
+        parts = name.split("/")
+        if not name.isprintable() or re.search(r"[\\:$~|*?<>`;]", name):
+            refuse(line, f"{shown(name)} is no plain file name")
+        if name.startswith("/") or ".." in parts:
+            refuse(line, f"{shown(name)} must lie in the netlist's own folder")
+        try:
+            path = (base.parent / name).resolve(strict=True)
+            if path.is_relative_to(self.folder) and path.is_file():
+                return path
+        except (OSError, ValueError, RuntimeError):
+            refuse(line, f"{shown(name)} was not found in the netlist's folder")
+        refuse(line, f"{shown(name)} must be a file in the netlist's own folder")
+
+    def _text(self, path: Path, line: Line) -> str:
+        try:
+            # A pipe or a device would block or never end.
+            if not stat.S_ISREG(path.stat().st_mode):
+                refuse(line, f"{shown(path.name)} is no regular file")
+            with path.open("rb") as file:
+                data = file.read(MAX_BYTES - self.bytes_read + 1)
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or type(error).__name__
+            refuse(line, f"{shown(path.name)} cannot be read ({reason})")
+        self.bytes_read += len(data)
+        if self.bytes_read > MAX_BYTES:
+            refuse(line, f"the netlist with its includes is larger than {MAX_BYTES // 10**6} MB")
+        return _decoded(data, path.name)
+
+
+def _decoded(data: bytes, name: str) -> str:
+    """The text, lines ended by line feeds; any other sign that some program takes for a line's end
+    or does not show is refused."""
+    try:
+        text = data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        line = Line("", shown(name), data.count(b"\n", 0, error.start) + 1)
+        refuse(line, "the text is not UTF-8")
+    for place, char in enumerate(text):
+        if char not in "\n\t" and category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
+            line = Line("", shown(name), text.count("\n", 0, place) + 1)
+            refuse(line, f"the control character U+{ord(char):04X} cannot stand in a netlist")
+    return text
+
+
+def _title(line: Line) -> str:
+    """The title as a comment, which ngspice takes for neither a script nor a directive."""
+    title = line.text.strip()
+    if "ng_script" in title.lower():
+        refuse(line, "the title makes the netlist a script of commands")
+    word, rest = _directive(line)
+    if word == ".title":
+        title = rest
+    elif word:
+        refuse(line, f"the first line is the title and cannot be {shown(word)}")
+    words = re.sub(r"[^\w ,.:()/+-]", " ", title, flags=re.ASCII).split()
+    return f"* {' '.join(words)[:200] or 'netlist'}"
+
+
+def _logical(text: str, file: str, first: int) -> Iterator[Line]:
+    """The lines with content, without comments, continuations joined to what they continue."""
+    pending: Line | None = None
+    for number, raw in enumerate(text.split("\n"), first):
+        content = _without_comment(Line(raw, file, number))
+        if not content:
+            continue
+        line = Line(content, file, number)
+        if content.startswith("+"):
+            if pending is None:
+                refuse(line, "the line continues nothing")
+            content = f"{pending.text} {content[1:].strip()}"
+            pending = Line(content, file, pending.number)
+        else:
+            if pending is not None:
+                yield pending
+            pending = line
+        if len(content) > MAX_LINE:
+            refuse(line, f"the line is longer than {MAX_LINE} characters")
+    if pending is not None:
+        yield pending
+
+
+def _without_comment(line: Line) -> str:
+    content = line.text.strip()
+    if content.startswith("*"):
+        if _COMMAND_COMMENT.match(content):
+            refuse(line, "a comment that begins with *# or *ng_script is a command to ngspice")
+        return ""
+    end = _TRAILING.search(content)
+    return " ".join((content[: end.start()] if end else content).split())
+
+
+def _directive(line: Line) -> tuple[str, str]:
+    """The dot word of a line, lower case, and what follows; no word for an element."""
+    text = line.text.strip()
+    if not text.startswith("."):
+        return "", text
+    match = re.match(r"\.[^\s=({'\"]*", text)
+    word = match[0] if match else "."
+    return word.lower(), text[len(word) :].strip()
+
+
+def _passed(line: Line, word: str, rest: str) -> str | None:
+    """The line's text if ngspice may see it, None if it is dropped."""
+    if "ng_script" in line.text.lower():
+        refuse(line, "ng_script would make the netlist a script of commands")
+    if word in DROPPED:
+        return None
+    if word and word not in KEPT:
+        refuse(line, f"{shown(word)} is not allowed in a netlist")
+    if not _TEXT.fullmatch(line.text) or _UNSAFE.search(line.text):
+        odd = next(c for c in line.text if not " " <= c <= "~" or c in '"`\\')
+        refuse(line, f"the character {shown(odd)} cannot stand in a netlist outside comments")
+    if max(map(len, line.text.split())) > MAX_WORD:
+        refuse(line, f"a word is longer than {MAX_WORD} characters")
+    if found := _FILE_WORD.search(line.text):
+        refuse(line, f"{shown(found[0])} is not allowed, as a netlist may not name files")
+    if word in (".options", ".option", ".opt"):
+        return _options(line, word, rest)
+    if word == ".model":
+        _check_model(line)
+    elif not word and line.text[0].lower() not in ELEMENTS:
+        letter = line.text.split()[0]
+        refuse(line, f"{shown(letter)} is no element that a netlist may have")
+    return line.text
+
+
+def _options(line: Line, word: str, rest: str) -> str | None:
+    kept: list[str] = []
+    place = 0
+    while place < len(rest):
+        match = _OPTION.match(rest, place)
+        if match is None:
+            refuse(line, f"{shown(rest[place:])} is no option")
+        name = match[1].lower()
+        if name in NUMERIC_OPTIONS:
+            kept.append(match[0].strip())
+        elif name not in DROPPED_OPTIONS:
+            refuse(line, f"the option {shown(name)} is not allowed in a netlist")
+        place = match.end()
+        while rest[place : place + 1] in (",", " "):
+            place += 1
+    return f"{word} {' '.join(kept)}" if kept else None
+
+
+def _check_model(line: Line) -> None:
+    match = _MODEL.match(line.text)
+    if match is None:
+        refuse(line, f"{shown(line.text)} is no complete .model line")
+    kind = match[2].lower()
+    if kind not in MODELS:
+        refuse(line, f"models of type {shown(kind)} are not allowed in a netlist")
+    if kind not in ("nmos", "pmos"):
+        return
+    for equals, level in _LEVEL.findall(line.text):
+        if not equals or level not in MOS_LEVELS:
+            refuse(line, f"MOS models of level {shown(level)} are not allowed: some write files")

@@ -1,0 +1,75 @@
+"""The words of a netlist's line: brackets, assignments and definitions, as ngspice splits them."""
+
+import re
+
+_ASSIGNED = re.compile(r"\s*(?<![<>=!])=(?!=)\s*")
+_DEFINITION = re.compile(r"([a-z_]\w*)\s*(\([^()]*\))?\s*=(?!=)\s*", re.IGNORECASE)
+
+
+def words(text: str) -> list[str]:
+    """The words of a line, lower case: ``{…}`` and ``'…'`` whole, ``key=value`` in one."""
+    found: list[str] = []
+    word = ""
+    place = 0
+    text = text.lower()
+    while place < len(text):
+        char = text[place]
+        if char in "{'":
+            end = closing(text, place)
+            word += text[place:end]
+            place = end
+        elif assigned := _ASSIGNED.match(text, place):
+            word = (word or (found.pop() if found else "")) + "="
+            place = assigned.end()
+        else:
+            if char in " \t,()":
+                if word:
+                    found.append(word)
+                word = ""
+            else:
+                word += char
+            place += 1
+    return [*found, word] if word else found
+
+
+def closing(text: str, place: int) -> int:
+    """The place after the bracket that closes the one at ``place`` (the text's end if none)."""
+    if text[place] == "'":
+        return (text.find("'", place + 1) + 1) or len(text)
+    opening = text[place]
+    shutting = {"{": "}", "(": ")"}[opening]
+    depth = 0
+    for i in range(place, len(text)):
+        depth += (text[i] == opening) - (text[i] == shutting)
+        if depth == 0:
+            return i + 1
+    return len(text)
+
+
+def definitions(text: str) -> list[tuple[tuple[str, str | None], str]]:
+    """The definitions of a ``.param`` line: name, formal parameters (of a function), expression."""
+    body = text.partition(" ")[2].lower()
+    starts: list[re.Match[str]] = []
+    place = 0
+    while place < len(body):
+        match = _DEFINITION.match(body, place)
+        if match and (place == 0 or not (body[place - 1].isalnum() or body[place - 1] == "_")):
+            starts.append(match)
+            place = match.end()
+        elif body[place] in "{'":
+            place = closing(body, place)
+        else:
+            place += 1
+    ends = [match.start() for match in starts[1:]] + [len(body)]
+    return [
+        ((match[1], match[2]), body[match.end() : end].strip(" ,"))
+        for match, end in zip(starts, ends, strict=False)
+    ]
+
+
+def split_assignments(found: list[str]) -> tuple[list[str], list[str]]:
+    """Words up to the first ``key=value`` or ``params:``, and the assignments after them."""
+    for i, word in enumerate(found):
+        if word in ("params:", "optional:", "text:") or "=" in word:
+            return found[:i], [word for word in found[i:] if "=" in word]
+    return found, []

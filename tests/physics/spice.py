@@ -1,0 +1,135 @@
+"""Runs decks in plain ngspice, through its shared library in a process of its own.
+
+ngspice keeps state, and an error in a netlist disables the library for good.
+"""
+
+import ctypes.util
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+CIRCUITS = Path(__file__).resolve().parents[2] / "circuits"
+LIBRARY = os.environ.get("NGSPICE_LIBRARY_PATH") or ctypes.util.find_library("ngspice")
+
+# Loads each deck, runs it, stores its last plot and its step counts; EXTERNAL sources
+# named in `external` follow (t, value) points, joined by straight lines.
+CHILD = r"""
+import json, logging, re, sys
+import numpy as np
+logging.disable(logging.CRITICAL)
+from PySpice.Spice.NgSpice.Shared import NgSpiceShared
+job = json.load(sys.stdin)
+class Shared(NgSpiceShared):
+    log = []
+    def send_char(self, message, ngspice_id):
+        self.log.append(message)
+        return 0
+    def get_vsrc_data(self, voltage, time, node, ngspice_id):
+        voltage[0] = np.interp(time, *job["external"][node.lower()])
+        return 0
+    def do(self, command):
+        try:
+            return self.exec_command(command)
+        except Exception:  # the wrapper takes any message on stderr for an error
+            return self.stdout
+ngspice = Shared()
+for deck in job["decks"]:
+    ngspice.log.clear()
+    ngspice.do("source " + deck)
+    ngspice.do("run")
+    usage = ngspice.do("rusage all")
+    count = {k: int(float(m.group(1))) for k, p in
+             (("accepted", "Accepted timepoints"), ("rejected", "Rejected timepoints"),
+              ("iterations", "Total iterations"))
+             if (m := re.search(p + r" = (\S+)", usage))}
+    plot = ngspice.plot(None, ngspice.last_plot)
+    np.savez(deck + ".npz", **{k: np.array(v._data) for k, v in plot.items()})
+    with open(deck + ".json", "w") as file:
+        json.dump({"count": count, "log": ngspice.log}, file)
+"""
+
+
+class Result(dict):
+    """Vectors by lower-case name (branch currents as vemf#branch), `count`, `log`."""
+
+    count: dict
+    log: list
+
+
+def run_all(folder, *decks, external=None) -> list[Result]:
+    """Runs the decks (text) in `folder`, beside copies of the libraries."""
+    for library in CIRCUITS.glob("*.lib"):
+        shutil.copy(library, folder)
+    paths = []
+    for number, deck in enumerate(decks):
+        path = folder / f"deck{number}.cir"
+        path.write_text(deck)
+        paths.append(str(path))
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD],
+        input=json.dumps({"decks": paths, "external": external or {}}),
+        env={**os.environ, "NGSPICE_LIBRARY_PATH": str(LIBRARY)},
+        cwd=folder,
+        text=True,
+        capture_output=True,
+        timeout=120,
+    )
+    results = []
+    for path in paths:
+        if not Path(path + ".json").exists():
+            raise AssertionError(f"ngspice failed:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
+        with np.load(path + ".npz") as data:
+            result = Result({k.lower(): data[k] for k in data.files})
+        stored = json.loads(Path(path + ".json").read_text())
+        result.count, result.log = stored["count"], stored["log"]
+        results.append(result)
+    return results
+
+
+def run(folder, deck, external=None) -> Result:
+    return run_all(folder, deck, external=external)[0]
+
+
+def netlist(name, *edits, tran=None, options=None, **parameters):
+    """A netlist with parameters overridden as the host does, lines replaced by expression."""
+    text = (CIRCUITS / f"{name}.cir").read_text()
+    edits = list(edits)
+    edits += [(rf"^\.param {k}=.*$", f".param {k}={v!r}") for k, v in parameters.items()]
+    if tran:
+        edits.append((r"^\.tran.*$", tran))
+    if options:
+        edits.append((r"^\.options.*$", ".options " + options))
+    for pattern, new in edits:
+        text, number = re.subn(pattern, lambda m, new=new: new, text, flags=re.M)
+        assert number == 1, f"{pattern} matches {number} lines of {name}.cir"
+    return text
+
+
+def opamp(kind, body, analysis, **parameters):
+    """A bench for one operational amplifier at +-18 V; nodes inp, inn, out."""
+    pins = "inp inn out vcc vee" + (" swing climit slewing" if kind == "opa548" else "")
+    values = " ".join(f"{k}={v}" for k, v in parameters.items())
+    return f"""bench
+.include {kind}.lib
+Vplus vcc 0 18
+Vminus vee 0 -18
+X1 {pins} {kind} {values}
+{body}
+.options reltol=1e-5 method=gear
+{analysis}
+.end
+"""
+
+
+def crossing(frequency, gain):
+    """Frequency at which |gain| falls through one, on logarithmic axes."""
+    level = np.log(np.abs(gain))
+    k = np.flatnonzero((level[:-1] >= 0) & (level[1:] < 0))[-1]
+    part = level[k] / (level[k] - level[k + 1])
+    return float(np.exp(np.interp(part, [0, 1], np.log(np.abs(frequency[k : k + 2])))))
