@@ -360,6 +360,7 @@ def bits():
     return simulate(load("paper", ["run.duration=0.02"])).waveforms["z_part"].tobytes()
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
     before = bits()
     for number in range(12):
         # a true signal: it reaches the main thread in the midst of ngspice's C
