@@ -6,11 +6,8 @@ One C compiler run makes one library with both interfaces; `stickslip-fmi2.fmu` 
 
 import hashlib
 import math
-import os
 import re
-import shlex
 import shutil
-import subprocess
 import sys
 import tempfile
 import zipfile
@@ -23,14 +20,13 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
+from cosim.compiler import COMPILE_FLAGS, LIBRARY_FLAGS, build_directory, compiler, execute
 from cosim.errors import BadInput
-from cosim.resources import REPOSITORY, fmu_sources, licence
+from cosim.resources import fmu_sources, licence
 
 MODEL = "stickslip"
 VERSIONS = (2, 3)
 HOST_TOOL = "describe.c"
-COMPILE_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra")
-LIBRARY_FLAGS = ("-fPIC", "-shared", "-fvisibility=hidden")
 LARGEST_FILE = 50_000_000  # bytes, when unpacking
 
 
@@ -128,20 +124,6 @@ def _trial_run(version: int) -> float:
     return z_part
 
 
-def build_directory() -> Path:
-    """`fmu/build` in a checkout that may be written to, else a folder of the user's cache."""
-    checkout = REPOSITORY / "fmu"
-    if fmu_sources() == checkout and os.access(checkout, os.W_OK):
-        return checkout / "build"
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "cosim" / "fmu"
-
-
 @cache
 def token() -> str:
     """A hash of all that the FMU files are made of: their GUID and instantiation token."""
@@ -163,33 +145,12 @@ def _headers() -> list[Path]:
     return sorted([*root.glob("src/*.h"), *root.glob("src/*.def"), *root.glob("include/*.h")])
 
 
-def _compiler() -> list[str]:
-    chosen = shlex.split(os.environ.get("CC", ""))
-    if chosen:
-        return chosen
-    for name in ("cc", "gcc", "clang"):
-        if shutil.which(name):
-            return [name]
-    raise BadInput("No C compiler was found; install gcc or clang, or name one in CC.")
-
-
-def _run(command: list[str]) -> bytes:
-    try:
-        done = subprocess.run(command, capture_output=True, check=False)
-    except OSError as error:
-        raise BadInput(f"{command[0]} cannot be run: {error.strerror}.") from error
-    if done.returncode:
-        lines = done.stderr.decode(errors="replace").splitlines()
-        first = next((line for line in lines if "error" in line), lines[0] if lines else "")
-        raise BadInput(f"{command[0]} failed while building the FMU: {first}")
-    return done.stdout
-
-
 def _compile(sources: list[Path], target: Path, flags: tuple[str, ...] = ()) -> None:
     root = fmu_sources()
     includes = [f"-I{root / 'include'}", f"-I{root / 'src'}", f"-DFMU_TOKEN={token()}"]
     files = [str(file) for file in sources]
-    _run([*_compiler(), *COMPILE_FLAGS, *flags, *includes, *files, "-o", str(target), "-lm"])
+    command = [*compiler(), *COMPILE_FLAGS, *flags, *includes, *files, "-o", str(target), "-lm"]
+    execute(command, "the FMU")
 
 
 def _compile_library(work: Path) -> bytes:
@@ -202,7 +163,7 @@ def _describe(work: Path, *arguments: str) -> bytes:
     tool = work / ("describe.exe" if sys.platform == "win32" else "describe")
     if not tool.exists():
         _compile([*_sources(), fmu_sources() / "src" / HOST_TOOL], tool)
-    return _run([str(tool), *arguments]).replace(b"\r\n", b"\n")
+    return execute([str(tool), *arguments], "the FMU").replace(b"\r\n", b"\n")
 
 
 def _library_place(version: int) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from cosim import fmu
+from cosim.compiler import COMPILE_FLAGS, compiler
 from cosim.resources import fmu_sources
 
 SANITIZE = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O1"]
@@ -17,7 +18,7 @@ LEAK = "#include <stdlib.h>\nint main(void) { char *volatile p = malloc(9); p = 
 def compile_with_sanitizers(sources: list[Path], program: Path) -> subprocess.CompletedProcess:
     root = fmu_sources()
     includes = [f"-I{root / 'include'}", f"-I{root / 'src'}", "-DFMU_TOKEN=harness"]
-    command = [*fmu._compiler(), *fmu.COMPILE_FLAGS, *SANITIZE, *includes, *map(str, sources)]
+    command = [*compiler(), *COMPILE_FLAGS, *SANITIZE, *includes, *map(str, sources)]
     return subprocess.run([*command, "-o", str(program), "-lm"], capture_output=True, text=True)
 
 

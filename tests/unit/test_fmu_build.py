@@ -17,6 +17,7 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from cosim import fmu
+from cosim.compiler import compiler
 from cosim.errors import BadInput
 from cosim.resources import circuits, fmu_sources, licence
 
@@ -152,9 +153,9 @@ def test_the_sources_inside_build_by_themselves(
     fmu.extract(built[version], tmp_path)
     sources = tmp_path / "sources"
     library = tmp_path / "own.so"
-    compiler = fmu._compiler()
+    command = compiler()
     files = sorted(str(path) for path in sources.glob("*.c"))
-    subprocess.run([*compiler, "-shared", "-fPIC", *files, "-lm", "-o", str(library)], check=True)
+    subprocess.run([*command, "-shared", "-fPIC", *files, "-lm", "-o", str(library)], check=True)
     instantiate = ctypes.CDLL(str(library)).fmi2Instantiate
     instantiate.restype = ctypes.c_void_p
     arguments = (None, None, False, False)
@@ -243,7 +244,7 @@ def test_outside_a_checkout_the_cache_is_used(
 ) -> None:
     if os.name != "posix" or fmpy.system != "linux":
         pytest.skip("the place differs by system")
-    monkeypatch.setattr(fmu, "REPOSITORY", tmp_path)
+    monkeypatch.setattr("cosim.compiler.REPOSITORY", tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     assert fmu.build_directory() == tmp_path / "cache" / "cosim" / "fmu"
     folder = fmu.unpacked(3)

@@ -1,0 +1,289 @@
+/* Motion of a part that is pressed against a surface whose velocity is prescribed.
+
+   All forces stand as accelerations, force over the part's mass, m/s^2. law[] holds
+       [0] mu_s F_n/m   the most that the surface can do while the part sticks to it
+       [1] mu_k F_n/m   what it does while the part slips
+       [2] mu_p F_n/m   friction of the springed plate, against the part's own velocity
+       [3] g            gravity along the motion, downwards
+   The surface's velocity is linear between knots (time, v); a time that is repeated is a jump. The
+   knots repeat `periods` times. Every function writes height, velocity and the time spent sticking
+   so far, and returns the number of changes between sticking and slipping. */
+
+#include <float.h>
+#include <math.h>
+#include <stddef.h>
+
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+enum { STATIC, KINETIC, PLATE, GRAVITY };
+enum { MOST_EVENTS = 64 }; /* in one piece; a handful suffices, and after these it is ended */
+
+typedef struct {
+    long count; /* of knots */
+    const double *time, *v;
+    long periods;
+} Surface;
+
+typedef struct {
+    double a;  /* acceleration of the part */
+    int side;  /* sign of part minus surface velocity; 0 sticks */
+} Mode;
+
+typedef struct {
+    long count, next; /* of times; the next to be written */
+    const double *time; /* NULL: at the knots */
+    double *z, *v, *stuck;
+} Output;
+
+static int sign(double x) { return (x > 0) - (x < 0); }
+
+/* What moves the part from here on, while the surface's acceleration is `slope`. Sticking comes
+   first, as the law has it; else the surface pulls the part the way that sticking would have
+   needed, but too weakly. `slack` is what rounding leaves open of the needed acceleration. */
+static Mode decide(const double *law, double relative, double v, double slope, double slack)
+{
+    int side = sign(relative), way = sign(v);
+    if (side == 0) {
+        const int going = way ? way : sign(slope);
+        double need = slope + law[GRAVITY] + going * law[PLATE];
+        if (going == 0) /* all at rest: the plate carries what it can */
+            need = copysign(fmax(0.0, fabs(law[GRAVITY]) - law[PLATE]), law[GRAVITY]);
+        if (fabs(need) <= law[STATIC] + slack)
+            return (Mode){slope, 0};
+        side = need > 0 ? -1 : 1;
+    }
+    const double down = law[GRAVITY] + side * law[KINETIC];
+    if (way == 0) {
+        if (fabs(down) <= law[PLATE] + slack)
+            return (Mode){law[PLATE] > 0 ? 0.0 : -down, side};
+        way = down > 0 ? -1 : 1;
+    }
+    return (Mode){-down - way * law[PLATE], side};
+}
+
+static void emit(Output *out, double z, double v, double stuck)
+{
+    out->z[out->next] = z;
+    out->v[out->next] = v;
+    out->stuck[out->next++] = stuck;
+}
+
+/* Exact: from event to event in closed form. A difference of velocities below what rounding can
+   have made of zero (`noise`, a bound that grows with each piece and begins anew when the part
+   sticks) is zero, so that an event on a knot is not missed by a bit. */
+EXPORT long part_exact(long knots, const double *time, const double *v_surface, long periods,
+                       const double *law, double z, double v, long outputs, const double *at,
+                       double *z_out, double *v_out, double *stuck_out)
+{
+    const double period = time[knots - 1] - time[0], eps = DBL_EPSILON;
+    const double forces = law[STATIC] + law[PLATE] + fabs(law[GRAVITY]);
+    Output out = {at ? outputs : periods * knots, 0, at, z_out, v_out, stuck_out};
+    double stuck = 0.0, noise = 0.0;
+    int sticks = -1; /* unknown yet */
+    long events = 0;
+
+    for (long k = 0; k < periods; k++) {
+        const double shift = (double)k * period;
+        while (at && k == 0 && out.next < out.count && at[out.next] <= time[0])
+            emit(&out, z, v, stuck);
+        if (!at)
+            emit(&out, z, v, stuck);
+        for (long i = 1; i < knots; i++) {
+            const double start = time[i - 1], length = time[i] - start;
+            const double begin = v_surface[i - 1], end = v_surface[i];
+            double left = length, done = 0.0, speed = begin;
+            if (length > 0) {
+                const double slope = (end - begin) / length;
+                const double late = eps * (fabs(start) + fabs(time[i])); /* rounding of times */
+                const double slack = 4 * eps * (forces + fabs(slope))
+                    + (2 * eps * (fabs(begin) + fabs(end)) + late * fabs(slope)) / length;
+                const double here = 2 * eps * (fabs(begin) + fabs(end)) + late * fabs(slope);
+                for (int n = 0; left > 0; n++) {
+                    double relative = v - speed;
+                    if (fabs(relative) <= noise)
+                        relative = 0.0;
+                    if (law[PLATE] > 0 && fabs(v) <= noise)
+                        v = 0.0;
+                    const Mode mode = decide(law, relative, v, slope, slack);
+                    const double rate = mode.a - slope;
+                    double tau = left;
+                    int meet = 0, rest = 0;
+                    const int open = n < MOST_EVENTS;
+                    if (open && relative * rate < 0 && -relative / rate <= tau) {
+                        tau = -relative / rate;
+                        meet = 1;
+                    }
+                    if (open && law[PLATE] > 0 && v * mode.a < 0 && -v / mode.a <= tau) {
+                        meet = meet && -v / mode.a == tau;
+                        tau = -v / mode.a;
+                        rest = 1;
+                    }
+                    if (sticks >= 0 && sticks != (mode.side == 0))
+                        events++;
+                    sticks = mode.side == 0;
+
+                    const int last = !(tau < left);
+                    while (at && out.next < out.count) {
+                        const double since = at[out.next] - shift - start - done;
+                        if (!(since <= tau))
+                            break;
+                        const double dt = since > 0 ? since : 0.0;
+                        emit(&out, z + dt * (v + 0.5 * mode.a * dt), v + mode.a * dt,
+                             stuck + (sticks ? dt : 0.0));
+                    }
+                    const double before = v;
+                    done += tau;
+                    left = last ? 0.0 : length - done;
+                    speed = last ? end : begin + slope * done;
+                    v = rest ? 0.0 : sticks || meet ? speed : v + mode.a * tau;
+                    z += 0.5 * tau * (before + v);
+                    stuck += sticks ? tau : 0.0;
+                    if (sticks || meet)
+                        noise = 0.0;
+                    noise += here + 2 * eps * (fabs(before) + fabs(v)) + late * fabs(mode.a);
+                }
+            }
+            if (!at)
+                emit(&out, z, v, stuck);
+        }
+    }
+    while (out.next < out.count) /* times that rounding puts behind the end */
+        emit(&out, z, v, stuck);
+    return events;
+}
+
+/* The surface as the stepping schemes see it: times that never decrease. */
+typedef struct {
+    Surface surface;
+    long knot, period;
+} Cursor;
+
+static double velocity(Cursor *c, double t)
+{
+    const Surface *s = &c->surface;
+    const double length = s->time[s->count - 1] - s->time[0];
+    double local = t - (double)c->period * length;
+    while (local >= s->time[s->count - 1] && c->period + 1 < s->periods) {
+        local = t - (double)++c->period * length;
+        c->knot = 0;
+    }
+    while (c->knot + 2 < s->count && local >= s->time[c->knot + 1])
+        c->knot++;
+    const double t0 = s->time[c->knot], dt = s->time[c->knot + 1] - t0;
+    const double v0 = s->v[c->knot], v1 = s->v[c->knot + 1];
+    return dt > 0 ? v0 + (v1 - v0) * ((local - t0) / dt) : v1;
+}
+
+/* A threshold of velocity instead of the set-valued law: sticking is |part - surface| < v_min. */
+typedef struct {
+    Cursor cursor;
+    const double *law;
+    double v_min;
+    double t, speed; /* of the surface, at the last full step; t = infinity: there was none */
+} Threshold;
+
+/* The part's acceleration. The surface's is the difference quotient since the last full step, which
+   is what Simulink's Derivative block makes of an interpolated velocity. */
+static double regularised(Threshold *h, int full, double t, double v, int *sticks)
+{
+    const double speed = velocity(&h->cursor, t), relative = v - speed;
+    const double slope = h->t < t ? (speed - h->speed) / (t - h->t) : 0.0;
+    const double other = -h->law[GRAVITY] - (fabs(v) < h->v_min ? 0 : sign(v)) * h->law[PLATE];
+    const double need = slope - other;
+    if (full) {
+        h->t = t;
+        h->speed = speed;
+    }
+    *sticks = fabs(relative) < h->v_min && fabs(need) <= h->law[STATIC];
+    return (*sticks ? need : -sign(relative) * h->law[KINETIC]) + other;
+}
+
+/* The third-order method of Bogacki and Shampine with a fixed step (Simulink's ode3), events
+   ignored; rows 0...steps. */
+EXPORT long part_threshold(long knots, const double *time, const double *v_surface, long periods,
+                           const double *law, double z, double v, double step, double v_min,
+                           long steps, double *z_out, double *v_out, double *stuck_out)
+{
+    Threshold h = {{{knots, time, v_surface, periods}, 0, 0}, law, v_min, INFINITY, 0.0};
+    Output out = {steps + 1, 0, NULL, z_out, v_out, stuck_out};
+    double stuck = 0.0;
+    int before = -1, sticks, minor;
+    long events = 0;
+    emit(&out, z, v, stuck);
+    for (long n = 0; n < steps; n++) {
+        const double t = time[0] + (double)n * step;
+        const double a1 = regularised(&h, 1, t, v, &sticks), v2 = v + 0.5 * step * a1;
+        const double a2 = regularised(&h, 0, t + 0.5 * step, v2, &minor);
+        const double v3 = v + 0.75 * step * a2;
+        const double a3 = regularised(&h, 0, t + 0.75 * step, v3, &minor);
+        z += step * (2 * v + 3 * v2 + 4 * v3) / 9;
+        v += step * (2 * a1 + 3 * a2 + 4 * a3) / 9;
+        stuck += sticks ? step : 0.0;
+        events += before >= 0 && sticks != before;
+        before = sticks;
+        emit(&out, z, v, stuck);
+    }
+    return events;
+}
+
+/* Implicit in the friction (Moreau's time stepping): the velocity at the end of each step solves
+   the set-valued law, height by the trapezoidal rule; rows 0...steps. */
+EXPORT long part_moreau(long knots, const double *time, const double *v_surface, long periods,
+                        const double *law, double z, double v, double step, long steps,
+                        double *z_out, double *v_out, double *stuck_out)
+{
+    Cursor c = {{knots, time, v_surface, periods}, 0, 0};
+    Output out = {steps + 1, 0, NULL, z_out, v_out, stuck_out};
+    const double plate = step * law[PLATE];
+    double stuck = 0.0;
+    int before = -1;
+    long events = 0;
+    emit(&out, z, v, stuck);
+    for (long n = 0; n < steps; n++) {
+        const double t = time[0] + (double)(n + 1) * step, speed = velocity(&c, t);
+        const double free = v - step * law[GRAVITY], old = v;
+        double need = speed - free + sign(speed) * plate;
+        if (speed == 0) /* the plate's share is whatever helps, up to its limit */
+            need = copysign(fmax(0.0, fabs(free) - plate), -free);
+        const double late = 1 + fabs(t) / step; /* what the rounding of t can do */
+        const double slack = 8 * DBL_EPSILON * (fabs(v) + fabs(speed) + late * fabs(speed - v));
+        const int sticks = fabs(need) <= step * law[STATIC] + slack;
+        if (sticks) {
+            v = speed;
+        } else {
+            v = free + sign(need) * step * law[KINETIC];
+            v = fabs(v) <= plate ? 0.0 : v - sign(v) * plate;
+        }
+        z += 0.5 * step * (old + v);
+        stuck += sticks ? step : 0.0;
+        events += before >= 0 && sticks != before;
+        before = sticks;
+        emit(&out, z, v, stuck);
+    }
+    return events;
+}
+
+/* Mean |z - measured| at `outputs` times, for each of `count` laws: by part_exact where step is 0,
+   else by part_threshold, whose steps are then the times. scratch holds 3 * outputs numbers. */
+EXPORT void part_errors(long knots, const double *time, const double *v_surface, double v,
+                        long count, const double *laws, double step, double v_min, long outputs,
+                        const double *at, const double *measured, double *scratch, double *errors)
+{
+    double *z = scratch, *v_out = scratch + outputs, *stuck = scratch + 2 * outputs;
+    for (long i = 0; i < count; i++) {
+        if (step > 0)
+            part_threshold(knots, time, v_surface, 1, laws + 4 * i, 0.0, v, step, v_min,
+                           outputs - 1, z, v_out, stuck);
+        else
+            part_exact(knots, time, v_surface, 1, laws + 4 * i, 0.0, v, outputs, at, z, v_out,
+                       stuck);
+        double sum = 0.0;
+        for (long k = 0; k < outputs; k++)
+            sum += fabs(z[k] - measured[k]);
+        errors[i] = sum / (double)outputs;
+    }
+}
