@@ -148,11 +148,22 @@ static void start_from(const Model *m, double tau, Point *point)
     evaluate(m, point);
 }
 
+/* The prescribed velocity may have jumped; the part keeps its own. */
+static void set_surface(Model *m)
+{
+    const double jump = m->r.surface_velocity - m->y[V];
+    m->y[V] = m->r.surface_velocity;
+    if (fabs(jump) > 1e-12 * (1.0 + fabs(m->y[V]))) /* else what the ramp's rounding makes */
+        m->y[W] -= jump;
+}
+
 int advance(Model *m, double h, char *message)
 {
     Point now, end;
     int events = 0;
 
+    if (m->n.prescribed)
+        set_surface(m);
     settle_mode(m, 0.0);
     start_from(m, 0.0, &now);
     m->r.a_surface_max = m->r.a_surface_min = now.dy[V];

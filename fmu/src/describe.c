@@ -205,7 +205,8 @@ static void variables(int version)
 
 /* ---- structure ---- */
 
-/* Outputs that follow current and normal force at once; all others wait for the next step. */
+/* Outputs that follow current, normal force and a prescribed acceleration at once; all others wait
+ * for the next step. */
 static int has_feedthrough(size_t place)
 {
     switch (place) {
@@ -240,8 +241,9 @@ static void unknowns(int version, const char *element, int with_dependencies)
             continue;
         printf("    <%s %s=\"%u\"", element, key, real_key(version, i));
         if (with_dependencies && has_feedthrough(i))
-            printf(" dependencies=\"%u %u\" dependenciesKind=\"dependent dependent\"",
-                   real_key(version, PLACE(current)), real_key(version, PLACE(normal_force)));
+            printf(" dependencies=\"%u %u %u\" dependenciesKind=\"dependent dependent dependent\"",
+                   real_key(version, PLACE(current)), real_key(version, PLACE(normal_force)),
+                   real_key(version, PLACE(surface_acceleration)));
         else if (with_dependencies)
             printf(" dependencies=\"\" dependenciesKind=\"\"");
         puts("/>");

@@ -204,6 +204,8 @@ static int consistent(const Model *m, double tau, int slip, int plate, double sl
     const double scale = fabs(f.a_surface) + m->r.gravity;
     const double noise = force_noise(&f);
 
+    if (slip == 0 && plate == 0 && m->n.prescribed && f.a_surface != 0.0)
+        return 0; /* the surface moves off, and takes the part from the plate or leaves it */
     if (slip == 0) {
         if (w != 0.0 || fabs(f.friction) > m->r.mu_s * f.normal + noise)
             return 0;
@@ -312,7 +314,7 @@ void apply_event(Model *m, double tau, EventKind kind)
         break;
     case EVENT_SLIP_ENDS:
         m->y[W] = 0.0;
-        if (m->mode.plate == 0 && plate_acts(m))
+        if (m->mode.plate == 0 && plate_acts(m) && !m->n.prescribed)
             m->y[V] = 0.0;
         keep = 0;
         break;

@@ -29,8 +29,61 @@ static double penetration(const Model *m, const Mode *mode, const double y[N_STA
     return depth > 0.0 ? depth : 0.0;
 }
 
+static int held_by_plate(const Model *m, const Mode *mode)
+{
+    return mode->plate == 0 && m->r.mu_plate > 0.0;
+}
+
+/* Where the surface's motion is prescribed: the part alone, the ram standing still in the actuator. */
+static void forces_on_part(const Model *m, const Mode *mode, double tau, Forces *f)
+{
+    const Reals *p = &m->r;
+    const double part = part_mass_per_surface(m), weight = part * p->gravity;
+    const int held = held_by_plate(m, mode);
+
+    f->a_surface = p->surface_acceleration;
+    f->a_q = f->wall = f->drive = 0.0;
+    f->normal = fmax(0.0, p->normal_force + p->normal_force_slope * tau);
+    f->plate = -p->mu_plate * f->normal * mode->plate;
+    f->a_slip = 0.0;
+    if (mode->slip == 0 && held) {
+        /* At rest on both: who carries the weight is not determined; the surface does if it can. */
+        f->friction = fmin(weight, p->mu_s * f->normal);
+        f->plate = weight - f->friction;
+    } else if (mode->slip == 0) {
+        f->friction = part * f->a_surface + weight - f->plate;
+    } else {
+        f->friction = -p->mu_k * f->normal * mode->slip;
+        if (held)
+            f->plate = weight - f->friction;
+        f->a_slip = (f->friction + f->plate) / part - p->gravity - f->a_surface;
+        if (held)
+            f->a_slip = -f->a_surface;
+    }
+}
+
+static void rates_on_part(const Model *m, const Mode *mode, const Forces *f, ForceRates *rate)
+{
+    const double normal = f->normal > 0.0 ? m->r.normal_force_slope : 0.0;
+    const int held = held_by_plate(m, mode);
+
+    rate->wall = 0.0;
+    rate->normal = normal;
+    rate->plate = -m->r.mu_plate * normal * mode->plate;
+    if (mode->slip == 0)
+        rate->friction = held ? 0.0 : -rate->plate;
+    else
+        rate->friction = -m->r.mu_k * normal * mode->slip;
+    if (held)
+        rate->plate = -rate->friction;
+}
+
 void forces(const Model *m, const Mode *mode, const double y[N_STATES], double tau, Forces *f)
 {
+    if (m->n.prescribed) {
+        forces_on_part(m, mode, tau, f);
+        return;
+    }
     const Reals *p = &m->r;
     const double q = y[Q], u = y[U];
     const double part = part_mass_per_surface(m);
@@ -53,7 +106,7 @@ void forces(const Model *m, const Mode *mode, const double y[N_STATES], double t
     const double body = rest ? p->surface_mass + p->ram_mass : p->surface_mass;
     const double load = -p->flexure_stiffness * y[Z] - p->flexure_damping * y[V] -
                         body * p->gravity - (rest ? 0.0 : on_ram);
-    const int held = mode->plate == 0 && p->mu_plate > 0.0;
+    const int held = held_by_plate(m, mode);
 
     f->plate = -p->mu_plate * f->normal * mode->plate;
     if (mode->slip == 0) {
@@ -87,11 +140,15 @@ void forces(const Model *m, const Mode *mode, const double y[N_STATES], double t
 void force_rates(const Model *m, const Mode *mode, const double y[N_STATES], double tau,
                  const Forces *f, ForceRates *rate)
 {
+    if (m->n.prescribed) {
+        rates_on_part(m, mode, f, rate);
+        return;
+    }
     const Reals *p = &m->r;
     const double q = y[Q], u = y[U];
     const double part = part_mass_per_surface(m);
     const int rest = mode->wall == WALL_REST;
-    const int held = mode->plate == 0 && p->mu_plate > 0.0;
+    const int held = held_by_plate(m, mode);
 
     double own = force_factor_rate(m, q, u) * (p->current + p->current_slope * tau) +
                  force_factor_at(m, q) * p->current_slope -
@@ -141,9 +198,11 @@ void state_rates(const Model *m, const Mode *mode, const double y[N_STATES], dou
     dy[U] = f.a_q;
     dy[D] = y[W];
     dy[W] = f.a_slip;
-    dy[E_IN] = f.drive * y[U];
+    dy[E_IN] = m->n.prescribed ? f.friction * y[V] : f.drive * y[U];
     dy[E_FRICTION] = -f.friction * y[W] - f.plate * (y[V] + y[W]);
-    dy[E_DAMPING] = p->flexure_damping * y[V] * y[V] + p->suspension_damping * y[U] * y[U];
+    dy[E_DAMPING] = m->n.prescribed ? 0.0
+                                    : p->flexure_damping * y[V] * y[V] +
+                                          p->suspension_damping * y[U] * y[U];
     dy[E_IMPACT] = 0.0;
     if (mode->wall == WALL_TOUCH) {
         /* What the wall takes, less what its spring stores. */
@@ -166,6 +225,8 @@ double energy_stored(const Model *m, const double y[N_STATES])
     const Reals *p = &m->r;
     const double part = part_mass_per_surface(m);
     const double q = y[Q], v_ram = y[V] + y[U], v_part = y[V] + y[W];
+    if (m->n.prescribed)
+        return part * (0.5 * v_part * v_part + p->gravity * (y[Z] + y[D]));
     double kinetic = 0.5 * (p->ram_mass * v_ram * v_ram + p->surface_mass * y[V] * y[V] +
                             part * v_part * v_part);
     double weight = p->gravity * (p->ram_mass * (y[Z] + q) + p->surface_mass * y[Z] +

@@ -97,8 +97,6 @@ static double ram_balance(const Model *m, double q)
 static void hang_ram(Model *m)
 {
     double low = -m->r.travel, high = 0.0;
-    m->mode.wall = WALL_FREE;
-    m->mode.side = 0;
     if (ram_balance(m, low) < 0.0) {
         m->mode.side = -1;
         m->mode.wall = m->n.contact == 1 ? WALL_TOUCH : WALL_REST;
@@ -130,9 +128,15 @@ int model_initialise(Model *m, char *message)
         return -1;
     }
     memset(m->y, 0, sizeof m->y);
-    hang_ram(m);
-    m->y[Z] = -(m->r.ram_mass + m->r.surface_mass + part_mass_per_surface(m)) * m->r.gravity /
-              m->r.flexure_stiffness;
+    m->mode.wall = WALL_FREE;
+    m->mode.side = 0;
+    if (m->n.prescribed) {
+        m->y[V] = m->r.surface_velocity;
+    } else {
+        hang_ram(m);
+        m->y[Z] = -(m->r.ram_mass + m->r.surface_mass + part_mass_per_surface(m)) * m->r.gravity /
+                  m->r.flexure_stiffness;
+    }
     m->mode.slip = 0;
     m->mode.plate = 0;
     if (!isfinite(m->y[Q]))
@@ -163,6 +167,7 @@ int model_step(Model *m, double h, char *message)
     if (advance(m, h, message))
         return -1;
     m->r.current = current;
+    m->r.surface_velocity += m->r.surface_acceleration * h;
     m->r.normal_force = normal > 0.0 ? normal : 0.0;
     return 0;
 }
@@ -204,12 +209,13 @@ void model_outputs(Model *m)
 double model_derivative(const Model *m, size_t output, size_t input)
 {
     Model a = *m;
-    double *inputs[] = {&a.r.current, &a.r.normal_force};
+    double *inputs[] = {&a.r.current, &a.r.normal_force, &a.r.surface_acceleration};
     const size_t places[] = {offsetof(Reals, current) / sizeof(double),
-                             offsetof(Reals, normal_force) / sizeof(double)};
+                             offsetof(Reals, normal_force) / sizeof(double),
+                             offsetof(Reals, surface_acceleration) / sizeof(double)};
     Forces low, high;
 
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 3; i++) {
         if (input != places[i])
             continue;
         *inputs[i] = 0.0;

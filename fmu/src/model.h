@@ -100,8 +100,8 @@ int model_step(Model *m, double h, char *message);
 /* Refresh the outputs from state and inputs, after a step or a change of an input. */
 void model_outputs(Model *m);
 
-/* d(output)/d(current or normal_force) in the present mode, analytically exact: forces are affine in
- * both. 0 for every other pair. */
+/* d(output)/d(current, normal_force or surface_acceleration) in the present mode, analytically exact:
+ * forces are affine in all three. 0 for every other pair. */
 double model_derivative(const Model *m, size_t output, size_t input);
 
 #endif
