@@ -13,7 +13,7 @@ where the highest command needs V_DAC = 0. In truth it is a PWM, of which ``v_of
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Iterable
-from math import cos, floor, inf, pi, sin
+from math import floor, inf, pi, sin
 
 import numpy as np
 import numpy.typing as npt
@@ -48,10 +48,6 @@ class Command(ABC):
     @abstractmethod
     def value_before(self, t: float) -> float:
         """Left limit of V1 at ``t``, V; differs from ``value`` at jumps only."""
-
-    @abstractmethod
-    def slope(self, t: float) -> float:
-        """Right derivative of V1 at ``t``, V/s."""
 
     @abstractmethod
     def next_jump(self, t: float) -> float:
@@ -104,9 +100,6 @@ class Constant(Command):
     def value_before(self, t: float) -> float:
         return self.level
 
-    def slope(self, t: float) -> float:
-        return 0.0
-
     def next_jump(self, t: float) -> float:
         return inf
 
@@ -146,12 +139,6 @@ class Sawtooth(Command):
             return self.offset + 0.5 * self.amplitude
         return self.value(t)
 
-    def slope(self, t: float) -> float:
-        f = self.frequency
-        if self._fall and t >= (_edge_before(t, f) + self._rise) / f:
-            return -self.amplitude / self.reset_time
-        return self.amplitude * f / self._rise
-
     def next_jump(self, t: float) -> float:
         if not self._jumps:
             return inf
@@ -184,9 +171,6 @@ class Sine(Command):
     def value_before(self, t: float) -> float:
         return self.value(t)
 
-    def slope(self, t: float) -> float:
-        return pi * self.frequency * self.amplitude * cos(self._angle(t))
-
     def next_jump(self, t: float) -> float:
         return inf
 
@@ -210,9 +194,6 @@ class Square(Command):
     def value_before(self, t: float) -> float:
         half = _edge_before(t, self._rate)
         return self._level(half - 1 if t == half / self._rate else half)
-
-    def slope(self, t: float) -> float:
-        return 0.0
 
     def next_jump(self, t: float) -> float:
         return (_edge_before(t, self._rate) + 1) / self._rate if self.amplitude else inf
@@ -245,9 +226,6 @@ class Staircase(Command):
 
     def value_before(self, t: float) -> float:
         return self._levels[self._step_before(t) % len(self._levels)]
-
-    def slope(self, t: float) -> float:
-        return 0.0
 
     def next_jump(self, t: float) -> float:
         if not self._edges:
@@ -335,9 +313,6 @@ class WithPwm(Command):
 
     def value_before(self, t: float) -> float:
         return self._command.value_before(t)
-
-    def slope(self, t: float) -> float:
-        return self._command.slope(t)
 
     def v_dac(self, t: float) -> float:
         return self._command.v_dac(t)

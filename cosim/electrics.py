@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.drive import Command
+from cosim.errors import BadInput
 from cosim.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -87,6 +88,32 @@ def from_circuit(
         current_min=float(settled.min()),
         limited=limited,
     )
+
+
+def refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
+    """Refuse a netlist whose voltage between ``out`` and ``sense`` is not that of the scene's coil.
+
+    Over the run, v = R i + L di/dt + e must hold in its integral, with the scene's coil (an eddy
+    branch only adds a voltage without a mean). Raises BadInput: a source the wrong way round, not
+    in series with the coil, or values of the netlist's own would make a result without meaning.
+    """
+    coil = scene.coil
+    time, current = log["time"], log["i(vemf)"] / coil.count
+    h = np.diff(time)
+    mean = 0.5 * (current[1:] + current[:-1])
+    voltage = log["v(out)"] - log["v(sense)"]
+    expected = coil.resistance * mean * h + coil.inductance * np.diff(current)
+    given = 0.5 * (voltage[1:] + voltage[:-1]) * h
+    emf = 0.5 * (log["emf"][1:] + log["emf"][:-1]) * h
+    # Running sums: single steps of a stiff circuit need not obey to the digit.
+    missing = np.cumsum(given - expected - emf)
+    swept = np.abs(given).sum() + np.abs(emf).sum()
+    if np.abs(missing).max() > 0.01 * swept + 1e-12 and not coil.eddy_inductance:
+        raise BadInput(
+            f"{scene.circuit.netlist}: v(out) - v(sense) is not the voltage of the scene's coil at "
+            "the current i(Vemf): Vemf must be in series with the coil, + towards out, and the "
+            "coil's values must come from .param lines (coil_resistance, coil_inductance, count)."
+        )
 
 
 def from_command(

@@ -21,20 +21,25 @@ PERIODS_SHOWN = 3
 
 def draw(result: Result, path: Path) -> None:
     """Draw the run into ``path`` (a PNG)."""
-    figure = Figure(figsize=(13.0, 8.2), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(3, 2)
     waves = result.waveforms
+    given = result.scene.surface_is_given
+    figure = Figure(figsize=(13.0, 5.8 if given else 8.2), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(2 if given else 3, 2)
     shown = _last_periods(result)
     time = waves["time"][shown] * 1e3
     cut = {name: values[shown] for name, values in waves.items()}
 
     _whole_run(axes[0, 0], result)
-    _command(axes[1, 0], result, time, cut)
-    _voltages(axes[2, 0], time, cut)
     _positions(axes[0, 1], time, cut)
-    _velocities(axes[1, 1], time, cut)
-    _acceleration(axes[2, 1], result, shown)
+    if given:
+        _velocities(axes[1, 0], time, cut)
+        _acceleration(axes[1, 1], result, shown)
+    else:
+        _command(axes[1, 0], result, time, cut)
+        _voltages(axes[2, 0], time, cut)
+        _velocities(axes[1, 1], time, cut)
+        _acceleration(axes[2, 1], result, shown)
     for axis in (*axes[1:, 0], *axes[:, 1]):
         axis.set_xlim(time[0], time[-1])
         axis.set_xlabel("time [ms]")
@@ -47,8 +52,13 @@ def draw(result: Result, path: Path) -> None:
 def _last_periods(result: Result) -> slice:
     """The rows of the last few periods; of the last part of the run where nothing is driven."""
     time = result.waveforms["time"]
-    run, driven = result.scene.run, result.scene.circuit.model != "none"
-    span = PERIODS_SHOWN / result.scene.drive.frequency if driven else run.duration / 10
+    scene, run = result.scene, result.scene.run
+    if scene.drive.file is not None:
+        span = run.duration
+    elif scene.circuit.model == "none" and not scene.surface_is_given:
+        span = run.duration / 10
+    else:
+        span = PERIODS_SHOWN / scene.drive.frequency
     first = int(np.searchsorted(time, time[-1] - span))
     return slice(min(first, max(0, len(time) - 2)), None)
 
@@ -57,6 +67,11 @@ def _title(result: Result) -> str:
     scene, numbers = result.scene, result.summary
     drive = scene.drive
     words = f"{scene.name}: part moves at {numbers['v_average'] * 1e3:+.2f} mm/s"  # pyright: ignore
+    if drive.file is not None:
+        return f"{words}; the surface moves as in {Path(drive.file).name}"
+    if scene.surface_is_given:
+        limit = f", at most {drive.acceleration_max:.4g} m/s²" if drive.waveform != "sine" else ""
+        return f"{words}; the surface is given: {drive.waveform}, {drive.frequency:.4g} Hz{limit}"
     if scene.circuit.model == "none":
         return f"{words}; no drive"
     return (
@@ -151,8 +166,9 @@ def _positions(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
 
 
 def _velocities(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
-    relative = (cut["v_ram"] - cut["v_surface"]) * 1e3
-    axis.plot(time, relative, color=RAM, lw=0.8, label="ram in the actuator")
+    if "v_ram" in cut:
+        relative = (cut["v_ram"] - cut["v_surface"]) * 1e3
+        axis.plot(time, relative, color=RAM, lw=0.8, label="ram in the actuator")
     axis.plot(time, cut["v_surface"] * 1e3, color=SURFACE, lw=1.2, label="surface")
     axis.plot(time, cut["v_part"] * 1e3, color=PART, lw=1.6, label="part")
     axis.set(ylabel="velocity [mm/s]")
@@ -196,5 +212,5 @@ def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
     axis.set_yscale("symlog", linthresh=100.0)
     _at_least(axis, 2.0)
     axis.set(ylabel="acceleration [m/s²]")
-    rigid = result.scene.mechanics.contact == "rigid"
+    rigid = result.scene.mechanics.contact == "rigid" and "v_ram" in waves
     _head(axis, "Acceleration of the surface" + (", without its jumps" if rigid else ""))

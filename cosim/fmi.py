@@ -147,4 +147,4 @@ def _text(message: bytes | None) -> str:
     return (message or b"").decode(errors="replace")
 
 
-INTERFACES: dict[int, type[Fmi2] | type[Fmi3]] = {2: Fmi2, 3: Fmi3}
+INTERFACES: dict[int, type[Interface]] = {2: Fmi2, 3: Fmi3}

@@ -36,9 +36,9 @@ class Recorder:
         self.mechanics = mechanics
         self._settle = run.settle
         self._progress = progress
-        self.time = _grid(run.output_step, run.duration)
+        self.time = grid(run.output_step, run.duration)
         self.rows = np.empty((len(self.time), len(COLUMNS)))
-        frame_times = _grid(1.0 / FRAME_RATE, run.duration)
+        frame_times = grid(1.0 / FRAME_RATE, run.duration)
         frame_times = frame_times[frame_times >= run.settle]
         self.frames = np.empty(len(frame_times))
         self.n_rows = 0
@@ -102,7 +102,7 @@ class Recorder:
 _ROW, _FRAME, _SETTLED = 1, 2, 4
 
 
-def _grid(step: float, end: float) -> npt.NDArray[np.float64]:
+def grid(step: float, end: float) -> npt.NDArray[np.float64]:
     """0, step, 2 step ... up to ``end``, which counts as reached within rounding."""
     return step * np.arange(int(end / step * (1 + 1e-12)) + 1, dtype=np.float64)
 

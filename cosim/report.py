@@ -19,15 +19,20 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
     if "current_max" in summary:
         rows += [
             ("coil current", _range(summary, "current", 1, "A", "+.3f")),
-            ("amplifier at a limit", _limits(summary)),
+            ("amplifier at a limit", "" if scene.circuit.model == "ideal" else _limits(summary)),
         ]
     rows += [
         ("impacts", f"{summary['impacts']}"),
         ("stick-slip events", f"{summary['stick_slip_events']}"),
-        ("energy unaccounted for", f"{summary['energy_residual']:.1e} of the total"),
+        ("energy unaccounted for", _residual(summary["energy_residual"])),
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
     ]
     return "\n".join(f"  {name:<24}{value}" for name, value in rows if value)
+
+
+def _residual(share: float) -> str:
+    text = f"{share:.1e} of the total"
+    return f"{text}: too much, take finer steps" if share > SUSPICIOUS else text
 
 
 def _scaled(value: float | None, factor: float, unit: str, form: str) -> str:
@@ -38,12 +43,18 @@ def _range(summary: dict[str, Any], name: str, factor: float, unit: str, form: s
     low, high = summary[f"{name}_min"], summary[f"{name}_max"]
     if low is None or high is None:
         return ""
-    return f"{low * factor:{form}} … {high * factor:{form}} {unit}"
+    ends = (f"{value * factor:{form}}" for value in (low, high))
+    # No sign where rounding leaves nothing.
+    low, high = (end if float(end) else end.lstrip("+-") for end in ends)
+    return f"{low} … {high} {unit}"
 
+
+SUSPICIOUS = 1e-3
+"""Share of the energy that a sound run does not lose track of."""
 
 LIMITS = {
-    "swing_high_fraction": "swing, high",
-    "swing_low_fraction": "swing, low",
+    "swing_high_fraction": "swing high",
+    "swing_low_fraction": "swing low",
     "current_limit_fraction": "current limit",
     "slew_fraction": "slew rate",
 }
@@ -52,7 +63,7 @@ LIMITS = {
 def _limits(summary: dict[str, Any]) -> str:
     """Which limits of the amplifier acted, and for which share of the time."""
     acted = [
-        f"{name} {summary[key] * 100:.2g} %" for key, name in LIMITS.items() if summary.get(key)
+        f"{name} {summary[key] * 100:.3g} %" for key, name in LIMITS.items() if summary.get(key)
     ]
     return f"{', '.join(acted)} of the time" if acted else "never"
 
@@ -60,4 +71,4 @@ def _limits(summary: dict[str, Any]) -> str:
 def _acceleration(scene: Scene, summary: dict[str, Any]) -> str:
     if scene.mechanics.contact == "rigid":
         return 'without bound at a rigid impact (mechanics.contact = "compliant" has a peak)'
-    return _range(summary, "a_surface", 1, "m/s²", "+.0f")
+    return _range(summary, "a_surface", 1, "m/s²", "+.0f") or "without bound: velocity jumps"

@@ -57,6 +57,11 @@ def simulate(
     has given up in this one. Raises BadInput for a netlist that cannot be used, SimulationFailed
     with where, when, and what to try.
     """
+    if scene.surface_is_given:
+        from cosim.prescribed import simulate_part
+
+        waveforms, summary = simulate_part(scene, progress)
+        return Result(scene, waveforms, summary | {"versions": _versions()})
     if _needs_own_process(scene):
         return isolated(_simulate, scene, progress, fmi_version=fmi_version)
     return _simulate(scene, progress, fmi_version)
@@ -95,6 +100,8 @@ def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int)
             circuit.run()
             log = circuit.log()
             refuse_false(scene, log, lambda finer: _circuit_log(finer, fmi_version))
+            if scene.circuit.netlist is not None:
+                electrics.refuse_foreign_coil(scene, log)
             limits = limits_at_work(log)
             electric = electrics.from_circuit(scene, drive, log, recorder.time, limits)
         totals = mechanics.totals()

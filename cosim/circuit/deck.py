@@ -10,6 +10,7 @@ import re
 import stat
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from errno import EINVAL
 from pathlib import Path
 from typing import NoReturn
 from unicodedata import category
@@ -107,20 +108,27 @@ class _Reader:
     bytes_read: int = 0
 
     def deck(self) -> list[Line]:
-        top = Line("", shown(self.path.name), 1)
+        name = shown(self.path.name)
+        text = self._top()
+        title, rest = text.split("\n", 1) if "\n" in text else (text, "")
+        self.lines.append(Line(_title(Line(title, name, 1)), name, 1))
+        ended = self._take(_logical(rest, name, 2), (self.path,))
+        if not ended:
+            last = Line("", name, text.rstrip().count("\n") + 1)
+            refuse(last, "the netlist does not end with .end, so it may be cut short")
+        return self.lines
+
+    def _top(self) -> str:
+        """The text of the netlist itself."""
+        name = ascii(str(self.path))[1:-1]
         try:
             self.path = self.path.absolute()
             self.folder = self.path.parent.resolve(strict=True)
+            return self._opened(self.path, Line("", shown(self.path.name), 1))
+        except (FileNotFoundError, NotADirectoryError):
+            raise BadInput(f"{name}: there is no such file.") from None
         except (OSError, ValueError, RuntimeError) as error:
-            refuse(top, f"the netlist cannot be read ({type(error).__name__})")
-        text = self._text(self.path, top)
-        title, rest = text.split("\n", 1) if "\n" in text else (text, "")
-        self.lines.append(Line(_title(Line(title, top.file, 1)), top.file, 1))
-        ended = self._take(_logical(rest, top.file, 2), (self.path,))
-        if not ended:
-            last = Line("", top.file, text.rstrip().count("\n") + 1)
-            refuse(last, "the netlist does not end with .end, so it may be cut short")
-        return self.lines
+            raise BadInput(f"{name}: cannot be read ({_reason(error)}).") from None
 
     def _take(
         self, lines: Iterator[Line], opened: tuple[Path, ...], section: str | None = None
@@ -188,19 +196,29 @@ class _Reader:
         refuse(line, f"{shown(name)} must be a file in the netlist's own folder")
 
     def _text(self, path: Path, line: Line) -> str:
+        """The text of an included file."""
         try:
-            # A pipe or a device would block or never end.
-            if not stat.S_ISREG(path.stat().st_mode):
-                refuse(line, f"{shown(path.name)} is no regular file")
-            with path.open("rb") as file:
-                data = file.read(MAX_BYTES - self.bytes_read + 1)
+            return self._opened(path, line)
         except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or type(error).__name__
-            refuse(line, f"{shown(path.name)} cannot be read ({reason})")
+            refuse(line, f"{shown(path.name)} cannot be read ({_reason(error)})")
+
+    def _opened(self, path: Path, line: Line) -> str:
+        # A pipe or a device would block or never end.
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise OSError(EINVAL, "no regular file")
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES - self.bytes_read + 1)
         self.bytes_read += len(data)
         if self.bytes_read > MAX_BYTES:
             refuse(line, f"the netlist with its includes is larger than {MAX_BYTES // 10**6} MB")
         return _decoded(data, path.name)
+
+
+def _reason(error: Exception) -> str:
+    """Why a file cannot be read, as the end of a message."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return "no possible file name"
 
 
 def _decoded(data: bytes, name: str) -> str:

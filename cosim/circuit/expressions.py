@@ -5,31 +5,75 @@ An undefined parameter does not only fail the run: ngspice gives up for the rest
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
 from cosim.circuit.deck import Line, refuse, shown, word_set
 from cosim.circuit.elements import Element, Scope
 from cosim.circuit.words import closing, definitions
 
-FUNCTIONS = word_set(
-    """abs acos acosh agauss arctan asin asinh atan atan2 atanh aunif cbrt ceil cos cosh cot ddt db
-    defined div eq0 exp fabs floor fmod gauss ge0 gt0 hypot idt if int le0 limit ln log log10 lt0
-    max min mod ne0 nint not pow pwl pwr pwrs sdt sgn sign sin sinh sqr sqrt stp table tan tanh
-    ternary_fcn u u2 unif uramp var"""
+_RANDOM = {"agauss": 3, "gauss": 3, "aunif": 2, "unif": 2, "limit": 2}
+_COMMON = word_set(
+    """abs acos acosh asin asinh atan atanh ceil cos cosh exp floor ln log log10 nint sgn sin sinh
+    sqrt tan tanh"""
 )
-"""Of ngspice's parameters and behavioural sources, of any version."""
-CONSTANTS = word_set("time temper hertz and or not div mod")
+PARAMETRIC = (
+    dict.fromkeys(_COMMON | word_set("arctan int sqr"), 1)
+    | dict.fromkeys(word_set("max min pow pwr"), 2)
+    | {"ternary_fcn": 3}
+    | _RANDOM
+)
+"""Functions of ngspice 39's parameters, which are numbers before a run, and how many arguments each
+takes: with too many or too few ngspice calculates something else in silence."""
+BEHAVIOURAL = (
+    dict.fromkeys(_COMMON | word_set("ddt eq0 ge0 gt0 le0 lt0 ne0 u u2 uramp"), 1)
+    | dict.fromkeys(word_set("max min pow pwr"), 2)
+    | {"ternary_fcn": 3}
+    | _RANDOM
+)
+"""Those of its behavioural sources, ``pwl`` (with any number of points) apart. The random ones are
+replaced by a number as the netlist is read."""
+CONSTANTS = word_set("time temper hertz")
 BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
 
+_INSTEAD = {
+    "limit": "limit() is no limiter in ngspice; write max(low, min(high, x))",
+    "if": "there is no if() in ngspice; write (condition ? yes : no)",
+    "table": "there is no table() in ngspice; write pwl(x, x1, y1, x2, y2, ...) in a B source",
+}
+_VARYING = re.compile(r"\b(?:[vi]\s*\(|(?:time|temper|hertz)\b)", re.IGNORECASE)
+_PLAIN = re.compile(r"\s*\{?\s*[+-]?\s*[\w.]+(?:(?<=\de)[+-]?\d+)?\s*\}?\s*", re.IGNORECASE)
 _TOKEN = re.compile(
     r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?[a-z]*|@[\w.#]+\[\w+\]|[a-z_][\w.$#]*|.", re.S
 )
-_ASSIGNMENT = re.compile(r"([a-z_]\w*)=([a-z_]\w*)", re.IGNORECASE)
+_ASSIGNMENT = re.compile(r"([a-z_]\w*)=([a-z_]\w*)\b(?!\s*\()", re.IGNORECASE)
 _DROPPABLE = re.compile(r"\.model ([^\s(]+)|\.func (\w+)")
 _CALLED = re.compile(r"(\w+)\s*\(")
+_FUNC = re.compile(r"\.func\s+([a-z_]\w*)\s*\(([^()]*)\)\s*=?(.*)", re.S)
 _KEY = re.compile(r"\s*=(?!=)")
 _CALL = re.compile(r"\s*\(")
 _BODY = re.compile(r"\b[vi]\s*=(?!=)", re.IGNORECASE)
+_NEXT_KEY = re.compile(r"\b[a-z_]\w*\s*(?<![<>=!])=(?!=)", re.IGNORECASE)
+_SOURCE = re.compile(r"\b(?:value|vol|cur)\s*=?\s*$", re.IGNORECASE)
+_SPACED = re.compile(r"([a-z_]\w*)\s+\(", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class _Function:
+    """A function that the netlist defines."""
+
+    name: str
+    formals: tuple[str, ...]
+    body: str
+    line: Line
+
+
+@dataclass(frozen=True)
+class _Place:
+    """An expression, and which of ngspice's two parsers evaluates it."""
+
+    text: str
+    behavioural: bool
 
 
 class Names:
@@ -44,6 +88,12 @@ class Names:
             self.parameters[id(scope)] = set().union(*(s.parameters for s in chain))
             self.functions[id(scope)] = set().union(*(s.functions for s in chain))
         lines = [line.text.lower() for s in scopes for line, _ in s.lines]
+        self.definitions: dict[str, list[_Function]] = {}
+        """Of the user's functions, whatever their scope."""
+        for scope in scopes:
+            for line, _ in scope.lines:
+                for function in _functions(line):
+                    self.definitions.setdefault(function.name, []).append(function)
         self.mentioned = {word for s in scopes for e in s.elements for word in [e.model, *e.words]}
         self.called = {
             name
@@ -81,22 +131,104 @@ class Names:
 def check_names(scope: Scope, names: Names) -> None:
     """Raise BadInput where an expression of the scope's lines uses an undefined name."""
     parameters = names.parameters[id(scope)] | CONSTANTS
-    functions = FUNCTIONS | names.functions[id(scope)]
+    own = names.functions[id(scope)]
     for line, element in scope.lines:
         if names.drops(line):
             continue
         formal = _formal(line)
         known = parameters | formal if formal else parameters
-        for expression in _expressions(line, element):
-            sensing = re.search(r"\b[vi]\s*\(", expression, re.IGNORECASE) is not None
-            loose = sensing or (element is not None and element.kind in "beg")
-            for name, called in used(expression):
-                if called and name not in functions:
-                    refuse(line, f"the function {shown(name)} is not defined")
-                if not called and name not in known:
-                    if loose and name in BEHAVIOURAL_CONSTANTS:
-                        continue
-                    refuse(line, f"the parameter {shown(name)} is not defined")
+        defines = any(True for _ in _functions(line))
+        for place in _expressions(line, element):
+            loose = place.behavioural or (element is not None and element.kind in "beg")
+            # Where a function's own definition will be evaluated is not known there.
+            behavioural = place.behavioural or (None if defines else False)
+            for name, arguments in used(place.text):
+                if arguments is None:
+                    if name not in known and not (loose and name in BEHAVIOURAL_CONSTANTS):
+                        refuse(line, f"the parameter {shown(name)} is not defined")
+                elif name in own:
+                    _check_own(line, name, arguments, names, behavioural, set())
+                else:
+                    _check_call(line, name, arguments, behavioural)
+        if element is not None and element.kind == "b":
+            _check_blanks(line, own)
+
+
+def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str | None:
+    """What is wrong with calling one of ngspice's functions like this, if anything; None for
+    ``behavioural`` stands for either parser."""
+    if behavioural is None:
+        reasons = [_misused(name, arguments, parser) for parser in (False, True)]
+        return reasons[name not in PARAMETRIC] if all(reasons) else None
+    known, other = (BEHAVIOURAL, PARAMETRIC) if behavioural else (PARAMETRIC, BEHAVIOURAL)
+    count = len(arguments)
+    if name == "pwl" and behavioural:
+        if count >= 5 and count % 2:
+            return None
+        return "pwl() takes a value and at least two points, each of two numbers"
+    if name == "limit" and count != 2:
+        return _INSTEAD[name]
+    if name not in known:
+        if name in _INSTEAD:
+            return _INSTEAD[name]
+        if name in other or name == "pwl":
+            where = "where all is known before the run" if behavioural else "in B sources"
+            return f"the function {name} works only {where}"
+        return f"the function {shown(name)} is not defined"
+    if count != known[name]:
+        return f"the function {name} takes {_counted(known[name])}, not {count}"
+    if name in _RANDOM and behavioural and not all(map(_is_plain, arguments)):
+        return _INSTEAD.get(
+            name, f"in a B source {name}() takes plain numbers only; write it in a .param line"
+        )
+    return None
+
+
+def _check_call(line: Line, name: str, arguments: list[str], behavioural: bool | None) -> None:
+    if reason := _misused(name, arguments, behavioural):
+        refuse(line, reason)
+
+
+def _check_own(
+    line: Line,
+    name: str,
+    arguments: list[str],
+    names: Names,
+    behavioural: bool | None,
+    met: set[str],
+) -> None:
+    """Check a call of the netlist's own function, whose body ngspice puts in its place."""
+    found = names.definitions.get(name, [])
+    if len(found) != 1 or name in met:  # which one is meant is not known
+        return
+    function = found[0]
+    if len(arguments) != len(function.formals):
+        wanted = _counted(len(function.formals))
+        refuse(line, f"the function {shown(name)} takes {wanted}, not {len(arguments)}")
+    for inner, inner_arguments in used(function.body):
+        if inner_arguments is None:
+            continue
+        if inner in names.definitions:
+            below = met | {name}
+            _check_own(function.line, inner, inner_arguments, names, behavioural, below)
+        else:
+            _check_call(function.line, inner, inner_arguments, behavioural)
+
+
+def _check_blanks(line: Line, own: set[str]) -> None:
+    """In a B source ngspice takes a name before a blank for a parameter, and gives up."""
+    for match in _SPACED.finditer(_unbraced(body(line))):
+        name = match[1].lower()
+        if name in own or name in BEHAVIOURAL or name == "pwl":
+            refuse(line, f"write {shown(name)}( without a blank, which ngspice cannot read here")
+
+
+def _counted(count: int) -> str:
+    return f"{count} argument{'' if count == 1 else 's'}"
+
+
+def _is_plain(argument: str) -> bool:
+    return _PLAIN.fullmatch(argument) is not None and not _VARYING.search(argument)
 
 
 def check_circles(top: Scope) -> None:
@@ -109,7 +241,7 @@ def check_circles(top: Scope) -> None:
         if line.text.lower().startswith(".param"):
             for (name, formal), expression in definitions(line.text):
                 if formal is None and name not in uses:
-                    uses[name] = {n for n, called in used(expression) if not called}
+                    uses[name] = {n for n, arguments in used(expression) if arguments is None}
                     lines[name] = line
     try:
         TopologicalSorter(uses).prepare()
@@ -118,8 +250,9 @@ def check_circles(top: Scope) -> None:
         refuse(lines[name], f"the parameter {shown(name)} depends on itself")
 
 
-def used(expression: str) -> Iterator[tuple[str, bool]]:
-    """The names in an expression and whether each is called; nodes and sources are left out."""
+def used(expression: str) -> Iterator[tuple[str, list[str] | None]]:
+    """The names in an expression, each with its arguments if it is called; nodes and sources are
+    left out."""
     text = expression.lower()
     place = 0
     while match := _TOKEN.match(text, place):
@@ -128,11 +261,27 @@ def used(expression: str) -> Iterator[tuple[str, bool]]:
             continue
         if _KEY.match(text, place):
             continue
-        called = _CALL.match(text, place) is not None
-        if called and token in ("v", "i"):
-            place = closing(text, text.index("(", place))
-            continue
-        yield token, called
+        call = _CALL.match(text, place)
+        if call is None:
+            yield token, None
+        elif token in ("v", "i"):
+            place = closing(text, call.end() - 1)
+        else:
+            yield token, _arguments(text[call.end() : closing(text, call.end() - 1) - 1])
+
+
+def _arguments(text: str) -> list[str]:
+    """What commas part, outside brackets."""
+    found = [""]
+    place = 0
+    while place < len(text):
+        end = closing(text, place) if text[place] in "({'" else place + 1
+        if text[place] == ",":
+            found.append("")
+        else:
+            found[-1] += text[place:end]
+        place = end
+    return found if text.strip() else []
 
 
 def sensed(text: str, kind: str) -> Iterator[str]:
@@ -147,29 +296,65 @@ def body(line: Line) -> str:
     return line.text[match.end() :] if match else ""
 
 
-def _expressions(line: Line, element: Element | None) -> Iterator[str]:
+def _expressions(line: Line, element: Element | None) -> Iterator[_Place]:
     text = line.text
     word = text.split()[0].lower()
     if word == ".param":
         for _, expression in definitions(text):
-            yield expression
+            yield _place(expression)
         return
     if word.startswith((".if", ".elseif")):
-        yield text[text.lower().index("if") + 2 :]
+        yield _place(text[text.lower().index("if") + 2 :])
         return
-    place = 0
+    end = 0
+    if element is not None and element.kind == "b":
+        # Braces make no difference there, up to the next key.
+        start = len(text) - len(body(line))
+        key = _NEXT_KEY.search(_masked(text), start)
+        end = key.start() if key else len(text)
+        yield _Place(text[start:end], True)
+    place = end
     while place < len(text):
         if text[place] in "{'":
-            end = closing(text, place)
-            yield text[place + 1 : end - 1]
-            place = end
+            after = closing(text, place)
+            inside = text[place + 1 : after - 1]
+            source = element is not None and _SOURCE.search(text[:place]) is not None
+            yield _Place(inside, True) if source else _place(inside)
+            place = after
         else:
             place += 1
-    if element is not None and element.kind == "b":
-        yield body(line)
-    elif element is not None or word in (".model", ".subckt"):
+    if element is None and word not in (".model", ".subckt"):
+        return
+    if element is None or element.kind != "b":
         for _, name in _ASSIGNMENT.findall(re.sub(r"\s*=\s*", "=", _unbraced(text))):
-            yield name
+            yield _place(name)
+
+
+def _place(expression: str) -> _Place:
+    """An expression outside a B source: what varies during a run makes it one."""
+    return _Place(expression, _VARYING.search(expression) is not None)
+
+
+def _functions(line: Line) -> Iterator[_Function]:
+    """The functions that a line defines."""
+    lower = line.text.lower()
+    if lower.startswith(".func"):
+        match = _FUNC.match(lower)
+        if match:
+            yield _Function(match[1], _formals(match[2]), match[3].strip().strip("{}'"), line)
+    elif lower.startswith(".param"):
+        for (name, formal), expression in definitions(lower):
+            if formal is not None:
+                yield _Function(name, _formals(formal), expression.strip("{}'"), line)
+
+
+def _formals(text: str) -> tuple[str, ...]:
+    return tuple(re.findall(r"\w+", text))
+
+
+def _masked(text: str) -> str:
+    """The text with what is in braces or quotes blanked out, place by place."""
+    return re.sub(r"\{[^{}]*\}|'[^']*'", lambda match: " " * len(match[0]), text)
 
 
 def _unbraced(text: str) -> str:
@@ -178,11 +363,4 @@ def _unbraced(text: str) -> str:
 
 def _formal(line: Line) -> set[str]:
     """The formal parameters of functions that a line defines."""
-    lower = line.text.lower()
-    if lower.startswith(".func"):
-        match = re.search(r"\(([^()]*)\)", lower)
-        return set(re.findall(r"\w+", match[1])) if match else set()
-    if lower.startswith(".param"):
-        formals = (formal for (_, formal), _ in definitions(lower) if formal)
-        return {name for formal in formals for name in re.findall(r"\w+", formal)}
-    return set()
+    return {name for function in _functions(line) for name in function.formals}

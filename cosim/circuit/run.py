@@ -43,7 +43,7 @@ class CircuitRun:
     @property
     def steps(self) -> int:
         """Steps that ngspice accepted."""
-        return max(0, len(self._log) // (1 + len(self._saved)) - 1)
+        return max(0, len(self._log) // (2 + len(self._saved)) - 1)
 
     @property
     def ngspice(self) -> str:
@@ -51,9 +51,10 @@ class CircuitRun:
         return str(engine().ngspice_version)
 
     def log(self) -> dict[str, npt.NDArray[np.float64]]:
-        """Time (s) and the saved vectors (A, V) at the accepted points."""
-        table = np.array(self._log).reshape(-1, 1 + len(self._saved))
-        return dict(zip(("time", *self._saved), table.T, strict=True))
+        """Time (s), the back-EMF given (V) and the saved vectors (A, V) at the accepted points."""
+        names = ("time", "emf", *self._saved)
+        table = np.array(self._log).reshape(-1, len(names))
+        return dict(zip(names, table.T, strict=True))
 
     def run(self) -> None:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
@@ -103,6 +104,7 @@ class CircuitRun:
         if not isfinite(sum(values)):
             raise SimulationFailed(f"The circuit left the range of numbers at t = {time:.6g} s.")
         self._log.append(time)
+        self._log.append(self._coupling.back_emf(time))
         self._log.extend(values)
         self._time = time
         if time <= 0.0:

@@ -17,8 +17,6 @@ from cosim.circuit.expressions import body, sensed
 MAX_ELEMENTS = 200_000
 MAX_DEPTH = 50
 
-_SOLID = "rldqjzsw"
-"""Elements with a path for direct current between all their nodes."""
 _VOLTAGE = "vehl"
 _LEAF = "rcd"
 """Elements of no use with a free end."""

@@ -16,7 +16,7 @@ from cosim.errors import BadInput
 from cosim.scene import messages
 from cosim.scene.describe import keys
 from cosim.scene.model import Scene
-from cosim.scene.tables import KNOBS, TABLES
+from cosim.scene.tables import KNOBS, TABLES, acts
 
 MAX_BYTES = 1 << 20
 """Largest scene file; far above any honest one."""
@@ -27,6 +27,7 @@ class _Layer:
     origin: str
     """The file or option, as messages name it."""
     tables: dict[str, Any]
+    builtin: bool = False
 
 
 def list_scenes() -> list[tuple[str, str]]:
@@ -51,10 +52,12 @@ def load(source: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scene
         layers.append(_Layer("--set", changes))
     merged, origins = _merge(layers)
     try:
-        return Scene.model_validate(merged)
+        scene = Scene.model_validate(merged)
     except ValidationError as error:
         base = layers[-2] if changes else layers[-1]
         raise BadInput(messages.explain(error, origins, base.origin)) from None
+    _refuse_idle(scene, layers, origins)
+    return scene
 
 
 def _layers(source: str) -> list[_Layer]:
@@ -71,10 +74,10 @@ def _layers(source: str) -> list[_Layer]:
         stem = re.sub(r"[^\w.+-]+", "-", Path(source).stem).strip("-.+")[:64]
         data.setdefault("name", stem or "scene")
     _check_names(data, origin)
-    _find_netlist(data, Path(source).parent)
+    _find_files(data, Path(source).parent)
     base = data.pop("base", None)
     if base is None:
-        return [_Layer(origin, data)]
+        return [_Layer(origin, data, source in builtin)]
     if base not in builtin:
         hint = messages.suggestion(str(base), builtin)
         raise BadInput(
@@ -85,7 +88,7 @@ def _layers(source: str) -> list[_Layer]:
         )
     below = _layers(base)
     below[-1].tables.pop("description", None)
-    return [*below, _Layer(origin, data)]
+    return [*below, _Layer(origin, data, source in builtin)]
 
 
 def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
@@ -170,15 +173,16 @@ def _overrides(overrides: Iterable[str]) -> dict[str, Any]:
             raise BadInput(f"--set {messages.plain(text)}: has no value.")
         _check_names({table: {key: None}}, "--set")
         tables.setdefault(table, {})[key] = _value(right.strip())
-    _find_netlist(tables, Path())
+    _find_files(tables, Path())
     return tables
 
 
-def _find_netlist(tables: dict[str, Any], folder: Path) -> None:
-    """Make the netlist's path, seen from ``folder``, one that means the same everywhere."""
-    netlist = tables.get("circuit", {}).get("netlist")
-    if isinstance(netlist, str):
-        tables["circuit"]["netlist"] = os.path.abspath(folder / netlist)
+def _find_files(tables: dict[str, Any], folder: Path) -> None:
+    """Make the paths of files, seen from ``folder``, ones that mean the same everywhere."""
+    for table, key in (("circuit", "netlist"), ("drive", "file")):
+        path = tables.get(table, {}).get(key)
+        if isinstance(path, str):
+            tables[table][key] = os.path.abspath(folder / path)
 
 
 def _value(text: str) -> Any:
@@ -209,3 +213,32 @@ def _merge(layers: list[_Layer]) -> tuple[dict[str, Any], dict[str, tuple[int, s
                 below[key] = value
                 origins[f"{table}.{key}"] = (rank, layer.origin)
     return merged, origins
+
+
+def _refuse_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int, str]]) -> None:
+    """Refuse what the user changed to no effect, as the circuit or waveform does not use it.
+
+    Only where the user, with that circuit and waveform chosen, gave the key another value: a file
+    may be run with another circuit on top, and a resolved scene holds every key.
+    """
+    model, waveform = scene.circuit.model, scene.drive.waveform
+    resolved = [_is_resolved(layer.tables) for layer in layers]
+    for key in keys():
+        rank, origin = origins.get(key.full, (-1, ""))
+        choices = ["circuit.model"] + ["drive.waveform"] * (key.table == "drive")
+        chosen = max(origins.get(choice, (-1, ""))[0] for choice in choices)
+        if rank < max(chosen, 0) or layers[rank].builtin or resolved[rank]:
+            continue
+        given = [layer.tables.get(key.table, {}) for layer in layers[: rank + 1]]
+        values = [key.default, *(table[key.name] for table in given if key.name in table)]
+        if values[-1] != values[-2] and not acts(key.table, key.name, model, waveform):
+            raise BadInput(f"{origin}: {messages.idle(key, model, waveform)}.")
+
+
+def _is_resolved(tables: dict[str, Any]) -> bool:
+    """Whether a layer gives every key, as the scene.toml of a run does."""
+    return all(
+        key.name in tables.get(key.table, {})
+        for key in keys()
+        if key.default is not None and key.name not in KNOBS.values()
+    )

@@ -6,9 +6,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cosim.scene.describe import keys
+from cosim.scene.describe import Key, keys
 from cosim.scene.model import toml_value
-from cosim.scene.tables import TABLES
+from cosim.scene.tables import CIRCUIT_KEYS, GIVEN_SURFACES, TABLES, acts
 
 ALLOWED_TOP = {
     "name": "at most 64 letters, digits, blanks and ._+- that begin with a letter or digit",
@@ -62,6 +62,26 @@ def unknown_key(table: str, name: str) -> str:
         or f" (keys of {table}: {', '.join(here)})"
     )
     return f'there is no key "{plain(full)}"' + hint
+
+
+def idle(key: Key, model: str, waveform: str) -> str:
+    """A sentence on a key that does nothing with this circuit.model and drive.waveform."""
+
+    def listed(names: Iterable[str]) -> str:
+        *rest, last = [f'"{name}"' for name in names]
+        return f"{', '.join(rest)} or {last}" if rest else last
+
+    at = f'circuit.model = "{model}"'
+    if key.table == "drive" and model == "none":
+        at += f' and drive.waveform = "{waveform}"'
+    where = [m for m in CIRCUIT_KEYS if acts(key.table, key.name, m, "sawtooth")]
+    if where:
+        return f"{key.full} has no effect with {at}; it acts in {listed(where)}"
+    waveforms = [name for name, known in GIVEN_SURFACES.items() if key.name in known]
+    return (
+        f'{key.full} has no effect with {at}; it acts in "none" with drive.waveform = '
+        f"{listed(waveforms)}"
+    )
 
 
 def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], default: str) -> str:

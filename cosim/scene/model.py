@@ -6,8 +6,9 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cosim import firmware
-from cosim.scene.describe import keys
+from cosim.scene.describe import Key, keys
 from cosim.scene.tables import (
+    GIVEN_SURFACES,
     KNOBS,
     TABLES,
     Circuit,
@@ -64,6 +65,13 @@ class Scene(BaseModel):
                 "drive.pwm_ripple",
                 "circuit.model",
             )
+        if drive.waveform in ("optimal", "quaid", "file") and self.circuit.model != "none":
+            raise fault(
+                f'drive.waveform = "{drive.waveform}" gives the surface its velocity, which needs '
+                'circuit.model = "none"',
+                "drive.waveform",
+                "circuit.model",
+            )
         if self.circuit.model == "none":
             return self
         if self.circuit.model == "full":
@@ -98,6 +106,11 @@ class Scene(BaseModel):
             )
         return self
 
+    @property
+    def surface_is_given(self) -> bool:
+        """Whether the drive prescribes the surface's velocity, and only the part moves freely."""
+        return self.circuit.model == "none" and self.drive.waveform in GIVEN_SURFACES
+
     def as_dict(self) -> dict[str, Any]:
         """The scene as plain tables that make an equal scene: nothing absent or said twice."""
         data: dict[str, Any] = {"name": self.name, "description": self.description}
@@ -121,12 +134,27 @@ def toml_value(value: bool | float | int | str) -> str:
 
 
 def to_toml(scene: Scene) -> str:
-    """The resolved scene as TOML with every key and its unit; loads to an equal scene."""
+    """The resolved scene as TOML: every key with its unit and meaning; loads to an equal scene.
+
+    A key without a value, or with the one that a knob gives it, is a comment.
+    """
     data = scene.as_dict()
     lines = [f"{key} = {toml_value(data[key])}" for key in ("name", "description")]
     for table in TABLES:
         lines += ["", f"[{table}]"]
-        for key in (key for key in keys() if key.table == table and key.name in data[table]):
-            unit = "" if key.unit in ("", "1") else f"  # {key.unit}"
-            lines.append(f"{key.name} = {toml_value(data[table][key.name])}{unit}")
+        for key in (key for key in keys() if key.table == table):
+            value = getattr(getattr(scene, table), key.name)
+            mark = "" if key.name in data[table] else "# "
+            shown = "" if value is None else toml_value(value)
+            unit = "" if key.unit in ("", "1") else f"{key.unit}; "
+            lines.append(f"{mark}{key.name} = {shown}  # {unit}{key.text}{_turned(scene, key)}")
     return "\n".join(lines) + "\n"
+
+
+def _turned(scene: Scene, key: Key) -> str:
+    """What a knob stands for, as the end of its comment."""
+    if key.name not in KNOBS or getattr(scene.drive, key.name) is None:
+        return ""
+    name = KNOBS[key.name]
+    unit = next(key.unit for key in keys() if key.full == f"drive.{name}")
+    return f"; {name} {getattr(scene.drive, name):.4g} {unit}"

@@ -56,7 +56,11 @@ class Drive(Table):
     Where a knob is given, ``amplitude``, ``frequency`` and ``offset`` hold what it stands for.
     """
 
-    waveform: Literal["sawtooth", "sine", "square"] = _choice("sawtooth", "Shape of the command")
+    waveform: Literal["sawtooth", "sine", "square", "optimal", "quaid", "file"] = _choice(
+        "sawtooth",
+        "Shape of the command; optimal, quaid, file and, with circuit none, sine are velocities "
+        "that the surface is given",
+    )
     frequency: float = _number(
         20.0, "Hz", 0.01, 1e5, "Frequency; the staircase rounds its period up to whole 50 us steps"
     )
@@ -64,6 +68,20 @@ class Drive(Table):
     offset: float = _number(-1.2, "V", -100.0, 100.0, "Mean voltage at V1")
     reset_time: float = _number(
         0.0, "s", 0.0, 100.0, "Length of the sawtooth's linear fall, at the end of the period"
+    )
+    acceleration_max: float = _number(
+        98.1, "m/s2", 1e-3, 1e6, "Greatest acceleration of a given surface, optimal and quaid"
+    )
+    optimum: Literal["up", "down", "robust"] = _choice(
+        "up",
+        "Optimal waveform: fastest upwards or downwards, or the upward one whose part need not "
+        "meet the surface at the period's very end",
+    )
+    velocity_amplitude: float = _number(
+        0.1, "m/s", 0.0, 1e3, "Amplitude of a given surface's velocity, sine"
+    )
+    file: str | None = _choice(
+        None, "Tracked trial or CSV with time and velocity that moves a given surface"
     )
     quantised: bool = _choice(
         False,
@@ -123,6 +141,13 @@ class Drive(Table):
 
     @model_validator(mode="after")
     def _check(self) -> "Drive":
+        # The other way round is told when it is run, so that a scene can leave the file open.
+        if self.file is not None and self.waveform != "file":
+            raise fault(
+                f'drive.file is for drive.waveform = "file", not for "{self.waveform}"',
+                "drive.file",
+                "drive.waveform",
+            )
         if self.waveform != "sawtooth":
             for key in ("quantised", "reset_time", "loop_time", *KNOBS):
                 if getattr(self, key):
@@ -178,7 +203,9 @@ class Circuit(Table):
     sense_resistance: float = _number(
         4.0, "Ohm", 1e-3, 1e6, "Sense resistor: current = V1 / sense_resistance"
     )
-    current_limit: float = _number(2.504, "A", 1e-3, 1e3, "Current limit of the power amplifier")
+    current_limit: float = _number(
+        2.504, "A", 1e-3, 1e3, 'Current limit of the power amplifier; only in "full"'
+    )
     gain_bandwidth: float = _number(
         1e6, "Hz", 1e2, 1e12, "Gain-bandwidth product of the power amplifier"
     )
@@ -187,10 +214,18 @@ class Circuit(Table):
     )
     slew_rate: float = _number(10e6, "V/s", 1e2, 1e12, "Slew rate of the power amplifier")
     swing_loss_high: float = _number(
-        4.0, "V", 0.0, 1e3, "Output's least distance to the positive supply"
+        4.0,
+        "V",
+        0.0,
+        1e3,
+        "Output's least distance to the positive supply; \"full\" has the data sheet's instead",
     )
     swing_loss_low: float = _number(
-        4.0, "V", 0.0, 1e3, "Output's least distance to the negative supply"
+        4.0,
+        "V",
+        0.0,
+        1e3,
+        "Output's least distance to the negative supply; \"full\" has the data sheet's instead",
     )
     output_resistance: float = _number(
         0.0, "Ohm", 0.0, 1e3, "Open-loop output resistance of the power amplifier"
@@ -206,8 +241,9 @@ class Circuit(Table):
 
     @model_validator(mode="after")
     def _check(self) -> "Circuit":
+        swing = self.model in ("amplifier", "file")
         for key in ("swing_loss_high", "swing_loss_low"):
-            if (loss := getattr(self, key)) >= self.supply:
+            if swing and (loss := getattr(self, key)) >= self.supply:
                 raise fault(
                     f"circuit.{key} = {loss:g} V must be below circuit.supply = {self.supply:g} V",
                     f"circuit.{key}",
@@ -300,6 +336,40 @@ class Coupling(Table):
     method: Literal["step-locked"] = _choice(
         "step-locked", "ngspice leads and the mechanics follow each of its accepted steps"
     )
+
+
+GIVEN_SURFACES = {
+    "optimal": {"frequency", "acceleration_max", "optimum"},
+    "quaid": {"frequency", "acceleration_max", "optimum"},
+    "sine": {"frequency", "velocity_amplitude"},
+    "file": {"file"},
+}
+"""Waveforms of ``[drive]`` that, with circuit none, are the surface's velocity, and their keys."""
+
+_OF_NGSPICE = set(Circuit.model_fields) - {"model"}
+CIRCUIT_KEYS: dict[str, set[str]] = {
+    "full": _OF_NGSPICE - {"swing_loss_high", "swing_loss_low"},
+    "amplifier": _OF_NGSPICE - {"current_limit"},
+    "ideal": {"sense_resistance"},
+    "none": set(),
+    "file": _OF_NGSPICE,
+}
+"""The keys of ``[circuit]`` that act with each ``circuit.model``."""
+
+
+def acts(table: str, key: str, model: str, waveform: str) -> bool:
+    """Whether a key does anything with this ``circuit.model`` and ``drive.waveform``."""
+    if key in ("model", "waveform"):
+        return True
+    if table == "circuit":
+        return key in CIRCUIT_KEYS[model]
+    if table == "coil":
+        return model != "none" or key == "count"  # as many rams take part in the energies
+    if table == "drive":
+        if model == "none":
+            return key in GIVEN_SURFACES.get(waveform, ())
+        return key not in set().union(*GIVEN_SURFACES.values()) - {"frequency"}
+    return True
 
 
 MAX_ROWS = 20_000_000

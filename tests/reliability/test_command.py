@@ -418,7 +418,10 @@ def test_scenes(tmp_path: Path) -> None:
     done = command("scenes", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     names = [line.split()[0] for line in done.stdout.splitlines()]
-    assert names == ["paper", "paper-full", "gripper", "held", "ideal-current"]
+    assert names == [
+        "paper", "paper-full", "gripper", "held", "ideal-current",
+        "optimal", "quaid", "trial", "umbanhowar",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("option", ["--help", "--version"])

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from cosim.circuit.checks import check
 from cosim.circuit.deck import Line, read
+from cosim.circuit.expressions import BEHAVIOURAL, PARAMETRIC
 from cosim.errors import BadInput
 from cosim.resources import circuits
 from tests.reliability.ngspice_alone import LIBRARY, run
@@ -115,6 +116,102 @@ def test_text_keeps_its_case_and_line_endings_do_not_matter(tmp_path):
     assert "Lcoil out c1 1m" in [line.text for line in plain]
 
 
+IN_B = "Rs s 0 4\nB1 b 0 V="
+IN_PARAM = "Rs s 0 4\n.param p="
+LIMITER = "limit() is no limiter in ngspice; write max(low, min(high, x))."
+BEFORE = "works only where all is known before the run."
+FUNCTIONS = [
+    # what takes the place of "Rs s 0 4", what the sentence says
+    (IN_B + "limit(3*V(v1),-12,12)", f":15: {LIMITER}"),
+    (IN_B + "limit(V(v1),1)", f":15: {LIMITER}"),
+    (IN_B + "limit(2*3,1)", f":15: {LIMITER}"),
+    (IN_PARAM + "{limit(30,-12,12)}", f":15: {LIMITER}"),
+    (".func f(x) {limit(x,-1,1)}\nRs s 0 4\nB1 b 0 V=f(V(v1))", f":14: {LIMITER}"),
+    (IN_B + "pow(V(v1))", ":15: the function pow takes 2 arguments, not 1."),
+    (IN_B + "max(1,2,3)", ":15: the function max takes 2 arguments, not 3."),
+    (IN_B + "{max(1,2,3)}", ":15: the function max takes 2 arguments, not 3."),
+    (IN_B + "sin()", ":15: the function sin takes 1 argument, not 0."),
+    (IN_B + "sqrt(V(v1,out),2)", ":15: the function sqrt takes 1 argument, not 2."),
+    (IN_B + "table(V(v1),0,0,1,1)", ":15: there is no table() in ngspice; write pwl("),
+    (IN_B + "if(V(v1)>0,1,2)", ":15: there is no if() in ngspice; write (condition ? yes : no)."),
+    (IN_B + "pwl(V(v1),0,0,1)", ":15: pwl() takes a value and at least two points"),
+    (IN_B + "int(V(v1))", f":15: the function int {BEFORE}"),
+    (IN_B + "{sqr(3)}*V(v1)", f":15: the function sqr {BEFORE}"),
+    (IN_B + "atan2(V(v1),1)", ":15: the function atan2 is not defined."),
+    (IN_B + "2*abs (V(v1))", ":15: write abs( without a blank"),
+    (IN_B + "agauss(V(v1),0,3)", ":15: in a B source agauss() takes plain numbers only"),
+    (IN_B + "agauss(2*k,0,3)", ":15: in a B source agauss() takes plain numbers only"),
+    (IN_B + "(V(v1)>0 and V(v1)<1) ? 1 : 0", ":15: the parameter and is not defined."),
+    (IN_PARAM + "{max(3,2,1)}", ":15: the function max takes 2 arguments, not 3."),
+    (IN_PARAM + "{agauss(3,0)}", ":15: the function agauss takes 3 arguments, not 2."),
+    (IN_PARAM + "{u(2)}", ":15: the function u works only in B sources."),
+    (IN_PARAM + "'if(k>1,2,3)'", ":15: there is no if() in ngspice"),
+    ("Rs s 0 {u(2)}", ":14: the function u works only in B sources."),
+    ("Rs s 0 4\nE1 e 0 value={sqr(3)}", f":15: the function sqr {BEFORE}"),
+    ("Rs s 0 4\nE1 e 0 vol='max(V(v1))'", ":15: the function max takes 2 arguments, not 1."),
+    ("Rs s 0 R='4+sqr(V(v1))'", f":14: the function sqr {BEFORE}"),
+    (".func f(x) {sqr(x)}\nRs s 0 4\nB1 b 0 V=f(2)", f":14: the function sqr {BEFORE}"),
+    (".func f(x) {u(x)}\nRs s 0 {f(4)}", ":14: the function u works only in B sources."),
+    (".func f(x) {max(x)}\nRs s 0 {f(4)}", ":14: the function max takes 2 arguments, not 1."),
+    (".func f(x) {x+1}\nRs s 0 {f(1,2)}", ":15: the function f takes 1 argument, not 2."),
+]
+
+
+@pytest.mark.parametrize(("new", "words"), FUNCTIONS)
+def test_misused_functions_are_told(tmp_path, new, words):
+    assert words in complaint(tmp_path, GOOD.replace("Rs s 0 4", new, 1))
+
+
+def calls(functions: dict[str, int]) -> list[str]:
+    """A call of each, with numbers of which it makes a number."""
+    return [
+        f"{name}({','.join(('2' if name == 'acosh' else '0.5', '2', '3')[:count])})"
+        for name, count in functions.items()
+    ]
+
+
+MORE_IN_SOURCES = [
+    "pwl(V(v1),0,0,1,k,{k*2},-3)",
+    "pow(V(v1,out),2)",
+    "{abs (V(v1))}",
+    "MAX(V(v1) , lim(V(v1), -1, {min(k, 3)})) tc1={sqr(0)}",
+    "agauss({k},1e-3,3)*V(v1)",
+    "cut(3*V(v1))",
+    "higher(V(v1))",
+]
+MORE_IN_PARAMETERS = ["max (sqr(k), 3)", "agauss(2*k, 0, 3)", "twice(sqr(2))"]
+MORE = """
+.func lim(x,lo,hi) {max(lo, min(hi, x))}
+.func limit(x,lo,hi) {lim(x,lo,hi)}
+.func cut(x) 'limit(x,-1,1)'
+.func twice(x) {sqr(x)*2}
+.func step(x) {u(x-1)}
+.func higher(x) {step(x)+twice_again(x)}
+.func twice_again(x) {x+x}
+Rf f 0 R='1+u(V(v1))' tc1={sqr(0)}
+Gf f 0 value={abs (V(v1))/1k} m={int(1.5)}
+Rg f 0 {sqr(3)}
+Vh h 0 dc=max(1,2)
+"""
+
+
+@pytest.mark.skipif(LIBRARY is None, reason="the ngspice shared library is not installed")
+@pytest.mark.parametrize(
+    ("sources", "given", "others"),
+    [
+        (calls(BEHAVIOURAL), calls(PARAMETRIC), ""),
+        (MORE_IN_SOURCES, MORE_IN_PARAMETERS, MORE),
+    ],
+)
+def test_functions_are_those_of_ngspice(tmp_path, sources, given, others):
+    lines = [f"B{i} b{i} 0 V={text}\nRb{i} b{i} 0 1k" for i, text in enumerate(sources)]
+    lines += [f".param p{i}={{{text}}}\nRp{i} s 0 {{1k+p{i}}}" for i, text in enumerate(given)]
+    deck = GOOD.replace(".tran", "\n".join([others, *lines, ".tran"]), 1)
+    checked(tmp_path, deck)
+    said = run(deck, tmp_path)
+    assert "finished = 1.000000e-03" in said and "rror" not in said, said[-2000:]
+
+
 MISTAKES = [
     # the good netlist's text, what takes its place, what the sentence says
     ("Rs s 0 4", "Rs s 0", ":14: rs has no value"),
@@ -193,6 +290,26 @@ MISTAKES = [
 def test_mistakes_are_told(tmp_path, old, new, words):
     assert old in GOOD
     assert words in complaint(tmp_path, GOOD.replace(old, new, 1))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("none.cir", "there is no such file."),
+        ("none/my.cir", "there is no such file."),
+        ("good.cir/my.cir", "there is no such file."),
+        ("folder", "cannot be read (no regular file)."),
+        ("a\0b", "cannot be read (no possible file name)."),
+        ("x" * 300, "cannot be read (File name too long)."),
+    ],
+)
+def test_missing_netlist_is_told_with_its_whole_path(tmp_path, name, words):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "good.cir").write_text(GOOD)
+    with pytest.raises(BadInput) as caught:
+        read(tmp_path / name)
+    path = f"{tmp_path}/{name}".replace("\0", "\\x00")
+    assert str(caught.value) == f"{path}: {words}"
 
 
 def test_no_ground(tmp_path):

@@ -21,6 +21,10 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "amplitude": 8.0,
         "offset": -1.2,
         "reset_time": 0,
+        "acceleration_max": 98.1,
+        "optimum": "up",
+        "velocity_amplitude": 0.1,
+        "file": None,
         "quantised": False,
         "loop_time": 0,
         "pwm_ripple": False,
@@ -105,14 +109,17 @@ def test_every_key_is_described() -> None:
             assert key.low is not None and key.high is not None and key.low < key.high
             assert key.default is None or key.low <= float(key.default) <= key.high
         else:
-            free = key.kind is bool or key.full == "circuit.netlist"
+            free = key.kind is bool or key.full in ("circuit.netlist", "drive.file")
             assert free or (key.choices and key.default in key.choices)
 
 
 def test_built_in_scenes() -> None:
     scenes = dict(list_scenes())
     assert next(iter(scenes)) == "paper"
-    assert set(scenes) == {"paper", "paper-full", "gripper", "ideal-current", "held"}
+    assert set(scenes) == {
+        "paper", "paper-full", "gripper", "ideal-current", "held",
+        "optimal", "quaid", "trial", "umbanhowar",
+    }  # fmt: skip
     for name, description in scenes.items():
         scene = load(name)
         assert (scene.name, scene.description) == (name, description)
@@ -215,7 +222,18 @@ def test_text_is_deterministic_and_complete() -> None:
     assert text == to_toml(load("paper"))
     for key in keys():
         assert (f"\n{key.name} = " in text) == (key.default is not None), key.full
-    assert "\nfrequency = 20.0  # Hz\n" in text
+        (line,) = (line for line in text.splitlines() if line.endswith(key.text))
+        assert line.startswith((f"{key.name} = ", f"# {key.name} =   # "))
+        assert key.unit in ("", "1") or f"  # {key.unit}; {key.text}" in line
+    assert "\nfrequency = 20.0  # Hz; Frequency; " in text
+
+
+def test_text_tells_what_a_knob_stands_for(tmp_path: Path) -> None:
+    scene = load("paper", ["drive.pot_max=0.7"])
+    text = to_toml(scene)
+    assert "\n# amplitude = 7.364112367021276  # V; Peak-to-peak voltage at V1\n" in text
+    assert "instead of amplitude; amplitude 7.364 V\n" in text
+    assert load(written(tmp_path, text, "paper.toml")) == scene.model_copy(update={"name": "paper"})
 
 
 @pytest.mark.parametrize("name", [name for name, _ in list_scenes()])
@@ -266,6 +284,70 @@ def test_netlist_is_seen_from_the_file_that_names_it(
     assert load("deep/rig.toml").circuit.netlist == str(tmp_path / "deep" / "my.cir")
     given = load("paper", ["circuit.model=file", "circuit.netlist=my.cir"])
     assert given.circuit.netlist == str(tmp_path / "my.cir")
+
+
+FULL_AND_FILE = 'it acts in "full" or "file".'
+ALL_BUT_NONE = 'it acts in "full", "amplifier", "ideal" or "file".'
+
+
+@pytest.mark.parametrize(
+    ("scene", "change", "why"),
+    [
+        ("paper", "circuit.current_limit=3", f'circuit.model = "amplifier"; {FULL_AND_FILE}'),
+        ("paper-full", "circuit.swing_loss_low=3", 'it acts in "amplifier" or "file".'),
+        ("ideal-current", "circuit.supply=3", 'it acts in "full", "amplifier" or "file".'),
+        ("ideal-current", "circuit.reltol=1e-4", 'it acts in "full", "amplifier" or "file".'),
+        ("held", "circuit.sense_resistance=5", f'circuit.model = "none"; {ALL_BUT_NONE}'),
+        ("held", "coil.resistance=5", f'circuit.model = "none"; {ALL_BUT_NONE}'),
+        ("held", "drive.frequency=30", f'drive.waveform = "sawtooth"; {ALL_BUT_NONE}'),
+        ("optimal", "drive.amplitude=3", f'drive.waveform = "optimal"; {ALL_BUT_NONE}'),
+        ("quaid", "drive.velocity_amplitude=3", 'in "none" with drive.waveform = "sine".'),
+        ("paper", "drive.acceleration_max=3", 'drive.waveform = "optimal" or "quaid".'),
+    ],
+)
+def test_keys_of_no_effect_are_refused(tmp_path: Path, scene: str, change: str, why: str) -> None:
+    full, _, value = change.partition("=")
+    table, _, key = full.partition(".")
+    path = written(tmp_path, f'base = "{scene}"\n[{table}]\n{key} = {value}\n')
+    for source, options, origin in ((scene, [change], "--set"), (path, [], str(path))):
+        with pytest.raises(BadInput) as caught:
+            load(source, options)
+        assert str(caught.value).startswith(f"{origin}: {full} has no effect with circuit.model = ")
+        assert str(caught.value).endswith(why)
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes"),
+    [
+        ("paper", ["circuit.current_limit=2.504"]),  # changes nothing
+        ("paper", ["circuit.model=full", "circuit.current_limit=3"]),
+        ("ideal-current", ["circuit.sense_resistance=5", "coil.inductance=1e-3"]),
+        ("gripper", ["circuit.model=none"]),  # the base's own keys
+        ("held", ["drive.waveform=sine", "drive.frequency=3", "drive.velocity_amplitude=0.2"]),
+        ("optimal", ["drive.optimum=down", "drive.acceleration_max=50"]),
+        ("trial", ["drive.file=trial.csv"]),
+    ],
+)
+def test_keys_of_use_are_not_refused(tmp_path: Path, scene: str, changes: list[str]) -> None:
+    resolved = written(tmp_path, to_toml(load(scene, changes)), "resolved.toml")
+    for model in ("full", "amplifier", "ideal", "none"):
+        waveform = load(resolved).drive.waveform
+        if model != "none" and waveform != "sawtooth":
+            continue
+        assert load(resolved, [f"circuit.model={model}"]).circuit.model == model
+
+
+def test_swing_losses_bound_the_supply_only_where_they_act() -> None:
+    assert load("paper-full", ["circuit.supply=3"]).circuit.supply == 3
+    with pytest.raises(BadInput, match=r"swing_loss_high = 4 V must be below"):
+        load("paper", ["circuit.supply=3"])
+
+
+def test_a_file_of_ones_own_runs_with_another_circuit_on_top(tmp_path: Path) -> None:
+    text = '[circuit]\nmodel = "full"\ncurrent_limit = 3\n[drive]\nfrequency = 30\n'
+    path = written(tmp_path, text)
+    for model in ("amplifier", "ideal", "none"):
+        assert load(path, [f"circuit.model={model}"]).circuit.current_limit == 3
 
 
 def test_scenes_are_frozen() -> None:
