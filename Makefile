@@ -4,7 +4,8 @@
 #   make test        sets up and runs the quick tests   (ARGS='-k name' for some of them)
 #   make test-all    the slow ones too
 #   make setup       sets up: system packages, .venv from the hashed lock, the FMU
-#   make charts      remakes what the README shows, into results/
+#   make charts      remakes the README's figure, results/paper.png; `make test` writes
+#                    results/datasheet.*
 #   make check       ruff and pyright
 #   make lock        remakes requirements.lock with uv  (ARGS=--upgrade for newer versions)
 #   make clean       removes .venv and everything built
@@ -30,7 +31,7 @@ VENV_READY := $(shell test -x $(PY) && test "$$(cat $(VENV)/.created 2>/dev/null
 # What the FMU is built from, and what builds it.
 FMU_SOURCES := $(shell find fmu -name build -prune -o -type f \
 	\( -name '*.[ch]' -o -name '*.xml' -o -name '*.def' -o -name '*.py' -o -name '*.toml' \) -print) \
-	$(wildcard cosim/fmu*.py cosim/fmu*/*.py)
+	cosim/fmu.py cosim/compiler.py
 
 .PHONY: help run test test-all setup charts check lock clean FORCE
 
@@ -69,6 +70,8 @@ $(VENV)/.fmu: $(VENV)/.installed $(FMU_SOURCES)
 charts: setup
 	@$(VENV)/bin/cosim run paper
 	@cp results/paper/figure.png results/paper.png
+	@$(VENV)/bin/cosim theory
+	@cp results/theory/knife_edge.png results/knife_edge.png
 
 check: $(VENV)/.installed
 	@$(VENV)/bin/ruff check

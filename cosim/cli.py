@@ -4,6 +4,7 @@ Exit codes: 0 done; 2 bad input, told in one sentence; 3 the simulation failed; 
 """
 
 import argparse
+import math
 import os
 import sys
 from io import TextIOWrapper
@@ -21,6 +22,13 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         raise BadInput(f"{message} (see {self.prog} --help).")
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+    return value
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -49,6 +57,69 @@ def _parser() -> argparse.ArgumentParser:
         "--out", type=Path, metavar="DIR", help="where to write (default: results/<scene>)"
     )
 
+    theory = commands.add_parser(
+        "theory", help="the paper's closed forms: theory.json, figure3.png, figure4.png"
+    )
+    for option, unit, text in (
+        ("--mu-s", "MU", "static coefficient of friction"),
+        ("--mu-k", "MU", "kinetic coefficient of friction"),
+        ("--a-max", "M/S2", "greatest acceleration of the surface, m/s²"),
+        ("--f-n", "RATIO", "normal force over the part's weight"),
+        ("--period", "S", "period, s"),
+    ):
+        theory.add_argument(
+            option, type=_number, metavar=unit, help=f"{text} (default: the paper's)"
+        )
+    theory.add_argument("--errata", action="store_true", help="the paper's misprints, each proven")
+    theory.add_argument(
+        "--out", type=Path, default=Path("results/theory"), metavar="DIR", help="where to write"
+    )
+
+    fit = commands.add_parser(
+        "fit", help="fit friction and normal forces to tracked trials; write table and figures"
+    )
+    fit.add_argument("trials", type=Path, metavar="TRIALS_DIR", help="folder of the trials' CSVs")
+    fit.add_argument(
+        "--evaluate", choices=["published"], help="take the paper's parameters instead of a fit"
+    )
+    fit.add_argument(
+        "--solver",
+        choices=["exact", "published"],
+        default="exact",
+        help="exact events, or the authors' fixed-step scheme (default: exact)",
+    )
+    fit.add_argument(
+        "--plate", action="store_true", help="fit the friction of the springed plate too"
+    )
+    fit.add_argument(
+        "--out", type=Path, default=Path("results/fit"), metavar="DIR", help="where to write"
+    )
+
+    compare = commands.add_parser(
+        "compare", help="simulated against measured: a run's folder or a scene, and a trial"
+    )
+    compare.add_argument(
+        "run", metavar="RUN|SCENE", help="a folder that cosim run wrote, or a scene"
+    )
+    compare.add_argument("trial", type=Path, metavar="TRIAL.csv", help="a tracked trial")
+    compare.add_argument(
+        "--set",
+        dest="overrides",
+        metavar="TABLE.KEY=VALUE",
+        action="append",
+        default=[],
+        help="replace a value of the scene; repeatable",
+    )
+    compare.add_argument(
+        "--out", type=Path, default=Path("results/compare"), metavar="DIR", help="where to write"
+    )
+
+    bench = commands.add_parser("bench", help="speed ratios, taken side by side in one run")
+    bench.add_argument("--trials", type=Path, metavar="DIR", help="folder of tracked trials")
+    bench.add_argument(
+        "--out", type=Path, default=Path("results/bench"), metavar="DIR", help="where to write"
+    )
+
     fmu = commands.add_parser("fmu", help="build or check the FMU files of the mechanics")
     actions = fmu.add_subparsers(dest="action", required=True, metavar="build|check")
     build = actions.add_parser("build", help="build stickslip-fmi2.fmu and stickslip-fmi3.fmu")
@@ -64,6 +135,20 @@ def _dispatch(arguments: argparse.Namespace) -> int:
         commands.scenes()
     elif arguments.command == "run":
         commands.run(arguments.scene, arguments.overrides, arguments.out)
+    elif arguments.command == "theory":
+        names = ("mu_s", "mu_k", "a_max", "f_n", "period")
+        given = {name: getattr(arguments, name) for name in names}
+        commands.theory(
+            arguments.out, arguments.errata, {k: v for k, v in given.items() if v is not None}
+        )
+    elif arguments.command == "fit":
+        commands.fit(
+            arguments.trials, arguments.out, arguments.evaluate, arguments.solver, arguments.plate
+        )
+    elif arguments.command == "compare":
+        commands.compare(arguments.run, arguments.overrides, arguments.trial, arguments.out)
+    elif arguments.command == "bench":
+        commands.bench(arguments.out, arguments.trials)
     elif arguments.action == "build":
         commands.fmu_build(arguments.force)
     else:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryFile
+from typing import Literal
 
 from cosim.errors import BadInput
 from cosim.report import table
@@ -109,3 +110,54 @@ def fmu_check() -> int:
     from cosim import fmu
 
     return 1 if fmu.check() else 0
+
+
+def theory(out: Path, errata: bool, given: dict[str, float]) -> None:
+    """Write the paper's closed forms, or print its misprints."""
+    from cosim import theory as closed_forms
+
+    if errata:
+        print(closed_forms.errata_text())
+        return
+    with _writable(out):
+        numbers = closed_forms.write(out, **(closed_forms.DEFAULTS | given))
+        from cosim.theory import knife_edge
+
+        knife_edge.write(out, **(closed_forms.DEFAULTS | given))
+    print(closed_forms.table(numbers))
+    print(f"Written to {out}: theory.json, knife_edge.csv")
+    print(
+        "Figures: " + ", ".join(str(out / f"{n}.png") for n in ("figure3", "figure4", "knife_edge"))
+    )
+
+
+def fit(
+    trials: Path,
+    out: Path,
+    evaluate: Literal["published"] | None,
+    solver: Literal["exact", "published"],
+    plate: bool,
+) -> None:
+    """Fit friction and normal forces to tracked trials, or evaluate the published ones."""
+    from cosim import fit as fitting
+
+    with _writable(out):
+        numbers = fitting.run(trials, out, evaluate=evaluate, solver=solver, plate=plate)
+    print(fitting.table(numbers))
+    print(f"Written to {out}: fit.json, fit.csv and figures")
+
+
+def compare(source: str, overrides: list[str], trial: Path, out: Path) -> None:
+    """Lay a run, or a scene that is run for it, over a tracked trial."""
+    from cosim import compare as comparison
+
+    with _writable(out):
+        comparison.run(source, overrides, trial, out)
+
+
+def bench(out: Path, trials: Path | None) -> None:
+    """Measure speed ratios."""
+    from cosim import bench as ratios
+
+    with _writable(out):
+        ratios.run(out, trials)

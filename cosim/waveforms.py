@@ -49,6 +49,21 @@ def write_csv(path: Path, waveforms: dict[str, Array], units: dict[str, str]) ->
         np.savetxt(temporary, table, fmt="%.10g", delimiter=",", header=header, comments="")
 
 
+def read_csv(path: Path) -> dict[str, Array]:
+    """The columns of a file that :func:`write_csv` wrote, by name, without their units."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            names = [cell.partition(" [")[0] for cell in file.readline().strip().split(",")]
+            table = np.loadtxt(file, delimiter=",", ndmin=2)
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be read ({error.strerror}).") from None
+    except ValueError as error:
+        raise BadInput(f"{path}: this is not a waveforms.csv ({error}).") from None
+    if table.shape[1] != len(names):
+        raise BadInput(f"{path}: the header has {len(names)} names for {table.shape[1]} columns.")
+    return dict(zip(names, table.T, strict=True))
+
+
 def write_netcdf(
     path: Path, waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
 ) -> None:

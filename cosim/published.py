@@ -1,0 +1,33 @@
+"""Numbers published with the ten tracked trials, by which `cosim fit` measures and compares.
+
+Source: C. Yako, J. Nowak, S. Yuan, K. Salisbury, *Vertical Vibratory Transport of Grasped Parts
+Using Impacts*, and `matlab/parameter_estimation.m` of the repository
+clyako/vertical-vibratory-transport-of-grasped-parts-using-impacts that belongs to it, which has
+the forces, the fitted numbers with all their digits, and the bounds of the fit. Forces are in
+weights of the part, m g, for the trials 1…10.
+"""
+
+PART_MASS = 0.009  # kg
+GRAVITY = 9.81  # m/s²
+FRAME_RATE = 960.0  # of the camera, 1/s
+
+MU_S = 0.72  # measured, and kept in the fit
+MU_K_MEASURED = 0.59
+MU_K_FITTED = 0.6234
+
+FORCES_MEASURED = (11.089, 16.901, 5.278, 5.278, 5.278, 5.278, 5.278, 5.278, 5.278, 22.841)
+FORCES_FITTED = (
+    *(10.6500, 13.0009, 9.9833, 6.7872, 6.0413),
+    *(7.0798, 6.2765, 6.6180, 7.1825, 8.2225),
+)
+FORCE_BOUNDS = (
+    *((4.0, 16.0), (12.8, 19.2), (4.0, 16.0), (4.9, 7.3), (4.9, 7.3)),
+    *((4.9, 7.3), (4.9, 7.3), (4.56, 6.84), (4.0, 8.0), (8.0, 24.0)),
+)
+OTHER_BOUNDS = (4.0, 24.0)  # for a trial that is not among the ten: the widest of theirs
+
+# What the authors report of their fit.
+MEAN_ERROR_MM = 0.161
+MEAN_ERROR_PERCENT = 11.87
+FORCE_CHANGE_MEDIAN_PERCENT = 26.99
+FORCE_CHANGE_MEAN_PERCENT = 33.78
