@@ -9,6 +9,7 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
     """The summary in a few lines, in the units of the bench."""
     rows = [
         ("part's mean velocity", _scaled(summary["v_average"], 1e3, "mm/s", "+.3f")),
+        ("", _broken_periods(scene)),
         ("transport per cycle", _scaled(summary["transport_per_cycle"], 1e6, "µm", "+.1f")),
         ("sticking", _scaled(summary["stick_fraction"], 100, "% of the time", ".1f")),
         ("surface, peak-to-peak", _scaled(summary["z_surface_pp"], 1e3, "mm", ".3f")),
@@ -35,6 +36,18 @@ def _residual(share: float) -> str:
     return f"{text}: too much, take finer steps" if share > SUSPICIOUS else text
 
 
+def _broken_periods(scene: Scene) -> str:
+    """A word where the averages end within a period, which makes them untrue."""
+    if scene.drive.waveform == "file" or (
+        scene.circuit.model == "none" and not scene.surface_is_given
+    ):
+        return ""
+    periods = (scene.run.duration - scene.run.settle) * scene.drive.frequency
+    if abs(periods - round(periods)) < 1e-6 or periods > MANY:
+        return ""
+    return f"over {periods:.4g} periods; whole ones give a truer mean"
+
+
 def _scaled(value: float | None, factor: float, unit: str, form: str) -> str:
     return "" if value is None else f"{value * factor:{form}} {unit}"
 
@@ -48,6 +61,9 @@ def _range(summary: dict[str, Any], name: str, factor: float, unit: str, form: s
     low, high = (end if float(end) else end.lstrip("+-") for end in ends)
     return f"{low} … {high} {unit}"
 
+
+MANY = 500
+"""Periods of which one more or less does not matter."""
 
 SUSPICIOUS = 1e-3
 """Share of the energy that a sound run does not lose track of."""
