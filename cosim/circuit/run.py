@@ -25,7 +25,7 @@ _ON_TIME = 1e-13
 class CircuitRun:
     """ngspice leads; the coupling follows each step that it accepts.
 
-    Steps end on the jumps of the command, where ngspice is told to begin anew.
+    Steps end on the jumps of the command, and begin small after them.
     """
 
     def __init__(self, scene: Scene, command: Command, coupling: Coupling) -> None:
