@@ -7,12 +7,13 @@ import argparse
 import math
 import os
 import sys
+import warnings
 from io import TextIOWrapper
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TextIO
 
 from cosim import __version__
-from cosim.errors import BadInput, CosimError
+from cosim.errors import BadInput, CosimError, NoEffect
 
 INTERRUPTED = 130
 
@@ -161,7 +162,10 @@ def main(argv: list[str] | None = None) -> int:
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # rather a question mark than no result
     try:
-        code = _dispatch(_parser().parse_args(argv))
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", NoEffect)
+            warnings.showwarning = _note
+            code = _dispatch(_parser().parse_args(argv))
         sys.stdout.flush()
         return code
     except CosimError as error:
@@ -176,6 +180,18 @@ def main(argv: list[str] | None = None) -> int:
         return _told(f"{where}{error.strerror or error}.", BadInput.exit_code)
     except KeyboardInterrupt:
         return _told("interrupted.", INTERRUPTED)
+
+
+def _note(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Tell a warning in one line, without where in the program it was raised."""
+    print("cosim: note:", " ".join(str(message).split()), file=sys.stderr)
 
 
 def _told(sentence: str, code: int) -> int:

@@ -13,6 +13,10 @@ class BadInput(CosimError):
     exit_code = 2
 
 
+class NoEffect(UserWarning):
+    """Something was asked for that does nothing here; the rest is done."""
+
+
 class SimulationFailed(CosimError):
     """The simulation could not be finished."""
 

@@ -3,6 +3,7 @@
 import os
 import re
 import tomllib
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import resources
@@ -12,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, NoEffect
 from cosim.scene import messages
 from cosim.scene.describe import keys
 from cosim.scene.model import Scene
@@ -56,7 +57,7 @@ def load(source: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scene
     except ValidationError as error:
         base = layers[-2] if changes else layers[-1]
         raise BadInput(messages.explain(error, origins, base.origin)) from None
-    _refuse_idle(scene, layers, origins)
+    _tell_idle(scene, layers, origins)
     return scene
 
 
@@ -215,9 +216,10 @@ def _merge(layers: list[_Layer]) -> tuple[dict[str, Any], dict[str, tuple[int, s
     return merged, origins
 
 
-def _refuse_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int, str]]) -> None:
-    """Refuse what the user changed to no effect, as the circuit or waveform does not use it.
+def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int, str]]) -> None:
+    """Warn of what the user changed to no effect, as the circuit or waveform does not use it.
 
+    Not an error: the same changes are laid over several circuits to compare them.
     Only where the user, with that circuit and waveform chosen, gave the key another value: a file
     may be run with another circuit on top, and a resolved scene holds every key.
     """
@@ -232,7 +234,8 @@ def _refuse_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[in
         given = [layer.tables.get(key.table, {}) for layer in layers[: rank + 1]]
         values = [key.default, *(table[key.name] for table in given if key.name in table)]
         if values[-1] != values[-2] and not acts(key.table, key.name, model, waveform):
-            raise BadInput(f"{origin}: {messages.idle(key, model, waveform)}.")
+            sentence = f"{origin}: {messages.idle(key, model, waveform)}."
+            warnings.warn(sentence, NoEffect, stacklevel=3)
 
 
 def _is_resolved(tables: dict[str, Any]) -> bool:

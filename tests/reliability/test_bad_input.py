@@ -45,7 +45,6 @@ FILES = [
     ("[drive]\nwaveform = 'quad'", 'must be one of "sawtooth", "sine", "square"'),
     ("[drive]\nwaveform = 'quaid'", "gives the surface its velocity, which needs circuit.model"),
     ("[drive]\nfile = 'a.csv'", 'drive.file is for drive.waveform = "file", not for "sawtooth"'),
-    ("[circuit]\ncurrent_limit = 3", "circuit.current_limit has no effect with circuit.model = "),
     ("[drive]\nwaveform = 'sawtoth'", "did you mean sawtooth?"),
     ("[drive]\nwaveform = 3", "drive.waveform = 3 must be one of"),
     ("[drive]\nquantised = 1", "drive.quantised = 1 must be true or false"),

@@ -429,3 +429,14 @@ def test_help_and_version(option: str, tmp_path: Path) -> None:
     done = command(option, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert "cosim" in done.stdout
+
+
+def test_a_key_without_effect_is_a_note(tmp_path: Path) -> None:
+    done = command(
+        *("run", "held", "--set", "run.duration=0.02", "--set", "drive.amplitude=9"),
+        *("--out", "out"),
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0
+    (said,) = done.stderr.splitlines()
+    assert said.startswith("cosim: note: --set: drive.amplitude has no effect with circuit.model")

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, NoEffect
 from cosim.scene import Key, Scene, keys, list_scenes, load, to_toml
 
 # The table of the design, written down once more: an accidental change of a default shows here.
@@ -305,15 +305,16 @@ ALL_BUT_NONE = 'it acts in "full", "amplifier", "ideal" or "file".'
         ("paper", "drive.acceleration_max=3", 'drive.waveform = "optimal" or "quaid".'),
     ],
 )
-def test_keys_of_no_effect_are_refused(tmp_path: Path, scene: str, change: str, why: str) -> None:
+def test_keys_of_no_effect_are_told(tmp_path: Path, scene: str, change: str, why: str) -> None:
     full, _, value = change.partition("=")
     table, _, key = full.partition(".")
     path = written(tmp_path, f'base = "{scene}"\n[{table}]\n{key} = {value}\n')
     for source, options, origin in ((scene, [change], "--set"), (path, [], str(path))):
-        with pytest.raises(BadInput) as caught:
+        with pytest.warns(NoEffect) as caught:
             load(source, options)
-        assert str(caught.value).startswith(f"{origin}: {full} has no effect with circuit.model = ")
-        assert str(caught.value).endswith(why)
+        (said,) = [str(warning.message) for warning in caught]
+        assert said.startswith(f"{origin}: {full} has no effect with circuit.model = ")
+        assert said.endswith(why)
 
 
 @pytest.mark.parametrize(
@@ -328,7 +329,8 @@ def test_keys_of_no_effect_are_refused(tmp_path: Path, scene: str, change: str, 
         ("trial", ["drive.file=trial.csv"]),
     ],
 )
-def test_keys_of_use_are_not_refused(tmp_path: Path, scene: str, changes: list[str]) -> None:
+@pytest.mark.filterwarnings("error")
+def test_keys_of_use_are_not_told(tmp_path: Path, scene: str, changes: list[str]) -> None:
     resolved = written(tmp_path, to_toml(load(scene, changes)), "resolved.toml")
     for model in ("full", "amplifier", "ideal", "none"):
         waveform = load(resolved).drive.waveform
@@ -343,6 +345,7 @@ def test_swing_losses_bound_the_supply_only_where_they_act() -> None:
         load("paper", ["circuit.supply=3"])
 
 
+@pytest.mark.filterwarnings("error")
 def test_a_file_of_ones_own_runs_with_another_circuit_on_top(tmp_path: Path) -> None:
     text = '[circuit]\nmodel = "full"\ncurrent_limit = 3\n[drive]\nfrequency = 30\n'
     path = written(tmp_path, text)
