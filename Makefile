@@ -80,9 +80,10 @@ check: $(VENV)/.installed
 
 lock:
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: install it (pip install uv) or name it with UV=/path/to/uv." >&2; exit 1; }
-	@$(UV) pip compile --quiet --universal --fork-strategy fewest --generate-hashes --no-emit-index-url --python-version 3.11 \
+	@$(UV) pip compile --quiet --universal --fork-strategy fewest --generate-hashes --python-version 3.11 \
 		--custom-compile-command "make lock" \
 		pyproject.toml --extra test --extra dev -o requirements.lock $(ARGS)
+	@! grep -n '://' requirements.lock || { echo "requirements.lock must name no registry." >&2; exit 1; }
 
 clean:
 	@rm -rf $(VENV) build dist *.egg-info fmu/build .pytest_cache .hypothesis .ruff_cache
