@@ -32,6 +32,17 @@ def _number(text: str) -> float:
     return value
 
 
+def _add_overrides(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--set",
+        dest="overrides",
+        metavar="TABLE.KEY=VALUE",
+        action="append",
+        default=[],
+        help="replace a value of the scene; repeatable",
+    )
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="cosim",
@@ -46,14 +57,7 @@ def _parser() -> argparse.ArgumentParser:
         "run", help="run a scene; write waveforms, summary and figure", allow_abbrev=False
     )
     run.add_argument("scene", metavar="SCENE", help="a built-in scene or a TOML file")
-    run.add_argument(
-        "--set",
-        dest="overrides",
-        metavar="TABLE.KEY=VALUE",
-        action="append",
-        default=[],
-        help="replace a value of the scene; repeatable",
-    )
+    _add_overrides(run)
     run.add_argument(
         "--out", type=Path, metavar="DIR", help="where to write (default: results/<scene>)"
     )
@@ -103,14 +107,7 @@ def _parser() -> argparse.ArgumentParser:
         "run", metavar="RUN|SCENE", help="a folder that cosim run wrote, or a scene"
     )
     compare.add_argument("trial", type=Path, metavar="TRIAL.csv", help="a tracked trial")
-    compare.add_argument(
-        "--set",
-        dest="overrides",
-        metavar="TABLE.KEY=VALUE",
-        action="append",
-        default=[],
-        help="replace a value of the scene; repeatable",
-    )
+    _add_overrides(compare)
     compare.add_argument(
         "--out", type=Path, default=Path("results/compare"), metavar="DIR", help="where to write"
     )

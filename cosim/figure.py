@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cosim.recorder import FRAME_RATE
+from cosim.published import FRAME_RATE
 from cosim.simulate import Result
 
 Array = npt.NDArray[np.float64]

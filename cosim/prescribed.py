@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from cosim import part
 from cosim.errors import BadInput
-from cosim.recorder import FRAME_RATE, grid
+from cosim.published import FRAME_RATE
+from cosim.recorder import grid
 from cosim.scene import Scene
 from cosim.scene.messages import plain
 

@@ -10,10 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.mechanics import SAMPLE_OUTPUTS, Mechanics
+from cosim.published import FRAME_RATE
 from cosim.scene import Scene
-
-FRAME_RATE = 960.0
-"""Frames of the camera a second, 1/s: that of the published trials."""
 
 COLUMNS = (*SAMPLE_OUTPUTS, "sticking")
 

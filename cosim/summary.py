@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from cosim.electrics import Electrics
-from cosim.recorder import FRAME_RATE, Recorder
+from cosim.published import FRAME_RATE
+from cosim.recorder import Recorder
 from cosim.scene import Scene
 
 

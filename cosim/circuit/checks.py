@@ -22,8 +22,8 @@ _WAVEFORMS = word_set(
 )
 
 
-def check(lines: Sequence[Line], required: Sequence[Sequence[str]] = REQUIRED) -> None:
-    """Raise BadInput, beginning with ``file:line:``, for the first mistake found in ``lines``.
+def check(lines: Sequence[Line], required: Sequence[Sequence[str]] = REQUIRED) -> Scope:
+    """The netlist's top level, or BadInput, beginning with ``file:line:``, for the first mistake.
 
     ``lines`` are those of ``deck.read``. One of the alternatives in ``required`` must be there.
     """
@@ -37,6 +37,7 @@ def check(lines: Sequence[Line], required: Sequence[Sequence[str]] = REQUIRED) -
     check_circles(top)
     _check_required(top, required)
     check_topology(top)
+    return top
 
 
 def _check_required(top: Scope, required: Sequence[Sequence[str]]) -> None:

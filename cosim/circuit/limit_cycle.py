@@ -53,7 +53,8 @@ def refuse_false(
 
     ``solve`` gives the log of another run of the circuit, with its mechanics.
     """
-    end = burst_ends(swings(log))
+    times = swings(log)
+    end = burst_ends(times)
     if end is None:
         return
     circuit, run = scene.circuit, scene.run
@@ -70,7 +71,6 @@ def refuse_false(
             }
         )
     )
-    times = swings(log)
     found, true = int((times <= end).sum()), len(swings(truth))
     if true <= found // 2:
         raise SimulationFailed(

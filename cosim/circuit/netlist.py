@@ -15,7 +15,7 @@ import numpy.typing as npt
 from cosim.circuit.checks import REQUIRED as AGREED
 from cosim.circuit.checks import check
 from cosim.circuit.deck import Line, read, refuse
-from cosim.circuit.elements import Element, parse
+from cosim.circuit.elements import Element
 from cosim.circuit.words import definitions
 from cosim.resources import circuits
 from cosim.scene import Scene
@@ -67,8 +67,7 @@ def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
     beginning with the netlist's file and line, for what is wrong with it or might do harm.
     """
     lines = read(path_of(scene))
-    check(lines)
-    elements = parse(lines).elements
+    elements = check(lines).elements
     external = _external_sources(elements)
     values = parameters(scene)
     deck = [lines[0].text]
