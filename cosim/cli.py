@@ -176,6 +176,9 @@ def main(argv: list[str] | None = None) -> int:
         where = f"{error.filename}: " if error.filename else "The output cannot be written: "
         return _told(f"{where}{error.strerror or error}.", BadInput.exit_code)
     except KeyboardInterrupt:
+        # One that struck while a library executed a string, as dataclasses do, is remembered by
+        # Python as not handled, and would end the process by the signal; another string clears it.
+        exec("")
         return _told("interrupted.", INTERRUPTED)
 
 

@@ -274,6 +274,21 @@ def test_interrupt(scene: str, tmp_path: Path) -> None:
             process.communicate()
 
 
+@posix
+def test_interrupt_within_an_executed_string_is_130_too(tmp_path: Path) -> None:
+    """As where Ctrl-C strikes while a library is imported that makes code of text."""
+    program = (
+        "import sys\nfrom cosim import cli\n"
+        "cli._dispatch = lambda arguments: exec('raise KeyboardInterrupt')\n"
+        "sys.exit(cli.main(['scenes']))\n"
+    )
+    (tmp_path / "struck.py").write_text(program)
+    # As a module: only then does Python look at what it remembers.
+    run = [sys.executable, "-m", "struck"]
+    done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "cosim: interrupted.\n")
+
+
 def test_interrupt_while_writing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
