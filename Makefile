@@ -4,7 +4,7 @@
 #   make test        sets up and runs the quick tests   (ARGS='-k name' for some of them)
 #   make test-all    the slow ones too
 #   make setup       sets up: system packages, .venv from the hashed lock, the FMU
-#   make charts      remakes the README's figure, results/paper.png; `make test` writes
+#   make charts      remakes the README's figures, results/*.png; `make test` writes
 #                    results/datasheet.*
 #   make check       ruff and pyright
 #   make lock        remakes requirements.lock with uv  (ARGS=--upgrade for newer versions)
@@ -72,6 +72,9 @@ charts: setup
 	@cp results/paper/figure.png results/paper.png
 	@$(VENV)/bin/cosim theory
 	@cp results/theory/knife_edge.png results/knife_edge.png
+	@$(VENV)/bin/cosim sweep ideal-current --over drive.pot_max=0:1:10 \
+		--over drive.pot_frequency=0.1:0.95:10 --over drive.pot_offset=0:1:10
+	@cp results/ideal-current-sweep/figure.png results/sweep.png
 
 check: $(VENV)/.installed
 	@$(VENV)/bin/ruff check

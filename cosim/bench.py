@@ -13,8 +13,12 @@ from cosim.fit_cases import Case
 from cosim.fit_timing import solvers
 from cosim.scene import load
 from cosim.simulate import simulate
+from cosim.sweep.timing import throughput
 from cosim.trials import Track, Trial, read_folder
 from cosim.waveforms import whole
+
+_OFFSETS = [-2.0 + 0.05 * k for k in range(40)]
+"""V; of the points of a sweep that is timed."""
 
 FRAMES = 312
 """Frames of a made-up trial: as many as the published ones have."""
@@ -28,8 +32,9 @@ def run(out: Path, trials: Path | None) -> dict[str, Any]:
     """
     found = read_folder(trials) if trials is not None else [_made_up(k) for k in range(10)]
     seconds = solvers([Case(trial) for trial in found])
-    numbers = {
+    numbers: dict[str, Any] = {
         "part": {**seconds, "trials": len(found), "measured": trials is not None},
+        "sweep_over_bare_loop": throughput(load("ideal-current", ["run.duration=1"]), _OFFSETS),
         "machine": {
             "processor": platform.processor() or platform.machine(),
             "cores": os.cpu_count(),
@@ -41,6 +46,9 @@ def run(out: Path, trials: Path | None) -> dict[str, Any]:
     print("The part on a given surface, both solvers compiled, medians:")
     for name, value in seconds.items():
         print(f"  {name:<22}{value:.4g}")
+    share = numbers["sweep_over_bare_loop"]
+    print("Points a second of a sweep's worker over those of a bare loop:")
+    print(f"  {share['median']:.3f} ({share['low']:.3f} … {share['high']:.3f})")
     print(f"Written to {out}: bench.json")
     return numbers
 

@@ -62,6 +62,37 @@ def _parser() -> argparse.ArgumentParser:
         "--out", type=Path, metavar="DIR", help="where to write (default: results/<scene>)"
     )
 
+    sweep = commands.add_parser(
+        "sweep", help="run a scene over a grid or a sample of settings", allow_abbrev=False
+    )
+    sweep.add_argument("scene", metavar="SCENE", help="a built-in scene or a TOML file")
+    sweep.add_argument(
+        "--over",
+        metavar="TABLE.KEY=START:STOP:N|A,B,C",
+        action="append",
+        default=[],
+        help="a numeric key and its values; repeatable, the last one runs fastest. Where the "
+        "frequency is swept, each point lasts whole periods",
+    )
+    _add_overrides(sweep)
+    sweep.add_argument(
+        "--samples",
+        type=int,
+        metavar="N",
+        help="N settings from the ranges of the keys, a Latin hypercube, instead of the grid",
+    )
+    sweep.add_argument("--random", action="store_true", help="independent samples instead of it")
+    sweep.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of the samples (default: 0)"
+    )
+    sweep.add_argument(
+        "--workers", type=int, metavar="N", help="processes (default: one for each processor)"
+    )
+    sweep.add_argument("--dask", metavar="ADDRESS", help="run on the Dask cluster at this address")
+    sweep.add_argument(
+        "--out", type=Path, metavar="DIR", help="where to write (default: results/<scene>-sweep)"
+    )
+
     theory = commands.add_parser(
         "theory", help="the paper's closed forms: theory.json, figure3.png, figure4.png"
     )
@@ -133,6 +164,16 @@ def _dispatch(arguments: argparse.Namespace) -> int:
         commands.scenes()
     elif arguments.command == "run":
         commands.run(arguments.scene, arguments.overrides, arguments.out)
+    elif arguments.command == "sweep":
+        commands.sweep(
+            arguments.scene,
+            arguments.overrides,
+            arguments.over,
+            commands.Sampling(arguments.samples, arguments.random, arguments.seed),
+            arguments.workers,
+            arguments.dask,
+            arguments.out,
+        )
     elif arguments.command == "theory":
         names = ("mu_s", "mu_k", "a_max", "f_n", "period")
         given = {name: getattr(arguments, name) for name in names}

@@ -4,14 +4,19 @@ import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from cosim.errors import BadInput
 from cosim.report import table
 from cosim.scene import Scene, list_scenes, load, to_toml
 from cosim.scene.messages import plain
+from cosim.waveforms import whole
+
+if TYPE_CHECKING:
+    from cosim.sweep import Design
 
 
 def scenes() -> None:
@@ -52,7 +57,7 @@ def _run(scene: Scene, folder: Path) -> None:
         result = simulate(scene, progress=progress)
     from cosim import figure
     from cosim.simulate import UNITS
-    from cosim.waveforms import whole, write_csv, write_netcdf
+    from cosim.waveforms import write_csv, write_netcdf
 
     write_csv(folder / "waveforms.csv", result.waveforms, UNITS)
     attributes = {"title": scene.description or scene.name, "scene": to_toml(scene)}
@@ -68,6 +73,69 @@ def _run(scene: Scene, folder: Path) -> None:
     print(f"{scene.name}: {scene.description}" if scene.description else scene.name)
     print(table(scene, result.summary))
     print(f"Written to {folder}: waveforms.csv, waveforms.nc, summary.json, scene.toml")
+    print(f"Figure: {folder / 'figure.png'}")
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Of a sweep: how many samples, None for the whole grid; independent ones; their seed."""
+
+    count: int | None
+    random: bool
+    seed: int
+
+
+def sweep(
+    source: str,
+    overrides: list[str],
+    over: list[str],
+    sampling: Sampling,
+    workers: int | None,
+    dask: str | None,
+    out: Path | None,
+) -> None:
+    """Run a scene over many settings and write their summaries as one dataset."""
+    from cosim.sweep import design
+
+    scene = load(source, overrides)
+    if sampling.count is None and sampling.random:
+        raise BadInput("--random needs --samples N.")
+    axes = design.parse(over)
+    chosen = (
+        design.grid(axes)
+        if sampling.count is None
+        else design.sample(axes, sampling.count, sampling.seed, sampling.random)
+    )
+    folder = out or Path("results") / f"{scene.name}-sweep"
+    with _writable(folder):
+        _sweep(scene, chosen, workers, dask, folder)
+
+
+def _sweep(
+    scene: Scene, design: "Design", workers: int | None, dask: str | None, folder: Path
+) -> None:
+    from tqdm import tqdm
+
+    from cosim import sweep
+
+    def progress(done: int, failed: int, total: int) -> None:
+        if bar.n == 0:
+            bar.initial = done  # those of an earlier run tell nothing of the rate
+        bar.update(done - bar.n)
+        if failed:
+            bar.set_postfix_str(f"{failed} failed", refresh=False)
+
+    with tqdm(
+        total=len(design), desc=scene.name, unit="point", leave=False, file=sys.stderr, disable=None
+    ) as bar:
+        data = sweep.sweep(scene, design, folder, workers, dask, progress)
+    from cosim.sweep import figure
+    from cosim.sweep.report import table
+
+    with whole(folder / "figure.png") as temporary:
+        figure.draw(data, scene.name, temporary)
+    print(table(scene, data))
+    print(f"Written to {folder}: sweep.nc")
     print(f"Figure: {folder / 'figure.png'}")
 
 

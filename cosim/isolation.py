@@ -53,7 +53,7 @@ def isolated(
         process.join(PATIENCE)
         raise SimulationFailed(
             f"The simulation's process died at t = {reached:.6g} s "
-            f"({_how_it_ended(process.exitcode)})."
+            f"({how_it_ended(process.exitcode)})."
         ) from None
     finally:
         process.kill()
@@ -61,7 +61,8 @@ def isolated(
         here.close()
 
 
-def _how_it_ended(code: int | None) -> str:
+def how_it_ended(code: int | None) -> str:
+    """The signal or exit code that ended a process."""
     if code is not None and code < 0:
         return signal.Signals(-code).name
     return f"exit code {code}"

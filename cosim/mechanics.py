@@ -9,7 +9,7 @@ from ctypes import c_double, c_int
 from typing import Any
 
 from cosim.errors import SimulationFailed
-from cosim.fmi import INTERFACES, places
+from cosim.fmi import borrow, give_back, places
 from cosim.scene import Scene
 
 STEP_OUTPUTS = (
@@ -59,7 +59,8 @@ class Mechanics:
         """Time that the mechanics have reached, s."""
         self.steps = 0
         """Number of steps so far."""
-        self._fmi = INTERFACES[fmi_version]()
+        self._fmi_version = fmi_version
+        self._fmi = borrow(fmi_version)
         self._input_places = places(fmi_version, ("current", "current_slope"))
         self._input = (c_double * 2)()
         self._step_places = places(fmi_version, STEP_OUTPUTS)
@@ -116,8 +117,8 @@ class Mechanics:
         return dict(zip((*TOTALS, *COUNTERS), (*reals, *integers), strict=True))
 
     def close(self) -> None:
-        """Free the instance."""
-        self._fmi.close()
+        """End the use of the instance."""
+        give_back(self._fmi_version, self._fmi)
 
     def _failed(self, error: Exception) -> SimulationFailed:
         said = self._fmi.messages[-1] if self._fmi.messages else str(error)

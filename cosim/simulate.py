@@ -61,7 +61,7 @@ def simulate(
         from cosim.prescribed import simulate_part
 
         waveforms, summary = simulate_part(scene, progress)
-        return Result(scene, waveforms, summary | {"versions": _versions()})
+        return Result(scene, waveforms, summary | {"versions": versions()})
     if _needs_own_process(scene):
         return isolated(_simulate, scene, progress, fmi_version=fmi_version)
     return _simulate(scene, progress, fmi_version)
@@ -115,7 +115,7 @@ def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int)
         "fmu_steps": steps,
         "wall_time": time.perf_counter() - began,
         "method": scene.coupling.method if circuit else "uncoupled",
-        "versions": _versions() | ({"ngspice": circuit.ngspice} if circuit else {}),
+        "versions": versions() | ({"ngspice": circuit.ngspice} if circuit else {}),
     }
     return Result(scene, _waveforms(recorder, electric), summary)
 
@@ -162,7 +162,7 @@ def _waveforms(recorder: Recorder, electric: electrics.Electrics | None) -> dict
     return {name: known[name] for name in UNITS if name in known}
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
     """What made the result."""
     found = {"python": platform.python_version()}
     for package in ("cosim", "fmpy", "PySpice", "numpy"):

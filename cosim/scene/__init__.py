@@ -6,7 +6,7 @@
 """
 
 from cosim.scene.describe import Key, keys
-from cosim.scene.loading import list_scenes, load
+from cosim.scene.loading import changed, list_scenes, load
 from cosim.scene.model import Scene, to_toml
 from cosim.scene.tables import Circuit, Coil, Coupling, Drive, Friction, Mechanics, Run
 
@@ -20,6 +20,7 @@ __all__ = [
     "Mechanics",
     "Run",
     "Scene",
+    "changed",
     "keys",
     "list_scenes",
     "load",

@@ -4,7 +4,7 @@ import os
 import re
 import tomllib
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -59,6 +59,25 @@ def load(source: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scene
         raise BadInput(messages.explain(error, origins, base.origin)) from None
     _tell_idle(scene, layers, origins)
     return scene
+
+
+def changed(scene: Scene, values: Mapping[str, float | int], origin: str) -> Scene:
+    """``scene`` with other numbers for some keys ("table.key", SI), checked like a loaded one.
+
+    ``origin`` names in messages where the values come from. Raises :class:`BadInput`.
+    """
+    tables: dict[str, Any] = {}
+    for full, value in values.items():
+        table, _, key = full.partition(".")
+        tables.setdefault(table, {})[key] = value
+    _check_names(tables, origin)
+    merged, origins = _merge(
+        [_Layer(f"scene {scene.name}", scene.as_dict()), _Layer(origin, tables)]
+    )
+    try:
+        return Scene.model_validate(merged)
+    except ValidationError as error:
+        raise BadInput(messages.explain(error, origins, origin)) from None
 
 
 def _layers(source: str) -> list[_Layer]:
