@@ -93,6 +93,32 @@ def _parser() -> argparse.ArgumentParser:
         "--out", type=Path, metavar="DIR", help="where to write (default: results/<scene>-sweep)"
     )
 
+    tune = commands.add_parser(
+        "tune", help="find the settings that transport best", allow_abbrev=False
+    )
+    tune.add_argument("scene", metavar="SCENE", help="a built-in scene or a TOML file")
+    goal = tune.add_mutually_exclusive_group(required=True)
+    goal.add_argument("--maximise", metavar="NAME", help="a number of the summary: v_average, …")
+    goal.add_argument("--minimise", metavar="NAME", help="the same, downwards")
+    tune.add_argument(
+        "--over",
+        metavar="TABLE.KEY=LOW:HIGH",
+        action="append",
+        default=[],
+        help="a numeric key and its range; repeatable (default: the three knobs, end to end)",
+    )
+    _add_overrides(tune)
+    tune.add_argument(
+        "--budget", type=int, default=200, metavar="N", help="runs in all (default: 200)"
+    )
+    tune.add_argument("--seed", type=int, default=0, metavar="N", help="of the search (default: 0)")
+    tune.add_argument(
+        "--workers", type=int, metavar="N", help="processes (default: one for each processor)"
+    )
+    tune.add_argument(
+        "--out", type=Path, metavar="DIR", help="where to write (default: results/<scene>-tune)"
+    )
+
     theory = commands.add_parser(
         "theory", help="the paper's closed forms: theory.json, figure3.png, figure4.png"
     )
@@ -143,6 +169,21 @@ def _parser() -> argparse.ArgumentParser:
         "--out", type=Path, default=Path("results/compare"), metavar="DIR", help="where to write"
     )
 
+    export = commands.add_parser(
+        "export", help="write a finished run in other programs' formats", allow_abbrev=False
+    )
+    export.add_argument("run", type=Path, metavar="DIR", help="a folder that cosim run wrote")
+    export.add_argument(
+        "--as",
+        dest="forms",
+        metavar="FORM,...",
+        action="append",
+        required=True,
+        help="csv, nc, mat (MATLAB 5), hdf5, raw (ngspice's binary), wav (the surface's velocity "
+        "as sound) or tracker (a tracked trial); repeatable",
+    )
+    export.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: the run)")
+
     bench = commands.add_parser("bench", help="speed ratios, taken side by side in one run")
     bench.add_argument("--trials", type=Path, metavar="DIR", help="folder of tracked trials")
     bench.add_argument(
@@ -174,6 +215,18 @@ def _dispatch(arguments: argparse.Namespace) -> int:
             arguments.dask,
             arguments.out,
         )
+    elif arguments.command == "tune":
+        commands.tune(
+            arguments.scene,
+            arguments.overrides,
+            arguments.over,
+            arguments.maximise or arguments.minimise,
+            arguments.maximise is not None,
+            arguments.budget,
+            arguments.seed,
+            arguments.workers,
+            arguments.out,
+        )
     elif arguments.command == "theory":
         names = ("mu_s", "mu_k", "a_max", "f_n", "period")
         given = {name: getattr(arguments, name) for name in names}
@@ -186,6 +239,8 @@ def _dispatch(arguments: argparse.Namespace) -> int:
         )
     elif arguments.command == "compare":
         commands.compare(arguments.run, arguments.overrides, arguments.trial, arguments.out)
+    elif arguments.command == "export":
+        commands.export(arguments.run, arguments.forms, arguments.out)
     elif arguments.command == "bench":
         commands.bench(arguments.out, arguments.trials)
     elif arguments.action == "build":

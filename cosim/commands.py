@@ -139,6 +139,71 @@ def _sweep(
     print(f"Figure: {folder / 'figure.png'}")
 
 
+def tune(
+    source: str,
+    overrides: list[str],
+    over: list[str],
+    quantity: str,
+    largest: bool,
+    budget: int,
+    seed: int,
+    workers: int | None,
+    out: Path | None,
+) -> None:
+    """Search a scene's settings for the best, and write the search."""
+    from cosim.tune.files import ranges_of
+
+    scene = load(source, overrides)
+    ranges = ranges_of(over)
+    if seed < 0:
+        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
+    folder = out or Path("results") / f"{scene.name}-tune"
+    with _writable(folder):
+        _tune(scene, quantity, largest, ranges, budget, seed, workers, folder)
+
+
+def _tune(
+    scene: Scene,
+    quantity: str,
+    largest: bool,
+    ranges: dict[str, tuple[float, float]],
+    budget: int,
+    seed: int,
+    workers: int | None,
+    folder: Path,
+) -> None:
+    from tqdm import tqdm
+
+    from cosim.tune import tune
+    from cosim.tune.files import table, write, write_runs
+    from cosim.tune.run import Run
+
+    runs: list[Run] = []
+
+    def progress(run: Run, best: Run | None) -> None:
+        runs.append(run)
+        if best is not None:
+            bar.set_postfix_str(f"{quantity} {best.value:.4g}", refresh=False)
+        bar.update()
+
+    with tqdm(
+        total=budget, desc=scene.name, unit="run", leave=False, file=sys.stderr, disable=None
+    ) as bar:
+        try:
+            found = tune(scene, quantity, largest, ranges, budget, seed, workers, progress)
+        except KeyboardInterrupt:
+            write_runs(folder / "tune.csv", runs, quantity)
+            raise
+    numbers = write(folder, found, seed)
+    from cosim.tune import figure
+
+    with whole(folder / "figure.png") as temporary:
+        figure.draw(found, temporary)
+    print(table(numbers))
+    print(f"Written to {folder}: tune.json, tune.csv, best.toml")
+    print(f"Figure: {folder / 'figure.png'}")
+
+
 @contextmanager
 def _writable(folder: Path) -> Iterator[None]:
     """Refuse a folder that cannot be written to before a long run, not after it.
@@ -221,6 +286,21 @@ def compare(source: str, overrides: list[str], trial: Path, out: Path) -> None:
 
     with _writable(out):
         comparison.run(source, overrides, trial, out)
+
+
+def export(run: Path, forms: list[str], out: Path | None) -> None:
+    """Write a finished run in other programs' formats."""
+    from cosim import export as exporting
+
+    chosen = exporting.parse(forms)
+    made = exporting.read(run)
+    folder = out or run
+    with _writable(folder):
+        files = exporting.export(made, chosen, folder)
+    width = max(map(len, files))
+    print(f"Written to {folder}:")
+    for name, note in files.items():
+        print(f"  {name:<{width}}  {note}")
 
 
 def bench(out: Path, trials: Path | None) -> None:

@@ -2,7 +2,8 @@
 
 The simulated heights are read at the trial's frame rate and differenced as the tracker does; only
 then are they laid over the measured ones. Where in its period the run meets the trial's first frame
-is not known: it is chosen so that the surfaces' velocities agree best.
+is not known: it is chosen so that the surfaces' velocities agree best. A trial that `cosim export`
+made of the same run is recognised by its heights; then the camera's own error is told too.
 """
 
 import json
@@ -15,7 +16,7 @@ import numpy.typing as npt
 from cosim.errors import BadInput
 from cosim.prescribed import knots
 from cosim.published import FRAME_RATE
-from cosim.scene import load
+from cosim.scene import Scene, load
 from cosim.scene.messages import plain
 from cosim.simulate import simulate
 from cosim.trials import Trial, read
@@ -70,6 +71,20 @@ class Frames:
     v_part: Array
 
 
+@dataclass(frozen=True)
+class CameraError:
+    """What the camera alone makes of a run: mean distances of the run's rows from the straight
+    lines between the frames, as scripts that interpolate a trial draw them.
+    """
+
+    camera_surface_mm: float
+    """Of the surface's height."""
+    camera_part_mm: float
+    """Of the part's height."""
+    camera_velocity: float
+    """Of the surface's velocity, m/s."""
+
+
 def through_camera(waveforms: dict[str, Array], start: float, frames: int) -> Frames:
     """The run as a camera reads it from ``start`` (s) on."""
     time = start + np.arange(frames) / FRAME_RATE
@@ -81,6 +96,11 @@ def through_camera(waveforms: dict[str, Array], start: float, frames: int) -> Fr
     return Frames(
         time - start, heights["surface"], speeds["surface"], heights["part"], speeds["part"]
     )
+
+
+def visible_frames(waveforms: dict[str, Array], start: float) -> int:
+    """How many frames the camera takes from ``start`` (s) to the run's end."""
+    return max(0, int((waveforms["time"][-1] - start) * FRAME_RATE + 1e-6) + 1)
 
 
 def differences(z: Array) -> Array:
@@ -107,7 +127,8 @@ def run(source: str, overrides: list[str], trial_path: Path, out: Path) -> Metri
     trial = read(trial_path)
     waveforms, earliest, period = _waveforms(source, overrides, trial)
     metrics, simulated, measured = compare(waveforms, trial, earliest, period)
-    numbers = asdict(metrics)
+    camera = camera_error(waveforms, trial, earliest) if _own(waveforms, trial, earliest) else None
+    numbers = asdict(metrics) | (asdict(camera) if camera else {})
     with whole(out / "compare.json") as temporary:
         content = {"run": source, "trial": trial.name, **numbers}
         temporary.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
@@ -127,6 +148,12 @@ def run(source: str, overrides: list[str], trial_path: Path, out: Path) -> Metri
     width = max(map(len, numbers))
     for name, value in numbers.items():
         print(f"  {name:<{width}}  {'not tracked' if value is None else f'{value:.6g}'}")
+    if camera:
+        print(
+            "This trial is the run's own. Both sides went through the same camera: mean_error_mm "
+            "is what the digits of the file make, and camera_… is the error that the camera alone "
+            "makes, the run's rows against straight lines between the frames."
+        )
     print(f"Written to {out}: compare.json, compare.csv, frames.csv")
     print(f"Figure: {out / 'compare.png'}")
     return metrics
@@ -140,8 +167,12 @@ def compare(
     ``earliest`` is the first time of the run that may be laid over the trial's first frame, s.
     """
     measured = _of_trial(trial)
+    for body, z in (("platform", measured.z_surface), ("part", measured.z_part)):
+        if np.ptp(z) == 0.0:
+            raise BadInput(f"{trial.name}: the {body} does not move: there is nothing to compare.")
+    own = _own(waveforms, trial, earliest)
     end = float(waveforms["time"][-1])
-    if period == 0.0:  # the run begins with the first frame whose velocity is known
+    if period == 0.0 and not own:  # the run begins with the first frame whose velocity is known
         first = int(np.argmax(np.isfinite(trial.platform.v)))
         last = first + int(end * FRAME_RATE + 1e-6) + 1
         measured = Frames(*(values[first:last] for values in vars(measured).values()))
@@ -152,7 +183,8 @@ def compare(
             f"The run ends at {end:.4g} s, too early to cover the {n} frames of {trial.name}: "
             f"run.duration must be at least {earliest + n / FRAME_RATE:.4g} s."
         )
-    starts = np.linspace(earliest, max(earliest, min(room, earliest + period)), SHIFTS)
+    latest = earliest if own else max(earliest, min(room, earliest + period))
+    starts = np.linspace(earliest, latest, SHIFTS)
     candidates = (through_camera(waveforms, float(start), n) for start in starts)
     fits = [explained(frames.v_surface, measured.v_surface) for frames in candidates]
     start = float(starts[int(np.argmax(fits))])
@@ -176,6 +208,38 @@ def compare(
         start=start,
     )
     return metrics, simulated, measured
+
+
+def camera_error(waveforms: dict[str, Array], trial: Trial, start: float) -> CameraError:
+    """The camera's error in a trial made of this run, whose first frame is at ``start`` (s)."""
+    measured = _of_trial(trial)
+    known = np.isfinite(measured.v_surface)
+    frames = (start + np.arange(len(known)) / FRAME_RATE)[known]
+    time = waveforms["time"]
+    shown = (time >= frames[0] - 1e-9) & (time <= frames[-1] + 1e-9)
+
+    def distance(column: str) -> float:
+        drawn = np.interp(time[shown], frames, getattr(measured, column)[known])
+        return float(np.mean(np.abs(waveforms[column][shown] - drawn)))
+
+    return CameraError(
+        camera_surface_mm=1e3 * distance("z_surface"),
+        camera_part_mm=1e3 * distance("z_part"),
+        camera_velocity=distance("v_surface"),
+    )
+
+
+def _own(waveforms: dict[str, Array], trial: Trial, start: float) -> bool:
+    """Whether the trial's heights are this run's from ``start`` (s) on, to a trial's digits."""
+    n = len(trial.time)
+    if n > visible_frames(waveforms, start):
+        return False
+    seen, tracked = through_camera(waveforms, start, n), _of_trial(trial)
+    # A trial has seven digits, and eight places of a second or millimetre.
+    return np.allclose(seen.time, tracked.time, rtol=6e-7, atol=6e-9) and all(
+        np.allclose(mine, theirs, rtol=6e-7, atol=6e-12)
+        for mine, theirs in ((seen.z_surface, tracked.z_surface), (seen.z_part, tracked.z_part))
+    )
 
 
 def _of_trial(trial: Trial) -> Frames:
@@ -223,6 +287,11 @@ def _waveforms(
     else:
         scene = load(folder / "scene.toml")
         waveforms = read_csv(folder / "waveforms.csv")
+    return waveforms, *laid_over(scene)
+
+
+def laid_over(scene: Scene) -> tuple[float, float]:
+    """The first time of a run that may be laid over a trial's first frame, s, and its period, s."""
     if scene.drive.file is not None:
-        return waveforms, 0.0, 0.0  # the trial's own surface: there is nothing to shift
-    return waveforms, scene.run.settle, 1.0 / scene.drive.frequency
+        return 0.0, 0.0  # the trial's own surface: there is nothing to shift
+    return scene.run.settle, 1.0 / scene.drive.frequency
