@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import ceil, inf, isfinite
+from math import inf, isfinite
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +24,11 @@ KNOBS: dict[str, tuple[float, float]] = {
 TURNS = (-0.05, -0.01, 0.01, 0.05)
 """How far each key is turned about the best, as shares of its range."""
 
-SEARCHED = 0.8
-"""Share of the runs that the search has; the rest turns one key after another about its best."""
+SEARCHED = 0.93
+"""Most that the search has of the runs; the rest turns one key after another about its best."""
+
+FEWEST_RUNS = 20
+"""Of the search."""
 
 
 @dataclass(frozen=True)
@@ -97,13 +100,13 @@ def tune(
     """
     ranges = _checked(over or KNOBS)
     turned = len(TURNS) * len(ranges)
-    least = ceil(turned / (1.0 - SEARCHED))
+    least = FEWEST_RUNS + turned
     if budget < least:
         raise BadInput(f"--budget {budget}: must be a whole number from {least} for these keys.")
     whole_periods = any(key in FREQUENCIES for key in ranges)
     with Pool(scene, workers_asked(workers), whole_periods) as pool:
         trial = _Trial(pool, quantity, largest, ranges, progress)
-        search(trial.costs, len(ranges), round(SEARCHED * budget), seed)
+        search(trial.costs, len(ranges), min(round(SEARCHED * budget), budget - turned), seed)
         if trial.best is None:
             reason = next(iter(trial.known.values())).outcome.failure
             raise SimulationFailed(f"No setting could be run; the first one: {reason}")
@@ -148,8 +151,8 @@ class _Trial:
         found = [run for run in self.known.values() if run.value is not None]
         return min(found, key=lambda run: self._cost(run.value), default=None)
 
-    def costs(self, points: Array) -> Array:
-        """The cost of each point of the unit cube (rows)."""
+    def costs(self, points: Array) -> tuple[Array, int]:
+        """The cost of each point of the unit cube (rows), and how many of them were run for it."""
         # The search comes back with what it has heard, but for rounding.
         places = [tuple(float(x) for x in np.round(row, 9)) for row in points]
         new = [place for place in dict.fromkeys(places) if place not in self.known]
@@ -160,7 +163,7 @@ class _Trial:
             self._progress(runs[number], self.best)
         for number, place in enumerate(new):
             self.known[place] = runs[number]
-        return np.array([self._cost(self.known[place].value) for place in places])
+        return np.array([self._cost(self.known[place].value) for place in places]), len(new)
 
     def settings(self, place: tuple[float, ...]) -> dict[str, Number]:
         """The keys' values at a point of the unit cube."""
