@@ -36,6 +36,22 @@ class Interface(Protocol):
         """Back to the state after the making: parameters can be set again."""
         ...
 
+    def derivative(self, unknown: Any, known: Any, result: Any) -> None:
+        """Put d(outputs ``unknown``)/d(input ``known``) into ``result``; ``known`` is one place."""
+        ...
+
+    def get_state(self, handle: c_void_p) -> None:
+        """Save the state into ``handle``: a null one is given memory, a used one is overwritten."""
+        ...
+
+    def set_state(self, handle: c_void_p) -> None:
+        """Go back to a saved state."""
+        ...
+
+    def free_state(self, handle: c_void_p) -> None:
+        """Free the memory of a saved state."""
+        ...
+
     def close(self) -> None:
         """Free the instance."""
         ...
@@ -108,6 +124,20 @@ class Fmi2:
     def get_integers(self, places: Any, values: Any) -> None:
         self._fmu.fmi2GetInteger(self._component, places, len(places), values)
 
+    def derivative(self, unknown: Any, known: Any, result: Any) -> None:
+        self._fmu.fmi2GetDirectionalDerivative(
+            self._component, unknown, len(unknown), known, 1, _ONE, result
+        )
+
+    def get_state(self, handle: c_void_p) -> None:
+        self._fmu.fmi2GetFMUstate(self._component, byref(handle))
+
+    def set_state(self, handle: c_void_p) -> None:
+        self._fmu.fmi2SetFMUstate(self._component, handle)
+
+    def free_state(self, handle: c_void_p) -> None:
+        self._fmu.fmi2FreeFMUstate(self._component, byref(handle))
+
     def close(self) -> None:
         if self._running:
             self._fmu.terminate()
@@ -152,12 +182,28 @@ class Fmi3:
     def get_integers(self, places: Any, values: Any) -> None:
         self._fmu.fmi3GetInt32(self._component, places, len(places), values, len(values))
 
+    def derivative(self, unknown: Any, known: Any, result: Any) -> None:
+        n = len(unknown)
+        self._fmu.fmi3GetDirectionalDerivative(
+            self._component, unknown, n, known, 1, _ONE, 1, result, n
+        )
+
+    def get_state(self, handle: c_void_p) -> None:
+        self._fmu.fmi3GetFMUState(self._component, byref(handle))
+
+    def set_state(self, handle: c_void_p) -> None:
+        self._fmu.fmi3SetFMUState(self._component, handle)
+
+    def free_state(self, handle: c_void_p) -> None:
+        self._fmu.fmi3FreeFMUState(self._component, byref(handle))
+
     def close(self) -> None:
         if self._running:
             self._fmu.terminate()
         self._fmu.freeInstance()
 
 
+_ONE = (c_double * 1)(1.0)
 _LOGGER_2 = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 """FMI 2.0's logger without its variable arguments: this FMU's messages use none."""
 

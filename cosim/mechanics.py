@@ -72,6 +72,9 @@ class Mechanics:
         self._sticking = (c_int * 1)()
         self._totals_places = places(fmi_version, TOTALS)
         self._counters_places = places(fmi_version, COUNTERS)
+        self._slope_place = places(fmi_version, ("back_emf_slope",))
+        self._current_place = places(fmi_version, ("current",))
+        self._gain = (c_double * 1)()
         reals, integers = _parameters(scene)
         try:
             self._fmi.set_reals(
@@ -115,6 +118,15 @@ class Mechanics:
         integers = (c_int * len(COUNTERS))()
         self._fmi.get_integers(self._counters_places, integers)
         return dict(zip((*TOTALS, *COUNTERS), (*reals, *integers), strict=True))
+
+    def gain(self) -> float:
+        """d(back-EMF slope)/d(current) now, V/(A s): Bl² over the mass that the coil feels, as the
+        part sticks or slips and the ram is free or rests on a wall."""
+        try:
+            self._fmi.derivative(self._slope_place, self._current_place, self._gain)
+        except Exception as error:
+            raise self._failed(error) from error
+        return self._gain[0]
 
     def close(self) -> None:
         """End the use of the instance."""

@@ -1,0 +1,143 @@
+"""The largest macro step at which a coupling is stable: predicted, and observed.
+
+Predicted: a fixed-step method between linear participants is a linear map of everything that it
+keeps from one macro step to the next (the states of both sides and the histories of what they
+exchanged). The map is read from the method itself, by giving it a basis; it is stable while its
+spectral radius is at most 1.
+
+Observed: the method runs, with any participants (the FMU among them), from a small disturbance, and
+it is seen whether what is exchanged grows.
+"""
+
+from collections.abc import Callable
+from math import inf, isfinite
+from typing import Any, Protocol
+
+import numpy as np
+
+from cosim.coupling.polynomials import Array
+from cosim.errors import SimulationFailed
+
+_MARGIN = 1e-9
+"""A spectral radius this much above 1 is rounding."""
+_WARM_UP = 4  # steps until all histories are full
+
+
+class Method(Protocol):
+    """What is asked of a method here: all of :mod:`cosim.coupling` have it."""
+
+    of_first: Any
+    of_second: Any
+
+    def step(self, h: float) -> None: ...
+    def save(self) -> Any: ...
+    def restore(self, saved: Any) -> None: ...
+
+
+def linear_map(make: Callable[[], Method], h: float) -> Array:
+    """The matrix by which one macro step of ``h`` (s) takes what the method keeps to the next.
+
+    ``make`` gives the method between two homogeneous linear participants. Raises SimulationFailed
+    where an iteration in it does not converge.
+    """
+    method = make()
+    for _ in range(_WARM_UP):
+        method.step(h)
+    shape = method.save()
+    size = sum(leaf.size for leaf in _leaves(shape))
+    basis = iter(np.split(np.eye(size), np.cumsum([leaf.size for leaf in _leaves(shape)])[:-1]))
+    method.restore(_replaced(shape, basis))
+    method.step(h)
+    return np.concatenate(_leaves(method.save()))
+
+
+def spectral_radius(make: Callable[[], Method], h: float) -> float:
+    """Largest magnitude of an eigenvalue of the map; inf where a step cannot be done at all."""
+    try:
+        m = linear_map(make, h)
+    except SimulationFailed:
+        return inf
+    if not np.isfinite(m).all():
+        return inf
+    return float(np.abs(np.linalg.eigvals(m)).max())
+
+
+def largest_stable_step(
+    make: Callable[[], Method], low: float, high: float, tolerance: float = 1e-3
+) -> float:
+    """The macro step (s) between ``low`` and ``high`` up to which the coupling is predicted stable.
+
+    The first limit from below; ``high`` where there is none, 0 where ``low`` is already unstable.
+    ``tolerance`` is relative.
+    """
+    return _first_limit(lambda h: spectral_radius(make, h) <= 1.0 + _MARGIN, low, high, tolerance)
+
+
+def observed_limit(
+    make: Callable[[], Method], low: float, high: float, tolerance: float = 0.02, steps: int = 600
+) -> float:
+    """The same by running the method itself; ``make`` gives it disturbed from its equilibrium."""
+    return _first_limit(lambda h: remains_bounded(make, h, steps), low, high, tolerance)
+
+
+def remains_bounded(make: Callable[[], Method], h: float, steps: int = 600) -> bool:
+    """Whether what is exchanged has stopped growing after ``steps`` macro steps of ``h`` (s).
+
+    It is compared in the last quarter of the steps with the second quarter.
+    """
+    method = make()
+    sizes = np.empty(steps)
+    try:
+        for k in range(steps):
+            method.step(h)
+            sizes[k] = max(
+                np.abs(method.of_first.value).max(), np.abs(method.of_second.value).max()
+            )
+            if not isfinite(sizes[k]) or sizes[k] > 1e12:
+                return False
+    except (SimulationFailed, FloatingPointError, ValueError):
+        return False
+    quarter = steps // 4
+    # What has died away leaves the noise of the participants' own solvers.
+    floor = 1e-6 * sizes[:quarter].max()
+    return bool(sizes[3 * quarter :].max() <= 1.0001 * sizes[quarter : 2 * quarter].max() + floor)
+
+
+def _first_limit(
+    stable: Callable[[float], bool], low: float, high: float, tolerance: float
+) -> float:
+    if not stable(low):
+        return 0.0
+    inside, outside = low, low
+    while outside < high:
+        # Fine enough not to leap over an unstable interval of any width worth its name.
+        outside = min(1.15 * inside, high)
+        if not stable(outside):
+            break
+        inside = outside
+    else:
+        return high
+    while outside > (1.0 + tolerance) * inside:
+        middle = (inside * outside) ** 0.5
+        if stable(middle):
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+def _leaves(saved: Any) -> list[Array]:
+    """The arrays in a nested tuple; all else in it (times) does not belong to the linear state."""
+    if isinstance(saved, np.ndarray):
+        return [saved]
+    if isinstance(saved, tuple):
+        return [leaf for part in saved for leaf in _leaves(part)]
+    return []
+
+
+def _replaced(saved: Any, leaves: Any) -> Any:
+    if isinstance(saved, np.ndarray):
+        return next(leaves)
+    if isinstance(saved, tuple):
+        return tuple(_replaced(part, leaves) for part in saved)
+    return saved
