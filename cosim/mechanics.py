@@ -119,6 +119,16 @@ class Mechanics:
         self._fmi.get_integers(self._counters_places, integers)
         return dict(zip((*TOTALS, *COUNTERS), (*reals, *integers), strict=True))
 
+    def refresh(self, current: float, slope: float = 0.0) -> None:
+        """Calculate the outputs anew with this current (A, A/s), which the last step did not end
+        with."""
+        self._input[0], self._input[1] = current, slope
+        try:
+            self._fmi.set_reals(self._input_places, self._input)
+            self._fmi.get_reals(self._step_places, self.step_outputs)
+        except Exception as error:
+            raise self._failed(error) from error
+
     def gain(self) -> float:
         """d(back-EMF slope)/d(current) now, V/(A s): Bl² over the mass that the coil feels, as the
         part sticks or slips and the ram is free or rests on a wall."""

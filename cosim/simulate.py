@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim import electrics
-from cosim.coupling.step_locked import StepLocked
+from cosim.coupling import coupling
 from cosim.drive import Command, command
 from cosim.isolation import isolated
 from cosim.mechanics import Mechanics
@@ -96,7 +96,7 @@ def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int)
             from cosim.circuit.netlist import limits_at_work
             from cosim.circuit.run import CircuitRun
 
-            circuit = CircuitRun(scene, drive, StepLocked(recorder))
+            circuit = CircuitRun(scene, drive, coupling(scene, recorder, drive))
             circuit.run()
             log = circuit.log()
             refuse_false(scene, log, lambda finer: _circuit_log(finer, fmi_version))
@@ -127,7 +127,8 @@ def _circuit_log(scene: Scene, fmi_version: int) -> dict[str, Array]:
     mechanics = Mechanics(scene, fmi_version)
     try:
         recorder = Recorder(scene, mechanics, lambda _: None)
-        circuit = CircuitRun(scene, command(scene), StepLocked(recorder))
+        drive = command(scene)
+        circuit = CircuitRun(scene, drive, coupling(scene, recorder, drive))
         circuit.run()
         return circuit.log()
     finally:

@@ -17,6 +17,7 @@ from cosim.circuit.checks import check
 from cosim.circuit.deck import Line, read, refuse
 from cosim.circuit.elements import Element
 from cosim.circuit.words import definitions
+from cosim.coupling.led import LEAK_TIME
 from cosim.resources import circuits
 from cosim.scene import Scene
 
@@ -27,6 +28,9 @@ REQUIRED = ("i(vemf)", "v(out)", "v(sense)")
 OPTIONAL = ("v1", "swing", "climit", "slewing")
 """Nodes that are read where a netlist has them: the command at the power amplifier's input, and
 limits at work, each while its magnitude is at least 0.5."""
+
+MOTIONAL = "v(motional)"
+"""The share of the back-EMF that the circuit carries itself, with the method "companion"."""
 
 
 def parameters(scene: Scene) -> dict[str, float]:
@@ -69,6 +73,10 @@ def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
     lines = read(path_of(scene))
     elements = check(lines).elements
     external = _external_sources(elements)
+    present = {node for element in elements for node in element.nodes}
+    companion = scene.coupling.method == "companion"
+    if companion:
+        _carry_inertia(external, lines[0], present)
     values = parameters(scene)
     deck = [lines[0].text]
     depth = 0
@@ -83,11 +91,12 @@ def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
                 deck.append(f".param {name}{formal or ''}={value}")
         else:
             deck.append(line.text)
-    present = {node for element in elements for node in element.nodes}
     for node in ("out", "sense"):
         if node not in present:
             refuse(lines[0], f"the netlist must have a node {node}, one of the coil's two ends")
     saved = REQUIRED + tuple(f"v({name})" for name in OPTIONAL if name in present)
+    if companion:
+        saved += (MOTIONAL,)
     run, circuit = scene.run, scene.circuit
     deck += [
         f".options reltol={circuit.reltol!r}",
@@ -106,6 +115,29 @@ def _external_sources(elements: Sequence[Element]) -> dict[Line, str]:
         for element in elements
         if element.name in agreed
     }
+
+
+def _carry_inertia(external: dict[Line, str], title: Line, present: set[str]) -> None:
+    """Put the mechanics' local inertia in series with the coil, for the method "companion".
+
+    A capacitor C = m/Bl² carries e = ∫ i dt / C. Since the mass that the coil feels follows stick,
+    slip and contact, it is 1 F charged by the current times 1/C, which an external source gives.
+    """
+    for node in ("motional", "motional_gain", "motional_emf"):
+        if node in present:
+            refuse(title, f'the node {node} cannot be used with coupling.method = "companion"')
+    line = next(line for line, text in external.items() if text.lower().startswith("vemf "))
+    name, plus, minus, *_ = external[line].split()
+    external[line] = "\n".join(
+        (
+            f"{name} {plus} motional_emf external",
+            f"Emotional motional_emf {minus} motional 0 1",
+            "Vgain motional_gain 0 external",
+            f"Bmotional 0 motional I=i({name})*v(motional_gain)",
+            "Cmotional motional 0 1",
+            f"Rmotional motional 0 {LEAK_TIME!r}",
+        )
+    )
 
 
 def limits_at_work(log: dict[str, Array]) -> dict[str, npt.NDArray[np.bool_]]:

@@ -7,7 +7,7 @@ from math import isfinite
 import numpy as np
 import numpy.typing as npt
 
-from cosim.circuit.netlist import prepare
+from cosim.circuit.netlist import MOTIONAL, prepare
 from cosim.circuit.ngspice import engine
 from cosim.coupling import Coupling
 from cosim.drive import Command
@@ -36,6 +36,7 @@ class CircuitRun:
         self._jump = command.next_jump(0.0)
         self._time = 0.0
         self._deck, self._saved = prepare(scene)
+        self._motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else None
         self._log = array("d")
         self.attempts = 0
         """Steps that ngspice tried."""
@@ -72,6 +73,9 @@ class CircuitRun:
     def source(self, name: str) -> Callable[[float], float]:
         if name == "vemf":
             return self._coupling.back_emf
+        if name == "vgain":
+            count = self._count
+            return lambda time: self._coupling.gain(time) / count
         if name == "vcommand":
             return self._held(self._command.value, self._command.value_before, 0.0)
         if name == "vdac":
@@ -104,12 +108,13 @@ class CircuitRun:
         if not isfinite(sum(values)):
             raise SimulationFailed(f"The circuit left the range of numbers at t = {time:.6g} s.")
         self._log.append(time)
-        self._log.append(self._coupling.back_emf(time))
+        motional = 0.0 if self._motional is None else values[self._motional]
+        self._log.append(self._coupling.back_emf(time) + motional)
         self._log.extend(values)
         self._time = time
         if time <= 0.0:
             return _AFTER_JUMP
-        longest = self._coupling.accepted(time, values[0] / self._count)
+        longest = self._coupling.accepted(time, values[0] / self._count, motional)
         if time >= self._jump - _ON_TIME:
             self._jump = self._command.next_jump(self._jump)
             longest = min(longest, _AFTER_JUMP)

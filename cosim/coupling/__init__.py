@@ -1,10 +1,21 @@
 """How circuit and mechanics are solved together: one method a file, behind one protocol.
 
-A method is told of each accepted step of the circuit and gives the back-EMF as a pure function of
-time, so that a step that the circuit rejects needs nothing undone in the mechanics.
+A circuit that leads (ngspice) is joined through :class:`Coupling`: the method is told of each
+accepted step and gives the back-EMF as a pure function of time, so that a step that the circuit
+rejects needs nothing undone in the mechanics.
+
+Between participants that can all go back to a moment before, methods are written once against
+:mod:`cosim.coupling.participant`: Jacobi, Gauss-Seidel, companion, iterated, error-controlled and
+event-aware; their stability and their orders are studied there.
 """
 
 from typing import Protocol
+
+from cosim.coupling.led import Led
+from cosim.coupling.step_locked import StepLocked
+from cosim.drive import Command
+from cosim.recorder import Recorder
+from cosim.scene import Scene
 
 
 class Coupling(Protocol):
@@ -14,9 +25,23 @@ class Coupling(Protocol):
         """Back-EMF of the coil, V, at ``time`` (s), at or after the last accepted step."""
         ...
 
-    def accepted(self, time: float, current: float) -> float:
+    def accepted(self, time: float, current: float, motional: float = 0.0) -> float:
         """The circuit has accepted a step to ``time`` (s), where one coil carries ``current`` (A).
 
-        Returns the longest step that the circuit may try next, s.
+        ``motional`` is the share of the back-EMF (V) that the circuit carries itself, if it does:
+        it grows with ``gain`` times the current. Returns the longest step that the circuit may try
+        next, s.
         """
         ...
+
+    def gain(self, time: float) -> float:
+        """Bl²/m_eff, V/(A s), of a circuit that carries a share of the back-EMF itself."""
+        ...
+
+
+def coupling(scene: Scene, recorder: Recorder, command: Command) -> Coupling:
+    """The method of a scene whose circuit leads."""
+    chosen = scene.coupling
+    if chosen.method == "step-locked":
+        return StepLocked(recorder)
+    return Led(recorder, command, chosen.method, chosen.macro_step, chosen.order)

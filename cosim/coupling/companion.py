@@ -4,7 +4,7 @@ To a circuit, a mass m on a coil is a capacitor m/Bl² (Beranek, "Acoustics", 19
 analogy). Over a macro step the circuit solves e(t) = e_n + (ė_n - g i_n)(t - t_n) + g ∫ i dt with
 g = Bl²/m_eff from the FMU's directional derivative, so that m_eff follows stick, slip and contact;
 only what springs, dampers and friction add is extrapolated. The mechanics then take the mean of the
-current, which is its exact charge. This is the linearly implicit stabilisation of Arnold, "Stability
+current, which is its exact charge. It is the linearly implicit stabilisation of Arnold, "Stability
 of sequential modular time integration methods for coupled multibody system models", J. Comput.
 Nonlinear Dyn. 5 (2010) 031003, with the circuit's solver doing the implicit part.
 

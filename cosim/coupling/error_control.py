@@ -14,8 +14,8 @@ that one side believes to have given with what the other took (Sadjina et al., "
 and power bonds in co-simulations", Eng. Comput. 33 (2017) 607, doi 10.1007/s00366-016-0492-8) and
 rejects a step whose residual is too large a share of the greatest power so far.
 
-Known limits: needs participants that can repeat a step, so ngspice cannot take part; at an event the
-step shrinks to what the jump allows, so wrap no more than is smooth, or cut at events first.
+Known limits: needs participants that can repeat a step, so ngspice cannot take part; at an event
+the step shrinks to what the jump allows, so wrap no more than is smooth, or cut at events first.
 """
 
 from typing import Literal

@@ -4,9 +4,9 @@ Wraps a method with macro steps. A step in which the second side has met an even
 repeated, shortened by bisection, until it ends just behind the event; what was extrapolated then
 forgets everything older. Where nothing jumps the method keeps its own order; without this, events
 leave first order or less (measured 0.5 to 1.6 at stick-slip: extrapolating across an event does
-harm). Handling of events by step localisation: Gomes et al., "Co-simulation: a survey", ACM Comput.
-Surv. 51 (2018) 49, section on hybrid co-simulation. Known limits: needs participants that can repeat
-a step, so ngspice cannot take part; costs some 20 repeated steps an event.
+harm). Handling of events by step localisation: Gomes et al., "Co-simulation: a survey", ACM
+Comput. Surv. 51 (2018) 49, section on hybrid co-simulation. Known limits: needs participants that
+can repeat a step, so ngspice cannot take part; costs some 20 repeated steps an event.
 """
 
 from typing import Any

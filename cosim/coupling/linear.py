@@ -91,7 +91,7 @@ class LinearParticipant:
         for k in range(degree):
             low = n + outputs + k * inputs
             m[low : low + inputs, low + inputs : low + 2 * inputs] = np.eye(inputs)
-        found = expm(m * h)[: n + outputs]
+        found = np.asarray(expm(m * h)[: n + outputs], np.float64)
         self._known[key] = found
         if len(self._known) > _REMEMBERED:
             self._known.popitem(last=False)

@@ -34,7 +34,7 @@ class FmuMechanics(Mechanics):
         self._touches = 0
         self._free: list[c_void_p] = []
         self.mean: Array = np.zeros(1)
-        """Mean back-EMF of the last step, V: the change of the coil's flux linkage over its time."""
+        """Mean back-EMF of the last step, V: the coil's flux linkage changed so much by time."""
 
     def advance(self, h: float, inputs: Array, gain: float = 0.0) -> None:
         if gain:
@@ -45,22 +45,14 @@ class FmuMechanics(Mechanics):
         self.step_to(self.time + h, float(line[0, 0]), rise)
         if len(inputs) > 2:
             # The slope of the output answers to the current itself, not to the line in its stead.
-            self._refresh(float(value(inputs, h)[0]), float(slope_of(inputs, h)[0]))
+            self.refresh(float(value(inputs, h)[0]), float(slope_of(inputs, h)[0]))
         self.mean = np.array([(self._flux() - before) / h])
         self._touches += self._read_events() != was
 
     def outputs(self, inputs: Signal | None = None) -> Signal:
         if inputs is not None:
-            self._refresh(float(inputs[0][0]), float(inputs[1][0]))
+            self.refresh(float(inputs[0][0]), float(inputs[1][0]))
         return np.array([self.step_outputs[0]]), np.array([self.step_outputs[1]])
-
-    def _refresh(self, current: float, slope: float) -> None:
-        self._input[0], self._input[1] = current, slope
-        try:
-            self._fmi.set_reals(self._input_places, self._input)
-            self._fmi.get_reals(self._step_places, self.step_outputs)
-        except Exception as error:
-            raise self._failed(error) from error
 
     def _flux(self) -> float:
         """∫ Bl(q) dq from the centre, V s."""
@@ -90,7 +82,7 @@ class FmuMechanics(Mechanics):
             self._fmi.set_state(saved.handle)
         except Exception as error:
             raise SimulationFailed(f"The mechanics cannot go back: {error}") from error
-        self.time, _, outputs, self.mean, self._touches = saved.rest
+        self.time, outputs, self.mean, self._touches = saved.rest
         self.step_outputs[:] = outputs
 
     def close(self) -> None:

@@ -28,7 +28,10 @@ class StepLocked:
     def back_emf(self, time: float) -> float:
         return self._emf + self._slope * (time - self._time)
 
-    def accepted(self, time: float, current: float) -> float:
+    def gain(self, time: float) -> float:
+        return 0.0
+
+    def accepted(self, time: float, current: float, motional: float = 0.0) -> float:
         self._recorder.advance(time, self._current, current)
         self._time, self._current = time, current
         outputs = self._mechanics.step_outputs

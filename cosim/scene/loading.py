@@ -242,18 +242,20 @@ def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int,
     Only where the user, with that circuit and waveform chosen, gave the key another value: a file
     may be run with another circuit on top, and a resolved scene holds every key.
     """
-    model, waveform = scene.circuit.model, scene.drive.waveform
+    model, waveform, method = scene.circuit.model, scene.drive.waveform, scene.coupling.method
     resolved = [_is_resolved(layer.tables) for layer in layers]
     for key in keys():
         rank, origin = origins.get(key.full, (-1, ""))
-        choices = ["circuit.model"] + ["drive.waveform"] * (key.table == "drive")
+        choices = ["circuit.model"]
+        choices += ["drive.waveform"] * (key.table == "drive")
+        choices += ["coupling.method"] * (key.table == "coupling" and key.name != "method")
         chosen = max(origins.get(choice, (-1, ""))[0] for choice in choices)
         if rank < max(chosen, 0) or layers[rank].builtin or resolved[rank]:
             continue
         given = [layer.tables.get(key.table, {}) for layer in layers[: rank + 1]]
         values = [key.default, *(table[key.name] for table in given if key.name in table)]
-        if values[-1] != values[-2] and not acts(key.table, key.name, model, waveform):
-            sentence = f"{origin}: {messages.idle(key, model, waveform)}."
+        if values[-1] != values[-2] and not acts(key.table, key.name, model, waveform, method):
+            sentence = f"{origin}: {messages.idle(key, model, waveform, method)}."
             warnings.warn(sentence, NoEffect, stacklevel=3)
 
 

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from cosim.scene.describe import Key, keys
 from cosim.scene.model import toml_value
-from cosim.scene.tables import CIRCUIT_KEYS, GIVEN_SURFACES, TABLES, acts
+from cosim.scene.tables import CIRCUIT_KEYS, COUPLING_KEYS, GIVEN_SURFACES, LED, TABLES, acts
 
 ALLOWED_TOP = {
     "name": "at most 64 letters, digits, blanks and ._+- that begin with a letter or digit",
@@ -64,8 +64,9 @@ def unknown_key(table: str, name: str) -> str:
     return f'there is no key "{plain(full)}"' + hint
 
 
-def idle(key: Key, model: str, waveform: str) -> str:
-    """A sentence on a key that does nothing with this circuit.model and drive.waveform."""
+def idle(key: Key, model: str, waveform: str, method: str) -> str:
+    """A sentence on a key that does nothing with this circuit.model, drive.waveform and
+    coupling.method."""
 
     def listed(names: Iterable[str]) -> str:
         *rest, last = [f'"{name}"' for name in names]
@@ -74,8 +75,15 @@ def idle(key: Key, model: str, waveform: str) -> str:
     at = f'circuit.model = "{model}"'
     if key.table == "drive" and model == "none":
         at += f' and drive.waveform = "{waveform}"'
-    where = [m for m in CIRCUIT_KEYS if acts(key.table, key.name, m, "sawtooth")]
-    if where:
+    if key.table == "coupling" and model in LED:
+        others = [name for name, known in COUPLING_KEYS.items() if key.name in known]
+        return (
+            f'{key.full} has no effect with coupling.method = "{method}"; it acts in '
+            f"{listed(others)}"
+        )
+    where = [m for m in CIRCUIT_KEYS if acts(key.table, key.name, m, "sawtooth", method)]
+    if where or key.table == "coupling":
+        where = where or list(LED)
         return f"{key.full} has no effect with {at}; it acts in {listed(where)}"
     waveforms = [name for name, known in GIVEN_SURFACES.items() if key.name in known]
     return (

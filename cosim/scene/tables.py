@@ -331,12 +331,39 @@ class Friction(Table):
 
 
 class Coupling(Table):
-    """How circuit and mechanics are joined."""
+    """How circuit and mechanics are joined; ngspice leads."""
 
-    method: Literal["step-locked"] = _choice(
-        "step-locked", "ngspice leads and the mechanics follow each of its accepted steps"
+    method: Literal["step-locked", "jacobi", "gauss-seidel", "mean-current", "companion"] = _choice(
+        "step-locked",
+        "Mechanics follow each accepted step of ngspice; or macro steps: both sides extrapolated, "
+        "the mechanics fed the current's line or mean, or the circuit carrying their inertia",
+    )
+    macro_step: float = _number(1e-4, "s", 1e-7, 1e-2, "Macro step; ends early at command's jumps")
+    order: int = _number(
+        1, "1", 0, 2, "Order of extrapolation: held, with the true slope, parabola"
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_repeating(cls, data: Any) -> Any:
+        method = data.get("method") if isinstance(data, dict) else None
+        if method in ("iterated", "error-controlled", "event-aware"):
+            raise fault(
+                f'coupling.method = "{method}" repeats steps, which ngspice cannot; it is for '
+                "cosim.coupling's other participants",
+                "coupling.method",
+            )
+        return data
+
+
+COUPLING_KEYS = {
+    "step-locked": {"method"},
+    "jacobi": {"method", "macro_step", "order"},
+    "gauss-seidel": {"method", "macro_step", "order"},
+    "mean-current": {"method", "macro_step", "order"},
+    "companion": {"method", "macro_step"},
+}
+"""The keys of ``[coupling]`` that act with each ``coupling.method``."""
 
 GIVEN_SURFACES = {
     "optimal": {"frequency", "acceleration_max", "optimum"},
@@ -357,10 +384,17 @@ CIRCUIT_KEYS: dict[str, set[str]] = {
 """The keys of ``[circuit]`` that act with each ``circuit.model``."""
 
 
-def acts(table: str, key: str, model: str, waveform: str) -> bool:
-    """Whether a key does anything with this ``circuit.model`` and ``drive.waveform``."""
+LED = ("full", "amplifier", "file")
+"""Values of ``circuit.model`` with which ngspice leads and there is something to couple."""
+
+
+def acts(table: str, key: str, model: str, waveform: str, method: str = "step-locked") -> bool:
+    """Whether a key does anything with this ``circuit.model``, ``drive.waveform`` and
+    ``coupling.method``."""
     if key in ("model", "waveform"):
         return True
+    if table == "coupling":
+        return model in LED and key in COUPLING_KEYS[method]
     if table == "circuit":
         return key in CIRCUIT_KEYS[model]
     if table == "coil":
