@@ -17,7 +17,6 @@ from cosim.circuit.checks import check
 from cosim.circuit.deck import Line, read, refuse
 from cosim.circuit.elements import Element
 from cosim.circuit.words import definitions
-from cosim.coupling.led import LEAK_TIME
 from cosim.resources import circuits
 from cosim.scene import Scene
 
@@ -31,6 +30,10 @@ limits at work, each while its magnitude is at least 0.5."""
 
 MOTIONAL = "v(motional)"
 """The share of the back-EMF that the circuit carries itself, with the method "companion"."""
+
+LEAK_TIME = 0.1
+"""s; time constant with which that share leaks away. It keeps the share small over a long run, so
+that ngspice's relative tolerance stays a tolerance on the back-EMF."""
 
 
 def parameters(scene: Scene) -> dict[str, float]:

@@ -12,16 +12,13 @@ from typing import Literal
 
 import numpy as np
 
+from cosim.circuit.netlist import LEAK_TIME
 from cosim.coupling.polynomials import Array, History, projected
 from cosim.drive import Command
 from cosim.recorder import Recorder
 
 _ON_TIME = 1e-13
 """s; times of the circuit this close to a macro point are on it."""
-
-LEAK_TIME = 0.1
-"""s; time constant with which the circuit's share of the back-EMF leaks away. It keeps that share
-small over a long run, so that ngspice's relative tolerance stays a tolerance on the back-EMF."""
 
 Kind = Literal["jacobi", "gauss-seidel", "mean-current", "companion"]
 

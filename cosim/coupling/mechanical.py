@@ -72,10 +72,8 @@ class FmuMechanics(Mechanics):
     def save(self) -> Any:
         handle = self._free.pop() if self._free else c_void_p()
         self._fmi.get_state(handle)
-        outputs = tuple(self.step_outputs)
-        return _Saved(
-            handle, self._free, (self.time, self.steps, outputs, self.mean, self.events())
-        )
+        rest = (self.time, tuple(self.step_outputs), self.mean, self._touches)
+        return _Saved(handle, self._free, rest)
 
     def restore(self, saved: Any) -> None:
         try:
