@@ -101,22 +101,15 @@ class LinearParticipant:
 def coil(resistance: float, inductance: float, current: float = 0.0) -> LinearParticipant:
     """A coil (Ω, H) on a voltage that stands still: the input is its back-EMF, V, the output the
     current, A. A clamped output is such a circuit, with the sense resistor in ``resistance``."""
-    return LinearParticipant(
-        [[-resistance / inductance]], [[-1.0 / inductance]], [[1.0]], state=[current]
-    )
+    return LinearParticipant(*_coil(resistance, inductance), state=[current])
 
 
 def driven_coil(
     resistance: float, inductance: float, amplitude: float, frequency: float
 ) -> LinearParticipant:
     """The same coil on a voltage ``amplitude`` sin(2π ``frequency`` t), V, at rest at t = 0."""
-    w = 2.0 * np.pi * frequency
-    return LinearParticipant(
-        [[-resistance / inductance, 1.0 / inductance, 0.0], [0.0, 0.0, w], [0.0, -w, 0.0]],
-        [[-1.0 / inductance], [0.0], [0.0]],
-        [[1.0, 0.0, 0.0]],
-        state=[0.0, 0.0, amplitude],
-    )
+    matrices = _coil(resistance, inductance)
+    return _on_sine(matrices, [1.0 / inductance], amplitude, frequency)
 
 
 def regulated_coil(
@@ -131,13 +124,58 @@ def regulated_coil(
 
     ``gain_bandwidth`` in Hz, ``open_loop_gain`` a plain number; input back-EMF, output current.
     """
+    matrices = _regulated(resistance, inductance, sense_resistance, gain_bandwidth, open_loop_gain)
+    return LinearParticipant(*matrices, state=[current, 0.0])
+
+
+def driven_regulated_coil(
+    resistance: float,
+    inductance: float,
+    sense_resistance: float,
+    gain_bandwidth: float,
+    open_loop_gain: float,
+    amplitude: float,
+    frequency: float,
+) -> LinearParticipant:
+    """The same, commanded by ``amplitude`` sin(2π ``frequency`` t), V, and at rest at t = 0."""
+    matrices = _regulated(resistance, inductance, sense_resistance, gain_bandwidth, open_loop_gain)
+    return _on_sine(matrices, [0.0, 2.0 * np.pi * gain_bandwidth], amplitude, frequency)
+
+
+_Matrices = tuple[Any, Any, Any]
+
+
+def _coil(resistance: float, inductance: float) -> _Matrices:
+    return [[-resistance / inductance]], [[-1.0 / inductance]], [[1.0]]
+
+
+def _regulated(
+    resistance: float,
+    inductance: float,
+    sense_resistance: float,
+    gain_bandwidth: float,
+    open_loop_gain: float,
+) -> _Matrices:
     rate = 2.0 * np.pi * gain_bandwidth
+    loop = resistance + sense_resistance
+    a = [
+        [-loop / inductance, 1.0 / inductance],
+        [-rate * sense_resistance, -rate / open_loop_gain],
+    ]
+    return a, [[-1.0 / inductance], [0.0]], [[1.0, 0.0]]
+
+
+def _on_sine(
+    matrices: _Matrices, enters: list[float], amplitude: float, frequency: float
+) -> LinearParticipant:
+    """At rest at t = 0; a sine with this amplitude ``enters`` the states' rates."""
+    a, b, c = (np.array(m, float) for m in matrices)
+    n, w = len(a), 2.0 * np.pi * frequency
+    whole = np.zeros((n + 2, n + 2))
+    whole[:n, :n], whole[:n, n] = a, enters
+    whole[n, n + 1], whole[n + 1, n] = w, -w
+    still = np.zeros((2, b.shape[1]))
+    outputs = np.hstack([c, np.zeros((len(c), 2))])
     return LinearParticipant(
-        [
-            [-(resistance + sense_resistance) / inductance, 1.0 / inductance],
-            [-rate * sense_resistance, -rate / open_loop_gain],
-        ],
-        [[-1.0 / inductance], [0.0]],
-        [[1.0, 0.0]],
-        state=[current, 0.0],
+        whole, np.vstack([b, still]), outputs, state=[0.0] * (n + 1) + [amplitude]
     )

@@ -48,6 +48,7 @@ SCALES = (1.0, 10.0, 1e-3, 0.1, 1e-3, 0.1, 1e-3, 0.1) + (1e-3,) * len(ENERGIES)
 class Params:
     """Scene keys, flattened; the defaults are those of the scene `paper`."""
 
+    waveform: str = "sawtooth"  # or "sine"
     frequency: float = 20.0  # Hz
     amplitude: float = 8.0  # V peak-to-peak at V1
     offset: float = -1.2  # V
@@ -130,11 +131,14 @@ class _Model:
     """The equations, with the modes and the state `y` that they are frozen at."""
 
     def __init__(self, p: Params, contact: str, circuit: str, energies: bool) -> None:
+        if p.waveform not in ("sawtooth", "sine"):
+            raise ValueError(f"waveform {p.waveform!r}")
         if contact not in ("rigid", "compliant") or circuit not in ("amplifier", "ideal"):
             raise ValueError(f"contact {contact!r}, circuit {circuit!r}")
         self.p, self.rigid, self.ideal = p, contact == "rigid", circuit == "ideal"
         self.with_energies = energies
-        self.period = 1.0 / p.frequency
+        self.sine = p.waveform == "sine"
+        self.period = math.inf if self.sine else 1.0 / p.frequency  # from jump to jump
         self.cycle = 0  # the running period of the sawtooth
         self.part_mass = p.part_mass / p.n_surfaces
         self.sense = p.sense_resistance * p.count  # as one coil's current sees it [ohm]
@@ -151,7 +155,10 @@ class _Model:
         self.choose_contacts()
 
     def drive(self, t: float) -> float:
-        """V1(t) [V]: a rising ramp with a sharp fall at each period's end."""
+        """V1(t) [V]: a rising ramp with a sharp fall at each period's end, or a sine."""
+        if self.sine:
+            wave = 0.5 * math.sin(2.0 * math.pi * self.p.frequency * t)
+            return self.p.offset + self.p.amplitude * wave
         return self.p.offset + self.p.amplitude * (t / self.period - self.cycle - 0.5)
 
     def current(self, t: float, i: float) -> float:
