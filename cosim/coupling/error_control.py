@@ -5,7 +5,7 @@ compatible master algorithm", 9th Modelica Conference 2012, doi 10.3384/ecp12076
 of a step's local error in the outputs, for a method whose inputs are extrapolated with degree k:
 
 ``"richardson"``  two steps of H against one of 2H from the same start; their difference over
-                  2^(k+1) - 1 ... (2^(k+2) - 2) / 2 is the error of the two;
+                  2^(k+1) - 1 is the error of the two;
 ``"predictor"``   what the step ends with against what was extrapolated to there, which costs no
                   step more.
 
@@ -38,7 +38,7 @@ class ErrorControlled:
         order: int,
         step: float,
         relative: float,
-        absolute: float,
+        absolute: float | Array,
         estimate: Estimate = "richardson",
         energy_share: float | None = None,
         safety: float = 0.8,
@@ -48,8 +48,8 @@ class ErrorControlled:
     ) -> None:
         """``order`` is the method's degree k of extrapolation, ``step`` (s) the first to try.
 
-        The error of each output counts against ``absolute + relative |y|``. With ``energy_share``
-        the audit is on.
+        The error of each output counts against ``absolute + relative |y|``; an infinite entry of an
+        array ``absolute`` leaves that output out. With ``energy_share`` the audit is on.
         """
         self.method = method
         self._order = order
@@ -77,10 +77,11 @@ class ErrorControlled:
 
     def try_step(self, h: float) -> bool:
         """Try to go on by ``h`` (twice, with Richardson's estimate); whether it was kept."""
-        saved = self.method.save()
+        saved, known = self.method.save(), self._power
         attempt = self._doubled if self._estimate == "richardson" else self._predicted
         error, residual = attempt(h, saved)
-        honest = self._energy_share is None or residual <= self._energy_share * self._power
+        # The first step from rest has nothing to be compared with: all of its power is residual.
+        honest = not self._energy_share or not known or residual <= self._energy_share * self._power
         power = 1.0 / (self._order + 2)
         low, high = self._growth
         factor = high if error == 0.0 else self._safety * error**-power
