@@ -190,6 +190,15 @@ def _parser() -> argparse.ArgumentParser:
         "--out", type=Path, default=Path("results/bench"), metavar="DIR", help="where to write"
     )
 
+    chart = commands.add_parser("chart", help="studies of the coupling methods: table and figure")
+    chart.add_argument("name", choices=["accuracy", "stability"], metavar="accuracy|stability")
+    chart.add_argument(
+        "--quick", action="store_true", help="fewer points, in a fraction of the time"
+    )
+    chart.add_argument(
+        "--out", type=Path, default=Path("results/charts"), metavar="DIR", help="where to write"
+    )
+
     fmu = commands.add_parser("fmu", help="build or check the FMU files of the mechanics")
     actions = fmu.add_subparsers(dest="action", required=True, metavar="build|check")
     build = actions.add_parser("build", help="build stickslip-fmi2.fmu and stickslip-fmi3.fmu")
@@ -243,6 +252,8 @@ def _dispatch(arguments: argparse.Namespace) -> int:
         commands.export(arguments.run, arguments.forms, arguments.out)
     elif arguments.command == "bench":
         commands.bench(arguments.out, arguments.trials)
+    elif arguments.command == "chart":
+        commands.chart(arguments.name, arguments.out, arguments.quick)
     elif arguments.action == "build":
         commands.fmu_build(arguments.force)
     else:

@@ -55,6 +55,7 @@ def _run(scene: Scene, folder: Path) -> None:
         bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.2f} of {total:g} s, {remaining} left",
     ) as bar:
         result = simulate(scene, progress=progress)
+    scene = result.scene  # with the method and steps that were chosen, if they were to be
     from cosim import figure
     from cosim.simulate import UNITS
     from cosim.waveforms import write_csv, write_netcdf
@@ -301,6 +302,19 @@ def export(run: Path, forms: list[str], out: Path | None) -> None:
     print(f"Written to {folder}:")
     for name, note in files.items():
         print(f"  {name:<{width}}  {note}")
+
+
+def chart(name: str, out: Path, quick: bool) -> None:
+    """Run a study and write its tables and figures."""
+    with _writable(out):
+        if name == "stability":
+            from cosim.chart import stability
+
+            stability.run(out, quick)
+        else:
+            from cosim.chart import accuracy
+
+            accuracy.run(out, quick)
 
 
 def bench(out: Path, trials: Path | None) -> None:

@@ -1,6 +1,6 @@
 """The scenes of the studies, and the participants that can go back to run them with."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from cosim.coupling.amplifier import Amplifier
@@ -13,32 +13,52 @@ from cosim.scene import Scene
 
 @dataclass(frozen=True)
 class Case:
-    """A scene: what differs from ``paper``, and how long it is studied, s."""
+    """A scene: what differs from ``paper``, how long it is studied and how often sampled, s."""
 
     name: str
     title: str
     overrides: tuple[str, ...]
     duration: float
+    sampled: float = 2.5e-3
+    judged: tuple[str, ...] = ("z_part",)
+    """What is compared; near impacts velocities would tell of nothing but the impacts' times."""
+    netlist: bool = False
+    """Whether its reference has the leak of the netlist's pole, which tells at low bandwidth."""
 
+    @property
+    def smooth(self) -> bool:
+        """Whether nothing jumps, so that orders can be measured."""
+        return self.name.startswith("smooth")
+
+    def times(self) -> list[float]:
+        """When it is compared, s."""
+        count = round(self.duration / self.sampled)
+        return [self.duration * k / count for k in range(1, count + 1)]
+
+
+_SMOOTH = Case(
+    "smooth",
+    "smooth: sine, slow amplifier, no wall met, the part sticks",
+    (
+        "drive.waveform=sine",
+        "drive.frequency=40",
+        "drive.amplitude=1",
+        "drive.offset=0",
+        "circuit.gain_bandwidth=1e3",
+        "coil.force_factor=3",
+        "mechanics.travel=1e-2",
+        "friction.normal_force=5",
+    ),
+    0.02,
+    1e-3,
+    ("z_surface", "z_ram", "v_ram", "current"),
+)
 
 CASES = {
     case.name: case
     for case in (
-        Case(
-            "smooth",
-            "smooth: sine, slow amplifier, no wall met, the part sticks",
-            (
-                "drive.waveform=sine",
-                "drive.frequency=40",
-                "drive.amplitude=1",
-                "drive.offset=0",
-                "circuit.gain_bandwidth=1e3",
-                "coil.force_factor=3",
-                "mechanics.travel=1e-2",
-                "friction.normal_force=5",
-            ),
-            0.05,
-        ),
+        _SMOOTH,
+        replace(_SMOOTH, name="smooth, netlist", netlist=True),
         Case(
             "stick-slip",
             "stick-slip: no wall met, the part sticks and slips",

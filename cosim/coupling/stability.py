@@ -21,6 +21,8 @@ from cosim.errors import SimulationFailed
 _MARGIN = 1e-9
 """A spectral radius this much above 1 is rounding."""
 _WARM_UP = 4  # steps until all histories are full
+_UNBOUNDED, _NOISE = 1e7, 1e-4
+"""Multiples of the first size: beyond the one nothing is bounded, below the other all is noise."""
 
 
 class Method(Protocol):
@@ -63,21 +65,31 @@ def spectral_radius(make: Callable[[], Method], h: float) -> float:
 
 
 def largest_stable_step(
-    make: Callable[[], Method], low: float, high: float, tolerance: float = 1e-3
+    make: Callable[[], Method],
+    low: float,
+    high: float,
+    tolerance: float = 1e-3,
+    leap: float = 1.15,
 ) -> float:
     """The macro step (s) between ``low`` and ``high`` up to which the coupling is predicted stable.
 
     The first limit from below; ``high`` where there is none, 0 where ``low`` is already unstable.
-    ``tolerance`` is relative.
+    ``tolerance`` is relative; an unstable interval within a ``leap`` (a ratio) may be missed.
     """
-    return _first_limit(lambda h: spectral_radius(make, h) <= 1.0 + _MARGIN, low, high, tolerance)
+    stable = lambda h: spectral_radius(make, h) <= 1.0 + _MARGIN  # noqa: E731
+    return _first_limit(stable, low, high, tolerance, leap)
 
 
 def observed_limit(
-    make: Callable[[], Method], low: float, high: float, tolerance: float = 0.02, steps: int = 600
+    make: Callable[[], Method],
+    low: float,
+    high: float,
+    tolerance: float = 0.02,
+    steps: int = 600,
+    leap: float = 1.15,
 ) -> float:
     """The same by running the method itself; ``make`` gives it disturbed from its equilibrium."""
-    return _first_limit(lambda h: remains_bounded(make, h, steps), low, high, tolerance)
+    return _first_limit(lambda h: remains_bounded(make, h, steps), low, high, tolerance, leap)
 
 
 def remains_bounded(make: Callable[[], Method], h: float, steps: int = 600) -> bool:
@@ -87,31 +99,33 @@ def remains_bounded(make: Callable[[], Method], h: float, steps: int = 600) -> b
     """
     method = make()
     sizes = np.empty(steps)
+    begun = _size(method)
     try:
         for k in range(steps):
             method.step(h)
-            sizes[k] = max(
-                np.abs(method.of_first.value).max(), np.abs(method.of_second.value).max()
-            )
-            if not isfinite(sizes[k]) or sizes[k] > 1e12:
+            sizes[k] = _size(method)
+            if not isfinite(sizes[k]) or sizes[k] > _UNBOUNDED * begun:
                 return False
     except (SimulationFailed, FloatingPointError, ValueError):
         return False
     quarter = steps // 4
     # What has died away leaves the noise of the participants' own solvers.
-    floor = 1e-6 * sizes[:quarter].max()
+    floor = _NOISE * max(begun, sizes[:quarter].max())
     return bool(sizes[3 * quarter :].max() <= 1.0001 * sizes[quarter : 2 * quarter].max() + floor)
 
 
+def _size(method: Method) -> float:
+    return float(max(np.abs(method.of_first.value).max(), np.abs(method.of_second.value).max()))
+
+
 def _first_limit(
-    stable: Callable[[float], bool], low: float, high: float, tolerance: float
+    stable: Callable[[float], bool], low: float, high: float, tolerance: float, leap: float
 ) -> float:
     if not stable(low):
         return 0.0
     inside, outside = low, low
     while outside < high:
-        # Fine enough not to leap over an unstable interval of any width worth its name.
-        outside = min(1.15 * inside, high)
+        outside = min(leap * inside, high)
         if not stable(outside):
             break
         inside = outside
