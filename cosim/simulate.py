@@ -16,6 +16,7 @@ from cosim.isolation import isolated
 from cosim.mechanics import Mechanics
 from cosim.recorder import COLUMNS, Recorder
 from cosim.scene import Scene
+from cosim.scene.tables import LED
 from cosim.summary import summarise
 
 Array = npt.NDArray[np.float64]
@@ -62,6 +63,12 @@ def simulate(
 
         waveforms, summary = simulate_part(scene, progress)
         return Result(scene, waveforms, summary | {"versions": versions()})
+    if scene.coupling.method == "auto" and scene.circuit.model in LED:
+        from cosim.automatic import simulate_within_tolerance
+
+        return simulate_within_tolerance(
+            scene, lambda chosen: simulate(chosen, progress, fmi_version)
+        )
     if _needs_own_process(scene):
         return isolated(_simulate, scene, progress, fmi_version=fmi_version)
     return _simulate(scene, progress, fmi_version)

@@ -17,7 +17,7 @@ from cosim.errors import BadInput, NoEffect
 from cosim.scene import messages
 from cosim.scene.describe import keys
 from cosim.scene.model import Scene
-from cosim.scene.tables import KNOBS, TABLES, acts
+from cosim.scene.tables import CHOSEN_BY_AUTO, KNOBS, TABLES, acts
 
 MAX_BYTES = 1 << 20
 """Largest scene file; far above any honest one."""
@@ -248,7 +248,8 @@ def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int,
         rank, origin = origins.get(key.full, (-1, ""))
         choices = ["circuit.model"]
         choices += ["drive.waveform"] * (key.table == "drive")
-        choices += ["coupling.method"] * (key.table == "coupling" and key.name != "method")
+        steered = key.table == "circuit" and key.name in CHOSEN_BY_AUTO
+        choices += ["coupling.method"] * (steered or key.full.startswith("coupling."))
         chosen = max(origins.get(choice, (-1, ""))[0] for choice in choices)
         if rank < max(chosen, 0) or layers[rank].builtin or resolved[rank]:
             continue

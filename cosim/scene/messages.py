@@ -8,7 +8,15 @@ from pydantic import ValidationError
 
 from cosim.scene.describe import Key, keys
 from cosim.scene.model import toml_value
-from cosim.scene.tables import CIRCUIT_KEYS, COUPLING_KEYS, GIVEN_SURFACES, LED, TABLES, acts
+from cosim.scene.tables import (
+    CHOSEN_BY_AUTO,
+    CIRCUIT_KEYS,
+    COUPLING_KEYS,
+    GIVEN_SURFACES,
+    LED,
+    TABLES,
+    acts,
+)
 
 ALLOWED_TOP = {
     "name": "at most 64 letters, digits, blanks and ._+- that begin with a letter or digit",
@@ -72,6 +80,8 @@ def idle(key: Key, model: str, waveform: str, method: str) -> str:
         *rest, last = [f'"{name}"' for name in names]
         return f"{', '.join(rest)} or {last}" if rest else last
 
+    if method == "auto" and key.table == "circuit" and key.name in CHOSEN_BY_AUTO:
+        return f'{key.full} has no effect with coupling.method = "auto", which chooses it'
     at = f'circuit.model = "{model}"'
     if key.table == "drive" and model == "none":
         at += f' and drive.waveform = "{waveform}"'

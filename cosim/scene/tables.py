@@ -333,14 +333,20 @@ class Friction(Table):
 class Coupling(Table):
     """How circuit and mechanics are joined; ngspice leads."""
 
-    method: Literal["step-locked", "jacobi", "gauss-seidel", "mean-current", "companion"] = _choice(
+    method: Literal[
+        "step-locked", "jacobi", "gauss-seidel", "mean-current", "companion", "auto"
+    ] = _choice(
         "step-locked",
         "Mechanics follow each accepted step of ngspice; or macro steps: both sides extrapolated, "
-        "the mechanics fed the current's line or mean, or the circuit carrying their inertia",
+        "the mechanics fed the current's line or mean, or the circuit carrying their inertia; or "
+        "the cheapest of these, and of ngspice's steps, that meets a tolerance",
     )
     macro_step: float = _number(1e-4, "s", 1e-7, 1e-2, "Macro step; ends early at command's jumps")
     order: int = _number(
         1, "1", 0, 2, "Order of extrapolation: held, with the true slope, parabola"
+    )
+    tolerance: float = _number(
+        1e-3, "1", 1e-6, 0.5, "With auto: error of the part's height that is allowed, of its range"
     )
 
     @model_validator(mode="before")
@@ -362,8 +368,12 @@ COUPLING_KEYS = {
     "gauss-seidel": {"method", "macro_step", "order"},
     "mean-current": {"method", "macro_step", "order"},
     "companion": {"method", "macro_step"},
+    "auto": {"method", "tolerance"},
 }
 """The keys of ``[coupling]`` that act with each ``coupling.method``."""
+
+CHOSEN_BY_AUTO = ("reltol", "max_step")
+"""The keys of ``[circuit]`` that ``coupling.method = "auto"`` chooses."""
 
 GIVEN_SURFACES = {
     "optimal": {"frequency", "acceleration_max", "optimum"},
@@ -396,7 +406,8 @@ def acts(table: str, key: str, model: str, waveform: str, method: str = "step-lo
     if table == "coupling":
         return model in LED and key in COUPLING_KEYS[method]
     if table == "circuit":
-        return key in CIRCUIT_KEYS[model]
+        steered = method == "auto" and key in CHOSEN_BY_AUTO
+        return key in CIRCUIT_KEYS[model] and not steered
     if table == "coil":
         return model != "none" or key == "count"  # as many rams take part in the energies
     if table == "drive":

@@ -78,7 +78,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "gravity": 9.81,
     },
     "friction": {"law": "coulomb", "mu_s": 0.72, "mu_k": 0.59, "normal_force": 0.5, "mu_plate": 0},
-    "coupling": {"method": "step-locked", "macro_step": 1e-4, "order": 1},
+    "coupling": {"method": "step-locked", "macro_step": 1e-4, "order": 1, "tolerance": 1e-3},
     "run": {"duration": 2.0, "settle": 1.0, "output_step": 5e-5},
 }
 
