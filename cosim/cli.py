@@ -190,14 +190,23 @@ def _parser() -> argparse.ArgumentParser:
         "--out", type=Path, default=Path("results/bench"), metavar="DIR", help="where to write"
     )
 
-    chart = commands.add_parser("chart", help="studies of the coupling methods: table and figure")
-    chart.add_argument("name", choices=["accuracy", "stability"], metavar="accuracy|stability")
-    chart.add_argument(
-        "--quick", action="store_true", help="fewer points, in a fraction of the time"
-    )
-    chart.add_argument(
-        "--out", type=Path, default=Path("results/charts"), metavar="DIR", help="where to write"
-    )
+    chart = commands.add_parser("chart", help="the studies, as tables and a figure")
+    charts = chart.add_subparsers(dest="chart", required=True, metavar="accuracy|stability")
+    for name, text in (
+        ("accuracy", "error of every coupling method over its run time"),
+        ("stability", "largest stable macro step of every coupling method"),
+    ):
+        one = charts.add_parser(name, help=text, allow_abbrev=False)
+        one.add_argument(
+            "--quick", action="store_true", help="a part of it, in a fraction of the time"
+        )
+        one.add_argument(
+            "--out",
+            type=Path,
+            default=Path("results"),
+            metavar="DIR",
+            help="where to write (default: results)",
+        )
 
     fmu = commands.add_parser("fmu", help="build or check the FMU files of the mechanics")
     actions = fmu.add_subparsers(dest="action", required=True, metavar="build|check")
@@ -253,7 +262,8 @@ def _dispatch(arguments: argparse.Namespace) -> int:
     elif arguments.command == "bench":
         commands.bench(arguments.out, arguments.trials)
     elif arguments.command == "chart":
-        commands.chart(arguments.name, arguments.out, arguments.quick)
+        chosen = {"accuracy": commands.chart_accuracy, "stability": commands.chart_stability}
+        chosen[arguments.chart](arguments.out, arguments.quick)
     elif arguments.action == "build":
         commands.fmu_build(arguments.force)
     else:

@@ -304,17 +304,20 @@ def export(run: Path, forms: list[str], out: Path | None) -> None:
         print(f"  {name:<{width}}  {note}")
 
 
-def chart(name: str, out: Path, quick: bool) -> None:
-    """Run a study and write its tables and figures."""
+def chart_accuracy(out: Path, quick: bool) -> None:
+    """Error of every coupling method over its run time."""
     with _writable(out):
-        if name == "stability":
-            from cosim.chart import stability
+        from cosim.chart import accuracy
 
-            stability.run(out, quick)
-        else:
-            from cosim.chart import accuracy
+        accuracy.run(out, quick)
 
-            accuracy.run(out, quick)
+
+def chart_stability(out: Path, quick: bool) -> None:
+    """Largest stable macro step of every coupling method."""
+    with _writable(out):
+        from cosim.chart import stability
+
+        stability.run(out, quick)
 
 
 def bench(out: Path, trials: Path | None) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 import cosim.bench
 from cosim.chart.cases import CASES, Case
 from cosim.chart.solvers import SOLVERS, Outcome, Solver
-from cosim.chart.tables import Row, write
+from cosim.chart.study import Row, write
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene, load
 

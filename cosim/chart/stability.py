@@ -23,7 +23,7 @@ from cosim.chart.machines import (
     scene_of,
 )
 from cosim.chart.methods import METHODS
-from cosim.chart.tables import Row, write
+from cosim.chart.study import Row, write
 from cosim.coupling.amplifier import Amplifier
 from cosim.coupling.gauss_seidel import GaussSeidel
 from cosim.coupling.joint import Joint
