@@ -75,6 +75,8 @@ charts: setup
 	@$(VENV)/bin/cosim sweep ideal-current --over drive.pot_max=0:1:10 \
 		--over drive.pot_frequency=0.1:0.95:10 --over drive.pot_offset=0:1:10
 	@cp results/ideal-current-sweep/figure.png results/sweep.png
+	@$(VENV)/bin/cosim chart stability
+	@$(VENV)/bin/cosim chart accuracy
 
 check: $(VENV)/.installed
 	@$(VENV)/bin/ruff check

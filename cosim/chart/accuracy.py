@@ -127,7 +127,7 @@ def _judged(
 def order(runs: Sequence[Run]) -> float:
     """Slope of log error over log setting, fitted to the last halvings; nan where it has none."""
     known = [run for run in runs if isfinite(run.error) and run.error > 0.0]
-    if not known or known[0].solver.setting in ("tolerance", "circuit.reltol"):
+    if not known or not known[0].solver.setting.endswith("[s]"):
         return nan
     last = known[-_HALVINGS - 1 :]
     if len(last) <= _HALVINGS:

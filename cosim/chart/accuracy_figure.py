@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
 # Colour, line style and width by the beginning of a method's name.
 _STYLES = {
-    "step-locked (default), max_step": ("#d1495b", "-", 2.6),
-    "step-locked (default), reltol": ("#d1495b", (0, (3, 1)), 2.0),
+    "step-locked (default), both": ("#d1495b", "-", 2.8),
+    "step-locked (default), reltol": ("#d1495b", (0, (3, 1)), 1.8),
+    "step-locked (default), max_step": ("#d1495b", (0, (1, 1)), 1.8),
     "Jacobi k = 0": ("#a9cbe6", "-", 1.2),
     "Jacobi k = 1": ("#5b9bd0", "-", 1.2),
     "Jacobi k = 2": ("#1f4e79", "-", 1.2),

@@ -21,8 +21,8 @@ METHODS: dict[str, Callable[[Any, Any], Joint]] = {
     "EMF's slope, linear current": lambda a, b: GaussSeidel(a, b, 1, 1, True),
     "companion": Companion,
     # Beyond the tolerance of the FMU's own solver there is nothing to agree on.
-    "iterated, plain": lambda a, b: Iterated(a, b, "plain", tolerance=1e-7),
-    "iterated, Newton": lambda a, b: Iterated(a, b, "newton", tolerance=1e-7),
+    "iterated, plain": lambda a, b: Iterated(a, b, "plain", tolerance=1e-9),
+    "iterated, Newton": lambda a, b: Iterated(a, b, "newton", tolerance=1e-9),
 }
 """Makers of a method between circuit and mechanics. ``EMF's slope, linear current`` is the default
 method, step-locked, whose steps are otherwise those of ngspice."""

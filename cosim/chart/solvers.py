@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from cosim.automatic import LEVELS
 from cosim.chart.cases import Case, participants
 from cosim.chart.methods import METHODS, ORDERS
 from cosim.coupling.error_control import ErrorControlled
@@ -138,6 +139,11 @@ def _led(*overrides: str) -> Callable[[Scene, Case, float], Outcome]:
     return run
 
 
+def _level(scene: Scene, case: Case, level: float) -> Outcome:
+    reltol, max_step = LEVELS[round(level)]
+    return _led(f"circuit.reltol={reltol!r}", "circuit.max_step={}")(scene, case, max_step)
+
+
 def _all_in_ngspice(scene: Scene, case: Case, reltol: float) -> Outcome:
     from cosim.bench.peer_ngspice import run
 
@@ -213,7 +219,8 @@ SOLVERS = (
         "step-locked (default), max_step",
         "ngspice leads",
         "circuit.max_step [s]",
-        _led("circuit.max_step={}", "circuit.reltol=1e-7"),
+        # So loose that steps are as long as they may be.
+        _led("circuit.max_step={}", "circuit.reltol=1e-2"),
         _max_steps,
         2,
     ),
@@ -223,6 +230,13 @@ SOLVERS = (
         "circuit.reltol",
         _led("circuit.reltol={}", "circuit.max_step=1e-4"),
         _reltols,
+    ),
+    Solver(
+        "step-locked (default), both",
+        "ngspice leads",
+        "level of coupling.method = auto",
+        _level,
+        lambda case: range(len(LEVELS)),
     ),
     *(
         Solver(

@@ -44,4 +44,6 @@ def coupling(scene: Scene, recorder: Recorder, command: Command) -> Coupling:
     chosen = scene.coupling
     if chosen.method == "step-locked":
         return StepLocked(recorder)
-    return Led(recorder, command, chosen.method, chosen.macro_step, chosen.order)
+    assert chosen.method != "auto", "it is another one by now"
+    duration = scene.run.duration
+    return Led(recorder, command, chosen.method, chosen.macro_step, chosen.order, duration)

@@ -27,10 +27,16 @@ class Led:
     """Couples through the recorder, which moves the mechanics and writes down what they do."""
 
     def __init__(
-        self, recorder: Recorder, command: Command, kind: Kind, macro_step: float, order: int
+        self,
+        recorder: Recorder,
+        command: Command,
+        kind: Kind,
+        macro_step: float,
+        order: int,
+        duration: float,
     ) -> None:
         """``order`` 0, 1 or 2 of the extrapolation, from the back-EMF's true slope on; the
-        companion's is its own."""
+        companion's is its own. The last macro step ends at ``duration``, s."""
         self._recorder = recorder
         self._mechanics = recorder.mechanics
         self._command = command
@@ -39,6 +45,7 @@ class Led:
         self._of_current = History(order, False)
         self._of_emf = History(order, True)
         self._gain = 0.0
+        self._duration = duration
         self._jump = 0.0  # the start is one too
         self._start = self._reached = 0.0
         self._current = 0.0
@@ -90,6 +97,8 @@ class Led:
             self._of_emf.restart()
             self._jump = self._command.next_jump(time + _ON_TIME)
         self._end = min(time + self._macro_step, self._jump)
+        if time < self._duration - _ON_TIME:
+            self._end = min(self._end, self._duration)
         if self._kind == "companion":
             self._gain = self._mechanics.gain()
             # The circuit's share starts from what it stands at, and leaks away.

@@ -384,6 +384,16 @@ def test_finer_circuit_gives_the_same_average() -> None:
     assert usual.summary["v_average"] == expected
 
 
+@pytest.mark.parametrize("method", ["jacobi", "mean-current", "companion"])
+def test_macro_steps_end_with_the_run(method: str) -> None:
+    """Also where that is in the midst of a macro step."""
+    overrides = ["drive.frequency=33", "run.duration=0.3", "run.output_step=1e-3"]
+    overrides += [f"coupling.method={method}", "coupling.macro_step=2e-4"]
+    result = simulate(load("paper", [*overrides, "circuit.reltol=1e-3", "circuit.max_step=1e-4"]))
+    assert result.waveforms["time"][-1] == pytest.approx(0.3)
+    assert len(result.waveforms["time"]) == 301
+
+
 def test_progress_goes_from_start_to_end() -> None:
     told: list[float] = []
     simulate(load("paper", ["run.duration=0.02"]), progress=told.append)
