@@ -77,7 +77,11 @@ def joined_error(make: Make, steps: int) -> float:
 
 
 METHODS: dict[str, tuple[Make, float]] = {
-    **{name: (METHODS_OF_STUDIES[name], float(order)) for name, order in ORDERS.items()},
+    **{
+        name: (METHODS_OF_STUDIES[name], float(order))
+        for name, order in ORDERS.items()
+        if name != "iterated, plain"  # has the solution of the accelerated one
+    },
     "Jacobi k = 1, slopes": (lambda a, b: Jacobi(a, b, 1, slopes=True), 2.0),
     "held EMF, linear current": (lambda a, b: GaussSeidel(a, b, 0, feed=1), 1.0),
     "iterated, Anderson, mean": (lambda a, b: Iterated(a, b, "anderson", "mean"), 2.0),
@@ -89,7 +93,7 @@ METHODS: dict[str, tuple[Make, float]] = {
 def test_order_on_the_smooth_scene(name: str) -> None:
     make, order = METHODS[name]
     # A parabola through older points needs shorter steps until its order shows.
-    first = 800 if name.endswith("k = 2") else 400
+    first = 800 if name == "Gauss-Seidel k = 2" else 400
     errors = [joined_error(make, first * 2**k) for k in range(5)]
     assert slopes(errors) == pytest.approx([order] * 4, abs=0.1), errors
 

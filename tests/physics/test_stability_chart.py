@@ -12,7 +12,7 @@ from cosim.chart.stability import LONGEST, Regime, observed, predicted
         ("Jacobi k = 0", Regime(DIRECT, "saturated")),
         ("Gauss-Seidel k = 1", Regime(DIRECT, "saturated")),
         ("EMF's slope, linear current", Regime(PAPER, "saturated", slips=True)),
-        ("Gauss-Seidel k = 0", Regime(PAPER, "regulated", cut="coil in mechanics")),
+        ("EMF's slope, linear current", Regime(PAPER, "saturated", cut="coil in mechanics")),
     ],
 )
 def test_prediction_and_observation_agree(method: str, regime: Regime) -> None:
