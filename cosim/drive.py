@@ -14,6 +14,7 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Iterable
 from math import floor, inf, pi, sin
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,26 @@ from cosim.firmware import (
     volts,
 )
 from cosim.scene import Scene
+
+LEVEL, RISE, FALL, SINE = range(4)
+"""Kinds of pieces; ``native/circuit.c`` has the same."""
+
+
+class Piece(NamedTuple):
+    """The command from some time until ``until`` (s), as the compiled coupling evaluates it.
+
+    With the phase (t - origin) rate, V1 is ``offset`` for a level, offset + amplitude/2
+    sin(2π phase) for a sine, and else offset + amplitude (shape - 1/2) with the shape phase / span
+    in a rise and (1 - phase) / span in a fall, kept within 0 and 1. Times in s, rate in Hz, V.
+    """
+
+    until: float
+    kind: int
+    offset: float
+    amplitude: float = 0.0
+    origin: float = 0.0
+    rate: float = 0.0
+    span: float = 1.0
 
 
 class Command(ABC):
@@ -52,6 +73,10 @@ class Command(ABC):
     @abstractmethod
     def next_jump(self, t: float) -> float:
         """Time of the first discontinuity of V1 or of a pin strictly after ``t``, s, or inf."""
+
+    @abstractmethod
+    def piece(self, t: float) -> Piece:
+        """The piece that holds at ``t``."""
 
     def next_corner(self, t: float) -> float:
         """Time of the first such jump or jump of V1's slope strictly after ``t``, s."""
@@ -103,6 +128,9 @@ class Constant(Command):
     def next_jump(self, t: float) -> float:
         return inf
 
+    def piece(self, t: float) -> Piece:
+        return Piece(inf, LEVEL, self.level)
+
 
 class Sawtooth(Command):
     """V1 = offset + amplitude (t/T - 1/2) on [0, T), then a sharp fall.
@@ -123,11 +151,14 @@ class Sawtooth(Command):
         self._rise = 1.0 - self._fall
         self._jumps = amplitude != 0.0 and reset_time == 0.0
 
+    def _falls(self, t: float, n: int) -> bool:
+        return self._fall > 0.0 and t >= (n + self._rise) / self.frequency
+
     def value(self, t: float) -> float:
         f = self.frequency
         n = _edge_before(t, f)
         phase = (t - n / f) * f
-        if self._fall and t >= (n + self._rise) / f:
+        if self._falls(t, n):
             shape = min(max((1.0 - phase) / self._fall, 0.0), 1.0)
         else:
             shape = min(phase / self._rise, 1.0)
@@ -143,6 +174,13 @@ class Sawtooth(Command):
         if not self._jumps:
             return inf
         return (_edge_before(t, self.frequency) + 1) / self.frequency
+
+    def piece(self, t: float) -> Piece:
+        f = self.frequency
+        n = _edge_before(t, f)
+        kind, span = (FALL, self._fall) if self._falls(t, n) else (RISE, self._rise)
+        until = (n + self._rise) / f if self._fall and kind == RISE else (n + 1) / f
+        return Piece(until, kind, self.offset, self.amplitude, n / f, f, span)
 
     def next_corner(self, t: float) -> float:
         f = self.frequency
@@ -174,6 +212,11 @@ class Sine(Command):
     def next_jump(self, t: float) -> float:
         return inf
 
+    def piece(self, t: float) -> Piece:
+        f = self.frequency
+        n = _edge_before(t, f)
+        return Piece((n + 1) / f, SINE, self.offset, self.amplitude, n / f, f)
+
 
 class Square(Command):
     """V1 = offset + amplitude/2 in the first half of each period, offset - amplitude/2 after."""
@@ -197,6 +240,9 @@ class Square(Command):
 
     def next_jump(self, t: float) -> float:
         return (_edge_before(t, self._rate) + 1) / self._rate if self.amplitude else inf
+
+    def piece(self, t: float) -> Piece:
+        return Piece(self.next_jump(t), LEVEL, self.value(t))
 
 
 class Staircase(Command):
@@ -236,6 +282,9 @@ class Staircase(Command):
         if place == len(self._edges):
             period, place = period + 1, 0
         return (period * count + self._edges[place]) / self._rate
+
+    def piece(self, t: float) -> Piece:
+        return Piece(self.next_jump(t), LEVEL, self.value(t))
 
     def v_dac(self, t: float) -> float:
         return volts(self.codes[_edge_before(t, self._rate) % len(self.codes)])
@@ -307,6 +356,10 @@ class WithPwm(Command):
 
     def next_corner(self, t: float) -> float:
         return min(self._command.next_corner(t), self._next_edge(t))
+
+    def piece(self, t: float) -> Piece:
+        piece = self._command.piece(t)
+        return piece._replace(until=min(piece.until, self._next_edge(t)))
 
     def value(self, t: float) -> float:
         return self._command.value(t)

@@ -84,7 +84,7 @@ class Mechanics:
             self._fmi.get_reals(self._step_places, self.step_outputs)
         except Exception as error:
             self._fmi.close()
-            raise self._failed(error) from error
+            raise self.failed(error) from error
 
     def step_to(self, time: float, current: float = 0.0, slope: float = 0.0) -> None:
         """Advance to ``time`` (s) with one coil's current (A) at the start and its slope (A/s).
@@ -98,7 +98,7 @@ class Mechanics:
             self._fmi.do_step(self.time, time - self.time)
             self._fmi.get_reals(self._step_places, self.step_outputs)
         except Exception as error:
-            raise self._failed(error) from error
+            raise self.failed(error) from error
         self.time = time
         self.steps += 1
 
@@ -116,11 +116,35 @@ class Mechanics:
         self._fmi.get_integers(self._counters_places, integers)
         return dict(zip((*TOTALS, *COUNTERS), (*reals, *integers), strict=True))
 
+    def shared(self) -> dict[str, Any]:
+        """What compiled code needs to step and read this instance, as fields of
+        :class:`cosim.compiled.Fmu`; it must not outlive it.
+        """
+        return {
+            **self._fmi.addresses(),
+            "version": self._fmi_version,
+            "input_places": self._input_places,
+            "step_places": self._step_places,
+            "sample_places": self._sample_places,
+            "sticking_place": self._sticking_place,
+            "total_places": self._totals_places,
+            "counter_places": self._counters_places,
+            "inputs": len(self._input_places),
+            "step_outputs_count": len(STEP_OUTPUTS),
+            "samples": len(SAMPLE_OUTPUTS),
+            "totals": len(TOTALS),
+            "counters": len(COUNTERS),
+            "step_outputs": self.step_outputs,
+            "time": self.time,
+            "steps": self.steps,
+        }
+
     def close(self) -> None:
         """End the use of the instance."""
         give_back(self._fmi_version, self._fmi)
 
-    def _failed(self, error: Exception) -> SimulationFailed:
+    def failed(self, error: Exception) -> SimulationFailed:
+        """The failure to raise for a call of the FMU that gave ``error``, in the FMU's words."""
         said = self._fmi.messages[-1] if self._fmi.messages else str(error)
         return SimulationFailed(f"The mechanics failed at t = {self.time:.6g} s: {said}")
 

@@ -13,10 +13,12 @@ from cosim.mechanics import SAMPLE_OUTPUTS, Mechanics
 from cosim.published import FRAME_RATE
 from cosim.scene import Scene
 
+Array = npt.NDArray[np.float64]
+
 COLUMNS = (*SAMPLE_OUTPUTS, "sticking")
 
 _SAME_TIME = 1e-12  # s; communication points closer than this are one
-_Z_SURFACE = COLUMNS.index("z_surface")
+Z_SURFACE = COLUMNS.index("z_surface")
 
 
 class Recorder:
@@ -35,25 +37,40 @@ class Recorder:
         self._settle = run.settle
         self._progress = progress
         self.time = grid(run.output_step, run.duration)
-        self.rows = np.empty((len(self.time), len(COLUMNS)))
+        self.rows = np.empty((len(self.time) + 1, len(COLUMNS)))[:-1]
         frame_times = grid(1.0 / FRAME_RATE, run.duration)
         frame_times = frame_times[frame_times >= run.settle]
         self.frames = np.empty(len(frame_times))
         self.n_rows = 0
         self._n_frames = 0
-        self._agenda = _agenda(self.time, frame_times, run.settle, run.duration)
-        self._next = 0
+        self.agenda = _agenda(self.time, frame_times, run.settle, run.duration)
+        """Times (s) at which something is to be written down, and what; an endless one last."""
         self.extremes = [-np.inf, np.inf] * 3
         self.at_settle: dict[str, float] = {}
         """Totals of the mechanics when settling ends."""
+        self._begin()
+
+    def _begin(self) -> None:
+        """Write down what the agenda has for time 0."""
+        times, what = self.agenda
+        self._times, self._what, self._next = times.tolist(), what.tolist(), 0
         self._visit()
+
+    def follow(self, edges: Array, start: Array, end: Array) -> None:
+        """Advance through intervals that end at ``edges`` (s); in each the current of one coil goes
+        linearly from ``start`` to ``end``, A.
+        """
+        for time, current, current_end in zip(
+            edges.tolist(), start.tolist(), end.tolist(), strict=True
+        ):
+            self.advance(time, current, current_end)
 
     def advance(self, time: float, current: float, current_end: float) -> None:
         """Advance to ``time`` (s); the current of one coil goes linearly between the two, A."""
         mechanics = self.mechanics
         start = mechanics.time
         slope = (current_end - current) / (time - start)
-        times, _ = self._agenda
+        times = self._times
         while times[self._next] < time - _SAME_TIME:
             stop = times[self._next]
             self._step(stop, current + slope * (mechanics.time - start), slope)
@@ -82,7 +99,7 @@ class Recorder:
 
     def _visit(self) -> None:
         """Write down what the agenda has for this time."""
-        what = self._agenda[1][self._next]
+        what = self._what[self._next]
         self._next += 1
         if what & _SETTLED:
             self.at_settle = self.mechanics.totals()
@@ -92,7 +109,7 @@ class Recorder:
                 self.rows[self.n_rows] = sample
                 self.n_rows += 1
             if what & _FRAME:
-                self.frames[self._n_frames] = sample[_Z_SURFACE]
+                self.frames[self._n_frames] = sample[Z_SURFACE]
                 self._n_frames += 1
         self._progress(self.mechanics.time)
 
@@ -100,20 +117,19 @@ class Recorder:
 _ROW, _FRAME, _SETTLED = 1, 2, 4
 
 
-def grid(step: float, end: float) -> npt.NDArray[np.float64]:
+def grid(step: float, end: float) -> Array:
     """0, step, 2 step ... up to ``end``, which counts as reached within rounding."""
     return step * np.arange(int(end / step * (1 + 1e-12)) + 1, dtype=np.float64)
 
 
 def _agenda(
-    rows: npt.NDArray[np.float64], frames: npt.NDArray[np.float64], settle: float, duration: float
-) -> tuple[list[float], list[int]]:
-    """Times at which something is to be written down, and what; an endless one behind them."""
-    wanted: dict[int, tuple[float, int]] = {}
-    for times, what in ((rows, _ROW), (frames, _FRAME), ((settle,), _SETTLED), ((duration,), 0)):
-        for time in times:
-            key = round(float(time) / _SAME_TIME)
-            known, before = wanted.get(key, (float(time), 0))
-            wanted[key] = (known, before | what)
-    ordered = sorted(wanted.values())
-    return [time for time, _ in ordered] + [np.inf], [what for _, what in ordered] + [0]
+    rows: Array, frames: Array, settle: float, duration: float
+) -> tuple[Array, npt.NDArray[np.int32]]:
+    groups = ((rows, _ROW), (frames, _FRAME), ([settle], _SETTLED), ([duration], 0))
+    times = np.concatenate([group for group, _ in groups])
+    what = np.repeat([kind for _, kind in groups], [len(group) for group, _ in groups])
+    # Of times that are one the first is taken.
+    _, first, place = np.unique(np.rint(times / _SAME_TIME), return_index=True, return_inverse=True)
+    joined = np.zeros(len(first) + 1, np.int32)
+    np.bitwise_or.at(joined, place, what.astype(np.int32))
+    return np.append(times[first], np.inf), joined

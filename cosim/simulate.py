@@ -5,11 +5,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim import electrics
+from cosim.compiled import CompiledRecorder, library
 from cosim.coupling.step_locked import StepLocked
 from cosim.drive import Command, command
 from cosim.isolation import isolated
@@ -17,6 +19,9 @@ from cosim.mechanics import Mechanics
 from cosim.recorder import COLUMNS, Recorder
 from cosim.scene import Scene
 from cosim.summary import summarise
+
+if TYPE_CHECKING:
+    from cosim.circuit.run import CircuitRun
 
 Array = npt.NDArray[np.float64]
 
@@ -49,9 +54,15 @@ class Result:
 
 
 def simulate(
-    scene: Scene, progress: Callable[[float], None] = lambda _: None, fmi_version: int = 3
+    scene: Scene,
+    progress: Callable[[float], None] = lambda _: None,
+    fmi_version: int = 3,
+    compiled: bool = True,
 ) -> Result:
     """Run a scene. ``progress`` is told the simulated time (s) now and then.
+
+    Not ``compiled``, every step goes through Python, as on a machine without a C compiler; the
+    numbers are the same.
 
     A netlist of the user's own runs in a process of its own, as does every circuit after ngspice
     has given up in this one. Raises BadInput for a netlist that cannot be used, SimulationFailed
@@ -63,8 +74,8 @@ def simulate(
         waveforms, summary = simulate_part(scene, progress)
         return Result(scene, waveforms, summary | {"versions": versions()})
     if _needs_own_process(scene):
-        return isolated(_simulate, scene, progress, fmi_version=fmi_version)
-    return _simulate(scene, progress, fmi_version)
+        return isolated(_simulate, scene, progress, fmi_version=fmi_version, compiled=compiled)
+    return _simulate(scene, progress, fmi_version, compiled)
 
 
 def _needs_own_process(scene: Scene) -> bool:
@@ -77,12 +88,14 @@ def _needs_own_process(scene: Scene) -> bool:
     return spoilt()
 
 
-def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int) -> Result:
+def _simulate(
+    scene: Scene, progress: Callable[[float], None], fmi_version: int, compiled: bool
+) -> Result:
     began = time.perf_counter()
     drive = command(scene)
     mechanics = Mechanics(scene, fmi_version)
     try:
-        recorder = Recorder(scene, mechanics, progress)
+        recorder = _recorder(scene, mechanics, progress, compiled)
         electric, circuit = None, None
         if scene.circuit.model == "none":
             recorder.advance(scene.run.duration, 0.0, 0.0)
@@ -94,12 +107,11 @@ def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int)
         else:
             from cosim.circuit.limit_cycle import refuse_false
             from cosim.circuit.netlist import limits_at_work
-            from cosim.circuit.run import CircuitRun
 
-            circuit = CircuitRun(scene, drive, StepLocked(recorder))
+            circuit = _circuit_run(scene, drive, recorder)
             circuit.run()
             log = circuit.log()
-            refuse_false(scene, log, lambda finer: _circuit_log(finer, fmi_version))
+            refuse_false(scene, log, lambda finer: _circuit_log(finer, fmi_version, compiled))
             if scene.circuit.netlist is not None:
                 electrics.refuse_foreign_coil(scene, log)
             limits = limits_at_work(log)
@@ -120,14 +132,29 @@ def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int)
     return Result(scene, _waveforms(recorder, electric), summary)
 
 
-def _circuit_log(scene: Scene, fmi_version: int) -> dict[str, Array]:
-    """The circuit's waveforms of a run of which nothing else is wanted."""
+def _recorder(
+    scene: Scene, mechanics: Mechanics, progress: Callable[[float], None], compiled: bool
+) -> Recorder:
+    made = CompiledRecorder if compiled and library() is not None else Recorder
+    return made(scene, mechanics, progress)
+
+
+def _circuit_run(scene: Scene, drive: Command, recorder: Recorder) -> "CircuitRun":
+    if isinstance(recorder, CompiledRecorder):
+        from cosim.circuit.compiled_run import CompiledRun
+
+        return CompiledRun(scene, drive, recorder)
     from cosim.circuit.run import CircuitRun
 
+    return CircuitRun(scene, drive, StepLocked(recorder))
+
+
+def _circuit_log(scene: Scene, fmi_version: int, compiled: bool) -> dict[str, Array]:
+    """The circuit's waveforms of a run of which nothing else is wanted."""
     mechanics = Mechanics(scene, fmi_version)
     try:
-        recorder = Recorder(scene, mechanics, lambda _: None)
-        circuit = CircuitRun(scene, command(scene), StepLocked(recorder))
+        recorder = _recorder(scene, mechanics, lambda _: None, compiled)
+        circuit = _circuit_run(scene, command(scene), recorder)
         circuit.run()
         return circuit.log()
     finally:
@@ -145,8 +172,9 @@ def _prescribe(scene: Scene, drive: Command, recorder: Recorder) -> dict[str, Ar
         edges.append(stop)
         start.append(share * drive.value(begin))
         end.append(share * drive.value_before(stop))
-        recorder.advance(stop, start[-1], end[-1])
-    return {"time": np.array(edges), "start": np.array(start), "end": np.array(end)}
+    log = {"time": np.array(edges), "start": np.array(start), "end": np.array(end)}
+    recorder.follow(log["time"][1:], log["start"], log["end"])
+    return log
 
 
 def _waveforms(recorder: Recorder, electric: electrics.Electrics | None) -> dict[str, Array]:
