@@ -84,8 +84,22 @@ class Command(ABC):
 
     def values(self, times: Iterable[float]) -> npt.NDArray[np.float64]:
         """V1 at each of ``times``, V."""
-        value = self.value
-        return np.array([value(float(t)) for t in times], dtype=np.float64)
+        at = np.array(list(times) if not isinstance(times, np.ndarray) else times, np.float64)
+        begin, last = (float(at.min()), float(at.max())) if at.size else (inf, inf)
+        pieces = []
+        while begin <= last < inf:
+            pieces.append(self.piece(begin))
+            begin = pieces[-1].until
+        if not pieces:
+            return at
+        columns = [np.array(column) for column in zip(*pieces, strict=True)]
+        place = np.searchsorted(columns[0], at, side="right")
+        kind, offset, amplitude, origin, rate, span = (column[place] for column in columns[1:])
+        phase = (at - origin) * rate
+        shape = np.where(kind == RISE, phase / span, np.maximum((1.0 - phase) / span, 0.0))
+        ramp = offset + amplitude * (np.minimum(shape, 1.0) - 0.5)
+        sine = offset + 0.5 * amplitude * np.sin(2 * pi * (at - origin) * rate)
+        return np.select([kind == LEVEL, kind == SINE], [offset, sine], ramp)
 
     def v_dac(self, t: float) -> float:
         """Voltage of the DAC at ``t``, V."""

@@ -4,6 +4,7 @@ Energies are those of all ``coil.count`` coils, J; currents and voltages those o
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -71,18 +72,18 @@ def from_circuit(
             coil.eddy_inductance, coil.eddy_resistance, h, current[:-1], current[1:]
         )
     spent = h * (time[1:] > scene.run.settle)
-    limited = {name: float(np.dot(spent, acts[1:]) / spent.sum()) for name, acts in limits.items()}
+    limited = {name: _total(spent, acts[1:]) / float(spent.sum()) for name, acts in limits.items()}
     at_limit = [acts for name, acts in limits.items() if name != "slew"]
     if at_limit:
-        limited["output"] = float(np.dot(spent, np.any(at_limit, axis=0)[1:]) / spent.sum())
+        limited["output"] = _total(spent, np.any(at_limit, axis=0)[1:]) / float(spent.sum())
     made = "v(v1)" in log and circuit.model != "amplifier"  # by the circuit, not given to it
     settled = current[time >= scene.run.settle]
     return Electrics(
         command=np.interp(rows, time, log["v(v1)"]) if made else command.values(rows),
         current=np.interp(rows, time, current),
         coil_voltage=np.interp(rows, time, out - sense),
-        energy_in=float(np.dot(h, mean * mean_delivered)),
-        energy_copper=float(copper * np.dot(h, mean**2)) + coil.count * eddy_heat,
+        energy_in=_total(h, mean * mean_delivered),
+        energy_copper=copper * _total(h, mean**2) + coil.count * eddy_heat,
         energy_magnetic=_magnetic(scene, float(current[-1]), eddy_current),
         current_max=float(settled.max()),
         current_min=float(settled.min()),
@@ -130,7 +131,7 @@ def from_command(
     coil = scene.coil
     edges, start, end = log["time"], log["start"], log["end"]
     h = np.diff(edges)
-    squares = float(np.dot(h, start**2 + start * end + end**2)) / 3.0
+    squares = _total(h, start**2 + start * end + end**2) / 3.0
     slope = (end - start) / h
     at = np.clip(np.searchsorted(edges, rows, side="right") - 1, 0, len(h) - 1)
     current = start[at] + slope[at] * (rows - edges[at])
@@ -163,6 +164,11 @@ def from_command(
         current_min=float(after.min()),
         limited={"output": 0.0},
     )
+
+
+def _total(shares: Array, values: npt.NDArray[Any]) -> float:
+    """Sum of the products, without BLAS: its threads cost more than the sum itself."""
+    return float((shares * values).sum())
 
 
 def _magnetic(scene: Scene, current: float, eddy_current: float) -> float:

@@ -147,8 +147,8 @@ class CompiledRun(CircuitRun):
         command, state = self._command, self._state
         kept = self._pieces[self._pieces["until"] > state.time]
         begin = float(self._pieces["until"][-1]) if len(self._pieces) else 0.0
-        pieces = []
-        while len(pieces) < _PIECES and isfinite(begin):
+        pieces: list[tuple[float, ...]] = []
+        while len(pieces) < _PIECES and begin <= self._scene.run.duration:
             until, kind, offset, amplitude, origin, rate, span = command.piece(begin)
             jump = command.next_jump(begin)
             pieces.append(

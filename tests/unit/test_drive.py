@@ -372,6 +372,15 @@ def test_smooth_between_corners(drive: Command, t: float, share: float) -> None:
         assert drive.value(late) == drive.value(t)
 
 
+@given(drive=COMMANDS, times=st.lists(st.floats(-0.02, 0.02), max_size=9), ripple=st.booleans())
+def test_values_are_those_of_each_time(drive: Command, times: list[float], ripple: bool) -> None:
+    edge = drive.next_jump(0.0)
+    times += [t for t in (edge, nextafter(edge, -inf)) if t < 0.05]
+    made = WithPwm(drive) if ripple else drive
+    expected = [drive.value(t) for t in times]
+    assert made.values(times) == pytest.approx(expected, rel=1e-15, abs=1e-15)
+
+
 @given(drive=COMMANDS, t=TIME)
 def test_pins_make_the_command(drive: Command, t: float) -> None:
     assert GAIN * (drive.v_offset - drive.v_dac(t)) == pytest.approx(drive.value(t), abs=1e-9)
