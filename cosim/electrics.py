@@ -72,10 +72,13 @@ def from_circuit(
             coil.eddy_inductance, coil.eddy_resistance, h, current[:-1], current[1:]
         )
     spent = h * (time[1:] > scene.run.settle)
-    limited = {name: _total(spent, acts[1:]) / float(spent.sum()) for name, acts in limits.items()}
+    spent /= spent.sum()
+    # A step that only begins or ends at the limit counts half.
+    limited = {name: _total(spent, 0.5 * acts[1:] + 0.5 * acts[:-1]) for name, acts in limits.items()}
     at_limit = [acts for name, acts in limits.items() if name != "slew"]
     if at_limit:
-        limited["output"] = _total(spent, np.any(at_limit, axis=0)[1:]) / float(spent.sum())
+        acts = np.any(at_limit, axis=0)
+        limited["output"] = _total(spent, 0.5 * acts[1:] + 0.5 * acts[:-1])
     made = "v(v1)" in log and circuit.model != "amplifier"  # by the circuit, not given to it
     settled = current[time >= scene.run.settle]
     return Electrics(
