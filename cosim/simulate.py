@@ -4,6 +4,7 @@ import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
@@ -192,6 +193,12 @@ def _waveforms(recorder: Recorder, electric: electrics.Electrics | None) -> dict
 
 def versions() -> dict[str, str]:
     """What made the result."""
+    return dict(_versions())
+
+
+@cache
+def _versions() -> dict[str, str]:
+    # Looked up once: it takes longer than a short run of the part alone.
     found = {"python": platform.python_version()}
     for package in ("cosim", "fmpy", "PySpice", "numpy"):
         try:
