@@ -303,9 +303,9 @@ def export(run: Path, forms: list[str], out: Path | None) -> None:
         print(f"  {name:<{width}}  {note}")
 
 
-def bench(out: Path, trials: Path | None) -> None:
+def bench(out: Path, trials: Path | None, quick: bool) -> None:
     """Measure speed ratios."""
     from cosim import bench as ratios
 
     with _writable(out):
-        ratios.run(out, trials)
+        ratios.run(out, trials, quick)

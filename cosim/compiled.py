@@ -110,12 +110,13 @@ class CompiledRecorder(Recorder):
         self.follow(*(np.array([value]) for value in (time, current, current_end)))
 
     def follow(self, edges: Array, start: Array, end: Array) -> None:
+        arrays = [np.ascontiguousarray(values) for values in (edges, start, end)]
         done = 0
         while done < len(edges):
             taken = self._library.recorder_follow(
                 ctypes.byref(self.state),
                 len(edges) - done,
-                *(values.ctypes.data + 8 * done for values in (edges, start, end)),
+                *(values.ctypes.data + 8 * done for values in arrays),
                 BLOCK,
             )
             if taken < 0:

@@ -74,7 +74,9 @@ def from_circuit(
     spent = h * (time[1:] > scene.run.settle)
     spent /= spent.sum()
     # A step that only begins or ends at the limit counts half.
-    limited = {name: _total(spent, 0.5 * acts[1:] + 0.5 * acts[:-1]) for name, acts in limits.items()}
+    limited = {
+        name: _total(spent, 0.5 * acts[1:] + 0.5 * acts[:-1]) for name, acts in limits.items()
+    }
     at_limit = [acts for name, acts in limits.items() if name != "slew"]
     if at_limit:
         acts = np.any(at_limit, axis=0)

@@ -72,7 +72,7 @@ class Mechanics:
         self._sticking = (c_int * 1)()
         self._totals_places = places(fmi_version, TOTALS)
         self._counters_places = places(fmi_version, COUNTERS)
-        reals, integers = _parameters(scene)
+        reals, integers = parameters(scene)
         try:
             self._fmi.set_reals(
                 places(fmi_version, tuple(reals)), (c_double * len(reals))(*reals.values())
@@ -149,7 +149,7 @@ class Mechanics:
         return SimulationFailed(f"The mechanics failed at t = {self.time:.6g} s: {said}")
 
 
-def _parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
+def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
     """Real and integer parameters of the FMU, with the scene's normal force."""
     table: dict[str, Any] = scene.mechanics.model_dump()
     integers = {

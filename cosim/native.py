@@ -15,10 +15,10 @@ from pathlib import Path
 from cosim.compiler import COMPILE_FLAGS, LIBRARY_FLAGS, build_directory, compiler, execute
 from cosim.errors import BadInput
 
-_FOLDER = Path(__file__).with_name("native")
+FOLDER = Path(__file__).with_name("native")
 SOURCES = {
-    "part": (_FOLDER / "part.c",),
-    "coupled": (_FOLDER / "recorder.c", _FOLDER / "circuit.c", _FOLDER / "coupled.h"),
+    "part": (FOLDER / "part.c",),
+    "coupled": (FOLDER / "recorder.c", FOLDER / "circuit.c", FOLDER / "coupled.h"),
 }
 """The libraries, and the files that each is made of."""
 FLAGS = (*COMPILE_FLAGS, *LIBRARY_FLAGS)

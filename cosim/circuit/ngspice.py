@@ -70,16 +70,22 @@ class Leader(Protocol):
 @cache
 def engine() -> "Engine":
     """The process's one ngspice. Raises BadInput where the library is missing."""
+    name = library_name()
+    try:
+        return Engine(name)
+    except OSError as error:
+        raise BadInput(f"{name}: this ngspice library cannot be loaded ({error}).") from error
+
+
+def library_name() -> str:
+    """The path or name of libngspice on this machine. Raises BadInput where it is missing."""
     name = os.environ.get("NGSPICE_LIBRARY_PATH") or _find_library()
     if name is None:
         raise BadInput(
             "libngspice was not found; install it (Debian and Ubuntu: libngspice0, macOS: brew "
             "install libngspice) or name it in NGSPICE_LIBRARY_PATH."
         )
-    try:
-        return Engine(name)
-    except OSError as error:
-        raise BadInput(f"{name}: this ngspice library cannot be loaded ({error}).") from error
+    return name
 
 
 def spoilt() -> bool:

@@ -35,7 +35,7 @@ class CircuitRun:
         self._count = scene.coil.count
         self._jump = command.next_jump(0.0)
         self._time = 0.0
-        self._deck, self._saved = prepare(scene)
+        self._deck, self._saved = self._netlist()
         self._log = array("d")
         self.attempts = 0
         """Steps that ngspice tried."""
@@ -66,6 +66,9 @@ class CircuitRun:
                 "If the circuit is right, a smaller circuit.max_step or another circuit.reltol may "
                 "help."
             )
+
+    def _netlist(self) -> tuple[str, tuple[str, ...]]:
+        return prepare(self._scene)
 
     def _lead(self) -> None:
         engine().run_transient(self._deck, self._saved, self)
