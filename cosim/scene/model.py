@@ -22,6 +22,9 @@ from cosim.scene.tables import (
 )
 
 
+_SHORT_STEP = 2e-5  # s
+
+
 class Scene(BaseModel):
     """Everything that a run needs to know, checked; frozen and comparable."""
 
@@ -40,7 +43,10 @@ class Scene(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _fill(cls, data: Any) -> Any:
-        """Make models of the tables, with the staircase where the firmware is in the circuit."""
+        """Make models of the tables, with the staircase where the firmware is in the circuit, and
+        with shorter steps where a jump of the back-EMF within one, or a circuit of any kind, asks
+        for them.
+        """
         if not isinstance(data, dict):
             return data
         data = dict(data)
@@ -53,6 +59,10 @@ class Scene(BaseModel):
             and not drive.get("reset_time")
         ):
             data["drive"] = {"quantised": True} | drive
+        mechanics = data.get("mechanics", {})
+        rigid = isinstance(mechanics, dict) and mechanics.get("contact") == "rigid"
+        if isinstance(circuit, dict) and (rigid or circuit.get("model") == "file"):
+            data["circuit"] = {"max_step": _SHORT_STEP} | circuit
         return data
 
     @model_validator(mode="after")

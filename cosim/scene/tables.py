@@ -237,7 +237,13 @@ class Circuit(Table):
         None, "F", 1e-12, 1.0, "Capacitance in series with it; both or neither are given"
     )
     reltol: float = _number(1e-5, "1", 1e-9, 1e-2, "Relative tolerance of ngspice")
-    max_step: float = _number(3e-5, "s", 1e-9, 1e-2, "Largest time step of ngspice")
+    max_step: float = _number(
+        5e-5,
+        "s",
+        1e-9,
+        1e-2,
+        "Largest time step of ngspice; 2e-05 s with rigid walls or a netlist, unless given",
+    )
 
     @model_validator(mode="after")
     def _check(self) -> "Circuit":

@@ -320,10 +320,15 @@ def test_two_coils_on_two_surfaces_are_one_twice() -> None:
         "circuit.sense_resistance=2",
     ]  # fmt: skip
     two = simulate(load("paper", short + twice))
+    # The circuits' steps differ, and what ngspice has lies between them: 2e-3 from finer runs.
+    within = {"current": 3e-3, "coil_voltage": 3e-3}
     for name in ("current", "coil_voltage", "z_surface", "z_ram", "z_part", "friction_force"):
         scale = np.abs(one.waveforms[name]).max()
         np.testing.assert_allclose(
-            two.waveforms[name] / scale, one.waveforms[name] / scale, rtol=0, atol=1e-3
+            two.waveforms[name] / scale,
+            one.waveforms[name] / scale,
+            rtol=0,
+            atol=within.get(name, 1e-3),
         )
     for name in ("energy_in", "energy_copper", "energy_friction", "energy_damping"):
         assert two.summary[name] == pytest.approx(2 * float(one.summary[name]), rel=1e-3)  # type: ignore

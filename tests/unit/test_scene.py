@@ -47,7 +47,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "snubber_resistance": None,
         "snubber_capacitance": None,
         "reltol": 1e-5,
-        "max_step": 3e-5,
+        "max_step": 5e-5,
     },
     "coil": {
         "resistance": 7.1,
