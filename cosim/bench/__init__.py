@@ -13,7 +13,7 @@ from cosim.bench.instructions import compiler_version, per_period
 from cosim.bench.parts import coupled_over_parts
 from cosim.bench.peers import compare
 from cosim.bench.rungs import cost_exponent, real_time
-from cosim.bench.truth import BRIEF
+from cosim.bench.truth import BRIEF, BRIEF_FULL
 from cosim.compare import through_camera
 from cosim.fit_cases import Case
 from cosim.fit_timing import solvers
@@ -47,7 +47,7 @@ def run(out: Path, trials: Path | None, quick: bool) -> dict[str, Any]:
 def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
     """All the numbers; ratios as median, ``low`` and ``high``, with their bars."""
     rounds = 3 if quick else 11
-    circuits = {"amplifier": load("paper", BRIEF), "full": load("paper-full", BRIEF)}
+    circuits = {"amplifier": load("paper", BRIEF), "full": load("paper-full", BRIEF_FULL)}
     found = read_folder(trials) if trials is not None else [_made_up(k) for k in range(10)]
     seconds = solvers([Case(trial) for trial in found], 11 if quick else 51)
     offsets = _OFFSETS[:: 4 if quick else 1]
@@ -59,7 +59,7 @@ def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
         **compare(rounds),
         "real_time": real_time(rounds),
         "cost_exponent": cost_exponent(
-            3 if quick else 5, (10, 30, 100) if quick else (10, 100, 1000)
+            2 if quick else 5, (20, 60, 200) if quick else (10, 100, 1000)
         ),
         "instructions_per_period": per_period(),
         "part": {**seconds, "trials": len(found), "measured": trials is not None},

@@ -38,7 +38,7 @@ def compare(rounds: int) -> dict[str, Any]:
 
     peers = {
         "all_in_ngspice_over_ours": (wanted, map(all_in_ngspice, (1e-7, 1e-8, 3e-9))),
-        "naive_over_ours": (wanted, map(naive, (3e-5, 2e-5, 1e-5))),
+        "naive_over_ours": (wanted, map(naive, (3e-5, 2e-5, 1.5e-5, 1e-5))),
         "solve_ivp_over_ours": (LSODA_ERROR, map(solve_ivp, (1e-4, 5e-5, 3e-5))),
     }
     numbers = {}

@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim import theory
 from cosim.bench.sampling import spread, take_turns
-from cosim.bench.truth import BRIEF, brief, error, heights
+from cosim.bench.truth import BRIEF_FULL, brief, error, heights
 from cosim.prescribed import force_per_mass
 from cosim.scene import Scene, load
 from cosim.scene.tables import CIRCUIT_KEYS
@@ -31,7 +31,7 @@ def real_time(rounds: int) -> dict[str, Any]:
     the part alone with the closed form of its mean velocity.
     """
     cases: dict[str, tuple[Scene, Callable[[], float]]] = {
-        "full": (load("paper-full", BRIEF), _error_of_full),
+        "full": (load("paper-full", BRIEF_FULL), _error_of_full),
         "amplifier": (load("paper"), lambda: _error("amplifier", "amplifier")),
         "ideal": (load("paper", ["circuit.model=ideal"]), lambda: _error("ideal", "ideal")),
         "part": (load("optimal", _LONG_PART), _error_of_part),
@@ -74,7 +74,7 @@ def _error(circuit: str, reference: str) -> float:
 
 def _error_of_full() -> float:
     path, finer = (
-        simulate(load("paper-full", [*BRIEF, *more])).waveforms["z_part"] for more in ((), _FINER)
+        simulate(load("paper-full", [*BRIEF_FULL, *more])).waveforms["z_part"] for more in ((), _FINER)
     )
     return float(np.abs(path - finer).max() / np.ptp(finer))
 

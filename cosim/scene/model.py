@@ -21,7 +21,6 @@ from cosim.scene.tables import (
     fault,
 )
 
-
 _SHORT_STEP = 2e-5  # s
 
 

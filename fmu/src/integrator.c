@@ -24,13 +24,16 @@ double trial_step(const Model *m, double tau, double h, const double y0[N_STATES
 
     for (int j = 0; j < N_STATES; j++)
         k[0][j] = dy0[j];
+    /* State by state in the inner loops: the compiler makes vectors of them. */
     for (int s = 0; s < 6; s++) {
-        for (int j = 0; j < N_STATES; j++) {
-            double sum = 0.0;
-            for (int l = 0; l <= s; l++)
-                sum += A[s][l] * k[l][j];
-            y1[j] = y0[j] + h * sum;
+        double sum[N_STATES] = {0.0};
+        for (int l = 0; l <= s; l++) {
+            const double a = A[s][l];
+            for (int j = 0; j < N_STATES; j++)
+                sum[j] += a * k[l][j];
         }
+        for (int j = 0; j < N_STATES; j++)
+            y1[j] = y0[j] + h * sum[j];
         state_rates(m, &m->mode, y1, tau + C[s] * h, k[s + 1]);
     }
     for (int j = 0; j < N_STATES; j++)

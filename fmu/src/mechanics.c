@@ -29,6 +29,12 @@ static double penetration(const Model *m, const Mode *mode, const double y[N_STA
     return depth > 0.0 ? depth : 0.0;
 }
 
+static double normal_force(const Reals *p, double tau)
+{
+    const double force = p->normal_force + p->normal_force_slope * tau;
+    return force > 0.0 ? force : 0.0;
+}
+
 static int held_by_plate(const Model *m, const Mode *mode)
 {
     return mode->plate == 0 && m->r.mu_plate > 0.0;
@@ -43,7 +49,7 @@ static void forces_on_part(const Model *m, const Mode *mode, double tau, Forces 
 
     f->a_surface = p->surface_acceleration;
     f->a_q = f->wall = f->drive = 0.0;
-    f->normal = fmax(0.0, p->normal_force + p->normal_force_slope * tau);
+    f->normal = normal_force(p, tau);
     f->plate = -p->mu_plate * f->normal * mode->plate;
     f->a_slip = 0.0;
     if (mode->slip == 0 && held) {
@@ -92,7 +98,7 @@ void forces(const Model *m, const Mode *mode, const double y[N_STATES], double t
         p->suspension_damping * u;
 
     f->drive = force_factor_at(m, q) * (p->current + p->current_slope * tau);
-    f->normal = fmax(0.0, p->normal_force + p->normal_force_slope * tau);
+    f->normal = normal_force(p, tau);
     f->wall = 0.0;
     if (mode->wall == WALL_TOUCH) {
         double depth = penetration(m, mode, y);
