@@ -7,7 +7,7 @@ process of its own, since a process has one ngspice and ours has other callbacks
 
 from collections.abc import Callable, Sequence
 from time import process_time
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -33,36 +33,48 @@ def run(
     return isolated(_rounds, scene, lambda _: None, times=times, rounds=rounds)
 
 
+class Shared(NgSpiceShared):
+    """ngspice with the two callbacks that PySpice means to be replaced."""
+
+    def __init__(self) -> None:
+        self.LIBRARY_PATH = library_name()
+        known = references(3)
+        self.inputs = [known["current"]]
+        self.outputs = [known["back_emf"], known["z_part"]]
+        super().__init__(send_data=True)
+
+    def begin(self, fmu: FMU3Slave) -> None:
+        """At rest, at time 0."""
+        self.fmu = fmu
+        self.time = self.current = self.emf = 0.0
+        self.path: list[tuple[float, float]] = []
+
+    def get_vsrc_data(self, voltage: Any, time: float, node: str, ngspice_id: int) -> Literal[0]:
+        voltage[0] = self.emf
+        return 0
+
+    def send_data(
+        self, actual_vector_values: dict[str, complex], number_of_vectors: int, ngspice_id: int
+    ) -> Literal[0]:
+        time = actual_vector_values["time"].real
+        current = actual_vector_values["vemf#branch"].real
+        if time > self.time:
+            self.fmu.setFloat64(self.inputs, [0.5 * (current + self.current)])
+            self.fmu.doStep(self.time, time - self.time)
+            self.emf, height = self.fmu.getFloat64(self.outputs)
+            self.path.append((time, height))
+        self.time, self.current = time, current
+        return 0
+
+
 def _rounds(
     scene: Scene, progress: Callable[[float], None], times: Sequence[float], rounds: int
 ) -> tuple[list[float], npt.NDArray[np.float64]]:
-    class Shared(NgSpiceShared):
-        LIBRARY_PATH = library_name()
-
-        def get_vsrc_data(self, voltage: Any, time: float, node: str, ngspice_id: int) -> int:
-            voltage[0] = self.emf
-            return 0
-
-        def send_data(self, values: dict[str, complex], number: int, ngspice_id: int) -> int:
-            time, current = values["time"].real, values["vemf#branch"].real
-            if time > self.time:
-                self.fmu.setFloat64(self.inputs, [0.5 * (current + self.current)])
-                self.fmu.doStep(self.time, time - self.time)
-                self.emf, height = self.fmu.getFloat64(self.outputs)
-                self.path.append((time, height))
-            self.time, self.current = time, current
-            return 0
-
-    known = references(3)
-    shared = Shared(send_data=True)
-    shared.inputs, shared.outputs = [known["current"]], [known["back_emf"], known["z_part"]]
-    deck = _deck(scene)
+    shared, deck = Shared(), _deck(scene)
     taken, found = [], np.empty(0)
     for done in range(rounds):
         began = process_time()
-        shared.fmu = _instance(scene)
-        shared.time = shared.current = 0.0
-        shared.emf, shared.path = 0.0, []
+        shared.begin(_instance(scene))
         shared.load_circuit(deck)
         shared.run()
         shared.destroy()
@@ -75,7 +87,7 @@ def _rounds(
     return taken, found
 
 
-def _instance(scene: Scene) -> Any:
+def _instance(scene: Scene) -> FMU3Slave:
     fmu = FMU3Slave(
         guid=token(), unzipDirectory=str(unpacked(3)), modelIdentifier=MODEL, instanceName="peer"
     )

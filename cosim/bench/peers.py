@@ -1,6 +1,6 @@
 """Against what users would write, on `paper`; each peer as coarse as its error allows."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -52,13 +52,14 @@ def compare(rounds: int) -> dict[str, Any]:
     return numbers
 
 
-def _coarsest(settings: Any, target: float) -> tuple[Peer, float]:
+def _coarsest(settings: Iterable[Peer], target: float) -> tuple[Peer, float]:
     """The first peer with an error of at most ``target``, or the last; and its error."""
+    tried: list[tuple[Peer, float]] = []
     for peer in settings:
-        reached = error(peer(1)[1])
-        if reached <= target:
+        tried.append((peer, error(peer(1)[1])))
+        if tried[-1][1] <= target:
             break
-    return peer, reached
+    return tried[-1]
 
 
 def _again(

@@ -50,7 +50,7 @@ def real_time(rounds: int) -> dict[str, Any]:
     }
 
 
-def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, float]:
+def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
     """Exponent with which the CPU time of `paper` grows with its duration, by least squares."""
     scenes = {str(n): load("paper", [f"run.duration={n / 20}"]) for n in periods}
     calls = {name: partial(simulate, scene) for name, scene in scenes.items()}
@@ -74,7 +74,8 @@ def _error(circuit: str, reference: str) -> float:
 
 def _error_of_full() -> float:
     path, finer = (
-        simulate(load("paper-full", [*BRIEF_FULL, *more])).waveforms["z_part"] for more in ((), _FINER)
+        simulate(load("paper-full", [*BRIEF_FULL, *more])).waveforms["z_part"]
+        for more in ((), _FINER)
     )
     return float(np.abs(path - finer).max() / np.ptp(finer))
 
