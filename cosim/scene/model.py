@@ -21,6 +21,9 @@ from cosim.scene.tables import (
     fault,
 )
 
+FASTEST = 1e-6
+"""Least time constant of a coil, s, that is solved together with the mechanics."""
+
 
 class Scene(BaseModel):
     """Everything that a run needs to know, checked; frozen and comparable."""
@@ -58,6 +61,18 @@ class Scene(BaseModel):
     @model_validator(mode="after")
     def _check_reach(self) -> "Scene":
         drive = self.drive
+        if self.circuit.model == "limited" and self._fastest_current() < FASTEST:
+            raise fault(
+                f"coil.inductance = {self.coil.inductance:g} H lets the current change within "
+                f'{self._fastest_current():.2g} s; with circuit.model = "limited" inductance over '
+                f"resistance (and that of the eddy branch) must leave it at least {FASTEST:g} s",
+                "coil.inductance",
+                "coil.resistance",
+                "coil.eddy_inductance",
+                "coil.eddy_resistance",
+                "circuit.sense_resistance",
+                "circuit.model",
+            )
         if drive.pwm_ripple and self.circuit.model != "full":
             raise fault(
                 'drive.pwm_ripple = true needs circuit.model = "full", which has the filter of '
@@ -105,6 +120,16 @@ class Scene(BaseModel):
                 "drive.quantised",
             )
         return self
+
+    def _fastest_current(self) -> float:
+        """Least time constant of the coil behind an output at its limit, s, or a little less."""
+        coil = self.coil
+        eddy = coil.eddy_resistance or 0.0
+        loop = coil.resistance + coil.count * self.circuit.sense_resistance + eddy
+        rate = loop / coil.inductance
+        if coil.eddy_inductance:
+            rate += eddy / coil.eddy_inductance
+        return 1.0 / rate
 
     @property
     def surface_is_given(self) -> bool:

@@ -355,7 +355,7 @@ def test_directional_derivatives_are_the_differences(
 def test_only_the_declared_outputs_follow_inputs_at_once(version: int) -> None:
     description = fmpy.read_model_description(str(fmu.unpacked(version)))
     declared = {u.variable.name for u in description.outputs if u.variable and u.dependencies}
-    assert declared == set(FOLLOWING)
+    assert declared == {*FOLLOWING, "coil_voltage"}
     with rig(version) as it:
         it.begin({"mu_plate": 0.1})
         followed = set()
@@ -367,7 +367,33 @@ def test_only_the_declared_outputs_follow_inputs_at_once(version: int) -> None:
             followed |= {name for name, value in it.outputs().items() if value != before[name]}
             it.set(current=current, normal_force=force)
     assert followed <= declared
-    assert followed >= declared - {"wall_force"}  # which follows in a rigid contact at rest only
+    # These follow in a rigid contact at rest, and with a source.
+    assert followed >= declared - {"wall_force", "coil_voltage"}
+
+
+def test_with_a_source_only_the_voltage_follows_the_command_at_once(version: int) -> None:
+    with rig(version) as it:
+        it.begin({"source": 1, "eddy_inductance": 1e-3, "eddy_resistance": 4.0})
+        modes = set()
+        for k in range(500):
+            command, slope = -5.0 + 0.08 * (k % 100), 800.0
+            it.set(command=command, command_slope=slope)
+            it.step()
+            before = it.outputs()
+            it.set(command_slope=slope + 100.0, current=1.0)
+            after = it.outputs()
+            found = it.derivative(["coil_voltage"], ["command_slope"], [1.0])[0]
+            moved = {name for name in after if after[name] != before[name]}
+            modes.add(before["output_clamped"])
+            if before["output_clamped"]:
+                assert (moved, found) == (set(), 0.0)
+            else:
+                assert moved == {"coil_voltage"}
+                change = after["coil_voltage"] - before["coil_voltage"]
+                assert found == pytest.approx(change / 100.0, rel=1e-9)
+                assert found == pytest.approx(1.2e-3 / 4.0)
+            it.set(command=command, current=0.0)
+    assert modes == {0, -1}
 
 
 def test_seeds_add_up(version: int) -> None:
