@@ -167,7 +167,10 @@ def from_command(
 
 
 def from_source(scene: Scene, command: Command, recorder: Recorder) -> Electrics:
-    """From the mechanics' own current source, at the end of its run."""
+    """From the mechanics' own current source, at the end of its run.
+
+    In a row at a corner or jump of the command stands the voltage before it.
+    """
     count, run = scene.coil.count, scene.run
     totals, before = recorder.mechanics.totals(), recorder.at_settle
     columns = recorder.mechanics.columns
