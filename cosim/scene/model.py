@@ -22,7 +22,7 @@ from cosim.scene.tables import (
 )
 
 FASTEST = 1e-6
-"""Least time constant of a coil, s, that is solved together with the mechanics."""
+"""Least time constant of a coil, s, that the mechanics' integration takes along."""
 
 
 class Scene(BaseModel):
@@ -59,20 +59,32 @@ class Scene(BaseModel):
         return data
 
     @model_validator(mode="after")
+    def _check_speed(self) -> "Scene":
+        """With "limited" one explicit method solves coil and mechanics: none may be stiff."""
+        if self.circuit.model != "limited":
+            return self
+        coil = self.coil
+        eddy = coil.eddy_resistance or 0.0
+        around = coil.resistance + coil.count * self.circuit.sense_resistance + eddy
+        for key, resistance in (("inductance", around), ("eddy_inductance", eddy)):
+            inductance = getattr(coil, key)
+            if inductance is not None and inductance < FASTEST * resistance:
+                raise fault(
+                    f"coil.{key} = {inductance:g} H must be at least {FASTEST * resistance:.3g} H "
+                    f'with circuit.model = "limited" and {resistance:g} Ohm around it, or the '
+                    "current changes too fast to be solved with the mechanics",
+                    f"coil.{key}",
+                    "coil.resistance",
+                    "coil.eddy_resistance",
+                    "coil.count",
+                    "circuit.sense_resistance",
+                    "circuit.model",
+                )
+        return self
+
+    @model_validator(mode="after")
     def _check_reach(self) -> "Scene":
         drive = self.drive
-        if self.circuit.model == "limited" and self._fastest_current() < FASTEST:
-            raise fault(
-                f"coil.inductance = {self.coil.inductance:g} H lets the current change within "
-                f'{self._fastest_current():.2g} s; with circuit.model = "limited" inductance over '
-                f"resistance (and that of the eddy branch) must leave it at least {FASTEST:g} s",
-                "coil.inductance",
-                "coil.resistance",
-                "coil.eddy_inductance",
-                "coil.eddy_resistance",
-                "circuit.sense_resistance",
-                "circuit.model",
-            )
         if drive.pwm_ripple and self.circuit.model != "full":
             raise fault(
                 'drive.pwm_ripple = true needs circuit.model = "full", which has the filter of '
@@ -120,16 +132,6 @@ class Scene(BaseModel):
                 "drive.quantised",
             )
         return self
-
-    def _fastest_current(self) -> float:
-        """Least time constant of the coil behind an output at its limit, s, or a little less."""
-        coil = self.coil
-        eddy = coil.eddy_resistance or 0.0
-        loop = coil.resistance + coil.count * self.circuit.sense_resistance + eddy
-        rate = loop / coil.inductance
-        if coil.eddy_inductance:
-            rate += eddy / coil.eddy_inductance
-        return 1.0 / rate
 
     @property
     def surface_is_given(self) -> bool:

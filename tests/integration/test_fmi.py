@@ -407,6 +407,72 @@ def test_seeds_add_up(version: int) -> None:
         assert it.derivative(["z_part"], ["current"], [1.0]) == [0.0]
 
 
+# ---- the source ----
+
+SOURCE = {"source": 1, "eddy_inductance": 1e-3, "eddy_resistance": 4.0, "mu_plate": 0.1}
+
+
+def sawtooth(it: Rig, steps: int, h: float = H) -> list[dict[str, float]]:
+    """A command of 20 Hz and 8 V; every step's outputs."""
+    found = []
+    for _ in range(steps):
+        phase = (it.time + 1e-9) * 20.0 % 1.0 - 20e-9
+        it.set(command=-5.2 + 8.0 * phase, command_slope=160.0)
+        it.step(h)
+        found.append(it.outputs())
+    return found
+
+
+def test_both_versions_solve_the_source_alike() -> None:
+    with rig(2) as a, rig(3) as b:
+        assert sawtooth(a.begin(SOURCE), 700) == sawtooth(b.begin(SOURCE), 700)
+
+
+@pytest.mark.parametrize("contact", [1, 2])
+def test_the_source_does_not_mind_how_long_the_steps_are(version: int, contact: int) -> None:
+    with rig(version) as short, rig(version) as long:
+        for it in (short, long):
+            it.begin(SOURCE | {"contact": contact})
+        fine, coarse = sawtooth(short, 700), sawtooth(long, 14, 50 * H)
+    for name, value in coarse[-1].items():
+        if not name.endswith(("_max", "_min")) and not name.startswith("internal"):
+            assert value == pytest.approx(fine[-1][name], rel=1e-6, abs=1e-9), name
+    assert {found["output_clamped"] for found in fine} == {0, -1}
+    assert max(found["coil_current_max"] for found in fine) == pytest.approx(0.7, rel=1e-9)
+    assert min(found["coil_current_min"] for found in fine) == pytest.approx(
+        min(found["coil_current_min"] for found in coarse), rel=1e-3
+    )
+
+
+def test_a_state_within_a_limit_brings_back_every_bit(version: int) -> None:
+    with rig(version) as it:
+        it.begin(SOURCE)
+        assert sawtooth(it, 501)[-1]["output_clamped"] == -1
+        kept, time = it.save(), it.time
+        first = sawtooth(it, 50)
+        it.load(kept)
+        it.time = time
+        assert sawtooth(it, 50) == first
+
+
+def test_derivatives_of_the_command_in_fmi_2() -> None:
+    with rig(2) as a, rig(2) as b:
+        for it in (a, b):
+            it.begin(SOURCE)
+            it.set(command=0.5)
+        a.set(command_slope=-300.0)
+        b.fmu.setRealInputDerivatives([b._reference("command")], [1], [-300.0])
+        a.step()
+        b.step()
+        assert a.outputs() == b.outputs()
+
+
+def test_a_source_needs_a_free_surface(version: int) -> None:
+    with rig(version) as it, pytest.raises(FMICallException):
+        it.begin({"source": 1, "prescribed": 1})
+    assert any("source must be 0" in message for message in it.messages)
+
+
 # ---- states ----
 
 

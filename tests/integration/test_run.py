@@ -305,8 +305,9 @@ def test_undriven_part_hangs_still(runs: dict[str, Run]) -> None:
 # --- whole runs against each other -----------------------------------------------
 
 
-def test_both_fmi_versions_agree() -> None:
-    scene = load("paper", ["run.duration=0.12"])
+@pytest.mark.parametrize("name", ["paper", "paper-limited"])
+def test_both_fmi_versions_agree(name: str) -> None:
+    scene = load(name, ["run.duration=0.12"])
     second, third = (simulate(scene, fmi_version=version) for version in (2, 3))
     for name, values in third.waveforms.items():
         np.testing.assert_allclose(second.waveforms[name], values, rtol=1e-12, atol=1e-12)
