@@ -5,7 +5,7 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -69,7 +69,7 @@ class Rig:
             )
         self.time = 0.0
 
-    def begin(self, parameters: dict[str, float] | None = None, **experiment: Any) -> "Rig":
+    def begin(self, parameters: Mapping[str, float] | None = None, **experiment: Any) -> "Rig":
         self.set(**(parameters or {}))
         self.enter(**experiment)
         self.fmu.exitInitializationMode()

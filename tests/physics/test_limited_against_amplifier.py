@@ -11,8 +11,6 @@ output slews at each fall.
                 (a ten-thousandth moves it by 3 %): statistics only, within an ensemble's spread
 """
 
-import statistics
-import time
 from functools import cache
 from typing import Literal
 
@@ -134,17 +132,3 @@ def test_a_good_part_of_the_settings_has_a_number_to_meet() -> None:
         common = settings(knobs)
         steady += classify(common, run("limited", common)["v_average"])[0] != "unsteady"
     assert steady >= 10
-
-
-def test_it_is_more_than_ten_times_faster() -> None:
-    """Processor time side by side, with few rows, whose writing costs the same in both."""
-    common = ["run.duration=0.3", "run.settle=0.1", "run.output_step=1e-3"]
-    spent: dict[str, list[float]] = {"amplifier": [], "limited": []}
-    for _ in range(3):
-        for model, seconds in spent.items():
-            scene = load("paper", [*common, f"circuit.model={model}"])
-            began = time.process_time()
-            simulate(scene)
-            seconds.append(time.process_time() - began)
-    amplifier, limited = (statistics.median(seconds) for seconds in spent.values())
-    assert amplifier > 10.0 * limited

@@ -5,7 +5,9 @@ resistances and inductances on a constant voltage, exponentials that anyone can 
 limit acts, the rung is "ideal".
 """
 
+from collections.abc import Callable
 from math import exp
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +27,11 @@ LOCKED = [
 FINE = ["run.duration=0.004", "run.settle=0.001", "run.output_step=2e-6"]
 R, R_SENSE, L, HIGH, LOW = 7.1, 4.0, 1.2e-3, 14.0, -14.0  # Ohm, Ohm, H, V, V
 EXACT = {"rtol": 0, "atol": 1e-11}  # A
+
+
+def root(function: Callable[[float], float], most: float) -> float:
+    found: Any = brentq(function, 0.0, most, xtol=1e-16)
+    return found
 
 
 def locked(*changes: str) -> Result:
@@ -75,7 +82,7 @@ def test_the_current_meets_the_command_after_its_fall(count: int) -> None:
     expected, spent = np.zeros(len(time)), 0.0
     for n in range(4):
         start = ramp(period) if n else 0.0
-        met = brentq(lambda t: clamped(t) - ramp(t), 0.0, period, xtol=1e-16)
+        met = root(lambda t: clamped(t) - ramp(t), period)
         spent += met
         for row in np.flatnonzero((time >= n * period - 1e-12) & (time < (n + 1) * period - 1e-12)):
             t = time[row] - n * period
@@ -84,7 +91,7 @@ def test_the_current_meets_the_command_after_its_fall(count: int) -> None:
     np.testing.assert_allclose(current, expected, **EXACT)
     limited = result.summary["swing_low_fraction"]
     # run.settle = 1 ms lies behind the first meeting.
-    first = brentq(lambda t: end * (1 - exp(-t / tau)) - ramp(t), 0.0, period, xtol=1e-16)
+    first = root(lambda t: end * (1 - exp(-t / tau)) - ramp(t), period)
     assert limited == pytest.approx((spent - first) / 0.015, rel=1e-8)
     assert result.summary["swing_high_fraction"] == 0.0
 
@@ -105,8 +112,9 @@ def test_eddy_branch_behind_a_clamped_output() -> None:
     expected = np.array([expm(rates * t)[:, 2] for t in time[some]])
     np.testing.assert_allclose(current[some], expected[:, 0], **EXACT)
     energy = 0.5 * (L * expected[-1, 0] ** 2 + eddy_l * expected[-1, 1] ** 2)
-    assert result.summary["energy_residual"] < 1e-9
-    stored = result.summary["energy_in"] - result.summary["energy_copper"]  # type: ignore
+    summary: Any = result.summary
+    assert summary["energy_residual"] < 1e-9
+    stored = summary["energy_in"] - summary["energy_copper"]
     assert stored == pytest.approx(energy, rel=1e-7)
 
 
@@ -143,10 +151,7 @@ def test_time_at_the_limit_of_an_overdriven_ramp() -> None:
     above = period * (1 - (R_SENSE * reached + 1.0) / 8.0)
     most = reached + slope * tau * (1 - exp(-above / tau))  # = 14 V / 11.1 Ω
     end = LOW / (R + R_SENSE)  # the current falls towards it until it meets the next ramp
-    met = brentq(
-        lambda t: end + (most - end) * exp(-t / tau) - (-1.0 + 16.0 * t) / R_SENSE,
-        0.0, 0.01, xtol=1e-16,
-    )  # fmt: skip
+    met = root(lambda t: end + (most - end) * exp(-t / tau) - (-1.0 + 16.0 * t) / R_SENSE, 0.01)
     assert most == pytest.approx(HIGH / (R + R_SENSE), rel=1e-9)
     assert result.summary["swing_high_fraction"] == pytest.approx(above / period, rel=1e-9)
     assert result.summary["swing_low_fraction"] == pytest.approx(met / period, rel=1e-7)
