@@ -180,6 +180,11 @@ def _tune(
 
     runs: list[Run] = []
 
+    def scouting(run: Run, best: Run | None) -> None:
+        if best is not None:
+            bar.set_postfix_str(f"without ngspice, {quantity} {best.value:.4g}", refresh=False)
+        bar.refresh()
+
     def progress(run: Run, best: Run | None) -> None:
         runs.append(run)
         if best is not None:
@@ -190,7 +195,9 @@ def _tune(
         total=budget, desc=scene.name, unit="run", leave=False, file=sys.stderr, disable=None
     ) as bar:
         try:
-            found = tune(scene, quantity, largest, ranges, budget, seed, workers, progress)
+            found = tune(
+                scene, quantity, largest, ranges, budget, seed, workers, progress, scouting
+            )
         except KeyboardInterrupt:
             write_runs(folder / "tune.csv", runs, quantity)
             raise

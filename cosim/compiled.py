@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import BadInput, SimulationFailed
-from cosim.mechanics import COUNTERS, TOTALS, Mechanics
+from cosim.mechanics import COUNTERS, Mechanics
 from cosim.native import coupled_library
 from cosim.recorder import Z_SURFACE, Recorder
 from cosim.scene import Scene
@@ -60,7 +60,7 @@ class State(ctypes.Structure):
         ("z_surface", c_int64),
         ("totals_at_settle", POINTER(c_double)),
         ("counters_at_settle", POINTER(c_int32)),
-        ("extremes", c_double * 6),
+        ("extremes", c_double * 8),
         ("began", c_double),
         ("inside", c_int64),
     )
@@ -83,7 +83,7 @@ class CompiledRecorder(Recorder):
     ) -> None:
         self._library = coupled_library()
         self._told = -1.0
-        self._totals = (c_double * len(TOTALS))()
+        self._totals = (c_double * len(mechanics.total_names))()
         self._counters = (c_int32 * len(COUNTERS))()
         super().__init__(scene, mechanics, progress)
 
@@ -100,7 +100,7 @@ class CompiledRecorder(Recorder):
             z_surface=Z_SURFACE,
             totals_at_settle=self._totals,
             counters_at_settle=self._counters,
-            extremes=(c_double * 6)(*self.extremes),
+            extremes=(c_double * 8)(*self.extremes),
         )
         if not self._library.recorder_begin(ctypes.byref(self.state)):
             raise self.failure()
@@ -134,10 +134,10 @@ class CompiledRecorder(Recorder):
 
     def finish(self) -> None:
         """Put what the compiled steps have done where the plain recorder has it."""
-        self.n_rows, self.extremes = self.state.n_rows, list(self.state.extremes)
+        self.n_rows, self.extremes = self.state.n_rows, self.state.extremes[: len(self.extremes)]
         self.mechanics.time, self.mechanics.steps = self.fmu.time, self.fmu.steps
         totals = (*self._totals, *self._counters)
-        self.at_settle = dict(zip((*TOTALS, *COUNTERS), totals, strict=True))
+        self.at_settle = dict(zip((*self.mechanics.total_names, *COUNTERS), totals, strict=True))
 
     def failure(self) -> SimulationFailed:
         """What to raise for the call of the FMU that has failed."""

@@ -42,7 +42,7 @@ typedef struct {
     int64_t z_surface; /* its place among the samples */
     double *totals_at_settle;
     int32_t *counters_at_settle;
-    double extremes[6];
+    double extremes[8]; /* those that the step's outputs have */
     double began;   /* of the interval under way */
     int64_t inside; /* whether one is */
 } Recorder;

@@ -82,7 +82,7 @@ static int step(Recorder *r, double time, double value, double slope)
         return 0;
     if (time > r->settle) {
         const double *found = r->fmu->step_outputs + 2;
-        for (int k = 0; k < 6; k += 2) {
+        for (int64_t k = 0; k < r->fmu->step_outputs_count - 2; k += 2) {
             if (found[k] > r->extremes[k])
                 r->extremes[k] = found[k];
             if (found[k + 1] < r->extremes[k + 1])
