@@ -106,8 +106,8 @@ class CompiledRecorder(Recorder):
             raise self.failure()
         self.tell()
 
-    def advance(self, time: float, current: float, current_end: float) -> None:
-        self.follow(*(np.array([value]) for value in (time, current, current_end)))
+    def advance(self, time: float, value: float, value_end: float) -> None:
+        self.follow(*(np.array([number]) for number in (time, value, value_end)))
 
     def follow(self, edges: Array, start: Array, end: Array) -> None:
         arrays = [np.ascontiguousarray(values) for values in (edges, start, end)]
