@@ -212,5 +212,5 @@ def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
     axis.set_yscale("symlog", linthresh=100.0)
     _at_least(axis, 2.0)
     axis.set(ylabel="acceleration [m/s²]")
-    rigid = result.scene.mechanics.contact == "rigid" and "v_ram" in waves
+    rigid = result.scene.mechanics.contact == "rigid" and not result.scene.surface_is_given
     _head(axis, "Acceleration of the surface" + (", without its jumps" if rigid else ""))

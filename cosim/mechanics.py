@@ -131,6 +131,7 @@ def _parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
     integers = {
         "contact": CONTACT_LAWS[table.pop("contact")],
         "n_surfaces": table.pop("n_surfaces"),
+        "ram_fixed": int(table.pop("actuator") == "direct"),
     }
     friction = scene.friction.model_dump(exclude={"law"})
     coil = scene.coil.model_dump(include={"force_factor", "b1", "b2"})

@@ -117,7 +117,7 @@ def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int)
         "method": scene.coupling.method if circuit else "uncoupled",
         "versions": versions() | ({"ngspice": circuit.ngspice} if circuit else {}),
     }
-    return Result(scene, _waveforms(recorder, electric), summary)
+    return Result(scene, _waveforms(scene, recorder, electric), summary)
 
 
 def _circuit_log(scene: Scene, fmi_version: int) -> dict[str, Array]:
@@ -149,7 +149,9 @@ def _prescribe(scene: Scene, drive: Command, recorder: Recorder) -> dict[str, Ar
     return {"time": np.array(edges), "start": np.array(start), "end": np.array(end)}
 
 
-def _waveforms(recorder: Recorder, electric: electrics.Electrics | None) -> dict[str, Array]:
+def _waveforms(
+    scene: Scene, recorder: Recorder, electric: electrics.Electrics | None
+) -> dict[str, Array]:
     n = recorder.n_rows
     known = {"time": recorder.time[:n]}
     if electric is not None:
@@ -159,6 +161,8 @@ def _waveforms(recorder: Recorder, electric: electrics.Electrics | None) -> dict
     known |= {name: recorder.rows[:n, k] for k, name in enumerate(COLUMNS)}
     if electric is None:
         del known["back_emf"]
+    if scene.mechanics.actuator == "direct":
+        del known["z_ram"], known["v_ram"]
     return {name: known[name] for name in UNITS if name in known}
 
 

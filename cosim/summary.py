@@ -79,7 +79,8 @@ def _energies(
         stored += electric.energy_magnetic
     missing = energy_in - copper - sum(lost.values()) - stored
     mechanics = scene.mechanics
-    mass = mechanics.ram_mass + mechanics.surface_mass + mechanics.part_mass / mechanics.n_surfaces
+    ram = 0.0 if mechanics.actuator == "direct" else mechanics.ram_mass
+    mass = ram + mechanics.surface_mass + mechanics.part_mass / mechanics.n_surfaces
     # In the flexures from the start: what a scene without a drive is measured against.
     hanging = count * (mass * mechanics.gravity) ** 2 / (2.0 * mechanics.flexure_stiffness)
     scale = max(abs(energy_in), copper + sum(lost.values()), abs(stored), hanging)

@@ -284,6 +284,11 @@ class Coil(Table):
 class Mechanics(Table):
     """Surface, ram and part."""
 
+    actuator: Literal["ram", "direct"] = _choice(
+        "ram",
+        "What the coil pushes off from: a free ram, or a magnet that stands on the ground; there "
+        "suspension and walls hold the surface itself",
+    )
     ram_mass: float = _number(0.004, "kg", 1e-9, 1e3, "Mass of the ram in the actuator")
     surface_mass: float = _number(
         0.0145, "kg", 1e-9, 1e3, "Mass of the surface: actuator body and platform"

@@ -60,7 +60,8 @@ int event_functions(const Model *m, const double y[N_STATES], double tau,
     }
     case WALL_REST:
         ADD(EVENT_WALL_LEFT, -mode->side * f.wall, -mode->side * rate.wall,
-            1e-13 * (fabs(f.drive) + p->ram_mass * p->gravity));
+            1e-13 * (fabs(f.drive) + p->ram_mass * p->gravity +
+                     (m->n.ram_fixed ? p->flexure_stiffness * fabs(y[Z]) : 0.0)));
         break;
     }
     if (mode->slip != 0) {
@@ -85,12 +86,12 @@ int event_functions(const Model *m, const double y[N_STATES], double tau,
 }
 
 /* Newton's impact: the ram's velocity in the actuator becomes u, the momentum of ram and surface
- * stays, the part keeps its velocity. */
+ * stays, unless the ram stands on the ground; the part keeps its velocity. */
 static void jump_to(Model *m, double u)
 {
     const double ram = m->r.ram_mass, surface = m->r.surface_mass;
-    const double share = ram / (ram + surface);
-    const double dv = -share * (u - m->y[U]);
+    const double share = m->n.ram_fixed ? 1.0 : ram / (ram + surface);
+    const double dv = m->n.ram_fixed ? -u - m->y[V] : -share * (u - m->y[U]);
     m->y[E_IMPACT] += 0.5 * share * surface * (m->y[U] * m->y[U] - u * u);
     m->y[U] = u;
     m->y[V] += dv;
@@ -110,8 +111,9 @@ static void stop_ram(Model *m)
     const double ram = m->r.ram_mass, body = m->r.surface_mass + part_mass_per_surface(m);
     const int held = m->mode.plate == 0 && plate_acts(m); /* then nothing moves but the ram */
     const double share = held ? 0.0 : ram / (ram + body);
-    m->y[E_IMPACT] += 0.5 * ram * (1.0 - share) * m->y[U] * m->y[U];
-    m->y[V] += share * m->y[U];
+    const double loss = m->n.ram_fixed ? body : ram * (1.0 - share);
+    m->y[E_IMPACT] += 0.5 * loss * m->y[U] * m->y[U];
+    m->y[V] = m->n.ram_fixed ? 0.0 : m->y[V] + share * m->y[U];
     m->y[U] = 0.0;
 }
 
@@ -123,6 +125,14 @@ static double pressing(const Model *m, double tau, int side)
     free.wall = WALL_FREE;
     forces(m, &free, m->y, tau, &f);
     return side * f.a_q;
+}
+
+/* The surface comes to rest, held through the part by the springed plate. */
+static void stop_surface(Model *m)
+{
+    m->y[V] = 0.0;
+    if (m->n.ram_fixed)
+        m->y[U] = 0.0;
 }
 
 static void set_wall(Model *m, WallMode wall, int side)
@@ -315,7 +325,7 @@ void apply_event(Model *m, double tau, EventKind kind)
     case EVENT_SLIP_ENDS:
         m->y[W] = 0.0;
         if (m->mode.plate == 0 && plate_acts(m) && !m->n.prescribed)
-            m->y[V] = 0.0;
+            stop_surface(m);
         keep = 0;
         break;
     case EVENT_SLIP_DOWN:
@@ -326,7 +336,7 @@ void apply_event(Model *m, double tau, EventKind kind)
         return;
     case EVENT_PLATE_STOPS:
         if (m->mode.slip == 0)
-            m->y[V] = 0.0;
+            stop_surface(m);
         else
             m->y[W] = -m->y[V];
         keep = 0;

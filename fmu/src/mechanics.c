@@ -17,6 +17,13 @@ double part_mass_per_surface(const Model *m)
     return m->r.part_mass / m->n.n_surfaces;
 }
 
+double rest_height(const Model *m)
+{
+    const double ram = m->n.ram_fixed ? 0.0 : m->r.ram_mass;
+    return -(ram + m->r.surface_mass + part_mass_per_surface(m)) * m->r.gravity /
+           m->r.flexure_stiffness;
+}
+
 double back_emf_slope(const Model *m, const double y[N_STATES], double a_q)
 {
     return force_factor_at(m, y[Q]) * a_q + force_factor_rate(m, y[Q], y[U]) * y[U];
@@ -34,14 +41,14 @@ static int held_by_plate(const Model *m, const Mode *mode)
     return mode->plate == 0 && m->r.mu_plate > 0.0;
 }
 
-/* Where the surface's motion is prescribed: the part alone, the ram standing still in the actuator. */
-static void forces_on_part(const Model *m, const Mode *mode, double tau, Forces *f)
+/* Where the surface's acceleration is given: the part alone, the ram standing still in the actuator. */
+static void forces_on_part(const Model *m, const Mode *mode, double tau, double a_surface, Forces *f)
 {
     const Reals *p = &m->r;
     const double part = part_mass_per_surface(m), weight = part * p->gravity;
     const int held = held_by_plate(m, mode);
 
-    f->a_surface = p->surface_acceleration;
+    f->a_surface = a_surface;
     f->a_q = f->wall = f->drive = 0.0;
     f->normal = fmax(0.0, p->normal_force + p->normal_force_slope * tau);
     f->plate = -p->mu_plate * f->normal * mode->plate;
@@ -81,7 +88,7 @@ static void rates_on_part(const Model *m, const Mode *mode, const Forces *f, For
 void forces(const Model *m, const Mode *mode, const double y[N_STATES], double tau, Forces *f)
 {
     if (m->n.prescribed) {
-        forces_on_part(m, mode, tau, f);
+        forces_on_part(m, mode, tau, m->r.surface_acceleration, f);
         return;
     }
     const Reals *p = &m->r;
@@ -91,6 +98,13 @@ void forces(const Model *m, const Mode *mode, const double y[N_STATES], double t
         -q * (p->suspension_k1 + q * (p->suspension_k2 + q * p->suspension_k3)) -
         p->suspension_damping * u;
 
+    if (mode->wall == WALL_REST && m->n.ram_fixed) {
+        forces_on_part(m, mode, tau, 0.0, f);
+        f->drive = force_factor_at(m, q) * (p->current + p->current_slope * tau);
+        f->wall = -p->flexure_stiffness * y[Z] - p->surface_mass * p->gravity - f->friction -
+                  f->drive - suspension;
+        return;
+    }
     f->drive = force_factor_at(m, q) * (p->current + p->current_slope * tau);
     f->normal = fmax(0.0, p->normal_force + p->normal_force_slope * tau);
     f->wall = 0.0;
@@ -132,6 +146,8 @@ void forces(const Model *m, const Mode *mode, const double y[N_STATES], double t
     if (rest) {
         f->a_q = 0.0;
         f->wall = p->ram_mass * (f->a_surface + p->gravity) - f->drive - suspension;
+    } else if (m->n.ram_fixed) {
+        f->a_q = -f->a_surface;
     } else {
         f->a_q = on_ram / p->ram_mass - p->gravity - f->a_surface;
     }
@@ -154,6 +170,11 @@ void force_rates(const Model *m, const Mode *mode, const double y[N_STATES], dou
                  force_factor_at(m, q) * p->current_slope -
                  (p->suspension_k1 + q * (2.0 * p->suspension_k2 + q * 3.0 * p->suspension_k3)) * u -
                  p->suspension_damping * f->a_q;
+    if (rest && m->n.ram_fixed) {
+        rates_on_part(m, mode, f, rate);
+        rate->wall = -rate->friction - own;
+        return;
+    }
     rate->wall = 0.0;
     if (mode->wall == WALL_TOUCH) {
         double depth = penetration(m, mode, y), speed = mode->side * u;
@@ -227,9 +248,10 @@ double energy_stored(const Model *m, const double y[N_STATES])
     const double q = y[Q], v_ram = y[V] + y[U], v_part = y[V] + y[W];
     if (m->n.prescribed)
         return part * (0.5 * v_part * v_part + p->gravity * (y[Z] + y[D]));
-    double kinetic = 0.5 * (p->ram_mass * v_ram * v_ram + p->surface_mass * y[V] * y[V] +
+    const double ram = m->n.ram_fixed ? 0.0 : p->ram_mass; /* what stands on the ground has none */
+    double kinetic = 0.5 * (ram * v_ram * v_ram + p->surface_mass * y[V] * y[V] +
                             part * v_part * v_part);
-    double weight = p->gravity * (p->ram_mass * (y[Z] + q) + p->surface_mass * y[Z] +
+    double weight = p->gravity * (ram * (y[Z] + q) + p->surface_mass * y[Z] +
                                   part * (y[Z] + y[D]));
     double springs = 0.5 * p->flexure_stiffness * y[Z] * y[Z] +
                      q * q * (p->suspension_k1 / 2.0 +

@@ -26,6 +26,8 @@ void state_rates(const Model *m, const Mode *mode, const double y[N_STATES], dou
 double back_emf_slope(const Model *m, const double y[N_STATES], double a_q);
 double force_factor_at(const Model *m, double q);
 double part_mass_per_surface(const Model *m);
+/* Height of the surface at rest, under the weight of all that it carries, m. */
+double rest_height(const Model *m);
 /* What the spring of a touched compliant wall holds, J. */
 double wall_energy(const Model *m, const double y[N_STATES]);
 double energy_stored(const Model *m, const double y[N_STATES]);

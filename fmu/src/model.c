@@ -133,9 +133,9 @@ int model_initialise(Model *m, char *message)
     if (m->n.prescribed) {
         m->y[V] = m->r.surface_velocity;
     } else {
-        hang_ram(m);
-        m->y[Z] = -(m->r.ram_mass + m->r.surface_mass + part_mass_per_surface(m)) * m->r.gravity /
-                  m->r.flexure_stiffness;
+        if (!m->n.ram_fixed)
+            hang_ram(m);
+        m->y[Z] = rest_height(m);
     }
     m->mode.slip = 0;
     m->mode.plate = 0;
@@ -181,7 +181,7 @@ void model_outputs(Model *m)
     r->z_surface = y[Z];
     r->v_surface = y[V];
     r->a_surface = f.a_surface;
-    r->z_ram = y[Z] + y[Q];
+    r->z_ram = m->n.ram_fixed && !m->n.prescribed ? rest_height(m) : y[Z] + y[Q];
     r->v_ram = y[V] + y[U];
     r->a_ram = f.a_surface + f.a_q;
     r->z_part = y[Z] + y[D];

@@ -90,7 +90,7 @@ int model_set_real(Model *m, size_t place, double value, char *message);
 int model_set_integer(Model *m, size_t place, int value, char *message);
 
 /* Static equilibrium without current: the ram on its suspension, the surface on its flexures
- * carrying all three bodies, the part sticking. 0, or -1 with a sentence in message. */
+ * carrying all three bodies (a fixed ram apart), the part sticking. 0, or -1 with a sentence in message. */
 int model_initialise(Model *m, char *message);
 
 /* Advance by h > 0 seconds. The inputs run on with their slopes. 0, or -1 with a sentence in

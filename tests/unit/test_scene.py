@@ -60,6 +60,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "count": 1,
     },
     "mechanics": {
+        "actuator": "ram",
         "ram_mass": 0.004,
         "surface_mass": 0.0145,
         "part_mass": 0.009,
@@ -119,6 +120,7 @@ def test_built_in_scenes() -> None:
     assert set(scenes) == {
         "paper", "paper-full", "gripper", "ideal-current", "held",
         "optimal", "quaid", "trial", "umbanhowar",
+        "direct-drive", "direct-drive-stops",
     }  # fmt: skip
     for name, description in scenes.items():
         scene = load(name)
