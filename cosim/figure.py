@@ -16,6 +16,7 @@ from cosim.simulate import Result
 Array = npt.NDArray[np.float64]
 
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
+GRIP = "#7a5195"
 PERIODS_SHOWN = 3
 
 
@@ -89,7 +90,13 @@ def _whole_run(axis: Axes, result: Result) -> None:
     axis.set_xlim(0, result.scene.run.duration)
     axis.set(xlabel="time [s]", ylabel="height [mm]")
     _at_least(axis, 0.01)
-    _head(axis, "Whole run")
+    curves, _ = axis.get_legend_handles_labels()
+    if "normal_force" in waves:
+        right = axis.twinx()
+        right.plot(waves["time"], waves["normal_force"], color=GRIP, lw=1.0, label="grip (right)")
+        right.set(ylabel="normal force [N]", ylim=(0.0, None))
+        curves += right.get_lines()
+    _head(axis, "Whole run", curves)
 
 
 def _head(axis: Axes, title: str, handles: Sequence[Artist] | None = None) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from cosim.errors import SimulationFailed
 from cosim.fmi import borrow, give_back, places
+from cosim.grip import normal_force
 from cosim.scene import Scene
 
 STEP_OUTPUTS = (
@@ -72,7 +73,13 @@ class Mechanics:
         self._sticking = (c_int * 1)()
         self._totals_places = places(fmi_version, TOTALS)
         self._counters_places = places(fmi_version, COUNTERS)
+        self.normal_force = normal_force(scene)
+        """The normal force where it changes in time."""
+        self._force_places = places(fmi_version, ("normal_force", "normal_force_slope"))
+        self._force = (c_double * 2)()
         reals, integers = _parameters(scene)
+        if self.normal_force is not None:
+            reals["normal_force"] = self.normal_force.value(0.0)
         try:
             self._fmi.set_reals(
                 places(fmi_version, tuple(reals)), (c_double * len(reals))(*reals.values())
@@ -89,12 +96,20 @@ class Mechanics:
     def step_to(self, time: float, current: float = 0.0, slope: float = 0.0) -> None:
         """Advance to ``time`` (s) with one coil's current (A) at the start and its slope (A/s).
 
+        The normal force must have no corner within the step.
         Raises SimulationFailed with the FMU's sentence.
         """
         self._input[0] = current
         self._input[1] = slope
         try:
             self._fmi.set_reals(self._input_places, self._input)
+            if self.normal_force is not None:
+                force, end = (
+                    self.normal_force.value(self.time),
+                    self.normal_force.value_before(time),
+                )
+                self._force[0], self._force[1] = force, (end - force) / (time - self.time)
+                self._fmi.set_reals(self._force_places, self._force)
             self._fmi.do_step(self.time, time - self.time)
             self._fmi.get_reals(self._step_places, self.step_outputs)
         except Exception as error:
@@ -133,6 +148,6 @@ def _parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
         "n_surfaces": table.pop("n_surfaces"),
         "ram_fixed": int(table.pop("actuator") == "direct"),
     }
-    friction = scene.friction.model_dump(exclude={"law"})
+    friction = scene.friction.model_dump(exclude={"law", "normal_force_file"})
     coil = scene.coil.model_dump(include={"force_factor", "b1", "b2"})
     return {**table, **friction, **coil}, integers

@@ -35,6 +35,7 @@ UNITS = {
     "v_part": "m/s",
     "friction_force": "N",
     "sticking": "1",
+    "normal_force": "N",
 }
 """The columns of the waveforms, in order, and their units. Absent participants have none."""
 
@@ -163,6 +164,8 @@ def _waveforms(
         del known["back_emf"]
     if scene.mechanics.actuator == "direct":
         del known["z_ram"], known["v_ram"]
+    if (force := recorder.mechanics.normal_force) is not None:
+        known["normal_force"] = np.array([force.value(t) for t in known["time"].tolist()])
     return {name: known[name] for name in UNITS if name in known}
 
 

@@ -72,6 +72,14 @@ class Scene(BaseModel):
                 "drive.waveform",
                 "circuit.model",
             )
+        if self.friction.normal_force_file and self.surface_is_given:
+            raise fault(
+                f'drive.waveform = "{drive.waveform}" with circuit.model = "none" moves the part '
+                "at a constant friction.normal_force, not at that of friction.normal_force_file",
+                "friction.normal_force_file",
+                "drive.waveform",
+                "circuit.model",
+            )
         if self.circuit.model == "none":
             return self
         if self.circuit.model == "full":
@@ -119,6 +127,8 @@ class Scene(BaseModel):
             for knob, key in KNOBS.items():
                 if table == "drive" and knob in values:
                     del values[key]
+            if values.get("normal_force_file"):
+                del values["normal_force"]
             data[table] = values
         return data
 
