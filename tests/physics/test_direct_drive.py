@@ -102,7 +102,7 @@ def test_against_the_reference_with_an_endless_ram(contact: str):
         assert result.summary[f"energy_{name}"] == pytest.approx(
             expected.energies[name], rel=1e-6, abs=1e-9
         )
-    assert result.summary["energy_residual"] < 1e-9
+    assert result.summary["energy_residual"] < 1e-9  # pyright: ignore[reportOperatorIssue]
     assert not {"z_ram", "v_ram"} & set(result.waveforms)
 
 
