@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from cosim.drive import Command
 from cosim.errors import BadInput
+from cosim.recorder import Recorder
 from cosim.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -162,6 +163,35 @@ def from_command(
         current_max=float(after.max()),
         current_min=float(after.min()),
         limited={"output": 0.0},
+    )
+
+
+def from_source(scene: Scene, command: Command, recorder: Recorder) -> Electrics:
+    """From the mechanics' own current source, at the end of its run.
+
+    In a row at a corner or jump of the command stands the voltage before it.
+    """
+    count, run = scene.coil.count, scene.run
+    totals, before = recorder.mechanics.totals(), recorder.at_settle
+    columns = recorder.mechanics.columns
+    share = {
+        limit: (totals[name] - before[name]) / (run.duration - run.settle)
+        for limit, name in (
+            ("swing_high", "output_high_time"),
+            ("swing_low", "output_low_time"),
+            ("current_limit", "current_limit_time"),
+        )
+    }
+    return Electrics(
+        command=command.values(recorder.time),
+        current=recorder.rows[:, columns.index("coil_current")],
+        coil_voltage=recorder.rows[:, columns.index("coil_voltage")],
+        energy_in=count * totals["energy_output"],
+        energy_copper=count * totals["energy_copper"],
+        energy_magnetic=count * totals["energy_magnetic"],
+        current_max=recorder.extremes[6],
+        current_min=recorder.extremes[7],
+        limited=share | {"output": sum(share.values())},
     )
 
 

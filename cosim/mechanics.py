@@ -1,7 +1,8 @@
 """The mechanical participant: the FMU with the scene's parameters.
 
-Names of parameters and outputs are those of ``fmu/src/variables.def``. The current is linear within
-a step: its value at the start and its slope are set before each step.
+Names of parameters and outputs are those of ``fmu/src/variables.def``. The input is linear within
+a step: its value at the start and its slope are set before each step. It is the current of one coil
+(A) or, where the FMU has the current source too (circuit.model "limited"), the command (V).
 """
 
 from collections.abc import Sequence
@@ -47,6 +48,21 @@ TOTALS = (
     "energy_damping",
     "energy_stored",
 )
+SOURCE_STEP_OUTPUTS = ("coil_current_max", "coil_current_min")
+"""What is read besides after every step where the source is in the FMU: one coil's, A."""
+
+SOURCE_SAMPLE_OUTPUTS = ("coil_current", "coil_voltage")
+"""What a row takes besides: current of one coil (A) and voltage across the coils (V)."""
+
+SOURCE_TOTALS = (
+    "output_high_time",
+    "output_low_time",
+    "current_limit_time",
+    "energy_output",
+    "energy_copper",
+    "energy_magnetic",
+)
+
 COUNTERS = ("impacts", "stick_slip_events", "internal_steps", "internal_rejected")
 
 CONTACT_LAWS = {"compliant": 1, "rigid": 2}
@@ -62,16 +78,26 @@ class Mechanics:
         """Number of steps so far."""
         self._fmi_version = fmi_version
         self._fmi = borrow(fmi_version)
-        self._input_places = places(fmi_version, ("current", "current_slope"))
+        self.has_source = scene.circuit.model == "limited"
+        """Whether the input is the command of the FMU's own source, V, and not a current, A."""
+        step_outputs, sampled, self._totals = STEP_OUTPUTS, SAMPLE_OUTPUTS, TOTALS
+        if self.has_source:
+            step_outputs += SOURCE_STEP_OUTPUTS
+            sampled += SOURCE_SAMPLE_OUTPUTS
+            self._totals += SOURCE_TOTALS
+        given = "command" if self.has_source else "current"
+        self._input_places = places(fmi_version, (given, f"{given}_slope"))
         self._input = (c_double * 2)()
-        self._step_places = places(fmi_version, STEP_OUTPUTS)
-        self.step_outputs = (c_double * len(STEP_OUTPUTS))()
-        """Values of STEP_OUTPUTS after the last step."""
-        self._sample_places = places(fmi_version, SAMPLE_OUTPUTS)
-        self._sample = (c_double * len(SAMPLE_OUTPUTS))()
+        self._step_places = places(fmi_version, step_outputs)
+        self.step_outputs = (c_double * len(step_outputs))()
+        """Values of STEP_OUTPUTS, and SOURCE_STEP_OUTPUTS, after the last step."""
+        self.columns = (*sampled, "sticking")
+        """Names of what ``sample`` gives."""
+        self._sample_places = places(fmi_version, sampled)
+        self._sample = (c_double * len(sampled))()
         self._sticking_place = places(fmi_version, ("sticking",))
         self._sticking = (c_int * 1)()
-        self._totals_places = places(fmi_version, TOTALS)
+        self._totals_places = places(fmi_version, self._totals)
         self._counters_places = places(fmi_version, COUNTERS)
         self.normal_force = normal_force(scene)
         """The normal force where it changes in time."""
@@ -93,13 +119,13 @@ class Mechanics:
             self._fmi.close()
             raise self._failed(error) from error
 
-    def step_to(self, time: float, current: float = 0.0, slope: float = 0.0) -> None:
-        """Advance to ``time`` (s) with one coil's current (A) at the start and its slope (A/s).
+    def step_to(self, time: float, value: float = 0.0, slope: float = 0.0) -> None:
+        """Advance to ``time`` (s) with the input (A or V) at the start and its slope (per s).
 
         The normal force must have no corner within the step.
         Raises SimulationFailed with the FMU's sentence.
         """
-        self._input[0] = current
+        self._input[0] = value
         self._input[1] = slope
         try:
             self._fmi.set_reals(self._input_places, self._input)
@@ -118,18 +144,18 @@ class Mechanics:
         self.steps += 1
 
     def sample(self) -> Sequence[float]:
-        """Values of SAMPLE_OUTPUTS now, and 1 for sticking or 0 for slipping."""
+        """Values of ``columns`` now; sticking is 1, slipping 0."""
         self._fmi.get_reals(self._sample_places, self._sample)
         self._fmi.get_integers(self._sticking_place, self._sticking)
         return [*self._sample, *self._sticking]
 
     def totals(self) -> dict[str, float]:
-        """Values of TOTALS and COUNTERS now, counted from the start."""
-        reals = (c_double * len(TOTALS))()
+        """Values of TOTALS (and SOURCE_TOTALS) and COUNTERS now, counted from the start."""
+        reals = (c_double * len(self._totals))()
         self._fmi.get_reals(self._totals_places, reals)
         integers = (c_int * len(COUNTERS))()
         self._fmi.get_integers(self._counters_places, integers)
-        return dict(zip((*TOTALS, *COUNTERS), (*reals, *integers), strict=True))
+        return dict(zip((*self._totals, *COUNTERS), (*reals, *integers), strict=True))
 
     def close(self) -> None:
         """End the use of the instance."""
@@ -150,4 +176,21 @@ def _parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
     }
     friction = scene.friction.model_dump(exclude={"law", "normal_force_file"})
     coil = scene.coil.model_dump(include={"force_factor", "b1", "b2"})
+    if scene.circuit.model == "limited":
+        coil |= _source_parameters(scene)
+        integers |= {"source": 1, "coil_count": scene.coil.count}
     return {**table, **friction, **coil}, integers
+
+
+def _source_parameters(scene: Scene) -> dict[str, float]:
+    circuit, coil = scene.circuit, scene.coil
+    return {
+        "coil_resistance": coil.resistance,
+        "inductance": coil.inductance,
+        "eddy_inductance": coil.eddy_inductance or 0.0,
+        "eddy_resistance": coil.eddy_resistance or 0.0,
+        "sense_resistance": circuit.sense_resistance,
+        "output_high": circuit.supply - circuit.swing_loss_high,
+        "output_low": circuit.swing_loss_low - circuit.supply,
+        "current_limit": circuit.current_limit,
+    }

@@ -13,18 +13,17 @@ from cosim.mechanics import SAMPLE_OUTPUTS, Mechanics
 from cosim.published import FRAME_RATE
 from cosim.scene import Scene
 
-COLUMNS = (*SAMPLE_OUTPUTS, "sticking")
-
 _SAME_TIME = 1e-12  # s; communication points closer than this are one
-_Z_SURFACE = COLUMNS.index("z_surface")
+_Z_SURFACE = SAMPLE_OUTPUTS.index("z_surface")
 
 
 class Recorder:
     """The waveforms of the mechanics, filled as ``advance`` is called.
 
-    ``time`` are the times of the rows (s), ``rows`` their values (one column each of COLUMNS),
-    ``frames`` the surface's height (m) at each frame of the camera after settling, ``extremes`` the
-    largest and smallest acceleration (m/s²), velocity (m/s) and height (m) of the surface after it.
+    ``time`` are the times of the rows (s), ``rows`` their values (a column for each of the
+    mechanics' ``columns``), ``frames`` the surface's height (m) at each frame of the camera after
+    settling, ``extremes`` the largest and smallest acceleration (m/s²), velocity (m/s) and height
+    (m) of the surface after it, and of the coil's current (A) where the mechanics have the source.
     """
 
     def __init__(
@@ -35,7 +34,7 @@ class Recorder:
         self._settle = run.settle
         self._progress = progress
         self.time = grid(run.output_step, run.duration)
-        self.rows = np.empty((len(self.time), len(COLUMNS)))
+        self.rows = np.empty((len(self.time), len(mechanics.columns)))
         frame_times = grid(1.0 / FRAME_RATE, run.duration)
         frame_times = frame_times[frame_times >= run.settle]
         self.frames = np.empty(len(frame_times))
@@ -45,29 +44,29 @@ class Recorder:
         corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
         self._agenda = _agenda(self.time, frame_times, run.settle, [*corners, run.duration])
         self._next = 0
-        self.extremes = [-np.inf, np.inf] * 3
+        self.extremes = [-np.inf, np.inf] * (4 if mechanics.has_source else 3)
         self.at_settle: dict[str, float] = {}
         """Totals of the mechanics when settling ends."""
         self._visit()
 
-    def advance(self, time: float, current: float, current_end: float) -> None:
-        """Advance to ``time`` (s); the current of one coil goes linearly between the two, A."""
+    def advance(self, time: float, value: float, value_end: float) -> None:
+        """Advance to ``time`` (s); the mechanics' input goes linearly between the two, A or V."""
         mechanics = self.mechanics
         start = mechanics.time
-        slope = (current_end - current) / (time - start)
+        slope = (value_end - value) / (time - start)
         times, _ = self._agenda
         while times[self._next] < time - _SAME_TIME:
             stop = times[self._next]
-            self._step(stop, current + slope * (mechanics.time - start), slope)
+            self._step(stop, value + slope * (mechanics.time - start), slope)
             self._visit()
-        self._step(time, current + slope * (mechanics.time - start), slope)
+        self._step(time, value + slope * (mechanics.time - start), slope)
         if times[self._next] <= time + _SAME_TIME:
             self._visit()
 
-    def _step(self, time: float, current: float, slope: float) -> None:
-        self.mechanics.step_to(time, current, slope)
+    def _step(self, time: float, value: float, slope: float) -> None:
+        self.mechanics.step_to(time, value, slope)
         if time > self._settle:
-            _, _, a_max, a_min, v_max, v_min, z_max, z_min = self.mechanics.step_outputs
+            _, _, a_max, a_min, v_max, v_min, z_max, z_min, *source = self.mechanics.step_outputs
             most = self.extremes
             if a_max > most[0]:
                 most[0] = a_max
@@ -81,6 +80,12 @@ class Recorder:
                 most[4] = z_max
             if z_min < most[5]:
                 most[5] = z_min
+            if source:
+                i_max, i_min = source
+                if i_max > most[6]:
+                    most[6] = i_max
+                if i_min < most[7]:
+                    most[7] = i_min
 
     def _visit(self) -> None:
         """Write down what the agenda has for this time."""

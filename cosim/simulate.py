@@ -14,8 +14,8 @@ from cosim.coupling.step_locked import StepLocked
 from cosim.drive import Command, command
 from cosim.isolation import isolated
 from cosim.mechanics import Mechanics
-from cosim.recorder import COLUMNS, Recorder
-from cosim.scene import Scene
+from cosim.recorder import Recorder
+from cosim.scene import WITHOUT_NGSPICE, Scene
 from cosim.summary import summarise
 
 Array = npt.NDArray[np.float64]
@@ -70,7 +70,7 @@ def simulate(
 
 def _needs_own_process(scene: Scene) -> bool:
     model = scene.circuit.model
-    if model in ("none", "ideal", "file"):
+    if model == "file" or model in WITHOUT_NGSPICE:
         return model == "file"
     # PySpice and ngspice are loaded only for those who run a circuit.
     from cosim.circuit.ngspice import spoilt
@@ -88,10 +88,14 @@ def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int)
         if scene.circuit.model == "none":
             recorder.advance(scene.run.duration, 0.0, 0.0)
         elif scene.circuit.model == "ideal":
-            log = _prescribe(scene, drive, recorder)
-            emf = recorder.rows[:, COLUMNS.index("back_emf")]
+            share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
+            log = _prescribe(scene, drive, recorder, share)
+            emf = recorder.rows[:, mechanics.columns.index("back_emf")]
             motion = mechanics.totals()["energy_in"]
             electric = electrics.from_command(scene, drive, log, recorder.time, emf, motion)
+        elif scene.circuit.model == "limited":
+            _prescribe(scene, drive, recorder, 1.0)
+            electric = electrics.from_source(scene, drive, recorder)
         else:
             from cosim.circuit.limit_cycle import refuse_false
             from cosim.circuit.netlist import limits_at_work
@@ -115,10 +119,17 @@ def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int)
         "circuit_rejected": circuit.attempts - circuit.steps if circuit else 0,
         "fmu_steps": steps,
         "wall_time": time.perf_counter() - began,
-        "method": scene.coupling.method if circuit else "uncoupled",
+        "method": _method(scene),
         "versions": versions() | ({"ngspice": circuit.ngspice} if circuit else {}),
     }
     return Result(scene, _waveforms(scene, recorder, electric), summary)
+
+
+def _method(scene: Scene) -> str:
+    model = scene.circuit.model
+    if model == "limited":
+        return "monolithic"
+    return "uncoupled" if model in WITHOUT_NGSPICE else scene.coupling.method
 
 
 def _circuit_log(scene: Scene, fmi_version: int) -> dict[str, Array]:
@@ -135,9 +146,12 @@ def _circuit_log(scene: Scene, fmi_version: int) -> dict[str, Array]:
         mechanics.close()
 
 
-def _prescribe(scene: Scene, drive: Command, recorder: Recorder) -> dict[str, Array]:
-    """The rung ``ideal``: the coil carries the commanded current, whatever voltage that takes."""
-    share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
+def _prescribe(scene: Scene, drive: Command, recorder: Recorder, share: float) -> dict[str, Array]:
+    """Give the mechanics ``share`` times the command, from corner to corner.
+
+    With the rung ``ideal`` that is the coil's current, whatever voltage it takes (A/V); with
+    ``limited`` the command itself.
+    """
     duration = scene.run.duration
     edges, start, end = [0.0], [], []
     while edges[-1] < duration:
@@ -159,7 +173,8 @@ def _waveforms(
         known["command"] = electric.command
         known["current"] = electric.current
         known["coil_voltage"] = electric.coil_voltage
-    known |= {name: recorder.rows[:n, k] for k, name in enumerate(COLUMNS)}
+    columns = recorder.mechanics.columns
+    known |= {name: recorder.rows[:n, k] for k, name in enumerate(columns) if name in UNITS}
     if electric is None:
         del known["back_emf"]
     if scene.mechanics.actuator == "direct":

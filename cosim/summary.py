@@ -39,7 +39,7 @@ def summarise(
     v_average = (totals["z_part"] - before["z_part"]) / span
     camera = np.diff(recorder.frames, 2) * FRAME_RATE**2
     rigid = scene.mechanics.contact == "rigid"
-    a_max, a_min, v_max, v_min, z_max, z_min = recorder.extremes
+    a_max, a_min, v_max, v_min, z_max, z_min = recorder.extremes[:6]
     driven = scene.circuit.model != "none"
     result: dict[str, Any] = {
         "v_average": v_average,

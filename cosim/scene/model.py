@@ -21,6 +21,9 @@ from cosim.scene.tables import (
     fault,
 )
 
+FASTEST = 1e-6
+"""Least time constant of a coil, s, that the mechanics' integration takes along."""
+
 
 class Scene(BaseModel):
     """Everything that a run needs to know, checked; frozen and comparable."""
@@ -54,6 +57,30 @@ class Scene(BaseModel):
         ):
             data["drive"] = {"quantised": True} | drive
         return data
+
+    @model_validator(mode="after")
+    def _check_speed(self) -> "Scene":
+        """With "limited" one explicit method solves coil and mechanics: none may be stiff."""
+        if self.circuit.model != "limited":
+            return self
+        coil = self.coil
+        eddy = coil.eddy_resistance or 0.0
+        around = coil.resistance + coil.count * self.circuit.sense_resistance + eddy
+        for key, resistance in (("inductance", around), ("eddy_inductance", eddy)):
+            inductance = getattr(coil, key)
+            if inductance is not None and inductance < FASTEST * resistance:
+                raise fault(
+                    f"coil.{key} = {inductance:g} H must be at least {FASTEST * resistance:.3g} H "
+                    f'with circuit.model = "limited" and {resistance:g} Ohm around it, or the '
+                    "current changes too fast to be solved with the mechanics",
+                    f"coil.{key}",
+                    "coil.resistance",
+                    "coil.eddy_resistance",
+                    "coil.count",
+                    "circuit.sense_resistance",
+                    "circuit.model",
+                )
+        return self
 
     @model_validator(mode="after")
     def _check_reach(self) -> "Scene":

@@ -196,10 +196,11 @@ class Drive(Table):
 class Circuit(Table):
     """What turns V1 into current."""
 
-    model: Literal["full", "amplifier", "ideal", "none", "file"] = _choice(
+    model: Literal["full", "amplifier", "limited", "ideal", "none", "file"] = _choice(
         "amplifier",
-        "Schematic with its difference amplifier, behavioural current source, "
-        "current = command, no drive at all, or the netlist named in circuit.netlist",
+        "Schematic with its difference amplifier, behavioural current source, the same reduced to "
+        "its limits and the coil, current = command, no drive at all, or the netlist named in "
+        "circuit.netlist",
     )
     netlist: str | None = _choice(None, "A netlist of one's own, seen from the scene's file")
     supply: float = _number(18.0, "V", 0.1, 1e3, "Supply voltage, both signs")
@@ -207,7 +208,7 @@ class Circuit(Table):
         4.0, "Ohm", 1e-3, 1e6, "Sense resistor: current = V1 / sense_resistance"
     )
     current_limit: float = _number(
-        2.504, "A", 1e-3, 1e3, 'Current limit of the power amplifier; only in "full"'
+        2.504, "A", 1e-3, 1e3, 'Current limit of the power amplifier; not in "amplifier"'
     )
     gain_bandwidth: float = _number(
         1e6, "Hz", 1e2, 1e12, "Gain-bandwidth product of the power amplifier"
@@ -244,7 +245,7 @@ class Circuit(Table):
 
     @model_validator(mode="after")
     def _check(self) -> "Circuit":
-        swing = self.model in ("amplifier", "file")
+        swing = self.model in ("amplifier", "limited", "file")
         for key in ("swing_loss_high", "swing_loss_low"):
             if swing and (loss := getattr(self, key)) >= self.supply:
                 raise fault(
@@ -371,11 +372,15 @@ _OF_NGSPICE = set(Circuit.model_fields) - {"model"}
 CIRCUIT_KEYS: dict[str, set[str]] = {
     "full": _OF_NGSPICE - {"swing_loss_high", "swing_loss_low"},
     "amplifier": _OF_NGSPICE - {"current_limit"},
+    "limited": {"supply", "sense_resistance", "current_limit", "swing_loss_high", "swing_loss_low"},
     "ideal": {"sense_resistance"},
     "none": set(),
     "file": _OF_NGSPICE,
 }
 """The keys of ``[circuit]`` that act with each ``circuit.model``."""
+
+WITHOUT_NGSPICE = ("limited", "ideal", "none")
+"""Each ``circuit.model`` that starts no ngspice."""
 
 
 def acts(table: str, key: str, model: str, waveform: str) -> bool:

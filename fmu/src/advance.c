@@ -132,6 +132,24 @@ static void note_extremes(Model *m, const Point *point)
         r->z_surface_max = z;
     if (z < r->z_surface_min)
         r->z_surface_min = z;
+    if (point->y[I_COIL] > r->coil_current_max)
+        r->coil_current_max = point->y[I_COIL];
+    if (point->y[I_COIL] < r->coil_current_min)
+        r->coil_current_min = point->y[I_COIL];
+}
+
+/* Times that are counted mode by mode. */
+static void note_time(Model *m, double taken)
+{
+    const Mode *mode = &m->mode;
+    if (mode->slip == 0)
+        m->r.stick_time += taken;
+    if (mode->output > 0)
+        m->r.output_high_time += taken;
+    else if (mode->output < 0)
+        m->r.output_low_time += taken;
+    else if (mode->limited)
+        m->r.current_limit_time += taken;
 }
 
 static void take_up(Model *m, const Point *point)
@@ -169,6 +187,7 @@ int advance(Model *m, double h, char *message)
     m->r.a_surface_max = m->r.a_surface_min = now.dy[V];
     m->r.v_surface_max = m->r.v_surface_min = now.y[V];
     m->r.z_surface_max = m->r.z_surface_min = now.y[Z];
+    m->r.coil_current_max = m->r.coil_current_min = now.y[I_COIL];
 
     for (int trials = 0; now.tau < h; trials++) {
         if (events > MAX_EVENTS_PER_STEP) {
@@ -217,8 +236,7 @@ int advance(Model *m, double h, char *message)
             if (!last || next > m->step)
                 m->step = next;
         }
-        if (m->mode.slip == 0)
-            m->r.stick_time += taken;
+        note_time(m, taken);
         m->n.internal_steps++;
         note_extremes(m, &end);
         take_up(m, &end);

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "source.h"
+
 /* A bounce that would last less than this, s, ends a Zeno sequence in resting contact. What it
  * leaves out is of the order 1e-14 J and 1e-12 m. */
 static const double ZENO_FLIGHT = 1e-7;
@@ -82,6 +84,8 @@ int event_functions(const Model *m, const double y[N_STATES], double tau,
         }
     }
 #undef ADD
+    if (m->n.source)
+        n = source_events(m, y, tau, back_emf_slope(m, y, f.a_q), functions, n);
     return n;
 }
 
@@ -286,12 +290,14 @@ static void settle(Model *m, double tau, int keep)
         changed |= settle_friction(m, tau, keep);
         keep = 1;
         if (!changed)
-            return;
+            break;
     }
+    source_settle_output(m, tau);
 }
 
 void settle_mode(Model *m, double tau)
 {
+    source_settle_command(m, tau);
     settle(m, tau, 1);
 }
 
@@ -346,6 +352,14 @@ void apply_event(Model *m, double tau, EventKind kind)
         return;
     case EVENT_PLATE_UP:
         break_plate(m, tau, 1);
+        return;
+    case EVENT_COMMAND_HIGH:
+    case EVENT_COMMAND_LOW:
+    case EVENT_COMMAND_BACK:
+    case EVENT_CURRENT_MET:
+    case EVENT_OUTPUT_HIGH:
+    case EVENT_OUTPUT_LOW:
+        source_apply(m, tau, kind);
         return;
     case N_EVENTS:
         break;

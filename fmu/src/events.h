@@ -15,6 +15,12 @@ typedef enum {
     EVENT_PLATE_STOPS,
     EVENT_PLATE_DOWN, /* the part breaks away from the springed plate */
     EVENT_PLATE_UP,
+    EVENT_COMMAND_HIGH, /* the source is asked for more than its current limit */
+    EVENT_COMMAND_LOW,
+    EVENT_COMMAND_BACK,
+    EVENT_CURRENT_MET, /* the current meets its target again */
+    EVENT_OUTPUT_HIGH, /* to follow its target would take more voltage than there is */
+    EVENT_OUTPUT_LOW,
     N_EVENTS
 } EventKind;
 
@@ -25,7 +31,7 @@ typedef struct {
     double noise;       /* values above -noise are rounding, not an event */
 } EventFunction;
 
-enum { MAX_EVENT_FUNCTIONS = 6 };
+enum { MAX_EVENT_FUNCTIONS = 10 };
 
 /* The event functions of the present mode at state y. Returns their number; the order is the same
  * for the same mode. */

@@ -4,8 +4,8 @@
 
 #include "mechanics.h"
 
-/* Errors are relative to |y| plus these: what counts as large for this machine, m and m/s. */
-static const double POSITION_SCALE = 1e-3, VELOCITY_SCALE = 0.1;
+/* Errors are relative to |y| plus these: what counts as large for this machine, m, m/s, A. */
+static const double POSITION_SCALE = 1e-3, VELOCITY_SCALE = 0.1, CURRENT_SCALE = 0.1;
 
 double trial_step(const Model *m, double tau, double h, const double y0[N_STATES],
                   const double dy0[N_STATES], double y1[N_STATES], double dy1[N_STATES])
@@ -37,11 +37,15 @@ double trial_step(const Model *m, double tau, double h, const double y0[N_STATES
         dy1[j] = k[6][j];
 
     double worst = 0.0;
-    for (int j = Z; j <= W; j++) {
+    for (int j = Z; j <= I_EDDY; j++) {
+        if (j >= E_IN && j <= E_DAMPING)
+            continue; /* they act on nothing */
         double sum = 0.0;
         for (int s = 0; s < 7; s++)
             sum += E[s] * k[s][j];
-        double scale = (j == V || j == U || j == W) ? VELOCITY_SCALE : POSITION_SCALE;
+        double scale = j >= I_COIL                       ? CURRENT_SCALE
+                       : (j == V || j == U || j == W) ? VELOCITY_SCALE
+                                                      : POSITION_SCALE;
         double error = fabs(h * sum) / (m->r.tolerance * (scale + fabs(y0[j])));
         if (!(error <= worst))
             worst = error; /* so that a NaN stays */

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "source.h"
+
 double force_factor_at(const Model *m, double q)
 {
     return m->r.force_factor * (1.0 + q * (m->r.b1 + q * m->r.b2));
@@ -100,12 +102,12 @@ void forces(const Model *m, const Mode *mode, const double y[N_STATES], double t
 
     if (mode->wall == WALL_REST && m->n.ram_fixed) {
         forces_on_part(m, mode, tau, 0.0, f);
-        f->drive = force_factor_at(m, q) * (p->current + p->current_slope * tau);
+        f->drive = force_factor_at(m, q) * coil_current(m, y, tau);
         f->wall = -p->flexure_stiffness * y[Z] - p->surface_mass * p->gravity - f->friction -
                   f->drive - suspension;
         return;
     }
-    f->drive = force_factor_at(m, q) * (p->current + p->current_slope * tau);
+    f->drive = force_factor_at(m, q) * coil_current(m, y, tau);
     f->normal = fmax(0.0, p->normal_force + p->normal_force_slope * tau);
     f->wall = 0.0;
     if (mode->wall == WALL_TOUCH) {
@@ -166,8 +168,8 @@ void force_rates(const Model *m, const Mode *mode, const double y[N_STATES], dou
     const int rest = mode->wall == WALL_REST;
     const int held = held_by_plate(m, mode);
 
-    double own = force_factor_rate(m, q, u) * (p->current + p->current_slope * tau) +
-                 force_factor_at(m, q) * p->current_slope -
+    double own = force_factor_rate(m, q, u) * coil_current(m, y, tau) +
+                 force_factor_at(m, q) * coil_current_rate(m, mode, y) -
                  (p->suspension_k1 + q * (2.0 * p->suspension_k2 + q * 3.0 * p->suspension_k3)) * u -
                  p->suspension_damping * f->a_q;
     if (rest && m->n.ram_fixed) {
@@ -224,6 +226,7 @@ void state_rates(const Model *m, const Mode *mode, const double y[N_STATES], dou
     dy[E_DAMPING] = m->n.prescribed ? 0.0
                                     : p->flexure_damping * y[V] * y[V] +
                                           p->suspension_damping * y[U] * y[U];
+    source_rates(m, mode, y, dy);
     dy[E_IMPACT] = 0.0;
     if (mode->wall == WALL_TOUCH) {
         /* What the wall takes, less what its spring stores. */

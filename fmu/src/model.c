@@ -7,6 +7,7 @@
 #include "advance.h"
 #include "events.h"
 #include "mechanics.h"
+#include "source.h"
 
 #define PARAMETER(name, unit, start, min, max, text) {#name, unit, text, KIND_PARAMETER, start, min, max},
 #define INPUT(name, unit, start, min, max, text) {#name, unit, text, KIND_INPUT, start, min, max},
@@ -127,7 +128,10 @@ int model_initialise(Model *m, char *message)
                  m->r.mu_s);
         return -1;
     }
+    if (m->n.prescribed && m->n.source)
+        return say(message, "prescribed = 1 leaves the coil out: source must be 0 then");
     memset(m->y, 0, sizeof m->y);
+    m->mode.output = m->mode.limited = 0;
     m->mode.wall = WALL_FREE;
     m->mode.side = 0;
     if (m->n.prescribed) {
@@ -145,6 +149,8 @@ int model_initialise(Model *m, char *message)
     m->energy_at_start = energy_stored(m, m->y);
     settle_mode(m, 0.0);
     m->r.stick_time = 0.0;
+    m->r.output_high_time = m->r.output_low_time = m->r.current_limit_time = 0.0;
+    m->r.coil_current_max = m->r.coil_current_min = 0.0;
     m->n.impacts = m->n.stick_slip_events = m->n.internal_steps = m->n.internal_rejected = 0;
     m->initialised = 1;
     model_outputs(m);
@@ -167,6 +173,7 @@ int model_step(Model *m, double h, char *message)
     if (advance(m, h, message))
         return -1;
     m->r.current = current;
+    m->r.command += m->r.command_slope * h;
     m->r.surface_velocity += m->r.surface_acceleration * h;
     m->r.normal_force = normal > 0.0 ? normal : 0.0;
     return 0;
@@ -202,6 +209,13 @@ void model_outputs(Model *m)
         r->energy_impact -= wall_energy(m, y);
     r->energy_damping = y[E_DAMPING];
     r->energy_stored = energy_stored(m, y) - m->energy_at_start;
+    r->coil_current = y[I_COIL];
+    r->coil_voltage = m->n.source ? coil_voltage(m, &m->mode, y) : 0.0;
+    r->energy_output = y[E_OUTPUT];
+    r->energy_copper = y[E_COPPER];
+    r->energy_magnetic = magnetic_energy(m, y);
+    m->n.output_clamped = m->mode.output;
+    m->n.command_limited = m->mode.limited;
     m->n.sticking = m->mode.slip == 0;
     m->n.wall_contact = m->mode.side;
 }
@@ -215,6 +229,9 @@ double model_derivative(const Model *m, size_t output, size_t input)
                              offsetof(Reals, surface_acceleration) / sizeof(double)};
     Forces low, high;
 
+    if (output == offsetof(Reals, coil_voltage) / sizeof(double) &&
+        input == offsetof(Reals, command_slope) / sizeof(double))
+        return m->n.source ? coil_voltage_per_slope(m) : 0.0;
     for (int i = 0; i < 3; i++) {
         if (input != places[i])
             continue;

@@ -56,7 +56,11 @@ extern const VariableInfo INTEGER_INFO[N_INTEGERS];
 
 /* Places in the state vector. The slip d = z_part - z_surface and its rate w are states of their
  * own: while the part sticks they do not change by a single bit. */
-enum { Z, V, Q, U, D, W, E_IN, E_FRICTION, E_IMPACT, E_DAMPING, N_STATES };
+enum {
+    Z, V, Q, U, D, W, E_IN, E_FRICTION, E_IMPACT, E_DAMPING,
+    I_COIL, I_EDDY, E_OUTPUT, E_COPPER, /* of the source, at rest without one */
+    N_STATES
+};
 
 typedef enum {
     WALL_FREE,
@@ -70,6 +74,9 @@ typedef struct {
     int side;  /* of a touched wall: +1 above, -1 below */
     int slip;  /* 0 sticking; else the sign of w */
     int plate; /* 0 part held by the springed plate; else the sign of the part's velocity */
+    int output;  /* of the source: 0 the current follows its target; else the limit of that sign
+                    holds the output, and the current is on its way to the target */
+    int limited; /* 0 the target is the command; else the current limit of that sign */
 } Mode;
 
 typedef struct {
@@ -101,7 +108,7 @@ int model_step(Model *m, double h, char *message);
 void model_outputs(Model *m);
 
 /* d(output)/d(current, normal_force or surface_acceleration) in the present mode, analytically exact:
- * forces are affine in all three. 0 for every other pair. */
+ * forces are affine in all three; and d(coil_voltage)/d(command_slope). 0 for every other pair. */
 double model_derivative(const Model *m, size_t output, size_t input);
 
 #endif

@@ -434,7 +434,7 @@ def test_scenes(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     names = [line.split()[0] for line in done.stdout.splitlines()]
     assert names == [
-        "paper", "paper-full", "gripper", "held", "ideal-current",
+        "paper", "paper-full", "paper-limited", "gripper", "held", "ideal-current",
         "optimal", "quaid", "trial", "umbanhowar",
     ]  # fmt: skip
 
