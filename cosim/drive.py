@@ -321,6 +321,44 @@ class WithPwm(Command):
         return self._command.v_dac_before(t)
 
 
+class Lagging(Command):
+    """Another command, later by ``lag`` (s)."""
+
+    def __init__(self, command: Command, lag: float) -> None:
+        self._command = command
+        self._lag = lag
+        self.v_offset = command.v_offset
+        self.longest_straight = command.longest_straight
+
+    def _own(self, t: float) -> float:
+        """The other command's time; exactly its corner where ``t`` is that within rounding."""
+        own = t - self._lag
+        same = 1e-12 + 1e-15 * abs(t)
+        corner = self._command.next_corner(own - same)
+        return corner if corner <= own + same else own
+
+    def value(self, t: float) -> float:
+        return self._command.value(self._own(t))
+
+    def value_before(self, t: float) -> float:
+        return self._command.value_before(self._own(t))
+
+    def next_jump(self, t: float) -> float:
+        return self._command.next_jump(self._own(t)) + self._lag
+
+    def next_corner(self, t: float) -> float:
+        return self._command.next_corner(self._own(t)) + self._lag
+
+
+def commands(scene: Scene) -> list[Command]:
+    """The commands of a scene's surfaces: one, or two where they move by themselves."""
+    first = command(scene)
+    if scene.drive.phase_deg is None:
+        return [first]
+    period = getattr(first, "period", 1.0 / scene.drive.frequency)
+    return [first, Lagging(first, scene.drive.phase_deg / 360.0 * period)]
+
+
 def command(scene: Scene) -> Command:
     """The command of a scene; 0 V for ever where its circuit is "none"."""
     if scene.circuit.model == "none":

@@ -49,6 +49,10 @@ class Recorder:
         """Totals of the mechanics when settling ends."""
         self._visit()
 
+    def column(self, name: str) -> npt.NDArray[np.float64]:
+        """The values of one of the mechanics' ``columns`` in the rows."""
+        return self.rows[:, self.mechanics.columns.index(name)]
+
     def advance(self, time: float, value: float, value_end: float) -> None:
         """Advance to ``time`` (s); the mechanics' input goes linearly between the two, A or V."""
         mechanics = self.mechanics

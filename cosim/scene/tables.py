@@ -72,6 +72,14 @@ class Drive(Table):
     reset_time: float = _number(
         0.0, "s", 0.0, 100.0, "Length of the sawtooth's linear fall, at the end of the period"
     )
+    phase_deg: float | None = _number(
+        None,
+        "deg",
+        0.0,
+        360.0,
+        "Lag of the second surface's command; where given, two surfaces move by themselves, each "
+        "with a source and coil of its own",
+    )
     acceleration_max: float = _number(
         98.1, "m/s2", 1e-3, 1e6, "Greatest acceleration of a given surface, optimal and quaid"
     )

@@ -21,6 +21,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "amplitude": 8.0,
         "offset": -1.2,
         "reset_time": 0,
+        "phase_deg": None,
         "acceleration_max": 98.1,
         "optimum": "up",
         "velocity_amplitude": 0.1,
@@ -131,7 +132,7 @@ def test_built_in_scenes() -> None:
         "paper", "paper-full", "paper-limited", "gripper", "ideal-current", "held",
         "optimal", "quaid", "trial", "umbanhowar",
         "direct-drive", "direct-drive-stops", "gripper-17g", "gripper-169g", "square",
-        "down-grip", "down-waveform", "closed-loop-grasp",
+        "down-grip", "down-waveform", "closed-loop-grasp", "two-surfaces",
         *(f"regime-{n:02}" for n in range(1, 11)),
     }  # fmt: skip
     for name, description in scenes.items():
