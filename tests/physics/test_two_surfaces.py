@@ -65,11 +65,9 @@ def test_a_scene_in_phase_is_the_scene_of_one(model: str):
 @pytest.mark.parametrize("contact", ["compliant", "rigid"])
 def test_the_energy_account_closes_at_any_phase(model: str, contact: str):
     for phase in (0, 45, 180, 299):
-        scene = load(
-            "two-surfaces",
-            [f"circuit.model={model}", f"mechanics.contact={contact}", f"drive.phase_deg={phase}"]
-            + ["run.duration=0.3", "run.settle=0.1", "run.output_step=1e-3"],
-        )
+        keys = [f"circuit.model={model}", f"mechanics.contact={contact}"]
+        run = ["run.duration=0.3", "run.settle=0.1", "run.output_step=1e-3"]
+        scene = load("two-surfaces", [*keys, f"drive.phase_deg={phase}", *run])
         assert simulate(scene).summary["energy_residual"] < 1e-9  # pyright: ignore
 
 
