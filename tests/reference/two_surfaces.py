@@ -7,6 +7,7 @@ Compliant walls, given currents. Shares neither code nor formulas with the FMU. 
 
 from collections.abc import Callable, Sequence
 from itertools import product
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -47,7 +48,7 @@ class TwoSurfaces:
             ram -= np.sign(q) * p["contact_stiffness"] * depth**1.5 * push
         return ram, -ram - p["flexure_stiffness"] * z - p["flexure_damping"] * v
 
-    def solve(self, t: float, y: Array, modes: Sequence[int]) -> Array:
+    def solve(self, t: float, y: Array, modes: Sequence[int]) -> npt.NDArray[Any]:
         """Accelerations of surface, ram, surface, ram and part, then both frictions on the part."""
         p = self.p
         a, b = np.zeros((7, 7)), np.zeros(7)
@@ -105,7 +106,7 @@ class TwoSurfaces:
 def rest(p: dict[str, float]) -> Array:
     """Static equilibrium without current."""
     weight = p["ram_mass"] * p["gravity"]
-    q = brentq(
+    q: Any = brentq(
         lambda q: -p["suspension_k1"] * q - p["suspension_k3"] * q**3 - weight,
         -p["travel"],
         0.0,
