@@ -13,7 +13,7 @@ where the highest command needs V_DAC = 0. In truth it is a PWM, of which ``v_of
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Iterable
-from math import floor, inf, pi, sin
+from math import floor, inf, nextafter, pi, sin
 
 import numpy as np
 import numpy.typing as npt
@@ -331,11 +331,13 @@ class Lagging(Command):
         self.longest_straight = command.longest_straight
 
     def _own(self, t: float) -> float:
-        """The other command's time; exactly its corner where ``t`` is that within rounding."""
+        """The other command's time: on, before or after its corner as ``t`` is here."""
         own = t - self._lag
-        same = 1e-12 + 1e-15 * abs(t)
-        corner = self._command.next_corner(own - same)
-        return corner if corner <= own + same else own
+        corner = self._command.next_corner(own - 1e-12 - 1e-15 * abs(t))
+        edge = corner + self._lag
+        if t == edge:
+            return corner
+        return min(own, nextafter(corner, -inf)) if t < edge else max(own, nextafter(corner, inf))
 
     def value(self, t: float) -> float:
         return self._command.value(self._own(t))
