@@ -13,6 +13,7 @@ DIRECTIONS = {
     "regime-01": 1, "regime-02": 1, "regime-04": 1, "regime-05": 1, "regime-06": -1,
     "regime-07": 1, "regime-08": 1, "regime-09": 1, "regime-10": 1, "gripper-17g": 1,
     "gripper-169g": 1, "square": -1, "down-grip": -1, "down-waveform": -1, "direct-drive": -1,
+    "direct-drive-stops": 1, "two-surfaces": 1,
 }  # fmt: skip
 
 
