@@ -40,12 +40,18 @@ class Recorder:
         self.frames = np.empty(len(frame_times))
         self.n_rows = 0
         self._n_frames = 0
-        self._agenda = _agenda(self.time, frame_times, run.settle, run.duration)
+        grip = mechanics.normal_force
+        corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
+        self._agenda = _agenda(self.time, frame_times, run.settle, [*corners, run.duration])
         self._next = 0
         self.extremes = [-np.inf, np.inf] * (4 if mechanics.has_source else 3)
         self.at_settle: dict[str, float] = {}
         """Totals of the mechanics when settling ends."""
         self._visit()
+
+    def column(self, name: str) -> npt.NDArray[np.float64]:
+        """The values of one of the mechanics' ``columns`` in the rows."""
+        return self.rows[:, self.mechanics.columns.index(name)]
 
     def advance(self, time: float, value: float, value_end: float) -> None:
         """Advance to ``time`` (s); the mechanics' input goes linearly between the two, A or V."""
@@ -111,11 +117,14 @@ def grid(step: float, end: float) -> npt.NDArray[np.float64]:
 
 
 def _agenda(
-    rows: npt.NDArray[np.float64], frames: npt.NDArray[np.float64], settle: float, duration: float
+    rows: npt.NDArray[np.float64],
+    frames: npt.NDArray[np.float64],
+    settle: float,
+    stops: list[float],
 ) -> tuple[list[float], list[int]]:
-    """Times at which something is to be written down, and what; an endless one behind them."""
+    """Times at which to stop, and what is to be written down then; an endless one behind them."""
     wanted: dict[int, tuple[float, int]] = {}
-    for times, what in ((rows, _ROW), (frames, _FRAME), ((settle,), _SETTLED), ((duration,), 0)):
+    for times, what in ((rows, _ROW), (frames, _FRAME), ((settle,), _SETTLED), (stops, 0)):
         for time in times:
             key = round(float(time) / _SAME_TIME)
             known, before = wanted.get(key, (float(time), 0))
