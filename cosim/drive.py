@@ -13,7 +13,7 @@ where the highest command needs V_DAC = 0. In truth it is a PWM, of which ``v_of
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Iterable
-from math import floor, inf, pi, sin
+from math import floor, inf, nextafter, pi, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -386,6 +386,52 @@ class WithPwm(Command):
 
     def v_dac_before(self, t: float) -> float:
         return self._command.v_dac_before(t)
+
+
+class Lagging(Command):
+    """Another command, later by ``lag`` (s)."""
+
+    def __init__(self, command: Command, lag: float) -> None:
+        self._command = command
+        self._lag = lag
+        self.v_offset = command.v_offset
+        self.longest_straight = command.longest_straight
+
+    def _own(self, t: float) -> float:
+        """The other command's time: on, before or after its corner as ``t`` is here."""
+        own = t - self._lag
+        corner = self._command.next_corner(own - 1e-12 - 1e-15 * abs(t))
+        edge = corner + self._lag
+        if t == edge:
+            return corner
+        return min(own, nextafter(corner, -inf)) if t < edge else max(own, nextafter(corner, inf))
+
+    def value(self, t: float) -> float:
+        return self._command.value(self._own(t))
+
+    def value_before(self, t: float) -> float:
+        return self._command.value_before(self._own(t))
+
+    def next_jump(self, t: float) -> float:
+        return self._command.next_jump(self._own(t)) + self._lag
+
+    def next_corner(self, t: float) -> float:
+        return self._command.next_corner(self._own(t)) + self._lag
+
+    def piece(self, t: float) -> Piece:
+        piece = self._command.piece(self._own(t))
+        # Behind t, whatever rounding makes of the sum.
+        until = max(piece.until + self._lag, nextafter(t, inf))
+        return piece._replace(until=until, origin=piece.origin + self._lag)
+
+
+def commands(scene: Scene) -> list[Command]:
+    """The commands of a scene's surfaces: one, or two where they move by themselves."""
+    first = command(scene)
+    if scene.drive.phase_deg is None:
+        return [first]
+    period = getattr(first, "period", 1.0 / scene.drive.frequency)
+    return [first, Lagging(first, scene.drive.phase_deg / 360.0 * period)]
 
 
 def command(scene: Scene) -> Command:

@@ -3,7 +3,7 @@
 Energies are those of all ``coil.count`` coils, J; currents and voltages those of one coil.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -169,6 +169,16 @@ def from_command(
         current_max=float(after.max()),
         current_min=float(after.min()),
         limited={"output": 0.0},
+    )
+
+
+def both(first: Electrics, second: Electrics) -> Electrics:
+    """The first coil's electrics with the energies of two coils that have a source each."""
+    return replace(
+        first,
+        energy_in=first.energy_in + second.energy_in,
+        energy_copper=first.energy_copper + second.energy_copper,
+        energy_magnetic=first.energy_magnetic + second.energy_magnetic,
     )
 
 

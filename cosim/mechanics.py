@@ -11,6 +11,7 @@ from typing import Any
 
 from cosim.errors import SimulationFailed
 from cosim.fmi import borrow, give_back, places
+from cosim.grip import normal_force
 from cosim.scene import Scene
 
 STEP_OUTPUTS = (
@@ -38,6 +39,17 @@ SAMPLE_OUTPUTS = (
 )
 """What a row of the waveforms takes, SI; ``sticking`` follows them."""
 
+SECOND_SAMPLE_OUTPUTS = (
+    "back_emf_2",
+    "z_surface_2",
+    "v_surface_2",
+    "a_surface_2",
+    "z_ram_2",
+    "v_ram_2",
+    "friction_force_2",
+)
+"""What a row takes besides where a second surface moves by itself; ``sticking_2`` ends the row."""
+
 TOTALS = (
     "z_part",
     "stick_time",
@@ -51,7 +63,9 @@ SOURCE_STEP_OUTPUTS = ("coil_current_max", "coil_current_min")
 """What is read besides after every step where the source is in the FMU: one coil's, A."""
 
 SOURCE_SAMPLE_OUTPUTS = ("coil_current", "coil_voltage")
-"""What a row takes besides: current of one coil (A) and voltage across the coils (V)."""
+"""What a row takes besides then: current of one coil (A) and voltage across the coils (V)."""
+
+SECOND_SOURCE_SAMPLE_OUTPUTS = ("coil_current_2", "coil_voltage_2")
 
 SOURCE_TOTALS = (
     "output_high_time",
@@ -84,21 +98,36 @@ class Mechanics:
             step_outputs += SOURCE_STEP_OUTPUTS
             sampled += SOURCE_SAMPLE_OUTPUTS
             self.total_names += SOURCE_TOTALS
+        self.has_second = scene.drive.phase_deg is not None
+        """Whether a second surface moves by itself."""
+        integers_sampled = ("sticking",)
+        if self.has_second:
+            sampled += SECOND_SAMPLE_OUTPUTS
+            sampled += SECOND_SOURCE_SAMPLE_OUTPUTS if self.has_source else ()
+            integers_sampled += ("sticking_2",)
+            self.total_names += ("stick_time_2",)
         given = "command" if self.has_source else "current"
         self._input_places = places(fmi_version, (given, f"{given}_slope"))
         self._input = (c_double * 2)()
+        self._second_places = places(fmi_version, (f"{given}_2", f"{given}_2_slope"))
         self._step_places = places(fmi_version, step_outputs)
         self.step_outputs = (c_double * len(step_outputs))()
         """Values of STEP_OUTPUTS, and SOURCE_STEP_OUTPUTS, after the last step."""
-        self.columns = (*sampled, "sticking")
+        self.columns = (*sampled, *integers_sampled)
         """Names of what ``sample`` gives."""
         self._sample_places = places(fmi_version, sampled)
         self._sample = (c_double * len(sampled))()
-        self._sticking_place = places(fmi_version, ("sticking",))
-        self._sticking = (c_int * 1)()
+        self._sticking_places = places(fmi_version, integers_sampled)
+        self._sticking = (c_int * len(integers_sampled))()
         self._totals_places = places(fmi_version, self.total_names)
         self._counters_places = places(fmi_version, COUNTERS)
+        self.normal_force = normal_force(scene)
+        """The normal force where it changes in time."""
+        self._force_places = places(fmi_version, ("normal_force", "normal_force_slope"))
+        self._force = (c_double * 2)()
         reals, integers = parameters(scene)
+        if self.normal_force is not None:
+            reals["normal_force"] = self.normal_force.value(0.0)
         try:
             self._fmi.set_reals(
                 places(fmi_version, tuple(reals)), (c_double * len(reals))(*reals.values())
@@ -115,12 +144,20 @@ class Mechanics:
     def step_to(self, time: float, value: float = 0.0, slope: float = 0.0) -> None:
         """Advance to ``time`` (s) with the input (A or V) at the start and its slope (per s).
 
+        The normal force must have no corner within the step.
         Raises SimulationFailed with the FMU's sentence.
         """
         self._input[0] = value
         self._input[1] = slope
         try:
             self._fmi.set_reals(self._input_places, self._input)
+            if self.normal_force is not None:
+                force, end = (
+                    self.normal_force.value(self.time),
+                    self.normal_force.value_before(time),
+                )
+                self._force[0], self._force[1] = force, (end - force) / (time - self.time)
+                self._fmi.set_reals(self._force_places, self._force)
             self._fmi.do_step(self.time, time - self.time)
             self._fmi.get_reals(self._step_places, self.step_outputs)
         except Exception as error:
@@ -128,10 +165,17 @@ class Mechanics:
         self.time = time
         self.steps += 1
 
+    def give_second(self, value: float, slope: float) -> None:
+        """The second surface's input (A or V) now, and its slope (per s) until given again."""
+        try:
+            self._fmi.set_reals(self._second_places, (c_double * 2)(value, slope))
+        except Exception as error:
+            raise self.failed(error) from error
+
     def sample(self) -> Sequence[float]:
         """Values of ``columns`` now; sticking is 1, slipping 0."""
         self._fmi.get_reals(self._sample_places, self._sample)
-        self._fmi.get_integers(self._sticking_place, self._sticking)
+        self._fmi.get_integers(self._sticking_places, self._sticking)
         return [*self._sample, *self._sticking]
 
     def totals(self) -> dict[str, float]:
@@ -152,7 +196,7 @@ class Mechanics:
             "input_places": self._input_places,
             "step_places": self._step_places,
             "sample_places": self._sample_places,
-            "sticking_place": self._sticking_place,
+            "sticking_place": self._sticking_places,
             "total_places": self._totals_places,
             "counter_places": self._counters_places,
             "inputs": len(self._input_places),
@@ -181,8 +225,10 @@ def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
     integers = {
         "contact": CONTACT_LAWS[table.pop("contact")],
         "n_surfaces": table.pop("n_surfaces"),
+        "ram_fixed": int(table.pop("actuator") == "direct"),
+        "independent": int(scene.drive.phase_deg is not None),
     }
-    friction = scene.friction.model_dump(exclude={"law"})
+    friction = scene.friction.model_dump(exclude={"law", "normal_force_file"})
     coil = scene.coil.model_dump(include={"force_factor", "b1", "b2"})
     if scene.circuit.model == "limited":
         coil |= _source_parameters(scene)

@@ -42,7 +42,9 @@ class Recorder:
         self.frames = np.empty(len(frame_times))
         self.n_rows = 0
         self._n_frames = 0
-        self.agenda = _agenda(self.time, frame_times, run.settle, run.duration)
+        grip = mechanics.normal_force
+        corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
+        self.agenda = _agenda(self.time, frame_times, run.settle, [*corners, run.duration])
         """Times (s) at which something is to be written down, and what; an endless one last."""
         self.extremes = [-np.inf, np.inf] * (4 if mechanics.has_source else 3)
         self.at_settle: dict[str, float] = {}
@@ -54,6 +56,10 @@ class Recorder:
         times, what = self.agenda
         self._times, self._what, self._next = times.tolist(), what.tolist(), 0
         self._visit()
+
+    def column(self, name: str) -> Array:
+        """The values of one of the mechanics' ``columns`` in the rows."""
+        return self.rows[:, self.mechanics.columns.index(name)]
 
     def follow(self, edges: Array, start: Array, end: Array) -> None:
         """Advance through intervals that end at ``edges`` (s); in each the mechanics' input goes
@@ -128,9 +134,9 @@ def grid(step: float, end: float) -> Array:
 
 
 def _agenda(
-    rows: Array, frames: Array, settle: float, duration: float
+    rows: Array, frames: Array, settle: float, stops: list[float]
 ) -> tuple[Array, npt.NDArray[np.int32]]:
-    groups = ((rows, _ROW), (frames, _FRAME), ([settle], _SETTLED), ([duration], 0))
+    groups = ((rows, _ROW), (frames, _FRAME), ([settle], _SETTLED), (stops, 0))
     times = np.concatenate([group for group, _ in groups])
     what = np.repeat([kind for _, kind in groups], [len(group) for group, _ in groups])
     # Of times that are one the first is taken.

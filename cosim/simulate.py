@@ -14,7 +14,7 @@ import numpy.typing as npt
 from cosim import electrics
 from cosim.compiled import CompiledRecorder, library
 from cosim.coupling.step_locked import StepLocked
-from cosim.drive import Command, command
+from cosim.drive import Command, command, commands
 from cosim.isolation import isolated
 from cosim.mechanics import Mechanics
 from cosim.recorder import Recorder
@@ -41,6 +41,18 @@ UNITS = {
     "v_part": "m/s",
     "friction_force": "N",
     "sticking": "1",
+    "normal_force": "N",
+    "command_2": "V",
+    "current_2": "A",
+    "coil_voltage_2": "V",
+    "back_emf_2": "V",
+    "z_surface_2": "m",
+    "v_surface_2": "m/s",
+    "a_surface_2": "m/s2",
+    "z_ram_2": "m",
+    "v_ram_2": "m/s",
+    "friction_force_2": "N",
+    "sticking_2": "1",
 }
 """The columns of the waveforms, in order, and their units. Absent participants have none."""
 
@@ -93,22 +105,35 @@ def _simulate(
     scene: Scene, progress: Callable[[float], None], fmi_version: int, compiled: bool
 ) -> Result:
     began = time.perf_counter()
-    drive = command(scene)
+    drive, *second_drive = commands(scene)
     mechanics = Mechanics(scene, fmi_version)
     try:
         recorder = _recorder(scene, mechanics, progress, compiled)
         electric, circuit = None, None
+        second: dict[str, Array] = {}
         if scene.circuit.model == "none":
             recorder.advance(scene.run.duration, 0.0, 0.0)
         elif scene.circuit.model == "ideal":
             share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
-            log = _prescribe(scene, drive, recorder, share)
-            emf = recorder.rows[:, mechanics.columns.index("back_emf")]
+            logs = _prescribe(scene, [drive, *second_drive], recorder, share)
             motion = mechanics.totals()["energy_in"]
-            electric = electrics.from_command(scene, drive, log, recorder.time, emf, motion)
+            electric = electrics.from_command(
+                scene, drive, logs[0], recorder.time, recorder.column("back_emf"), motion
+            )
+            for command_2 in second_drive:
+                other = electrics.from_command(
+                    scene, command_2, logs[1], recorder.time, recorder.column("back_emf_2"), 0.0
+                )
+                electric = electrics.both(electric, other)
+                second = {"current_2": other.current, "coil_voltage_2": other.coil_voltage}
         elif scene.circuit.model == "limited":
-            _prescribe(scene, drive, recorder, 1.0)
+            _prescribe(scene, [drive, *second_drive], recorder, 1.0)
             electric = electrics.from_source(scene, drive, recorder)
+            if second_drive:
+                second = {
+                    "current_2": recorder.column("coil_current_2"),
+                    "coil_voltage_2": recorder.column("coil_voltage_2"),
+                }
         else:
             from cosim.circuit.limit_cycle import refuse_false
             from cosim.circuit.netlist import limits_at_work
@@ -121,6 +146,8 @@ def _simulate(
                 electrics.refuse_foreign_coil(scene, log)
             limits = limits_at_work(log)
             electric = electrics.from_circuit(scene, drive, log, recorder.time, limits)
+        for command_2 in second_drive:
+            second["command_2"] = command_2.values(recorder.time)
         totals = mechanics.totals()
         steps = mechanics.steps
     finally:
@@ -134,7 +161,7 @@ def _simulate(
         "method": _method(scene),
         "versions": versions() | ({"ngspice": circuit.ngspice} if circuit else {}),
     }
-    return Result(scene, _waveforms(recorder, electric), summary)
+    return Result(scene, _waveforms(scene, recorder, electric, second), summary)
 
 
 def _method(scene: Scene) -> str:
@@ -147,6 +174,9 @@ def _method(scene: Scene) -> str:
 def _recorder(
     scene: Scene, mechanics: Mechanics, progress: Callable[[float], None], compiled: bool
 ) -> Recorder:
+    # The compiled steps have one input.
+    if mechanics.has_second or mechanics.normal_force is not None:
+        compiled = False
     made = CompiledRecorder if compiled and library() is not None else Recorder
     return made(scene, mechanics, progress)
 
@@ -173,28 +203,47 @@ def _circuit_log(scene: Scene, fmi_version: int, compiled: bool) -> dict[str, Ar
         mechanics.close()
 
 
-def _prescribe(scene: Scene, drive: Command, recorder: Recorder, share: float) -> dict[str, Array]:
-    """Give the mechanics ``share`` times the command, from corner to corner.
+def _prescribe(
+    scene: Scene, drives: list[Command], recorder: Recorder, share: float
+) -> list[dict[str, Array]]:
+    """Give the mechanics ``share`` times each surface's command, from corner to corner.
 
     With the rung ``ideal`` that is the coil's current, whatever voltage it takes (A/V); with
     ``limited`` the command itself.
     """
     duration = scene.run.duration
-    edges, start, end = [0.0], [], []
+    edges = [0.0]
+    ends: list[list[tuple[float, float]]] = [[] for _ in drives]
     while edges[-1] < duration:
         begin = edges[-1]
-        stop = min(drive.next_corner(begin), begin + drive.longest_straight, duration)
+        stop = min(
+            duration,
+            *(drive.next_corner(begin) for drive in drives),
+            *(begin + drive.longest_straight for drive in drives),
+        )
         edges.append(stop)
-        start.append(share * drive.value(begin))
-        end.append(share * drive.value_before(stop))
-    log = {"time": np.array(edges), "start": np.array(start), "end": np.array(end)}
-    recorder.follow(log["time"][1:], log["start"], log["end"])
-    return log
+        for drive, log in zip(drives, ends, strict=True):
+            log.append((share * drive.value(begin), share * drive.value_before(stop)))
+    times = np.array(edges)
+    logs = [np.array(log).T for log in ends]
+    if len(logs) == 1:
+        recorder.follow(times[1:], *logs[0])
+    else:
+        for k, stop in enumerate(edges[1:]):
+            value, value_end = ends[1][k]
+            recorder.mechanics.give_second(value, (value_end - value) / (stop - edges[k]))
+            recorder.advance(stop, *ends[0][k])
+    return [dict(zip(("time", "start", "end"), (times, *log), strict=True)) for log in logs]
 
 
-def _waveforms(recorder: Recorder, electric: electrics.Electrics | None) -> dict[str, Array]:
+def _waveforms(
+    scene: Scene,
+    recorder: Recorder,
+    electric: electrics.Electrics | None,
+    second: dict[str, Array],
+) -> dict[str, Array]:
     n = recorder.n_rows
-    known = {"time": recorder.time[:n]}
+    known = {"time": recorder.time[:n]} | second
     if electric is not None:
         known["command"] = electric.command
         known["current"] = electric.current
@@ -203,6 +252,10 @@ def _waveforms(recorder: Recorder, electric: electrics.Electrics | None) -> dict
     known |= {name: recorder.rows[:n, k] for k, name in enumerate(columns) if name in UNITS}
     if electric is None:
         del known["back_emf"]
+    if scene.mechanics.actuator == "direct":
+        del known["z_ram"], known["v_ram"]
+    if (force := recorder.mechanics.normal_force) is not None:
+        known["normal_force"] = np.array([force.value(t) for t in known["time"].tolist()])
     return {name: known[name] for name in UNITS if name in known}
 
 

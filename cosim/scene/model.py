@@ -92,6 +92,31 @@ class Scene(BaseModel):
         return self
 
     @model_validator(mode="after")
+    def _check_phase(self) -> "Scene":
+        """Two surfaces that move by themselves are solved in the FMU only, without a plate."""
+        if self.drive.phase_deg is None:
+            return self
+        needed: list[tuple[str, tuple[object, ...], str]] = [
+            ("circuit.model", ("ideal", "limited"), '"ideal" or "limited"'),
+            ("coil.count", (1,), "1: each surface has a source of its own"),
+            ("mechanics.n_surfaces", (2,), "2"),
+            ("mechanics.actuator", ("ram",), '"ram"'),
+            ("friction.mu_plate", (0.0,), "0"),
+        ]
+        for full, allowed, words in needed:
+            table, _, key = full.partition(".")
+            value = getattr(getattr(self, table), key)
+            if value not in allowed:
+                shown = f'"{value}"' if isinstance(value, str) else f"{value:g}"
+                raise fault(
+                    f"drive.phase_deg lets two surfaces move by themselves; with it {full} = "
+                    f"{shown} must be {words}",
+                    full,
+                    "drive.phase_deg",
+                )
+        return self
+
+    @model_validator(mode="after")
     def _check_reach(self) -> "Scene":
         drive = self.drive
         if drive.pwm_ripple and self.circuit.model != "full":
@@ -105,6 +130,14 @@ class Scene(BaseModel):
             raise fault(
                 f'drive.waveform = "{drive.waveform}" gives the surface its velocity, which needs '
                 'circuit.model = "none"',
+                "drive.waveform",
+                "circuit.model",
+            )
+        if self.friction.normal_force_file and self.surface_is_given:
+            raise fault(
+                f'drive.waveform = "{drive.waveform}" with circuit.model = "none" moves the part '
+                "at a constant friction.normal_force, not at that of friction.normal_force_file",
+                "friction.normal_force_file",
                 "drive.waveform",
                 "circuit.model",
             )
@@ -155,6 +188,8 @@ class Scene(BaseModel):
             for knob, key in KNOBS.items():
                 if table == "drive" and knob in values:
                     del values[key]
+            if values.get("normal_force_file"):
+                del values["normal_force"]
             data[table] = values
         return data
 

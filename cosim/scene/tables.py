@@ -46,6 +46,9 @@ class Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
+NORMAL_FORCES = ("normal_force", "normal_force_file")
+"""The keys of ``[friction]`` of which each replaces the other."""
+
 KNOBS = {"pot_max": "amplitude", "pot_frequency": "frequency", "pot_offset": "offset"}
 """The knobs of the device and the keys of ``[drive]`` that each replaces."""
 
@@ -68,6 +71,14 @@ class Drive(Table):
     offset: float = _number(-1.2, "V", -100.0, 100.0, "Mean voltage at V1")
     reset_time: float = _number(
         0.0, "s", 0.0, 100.0, "Length of the sawtooth's linear fall, at the end of the period"
+    )
+    phase_deg: float | None = _number(
+        None,
+        "deg",
+        0.0,
+        360.0,
+        "Lag of the second surface's command; where given, two surfaces move by themselves, each "
+        "with a source and coil of its own",
     )
     acceleration_max: float = _number(
         98.1, "m/s2", 1e-3, 1e6, "Greatest acceleration of a given surface, optimal and quaid"
@@ -291,6 +302,11 @@ class Coil(Table):
 class Mechanics(Table):
     """Surface, ram and part."""
 
+    actuator: Literal["ram", "direct"] = _choice(
+        "ram",
+        "What the coil pushes off from: a free ram, or a magnet that stands on the ground; there "
+        "suspension and walls hold the surface itself",
+    )
     ram_mass: float = _number(0.004, "kg", 1e-9, 1e3, "Mass of the ram in the actuator")
     surface_mass: float = _number(
         0.0145, "kg", 1e-9, 1e3, "Mass of the surface: actuator body and platform"
@@ -324,7 +340,20 @@ class Friction(Table):
     mu_s: float = _number(0.72, "1", 0.0, 1e3, "Static coefficient, surface on part")
     mu_k: float = _number(0.59, "1", 0.0, 1e3, "Kinetic coefficient, at most mu_s")
     normal_force: float = _number(0.5, "N", 0.0, 1e9, "Normal force of one surface on the part")
+    normal_force_file: str | None = _choice(
+        None,
+        "CSV with time [s] and normal_force [N], linear in between, its last value kept; instead "
+        "of normal_force",
+    )
     mu_plate: float = _number(0.0, "1", 0.0, 1e3, "Coefficient of the springed plate on the part")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_force(cls, data: Any) -> Any:
+        if isinstance(data, dict) and None not in map(data.get, NORMAL_FORCES):
+            one, other = (f"friction.{key}" for key in NORMAL_FORCES)
+            raise fault(f"{one} and {other} say the same thing twice; give one of them", one, other)
+        return data
 
     @model_validator(mode="after")
     def _check(self) -> "Friction":

@@ -11,14 +11,14 @@ static const int MAX_EVENTS_PER_STEP = 1000000; /* Zeno sequences end by themsel
 static const int MAX_TRIALS_PER_STEP = 2000000;
 
 typedef struct {
-    double tau, y[N_STATES], dy[N_STATES];
+    double tau, y[N_ALL], dy[N_ALL];
     EventFunction functions[MAX_EVENT_FUNCTIONS];
     int n;
 } Point;
 
 static void evaluate(const Model *m, Point *point)
 {
-    state_rates(m, &m->mode, point->y, point->tau, point->dy);
+    state_rates(m, m->mode, point->y, point->tau, point->dy);
     point->n = event_functions(m, point->y, point->tau, point->functions);
 }
 
@@ -116,6 +116,7 @@ static double first_event(const Model *m, const Point *start, const Point *end, 
     return found;
 }
 
+/* Of the first surface. */
 static void note_extremes(Model *m, const Point *point)
 {
     Reals *r = &m->r;
@@ -138,12 +139,14 @@ static void note_extremes(Model *m, const Point *point)
         r->coil_current_min = point->y[I_COIL];
 }
 
-/* Times that are counted mode by mode. */
+/* Times that are counted mode by mode; those of the source are the first one's. */
 static void note_time(Model *m, double taken)
 {
-    const Mode *mode = &m->mode;
+    const Mode *mode = &m->mode[0];
     if (mode->slip == 0)
         m->r.stick_time += taken;
+    if (m->n.independent && m->mode[1].slip == 0)
+        m->r.stick_time_2 += taken;
     if (mode->output > 0)
         m->r.output_high_time += taken;
     else if (mode->output < 0)
@@ -154,13 +157,13 @@ static void note_time(Model *m, double taken)
 
 static void take_up(Model *m, const Point *point)
 {
-    for (int j = 0; j < N_STATES; j++)
+    for (int j = 0; j < moving(m) * N_STATES; j++)
         m->y[j] = point->y[j];
 }
 
 static void start_from(const Model *m, double tau, Point *point)
 {
-    for (int j = 0; j < N_STATES; j++)
+    for (int j = 0; j < moving(m) * N_STATES; j++)
         point->y[j] = m->y[j];
     point->tau = tau;
     evaluate(m, point);
@@ -242,7 +245,7 @@ int advance(Model *m, double h, char *message)
         take_up(m, &end);
         if (found >= 0.0) {
             events++;
-            apply_event(m, end.tau, now.functions[which].kind);
+            apply_event(m, now.functions[which].surface, end.tau, now.functions[which].kind);
             start_from(m, end.tau, &now);
             note_extremes(m, &now);
         } else {

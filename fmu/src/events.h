@@ -27,19 +27,20 @@ typedef enum {
 /* An event happens where its value falls through zero. */
 typedef struct {
     EventKind kind;
+    int surface; /* whose event it is */
     double value, rate; /* rate: d(value)/dt */
     double noise;       /* values above -noise are rounding, not an event */
 } EventFunction;
 
-enum { MAX_EVENT_FUNCTIONS = 10 };
+enum { MAX_EVENT_FUNCTIONS = N_MOVING * 10 };
 
 /* The event functions of the present mode at state y. Returns their number; the order is the same
  * for the same mode. */
-int event_functions(const Model *m, const double y[N_STATES], double tau,
+int event_functions(const Model *m, const double y[N_ALL], double tau,
                     EventFunction functions[MAX_EVENT_FUNCTIONS]);
 
-/* Apply one event to state and mode, then settle. */
-void apply_event(Model *m, double tau, EventKind kind);
+/* Apply one event of surface s to state and mode, then settle. */
+void apply_event(Model *m, int s, double tau, EventKind kind);
 
 /* Make the mode agree with state and inputs: after a jump of either, several conditions can be
  * violated at once (impact and slip, release and stick, ...). */

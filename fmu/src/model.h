@@ -62,6 +62,9 @@ enum {
     N_STATES
 };
 
+/* Surfaces that can move by themselves. Their states lie one after the other, N_STATES each. */
+enum { N_MOVING = 2, N_ALL = N_MOVING * N_STATES };
+
 typedef enum {
     WALL_FREE,
     WALL_TOUCH,   /* compliant contact, the force acts */
@@ -82,12 +85,18 @@ typedef struct {
 typedef struct {
     Reals r;
     Integers n;
-    Mode mode;
-    double y[N_STATES];
+    Mode mode[N_MOVING];
+    double y[N_ALL];
     double step;           /* the next internal step that the error control would take, s */
     double energy_at_start;
     int initialised;
 } Model;
+
+/* How many surfaces are solved for: 1, which stands for all that move alike, or 2. */
+static inline int moving(const Model *m)
+{
+    return m->n.independent ? 2 : 1;
+}
 
 void model_defaults(Model *m);
 
@@ -97,7 +106,7 @@ int model_set_real(Model *m, size_t place, double value, char *message);
 int model_set_integer(Model *m, size_t place, int value, char *message);
 
 /* Static equilibrium without current: the ram on its suspension, the surface on its flexures
- * carrying all three bodies, the part sticking. 0, or -1 with a sentence in message. */
+ * carrying all three bodies (a fixed ram apart), the part sticking. 0, or -1 with a sentence in message. */
 int model_initialise(Model *m, char *message);
 
 /* Advance by h > 0 seconds. The inputs run on with their slopes. 0, or -1 with a sentence in
@@ -107,8 +116,8 @@ int model_step(Model *m, double h, char *message);
 /* Refresh the outputs from state and inputs, after a step or a change of an input. */
 void model_outputs(Model *m);
 
-/* d(output)/d(current, normal_force or surface_acceleration) in the present mode, analytically exact:
- * forces are affine in all three; and d(coil_voltage)/d(command_slope). 0 for every other pair. */
+/* d(output)/d(current, current_2, normal_force or surface_acceleration) in the present mode,
+ * analytically exact: forces are affine in all four; and d(coil_voltage)/d(command_slope), of either source. 0 for every other pair. */
 double model_derivative(const Model *m, size_t output, size_t input);
 
 #endif

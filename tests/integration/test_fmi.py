@@ -322,9 +322,11 @@ FOLLOWING = [
     "plate_force",
     "wall_force",
 ]
+OF_SECOND = ["a_surface_2", "friction_force_2"]
+TWO = {"independent": 1, "n_surfaces": 2}
 
 
-@pytest.mark.parametrize("parameters", [{}, {"mu_plate": 0.1, "b1": 40.0}, {"contact": 2}])
+@pytest.mark.parametrize("parameters", [{}, {"mu_plate": 0.1, "b1": 40.0}, {"contact": 2}, TWO])
 def test_directional_derivatives_are_the_differences(
     version: int, parameters: dict[str, float]
 ) -> None:
@@ -337,15 +339,20 @@ def test_directional_derivatives_are_the_differences(
             if mode in modes:
                 continue
             modes.add(mode)
-            for known, distance in (("current", 0.25), ("normal_force", 0.125)):
+            following = FOLLOWING + OF_SECOND
+            for known, distance in (
+                ("current", 0.25),
+                ("current_2", 0.25),
+                ("normal_force", 0.125),
+            ):
                 here = it.get(known)
                 sides = []
                 for value in (here + distance, here - distance):
                     it.set(**{known: value})
-                    sides.append(np.array(it.get(*FOLLOWING)))
+                    sides.append(np.array(it.get(*following)))
                 it.set(**{known: here})
                 differences = (sides[0] - sides[1]) / (2.0 * distance)
-                found = it.derivative(FOLLOWING, [known], [1.0])
+                found = it.derivative(following, [known], [1.0])
                 scale = np.abs(sides).max(axis=0) + 1.0
                 assert found == pytest.approx(differences, rel=1e-9, abs=1e-11 * scale.max())
     assert {sticking for sticking, _ in modes} == {0, 1}
@@ -355,7 +362,8 @@ def test_directional_derivatives_are_the_differences(
 def test_only_the_declared_outputs_follow_inputs_at_once(version: int) -> None:
     description = fmpy.read_model_description(str(fmu.unpacked(version)))
     declared = {u.variable.name for u in description.outputs if u.variable and u.dependencies}
-    assert declared == {*FOLLOWING, "coil_voltage"}
+    of_second = {*OF_SECOND, "coil_voltage_2"}
+    assert declared == {*FOLLOWING, "coil_voltage", *of_second}
     with rig(version) as it:
         it.begin({"mu_plate": 0.1})
         followed = set()
@@ -368,7 +376,7 @@ def test_only_the_declared_outputs_follow_inputs_at_once(version: int) -> None:
             it.set(current=current, normal_force=force)
     assert followed <= declared
     # These follow in a rigid contact at rest, and with a source.
-    assert followed >= declared - {"wall_force", "coil_voltage"}
+    assert followed >= declared - {"wall_force", "coil_voltage", *of_second}
 
 
 def test_with_a_source_only_the_voltage_follows_the_command_at_once(version: int) -> None:

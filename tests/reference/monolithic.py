@@ -82,7 +82,8 @@ class Params:
     gravity: float = 9.81  # m/s^2
     mu_s: float = 0.72
     mu_k: float = 0.59
-    normal_force: float = 0.5  # N
+    normal_force: float = 0.5  # N, at the start
+    normal_force_slope: float = 0.0  # N/s
     mu_plate: float = 0.0
 
 
@@ -150,6 +151,7 @@ class _Model:
         self.friction, self.plate = STICK, STICK
         self.amp, self.amp_sign = LINEAR, 0
         self.impact_loss = 0.0  # J, in rigid impacts
+        self.normal = p.normal_force  # N, at the time of the last call of `forces`
         self.y = self._equilibrium() + [0.0] * (len(ENERGIES) if energies else 0)
         self.choose_amp(jumped=True)
         self.choose_contacts()
@@ -185,6 +187,7 @@ class _Model:
         """Force on the ram but for gravity and rigid walls; load and mass of what moves as the
         surface [N, N, kg], friction excluded: with the ram resting on it, both bodies."""
         p = self.p
+        self.normal = p.normal_force + p.normal_force_slope * t
         i, q, dq, zs, vs = self.current(t, y[0]), y[2], y[3], y[4], y[5]
         ram = self.bl(q) * i - p.suspension_damping * dq
         ram -= q * (p.suspension_k1 + q * (p.suspension_k2 + q * p.suspension_k3))
@@ -203,11 +206,11 @@ class _Model:
         the part [N], if these modes hold."""
         p, m = self.p, self.part_mass
         weight = m * p.gravity
-        slip_force = friction * p.mu_k * p.normal_force
+        slip_force = friction * p.mu_k * self.normal
         if p.mu_plate > 0.0 and plate == STICK:
             f = load if friction == STICK else slip_force
             return (load - f) / mass, 0.0, f, weight - f
-        f_plate = -plate * p.mu_plate * p.normal_force
+        f_plate = -plate * p.mu_plate * self.normal
         if friction == STICK:
             a = (load + f_plate - weight) / (mass + m)
             return a, a, m * a + weight - f_plate, f_plate
@@ -268,9 +271,9 @@ class _Model:
         else:
             out[R_UPPER] = -self.side * (p.ram_mass * (a_s + p.gravity) - ram)
         sticks, rests = self.friction == STICK, self.plate == STICK
-        out[R_STICK] = p.mu_s * p.normal_force - abs(f) if sticks else self.friction * u
+        out[R_STICK] = p.mu_s * self.normal - abs(f) if sticks else self.friction * u
         if p.mu_plate > 0.0:
-            hold = p.mu_plate * p.normal_force
+            hold = p.mu_plate * self.normal
             out[R_PLATE] = hold - abs(f_plate) if rests else self.plate * (vs - u)
         if self.limited:
             if self.amp == CLAMP:
@@ -322,8 +325,8 @@ class _Model:
         p, u = self.p, self.y[7]
         v_part = self.y[5] - u
         _, load, mass = self.forces(t, self.y)
-        hold_s = p.mu_s * p.normal_force * (1.0 - 1e-9 * broken[0])
-        hold_p = p.mu_plate * p.normal_force * (1.0 - 1e-9 * broken[1])
+        hold_s = p.mu_s * self.normal * (1.0 - 1e-9 * broken[0])
+        hold_p = p.mu_plate * self.normal * (1.0 - 1e-9 * broken[1])
         plates = (_sign(v_part),) if v_part else (STICK, 1, -1)
         for friction in (_sign(u),) if u else (STICK, 1, -1):
             for plate in plates if p.mu_plate > 0.0 else (STICK,):

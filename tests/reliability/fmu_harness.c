@@ -181,10 +181,13 @@ static void choose_parameters(fmi2Component c3, fmi2Component c2)
         CHECK(fmi3SetFloat64(c3, &vr, 1, &value, 1) == fmi3OK);
     }
     const fmi2ValueReference choices[] = {INT_PLACE(contact), INT_PLACE(source),
-                                          INT_PLACE(coil_count)};
-    const int chosen[] = {1 + (int)(draw() % 2), (int)(draw() % 2), 1 + (int)(draw() % 3)};
-    CHECK(fmi2SetInteger(c2, choices, 3, chosen) == fmi2OK);
-    CHECK(fmi3SetInt32(c3, choices, 3, chosen, 3) == fmi3OK);
+                                          INT_PLACE(coil_count), INT_PLACE(independent),
+                                          INT_PLACE(n_surfaces)};
+    const int two = (int)(draw() % 2);
+    const int chosen[] = {1 + (int)(draw() % 2), (int)(draw() % 2), 1 + (int)(draw() % 3), two,
+                          1 + two};
+    CHECK(fmi2SetInteger(c2, choices, 5, chosen) == fmi2OK);
+    CHECK(fmi3SetInt32(c3, choices, 5, chosen, 5) == fmi3OK);
 }
 
 static void compare(fmi2Component c2, fmi3Instance c3)
@@ -214,12 +217,16 @@ static void simulate(int steps)
 
     const fmi2ValueReference inputs[] = {PLACE(current), PLACE(current_slope),
                                          PLACE(normal_force), PLACE(normal_force_slope),
-                                         PLACE(command), PLACE(command_slope)};
+                                         PLACE(command), PLACE(command_slope),
+                                         PLACE(current_2), PLACE(current_2_slope),
+                                         PLACE(command_2), PLACE(command_2_slope)};
     double time = 0.0;
     for (int i = 0; i < steps; i++) {
         const double h = pow(10.0, uniform(-6.0, -3.0));
         double values[] = {uniform(-1.5, 1.5), uniform(-1.0, 1.0) / h, uniform(0.1, 1.0),
-                           uniform(-0.1, 0.1) / h, uniform(-15.0, 15.0), uniform(-9.0, 9.0) / h};
+                           uniform(-0.1, 0.1) / h, uniform(-15.0, 15.0), uniform(-9.0, 9.0) / h,
+                           uniform(-1.5, 1.5), uniform(-1.0, 1.0) / h, uniform(-15.0, 15.0),
+                           uniform(-9.0, 9.0) / h};
         double last;
         fmi3Boolean event, terminate, early;
         fmi2FMUstate before = NULL;
@@ -227,8 +234,8 @@ static void simulate(int steps)
         abuse(c2, 2);
         CHECK(fmi2SetFMUstate(c2, before) == fmi2OK);
         CHECK(fmi2FreeFMUstate(c2, &before) == fmi2OK);
-        CHECK(fmi2SetReal(c2, inputs, 6, values) == fmi2OK);
-        CHECK(fmi3SetFloat64(c3, inputs, 6, values, 6) == fmi3OK);
+        CHECK(fmi2SetReal(c2, inputs, 10, values) == fmi2OK);
+        CHECK(fmi3SetFloat64(c3, inputs, 10, values, 10) == fmi3OK);
         CHECK(fmi2DoStep(c2, time, h, 1) == fmi2OK);
         CHECK(fmi3DoStep(c3, time, h, 1, &event, &terminate, &early, &last) == fmi3OK);
         CHECK(!event && !terminate && !early && last == time + h);

@@ -21,6 +21,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "amplitude": 8.0,
         "offset": -1.2,
         "reset_time": 0,
+        "phase_deg": None,
         "acceleration_max": 98.1,
         "optimum": "up",
         "velocity_amplitude": 0.1,
@@ -60,6 +61,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "count": 1,
     },
     "mechanics": {
+        "actuator": "ram",
         "ram_mass": 0.004,
         "surface_mass": 0.0145,
         "part_mass": 0.009,
@@ -77,7 +79,14 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "n_surfaces": 1,
         "gravity": 9.81,
     },
-    "friction": {"law": "coulomb", "mu_s": 0.72, "mu_k": 0.59, "normal_force": 0.5, "mu_plate": 0},
+    "friction": {
+        "law": "coulomb",
+        "mu_s": 0.72,
+        "mu_k": 0.59,
+        "normal_force": 0.5,
+        "normal_force_file": None,
+        "mu_plate": 0,
+    },
     "coupling": {"method": "step-locked"},
     "run": {"duration": 2.0, "settle": 1.0, "output_step": 5e-5},
 }
@@ -96,6 +105,9 @@ def test_paper_is_the_defaults() -> None:
     assert scene == Scene.model_validate(bare)
 
 
+FILES = ("circuit.netlist", "drive.file", "friction.normal_force_file")
+
+
 def test_every_key_is_described() -> None:
     assert {(key.table, key.name) for key in keys()} == {
         (table, name) for table, names in DEFAULTS.items() for name in names
@@ -109,7 +121,7 @@ def test_every_key_is_described() -> None:
             assert key.low is not None and key.high is not None and key.low < key.high
             assert key.default is None or key.low <= float(key.default) <= key.high
         else:
-            free = key.kind is bool or key.full in ("circuit.netlist", "drive.file")
+            free = key.kind is bool or key.full in FILES
             assert free or (key.choices and key.default in key.choices)
 
 
@@ -119,6 +131,9 @@ def test_built_in_scenes() -> None:
     assert set(scenes) == {
         "paper", "paper-full", "paper-limited", "gripper", "ideal-current", "held",
         "optimal", "quaid", "trial", "umbanhowar",
+        "direct-drive", "direct-drive-stops", "gripper-17g", "gripper-169g", "square",
+        "down-grip", "down-waveform", "closed-loop-grasp", "two-surfaces",
+        *(f"regime-{n:02}" for n in range(1, 11)),
     }  # fmt: skip
     for name, description in scenes.items():
         scene = load(name)
