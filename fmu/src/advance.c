@@ -74,9 +74,10 @@ static double locate(const Model *m, const Point *start, int index, int use_rate
 static double first_event(const Model *m, const Point *start, const Point *end, int *which)
 {
     double h = end->tau - start->tau, found = -1.0;
-    Point stop = *end;
+    const Point *stop = end;
+    Point nearer;
     for (int i = 0; i < start->n; i++) {
-        const EventFunction *a = &start->functions[i], *b = &stop.functions[i];
+        const EventFunction *a = &start->functions[i], *b = &stop->functions[i];
         double high = -1.0;
         if (b->value < -b->noise) {
             high = h;
@@ -111,7 +112,8 @@ static double first_event(const Model *m, const Point *start, const Point *end, 
             found = locate(m, start, i, 0, 0.0, high, 1.0);
         }
         h = found;
-        try_with_functions(m, start, h, &stop);
+        try_with_functions(m, start, h, &nearer);
+        stop = &nearer;
     }
     return found;
 }

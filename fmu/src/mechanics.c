@@ -100,14 +100,14 @@ typedef struct {
     double load;                    /* force on it, N */
 } Load;
 
-static double suspension_force(const Model *m, double q, double u)
+static inline double suspension_force(const Model *m, double q, double u)
 {
     const Reals *p = &m->r;
     return -q * (p->suspension_k1 + q * (p->suspension_k2 + q * p->suspension_k3)) -
            p->suspension_damping * u;
 }
 
-static void load_on(const Model *m, const Mode *mode, const double y[N_STATES], int s, double tau,
+static inline void load_on(const Model *m, const Mode *mode, const double y[N_STATES], int s, double tau,
                     Load *l)
 {
     const Reals *p = &m->r;
