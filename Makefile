@@ -6,6 +6,7 @@
 #   make setup       sets up: system packages, .venv from the hashed lock, the FMU
 #   make charts      remakes the README's figures, results/*.png; `make test` writes
 #                    results/datasheet.*
+#   make bench       remakes results/bench.json, some minutes (ARGS='--trials DIR')
 #   make check       ruff and pyright
 #   make lock        remakes requirements.lock with uv  (ARGS=--upgrade for newer versions)
 #   make clean       removes .venv and everything built
@@ -33,7 +34,7 @@ FMU_SOURCES := $(shell find fmu -name build -prune -o -type f \
 	\( -name '*.[ch]' -o -name '*.xml' -o -name '*.def' -o -name '*.py' -o -name '*.toml' \) -print) \
 	cosim/fmu.py cosim/compiler.py
 
-.PHONY: help run test test-all setup charts check lock clean FORCE
+.PHONY: help run test test-all setup charts bench check lock clean FORCE
 
 help:
 	@sed -n 's/^#  \( .*\)/\1/p' Makefile
@@ -77,6 +78,10 @@ charts: setup
 	@cp results/ideal-current-sweep/figure.png results/sweep.png
 	@$(VENV)/bin/cosim chart stability
 	@$(VENV)/bin/cosim chart accuracy
+
+bench: setup
+	@$(VENV)/bin/cosim bench $(ARGS)
+	@cp results/bench/bench.json results/bench.json
 
 check: $(VENV)/.installed
 	@$(VENV)/bin/ruff check

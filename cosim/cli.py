@@ -186,6 +186,7 @@ def _parser() -> argparse.ArgumentParser:
 
     bench = commands.add_parser("bench", help="speed ratios, taken side by side in one run")
     bench.add_argument("--trials", type=Path, metavar="DIR", help="folder of tracked trials")
+    bench.add_argument("--quick", action="store_true", help="fewer rounds: under a minute")
     bench.add_argument(
         "--out", type=Path, default=Path("results/bench"), metavar="DIR", help="where to write"
     )
@@ -260,7 +261,7 @@ def _dispatch(arguments: argparse.Namespace) -> int:
     elif arguments.command == "export":
         commands.export(arguments.run, arguments.forms, arguments.out)
     elif arguments.command == "bench":
-        commands.bench(arguments.out, arguments.trials)
+        commands.bench(arguments.out, arguments.trials, arguments.quick)
     elif arguments.command == "chart":
         chosen = {"accuracy": commands.chart_accuracy, "stability": commands.chart_stability}
         chosen[arguments.chart](arguments.out, arguments.quick)

@@ -181,6 +181,11 @@ def _tune(
 
     runs: list[Run] = []
 
+    def scouting(run: Run, best: Run | None) -> None:
+        if best is not None:
+            bar.set_postfix_str(f"without ngspice, {quantity} {best.value:.4g}", refresh=False)
+        bar.refresh()
+
     def progress(run: Run, best: Run | None) -> None:
         runs.append(run)
         if best is not None:
@@ -191,7 +196,9 @@ def _tune(
         total=budget, desc=scene.name, unit="run", leave=False, file=sys.stderr, disable=None
     ) as bar:
         try:
-            found = tune(scene, quantity, largest, ranges, budget, seed, workers, progress)
+            found = tune(
+                scene, quantity, largest, ranges, budget, seed, workers, progress, scouting
+            )
         except KeyboardInterrupt:
             write_runs(folder / "tune.csv", runs, quantity)
             raise
@@ -320,9 +327,9 @@ def chart_stability(out: Path, quick: bool) -> None:
         stability.run(out, quick)
 
 
-def bench(out: Path, trials: Path | None) -> None:
+def bench(out: Path, trials: Path | None, quick: bool) -> None:
     """Measure speed ratios."""
     from cosim import bench as ratios
 
     with _writable(out):
-        ratios.run(out, trials)
+        ratios.run(out, trials, quick)

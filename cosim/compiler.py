@@ -11,7 +11,7 @@ from cosim.errors import BadInput
 from cosim.resources import REPOSITORY, fmu_sources
 
 # Without contraction every platform computes the same bits.
-COMPILE_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra")
+COMPILE_FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-Wall", "-Wextra")
 LIBRARY_FLAGS = ("-fPIC", "-shared", "-fvisibility=hidden")
 
 

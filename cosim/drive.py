@@ -13,7 +13,8 @@ where the highest command needs V_DAC = 0. In truth it is a PWM, of which ``v_of
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Iterable
-from math import floor, inf, pi, sin
+from math import floor, inf, nextafter, pi, sin
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,26 @@ from cosim.firmware import (
     volts,
 )
 from cosim.scene import Scene
+
+LEVEL, RISE, FALL, SINE = range(4)
+"""Kinds of pieces; ``native/circuit.c`` has the same."""
+
+
+class Piece(NamedTuple):
+    """The command from some time until ``until`` (s), as the compiled coupling evaluates it.
+
+    With the phase (t - origin) rate, V1 is ``offset`` for a level, offset + amplitude/2
+    sin(2π phase) for a sine, and else offset + amplitude (shape - 1/2) with the shape phase / span
+    in a rise and (1 - phase) / span in a fall, kept within 0 and 1. Times in s, rate in Hz, V.
+    """
+
+    until: float
+    kind: int
+    offset: float
+    amplitude: float = 0.0
+    origin: float = 0.0
+    rate: float = 0.0
+    span: float = 1.0
 
 
 class Command(ABC):
@@ -53,14 +74,32 @@ class Command(ABC):
     def next_jump(self, t: float) -> float:
         """Time of the first discontinuity of V1 or of a pin strictly after ``t``, s, or inf."""
 
+    @abstractmethod
+    def piece(self, t: float) -> Piece:
+        """The piece that holds at ``t``."""
+
     def next_corner(self, t: float) -> float:
         """Time of the first such jump or jump of V1's slope strictly after ``t``, s."""
         return self.next_jump(t)
 
     def values(self, times: Iterable[float]) -> npt.NDArray[np.float64]:
         """V1 at each of ``times``, V."""
-        value = self.value
-        return np.array([value(float(t)) for t in times], dtype=np.float64)
+        at = np.array(list(times) if not isinstance(times, np.ndarray) else times, np.float64)
+        begin, last = (float(at.min()), float(at.max())) if at.size else (inf, inf)
+        pieces = []
+        while begin <= last < inf:
+            pieces.append(self.piece(begin))
+            begin = pieces[-1].until
+        if not pieces:
+            return at
+        columns = [np.array(column) for column in zip(*pieces, strict=True)]
+        place = np.searchsorted(columns[0], at, side="right")
+        kind, offset, amplitude, origin, rate, span = (column[place] for column in columns[1:])
+        phase = (at - origin) * rate
+        shape = np.where(kind == RISE, phase / span, np.maximum((1.0 - phase) / span, 0.0))
+        ramp = offset + amplitude * (np.minimum(shape, 1.0) - 0.5)
+        sine = offset + 0.5 * amplitude * np.sin(2 * pi * (at - origin) * rate)
+        return np.select([kind == LEVEL, kind == SINE], [offset, sine], ramp)
 
     def v_dac(self, t: float) -> float:
         """Voltage of the DAC at ``t``, V."""
@@ -103,6 +142,9 @@ class Constant(Command):
     def next_jump(self, t: float) -> float:
         return inf
 
+    def piece(self, t: float) -> Piece:
+        return Piece(inf, LEVEL, self.level)
+
 
 class Sawtooth(Command):
     """V1 = offset + amplitude (t/T - 1/2) on [0, T), then a sharp fall.
@@ -123,11 +165,14 @@ class Sawtooth(Command):
         self._rise = 1.0 - self._fall
         self._jumps = amplitude != 0.0 and reset_time == 0.0
 
+    def _falls(self, t: float, n: int) -> bool:
+        return self._fall > 0.0 and t >= (n + self._rise) / self.frequency
+
     def value(self, t: float) -> float:
         f = self.frequency
         n = _edge_before(t, f)
         phase = (t - n / f) * f
-        if self._fall and t >= (n + self._rise) / f:
+        if self._falls(t, n):
             shape = min(max((1.0 - phase) / self._fall, 0.0), 1.0)
         else:
             shape = min(phase / self._rise, 1.0)
@@ -143,6 +188,13 @@ class Sawtooth(Command):
         if not self._jumps:
             return inf
         return (_edge_before(t, self.frequency) + 1) / self.frequency
+
+    def piece(self, t: float) -> Piece:
+        f = self.frequency
+        n = _edge_before(t, f)
+        kind, span = (FALL, self._fall) if self._falls(t, n) else (RISE, self._rise)
+        until = (n + self._rise) / f if self._fall and kind == RISE else (n + 1) / f
+        return Piece(until, kind, self.offset, self.amplitude, n / f, f, span)
 
     def next_corner(self, t: float) -> float:
         f = self.frequency
@@ -174,6 +226,11 @@ class Sine(Command):
     def next_jump(self, t: float) -> float:
         return inf
 
+    def piece(self, t: float) -> Piece:
+        f = self.frequency
+        n = _edge_before(t, f)
+        return Piece((n + 1) / f, SINE, self.offset, self.amplitude, n / f, f)
+
 
 class Square(Command):
     """V1 = offset + amplitude/2 in the first half of each period, offset - amplitude/2 after."""
@@ -197,6 +254,9 @@ class Square(Command):
 
     def next_jump(self, t: float) -> float:
         return (_edge_before(t, self._rate) + 1) / self._rate if self.amplitude else inf
+
+    def piece(self, t: float) -> Piece:
+        return Piece(self.next_jump(t), LEVEL, self.value(t))
 
 
 class Staircase(Command):
@@ -236,6 +296,9 @@ class Staircase(Command):
         if place == len(self._edges):
             period, place = period + 1, 0
         return (period * count + self._edges[place]) / self._rate
+
+    def piece(self, t: float) -> Piece:
+        return Piece(self.next_jump(t), LEVEL, self.value(t))
 
     def v_dac(self, t: float) -> float:
         return volts(self.codes[_edge_before(t, self._rate) % len(self.codes)])
@@ -308,6 +371,10 @@ class WithPwm(Command):
     def next_corner(self, t: float) -> float:
         return min(self._command.next_corner(t), self._next_edge(t))
 
+    def piece(self, t: float) -> Piece:
+        piece = self._command.piece(t)
+        return piece._replace(until=min(piece.until, self._next_edge(t)))
+
     def value(self, t: float) -> float:
         return self._command.value(t)
 
@@ -319,6 +386,52 @@ class WithPwm(Command):
 
     def v_dac_before(self, t: float) -> float:
         return self._command.v_dac_before(t)
+
+
+class Lagging(Command):
+    """Another command, later by ``lag`` (s)."""
+
+    def __init__(self, command: Command, lag: float) -> None:
+        self._command = command
+        self._lag = lag
+        self.v_offset = command.v_offset
+        self.longest_straight = command.longest_straight
+
+    def _own(self, t: float) -> float:
+        """The other command's time: on, before or after its corner as ``t`` is here."""
+        own = t - self._lag
+        corner = self._command.next_corner(own - 1e-12 - 1e-15 * abs(t))
+        edge = corner + self._lag
+        if t == edge:
+            return corner
+        return min(own, nextafter(corner, -inf)) if t < edge else max(own, nextafter(corner, inf))
+
+    def value(self, t: float) -> float:
+        return self._command.value(self._own(t))
+
+    def value_before(self, t: float) -> float:
+        return self._command.value_before(self._own(t))
+
+    def next_jump(self, t: float) -> float:
+        return self._command.next_jump(self._own(t)) + self._lag
+
+    def next_corner(self, t: float) -> float:
+        return self._command.next_corner(self._own(t)) + self._lag
+
+    def piece(self, t: float) -> Piece:
+        piece = self._command.piece(self._own(t))
+        # Behind t, whatever rounding makes of the sum.
+        until = max(piece.until + self._lag, nextafter(t, inf))
+        return piece._replace(until=until, origin=piece.origin + self._lag)
+
+
+def commands(scene: Scene) -> list[Command]:
+    """The commands of a scene's surfaces: one, or two where they move by themselves."""
+    first = command(scene)
+    if scene.drive.phase_deg is None:
+        return [first]
+    period = getattr(first, "period", 1.0 / scene.drive.frequency)
+    return [first, Lagging(first, scene.drive.phase_deg / 360.0 * period)]
 
 
 def command(scene: Scene) -> Command:

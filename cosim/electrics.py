@@ -3,13 +3,15 @@
 Energies are those of all ``coil.count`` coils, J; currents and voltages those of one coil.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.drive import Command
 from cosim.errors import BadInput
+from cosim.recorder import Recorder
 from cosim.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -71,18 +73,23 @@ def from_circuit(
             coil.eddy_inductance, coil.eddy_resistance, h, current[:-1], current[1:]
         )
     spent = h * (time[1:] > scene.run.settle)
-    limited = {name: float(np.dot(spent, acts[1:]) / spent.sum()) for name, acts in limits.items()}
+    spent /= spent.sum()
+    # A step that only begins or ends at the limit counts half.
+    limited = {
+        name: _total(spent, 0.5 * acts[1:] + 0.5 * acts[:-1]) for name, acts in limits.items()
+    }
     at_limit = [acts for name, acts in limits.items() if name != "slew"]
     if at_limit:
-        limited["output"] = float(np.dot(spent, np.any(at_limit, axis=0)[1:]) / spent.sum())
+        acts = np.any(at_limit, axis=0)
+        limited["output"] = _total(spent, 0.5 * acts[1:] + 0.5 * acts[:-1])
     made = "v(v1)" in log and circuit.model != "amplifier"  # by the circuit, not given to it
     settled = current[time >= scene.run.settle]
     return Electrics(
         command=np.interp(rows, time, log["v(v1)"]) if made else command.values(rows),
         current=np.interp(rows, time, current),
         coil_voltage=np.interp(rows, time, out - sense),
-        energy_in=float(np.dot(h, mean * mean_delivered)),
-        energy_copper=float(copper * np.dot(h, mean**2)) + coil.count * eddy_heat,
+        energy_in=_total(h, mean * mean_delivered),
+        energy_copper=copper * _total(h, mean**2) + coil.count * eddy_heat,
         energy_magnetic=_magnetic(scene, float(current[-1]), eddy_current),
         current_max=float(settled.max()),
         current_min=float(settled.min()),
@@ -130,7 +137,7 @@ def from_command(
     coil = scene.coil
     edges, start, end = log["time"], log["start"], log["end"]
     h = np.diff(edges)
-    squares = float(np.dot(h, start**2 + start * end + end**2)) / 3.0
+    squares = _total(h, start**2 + start * end + end**2) / 3.0
     slope = (end - start) / h
     at = np.clip(np.searchsorted(edges, rows, side="right") - 1, 0, len(h) - 1)
     current = start[at] + slope[at] * (rows - edges[at])
@@ -163,6 +170,50 @@ def from_command(
         current_min=float(after.min()),
         limited={"output": 0.0},
     )
+
+
+def both(first: Electrics, second: Electrics) -> Electrics:
+    """The first coil's electrics with the energies of two coils that have a source each."""
+    return replace(
+        first,
+        energy_in=first.energy_in + second.energy_in,
+        energy_copper=first.energy_copper + second.energy_copper,
+        energy_magnetic=first.energy_magnetic + second.energy_magnetic,
+    )
+
+
+def from_source(scene: Scene, command: Command, recorder: Recorder) -> Electrics:
+    """From the mechanics' own current source, at the end of its run.
+
+    In a row at a corner or jump of the command stands the voltage before it.
+    """
+    count, run = scene.coil.count, scene.run
+    totals, before = recorder.mechanics.totals(), recorder.at_settle
+    columns = recorder.mechanics.columns
+    share = {
+        limit: (totals[name] - before[name]) / (run.duration - run.settle)
+        for limit, name in (
+            ("swing_high", "output_high_time"),
+            ("swing_low", "output_low_time"),
+            ("current_limit", "current_limit_time"),
+        )
+    }
+    return Electrics(
+        command=command.values(recorder.time),
+        current=recorder.rows[:, columns.index("coil_current")],
+        coil_voltage=recorder.rows[:, columns.index("coil_voltage")],
+        energy_in=count * totals["energy_output"],
+        energy_copper=count * totals["energy_copper"],
+        energy_magnetic=count * totals["energy_magnetic"],
+        current_max=recorder.extremes[6],
+        current_min=recorder.extremes[7],
+        limited=share | {"output": sum(share.values())},
+    )
+
+
+def _total(shares: Array, values: npt.NDArray[Any]) -> float:
+    """Sum of the products, without BLAS: its threads cost more than the sum itself."""
+    return float((shares * values).sum())
 
 
 def _magnetic(scene: Scene, current: float, eddy_current: float) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,12 @@ from cosim.simulate import Result
 Array = npt.NDArray[np.float64]
 
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
+GRIP = "#7a5195"
+SECOND = "#6fb7e9"
+"""The second surface, where two move by themselves; its curves are dashed."""
+SECOND_SURFACE: dict[str, Any] = {
+    "color": SECOND, "lw": 1.1, "ls": "--", "label": "second"
+}  # fmt: skip
 PERIODS_SHOWN = 3
 
 
@@ -74,9 +81,10 @@ def _title(result: Result) -> str:
         return f"{words}; the surface is given: {drive.waveform}, {drive.frequency:.4g} Hz{limit}"
     if scene.circuit.model == "none":
         return f"{words}; no drive"
+    late = "" if drive.phase_deg is None else f", second coil {drive.phase_deg:.4g}° late"
     return (
         f"{words}; {drive.waveform} {drive.frequency:.4g} Hz, {drive.amplitude:.3g} V "
-        f"peak-to-peak, offset {drive.offset:+.3g} V, circuit “{scene.circuit.model}”"
+        f"peak-to-peak, offset {drive.offset:+.3g} V{late}, circuit “{scene.circuit.model}”"
     )
 
 
@@ -89,7 +97,13 @@ def _whole_run(axis: Axes, result: Result) -> None:
     axis.set_xlim(0, result.scene.run.duration)
     axis.set(xlabel="time [s]", ylabel="height [mm]")
     _at_least(axis, 0.01)
-    _head(axis, "Whole run")
+    curves, _ = axis.get_legend_handles_labels()
+    if "normal_force" in waves:
+        right = axis.twinx()
+        right.plot(waves["time"], waves["normal_force"], color=GRIP, lw=1.0, label="grip (right)")
+        right.set(ylabel="normal force [N]", ylim=(0.0, None))
+        curves += right.get_lines()
+    _head(axis, "Whole run", curves)
 
 
 def _head(axis: Axes, title: str, handles: Sequence[Artist] | None = None) -> None:
@@ -129,10 +143,12 @@ def _command(axis: Axes, result: Result, time: Array, cut: dict[str, Array]) -> 
     if "command" not in cut:
         _no_drive(axis, title, "current [A]")
         return
-    axis.plot(time, cut["current"], color=DRIVE, lw=1.3, label="current of one coil (left)")
+    axis.plot(time, cut["current"], color=DRIVE, lw=1.3, label="one coil (left)")
     axis.set(ylabel="current [A]")
     right = axis.twinx()
-    right.plot(time, cut["command"], color="0.45", lw=0.9, ls="--", label="command V1 (right)")
+    right.plot(time, cut["command"], color="0.45", lw=0.9, ls="--", label="V1 (right)")
+    if "current_2" in cut:
+        axis.plot(time, cut["current_2"], color=SECOND, lw=1.1, ls="--", label="second (left)")
     right.set_ylabel("V1 [V]")
     # On these scales the two curves coincide where the source does what it is told.
     scale = result.scene.circuit.sense_resistance * result.scene.coil.count
@@ -159,6 +175,9 @@ def _positions(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
     for name, color, width in (("surface", SURFACE, 1.2), ("part", PART, 1.6)):
         height = cut[f"z_{name}"]
         axis.plot(time, (height - height[0]) * 1e3, color=color, lw=width, label=name)
+    if "z_surface_2" in cut:
+        height = cut["z_surface_2"]
+        axis.plot(time, (height - height[0]) * 1e3, **SECOND_SURFACE)
     axis.set(ylabel="height [mm]")
     _shade_sticking(axis, time, cut["sticking"])
     _at_least(axis, 0.01)
@@ -168,8 +187,10 @@ def _positions(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
 def _velocities(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
     if "v_ram" in cut:
         relative = (cut["v_ram"] - cut["v_surface"]) * 1e3
-        axis.plot(time, relative, color=RAM, lw=0.8, label="ram in the actuator")
+        axis.plot(time, relative, color=RAM, lw=0.8, label="ram, relative")
     axis.plot(time, cut["v_surface"] * 1e3, color=SURFACE, lw=1.2, label="surface")
+    if "v_surface_2" in cut:
+        axis.plot(time, cut["v_surface_2"] * 1e3, **SECOND_SURFACE)
     axis.plot(time, cut["v_part"] * 1e3, color=PART, lw=1.6, label="part")
     axis.set(ylabel="velocity [mm/s]")
     _at_least(axis, 1.0)
@@ -212,5 +233,5 @@ def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
     axis.set_yscale("symlog", linthresh=100.0)
     _at_least(axis, 2.0)
     axis.set(ylabel="acceleration [m/s²]")
-    rigid = result.scene.mechanics.contact == "rigid" and "v_ram" in waves
+    rigid = result.scene.mechanics.contact == "rigid" and not result.scene.surface_is_given
     _head(axis, "Acceleration of the surface" + (", without its jumps" if rigid else ""))

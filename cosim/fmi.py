@@ -3,7 +3,7 @@
 Both go through fmpy's own functions, which check every return code.
 """
 
-from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_uint, c_void_p
+from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_uint, c_void_p, cast
 from functools import cache
 from typing import Any, Protocol
 
@@ -52,6 +52,10 @@ class Interface(Protocol):
         """Free the memory of a saved state."""
         ...
 
+    def addresses(self) -> dict[str, int]:
+        """Where compiled code finds the instance and the five functions, by their names here."""
+        ...
+
     def close(self) -> None:
         """Free the instance."""
         ...
@@ -68,6 +72,12 @@ def places(version: int, names: Any) -> Any:
     """The value references of variables as an array for the calls."""
     known = references(version)
     return (c_uint * len(names))(*(known[name] for name in names))
+
+
+def _addresses(fmu: Any, *functions: str) -> dict[str, int]:
+    names = ("set_reals", "do_step", "get_reals", "get_integers")
+    found = [cast(getattr(fmu.dll, function), c_void_p).value or 0 for function in functions]
+    return {"instance": fmu.component, **dict(zip(names, found, strict=True))}
 
 
 def _arguments(version: int) -> dict[str, Any]:
@@ -138,6 +148,9 @@ class Fmi2:
     def free_state(self, handle: c_void_p) -> None:
         self._fmu.fmi2FreeFMUstate(self._component, byref(handle))
 
+    def addresses(self) -> dict[str, int]:
+        return _addresses(self._fmu, "fmi2SetReal", "fmi2DoStep", "fmi2GetReal", "fmi2GetInteger")
+
     def close(self) -> None:
         if self._running:
             self._fmu.terminate()
@@ -196,6 +209,10 @@ class Fmi3:
 
     def free_state(self, handle: c_void_p) -> None:
         self._fmu.fmi3FreeFMUState(self._component, byref(handle))
+
+    def addresses(self) -> dict[str, int]:
+        names = ("fmi3SetFloat64", "fmi3DoStep", "fmi3GetFloat64", "fmi3GetInt32")
+        return _addresses(self._fmu, *names)
 
     def close(self) -> None:
         if self._running:

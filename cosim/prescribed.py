@@ -4,7 +4,6 @@ The surface's velocity is linear between knots, so the part's motion is a closed
 knots and its own events (:mod:`cosim.part`): there is no time stepping at all.
 """
 
-import csv
 import math
 import time
 from collections.abc import Callable
@@ -20,6 +19,7 @@ from cosim.published import FRAME_RATE
 from cosim.recorder import grid
 from cosim.scene import Scene
 from cosim.scene.messages import plain
+from cosim.timetable import read_timetable
 
 Array = npt.NDArray[np.float64]
 
@@ -86,39 +86,11 @@ def read_surface(path: Path) -> tuple[Array, Array]:
     The CSV has a header with ``time [s]`` and ``v_surface [m/s]`` (as ``waveforms.csv`` has), or
     ``time`` and ``velocity``; other columns do not matter.
     """
-    name = plain(str(path))
-    try:
-        with open(path, newline="", encoding="utf-8-sig", errors="replace") as file:
-            rows = csv.reader(file)
-            header = [cell.strip() for cell in next(rows, [])]
-            columns = [
-                next((header.index(known) for known in names if known in header), None)
-                for names in (("time [s]", "time"), ("v_surface [m/s]", "velocity"))
-            ]
-            if None in columns:
-                return _trial(path)
-            table = [[_number(row, k, name, rows.line_num) for k in columns] for row in rows if row]
-    except OSError as error:
-        raise BadInput(f"{name}: cannot be read ({error.strerror}).") from None
-    except csv.Error as error:
-        raise BadInput(f"{name}: this is not CSV ({error}).") from None
-    if len(table) < 2:
-        raise BadInput(f"{name}: at least two rows of time and velocity are needed.")
-    times, velocities = np.array(table).T
-    if np.any(np.diff(times) < 0):
-        row = int(np.argmax(np.diff(times) < 0)) + 3
-        raise BadInput(f"{name}, row {row}: the time must not fall.")
+    table = read_timetable(path, ("time [s]", "time"), ("v_surface [m/s]", "velocity"))
+    if table is None:
+        return _trial(path)
+    times, velocities = table.T
     return times - times[0], velocities
-
-
-def _number(row: list[str], column: int | None, name: str, line: int) -> float:
-    try:
-        value = float(row[column or 0])
-    except (ValueError, IndexError):
-        value = math.nan
-    if not math.isfinite(value):
-        raise BadInput(f"{name}, row {line}, column {(column or 0) + 1}: a number is needed.")
-    return value
 
 
 def _trial(path: Path) -> tuple[Array, Array]:

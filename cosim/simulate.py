@@ -4,20 +4,26 @@ import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim import electrics
+from cosim.compiled import CompiledRecorder, library
 from cosim.coupling import coupling
-from cosim.drive import Command, command
+from cosim.drive import Command, command, commands
 from cosim.isolation import isolated
 from cosim.mechanics import Mechanics
-from cosim.recorder import COLUMNS, Recorder
-from cosim.scene import Scene
+from cosim.recorder import Recorder
+from cosim.scene import WITHOUT_NGSPICE, Scene
 from cosim.scene.tables import LED
 from cosim.summary import summarise
+
+if TYPE_CHECKING:
+    from cosim.circuit.run import CircuitRun
 
 Array = npt.NDArray[np.float64]
 
@@ -36,6 +42,18 @@ UNITS = {
     "v_part": "m/s",
     "friction_force": "N",
     "sticking": "1",
+    "normal_force": "N",
+    "command_2": "V",
+    "current_2": "A",
+    "coil_voltage_2": "V",
+    "back_emf_2": "V",
+    "z_surface_2": "m",
+    "v_surface_2": "m/s",
+    "a_surface_2": "m/s2",
+    "z_ram_2": "m",
+    "v_ram_2": "m/s",
+    "friction_force_2": "N",
+    "sticking_2": "1",
 }
 """The columns of the waveforms, in order, and their units. Absent participants have none."""
 
@@ -50,9 +68,15 @@ class Result:
 
 
 def simulate(
-    scene: Scene, progress: Callable[[float], None] = lambda _: None, fmi_version: int = 3
+    scene: Scene,
+    progress: Callable[[float], None] = lambda _: None,
+    fmi_version: int = 3,
+    compiled: bool = True,
 ) -> Result:
     """Run a scene. ``progress`` is told the simulated time (s) now and then.
+
+    Not ``compiled``, every step goes through Python, as on a machine without a C compiler; the
+    numbers are the same.
 
     A netlist of the user's own runs in a process of its own, as does every circuit after ngspice
     has given up in this one. Raises BadInput for a netlist that cannot be used, SimulationFailed
@@ -67,16 +91,16 @@ def simulate(
         from cosim.automatic import simulate_within_tolerance
 
         return simulate_within_tolerance(
-            scene, lambda chosen: simulate(chosen, progress, fmi_version)
+            scene, lambda chosen: simulate(chosen, progress, fmi_version, compiled)
         )
     if _needs_own_process(scene):
-        return isolated(_simulate, scene, progress, fmi_version=fmi_version)
-    return _simulate(scene, progress, fmi_version)
+        return isolated(_simulate, scene, progress, fmi_version=fmi_version, compiled=compiled)
+    return _simulate(scene, progress, fmi_version, compiled)
 
 
 def _needs_own_process(scene: Scene) -> bool:
     model = scene.circuit.model
-    if model in ("none", "ideal", "file"):
+    if model == "file" or model in WITHOUT_NGSPICE:
         return model == "file"
     # PySpice and ngspice are loaded only for those who run a circuit.
     from cosim.circuit.ngspice import spoilt
@@ -84,33 +108,53 @@ def _needs_own_process(scene: Scene) -> bool:
     return spoilt()
 
 
-def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int) -> Result:
+def _simulate(
+    scene: Scene, progress: Callable[[float], None], fmi_version: int, compiled: bool
+) -> Result:
     began = time.perf_counter()
-    drive = command(scene)
+    drive, *second_drive = commands(scene)
     mechanics = Mechanics(scene, fmi_version)
     try:
-        recorder = Recorder(scene, mechanics, progress)
+        recorder = _recorder(scene, mechanics, progress, compiled)
         electric, circuit = None, None
+        second: dict[str, Array] = {}
         if scene.circuit.model == "none":
             recorder.advance(scene.run.duration, 0.0, 0.0)
         elif scene.circuit.model == "ideal":
-            log = _prescribe(scene, drive, recorder)
-            emf = recorder.rows[:, COLUMNS.index("back_emf")]
+            share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
+            logs = _prescribe(scene, [drive, *second_drive], recorder, share)
             motion = mechanics.totals()["energy_in"]
-            electric = electrics.from_command(scene, drive, log, recorder.time, emf, motion)
+            electric = electrics.from_command(
+                scene, drive, logs[0], recorder.time, recorder.column("back_emf"), motion
+            )
+            for command_2 in second_drive:
+                other = electrics.from_command(
+                    scene, command_2, logs[1], recorder.time, recorder.column("back_emf_2"), 0.0
+                )
+                electric = electrics.both(electric, other)
+                second = {"current_2": other.current, "coil_voltage_2": other.coil_voltage}
+        elif scene.circuit.model == "limited":
+            _prescribe(scene, [drive, *second_drive], recorder, 1.0)
+            electric = electrics.from_source(scene, drive, recorder)
+            if second_drive:
+                second = {
+                    "current_2": recorder.column("coil_current_2"),
+                    "coil_voltage_2": recorder.column("coil_voltage_2"),
+                }
         else:
             from cosim.circuit.limit_cycle import refuse_false
             from cosim.circuit.netlist import limits_at_work
-            from cosim.circuit.run import CircuitRun
 
-            circuit = CircuitRun(scene, drive, coupling(scene, recorder, drive))
+            circuit = _circuit_run(scene, drive, recorder)
             circuit.run()
             log = circuit.log()
-            refuse_false(scene, log, lambda finer: _circuit_log(finer, fmi_version))
+            refuse_false(scene, log, lambda finer: _circuit_log(finer, fmi_version, compiled))
             if scene.circuit.netlist is not None:
                 electrics.refuse_foreign_coil(scene, log)
             limits = limits_at_work(log)
             electric = electrics.from_circuit(scene, drive, log, recorder.time, limits)
+        for command_2 in second_drive:
+            second["command_2"] = command_2.values(recorder.time)
         totals = mechanics.totals()
         steps = mechanics.steps
     finally:
@@ -121,57 +165,117 @@ def _simulate(scene: Scene, progress: Callable[[float], None], fmi_version: int)
         "circuit_rejected": circuit.attempts - circuit.steps if circuit else 0,
         "fmu_steps": steps,
         "wall_time": time.perf_counter() - began,
-        "method": scene.coupling.method if circuit else "uncoupled",
+        "method": _method(scene),
         "versions": versions() | ({"ngspice": circuit.ngspice} if circuit else {}),
     }
-    return Result(scene, _waveforms(recorder, electric), summary)
+    return Result(scene, _waveforms(scene, recorder, electric, second), summary)
 
 
-def _circuit_log(scene: Scene, fmi_version: int) -> dict[str, Array]:
-    """The circuit's waveforms of a run of which nothing else is wanted."""
+def _method(scene: Scene) -> str:
+    model = scene.circuit.model
+    if model == "limited":
+        return "monolithic"
+    return "uncoupled" if model in WITHOUT_NGSPICE else scene.coupling.method
+
+
+def _recorder(
+    scene: Scene, mechanics: Mechanics, progress: Callable[[float], None], compiled: bool
+) -> Recorder:
+    # The compiled steps have one input, and are those of the default coupling.
+    if mechanics.has_second or mechanics.normal_force is not None:
+        compiled = False
+    if scene.circuit.model in LED and scene.coupling.method != "step-locked":
+        compiled = False
+    made = CompiledRecorder if compiled and library() is not None else Recorder
+    return made(scene, mechanics, progress)
+
+
+def _circuit_run(scene: Scene, drive: Command, recorder: Recorder) -> "CircuitRun":
+    if isinstance(recorder, CompiledRecorder):
+        from cosim.circuit.compiled_run import CompiledRun
+
+        return CompiledRun(scene, drive, recorder)
     from cosim.circuit.run import CircuitRun
 
+    return CircuitRun(scene, drive, coupling(scene, recorder, drive))
+
+
+def _circuit_log(scene: Scene, fmi_version: int, compiled: bool) -> dict[str, Array]:
+    """The circuit's waveforms of a run of which nothing else is wanted."""
     mechanics = Mechanics(scene, fmi_version)
     try:
-        recorder = Recorder(scene, mechanics, lambda _: None)
-        drive = command(scene)
-        circuit = CircuitRun(scene, drive, coupling(scene, recorder, drive))
+        recorder = _recorder(scene, mechanics, lambda _: None, compiled)
+        circuit = _circuit_run(scene, command(scene), recorder)
         circuit.run()
         return circuit.log()
     finally:
         mechanics.close()
 
 
-def _prescribe(scene: Scene, drive: Command, recorder: Recorder) -> dict[str, Array]:
-    """The rung ``ideal``: the coil carries the commanded current, whatever voltage that takes."""
-    share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
+def _prescribe(
+    scene: Scene, drives: list[Command], recorder: Recorder, share: float
+) -> list[dict[str, Array]]:
+    """Give the mechanics ``share`` times each surface's command, from corner to corner.
+
+    With the rung ``ideal`` that is the coil's current, whatever voltage it takes (A/V); with
+    ``limited`` the command itself.
+    """
     duration = scene.run.duration
-    edges, start, end = [0.0], [], []
+    edges = [0.0]
+    ends: list[list[tuple[float, float]]] = [[] for _ in drives]
     while edges[-1] < duration:
         begin = edges[-1]
-        stop = min(drive.next_corner(begin), begin + drive.longest_straight, duration)
+        stop = min(
+            duration,
+            *(drive.next_corner(begin) for drive in drives),
+            *(begin + drive.longest_straight for drive in drives),
+        )
         edges.append(stop)
-        start.append(share * drive.value(begin))
-        end.append(share * drive.value_before(stop))
-        recorder.advance(stop, start[-1], end[-1])
-    return {"time": np.array(edges), "start": np.array(start), "end": np.array(end)}
+        for drive, log in zip(drives, ends, strict=True):
+            log.append((share * drive.value(begin), share * drive.value_before(stop)))
+    times = np.array(edges)
+    logs = [np.array(log).T for log in ends]
+    if len(logs) == 1:
+        recorder.follow(times[1:], *logs[0])
+    else:
+        for k, stop in enumerate(edges[1:]):
+            value, value_end = ends[1][k]
+            recorder.mechanics.give_second(value, (value_end - value) / (stop - edges[k]))
+            recorder.advance(stop, *ends[0][k])
+    return [dict(zip(("time", "start", "end"), (times, *log), strict=True)) for log in logs]
 
 
-def _waveforms(recorder: Recorder, electric: electrics.Electrics | None) -> dict[str, Array]:
+def _waveforms(
+    scene: Scene,
+    recorder: Recorder,
+    electric: electrics.Electrics | None,
+    second: dict[str, Array],
+) -> dict[str, Array]:
     n = recorder.n_rows
-    known = {"time": recorder.time[:n]}
+    known = {"time": recorder.time[:n]} | second
     if electric is not None:
         known["command"] = electric.command
         known["current"] = electric.current
         known["coil_voltage"] = electric.coil_voltage
-    known |= {name: recorder.rows[:n, k] for k, name in enumerate(COLUMNS)}
+    columns = recorder.mechanics.columns
+    known |= {name: recorder.rows[:n, k] for k, name in enumerate(columns) if name in UNITS}
     if electric is None:
         del known["back_emf"]
+    if scene.mechanics.actuator == "direct":
+        del known["z_ram"], known["v_ram"]
+    if (force := recorder.mechanics.normal_force) is not None:
+        known["normal_force"] = np.array([force.value(t) for t in known["time"].tolist()])
     return {name: known[name] for name in UNITS if name in known}
 
 
 def versions() -> dict[str, str]:
     """What made the result."""
+    return dict(_versions())
+
+
+@cache
+def _versions() -> dict[str, str]:
+    # Looked up once: it takes longer than a short run of the part alone.
     found = {"python": platform.python_version()}
     for package in ("cosim", "fmpy", "PySpice", "numpy"):
         try:

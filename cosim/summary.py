@@ -30,6 +30,9 @@ def summarise(
 ) -> dict[str, Any]:
     """Averages, extremes and counts after ``run.settle``; energies over the whole run. SI.
 
+    Where two surfaces move by themselves, extremes and limits are those of the first, counts and
+    energies those of both.
+
     A rigid impact changes velocities in no time: there ``a_surface_max`` and ``a_surface_min`` are
     None. The camera's reading is of the true surface at each frame, through three-point second
     differences.
@@ -39,7 +42,7 @@ def summarise(
     v_average = (totals["z_part"] - before["z_part"]) / span
     camera = np.diff(recorder.frames, 2) * FRAME_RATE**2
     rigid = scene.mechanics.contact == "rigid"
-    a_max, a_min, v_max, v_min, z_max, z_min = recorder.extremes
+    a_max, a_min, v_max, v_min, z_max, z_min = recorder.extremes[:6]
     driven = scene.circuit.model != "none"
     result: dict[str, Any] = {
         "v_average": v_average,
@@ -58,6 +61,8 @@ def summarise(
         result["current_min"] = electric.current_min
         for name, share in electric.limited.items():
             result["saturated_fraction" if name == "output" else f"{name}_fraction"] = share
+    if "stick_time_2" in totals:
+        result["stick_fraction_2"] = (totals["stick_time_2"] - before["stick_time_2"]) / span
     for counter in ("impacts", "stick_slip_events"):
         result[counter] = totals[counter] - before[counter]
     return result | _energies(scene, totals, electric)
@@ -79,7 +84,8 @@ def _energies(
         stored += electric.energy_magnetic
     missing = energy_in - copper - sum(lost.values()) - stored
     mechanics = scene.mechanics
-    mass = mechanics.ram_mass + mechanics.surface_mass + mechanics.part_mass / mechanics.n_surfaces
+    ram = 0.0 if mechanics.actuator == "direct" else mechanics.ram_mass
+    mass = ram + mechanics.surface_mass + mechanics.part_mass / mechanics.n_surfaces
     # In the flexures from the start: what a scene without a drive is measured against.
     hanging = count * (mass * mechanics.gravity) ** 2 / (2.0 * mechanics.flexure_stiffness)
     scale = max(abs(energy_in), copper + sum(lost.values()), abs(stored), hanging)

@@ -15,6 +15,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from ctypes import byref, c_void_p, cast
 from ctypes.util import find_library
 from functools import cache
 from math import nan
@@ -24,7 +25,9 @@ from typing import Any, Protocol
 
 from PySpice.Spice.NgSpice import Shared
 
+from cosim.compiled import library
 from cosim.errors import BadInput, SimulationFailed
+from cosim.native import coupled_library
 
 _ACCEPTED = 0
 """Location of a GetSyncData call that follows an accepted step."""
@@ -67,16 +70,22 @@ class Leader(Protocol):
 @cache
 def engine() -> "Engine":
     """The process's one ngspice. Raises BadInput where the library is missing."""
+    name = library_name()
+    try:
+        return Engine(name)
+    except OSError as error:
+        raise BadInput(f"{name}: this ngspice library cannot be loaded ({error}).") from error
+
+
+def library_name() -> str:
+    """The path or name of libngspice on this machine. Raises BadInput where it is missing."""
     name = os.environ.get("NGSPICE_LIBRARY_PATH") or _find_library()
     if name is None:
         raise BadInput(
             "libngspice was not found; install it (Debian and Ubuntu: libngspice0, macOS: brew "
             "install libngspice) or name it in NGSPICE_LIBRARY_PATH."
         )
-    try:
-        return Engine(name)
-    except OSError as error:
-        raise BadInput(f"{name}: this ngspice library cannot be loaded ({error}).") from error
+    return name
 
 
 def spoilt() -> bool:
@@ -127,6 +136,8 @@ class Engine(Shared.NgSpiceShared):
         self.poisoned = False
         """ngspice has given up for good: nothing runs in this process's library any more."""
         self._leader: Leader | None = None
+        self._circuit: Any = None
+        self._circuit_places: Any = None
         self._failure: BaseException | None = None
         self._sources: dict[bytes, Callable[[float], float]] = {}
         self._save: tuple[str, ...] = ()
@@ -134,28 +145,74 @@ class Engine(Shared.NgSpiceShared):
         self._values: list[float] = []
         self._time_place = -1
         self._time = self._told = 0.0
-        with _caught_signals(self._fail), _nowhere():
+        with _caught_signals(self.fail), _nowhere():
             super().__init__(ngspice_id=0, send_data=True)
             self._library: Any = self._ngspice_shared
             # PySpice leaves GetSyncData out; a second call puts it in beside its own.
             self._sync_c = _ffi.callback("GetSyncData", self._get_sync_data)
-            self._library.ngSpice_Init_Sync(
-                self._get_vsrc_data_c, self._get_isrc_data_c, self._sync_c, _ffi.NULL, self._self_c
-            )
+            self._call_back(self._get_vsrc_data_c, self._sync_c)
         if self._failure is not None:
             raise self._failure
+
+    @property
+    def _send_data_c(self) -> Any:
+        """What PySpice gives to ngspice for SendData. It must be given when the library starts, so
+        the compiled one stands there for good, and hands on where it is not wanted.
+        """
+        compiled = library()
+        if compiled is None:
+            return self._plain_data
+        address = int(_ffi.cast("uintptr_t", self._plain_data))
+        compiled.coupled_hand_on(address)
+        return _compiled("SendData", "coupled_data")
+
+    @_send_data_c.setter
+    def _send_data_c(self, plain: Any) -> None:
+        self._plain_data = plain
 
     def run_transient(self, deck: str, save: tuple[str, ...], leader: Leader) -> None:
         """Run the transient analysis of ``deck``; ``save`` are its saved vectors, in this order.
 
         Raises what the leader raised, or SimulationFailed with ngspice's own words.
         """
-        self._leader, self._failure = leader, None
-        self._sources, self._save = {}, save
+        self._leader, self._sources = leader, {}
+        self._call_back(self._get_vsrc_data_c, self._sync_c)
+        try:
+            self._run(deck, save)
+            if self._time > self._told:
+                leader.accepted(self._time, self._values, 0.0)
+        finally:
+            self._leader = None
+
+    def run_compiled(self, deck: str, save: tuple[str, ...], circuit: Any, places: Any) -> None:
+        """The same, led by compiled code: ``circuit`` is its ``Circuit``, with its ``places``.
+
+        What it finds wrong stands in ``circuit.status``.
+        """
+        compiled = coupled_library()
+        self._circuit, self._circuit_places = circuit, places
+        self._call_back(
+            _compiled("GetVSRCData", "coupled_source"), _compiled("GetSyncData", "coupled_step")
+        )
+        compiled.coupled_lead(byref(circuit))
+        try:
+            self._run(deck, save)
+        finally:
+            compiled.coupled_finish(byref(circuit))
+            self._circuit = self._circuit_places = None
+
+    def _call_back(self, source: Any, sync: Any) -> None:
+        self._library.ngSpice_Init_Sync(
+            source, self._get_isrc_data_c, sync, _ffi.NULL, self._self_c
+        )
+
+    def _run(self, deck: str, save: tuple[str, ...]) -> None:
+        self._failure = None
+        self._save = save
         self._time, self._told = 0.0, 0.0
         self.clear_output()
         try:
-            with _caught_signals(self._fail):
+            with _caught_signals(self.fail):
                 # Not PySpice's load_circuit and run: they take any word on stderr, and any node
                 # with "error" in its name, for a failure. What fails is known by what is missing.
                 self._load(deck)
@@ -163,10 +220,7 @@ class Engine(Shared.NgSpiceShared):
                     self._library.ngSpice_Command(b"run")
             if self._failure is not None:
                 raise self._failure
-            if self._time > self._told:
-                leader.accepted(self._time, self._values, 0.0)
         finally:
-            self._leader = None
             if not self.poisoned:
                 for command in (b"destroy all", b"remcirc"):
                     self._library.ngSpice_Command(command)
@@ -181,11 +235,14 @@ class Engine(Shared.NgSpiceShared):
         telling = [word for word in words if _TROUBLE.search(word) and not _NOISE.search(word)]
         return "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
 
-    def _fail(self, failure: BaseException) -> None:
-        # An exception cannot pass through C. ngspice is made to give up (its sources become NaN,
-        # no step can succeed), and run_transient() raises it then.
+    def fail(self, failure: BaseException) -> None:
+        """Make ngspice give up (its sources become NaN, no step can succeed); what runs it raises
+        ``failure`` then. An exception cannot pass through C.
+        """
         if self._failure is None:
             self._failure = failure
+        if self._circuit is not None:
+            self._circuit.stopped = 1
 
     @staticmethod
     def _exit(
@@ -203,8 +260,10 @@ class Engine(Shared.NgSpiceShared):
             self._places = [names.index(_vector(name)) for name in self._save]
             self._values = [0.0] * len(self._places)
             self._time_place = names.index("time")
+            if self._circuit_places is not None:
+                self._circuit_places[:] = [*self._places, self._time_place]
         except ValueError as error:
-            self._fail(SimulationFailed(f"The netlist has no such vector: {error}."))
+            self.fail(SimulationFailed(f"The netlist has no such vector: {error}."))
         return 0
 
     @staticmethod
@@ -232,7 +291,7 @@ class Engine(Shared.NgSpiceShared):
             voltage[0] = source(time)
         except BaseException as failure:
             voltage[0] = nan
-            self._fail(failure)
+            self.fail(failure)
         return 0
 
     @staticmethod
@@ -255,7 +314,7 @@ class Engine(Shared.NgSpiceShared):
             else:
                 self._leader.attempted()
         except BaseException as failure:
-            self._fail(failure)
+            self.fail(failure)
         return 0
 
 
@@ -274,6 +333,12 @@ def _nowhere() -> Iterator[None]:
                 del os.environ["HOME"]
             else:
                 os.environ["HOME"] = home
+
+
+def _compiled(kind: str, name: str) -> Any:
+    """A function of the compiled library as a callback of ngspice."""
+    address = cast(getattr(coupled_library(), name), c_void_p).value
+    return _ffi.cast(f"{kind} *", address)
 
 
 def _vector(name: str) -> str:

@@ -35,7 +35,7 @@ class CircuitRun:
         self._count = scene.coil.count
         self._jump = command.next_jump(0.0)
         self._time = 0.0
-        self._deck, self._saved = prepare(scene)
+        self._deck, self._saved = self._netlist()
         self._motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else None
         self._log = array("d")
         self.attempts = 0
@@ -60,13 +60,19 @@ class CircuitRun:
     def run(self) -> None:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         duration = self._scene.run.duration
-        engine().run_transient(self._deck, self._saved, self)
+        self._lead()
         if self._time < duration * (1 - 1e-9):
             raise SimulationFailed(
                 f"ngspice stopped at t = {self._time:.6g} s of {duration:g} s: {engine().said()}. "
                 "If the circuit is right, a smaller circuit.max_step or another circuit.reltol may "
                 "help."
             )
+
+    def _netlist(self) -> tuple[str, tuple[str, ...]]:
+        return prepare(self._scene)
+
+    def _lead(self) -> None:
+        engine().run_transient(self._deck, self._saved, self)
 
     # What ngspice asks for (see cosim.circuit.ngspice.Leader).
 
@@ -85,7 +91,7 @@ class CircuitRun:
         if name == "voffset":
             offset = self._command.v_offset
             return self._held(self._command.v_offset_at, self._command.v_offset_before, offset)
-        raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
+        raise unknown_source(name)
 
     def _held(
         self, value: Callable[[float], float], before: Callable[[float], float], start: float
@@ -106,7 +112,7 @@ class CircuitRun:
 
     def accepted(self, time: float, values: Sequence[float], next_step: float) -> float:
         if not isfinite(sum(values)):
-            raise SimulationFailed(f"The circuit left the range of numbers at t = {time:.6g} s.")
+            raise out_of_range(time)
         self._log.append(time)
         motional = 0.0 if self._motional is None else values[self._motional]
         self._log.append(self._coupling.back_emf(time) + motional)
@@ -119,3 +125,13 @@ class CircuitRun:
             self._jump = self._command.next_jump(self._jump)
             longest = min(longest, _AFTER_JUMP)
         return min(next_step, longest, self._jump - time)
+
+
+def unknown_source(name: str) -> SimulationFailed:
+    """What to raise for an external source that is none of the agreed ones."""
+    return SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
+
+
+def out_of_range(time: float) -> SimulationFailed:
+    """What to raise for values of the circuit that are not finite."""
+    return SimulationFailed(f"The circuit left the range of numbers at t = {time:.6g} s.")

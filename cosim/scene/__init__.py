@@ -8,9 +8,19 @@
 from cosim.scene.describe import Key, keys
 from cosim.scene.loading import changed, list_scenes, load
 from cosim.scene.model import Scene, to_toml
-from cosim.scene.tables import Circuit, Coil, Coupling, Drive, Friction, Mechanics, Run
+from cosim.scene.tables import (
+    WITHOUT_NGSPICE,
+    Circuit,
+    Coil,
+    Coupling,
+    Drive,
+    Friction,
+    Mechanics,
+    Run,
+)
 
 __all__ = [
+    "WITHOUT_NGSPICE",
     "Circuit",
     "Coil",
     "Coupling",

@@ -17,7 +17,10 @@ from cosim.errors import BadInput, NoEffect
 from cosim.scene import messages
 from cosim.scene.describe import keys
 from cosim.scene.model import Scene
-from cosim.scene.tables import CHOSEN_BY_AUTO, KNOBS, TABLES, acts
+from cosim.scene.tables import CHOSEN_BY_AUTO, KNOBS, NORMAL_FORCES, TABLES, acts
+
+PATHS = (("circuit", "netlist"), ("drive", "file"), ("friction", "normal_force_file"))
+"""The keys that name files."""
 
 MAX_BYTES = 1 << 20
 """Largest scene file; far above any honest one."""
@@ -61,8 +64,8 @@ def load(source: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scene
     return scene
 
 
-def changed(scene: Scene, values: Mapping[str, float | int], origin: str) -> Scene:
-    """``scene`` with other numbers for some keys ("table.key", SI), checked like a loaded one.
+def changed(scene: Scene, values: Mapping[str, float | int | str], origin: str) -> Scene:
+    """``scene`` with other values for some keys ("table.key", SI), checked like a loaded one.
 
     ``origin`` names in messages where the values come from. Raises :class:`BadInput`.
     """
@@ -88,13 +91,14 @@ def _layers(source: str) -> list[_Layer]:
         entry = resources.files("cosim") / "scenes" / f"{source}.toml"
         data = tomllib.loads(entry.read_text(encoding="utf-8"))
         data.setdefault("name", source)
+        folder = Path(str(entry)).parent
     else:
-        origin = messages.plain(source)
+        origin, folder = messages.plain(source), Path(source).parent
         data = _read(source, origin, builtin)
         stem = re.sub(r"[^\w.+-]+", "-", Path(source).stem).strip("-.+")[:64]
         data.setdefault("name", stem or "scene")
     _check_names(data, origin)
-    _find_files(data, Path(source).parent)
+    _find_files(data, folder)
     base = data.pop("base", None)
     if base is None:
         return [_Layer(origin, data, source in builtin)]
@@ -199,7 +203,7 @@ def _overrides(overrides: Iterable[str]) -> dict[str, Any]:
 
 def _find_files(tables: dict[str, Any], folder: Path) -> None:
     """Make the paths of files, seen from ``folder``, ones that mean the same everywhere."""
-    for table, key in (("circuit", "netlist"), ("drive", "file")):
+    for table, key in PATHS:
         path = tables.get(table, {}).get(key)
         if isinstance(path, str):
             tables[table][key] = os.path.abspath(folder / path)
@@ -218,7 +222,10 @@ def _merge(layers: list[_Layer]) -> tuple[dict[str, Any], dict[str, tuple[int, s
     """The layers as one, and for each key the rank and origin of the layer that gave it."""
     merged: dict[str, Any] = {}
     origins: dict[str, tuple[int, str]] = {}
-    twins = KNOBS | {key: knob for knob, key in KNOBS.items()}
+    twins = {
+        "drive": KNOBS | {key: knob for knob, key in KNOBS.items()},
+        "friction": dict(zip(NORMAL_FORCES, reversed(NORMAL_FORCES), strict=True)),
+    }
     for rank, layer in enumerate(layers):
         for table, content in layer.tables.items():
             if table not in TABLES:
@@ -227,8 +234,8 @@ def _merge(layers: list[_Layer]) -> tuple[dict[str, Any], dict[str, tuple[int, s
                 continue
             below = merged.setdefault(table, {})
             for key in content:
-                if table == "drive" and key in twins:
-                    below.pop(twins[key], None)
+                if twin := twins.get(table, {}).get(key):
+                    below.pop(twin, None)
             for key, value in content.items():
                 below[key] = value
                 origins[f"{table}.{key}"] = (rank, layer.origin)

@@ -21,6 +21,11 @@ from cosim.scene.tables import (
     fault,
 )
 
+_SHORT_STEP = 2e-5  # s
+
+FASTEST = 1e-6
+"""Least time constant of a coil, s, that the mechanics' integration takes along."""
+
 
 class Scene(BaseModel):
     """Everything that a run needs to know, checked; frozen and comparable."""
@@ -40,7 +45,10 @@ class Scene(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _fill(cls, data: Any) -> Any:
-        """Make models of the tables, with the staircase where the firmware is in the circuit."""
+        """Make models of the tables, with the staircase where the firmware is in the circuit, and
+        with shorter steps where a jump of the back-EMF within one, or a circuit of any kind, asks
+        for them.
+        """
         if not isinstance(data, dict):
             return data
         data = dict(data)
@@ -53,7 +61,60 @@ class Scene(BaseModel):
             and not drive.get("reset_time")
         ):
             data["drive"] = {"quantised": True} | drive
+        mechanics = data.get("mechanics", {})
+        rigid = isinstance(mechanics, dict) and mechanics.get("contact") == "rigid"
+        if isinstance(circuit, dict) and (rigid or circuit.get("model") == "file"):
+            data["circuit"] = {"max_step": _SHORT_STEP} | circuit
         return data
+
+    @model_validator(mode="after")
+    def _check_speed(self) -> "Scene":
+        """With "limited" one explicit method solves coil and mechanics: none may be stiff."""
+        if self.circuit.model != "limited":
+            return self
+        coil = self.coil
+        eddy = coil.eddy_resistance or 0.0
+        around = coil.resistance + coil.count * self.circuit.sense_resistance + eddy
+        for key, resistance in (("inductance", around), ("eddy_inductance", eddy)):
+            inductance = getattr(coil, key)
+            if inductance is not None and inductance < FASTEST * resistance:
+                raise fault(
+                    f"coil.{key} = {inductance:g} H must be at least {FASTEST * resistance:.3g} H "
+                    f'with circuit.model = "limited" and {resistance:g} Ohm around it, or the '
+                    "current changes too fast to be solved with the mechanics",
+                    f"coil.{key}",
+                    "coil.resistance",
+                    "coil.eddy_resistance",
+                    "coil.count",
+                    "circuit.sense_resistance",
+                    "circuit.model",
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _check_phase(self) -> "Scene":
+        """Two surfaces that move by themselves are solved in the FMU only, without a plate."""
+        if self.drive.phase_deg is None:
+            return self
+        needed: list[tuple[str, tuple[object, ...], str]] = [
+            ("circuit.model", ("ideal", "limited"), '"ideal" or "limited"'),
+            ("coil.count", (1,), "1: each surface has a source of its own"),
+            ("mechanics.n_surfaces", (2,), "2"),
+            ("mechanics.actuator", ("ram",), '"ram"'),
+            ("friction.mu_plate", (0.0,), "0"),
+        ]
+        for full, allowed, words in needed:
+            table, _, key = full.partition(".")
+            value = getattr(getattr(self, table), key)
+            if value not in allowed:
+                shown = f'"{value}"' if isinstance(value, str) else f"{value:g}"
+                raise fault(
+                    f"drive.phase_deg lets two surfaces move by themselves; with it {full} = "
+                    f"{shown} must be {words}",
+                    full,
+                    "drive.phase_deg",
+                )
+        return self
 
     @model_validator(mode="after")
     def _check_reach(self) -> "Scene":
@@ -69,6 +130,14 @@ class Scene(BaseModel):
             raise fault(
                 f'drive.waveform = "{drive.waveform}" gives the surface its velocity, which needs '
                 'circuit.model = "none"',
+                "drive.waveform",
+                "circuit.model",
+            )
+        if self.friction.normal_force_file and self.surface_is_given:
+            raise fault(
+                f'drive.waveform = "{drive.waveform}" with circuit.model = "none" moves the part '
+                "at a constant friction.normal_force, not at that of friction.normal_force_file",
+                "friction.normal_force_file",
                 "drive.waveform",
                 "circuit.model",
             )
@@ -119,6 +188,8 @@ class Scene(BaseModel):
             for knob, key in KNOBS.items():
                 if table == "drive" and knob in values:
                     del values[key]
+            if values.get("normal_force_file"):
+                del values["normal_force"]
             data[table] = values
         return data
 

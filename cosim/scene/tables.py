@@ -46,6 +46,9 @@ class Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
+NORMAL_FORCES = ("normal_force", "normal_force_file")
+"""The keys of ``[friction]`` of which each replaces the other."""
+
 KNOBS = {"pot_max": "amplitude", "pot_frequency": "frequency", "pot_offset": "offset"}
 """The knobs of the device and the keys of ``[drive]`` that each replaces."""
 
@@ -68,6 +71,14 @@ class Drive(Table):
     offset: float = _number(-1.2, "V", -100.0, 100.0, "Mean voltage at V1")
     reset_time: float = _number(
         0.0, "s", 0.0, 100.0, "Length of the sawtooth's linear fall, at the end of the period"
+    )
+    phase_deg: float | None = _number(
+        None,
+        "deg",
+        0.0,
+        360.0,
+        "Lag of the second surface's command; where given, two surfaces move by themselves, each "
+        "with a source and coil of its own",
     )
     acceleration_max: float = _number(
         98.1, "m/s2", 1e-3, 1e6, "Greatest acceleration of a given surface, optimal and quaid"
@@ -193,10 +204,11 @@ class Drive(Table):
 class Circuit(Table):
     """What turns V1 into current."""
 
-    model: Literal["full", "amplifier", "ideal", "none", "file"] = _choice(
+    model: Literal["full", "amplifier", "limited", "ideal", "none", "file"] = _choice(
         "amplifier",
-        "Schematic with its difference amplifier, behavioural current source, "
-        "current = command, no drive at all, or the netlist named in circuit.netlist",
+        "Schematic with its difference amplifier, behavioural current source, the same reduced to "
+        "its limits and the coil, current = command, no drive at all, or the netlist named in "
+        "circuit.netlist",
     )
     netlist: str | None = _choice(None, "A netlist of one's own, seen from the scene's file")
     supply: float = _number(18.0, "V", 0.1, 1e3, "Supply voltage, both signs")
@@ -204,7 +216,7 @@ class Circuit(Table):
         4.0, "Ohm", 1e-3, 1e6, "Sense resistor: current = V1 / sense_resistance"
     )
     current_limit: float = _number(
-        2.504, "A", 1e-3, 1e3, 'Current limit of the power amplifier; only in "full"'
+        2.504, "A", 1e-3, 1e3, 'Current limit of the power amplifier; not in "amplifier"'
     )
     gain_bandwidth: float = _number(
         1e6, "Hz", 1e2, 1e12, "Gain-bandwidth product of the power amplifier"
@@ -237,11 +249,17 @@ class Circuit(Table):
         None, "F", 1e-12, 1.0, "Capacitance in series with it; both or neither are given"
     )
     reltol: float = _number(1e-5, "1", 1e-9, 1e-2, "Relative tolerance of ngspice")
-    max_step: float = _number(1e-5, "s", 1e-9, 1e-2, "Largest time step of ngspice")
+    max_step: float = _number(
+        5e-5,
+        "s",
+        1e-9,
+        1e-2,
+        "Largest time step of ngspice; 2e-05 s with rigid walls or a netlist, unless given",
+    )
 
     @model_validator(mode="after")
     def _check(self) -> "Circuit":
-        swing = self.model in ("amplifier", "file")
+        swing = self.model in ("amplifier", "limited", "file")
         for key in ("swing_loss_high", "swing_loss_low"):
             if swing and (loss := getattr(self, key)) >= self.supply:
                 raise fault(
@@ -284,6 +302,11 @@ class Coil(Table):
 class Mechanics(Table):
     """Surface, ram and part."""
 
+    actuator: Literal["ram", "direct"] = _choice(
+        "ram",
+        "What the coil pushes off from: a free ram, or a magnet that stands on the ground; there "
+        "suspension and walls hold the surface itself",
+    )
     ram_mass: float = _number(0.004, "kg", 1e-9, 1e3, "Mass of the ram in the actuator")
     surface_mass: float = _number(
         0.0145, "kg", 1e-9, 1e3, "Mass of the surface: actuator body and platform"
@@ -317,7 +340,20 @@ class Friction(Table):
     mu_s: float = _number(0.72, "1", 0.0, 1e3, "Static coefficient, surface on part")
     mu_k: float = _number(0.59, "1", 0.0, 1e3, "Kinetic coefficient, at most mu_s")
     normal_force: float = _number(0.5, "N", 0.0, 1e9, "Normal force of one surface on the part")
+    normal_force_file: str | None = _choice(
+        None,
+        "CSV with time [s] and normal_force [N], linear in between, its last value kept; instead "
+        "of normal_force",
+    )
     mu_plate: float = _number(0.0, "1", 0.0, 1e3, "Coefficient of the springed plate on the part")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_force(cls, data: Any) -> Any:
+        if isinstance(data, dict) and None not in map(data.get, NORMAL_FORCES):
+            one, other = (f"friction.{key}" for key in NORMAL_FORCES)
+            raise fault(f"{one} and {other} say the same thing twice; give one of them", one, other)
+        return data
 
     @model_validator(mode="after")
     def _check(self) -> "Friction":
@@ -387,11 +423,15 @@ _OF_NGSPICE = set(Circuit.model_fields) - {"model"}
 CIRCUIT_KEYS: dict[str, set[str]] = {
     "full": _OF_NGSPICE - {"swing_loss_high", "swing_loss_low"},
     "amplifier": _OF_NGSPICE - {"current_limit"},
+    "limited": {"supply", "sense_resistance", "current_limit", "swing_loss_high", "swing_loss_low"},
     "ideal": {"sense_resistance"},
     "none": set(),
     "file": _OF_NGSPICE,
 }
 """The keys of ``[circuit]`` that act with each ``circuit.model``."""
+
+WITHOUT_NGSPICE = ("limited", "ideal", "none")
+"""Each ``circuit.model`` that starts no ngspice."""
 
 
 LED = ("full", "amplifier", "file")

@@ -15,7 +15,7 @@ from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.isolation import PATIENCE, how_it_ended
-from cosim.scene import Scene
+from cosim.scene import WITHOUT_NGSPICE, Scene
 from cosim.sweep.point import Number, Outcome, evaluate
 
 POINTS_A_WORKER = 250
@@ -193,7 +193,7 @@ def _send(pipe: Connection, message: Any) -> None:
 
 
 def _library_spoilt(base: Scene) -> bool:
-    if base.circuit.model in ("none", "ideal", "file"):
+    if base.circuit.model == "file" or base.circuit.model in WITHOUT_NGSPICE:
         return False
     from cosim.circuit.ngspice import spoilt
 

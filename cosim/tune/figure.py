@@ -72,7 +72,8 @@ def draw(tuning: Tuning, path: Path) -> None:
     best = tuning.best.value * scale
     figure.suptitle(
         f"{tuning.scene.name}: {tuning.quantity} {best:.4g}{'' if unit == '1' else f' {unit}'} "
-        f"after {len(values)} runs",
+        f"after {len(values)} runs"
+        + (f", and {tuning.scouts} ahead without ngspice" if tuning.scouts else ""),
         fontsize=12,
     )
     figure.savefig(path, format="png")

@@ -35,7 +35,8 @@ def write(folder: Path, tuning: Tuning, seed: int) -> dict[str, Any]:
         "runs": len(tuning.runs),
         "failed": sum(run.value is None for run in tuning.runs),
         "seed": seed,
-        "search": "Latin hypercube, then differential evolution (SciPy)",
+        "search": "Latin hypercube, then the cross-entropy method",
+        "scouts": tuning.scouts,
         "turns": list(TURNS),
         "neighbours": tuning.neighbours,
         "robustness": robustness(tuning),
@@ -109,9 +110,10 @@ def table(numbers: dict[str, Any]) -> str:
     unit, scale = UNITS.get(quantity, ""), 1.0
     if unit == "m/s":
         unit, scale = "mm/s", 1e3
+    ahead = f" ({numbers['scouts']} ahead without ngspice)" if numbers["scouts"] else ""
     lines = [
         f"{quantity} = {value * scale:.5g} {unit}".rstrip()
-        + f" after {numbers['runs']} runs, {numbers['failed']} failed, at"
+        + f" after {numbers['runs']} runs{ahead}, {numbers['failed']} failed, at"
     ]
     for name, setting in numbers["settings"].items():
         about = numeric_key(name, "--over").unit

@@ -1,6 +1,7 @@
 """Tunes a scene: searches its settings, then turns each key a little about the best."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, isfinite
 
@@ -8,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import BadInput, SimulationFailed
-from cosim.scene import Scene, changed
+from cosim.scene import WITHOUT_NGSPICE, Scene, changed
 from cosim.sweep.design import FREQUENCIES, numeric_key
 from cosim.sweep.point import Number, Outcome, periods_made_whole
 from cosim.sweep.pool import Pool, workers_asked
-from cosim.tune.search import search
+from cosim.tune.search import apart, search
 
 Array = npt.NDArray[np.float64]
 
@@ -29,6 +30,12 @@ SEARCHED = 0.93
 
 FEWEST_RUNS = 20
 """Of the search."""
+
+SCOUTS = 5
+"""Runs without ngspice that go ahead of each run with it: some ten times cheaper each."""
+
+HINTS, HINTS_APART = 25, 0.02
+"""Best scouts that are run again with ngspice, and how far apart, as a share of the ranges."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +63,8 @@ class Tuning:
     neighbours: dict[str, list[float | None]]
     scene: Scene
     """The scene at the best settings."""
+    scouts: int
+    """Runs on the rung "limited" that went ahead; 0 where the scene needs no ngspice itself."""
 
     def lost(self, turn: float) -> float | None:
         """Greatest loss when one key is turned by ``turn`` of its range either way.
@@ -86,14 +95,16 @@ def tune(
     seed: int = 0,
     workers: int | None = None,
     progress: Callable[[Run, Run | None], None] = lambda run, best: None,
+    scouting: Callable[[Run, Run | None], None] = lambda run, best: None,
 ) -> Tuning:
     """Search ``scene`` for the largest (or least) ``quantity`` of its summary, in ``budget`` runs.
 
-    ``over`` gives the range of each ``table.key``, SI; by default the three knobs. After the search
-    each key is turned a little about the best, which moves on while that helps and the budget
-    lasts. The same for the same ``seed``, whatever the number of
-    ``workers``. ``progress`` is told each run and the best so far, as they finish. Where the
-    frequency is tuned, each run lasts whole periods.
+    ``over`` gives the range of each ``table.key``, SI; by default the three knobs. Where the scene
+    needs ngspice, SCOUTS times as many runs on the rung "limited" look first where it is worth
+    while. After the search each key is turned a little about the best, which moves on while that
+    helps and the budget lasts. The same for the same ``seed``, whatever the number of ``workers``.
+    ``progress`` is told each run and the best so far, as they finish, ``scouting`` each one ahead.
+    Where the frequency is tuned, each run lasts whole periods.
 
     Raises BadInput for keys, ranges and quantities that are none; SimulationFailed where every run
     failed.
@@ -104,9 +115,18 @@ def tune(
     if budget < least:
         raise BadInput(f"--budget {budget}: must be a whole number from {least} for these keys.")
     whole_periods = any(key in FREQUENCIES for key in ranges)
+    searched = min(round(SEARCHED * budget), budget - turned)
+    scouts, hints = 0, None
+    ahead = _simplified(scene)
+    # Quantities that only the scene's own rung has find no scouts.
+    with suppress(BadInput), Pool(ahead or scene, workers_asked(workers), whole_periods) as pool:
+        if ahead is not None:
+            trial = _Trial(pool, quantity, largest, ranges, scouting)
+            search(trial.costs, len(ranges), SCOUTS * searched, seed)
+            scouts, hints = len(trial.known), apart(trial.ranked(), HINTS_APART)[:HINTS]
     with Pool(scene, workers_asked(workers), whole_periods) as pool:
         trial = _Trial(pool, quantity, largest, ranges, progress)
-        search(trial.costs, len(ranges), min(round(SEARCHED * budget), budget - turned), seed)
+        search(trial.costs, len(ranges), searched, seed, hints)
         if trial.best is None:
             reason = next(iter(trial.known.values())).outcome.failure
             raise SimulationFailed(f"No setting could be run; the first one: {reason}")
@@ -117,7 +137,7 @@ def tune(
     tuned = changed(scene, best.values, "tune")
     if whole_periods:
         tuned = changed(tuned, periods_made_whole(tuned), "tune")
-    return Tuning(quantity, largest, ranges, runs, best, neighbours, tuned)
+    return Tuning(quantity, largest, ranges, runs, best, neighbours, tuned, scouts)
 
 
 def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
@@ -127,6 +147,16 @@ def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, 
         if not (isfinite(low) and isfinite(high) and key.low <= low < high <= key.high):
             raise BadInput(f"--over {name}={low:g}:{high:g}: must be a range, of {key.allowed}.")
     return dict(over)
+
+
+def _simplified(scene: Scene) -> Scene | None:
+    """The scene without ngspice; None where it is so already, or cannot be."""
+    if scene.circuit.model == "file" or scene.circuit.model in WITHOUT_NGSPICE:
+        return None
+    try:
+        return changed(scene, {"circuit.model": "limited", "drive.pwm_ripple": False}, "tune")
+    except BadInput:
+        return None
 
 
 class _Trial:
@@ -150,6 +180,12 @@ class _Trial:
         """The first of the best runs."""
         found = [run for run in self.known.values() if run.value is not None]
         return min(found, key=lambda run: self._cost(run.value), default=None)
+
+    def ranked(self) -> Array:
+        """Points of the unit cube that have a value, the best first."""
+        found = [place for place, run in self.known.items() if run.value is not None]
+        found.sort(key=lambda place: self._cost(self.known[place].value))
+        return np.array(found).reshape(-1, len(self.ranges))
 
     def costs(self, points: Array) -> tuple[Array, int]:
         """The cost of each point of the unit cube (rows), and how many of them were run for it."""

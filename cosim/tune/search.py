@@ -1,99 +1,75 @@
-"""The search: a Latin hypercube to hear the whole range, differential evolution from its best, and
-evolution again in ever narrower boxes about the best.
+"""The search: a Latin hypercube to hear the whole range, then the cross-entropy method.
 
 The objective jumps where a mode of motion ends, is ragged where motion is chaotic, and is missing
-where a scene cannot be: no method that trusts a slope finds its way there. Where it is ragged the
-peaks are a few per cent of a knob wide, which is what the boxes are for.
+where a scene cannot be: no method that trusts a slope finds its way there. Its heights are narrow
+ridges aslant to the knobs, which samples from a normal distribution can lie along.
 """
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-EXPLORED, EVOLVED = 0.35, 0.3
-"""Shares of the runs that listen to the whole range, and that evolve in it."""
+EXPLORED = 0.4
+"""Share of the runs that listens to the whole range."""
 
-GENERATIONS = 5
-"""Of the evolution in the whole range."""
+GENERATION = 10
+"""Samples that are drawn at once."""
 
-BOXES = (0.06, 0.03, 0.015)
-"""Half widths of the boxes, as shares of the ranges."""
+ELITE = 5
+"""Best points so far, whose mean and covariance the next samples are drawn with."""
 
-BOX_GENERATIONS = 3
+INFLATION = 2.0
+"""Of that covariance: with less, the samples close in on the first ridge that they find."""
 
-_SMALLEST = 5
-"""SciPy's least population."""
+LEAST_SPREAD = 1e-3
+"""Standard deviation that is left in every direction, as a share of the range."""
 
 
-def search(costs: Callable[[Array], tuple[Array, int]], keys: int, runs: int, seed: int) -> None:
+def search(
+    costs: Callable[[Array], tuple[Array, int]],
+    keys: int,
+    runs: int,
+    seed: int,
+    hints: Array | None = None,
+) -> None:
     """Ask ``costs`` for at most ``runs`` points of the unit cube of ``keys`` dimensions.
 
     ``costs`` takes points (rows) and gives a cost each, inf where there is none, and how many of
-    them it had to run: it keeps what it learns, for a point may be asked for again. Few runs leave
-    out the last boxes. Rainer Storn, Kenneth Price, "Differential evolution", J. Global
-    Optimization 11 (1997), strategy best/1/bin of SciPy.
+    them it had to run. ``hints`` (rows) are asked for first, in place of most of the exploration.
+    R. Y. Rubinstein, "The cross-entropy method for combinatorial and continuous optimization",
+    Methodology and Computing in Applied Probability 1 (1999), with the elite of all samples so far
+    and every other sample drawn about the best of them instead of about their mean.
     """
     from scipy.stats import qmc
 
     generator = np.random.default_rng(seed)
-    best, least = np.full(keys, 0.5), np.inf
-    left = runs
-
-    def heard(points: Array) -> Array:
-        nonlocal best, least, left
-        found, new = costs(points)
-        left -= new
-        if found.min() < least:
-            best, least = points[np.argmin(found)].copy(), found.min()
-        return found
-
-    def spread(count: int) -> Array:
-        return qmc.LatinHypercube(keys, rng=generator).random(count)
-
-    points = spread(max(_SMALLEST, round(EXPLORED * runs)))
-    ranked = points[np.argsort(heard(points), kind="stable")]
-    population = max(_SMALLEST, round(EVOLVED * runs / GENERATIONS))
-    generations = min(GENERATIONS, left // population)
-    _evolve(heard, np.zeros(keys), np.ones(keys), ranked[:population], generations, generator)
-    size = max(_SMALLEST, round((1.0 - EXPLORED - EVOLVED) * runs / len(BOXES) / BOX_GENERATIONS))
-    for width in BOXES:
-        if left < BOX_GENERATIONS * size:
+    explored = max(ELITE, round(EXPLORED * runs))
+    points = np.empty((0, keys)) if hints is None else hints[:explored]
+    spread = max(explored - len(points), min(GENERATION, runs - len(points)))
+    points = np.vstack([points, qmc.LatinHypercube(keys, rng=generator).random(spread)])
+    found, taken = costs(points)
+    while taken < runs:
+        best = points[np.argsort(found, kind="stable")[:ELITE]]
+        covariance = INFLATION * np.cov(best.T).reshape(keys, keys)
+        covariance += LEAST_SPREAD**2 * np.eye(keys)
+        size = min(GENERATION, runs - taken)
+        steps = generator.multivariate_normal(np.zeros(keys), covariance, size)
+        about = np.where(generator.random((size, 1)) < 0.5, best[0], best.mean(axis=0))
+        samples = np.clip(about + steps, 0.0, 1.0)
+        heard, new = costs(samples)
+        if not new:  # whole numbers leave no more to ask for
             return
-        low, high = np.maximum(best - width, 0.0), np.minimum(best + width, 1.0)
-        points = low + spread(size) * (high - low)
-        found = heard(points)
-        points[np.argmax(found)] = best
-        _evolve(heard, low, high, points, BOX_GENERATIONS - 1, generator)
+        points, found = np.vstack([points, samples]), np.concatenate([found, heard])
+        taken += new
 
 
-def _evolve(
-    heard: Callable[[Array], Array],
-    low: Array,
-    high: Array,
-    first: Array,
-    generations: int,
-    generator: np.random.Generator,
-) -> None:
-    """Generations after ``first``, whose costs are known, within ``low`` … ``high``."""
-    from scipy.optimize import differential_evolution
-
-    if generations < 1 or len(first) < _SMALLEST:
-        return
-    evolve: Any = differential_evolution  # whose stubs know no array for init
-    evolve(
-        lambda columns: heard(columns.T),
-        bounds=list(zip(low, high, strict=True)),
-        init=first,
-        maxiter=generations,
-        mutation=(0.3, 0.8),
-        recombination=0.9,
-        tol=0.0,
-        polish=False,
-        rng=generator,
-        vectorized=True,
-        updating="deferred",
-    )
+def apart(points: Array, distance: float) -> Array:
+    """The first of ``points`` (rows), and each later one that is ``distance`` from all kept."""
+    kept: list[Array] = []
+    for point in points:
+        if all(np.abs(point - other).max() >= distance for other in kept):
+            kept.append(point)
+    return np.array(kept).reshape(-1, points.shape[1])

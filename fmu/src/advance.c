@@ -11,14 +11,14 @@ static const int MAX_EVENTS_PER_STEP = 1000000; /* Zeno sequences end by themsel
 static const int MAX_TRIALS_PER_STEP = 2000000;
 
 typedef struct {
-    double tau, y[N_STATES], dy[N_STATES];
+    double tau, y[N_ALL], dy[N_ALL];
     EventFunction functions[MAX_EVENT_FUNCTIONS];
     int n;
 } Point;
 
 static void evaluate(const Model *m, Point *point)
 {
-    state_rates(m, &m->mode, point->y, point->tau, point->dy);
+    state_rates(m, m->mode, point->y, point->tau, point->dy);
     point->n = event_functions(m, point->y, point->tau, point->functions);
 }
 
@@ -74,9 +74,10 @@ static double locate(const Model *m, const Point *start, int index, int use_rate
 static double first_event(const Model *m, const Point *start, const Point *end, int *which)
 {
     double h = end->tau - start->tau, found = -1.0;
-    Point stop = *end;
+    const Point *stop = end;
+    Point nearer;
     for (int i = 0; i < start->n; i++) {
-        const EventFunction *a = &start->functions[i], *b = &stop.functions[i];
+        const EventFunction *a = &start->functions[i], *b = &stop->functions[i];
         double high = -1.0;
         if (b->value < -b->noise) {
             high = h;
@@ -111,11 +112,13 @@ static double first_event(const Model *m, const Point *start, const Point *end, 
             found = locate(m, start, i, 0, 0.0, high, 1.0);
         }
         h = found;
-        try_with_functions(m, start, h, &stop);
+        try_with_functions(m, start, h, &nearer);
+        stop = &nearer;
     }
     return found;
 }
 
+/* Of the first surface. */
 static void note_extremes(Model *m, const Point *point)
 {
     Reals *r = &m->r;
@@ -132,17 +135,37 @@ static void note_extremes(Model *m, const Point *point)
         r->z_surface_max = z;
     if (z < r->z_surface_min)
         r->z_surface_min = z;
+    if (point->y[I_COIL] > r->coil_current_max)
+        r->coil_current_max = point->y[I_COIL];
+    if (point->y[I_COIL] < r->coil_current_min)
+        r->coil_current_min = point->y[I_COIL];
+}
+
+/* Times that are counted mode by mode; those of the source are the first one's. */
+static void note_time(Model *m, double taken)
+{
+    const Mode *mode = &m->mode[0];
+    if (mode->slip == 0)
+        m->r.stick_time += taken;
+    if (m->n.independent && m->mode[1].slip == 0)
+        m->r.stick_time_2 += taken;
+    if (mode->output > 0)
+        m->r.output_high_time += taken;
+    else if (mode->output < 0)
+        m->r.output_low_time += taken;
+    else if (mode->limited)
+        m->r.current_limit_time += taken;
 }
 
 static void take_up(Model *m, const Point *point)
 {
-    for (int j = 0; j < N_STATES; j++)
+    for (int j = 0; j < moving(m) * N_STATES; j++)
         m->y[j] = point->y[j];
 }
 
 static void start_from(const Model *m, double tau, Point *point)
 {
-    for (int j = 0; j < N_STATES; j++)
+    for (int j = 0; j < moving(m) * N_STATES; j++)
         point->y[j] = m->y[j];
     point->tau = tau;
     evaluate(m, point);
@@ -169,6 +192,7 @@ int advance(Model *m, double h, char *message)
     m->r.a_surface_max = m->r.a_surface_min = now.dy[V];
     m->r.v_surface_max = m->r.v_surface_min = now.y[V];
     m->r.z_surface_max = m->r.z_surface_min = now.y[Z];
+    m->r.coil_current_max = m->r.coil_current_min = now.y[I_COIL];
 
     for (int trials = 0; now.tau < h; trials++) {
         if (events > MAX_EVENTS_PER_STEP) {
@@ -217,14 +241,13 @@ int advance(Model *m, double h, char *message)
             if (!last || next > m->step)
                 m->step = next;
         }
-        if (m->mode.slip == 0)
-            m->r.stick_time += taken;
+        note_time(m, taken);
         m->n.internal_steps++;
         note_extremes(m, &end);
         take_up(m, &end);
         if (found >= 0.0) {
             events++;
-            apply_event(m, end.tau, now.functions[which].kind);
+            apply_event(m, now.functions[which].surface, end.tau, now.functions[which].kind);
             start_from(m, end.tau, &now);
             note_extremes(m, &now);
         } else {

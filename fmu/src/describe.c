@@ -65,7 +65,8 @@ static const struct {
     int exponents[N_BASES];
 } SYMBOLS[] = {{"kg", {1, 0, 0, 0}}, {"m", {0, 1, 0, 0}},  {"s", {0, 0, 1, 0}},
                {"A", {0, 0, 0, 1}},  {"N", {1, 1, -2, 0}}, {"J", {1, 2, -2, 0}},
-               {"V", {1, 2, -3, -1}}};
+               {"V", {1, 2, -3, -1}}, {"Ohm", {1, 2, -3, -2}},
+               {"H", {1, 2, -2, -2}}};
 
 /* A unit is factors such as N, m1.5 or 1, joined by . or /. */
 static void parse_unit(const char *unit, double exponents[N_BASES])
@@ -205,8 +206,8 @@ static void variables(int version)
 
 /* ---- structure ---- */
 
-/* Outputs that follow current, normal force and a prescribed acceleration at once; all others wait
- * for the next step. */
+/* Outputs that follow currents, normal force and a prescribed acceleration at once; all others, but
+ * for the coil voltages, wait for the next step. */
 static int has_feedthrough(size_t place)
 {
     switch (place) {
@@ -217,6 +218,8 @@ static int has_feedthrough(size_t place)
     case PLACE(friction_force):
     case PLACE(plate_force):
     case PLACE(wall_force):
+    case PLACE(a_surface_2):
+    case PLACE(friction_force_2):
         return 1;
     }
     return 0;
@@ -241,9 +244,17 @@ static void unknowns(int version, const char *element, int with_dependencies)
             continue;
         printf("    <%s %s=\"%u\"", element, key, real_key(version, i));
         if (with_dependencies && has_feedthrough(i))
-            printf(" dependencies=\"%u %u %u\" dependenciesKind=\"dependent dependent dependent\"",
+            printf(" dependencies=\"%u %u %u %u\" "
+                   "dependenciesKind=\"dependent dependent dependent dependent\"",
                    real_key(version, PLACE(current)), real_key(version, PLACE(normal_force)),
+                   real_key(version, PLACE(current_2)),
                    real_key(version, PLACE(surface_acceleration)));
+        else if (with_dependencies && i == PLACE(coil_voltage))
+            printf(" dependencies=\"%u\" dependenciesKind=\"dependent\"",
+                   real_key(version, PLACE(command_slope)));
+        else if (with_dependencies && i == PLACE(coil_voltage_2))
+            printf(" dependencies=\"%u\" dependenciesKind=\"dependent\"",
+                   real_key(version, PLACE(command_2_slope)));
         else if (with_dependencies)
             printf(" dependencies=\"\" dependenciesKind=\"\"");
         puts("/>");

@@ -2,12 +2,17 @@
 
 #include <math.h>
 
+#include "source.h"
+
 /* A bounce that would last less than this, s, ends a Zeno sequence in resting contact. What it
  * leaves out is of the order 1e-14 J and 1e-12 m. */
 static const double ZENO_FLIGHT = 1e-7;
 
 /* m/s; a ram that meets a wall more slowly is at rest against it. */
 static const double STILL = 1e-15;
+
+/* m/s; two slips that differ by less are equal but for rounding. */
+static const double SAME_SPEED = 1e-12;
 
 /* How far an acceleration that starts a motion from rest may seem to point the wrong way, against
  * gravity and the surface's: a choice between modes must be clear; a mode once taken is kept through
@@ -31,20 +36,22 @@ static double force_noise(const Forces *f)
     return 1e-13 * (fabs(f->friction) + f->normal);
 }
 
-int event_functions(const Model *m, const double y[N_STATES], double tau,
-                    EventFunction functions[MAX_EVENT_FUNCTIONS])
+static int functions_of(const Model *m, const double all[N_ALL], int s, double tau,
+                        EventFunction functions[MAX_EVENT_FUNCTIONS], int n)
 {
     const Reals *p = &m->r;
-    const Mode *mode = &m->mode;
+    const Mode *mode = m->mode + s;
+    const double *y = all + s * N_STATES;
     Forces f;
     ForceRates rate;
-    int n = 0;
-    forces(m, mode, y, tau, &f);
-    force_rates(m, mode, y, tau, &f, &rate);
+    forces(m, m->mode, all, s, tau, &f);
+    force_rates(m, m->mode, all, s, tau, &f, &rate);
 
     const double length = 1e-15 * p->travel, force = force_noise(&f);
     const double speed = 1e-16;
-#define ADD(k, v, r, e) functions[n++] = (EventFunction){.kind = k, .value = v, .rate = r, .noise = e}
+#define ADD(k, v, r, e)                                                                            \
+    functions[n++] =                                                                               \
+        (EventFunction){.kind = k, .surface = s, .value = v, .rate = r, .noise = e}
     switch (mode->wall) {
     case WALL_FREE:
         ADD(EVENT_WALL_ABOVE, p->travel - y[Q], -y[U], length);
@@ -60,7 +67,8 @@ int event_functions(const Model *m, const double y[N_STATES], double tau,
     }
     case WALL_REST:
         ADD(EVENT_WALL_LEFT, -mode->side * f.wall, -mode->side * rate.wall,
-            1e-13 * (fabs(f.drive) + p->ram_mass * p->gravity));
+            1e-13 * (fabs(f.drive) + p->ram_mass * p->gravity +
+                     (m->n.ram_fixed ? p->flexure_stiffness * fabs(y[Z]) : 0.0)));
         break;
     }
     if (mode->slip != 0) {
@@ -81,106 +89,143 @@ int event_functions(const Model *m, const double y[N_STATES], double tau,
         }
     }
 #undef ADD
+    if (m->n.source)
+        n = source_events(m, y, s, tau, back_emf_slope(m, y, f.a_q), functions, n);
+    return n;
+}
+
+int event_functions(const Model *m, const double y[N_ALL], double tau,
+                    EventFunction functions[MAX_EVENT_FUNCTIONS])
+{
+    int n = 0;
+    for (int s = 0; s < moving(m); s++)
+        n = functions_of(m, y, s, tau, functions, n);
     return n;
 }
 
 /* Newton's impact: the ram's velocity in the actuator becomes u, the momentum of ram and surface
- * stays, the part keeps its velocity. */
-static void jump_to(Model *m, double u)
+ * stays, unless the ram stands on the ground; the part keeps its velocity. */
+static void jump_to(Model *m, int s, double u)
 {
+    double *y = m->y + s * N_STATES;
     const double ram = m->r.ram_mass, surface = m->r.surface_mass;
-    const double share = ram / (ram + surface);
-    const double dv = -share * (u - m->y[U]);
-    m->y[E_IMPACT] += 0.5 * share * surface * (m->y[U] * m->y[U] - u * u);
-    m->y[U] = u;
-    m->y[V] += dv;
-    if (m->mode.plate == 0 && plate_acts(m))
-        m->y[W] = -m->y[V];
+    const double share = m->n.ram_fixed ? 1.0 : ram / (ram + surface);
+    const double dv = m->n.ram_fixed ? -u - y[V] : -share * (u - y[U]);
+    y[E_IMPACT] += 0.5 * share * surface * (y[U] * y[U] - u * u);
+    y[U] = u;
+    y[V] += dv;
+    if (m->mode[s].plate == 0 && plate_acts(m))
+        y[W] = -y[V];
     else
-        m->y[W] -= dv;
+        y[W] -= dv;
+}
+
+/* Add dv to the surface's velocity. A free ram keeps its own. */
+static void shove(Model *m, int s, double dv)
+{
+    m->y[s * N_STATES + V] += dv;
+    if (m->mode[s].wall != WALL_REST)
+        m->y[s * N_STATES + U] -= dv;
 }
 
 /* The ram comes to rest in the actuator, so gently that a sticking part goes along. */
-static void stop_ram(Model *m)
+static void stop_ram(Model *m, int s)
 {
-    if (m->mode.slip != 0) {
-        jump_to(m, 0.0);
+    double *y = m->y + s * N_STATES;
+    if (m->mode[s].slip != 0) {
+        jump_to(m, s, 0.0);
         return;
     }
-    const double ram = m->r.ram_mass, body = m->r.surface_mass + part_mass_per_surface(m);
-    const int held = m->mode.plate == 0 && plate_acts(m); /* then nothing moves but the ram */
+    const double ram = m->r.ram_mass, body = m->r.surface_mass + carried_mass(m, m->mode, s);
+    const int held = m->mode[s].plate == 0 && plate_acts(m); /* then nothing moves but the ram */
     const double share = held ? 0.0 : ram / (ram + body);
-    m->y[E_IMPACT] += 0.5 * ram * (1.0 - share) * m->y[U] * m->y[U];
-    m->y[V] += share * m->y[U];
-    m->y[U] = 0.0;
+    const double loss = m->n.ram_fixed ? body : ram * (1.0 - share);
+    y[E_IMPACT] += 0.5 * loss * y[U] * y[U];
+    if (m->n.independent && m->mode[1 - s].slip == 0)
+        shove(m, 1 - s, share * y[U]);
+    else if (m->n.independent)
+        m->y[(1 - s) * N_STATES + W] += share * y[U];
+    y[V] = m->n.ram_fixed ? 0.0 : y[V] + share * y[U];
+    y[U] = 0.0;
 }
 
 /* Acceleration with which a free ram would press into the wall of the given side. */
-static double pressing(const Model *m, double tau, int side)
+static double pressing(const Model *m, int s, double tau, int side)
 {
-    Mode free = m->mode;
+    Mode free[N_MOVING] = {m->mode[0], m->mode[1]};
     Forces f;
-    free.wall = WALL_FREE;
-    forces(m, &free, m->y, tau, &f);
+    free[s].wall = WALL_FREE;
+    forces(m, free, m->y, s, tau, &f);
     return side * f.a_q;
 }
 
-static void set_wall(Model *m, WallMode wall, int side)
+/* The surface comes to rest, held through the part by the springed plate. */
+static void stop_surface(Model *m, int s)
 {
-    m->mode.wall = wall;
-    m->mode.side = side;
+    double *y = m->y + s * N_STATES;
+    y[V] = 0.0;
+    if (m->n.ram_fixed)
+        y[U] = 0.0;
 }
 
-static void set_friction(Model *m, int slip, int plate)
+static void set_wall(Model *m, int s, WallMode wall, int side)
 {
-    if ((m->mode.slip == 0) != (slip == 0))
+    m->mode[s].wall = wall;
+    m->mode[s].side = side;
+}
+
+static void set_friction(Model *m, int s, int slip, int plate)
+{
+    if ((m->mode[s].slip == 0) != (slip == 0))
         m->n.stick_slip_events++;
-    m->mode.slip = slip;
-    m->mode.plate = plate;
+    m->mode[s].slip = slip;
+    m->mode[s].plate = plate;
 }
 
-static void impact(Model *m, double tau, int side)
+static void impact(Model *m, int s, double tau, int side)
 {
-    m->y[Q] = side * m->r.travel;
+    double *y = m->y + s * N_STATES;
+    y[Q] = side * m->r.travel;
     m->n.impacts++;
     if (m->n.contact == 1) {
-        set_wall(m, WALL_TOUCH, side);
+        set_wall(m, s, WALL_TOUCH, side);
         return;
     }
-    const double closing = side * m->y[U], before = pressing(m, tau, side);
+    const double closing = side * y[U], before = pressing(m, s, tau, side);
     if (2.0 * closing <= fmax(ZENO_FLIGHT * before, 2.0 * STILL)) {
         /* A ram at rest that is said to meet the wall left it and came back unseen: it rests. */
         const int unseen = closing == 0.0;
-        stop_ram(m);
+        stop_ram(m, s);
         if (before > 0.0 || unseen)
-            set_wall(m, WALL_REST, side);
+            set_wall(m, s, WALL_REST, side);
         return;
     }
-    jump_to(m, -m->r.restitution * m->y[U]);
-    if (m->mode.slip == 0)
-        set_friction(m, sign(m->y[W]), m->mode.plate); /* the surface jumped, the part did not */
-    const double after = pressing(m, tau, side);
-    if (after >= 0.0 && 2.0 * fabs(m->y[U]) <= ZENO_FLIGHT * after) {
-        jump_to(m, 0.0);
-        set_wall(m, WALL_REST, side);
+    jump_to(m, s, -m->r.restitution * y[U]);
+    if (m->mode[s].slip == 0)
+        set_friction(m, s, sign(y[W]), m->mode[s].plate); /* the surface jumped, the part did not */
+    const double after = pressing(m, s, tau, side);
+    if (after >= 0.0 && 2.0 * fabs(y[U]) <= ZENO_FLIGHT * after) {
+        jump_to(m, s, 0.0);
+        set_wall(m, s, WALL_REST, side);
     }
 }
 
 /* Touch or rest where the free ram is at a wall and does not leave it. */
-static int settle_wall(Model *m, double tau)
+static int settle_wall(Model *m, int s, double tau)
 {
-    if (m->mode.wall != WALL_FREE)
+    const double *y = m->y + s * N_STATES;
+    if (m->mode[s].wall != WALL_FREE)
         return 0;
     for (int side = -1; side <= 1; side += 2) {
-        double closing = side * m->y[U];
-        if (m->r.travel - side * m->y[Q] > 0.0 || closing < 0.0)
+        double closing = side * y[U];
+        if (m->r.travel - side * y[Q] > 0.0 || closing < 0.0)
             continue;
         if (closing > 0.0) {
-            impact(m, tau, side);
+            impact(m, s, tau, side);
             return 1;
         }
-        if (pressing(m, tau, side) > KEPT * m->r.gravity) {
-            set_wall(m, m->n.contact == 1 ? WALL_TOUCH : WALL_REST, side);
+        if (pressing(m, s, tau, side) > KEPT * m->r.gravity) {
+            set_wall(m, s, m->n.contact == 1 ? WALL_TOUCH : WALL_REST, side);
             return 1;
         }
     }
@@ -192,48 +237,79 @@ static int starts(double acceleration, double scale, double slack)
     return slack > 0.0 ? acceleration >= -slack * scale : acceleration > 0.0;
 }
 
-/* Is a friction mode (slip, plate) consistent with the state and the forces that it makes? */
-static int consistent(const Model *m, double tau, int slip, int plate, double slack)
+/* Beside a surface's slip a second friction has a mode: that of the springed plate or, where two
+ * surfaces move by themselves, that of the other surface. There is no plate then. */
+static int second_mode(const Model *m, int s)
 {
-    Mode mode = m->mode;
-    Forces f;
-    mode.slip = slip;
-    mode.plate = plate;
-    forces(m, &mode, m->y, tau, &f);
-    const double w = m->y[W], v_part = m->y[V] + m->y[W];
-    const double scale = fabs(f.a_surface) + m->r.gravity;
-    const double noise = force_noise(&f);
+    return m->n.independent ? m->mode[1 - s].slip : m->mode[s].plate;
+}
 
-    if (slip == 0 && plate == 0 && m->n.prescribed && f.a_surface != 0.0)
+static void set_frictions(Model *m, int s, int slip, int second)
+{
+    if (!m->n.independent) {
+        set_friction(m, s, slip, second);
+        return;
+    }
+    set_friction(m, s, slip, m->mode[s].plate);
+    set_friction(m, 1 - s, second, m->mode[1 - s].plate);
+}
+
+/* Does surface s, with these modes, slip or stick as its mode says? */
+static int slips_so(const Model *m, const Mode mode[N_MOVING], int s, const Forces *f, double slack)
+{
+    const double w = m->y[s * N_STATES + W];
+    const int slip = mode[s].slip;
+    if (slip == 0)
+        return w == 0.0 && fabs(f->friction) <= m->r.mu_s * f->normal + force_noise(f);
+    const double scale = fabs(f->a_surface) + m->r.gravity;
+    return w != 0.0 ? slip == sign(w) : starts(slip * f->a_slip, scale, slack);
+}
+
+/* Are two friction modes consistent with the state and the forces that they make? */
+static int consistent(const Model *m, int s, double tau, int slip, int second, double slack)
+{
+    Mode mode[N_MOVING] = {m->mode[0], m->mode[1]};
+    Forces f;
+    mode[s].slip = slip;
+    if (m->n.independent)
+        mode[1 - s].slip = second;
+    else
+        mode[s].plate = second;
+    forces(m, mode, m->y, s, tau, &f);
+
+    if (slip == 0 && second == 0 && m->n.prescribed && f.a_surface != 0.0)
         return 0; /* the surface moves off, and takes the part from the plate or leaves it */
-    if (slip == 0) {
-        if (w != 0.0 || fabs(f.friction) > m->r.mu_s * f.normal + noise)
-            return 0;
-    } else if (w != 0.0 ? slip != sign(w) : !starts(slip * f.a_slip, scale, slack)) {
+    if (!slips_so(m, mode, s, &f, slack))
         return 0;
+    if (m->n.independent) {
+        forces(m, mode, m->y, 1 - s, tau, &f);
+        return slips_so(m, mode, 1 - s, &f, slack);
     }
     if (!plate_acts(m))
         return 1;
-    if (plate == 0)
-        return v_part == 0.0 && fabs(f.plate) <= m->r.mu_plate * f.normal + noise;
-    return v_part != 0.0 ? plate == sign(v_part)
-                         : starts(plate * (f.a_surface + f.a_slip), scale, slack);
+    const double v_part = m->y[V] + m->y[W];
+    if (second == 0)
+        return v_part == 0.0 && fabs(f.plate) <= m->r.mu_plate * f.normal + force_noise(&f);
+    return v_part != 0.0 ? second == sign(v_part)
+                         : starts(second * (f.a_surface + f.a_slip),
+                                  fabs(f.a_surface) + m->r.gravity, slack);
 }
 
 enum { ANY = 2 };
 
 /* Take the first consistent mode of those asked for, sticking before slipping, as Coulomb's law has
  * it where both are possible. */
-static int choose(Model *m, double tau, int slip, int plate, double slack)
+static int choose(Model *m, int s, double tau, int slip, int second, double slack)
 {
     static const int ORDER[3] = {0, -1, 1};
+    const int open = plate_acts(m) || m->n.independent;
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) {
-            int this_plate = plate_acts(m) ? ORDER[j] : m->mode.plate;
-            if ((slip != ANY && slip != ORDER[i]) || (plate != ANY && plate != this_plate) ||
-                !consistent(m, tau, ORDER[i], this_plate, slack))
+            int this_second = open ? ORDER[j] : m->mode[s].plate;
+            if ((slip != ANY && slip != ORDER[i]) || (second != ANY && second != this_second) ||
+                !consistent(m, s, tau, ORDER[i], this_second, slack))
                 continue;
-            set_friction(m, ORDER[i], this_plate);
+            set_frictions(m, s, ORDER[i], this_second);
             return 1;
         }
     }
@@ -241,94 +317,117 @@ static int choose(Model *m, double tau, int slip, int plate, double slack)
 }
 
 /* The present mode, if it is consistent and may be kept; else another. */
-static int settle_friction(Model *m, double tau, int keep)
+static int settle_friction(Model *m, int s, double tau, int keep)
 {
-    const Mode before = m->mode;
-    if (keep && consistent(m, tau, before.slip, before.plate, KEPT))
+    const int slip = m->mode[s].slip, second = second_mode(m, s);
+    if (keep && consistent(m, s, tau, slip, second, KEPT))
         return 0;
     /* If neither finds one, the state is on a boundary to the last bit, and the present mode is as
      * good as its neighbour. */
-    if (!choose(m, tau, ANY, ANY, CLEAR))
-        choose(m, tau, ANY, ANY, KEPT);
-    return m->mode.slip != before.slip || m->mode.plate != before.plate;
+    if (!choose(m, s, tau, ANY, ANY, CLEAR))
+        choose(m, s, tau, ANY, ANY, KEPT);
+    return m->mode[s].slip != slip || second_mode(m, s) != second;
 }
 
 /* Break away in a given direction. The other friction keeps its mode if it can. */
-static void break_slip(Model *m, double tau, int slip)
+static void break_slip(Model *m, int s, double tau, int slip)
 {
-    if (!choose(m, tau, slip, m->mode.plate, BROKEN) && !choose(m, tau, slip, ANY, BROKEN))
-        set_friction(m, slip, m->mode.plate);
+    const int second = second_mode(m, s);
+    if (!choose(m, s, tau, slip, second, BROKEN) && !choose(m, s, tau, slip, ANY, BROKEN))
+        set_frictions(m, s, slip, second);
 }
 
 static void break_plate(Model *m, double tau, int plate)
 {
-    if (!choose(m, tau, m->mode.slip, plate, BROKEN) && !choose(m, tau, ANY, plate, BROKEN))
-        set_friction(m, m->mode.slip, plate);
+    if (!choose(m, 0, tau, m->mode[0].slip, plate, BROKEN) &&
+        !choose(m, 0, tau, ANY, plate, BROKEN))
+        set_friction(m, 0, m->mode[0].slip, plate);
 }
 
-static void settle(Model *m, double tau, int keep)
+static void settle(Model *m, int s, double tau, int keep)
 {
-    if (m->mode.plate == 0 && !plate_acts(m))
-        m->mode.plate = 1;
+    for (int k = 0; k < moving(m); k++)
+        if (m->mode[k].plate == 0 && !plate_acts(m))
+            m->mode[k].plate = 1;
     /* Two passes suffice; a limit, so that rounding on a boundary cannot make an endless loop. */
     for (int pass = 0; pass < 8; pass++) {
-        int changed = settle_wall(m, tau);
-        changed |= settle_friction(m, tau, keep);
+        int changed = 0;
+        for (int k = 0; k < moving(m); k++)
+            changed |= settle_wall(m, k, tau);
+        changed |= settle_friction(m, s, tau, keep);
         keep = 1;
         if (!changed)
-            return;
+            break;
     }
+    for (int k = 0; k < moving(m); k++)
+        source_settle_output(m, k, tau);
 }
 
 void settle_mode(Model *m, double tau)
 {
-    settle(m, tau, 1);
+    for (int k = 0; k < moving(m); k++)
+        source_settle_command(m, k, tau);
+    settle(m, 0, tau, 1);
 }
 
-void apply_event(Model *m, double tau, EventKind kind)
+/* Where both surfaces come to stick at once, rounding must not make one of them do so alone: its
+ * friction, bearing the whole part, could be too much. */
+static void end_slip_of_both(Model *m, int s)
 {
-    const Mode before = m->mode;
-    const int no_slip = m->y[W] == 0.0, no_travel = m->y[V] + m->y[W] == 0.0;
+    const double w = m->y[s * N_STATES + W];
+    if (m->mode[s].slip == 0 || fabs(w) > SAME_SPEED)
+        return;
+    m->y[s * N_STATES + W] = 0.0;
+    shove(m, s, w);
+}
+
+void apply_event(Model *m, int s, double tau, EventKind kind)
+{
+    double *y = m->y + s * N_STATES;
+    const Mode before = m->mode[s];
+    const int no_slip = y[W] == 0.0, no_travel = y[V] + y[W] == 0.0;
     int keep = 1;
     switch (kind) {
     case EVENT_WALL_ABOVE:
     case EVENT_WALL_BELOW:
-        impact(m, tau, kind == EVENT_WALL_ABOVE ? 1 : -1);
+        impact(m, s, tau, kind == EVENT_WALL_ABOVE ? 1 : -1);
         break;
     case EVENT_WALL_LEFT:
         /* Not to be settled again: it would find the ram at the wall, as near to pressing as not. */
-        m->y[Q] = m->mode.side * m->r.travel;
-        set_wall(m, WALL_FREE, 0);
-        settle_friction(m, tau, 1);
+        y[Q] = m->mode[s].side * m->r.travel;
+        set_wall(m, s, WALL_FREE, 0);
+        settle_friction(m, s, tau, 1);
         return;
     case EVENT_WALL_PARTING:
         /* While parted, E_IMPACT counts all that the spring holds as lost; model_outputs takes off
          * what it still holds. */
-        if (m->mode.wall == WALL_TOUCH) {
-            m->mode.wall = WALL_PARTING;
-            m->y[E_IMPACT] += wall_energy(m, m->y);
+        if (m->mode[s].wall == WALL_TOUCH) {
+            m->mode[s].wall = WALL_PARTING;
+            y[E_IMPACT] += wall_energy(m, m->mode + s, y);
         } else {
-            m->y[E_IMPACT] -= wall_energy(m, m->y);
-            m->mode.wall = WALL_TOUCH;
+            y[E_IMPACT] -= wall_energy(m, m->mode + s, y);
+            m->mode[s].wall = WALL_TOUCH;
         }
         break;
     case EVENT_SLIP_ENDS:
-        m->y[W] = 0.0;
-        if (m->mode.plate == 0 && plate_acts(m) && !m->n.prescribed)
-            m->y[V] = 0.0;
+        y[W] = 0.0;
+        if (m->mode[s].plate == 0 && plate_acts(m) && !m->n.prescribed)
+            stop_surface(m, s);
+        if (m->n.independent)
+            end_slip_of_both(m, 1 - s);
         keep = 0;
         break;
     case EVENT_SLIP_DOWN:
-        break_slip(m, tau, -1);
+        break_slip(m, s, tau, -1);
         return;
     case EVENT_SLIP_UP:
-        break_slip(m, tau, 1);
+        break_slip(m, s, tau, 1);
         return;
     case EVENT_PLATE_STOPS:
-        if (m->mode.slip == 0)
-            m->y[V] = 0.0;
+        if (m->mode[s].slip == 0)
+            stop_surface(m, s);
         else
-            m->y[W] = -m->y[V];
+            y[W] = -y[V];
         keep = 0;
         break;
     case EVENT_PLATE_DOWN:
@@ -337,13 +436,21 @@ void apply_event(Model *m, double tau, EventKind kind)
     case EVENT_PLATE_UP:
         break_plate(m, tau, 1);
         return;
+    case EVENT_COMMAND_HIGH:
+    case EVENT_COMMAND_LOW:
+    case EVENT_COMMAND_BACK:
+    case EVENT_CURRENT_MET:
+    case EVENT_OUTPUT_HIGH:
+    case EVENT_OUTPUT_LOW:
+        source_apply(m, s, tau, kind);
+        return;
     case N_EVENTS:
         break;
     }
-    settle(m, tau, keep);
+    settle(m, s, tau, keep);
     /* A motion that ends at the instant of its start, and would start again, is none. */
-    if (kind == EVENT_SLIP_ENDS && no_slip && m->mode.slip == before.slip)
-        set_friction(m, 0, m->mode.plate);
-    if (kind == EVENT_PLATE_STOPS && no_travel && m->mode.plate == before.plate)
-        set_friction(m, m->mode.slip, 0);
+    if (kind == EVENT_SLIP_ENDS && no_slip && m->mode[s].slip == before.slip)
+        set_friction(m, s, 0, m->mode[s].plate);
+    if (kind == EVENT_PLATE_STOPS && no_travel && m->mode[s].plate == before.plate)
+        set_friction(m, s, m->mode[s].slip, 0);
 }

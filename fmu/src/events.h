@@ -15,25 +15,32 @@ typedef enum {
     EVENT_PLATE_STOPS,
     EVENT_PLATE_DOWN, /* the part breaks away from the springed plate */
     EVENT_PLATE_UP,
+    EVENT_COMMAND_HIGH, /* the source is asked for more than its current limit */
+    EVENT_COMMAND_LOW,
+    EVENT_COMMAND_BACK,
+    EVENT_CURRENT_MET, /* the current meets its target again */
+    EVENT_OUTPUT_HIGH, /* to follow its target would take more voltage than there is */
+    EVENT_OUTPUT_LOW,
     N_EVENTS
 } EventKind;
 
 /* An event happens where its value falls through zero. */
 typedef struct {
     EventKind kind;
+    int surface; /* whose event it is */
     double value, rate; /* rate: d(value)/dt */
     double noise;       /* values above -noise are rounding, not an event */
 } EventFunction;
 
-enum { MAX_EVENT_FUNCTIONS = 6 };
+enum { MAX_EVENT_FUNCTIONS = N_MOVING * 10 };
 
 /* The event functions of the present mode at state y. Returns their number; the order is the same
  * for the same mode. */
-int event_functions(const Model *m, const double y[N_STATES], double tau,
+int event_functions(const Model *m, const double y[N_ALL], double tau,
                     EventFunction functions[MAX_EVENT_FUNCTIONS]);
 
-/* Apply one event to state and mode, then settle. */
-void apply_event(Model *m, double tau, EventKind kind);
+/* Apply one event of surface s to state and mode, then settle. */
+void apply_event(Model *m, int s, double tau, EventKind kind);
 
 /* Make the mode agree with state and inputs: after a jump of either, several conditions can be
  * violated at once (impact and slip, release and stick, ...). */

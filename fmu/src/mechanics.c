@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "source.h"
+
 double force_factor_at(const Model *m, double q)
 {
     return m->r.force_factor * (1.0 + q * (m->r.b1 + q * m->r.b2));
@@ -15,6 +17,13 @@ static double force_factor_rate(const Model *m, double q, double u)
 double part_mass_per_surface(const Model *m)
 {
     return m->r.part_mass / m->n.n_surfaces;
+}
+
+double rest_height(const Model *m)
+{
+    const double ram = m->n.ram_fixed ? 0.0 : m->r.ram_mass;
+    return -(ram + m->r.surface_mass + part_mass_per_surface(m)) * m->r.gravity /
+           m->r.flexure_stiffness;
 }
 
 double back_emf_slope(const Model *m, const double y[N_STATES], double a_q)
@@ -34,16 +43,22 @@ static int held_by_plate(const Model *m, const Mode *mode)
     return mode->plate == 0 && m->r.mu_plate > 0.0;
 }
 
-/* Where the surface's motion is prescribed: the part alone, the ram standing still in the actuator. */
-static void forces_on_part(const Model *m, const Mode *mode, double tau, Forces *f)
+static double normal_force_at(const Model *m, double tau)
+{
+    const double force = m->r.normal_force + m->r.normal_force_slope * tau;
+    return force > 0.0 ? force : 0.0; /* not fmax, which is a call */
+}
+
+/* Where the surface's acceleration is given: the part alone, the ram standing still in the actuator. */
+static void forces_on_part(const Model *m, const Mode *mode, double tau, double a_surface, Forces *f)
 {
     const Reals *p = &m->r;
     const double part = part_mass_per_surface(m), weight = part * p->gravity;
     const int held = held_by_plate(m, mode);
 
-    f->a_surface = p->surface_acceleration;
+    f->a_surface = a_surface;
     f->a_q = f->wall = f->drive = 0.0;
-    f->normal = fmax(0.0, p->normal_force + p->normal_force_slope * tau);
+    f->normal = normal_force_at(m, tau);
     f->plate = -p->mu_plate * f->normal * mode->plate;
     f->a_slip = 0.0;
     if (mode->slip == 0 && held) {
@@ -78,91 +93,184 @@ static void rates_on_part(const Model *m, const Mode *mode, const Forces *f, For
         rate->plate = -rate->friction;
 }
 
-void forces(const Model *m, const Mode *mode, const double y[N_STATES], double tau, Forces *f)
+/* What acts on one surface without friction. */
+typedef struct {
+    double suspension, drive, wall; /* on the ram, N */
+    double body;                    /* mass that moves as one with the surface, kg */
+    double load;                    /* force on it, N */
+} Load;
+
+static inline double suspension_force(const Model *m, double q, double u)
+{
+    const Reals *p = &m->r;
+    return -q * (p->suspension_k1 + q * (p->suspension_k2 + q * p->suspension_k3)) -
+           p->suspension_damping * u;
+}
+
+static inline void load_on(const Model *m, const Mode *mode, const double y[N_STATES], int s, double tau,
+                    Load *l)
+{
+    const Reals *p = &m->r;
+    const double q = y[Q], u = y[U];
+    const int rest = mode->wall == WALL_REST;
+    l->suspension = suspension_force(m, q, u);
+    l->drive = force_factor_at(m, q) * coil_current(m, y, s, tau);
+    l->wall = 0.0;
+    if (mode->wall == WALL_TOUCH) {
+        double depth = penetration(m, mode, y);
+        l->wall = -mode->side * p->contact_stiffness * depth * sqrt(depth) *
+                  (1.0 + p->contact_damping * mode->side * u);
+    }
+    const double on_ram = l->drive + l->suspension + l->wall;
+    l->body = rest ? p->surface_mass + p->ram_mass : p->surface_mass;
+    l->load = -p->flexure_stiffness * y[Z] - p->flexure_damping * y[V] - l->body * p->gravity -
+              (rest ? 0.0 : on_ram);
+}
+
+double carried_mass(const Model *m, const Mode mode[N_MOVING], int s)
+{
+    if (!m->n.independent)
+        return part_mass_per_surface(m);
+    const Mode *other = &mode[1 - s];
+    if (other->slip != 0)
+        return m->r.part_mass;
+    return m->r.part_mass + m->r.surface_mass + (other->wall == WALL_REST ? m->r.ram_mass : 0.0);
+}
+
+/* Force on what surface s carries, beside that surface and the weight of carried_mass: the friction
+ * of the other surface where that slips, and what acts on the other surface where it moves along. */
+static double lift_on(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], int s,
+                      double tau, double normal)
+{
+    const int other = 1 - s;
+    if (mode[other].slip != 0)
+        return -m->r.mu_k * normal * mode[other].slip;
+    Load l;
+    load_on(m, &mode[other], y + other * N_STATES, other, tau, &l);
+    return l.load + l.body * m->r.gravity;
+}
+
+void forces(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL], int s, double tau,
+            Forces *f)
 {
     if (m->n.prescribed) {
-        forces_on_part(m, mode, tau, f);
+        forces_on_part(m, modes, tau, m->r.surface_acceleration, f);
         return;
     }
     const Reals *p = &m->r;
-    const double q = y[Q], u = y[U];
-    const double part = part_mass_per_surface(m);
-    const double suspension =
-        -q * (p->suspension_k1 + q * (p->suspension_k2 + q * p->suspension_k3)) -
-        p->suspension_damping * u;
+    const Mode *mode = modes + s;
+    const double *y = all + s * N_STATES;
 
-    f->drive = force_factor_at(m, q) * (p->current + p->current_slope * tau);
-    f->normal = fmax(0.0, p->normal_force + p->normal_force_slope * tau);
-    f->wall = 0.0;
-    if (mode->wall == WALL_TOUCH) {
-        double depth = penetration(m, mode, y);
-        f->wall = -mode->side * p->contact_stiffness * depth * sqrt(depth) *
-                  (1.0 + p->contact_damping * mode->side * u);
+    if (mode->wall == WALL_REST && m->n.ram_fixed) {
+        forces_on_part(m, mode, tau, 0.0, f);
+        f->drive = force_factor_at(m, y[Q]) * coil_current(m, y, s, tau);
+        f->wall = -p->flexure_stiffness * y[Z] - p->surface_mass * p->gravity - f->friction -
+                  f->drive - suspension_force(m, y[Q], y[U]);
+        return;
     }
-
-    /* What moves as one with the surface, and the force on it without friction. */
-    const int rest = mode->wall == WALL_REST;
-    const double on_ram = f->drive + suspension + f->wall;
-    const double body = rest ? p->surface_mass + p->ram_mass : p->surface_mass;
-    const double load = -p->flexure_stiffness * y[Z] - p->flexure_damping * y[V] -
-                        body * p->gravity - (rest ? 0.0 : on_ram);
+    Load l;
+    load_on(m, mode, y, s, tau, &l);
+    f->drive = l.drive;
+    f->wall = l.wall;
+    f->normal = normal_force_at(m, tau);
+    const double part = carried_mass(m, modes, s), body = l.body;
+    const double lift = m->n.independent ? lift_on(m, modes, all, s, tau, f->normal) : 0.0;
     const int held = held_by_plate(m, mode);
 
     f->plate = -p->mu_plate * f->normal * mode->plate;
     if (mode->slip == 0) {
         if (held) {
             f->a_surface = 0.0;
-            f->friction = load;
+            f->friction = l.load;
             f->plate = part * p->gravity - f->friction;
         } else {
-            f->a_surface = (load - part * p->gravity + f->plate) / (body + part);
-            f->friction = part * (f->a_surface + p->gravity) - f->plate;
+            f->a_surface = (l.load - part * p->gravity + f->plate + lift) / (body + part);
+            f->friction = part * (f->a_surface + p->gravity) - f->plate - lift;
         }
         f->a_slip = 0.0;
     } else {
         f->friction = -p->mu_k * f->normal * mode->slip;
-        f->a_surface = (load - f->friction) / body;
+        f->a_surface = (l.load - f->friction) / body;
         if (held) {
             f->plate = part * p->gravity - f->friction;
             f->a_slip = -f->a_surface;
         } else {
-            f->a_slip = (f->friction + f->plate) / part - p->gravity - f->a_surface;
+            f->a_slip = (f->friction + f->plate + lift) / part - p->gravity - f->a_surface;
         }
     }
-    if (rest) {
+    if (mode->wall == WALL_REST) {
         f->a_q = 0.0;
-        f->wall = p->ram_mass * (f->a_surface + p->gravity) - f->drive - suspension;
+        f->wall = p->ram_mass * (f->a_surface + p->gravity) - f->drive - l.suspension;
+    } else if (m->n.ram_fixed) {
+        f->a_q = -f->a_surface;
     } else {
-        f->a_q = on_ram / p->ram_mass - p->gravity - f->a_surface;
+        f->a_q = (l.drive + l.suspension + l.wall) / p->ram_mass - p->gravity - f->a_surface;
     }
 }
 
-void force_rates(const Model *m, const Mode *mode, const double y[N_STATES], double tau,
-                 const Forces *f, ForceRates *rate)
+/* Rate of the force on the ram without the wall's. */
+static double ram_rate(const Model *m, const Mode *mode, const double y[N_STATES], int s,
+                       double tau, const Forces *f)
+{
+    const Reals *p = &m->r;
+    const double q = y[Q], u = y[U];
+    return force_factor_rate(m, q, u) * coil_current(m, y, s, tau) +
+           force_factor_at(m, q) * coil_current_rate(m, mode, y, s) -
+           (p->suspension_k1 + q * (2.0 * p->suspension_k2 + q * 3.0 * p->suspension_k3)) * u -
+           p->suspension_damping * f->a_q;
+}
+
+/* Rate of Load.load; *wall receives that of the wall's force. */
+static double load_rate(const Model *m, const Mode *mode, const double y[N_STATES], const Forces *f,
+                        double own, double *wall)
+{
+    const Reals *p = &m->r;
+    *wall = 0.0;
+    if (mode->wall == WALL_TOUCH) {
+        double depth = penetration(m, mode, y), speed = mode->side * y[U];
+        *wall = -mode->side * p->contact_stiffness * sqrt(depth) *
+                (1.5 * speed * (1.0 + p->contact_damping * speed) +
+                 depth * p->contact_damping * mode->side * f->a_q);
+    }
+    return -p->flexure_stiffness * y[V] - p->flexure_damping * f->a_surface -
+           (mode->wall == WALL_REST ? 0.0 : own + *wall);
+}
+
+static double lift_rate(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], int s,
+                        double tau, double normal_rate)
+{
+    const int other = 1 - s;
+    if (mode[other].slip != 0)
+        return -m->r.mu_k * normal_rate * mode[other].slip;
+    const double *own = y + other * N_STATES;
+    Forces f;
+    double wall;
+    forces(m, mode, y, other, tau, &f);
+    return load_rate(m, &mode[other], own, &f, ram_rate(m, &mode[other], own, other, tau, &f),
+                     &wall);
+}
+
+void force_rates(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL], int s,
+                 double tau, const Forces *f, ForceRates *rate)
 {
     if (m->n.prescribed) {
-        rates_on_part(m, mode, f, rate);
+        rates_on_part(m, modes, f, rate);
         return;
     }
     const Reals *p = &m->r;
-    const double q = y[Q], u = y[U];
-    const double part = part_mass_per_surface(m);
+    const Mode *mode = modes + s;
+    const double *y = all + s * N_STATES;
+    const double part = carried_mass(m, modes, s);
     const int rest = mode->wall == WALL_REST;
     const int held = held_by_plate(m, mode);
 
-    double own = force_factor_rate(m, q, u) * (p->current + p->current_slope * tau) +
-                 force_factor_at(m, q) * p->current_slope -
-                 (p->suspension_k1 + q * (2.0 * p->suspension_k2 + q * 3.0 * p->suspension_k3)) * u -
-                 p->suspension_damping * f->a_q;
-    rate->wall = 0.0;
-    if (mode->wall == WALL_TOUCH) {
-        double depth = penetration(m, mode, y), speed = mode->side * u;
-        rate->wall = -mode->side * p->contact_stiffness * sqrt(depth) *
-                     (1.5 * speed * (1.0 + p->contact_damping * speed) +
-                      depth * p->contact_damping * mode->side * f->a_q);
+    const double own = ram_rate(m, mode, y, s, tau, f);
+    if (rest && m->n.ram_fixed) {
+        rates_on_part(m, mode, f, rate);
+        rate->wall = -rate->friction - own;
+        return;
     }
-    const double load = -p->flexure_stiffness * y[V] - p->flexure_damping * f->a_surface -
-                        (rest ? 0.0 : own + rate->wall);
+    const double load = load_rate(m, mode, y, f, own, &rate->wall);
     const double body = rest ? p->surface_mass + p->ram_mass : p->surface_mass;
     double jerk = 0.0;
 
@@ -173,8 +281,10 @@ void force_rates(const Model *m, const Mode *mode, const double y[N_STATES], dou
             rate->friction = load;
             rate->plate = -load;
         } else {
-            jerk = (load + rate->plate) / (body + part);
-            rate->friction = part * jerk - rate->plate;
+            const double lift =
+                m->n.independent ? lift_rate(m, modes, all, s, tau, rate->normal) : 0.0;
+            jerk = (load + rate->plate + lift) / (body + part);
+            rate->friction = part * jerk - rate->plate - lift;
         }
     } else {
         rate->friction = -p->mu_k * rate->normal * mode->slip;
@@ -186,53 +296,69 @@ void force_rates(const Model *m, const Mode *mode, const double y[N_STATES], dou
         rate->wall = p->ram_mass * jerk - own;
 }
 
-void state_rates(const Model *m, const Mode *mode, const double y[N_STATES], double tau,
-                 double dy[N_STATES])
+void state_rates(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL], double tau,
+                 double rates[N_ALL])
 {
     const Reals *p = &m->r;
-    Forces f;
-    forces(m, mode, y, tau, &f);
-    dy[Z] = y[V];
-    dy[V] = f.a_surface;
-    dy[Q] = y[U];
-    dy[U] = f.a_q;
-    dy[D] = y[W];
-    dy[W] = f.a_slip;
-    dy[E_IN] = m->n.prescribed ? f.friction * y[V] : f.drive * y[U];
-    dy[E_FRICTION] = -f.friction * y[W] - f.plate * (y[V] + y[W]);
-    dy[E_DAMPING] = m->n.prescribed ? 0.0
-                                    : p->flexure_damping * y[V] * y[V] +
-                                          p->suspension_damping * y[U] * y[U];
-    dy[E_IMPACT] = 0.0;
-    if (mode->wall == WALL_TOUCH) {
-        /* What the wall takes, less what its spring stores. */
-        double depth = penetration(m, mode, y);
-        double spring = p->contact_stiffness * depth * sqrt(depth);
-        dy[E_IMPACT] = -(f.wall * mode->side + spring) * mode->side * y[U];
+    for (int s = 0; s < moving(m); s++) {
+        const Mode *mode = modes + s;
+        const double *y = all + s * N_STATES;
+        double *dy = rates + s * N_STATES;
+        Forces f;
+        forces(m, modes, all, s, tau, &f);
+        dy[Z] = y[V];
+        dy[V] = f.a_surface;
+        dy[Q] = y[U];
+        dy[U] = f.a_q;
+        dy[D] = y[W];
+        dy[W] = f.a_slip;
+        dy[E_IN] = m->n.prescribed ? f.friction * y[V] : f.drive * y[U];
+        dy[E_FRICTION] = -f.friction * y[W] - f.plate * (y[V] + y[W]);
+        dy[E_DAMPING] = m->n.prescribed ? 0.0
+                                        : p->flexure_damping * y[V] * y[V] +
+                                              p->suspension_damping * y[U] * y[U];
+        source_rates(m, mode, y, s, dy);
+        dy[E_IMPACT] = 0.0;
+        if (mode->wall == WALL_TOUCH) {
+            /* What the wall takes, less what its spring stores. */
+            double depth = penetration(m, mode, y);
+            double spring = p->contact_stiffness * depth * sqrt(depth);
+            dy[E_IMPACT] = -(f.wall * mode->side + spring) * mode->side * y[U];
+        }
     }
 }
 
-double wall_energy(const Model *m, const double y[N_STATES])
+double wall_energy(const Model *m, const Mode *mode, const double y[N_STATES])
 {
-    if (m->mode.wall != WALL_TOUCH && m->mode.wall != WALL_PARTING)
+    if (mode->wall != WALL_TOUCH && mode->wall != WALL_PARTING)
         return 0.0;
-    double depth = penetration(m, &m->mode, y);
+    double depth = penetration(m, mode, y);
     return 0.4 * m->r.contact_stiffness * depth * depth * sqrt(depth);
 }
 
-double energy_stored(const Model *m, const double y[N_STATES])
+/* With the given mass of the part, kg. */
+static double energy_of_surface(const Model *m, const Mode *mode, const double y[N_STATES],
+                                double part)
 {
     const Reals *p = &m->r;
-    const double part = part_mass_per_surface(m);
     const double q = y[Q], v_ram = y[V] + y[U], v_part = y[V] + y[W];
     if (m->n.prescribed)
         return part * (0.5 * v_part * v_part + p->gravity * (y[Z] + y[D]));
-    double kinetic = 0.5 * (p->ram_mass * v_ram * v_ram + p->surface_mass * y[V] * y[V] +
+    const double ram = m->n.ram_fixed ? 0.0 : p->ram_mass; /* what stands on the ground has none */
+    double kinetic = 0.5 * (ram * v_ram * v_ram + p->surface_mass * y[V] * y[V] +
                             part * v_part * v_part);
-    double weight = p->gravity * (p->ram_mass * (y[Z] + q) + p->surface_mass * y[Z] +
+    double weight = p->gravity * (ram * (y[Z] + q) + p->surface_mass * y[Z] +
                                   part * (y[Z] + y[D]));
     double springs = 0.5 * p->flexure_stiffness * y[Z] * y[Z] +
                      q * q * (p->suspension_k1 / 2.0 +
                               q * (p->suspension_k2 / 3.0 + q * p->suspension_k3 / 4.0));
-    return kinetic + weight + springs + wall_energy(m, y);
+    return kinetic + weight + springs + wall_energy(m, mode, y);
+}
+
+double energy_stored(const Model *m, const double y[N_ALL])
+{
+    if (!m->n.independent)
+        return energy_of_surface(m, m->mode, y, part_mass_per_surface(m));
+    return energy_of_surface(m, m->mode, y, m->r.part_mass) +
+           energy_of_surface(m, m->mode + 1, y + N_STATES, 0.0);
 }

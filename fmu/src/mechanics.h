@@ -16,18 +16,28 @@ typedef struct {
     double normal;                /* N/s */
 } ForceRates;
 
-/* tau is the time since the inputs were brought up to date (the start of the step), s. */
-void forces(const Model *m, const Mode *mode, const double y[N_STATES], double tau, Forces *f);
-void force_rates(const Model *m, const Mode *mode, const double y[N_STATES], double tau,
-                 const Forces *f, ForceRates *rate);
-void state_rates(const Model *m, const Mode *mode, const double y[N_STATES], double tau,
-                 double dy[N_STATES]);
+/* For surface s, of the modes and states of all that move. tau is the time since the inputs were
+ * brought up to date (the start of the step), s. */
+void forces(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], int s, double tau,
+            Forces *f);
+void force_rates(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], int s,
+                 double tau, const Forces *f, ForceRates *rate);
+/* Mass that moves with surface s while the part sticks to it, without the surface and its ram, kg. */
+double carried_mass(const Model *m, const Mode mode[N_MOVING], int s);
+
+/* For all surfaces that move. */
+void state_rates(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], double tau,
+                 double dy[N_ALL]);
+double energy_stored(const Model *m, const double y[N_ALL]);
+
+/* For one surface, of its own mode and states. */
 
 double back_emf_slope(const Model *m, const double y[N_STATES], double a_q);
 double force_factor_at(const Model *m, double q);
 double part_mass_per_surface(const Model *m);
+/* Height of the surface at rest, under the weight of all that it carries, m. */
+double rest_height(const Model *m);
 /* What the spring of a touched compliant wall holds, J. */
-double wall_energy(const Model *m, const double y[N_STATES]);
-double energy_stored(const Model *m, const double y[N_STATES]);
+double wall_energy(const Model *m, const Mode *mode, const double y[N_STATES]);
 
 #endif

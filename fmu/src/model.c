@@ -7,6 +7,7 @@
 #include "advance.h"
 #include "events.h"
 #include "mechanics.h"
+#include "source.h"
 
 #define PARAMETER(name, unit, start, min, max, text) {#name, unit, text, KIND_PARAMETER, start, min, max},
 #define INPUT(name, unit, start, min, max, text) {#name, unit, text, KIND_INPUT, start, min, max},
@@ -98,9 +99,9 @@ static void hang_ram(Model *m)
 {
     double low = -m->r.travel, high = 0.0;
     if (ram_balance(m, low) < 0.0) {
-        m->mode.side = -1;
-        m->mode.wall = m->n.contact == 1 ? WALL_TOUCH : WALL_REST;
-        if (m->mode.wall == WALL_REST) {
+        m->mode[0].side = -1;
+        m->mode[0].wall = m->n.contact == 1 ? WALL_TOUCH : WALL_REST;
+        if (m->mode[0].wall == WALL_REST) {
             m->y[Q] = low;
             return;
         }
@@ -127,24 +128,31 @@ int model_initialise(Model *m, char *message)
                  m->r.mu_s);
         return -1;
     }
+    if (m->n.prescribed && m->n.source)
+        return say(message, "prescribed = 1 leaves the coil out: source must be 0 then");
+    if (m->n.independent &&
+        (m->n.n_surfaces != 2 || m->n.prescribed || m->n.ram_fixed || m->r.mu_plate > 0.0))
+        return say(message, "independent = 1 needs n_surfaces = 2, and prescribed, ram_fixed and "
+                            "mu_plate to be 0");
     memset(m->y, 0, sizeof m->y);
-    m->mode.wall = WALL_FREE;
-    m->mode.side = 0;
+    memset(m->mode, 0, sizeof m->mode); /* the walls free, the part sticking */
     if (m->n.prescribed) {
         m->y[V] = m->r.surface_velocity;
     } else {
-        hang_ram(m);
-        m->y[Z] = -(m->r.ram_mass + m->r.surface_mass + part_mass_per_surface(m)) * m->r.gravity /
-                  m->r.flexure_stiffness;
+        if (!m->n.ram_fixed)
+            hang_ram(m);
+        m->y[Z] = rest_height(m);
     }
-    m->mode.slip = 0;
-    m->mode.plate = 0;
+    m->mode[1] = m->mode[0];
+    memcpy(m->y + N_STATES, m->y, N_STATES * sizeof *m->y);
     if (!isfinite(m->y[Q]))
         return say(message, "the ram has no static equilibrium: the suspension is too weak");
     m->step = 1e-6;
     m->energy_at_start = energy_stored(m, m->y);
     settle_mode(m, 0.0);
-    m->r.stick_time = 0.0;
+    m->r.stick_time = m->r.stick_time_2 = 0.0;
+    m->r.output_high_time = m->r.output_low_time = m->r.current_limit_time = 0.0;
+    m->r.coil_current_max = m->r.coil_current_min = 0.0;
     m->n.impacts = m->n.stick_slip_events = m->n.internal_steps = m->n.internal_rejected = 0;
     m->initialised = 1;
     model_outputs(m);
@@ -167,9 +175,39 @@ int model_step(Model *m, double h, char *message)
     if (advance(m, h, message))
         return -1;
     m->r.current = current;
+    m->r.command += m->r.command_slope * h;
+    m->r.current_2 += m->r.current_2_slope * h;
+    m->r.command_2 += m->r.command_2_slope * h;
     m->r.surface_velocity += m->r.surface_acceleration * h;
     m->r.normal_force = normal > 0.0 ? normal : 0.0;
     return 0;
+}
+
+/* Sum of one of the energies over all surfaces that move. */
+static double sum_of(const Model *m, int state)
+{
+    return m->n.independent ? m->y[state] + m->y[N_STATES + state] : m->y[state];
+}
+
+static void outputs_of_second(Model *m)
+{
+    Forces f;
+    const double *y = m->y + N_STATES;
+    Reals *r = &m->r;
+    forces(m, m->mode, m->y, 1, 0.0, &f);
+    r->z_surface_2 = y[Z];
+    r->v_surface_2 = y[V];
+    r->a_surface_2 = f.a_surface;
+    r->z_ram_2 = y[Z] + y[Q];
+    r->v_ram_2 = y[V] + y[U];
+    r->back_emf_2 = force_factor_at(m, y[Q]) * y[U];
+    r->friction_force_2 = f.friction;
+    r->coil_current_2 = y[I_COIL];
+    r->coil_voltage_2 = m->n.source ? coil_voltage(m, m->mode + 1, y, 1) : 0.0;
+    r->energy_magnetic += magnetic_energy(m, y);
+    if (m->mode[1].wall == WALL_PARTING)
+        r->energy_impact -= wall_energy(m, m->mode + 1, y);
+    m->n.sticking_2 = m->mode[1].slip == 0;
 }
 
 void model_outputs(Model *m)
@@ -177,11 +215,11 @@ void model_outputs(Model *m)
     Forces f;
     const double *y = m->y;
     Reals *r = &m->r;
-    forces(m, &m->mode, y, 0.0, &f);
+    forces(m, m->mode, y, 0, 0.0, &f);
     r->z_surface = y[Z];
     r->v_surface = y[V];
     r->a_surface = f.a_surface;
-    r->z_ram = y[Z] + y[Q];
+    r->z_ram = m->n.ram_fixed && !m->n.prescribed ? rest_height(m) : y[Z] + y[Q];
     r->v_ram = y[V] + y[U];
     r->a_ram = f.a_surface + f.a_q;
     r->z_part = y[Z] + y[D];
@@ -195,33 +233,54 @@ void model_outputs(Model *m)
     r->friction_force = f.friction;
     r->plate_force = f.plate;
     r->wall_force = f.wall;
-    r->energy_in = y[E_IN];
-    r->energy_friction = y[E_FRICTION];
-    r->energy_impact = y[E_IMPACT];
-    if (m->mode.wall == WALL_PARTING)
-        r->energy_impact -= wall_energy(m, y);
-    r->energy_damping = y[E_DAMPING];
+    r->energy_in = sum_of(m, E_IN);
+    r->energy_friction = sum_of(m, E_FRICTION);
+    r->energy_impact = sum_of(m, E_IMPACT);
+    if (m->mode[0].wall == WALL_PARTING)
+        r->energy_impact -= wall_energy(m, m->mode, y);
+    r->energy_damping = sum_of(m, E_DAMPING);
     r->energy_stored = energy_stored(m, y) - m->energy_at_start;
-    m->n.sticking = m->mode.slip == 0;
-    m->n.wall_contact = m->mode.side;
+    r->coil_current = y[I_COIL];
+    r->coil_voltage = m->n.source ? coil_voltage(m, m->mode, y, 0) : 0.0;
+    r->energy_output = sum_of(m, E_OUTPUT);
+    r->energy_copper = sum_of(m, E_COPPER);
+    r->energy_magnetic = magnetic_energy(m, y);
+    m->n.output_clamped = m->mode[0].output;
+    m->n.command_limited = m->mode[0].limited;
+    m->n.sticking = m->mode[0].slip == 0;
+    m->n.wall_contact = m->mode[0].side;
+    if (m->n.independent)
+        outputs_of_second(m);
 }
 
 double model_derivative(const Model *m, size_t output, size_t input)
 {
     Model a = *m;
-    double *inputs[] = {&a.r.current, &a.r.normal_force, &a.r.surface_acceleration};
+    double *inputs[] = {&a.r.current, &a.r.current_2, &a.r.normal_force,
+                        &a.r.surface_acceleration};
     const size_t places[] = {offsetof(Reals, current) / sizeof(double),
+                             offsetof(Reals, current_2) / sizeof(double),
                              offsetof(Reals, normal_force) / sizeof(double),
                              offsetof(Reals, surface_acceleration) / sizeof(double)};
-    Forces low, high;
+    Forces low, high, low_2 = {0}, high_2 = {0};
 
-    for (int i = 0; i < 3; i++) {
+    if (output == offsetof(Reals, coil_voltage) / sizeof(double) &&
+        input == offsetof(Reals, command_slope) / sizeof(double))
+        return coil_voltage_per_slope(m, 0);
+    if (output == offsetof(Reals, coil_voltage_2) / sizeof(double) &&
+        input == offsetof(Reals, command_2_slope) / sizeof(double))
+        return m->n.independent ? coil_voltage_per_slope(m, 1) : 0.0;
+    for (int i = 0; i < 4; i++) {
         if (input != places[i])
             continue;
         *inputs[i] = 0.0;
-        forces(&a, &a.mode, a.y, 0.0, &low);
+        forces(&a, a.mode, a.y, 0, 0.0, &low);
+        if (m->n.independent)
+            forces(&a, a.mode, a.y, 1, 0.0, &low_2);
         *inputs[i] = 1.0;
-        forces(&a, &a.mode, a.y, 0.0, &high);
+        forces(&a, a.mode, a.y, 0, 0.0, &high);
+        if (m->n.independent)
+            forces(&a, a.mode, a.y, 1, 0.0, &high_2);
         switch (output) {
 #define PLACE(name) offsetof(Reals, name) / sizeof(double)
         case PLACE(a_surface):
@@ -238,6 +297,10 @@ double model_derivative(const Model *m, size_t output, size_t input)
             return high.plate - low.plate;
         case PLACE(wall_force):
             return high.wall - low.wall;
+        case PLACE(a_surface_2):
+            return high_2.a_surface - low_2.a_surface;
+        case PLACE(friction_force_2):
+            return high_2.friction - low_2.friction;
 #undef PLACE
         }
     }

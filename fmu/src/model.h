@@ -56,7 +56,14 @@ extern const VariableInfo INTEGER_INFO[N_INTEGERS];
 
 /* Places in the state vector. The slip d = z_part - z_surface and its rate w are states of their
  * own: while the part sticks they do not change by a single bit. */
-enum { Z, V, Q, U, D, W, E_IN, E_FRICTION, E_IMPACT, E_DAMPING, N_STATES };
+enum {
+    Z, V, Q, U, D, W, E_IN, E_FRICTION, E_IMPACT, E_DAMPING,
+    I_COIL, I_EDDY, E_OUTPUT, E_COPPER, /* of the source, at rest without one */
+    N_STATES
+};
+
+/* Surfaces that can move by themselves. Their states lie one after the other, N_STATES each. */
+enum { N_MOVING = 2, N_ALL = N_MOVING * N_STATES };
 
 typedef enum {
     WALL_FREE,
@@ -70,17 +77,26 @@ typedef struct {
     int side;  /* of a touched wall: +1 above, -1 below */
     int slip;  /* 0 sticking; else the sign of w */
     int plate; /* 0 part held by the springed plate; else the sign of the part's velocity */
+    int output;  /* of the source: 0 the current follows its target; else the limit of that sign
+                    holds the output, and the current is on its way to the target */
+    int limited; /* 0 the target is the command; else the current limit of that sign */
 } Mode;
 
 typedef struct {
     Reals r;
     Integers n;
-    Mode mode;
-    double y[N_STATES];
+    Mode mode[N_MOVING];
+    double y[N_ALL];
     double step;           /* the next internal step that the error control would take, s */
     double energy_at_start;
     int initialised;
 } Model;
+
+/* How many surfaces are solved for: 1, which stands for all that move alike, or 2. */
+static inline int moving(const Model *m)
+{
+    return m->n.independent ? 2 : 1;
+}
 
 void model_defaults(Model *m);
 
@@ -90,7 +106,7 @@ int model_set_real(Model *m, size_t place, double value, char *message);
 int model_set_integer(Model *m, size_t place, int value, char *message);
 
 /* Static equilibrium without current: the ram on its suspension, the surface on its flexures
- * carrying all three bodies, the part sticking. 0, or -1 with a sentence in message. */
+ * carrying all three bodies (a fixed ram apart), the part sticking. 0, or -1 with a sentence in message. */
 int model_initialise(Model *m, char *message);
 
 /* Advance by h > 0 seconds. The inputs run on with their slopes. 0, or -1 with a sentence in
@@ -100,8 +116,8 @@ int model_step(Model *m, double h, char *message);
 /* Refresh the outputs from state and inputs, after a step or a change of an input. */
 void model_outputs(Model *m);
 
-/* d(output)/d(current, normal_force or surface_acceleration) in the present mode, analytically exact:
- * forces are affine in all three. 0 for every other pair. */
+/* d(output)/d(current, current_2, normal_force or surface_acceleration) in the present mode,
+ * analytically exact: forces are affine in all four; and d(coil_voltage)/d(command_slope), of either source. 0 for every other pair. */
 double model_derivative(const Model *m, size_t output, size_t input);
 
 #endif

@@ -148,9 +148,15 @@ int instance_set_slopes(Instance *inst, const char *function, const uint32_t vr[
             slope = PLACE(current_slope);
         else if (place == PLACE(normal_force))
             slope = PLACE(normal_force_slope);
+        else if (place == PLACE(command))
+            slope = PLACE(command_slope);
+        else if (place == PLACE(current_2))
+            slope = PLACE(current_2_slope);
+        else if (place == PLACE(command_2))
+            slope = PLACE(command_2_slope);
         else
             return undo(inst, function, &before,
-                        "only current and normal_force can be given with a derivative");
+                        "only currents, commands and normal_force can be given with a derivative");
         if (model_set_real(&inst->state.model, slope, values[i], message))
             return undo(inst, function, &before, message);
     }

@@ -5,7 +5,7 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -69,7 +69,7 @@ class Rig:
             )
         self.time = 0.0
 
-    def begin(self, parameters: dict[str, float] | None = None, **experiment: Any) -> "Rig":
+    def begin(self, parameters: Mapping[str, float] | None = None, **experiment: Any) -> "Rig":
         self.set(**(parameters or {}))
         self.enter(**experiment)
         self.fmu.exitInitializationMode()
@@ -322,9 +322,11 @@ FOLLOWING = [
     "plate_force",
     "wall_force",
 ]
+OF_SECOND = ["a_surface_2", "friction_force_2"]
+TWO = {"independent": 1, "n_surfaces": 2}
 
 
-@pytest.mark.parametrize("parameters", [{}, {"mu_plate": 0.1, "b1": 40.0}, {"contact": 2}])
+@pytest.mark.parametrize("parameters", [{}, {"mu_plate": 0.1, "b1": 40.0}, {"contact": 2}, TWO])
 def test_directional_derivatives_are_the_differences(
     version: int, parameters: dict[str, float]
 ) -> None:
@@ -337,15 +339,20 @@ def test_directional_derivatives_are_the_differences(
             if mode in modes:
                 continue
             modes.add(mode)
-            for known, distance in (("current", 0.25), ("normal_force", 0.125)):
+            following = FOLLOWING + OF_SECOND
+            for known, distance in (
+                ("current", 0.25),
+                ("current_2", 0.25),
+                ("normal_force", 0.125),
+            ):
                 here = it.get(known)
                 sides = []
                 for value in (here + distance, here - distance):
                     it.set(**{known: value})
-                    sides.append(np.array(it.get(*FOLLOWING)))
+                    sides.append(np.array(it.get(*following)))
                 it.set(**{known: here})
                 differences = (sides[0] - sides[1]) / (2.0 * distance)
-                found = it.derivative(FOLLOWING, [known], [1.0])
+                found = it.derivative(following, [known], [1.0])
                 scale = np.abs(sides).max(axis=0) + 1.0
                 assert found == pytest.approx(differences, rel=1e-9, abs=1e-11 * scale.max())
     assert {sticking for sticking, _ in modes} == {0, 1}
@@ -355,7 +362,8 @@ def test_directional_derivatives_are_the_differences(
 def test_only_the_declared_outputs_follow_inputs_at_once(version: int) -> None:
     description = fmpy.read_model_description(str(fmu.unpacked(version)))
     declared = {u.variable.name for u in description.outputs if u.variable and u.dependencies}
-    assert declared == set(FOLLOWING)
+    of_second = {*OF_SECOND, "coil_voltage_2"}
+    assert declared == {*FOLLOWING, "coil_voltage", *of_second}
     with rig(version) as it:
         it.begin({"mu_plate": 0.1})
         followed = set()
@@ -367,7 +375,33 @@ def test_only_the_declared_outputs_follow_inputs_at_once(version: int) -> None:
             followed |= {name for name, value in it.outputs().items() if value != before[name]}
             it.set(current=current, normal_force=force)
     assert followed <= declared
-    assert followed >= declared - {"wall_force"}  # which follows in a rigid contact at rest only
+    # These follow in a rigid contact at rest, and with a source.
+    assert followed >= declared - {"wall_force", "coil_voltage", *of_second}
+
+
+def test_with_a_source_only_the_voltage_follows_the_command_at_once(version: int) -> None:
+    with rig(version) as it:
+        it.begin({"source": 1, "eddy_inductance": 1e-3, "eddy_resistance": 4.0})
+        modes = set()
+        for k in range(500):
+            command, slope = -5.0 + 0.08 * (k % 100), 800.0
+            it.set(command=command, command_slope=slope)
+            it.step()
+            before = it.outputs()
+            it.set(command_slope=slope + 100.0, current=1.0)
+            after = it.outputs()
+            found = it.derivative(["coil_voltage"], ["command_slope"], [1.0])[0]
+            moved = {name for name in after if after[name] != before[name]}
+            modes.add(before["output_clamped"])
+            if before["output_clamped"]:
+                assert (moved, found) == (set(), 0.0)
+            else:
+                assert moved == {"coil_voltage"}
+                change = after["coil_voltage"] - before["coil_voltage"]
+                assert found == pytest.approx(change / 100.0, rel=1e-9)
+                assert found == pytest.approx(1.2e-3 / 4.0)
+            it.set(command=command, current=0.0)
+    assert modes == {0, -1}
 
 
 def test_seeds_add_up(version: int) -> None:
@@ -379,6 +413,72 @@ def test_seeds_add_up(version: int) -> None:
         both = it.derivative(FOLLOWING, ["current", "normal_force"], [2.0, -3.0])
         assert both == pytest.approx(2.0 * one - 3.0 * other)
         assert it.derivative(["z_part"], ["current"], [1.0]) == [0.0]
+
+
+# ---- the source ----
+
+SOURCE = {"source": 1, "eddy_inductance": 1e-3, "eddy_resistance": 4.0, "mu_plate": 0.1}
+
+
+def sawtooth(it: Rig, steps: int, h: float = H) -> list[dict[str, float]]:
+    """A command of 20 Hz and 8 V; every step's outputs."""
+    found = []
+    for _ in range(steps):
+        phase = (it.time + 1e-9) * 20.0 % 1.0 - 20e-9
+        it.set(command=-5.2 + 8.0 * phase, command_slope=160.0)
+        it.step(h)
+        found.append(it.outputs())
+    return found
+
+
+def test_both_versions_solve_the_source_alike() -> None:
+    with rig(2) as a, rig(3) as b:
+        assert sawtooth(a.begin(SOURCE), 700) == sawtooth(b.begin(SOURCE), 700)
+
+
+@pytest.mark.parametrize("contact", [1, 2])
+def test_the_source_does_not_mind_how_long_the_steps_are(version: int, contact: int) -> None:
+    with rig(version) as short, rig(version) as long:
+        for it in (short, long):
+            it.begin(SOURCE | {"contact": contact})
+        fine, coarse = sawtooth(short, 700), sawtooth(long, 14, 50 * H)
+    for name, value in coarse[-1].items():
+        if not name.endswith(("_max", "_min")) and not name.startswith("internal"):
+            assert value == pytest.approx(fine[-1][name], rel=1e-6, abs=1e-9), name
+    assert {found["output_clamped"] for found in fine} == {0, -1}
+    assert max(found["coil_current_max"] for found in fine) == pytest.approx(0.7, rel=1e-9)
+    assert min(found["coil_current_min"] for found in fine) == pytest.approx(
+        min(found["coil_current_min"] for found in coarse), rel=1e-3
+    )
+
+
+def test_a_state_within_a_limit_brings_back_every_bit(version: int) -> None:
+    with rig(version) as it:
+        it.begin(SOURCE)
+        assert sawtooth(it, 501)[-1]["output_clamped"] == -1
+        kept, time = it.save(), it.time
+        first = sawtooth(it, 50)
+        it.load(kept)
+        it.time = time
+        assert sawtooth(it, 50) == first
+
+
+def test_derivatives_of_the_command_in_fmi_2() -> None:
+    with rig(2) as a, rig(2) as b:
+        for it in (a, b):
+            it.begin(SOURCE)
+            it.set(command=0.5)
+        a.set(command_slope=-300.0)
+        b.fmu.setRealInputDerivatives([b._reference("command")], [1], [-300.0])
+        a.step()
+        b.step()
+        assert a.outputs() == b.outputs()
+
+
+def test_a_source_needs_a_free_surface(version: int) -> None:
+    with rig(version) as it, pytest.raises(FMICallException):
+        it.begin({"source": 1, "prescribed": 1})
+    assert any("source must be 0" in message for message in it.messages)
 
 
 # ---- states ----

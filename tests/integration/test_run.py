@@ -38,6 +38,7 @@ CAMERA = ["a_camera_max", "a_camera_min"]
 DRIVEN = ["transport_per_cycle", "current_max", "current_min", "saturated_fraction"]
 LIMITS = {
     "amplifier": {"swing_high_fraction", "swing_low_fraction", "slew_fraction"},
+    "limited": {"swing_high_fraction", "swing_low_fraction", "current_limit_fraction"},
     "full": {
         "swing_high_fraction",
         "swing_low_fraction",
@@ -51,6 +52,7 @@ RUNS = {
     "paper": ("paper", "run.duration=0.4", "run.settle=0.1"),
     # rows out of step with the staircase of 50 µs
     "paper-full": ("paper-full", "run.duration=0.15", "run.settle=0.06", "run.output_step=3e-5"),
+    "paper-limited": ("paper-limited", "run.duration=0.4", "run.settle=0.1"),
     "gripper": ("gripper", "run.duration=0.3", "run.settle=0.1"),
     "ideal-current": ("ideal-current", "run.duration=0.4", "run.settle=0.1"),
     "held": ("held", "run.duration=0.3", "run.settle=0.1"),
@@ -303,8 +305,9 @@ def test_undriven_part_hangs_still(runs: dict[str, Run]) -> None:
 # --- whole runs against each other -----------------------------------------------
 
 
-def test_both_fmi_versions_agree() -> None:
-    scene = load("paper", ["run.duration=0.12"])
+@pytest.mark.parametrize("name", ["paper", "paper-limited"])
+def test_both_fmi_versions_agree(name: str) -> None:
+    scene = load(name, ["run.duration=0.12"])
     second, third = (simulate(scene, fmi_version=version) for version in (2, 3))
     for name, values in third.waveforms.items():
         np.testing.assert_allclose(second.waveforms[name], values, rtol=1e-12, atol=1e-12)
@@ -320,17 +323,22 @@ def test_two_coils_on_two_surfaces_are_one_twice() -> None:
         "circuit.sense_resistance=2",
     ]  # fmt: skip
     two = simulate(load("paper", short + twice))
+    # The circuits' steps differ, and what ngspice has lies between them: 2e-3 from finer runs.
+    within = {"current": 3e-3, "coil_voltage": 3e-3}
     for name in ("current", "coil_voltage", "z_surface", "z_ram", "z_part", "friction_force"):
         scale = np.abs(one.waveforms[name]).max()
         np.testing.assert_allclose(
-            two.waveforms[name] / scale, one.waveforms[name] / scale, rtol=0, atol=1e-3
+            two.waveforms[name] / scale,
+            one.waveforms[name] / scale,
+            rtol=0,
+            atol=within.get(name, 1e-3),
         )
     for name in ("energy_in", "energy_copper", "energy_friction", "energy_damping"):
         assert two.summary[name] == pytest.approx(2 * float(one.summary[name]), rel=1e-3)  # type: ignore
     assert two.summary["energy_residual"] < 1e-4  # type: ignore
 
 
-@pytest.mark.parametrize("model", ["ideal", "amplifier"])
+@pytest.mark.parametrize("model", ["ideal", "limited", "amplifier"])
 @pytest.mark.parametrize(
     "changes",
     [
@@ -349,7 +357,8 @@ def test_energy_balances_with_other_coils_and_commands(
     model: str, changes: tuple[str, ...]
 ) -> None:
     scene = load("paper", ["run.duration=0.12", f"circuit.model={model}", *changes])
-    assert simulate(scene).summary["energy_residual"] < 1e-4  # type: ignore
+    allowed = {"ideal": 1e-6, "limited": 1e-9, "amplifier": 1e-4}[model]
+    assert simulate(scene).summary["energy_residual"] < allowed  # type: ignore
 
 
 def test_sine_command() -> None:

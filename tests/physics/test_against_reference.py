@@ -20,12 +20,13 @@ CASES = {case["name"]: case for case in GOLDEN["cases"]}
 FULL_NAME = {key.name: key.full for key in keys()}
 
 # Allowed differences of a trajectory's samples in the first 60 ms, SI: about five times what the
-# coupling's error makes; without a circuit only the two integrators differ.
+# coupling's error makes; without ngspice only the two integrators differ.
 EARLY = {
     "amplifier": {"z_surface": 2e-6, "z_ram": 1e-5, "z_part": 2e-6, "v_part": 1e-3},
+    "limited": {"current": 1e-7, "z_surface": 2e-9, "z_ram": 5e-9, "z_part": 2e-9, "v_part": 5e-7},
     "ideal": {"z_surface": 2e-9, "z_ram": 5e-9, "z_part": 2e-9, "v_part": 5e-7},
 }
-AVERAGE = {"amplifier": 2e-3, "ideal": 1e-6}  # relative, of v_average
+AVERAGE = {"amplifier": 2e-3, "limited": 1e-6, "ideal": 1e-6}  # relative, of v_average
 
 
 def scene_of(case: dict) -> Scene:

@@ -98,6 +98,16 @@ CASES = (
     case("wide", "compliant", "amplifier", travel=4e-3, frequency=35.0, amplitude=6.0),
     case("low-swing", "compliant", "amplifier", swing_loss_high=8.0, swing_loss_low=6.0),
     case("no-walls", "compliant", "amplifier", travel=1e-2, frequency=35.0, amplitude=6.0),
+    Case("paper-limited", "compliant", "limited", {}, 2.0, 1.0),
+    case("paper-rigid-limited", "rigid", "limited"),
+    case("fast-limited", "compliant", "limited", **FAST),
+    case("quick-rigid-limited", "rigid", "limited", frequency=40.0, amplitude=10.0),
+    case("low-supply-limited", "compliant", "limited", supply=10.0),
+    case("low-swing-rigid-limited", "rigid", "limited", swing_loss_high=8.0, swing_loss_low=6.0),
+    case("gripper-limited", "compliant", "limited", **GRIPPER, amplitude=10.6, normal_force=0.6),
+    case("plate-limited", "compliant", "limited", mu_plate=0.1, inductance=3e-3),
+    case("bent-bl-limited", "rigid", "limited", b1=60.0, b2=-5e4, amplitude=9.0),
+    case("no-walls-limited", "compliant", "limited", travel=1e-2, force_factor=2.0, frequency=35.0),
 )
 
 

@@ -9,7 +9,7 @@ It exists to judge other solvers, so it shares neither code nor formulas with th
 the vertical axis points up. State vector, per coil and per surface:
 
     i    current of one coil [A] (not integrated on the rung "ideal")
-    va   output of the amplifier's pole [V]
+    va   output of the amplifier's pole [V] (on the rung "amplifier" only)
     q    ram relative to the surface [m], dq its rate [m/s]
     zs   surface [m], vs its rate [m/s]
     w    surface minus part [m], u its rate, the slip velocity [m/s]
@@ -83,7 +83,8 @@ class Params:
     gravity: float = 9.81  # m/s^2
     mu_s: float = 0.72
     mu_k: float = 0.59
-    normal_force: float = 0.5  # N
+    normal_force: float = 0.5  # N, at the start
+    normal_force_slope: float = 0.0  # N/s
     mu_plate: float = 0.0
 
 
@@ -116,7 +117,9 @@ class Result:
 
 STICK = 0  # friction mode: 0 sticks, +1/-1 slips with sgn(u); plate mode: 0 at rest, else sgn(v_p)
 FREE, TOUCH, REST = "free", "touch", "rest"  # wall modes, with side +1 (upper) or -1 (lower)
-LINEAR, SLEW, CLAMP = "linear", "slew", "clamp"  # amplifier modes, with a sign
+# Amplifier modes, with a sign; on the rung "limited" LINEAR means that the current is the command.
+LINEAR, SLEW, CLAMP = "linear", "slew", "clamp"
+CURRENT_EPS = 1e-12  # A; two currents closer than this are one
 # Root functions; every root is a fall through zero of a function that is positive in its mode.
 R_UPPER, R_LOWER, R_KINK, R_STICK, R_PLATE, R_RATE, R_HIGH, R_LOW = range(8)
 N_ROOTS = 8
@@ -133,9 +136,11 @@ class _Model:
     def __init__(self, p: Params, contact: str, circuit: str, energies: bool) -> None:
         if p.waveform not in ("sawtooth", "sine"):
             raise ValueError(f"waveform {p.waveform!r}")
-        if contact not in ("rigid", "compliant") or circuit not in ("amplifier", "ideal"):
+        circuits = ("amplifier", "limited", "ideal")
+        if contact not in ("rigid", "compliant") or circuit not in circuits:
             raise ValueError(f"contact {contact!r}, circuit {circuit!r}")
         self.p, self.rigid, self.ideal = p, contact == "rigid", circuit == "ideal"
+        self.limited = circuit == "limited"
         self.with_energies = energies
         self.sine = p.waveform == "sine"
         self.period = math.inf if self.sine else 1.0 / p.frequency  # from jump to jump
@@ -150,6 +155,7 @@ class _Model:
         self.friction, self.plate = STICK, STICK
         self.amp, self.amp_sign = LINEAR, 0
         self.impact_loss = 0.0  # J, in rigid impacts
+        self.normal = p.normal_force  # N, at the time of the last call of `forces`
         self.y = self._equilibrium() + [0.0] * (len(ENERGIES) if energies else 0)
         self.choose_amp(jumped=True)
         self.choose_contacts()
@@ -163,7 +169,14 @@ class _Model:
 
     def current(self, t: float, i: float) -> float:
         """Current of one coil [A]."""
-        return self.drive(t) / self.sense if self.ideal else i
+        given = self.ideal or (self.limited and self.amp == LINEAR)
+        return self.drive(t) / self.sense if given else i
+
+    def following(self, t: float, y: Sequence[float]) -> float:
+        """Output voltage at which the coil's current would be the command [V]."""
+        p, slope = self.p, self.p.amplitude / self.period  # of V1 [V/s]
+        ohmic = (1.0 + p.resistance / self.sense) * self.drive(t)
+        return ohmic + p.inductance * slope / self.sense + self.bl(y[2]) * y[3]
 
     def bl(self, q: float) -> float:
         """Force factor at the ram's position [N/A]."""
@@ -181,6 +194,7 @@ class _Model:
         """Force on the ram but for gravity and rigid walls; load and mass of what moves as the
         surface [N, N, kg], friction excluded: with the ram resting on it, both bodies."""
         p = self.p
+        self.normal = p.normal_force + p.normal_force_slope * t
         i, q, dq, zs, vs = self.current(t, y[0]), y[2], y[3], y[4], y[5]
         ram = self.bl(q) * i - p.suspension_damping * dq
         ram -= q * (p.suspension_k1 + q * (p.suspension_k2 + q * p.suspension_k3))
@@ -199,11 +213,11 @@ class _Model:
         the part [N], if these modes hold."""
         p, m = self.p, self.part_mass
         weight = m * p.gravity
-        slip_force = friction * p.mu_k * p.normal_force
+        slip_force = friction * p.mu_k * self.normal
         if p.mu_plate > 0.0 and plate == STICK:
             f = load if friction == STICK else slip_force
             return (load - f) / mass, 0.0, f, weight - f
-        f_plate = -plate * p.mu_plate * p.normal_force
+        f_plate = -plate * p.mu_plate * self.normal
         if friction == STICK:
             a = (load + f_plate - weight) / (mass + m)
             return a, a, m * a + weight - f_plate, f_plate
@@ -223,7 +237,14 @@ class _Model:
         ddq = 0.0 if self.wall == REST else ram / p.ram_mass - p.gravity - a_s
         emf, r_loop = self.bl(q) * dq, p.resistance + self.sense
         di = dva = 0.0
-        if not self.ideal:
+        if self.limited:
+            if self.amp == LINEAR:
+                va, di = self.following(t, y), p.amplitude / (self.period * self.sense)
+                i = self.current(t, i)
+            else:
+                va = self.high if self.amp_sign > 0 else self.low
+                di = (va - emf - r_loop * i) / p.inductance
+        elif not self.ideal:
             di = (va - r_loop * i - emf) / p.inductance
             if self.amp != CLAMP:
                 dva = self.amp_rate(t, i, va) if self.amp == LINEAR else self.amp_sign * p.slew_rate
@@ -257,11 +278,18 @@ class _Model:
         else:
             out[R_UPPER] = -self.side * (p.ram_mass * (a_s + p.gravity) - ram)
         sticks, rests = self.friction == STICK, self.plate == STICK
-        out[R_STICK] = p.mu_s * p.normal_force - abs(f) if sticks else self.friction * u
+        out[R_STICK] = p.mu_s * self.normal - abs(f) if sticks else self.friction * u
         if p.mu_plate > 0.0:
-            hold = p.mu_plate * p.normal_force
+            hold = p.mu_plate * self.normal
             out[R_PLATE] = hold - abs(f_plate) if rests else self.plate * (vs - u)
-        if not self.ideal:
+        if self.limited:
+            if self.amp == CLAMP:
+                out[R_RATE] = self.amp_sign * (self.drive(t) - self.sense * i)
+            else:
+                va = self.following(t, y)
+                out[R_HIGH] = self.high - va
+                out[R_LOW] = va - self.low
+        elif not self.ideal:
             rate = self.amp_rate(t, i, va)
             if self.amp == CLAMP:
                 out[R_RATE] = self.amp_sign * rate / p.slew_rate
@@ -276,6 +304,9 @@ class _Model:
         """Amplifier mode after a jump of V1 or with the pole newly on its limit."""
         if self.ideal:
             return
+        if self.limited:
+            self.choose_output(t)
+            return
         va, rate = self.y[1], self.amp_rate(t, self.y[0], self.y[1])
         if (va >= self.high and rate > 0.0) or (va <= self.low and rate < 0.0):
             self.amp, self.amp_sign = CLAMP, _sign(rate)
@@ -283,14 +314,26 @@ class _Model:
             slewing = abs(rate) > self.p.slew_rate
             self.amp, self.amp_sign = (SLEW, _sign(rate)) if slewing else (LINEAR, 0)
 
+    def choose_output(self, t: float) -> None:
+        """On the rung "limited": whether the current follows, or the output is at a limit."""
+        wanted, va = self.drive(t) / self.sense, self.following(t, self.y)
+        missing = wanted - self.y[0]
+        if abs(missing) > CURRENT_EPS:
+            self.amp, self.amp_sign = CLAMP, _sign(missing)
+        elif self.low <= va <= self.high:
+            self.amp, self.amp_sign = LINEAR, 0
+            self.y[0] = wanted
+        else:
+            self.amp, self.amp_sign = CLAMP, 1 if va > self.high else -1
+
     def choose_friction(self, t: float, broken: Broken = (False, False)) -> None:
         """First consistent pair of modes, sticking ones first. `broken` tells for surface and
         plate that static friction has just been found overcome, which rounding might hide."""
         p, u = self.p, self.y[7]
         v_part = self.y[5] - u
         _, load, mass = self.forces(t, self.y)
-        hold_s = p.mu_s * p.normal_force * (1.0 - 1e-9 * broken[0])
-        hold_p = p.mu_plate * p.normal_force * (1.0 - 1e-9 * broken[1])
+        hold_s = p.mu_s * self.normal * (1.0 - 1e-9 * broken[0])
+        hold_p = p.mu_plate * self.normal * (1.0 - 1e-9 * broken[1])
         plates = (_sign(v_part),) if v_part else (STICK, 1, -1)
         for friction in (_sign(u),) if u else (STICK, 1, -1):
             for plate in plates if p.mu_plate > 0.0 else (STICK,):
@@ -351,7 +394,14 @@ class _Model:
             if self.wall == TOUCH:
                 y[2] = self.side * self.p.travel
             self.wall, self.side = FREE, 0
-        if R_RATE in fired:
+        if self.limited:
+            if R_RATE in fired:
+                y[0] = self.drive(t) / self.sense
+            if R_HIGH in fired or R_LOW in fired:
+                self.amp, self.amp_sign = CLAMP, 1 if R_HIGH in fired else -1
+            elif R_RATE in fired or met is not None:
+                self.choose_output(t)
+        elif R_RATE in fired:
             if self.amp == LINEAR:
                 self.amp, self.amp_sign = SLEW, _sign(self.amp_rate(t, y[0], y[1]))
             else:

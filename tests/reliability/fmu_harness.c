@@ -18,6 +18,9 @@
         }                                                                                          \
     } while (0)
 
+#define PLACE(name) ((unsigned)(REFERENCE_REALS + offsetof(Reals, name) / sizeof(double)))
+#define INT_PLACE(name) ((unsigned)(REFERENCE_INTEGERS + offsetof(Integers, name) / sizeof(int)))
+
 static unsigned long long seed = 88172645463325252ull;
 static int refusals, messages;
 
@@ -109,15 +112,16 @@ static int set_anything(fmi2Component c)
 
 static int get_anything(fmi2Component c)
 {
-    fmi2ValueReference vr = (unsigned)(draw() % 60);
+    fmi2ValueReference vr = (unsigned)(draw() % (N_REALS + 2));
     double value;
     return fmi2GetReal(c, &vr, 1, &value) == fmi2OK;
 }
 
 static int differentiate(fmi2Component c)
 {
-    fmi2ValueReference unknowns[] = {(unsigned)(draw() % 60), (unsigned)(draw() % 60)};
-    fmi2ValueReference knowns[] = {22 + (unsigned)(draw() % 5), 24};
+    fmi2ValueReference unknowns[] = {(unsigned)(draw() % (N_REALS + 2)),
+                                     (unsigned)(draw() % (N_REALS + 2))};
+    fmi2ValueReference knowns[] = {PLACE(current) + (unsigned)(draw() % 9), PLACE(normal_force)};
     double given[] = {uniform(-1, 1), draw() % 8 ? 1.0 : senseless()}, found[2];
     return fmi2GetDirectionalDerivative(c, unknowns, 2, knowns, 2, given, found) == fmi2OK;
 }
@@ -176,10 +180,14 @@ static void choose_parameters(fmi2Component c3, fmi2Component c2)
         CHECK(fmi2SetReal(c2, &vr, 1, &value) == fmi2OK);
         CHECK(fmi3SetFloat64(c3, &vr, 1, &value, 1) == fmi3OK);
     }
-    const fmi2ValueReference contact = REFERENCE_INTEGERS;
-    const int law = 1 + (int)(draw() % 2);
-    CHECK(fmi2SetInteger(c2, &contact, 1, &law) == fmi2OK);
-    CHECK(fmi3SetInt32(c3, &contact, 1, &law, 1) == fmi3OK);
+    const fmi2ValueReference choices[] = {INT_PLACE(contact), INT_PLACE(source),
+                                          INT_PLACE(coil_count), INT_PLACE(independent),
+                                          INT_PLACE(n_surfaces)};
+    const int two = (int)(draw() % 2);
+    const int chosen[] = {1 + (int)(draw() % 2), (int)(draw() % 2), 1 + (int)(draw() % 3), two,
+                          1 + two};
+    CHECK(fmi2SetInteger(c2, choices, 5, chosen) == fmi2OK);
+    CHECK(fmi3SetInt32(c3, choices, 5, chosen, 5) == fmi3OK);
 }
 
 static void compare(fmi2Component c2, fmi3Instance c3)
@@ -207,12 +215,18 @@ static void simulate(int steps)
     CHECK(fmi3EnterInitializationMode(c3, 0, 0.0, 0.0, 0, 0.0) == fmi3OK);
     CHECK(fmi3ExitInitializationMode(c3) == fmi3OK);
 
-    const fmi2ValueReference inputs[] = {22, 23, 24, 25};
+    const fmi2ValueReference inputs[] = {PLACE(current), PLACE(current_slope),
+                                         PLACE(normal_force), PLACE(normal_force_slope),
+                                         PLACE(command), PLACE(command_slope),
+                                         PLACE(current_2), PLACE(current_2_slope),
+                                         PLACE(command_2), PLACE(command_2_slope)};
     double time = 0.0;
     for (int i = 0; i < steps; i++) {
         const double h = pow(10.0, uniform(-6.0, -3.0));
         double values[] = {uniform(-1.5, 1.5), uniform(-1.0, 1.0) / h, uniform(0.1, 1.0),
-                           uniform(-0.1, 0.1) / h};
+                           uniform(-0.1, 0.1) / h, uniform(-15.0, 15.0), uniform(-9.0, 9.0) / h,
+                           uniform(-1.5, 1.5), uniform(-1.0, 1.0) / h, uniform(-15.0, 15.0),
+                           uniform(-9.0, 9.0) / h};
         double last;
         fmi3Boolean event, terminate, early;
         fmi2FMUstate before = NULL;
@@ -220,8 +234,8 @@ static void simulate(int steps)
         abuse(c2, 2);
         CHECK(fmi2SetFMUstate(c2, before) == fmi2OK);
         CHECK(fmi2FreeFMUstate(c2, &before) == fmi2OK);
-        CHECK(fmi2SetReal(c2, inputs, 4, values) == fmi2OK);
-        CHECK(fmi3SetFloat64(c3, inputs, 4, values, 4) == fmi3OK);
+        CHECK(fmi2SetReal(c2, inputs, 10, values) == fmi2OK);
+        CHECK(fmi3SetFloat64(c3, inputs, 10, values, 10) == fmi3OK);
         CHECK(fmi2DoStep(c2, time, h, 1) == fmi2OK);
         CHECK(fmi3DoStep(c3, time, h, 1, &event, &terminate, &early, &last) == fmi3OK);
         CHECK(!event && !terminate && !early && last == time + h);

@@ -66,8 +66,11 @@ FILES = [
     ("name = ''", "name = "),
     ("description = 'a\\nb'", None),
     ('description = "a\\nb"', "must be one line"),
-    ("[circuit]\nmodel = 'limited'", 'must be one of "full", "amplifier", "ideal", "none"'),
-    ("[circuit]\nmodel = 'spice'", 'must be one of "full", "amplifier", "ideal", "none", "file"'),
+    ("[circuit]\nmodel = 'limitd'", "did you mean limited?"),
+    (
+        "[circuit]\nmodel = 'spice'",
+        'must be one of "full", "amplifier", "limited", "ideal", "none", "file"',
+    ),
     ("[circuit]\nmodel = 'file'", "circuit.netlist must be given together"),
     ("[circuit]\nnetlist = 'a.cir'", 'circuit.model = "file" and circuit.netlist must be given'),
     ("[circuit]\nnetlist = 7", "circuit.netlist = 7 must be the path of a file"),

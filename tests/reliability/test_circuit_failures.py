@@ -156,7 +156,7 @@ def test_exception_in_a_callback(
 
     monkeypatch.setattr(owner, name, fail)
     with pytest.raises(type(failure)):
-        simulate(load("paper", SHORT))
+        simulate(load("paper", SHORT), compiled=False)
     monkeypatch.undo()
     assert np.array_equal(good_run(), before)
 
@@ -169,7 +169,7 @@ def test_not_a_number_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.n
         lambda self, t, values, step: original(self, t, [np.nan, *values[1:]], step),
     )
     with pytest.raises(SimulationFailed, match="range of numbers"):
-        simulate(load("paper", SHORT))
+        simulate(load("paper", SHORT), compiled=False)
     monkeypatch.undo()
     assert np.array_equal(good_run(), before)
 

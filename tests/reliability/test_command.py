@@ -337,7 +337,7 @@ def test_mechanics_fail(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(Mechanics, "step_to", after_calls(500, Mechanics.step_to, failure))
         with pytest.raises(SimulationFailed, match="as the test wants it"):
-            simulate(load(scene, SHORT))
+            simulate(load(scene, SHORT), compiled=False)
     assert bits(scene) == before
 
 
@@ -353,7 +353,7 @@ def test_callback_fails(
     with monkeypatch.context() as patch:
         patch.setattr(owner, name, after_calls(calls, getattr(owner, name), Trouble("here")))
         with pytest.raises(Trouble, match="here"):
-            simulate(load("paper", SHORT))
+            simulate(load("paper", SHORT), compiled=False)
     assert bits() == before
 
 
@@ -362,7 +362,7 @@ def test_callback_gives_nonsense(monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(StepLocked, "back_emf", lambda self, time: np.nan if time > 0.01 else 0.0)
         with pytest.raises(SimulationFailed, match=r"ngspice stopped at t = 0\.0(0999|1)"):
-            simulate(load("paper", SHORT))
+            simulate(load("paper", SHORT), compiled=False)
     assert bits() == before
 
 
@@ -377,14 +377,14 @@ def bits():
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
     before = bits()
-    for number in range(12):
+    for number in range(20):
         # a true signal: it reaches the main thread in the midst of ngspice's C
         strike = (os.getpid(), signal.SIGINT)
-        timer = threading.Timer(0.1 + 0.0137 * number, os.kill, strike)
+        timer = threading.Timer(0.1 + 0.00822 * number, os.kill, strike)
         began = time.perf_counter()
         try:
             timer.start()
-            simulate(load("paper", ["run.duration=10"]))
+            simulate(load("paper", ["run.duration=10"]), compiled=number % 2 == 0)
         except KeyboardInterrupt:
             assert time.perf_counter() - began < 5
         else:
@@ -434,7 +434,7 @@ def test_scenes(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     names = [line.split()[0] for line in done.stdout.splitlines()]
     assert names == [
-        "paper", "paper-full", "gripper", "held", "ideal-current",
+        "paper", "paper-full", "paper-limited", "gripper", "held", "ideal-current",
         "optimal", "quaid", "trial", "umbanhowar",
     ]  # fmt: skip
 

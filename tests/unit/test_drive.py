@@ -8,7 +8,18 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from cosim.drive import Command, Constant, Sawtooth, Sine, Square, Staircase, WithPwm, command
+from cosim.drive import (
+    Command,
+    Constant,
+    Lagging,
+    Sawtooth,
+    Sine,
+    Square,
+    Staircase,
+    WithPwm,
+    command,
+    commands,
+)
 from cosim.firmware import passes, staircase
 from cosim.scene import load
 
@@ -305,6 +316,27 @@ def test_pwm_edges_are_exact(code: int, inner: str, t: float) -> None:
         t = jump
 
 
+# --- a second surface's command ---------------------------------------------------------------
+
+
+def test_a_lagging_command_is_the_other_one_later() -> None:
+    first, second = commands(load("two-surfaces", ["drive.phase_deg=90"]))
+    times = np.linspace(1e-5, 0.3, 997)
+    np.testing.assert_allclose(second.values(times + 0.0125), first.values(times), atol=1e-9)
+    assert second.next_jump(0.0) == 0.0125
+    assert (second.value_before(0.0125), second.value(0.0125)) == pytest.approx((2.8, -5.2))
+    assert len(commands(load("paper"))) == 1
+
+
+def test_a_staircase_lags_by_a_share_of_its_own_period() -> None:
+    staircase_of = ["drive.quantised=true", "drive.phase_deg=180"]
+    first, second = commands(load("two-surfaces", staircase_of))
+    assert isinstance(first, Staircase)
+    times = np.linspace(1e-5, 0.1, 333)
+    late = second.values(times + 0.5 * first.period)
+    np.testing.assert_allclose(late, first.values(times), atol=1e-9)
+
+
 # --- everything at once -----------------------------------------------------------------------
 
 FREQUENCY = st.floats(0.5, 2000)
@@ -318,6 +350,8 @@ COMMANDS = st.one_of(
     st.builds(Square, FREQUENCY, AMPLITUDE, OFFSET),
     st.builds(lambda m, f, v: Staircase(staircase(m, f), v), st.integers(0, 1023), FREQUENCY,
               st.floats(0, 3.3)),
+    st.builds(lambda f, a, o, lag: Lagging(Square(f, a, o), lag / f), FREQUENCY, AMPLITUDE, OFFSET,
+              st.floats(0, 1)),
 )  # fmt: skip
 TIME = st.floats(0, 1e4)
 
@@ -370,6 +404,15 @@ def test_smooth_between_corners(drive: Command, t: float, share: float) -> None:
         assert change <= 1e-9 + steepest(drive) * (late - t) * 1.001
     else:
         assert drive.value(late) == drive.value(t)
+
+
+@given(drive=COMMANDS, times=st.lists(st.floats(-0.02, 0.02), max_size=9), ripple=st.booleans())
+def test_values_are_those_of_each_time(drive: Command, times: list[float], ripple: bool) -> None:
+    edge = drive.next_jump(0.0)
+    times += [t for t in (edge, nextafter(edge, -inf)) if t < 0.05]
+    made = WithPwm(drive) if ripple else drive
+    expected = [drive.value(t) for t in times]
+    assert made.values(times) == pytest.approx(expected, rel=1e-15, abs=1e-15)
 
 
 @given(drive=COMMANDS, t=TIME)

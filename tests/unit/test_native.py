@@ -24,7 +24,7 @@ def test_it_is_built_once_and_leaves_nothing_else(
     own_folder: Path, monkeypatch: pytest.MonkeyPatch
 ):
     assert load().part_exact
-    assert list(own_folder.iterdir()) == [native.library_path()]
+    assert list(own_folder.iterdir()) == [native.library_path("part")]
     monkeypatch.setenv("CC", "/does/not/exist")  # and needs no compiler from now on
     assert load().part_moreau
 
@@ -32,19 +32,19 @@ def test_it_is_built_once_and_leaves_nothing_else(
 def test_other_sources_make_another_library(
     own_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    before = native.library_path()
+    before = native.library_path("part")
     changed = tmp_path / "part.c"
-    changed.write_bytes(native.SOURCE.read_bytes() + b"\n")
-    monkeypatch.setattr(native, "SOURCE", changed)
-    assert native.library_path() != before
+    changed.write_bytes(native.SOURCES["part"][0].read_bytes() + b"\n")
+    monkeypatch.setitem(native.SOURCES, "part", (changed,))
+    assert native.library_path("part") != before
     changed.unlink()
     with pytest.raises(BadInput, match="is missing"):
-        native.library_path()
+        native.library_path("part")
 
 
 def test_a_damaged_library_is_built_again(own_folder: Path):
     own_folder.mkdir(parents=True)
-    native.library_path().write_bytes(b"cut off")
+    native.library_path("part").write_bytes(b"cut off")
     assert load().part_exact
 
 

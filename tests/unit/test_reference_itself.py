@@ -167,7 +167,7 @@ def test_impact_keeps_momentum_and_its_law(contact: str, side: int) -> None:
     assert r.impacts == 1
 
 
-@pytest.mark.parametrize("circuit", ["amplifier", "ideal"])
+@pytest.mark.parametrize("circuit", ["amplifier", "limited", "ideal"])
 @pytest.mark.parametrize("contact", ["rigid", "compliant"])
 @pytest.mark.parametrize("mu_plate", [0.0, 0.1])
 def test_energy_is_accounted_for(contact: str, circuit: str, mu_plate: float) -> None:

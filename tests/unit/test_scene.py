@@ -21,6 +21,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "amplitude": 8.0,
         "offset": -1.2,
         "reset_time": 0,
+        "phase_deg": None,
         "acceleration_max": 98.1,
         "optimum": "up",
         "velocity_amplitude": 0.1,
@@ -47,7 +48,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "snubber_resistance": None,
         "snubber_capacitance": None,
         "reltol": 1e-5,
-        "max_step": 1e-5,
+        "max_step": 5e-5,
     },
     "coil": {
         "resistance": 7.1,
@@ -60,6 +61,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "count": 1,
     },
     "mechanics": {
+        "actuator": "ram",
         "ram_mass": 0.004,
         "surface_mass": 0.0145,
         "part_mass": 0.009,
@@ -77,7 +79,14 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "n_surfaces": 1,
         "gravity": 9.81,
     },
-    "friction": {"law": "coulomb", "mu_s": 0.72, "mu_k": 0.59, "normal_force": 0.5, "mu_plate": 0},
+    "friction": {
+        "law": "coulomb",
+        "mu_s": 0.72,
+        "mu_k": 0.59,
+        "normal_force": 0.5,
+        "normal_force_file": None,
+        "mu_plate": 0,
+    },
     "coupling": {"method": "step-locked", "macro_step": 1e-4, "order": 1, "tolerance": 1e-3},
     "run": {"duration": 2.0, "settle": 1.0, "output_step": 5e-5},
 }
@@ -96,6 +105,9 @@ def test_paper_is_the_defaults() -> None:
     assert scene == Scene.model_validate(bare)
 
 
+FILES = ("circuit.netlist", "drive.file", "friction.normal_force_file")
+
+
 def test_every_key_is_described() -> None:
     assert {(key.table, key.name) for key in keys()} == {
         (table, name) for table, names in DEFAULTS.items() for name in names
@@ -109,7 +121,7 @@ def test_every_key_is_described() -> None:
             assert key.low is not None and key.high is not None and key.low < key.high
             assert key.default is None or key.low <= float(key.default) <= key.high
         else:
-            free = key.kind is bool or key.full in ("circuit.netlist", "drive.file")
+            free = key.kind is bool or key.full in FILES
             assert free or (key.choices and key.default in key.choices)
 
 
@@ -117,14 +129,18 @@ def test_built_in_scenes() -> None:
     scenes = dict(list_scenes())
     assert next(iter(scenes)) == "paper"
     assert set(scenes) == {
-        "paper", "paper-full", "gripper", "ideal-current", "held",
+        "paper", "paper-full", "paper-limited", "gripper", "ideal-current", "held",
         "optimal", "quaid", "trial", "umbanhowar",
+        "direct-drive", "direct-drive-stops", "gripper-17g", "gripper-169g", "square",
+        "down-grip", "down-waveform", "closed-loop-grasp", "two-surfaces",
+        *(f"regime-{n:02}" for n in range(1, 11)),
     }  # fmt: skip
     for name, description in scenes.items():
         scene = load(name)
         assert (scene.name, scene.description) == (name, description)
         assert description
     assert load("paper-full").circuit.model == "full"
+    assert load("paper-limited").circuit.model == "limited"
     assert load("ideal-current").circuit.model == "ideal"
     assert load("held").circuit.model == "none"
     gripper = load("gripper")
@@ -286,16 +302,22 @@ def test_netlist_is_seen_from_the_file_that_names_it(
     assert given.circuit.netlist == str(tmp_path / "my.cir")
 
 
-FULL_AND_FILE = 'it acts in "full" or "file".'
-ALL_BUT_NONE = 'it acts in "full", "amplifier", "ideal" or "file".'
+OF_THE_LIMIT = 'it acts in "full", "limited" or "file".'
+ALL_BUT_NONE = 'it acts in "full", "amplifier", "limited", "ideal" or "file".'
 
 
 @pytest.mark.parametrize(
     ("scene", "change", "why"),
     [
-        ("paper", "circuit.current_limit=3", f'circuit.model = "amplifier"; {FULL_AND_FILE}'),
-        ("paper-full", "circuit.swing_loss_low=3", 'it acts in "amplifier" or "file".'),
-        ("ideal-current", "circuit.supply=3", 'it acts in "full", "amplifier" or "file".'),
+        ("paper", "circuit.current_limit=3", f'circuit.model = "amplifier"; {OF_THE_LIMIT}'),
+        ("paper-full", "circuit.swing_loss_low=3", 'it acts in "amplifier", "limited" or "file".'),
+        (
+            "ideal-current",
+            "circuit.supply=3",
+            'it acts in "full", "amplifier", "limited" or "file".',
+        ),
+        ("paper-limited", "circuit.slew_rate=1e5", 'it acts in "full", "amplifier" or "file".'),
+        ("paper-limited", "circuit.gain_bandwidth=1e5", 'in "full", "amplifier" or "file".'),
         ("ideal-current", "circuit.reltol=1e-4", 'it acts in "full", "amplifier" or "file".'),
         ("held", "circuit.sense_resistance=5", f'circuit.model = "none"; {ALL_BUT_NONE}'),
         ("held", "coil.resistance=5", f'circuit.model = "none"; {ALL_BUT_NONE}'),
@@ -322,6 +344,7 @@ def test_keys_of_no_effect_are_told(tmp_path: Path, scene: str, change: str, why
     [
         ("paper", ["circuit.current_limit=2.504"]),  # changes nothing
         ("paper", ["circuit.model=full", "circuit.current_limit=3"]),
+        ("paper-limited", ["circuit.current_limit=3", "circuit.supply=20", "coil.resistance=6"]),
         ("ideal-current", ["circuit.sense_resistance=5", "coil.inductance=1e-3"]),
         ("gripper", ["circuit.model=none"]),  # the base's own keys
         ("held", ["drive.waveform=sine", "drive.frequency=3", "drive.velocity_amplitude=0.2"]),
@@ -332,7 +355,7 @@ def test_keys_of_no_effect_are_told(tmp_path: Path, scene: str, change: str, why
 @pytest.mark.filterwarnings("error")
 def test_keys_of_use_are_not_told(tmp_path: Path, scene: str, changes: list[str]) -> None:
     resolved = written(tmp_path, to_toml(load(scene, changes)), "resolved.toml")
-    for model in ("full", "amplifier", "ideal", "none"):
+    for model in ("full", "amplifier", "limited", "ideal", "none"):
         waveform = load(resolved).drive.waveform
         if model != "none" and waveform != "sawtooth":
             continue
@@ -341,15 +364,39 @@ def test_keys_of_use_are_not_told(tmp_path: Path, scene: str, changes: list[str]
 
 def test_swing_losses_bound_the_supply_only_where_they_act() -> None:
     assert load("paper-full", ["circuit.supply=3"]).circuit.supply == 3
-    with pytest.raises(BadInput, match=r"swing_loss_high = 4 V must be below"):
-        load("paper", ["circuit.supply=3"])
+    for scene in ("paper", "paper-limited"):
+        with pytest.raises(BadInput, match=r"swing_loss_high = 4 V must be below"):
+            load(scene, ["circuit.supply=3"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        (["coil.inductance=1e-5"], "coil.inductance = 1e-05 H must be at least 1.11e-05 H"),
+        (
+            ["coil.eddy_inductance=1e-6", "coil.eddy_resistance=5"],
+            "coil.eddy_inductance = 1e-06 H must be at least 5e-06 H",
+        ),
+        (
+            ["coil.eddy_inductance=1e-2", "coil.eddy_resistance=2000"],
+            "coil.inductance = 0.0012 H must be at least 0.00201 H",
+        ),
+    ],
+)
+def test_a_coil_too_fast_to_solve_with_the_mechanics_is_refused(
+    changes: list[str], why: str
+) -> None:
+    load("paper", changes)
+    with pytest.raises(BadInput) as caught:
+        load("paper-limited", changes)
+    assert f'--set: {why} with circuit.model = "limited"' in str(caught.value)
 
 
 @pytest.mark.filterwarnings("error")
 def test_a_file_of_ones_own_runs_with_another_circuit_on_top(tmp_path: Path) -> None:
     text = '[circuit]\nmodel = "full"\ncurrent_limit = 3\n[drive]\nfrequency = 30\n'
     path = written(tmp_path, text)
-    for model in ("amplifier", "ideal", "none"):
+    for model in ("amplifier", "limited", "ideal", "none"):
         assert load(path, [f"circuit.model={model}"]).circuit.current_limit == 3
 
 

@@ -1,0 +1,83 @@
+"""What each number is to reach, and the table that says whether it does."""
+
+from typing import Any
+
+AT_MOST = {"coupled_over_parts.amplifier": 1.25, "coupled_over_parts.full": 1.25}
+AT_LEAST = {
+    "all_in_ngspice_over_ours": 5.0,
+    "naive_over_ours": 4.0,
+    "solve_ivp_over_ours": 3.0,
+    "real_time.amplifier": 3.0,
+    "real_time.limited": 30.0,
+    "real_time.ideal": 60.0,
+    "real_time.part": 5000.0,
+}
+EXPONENT = (0.97, 1.03)
+
+_TITLES = {
+    "coupled_over_parts": "Coupled run over the sum of its parts, each alone",
+    "all_in_ngspice_over_ours": "The whole machine in one netlist, over ours",
+    "naive_over_ours": "PySpice's and fmpy's plain calls, over ours",
+    "solve_ivp_over_ours": "SciPy's solve_ivp (LSODA, events), over ours",
+    "real_time": "Simulated seconds per second of one core",
+    "cost_exponent": "Exponent of the cost over the duration",
+    "instructions_per_period": "Instructions of the FMU per period",
+    "part": "The part on a given surface, exact over published solver",
+    "sweep_over_bare_loop": "Points a second of a sweep's worker over those of a bare loop",
+}
+
+
+def held(numbers: dict[str, Any]) -> dict[str, Any]:
+    """The numbers, each that has one with its ``bar`` and whether it ``holds``, by its median."""
+    for name, found in _entries(numbers):
+        if name in AT_MOST:
+            found |= {"bar": f"<= {AT_MOST[name]:g}", "holds": found["median"] <= AT_MOST[name]}
+        elif name in AT_LEAST:
+            found |= {"bar": f">= {AT_LEAST[name]:g}", "holds": found["median"] >= AT_LEAST[name]}
+        elif name == "cost_exponent":
+            low, high = EXPONENT
+            found |= {
+                "bar": f"{low:g} ... {high:g}",
+                "holds": low <= found["median"] <= high,
+            }
+    return numbers
+
+
+def table(numbers: dict[str, Any]) -> str:
+    """All numbers for people: median, low, high, error, bar, and whether it holds."""
+    machine = numbers["machine"]
+    lines = [f"{machine['processor']}, {machine['cores']} cores, Python {machine['python']}"]
+    last = ""
+    for name, found in _entries(numbers):
+        group, _, case = name.partition(".")
+        if group != last:
+            lines.append(f"{_TITLES[group]}:")
+            last = group
+        lines.append(f"  {case:<10}{_numbers(found)}")
+    lines.append(f"{_TITLES['part']}:\n  {'':<10}{numbers['part']['ratio']:.4g}")
+    count = numbers["instructions_per_period"]
+    told = f"{count:,}" if count else "not counted: valgrind and a C compiler are needed"
+    lines.append(f"{_TITLES['instructions_per_period']}:\n  {'':<10}{told}")
+    return "\n".join(lines)
+
+
+def _entries(numbers: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Each spread with its dotted name."""
+    found = []
+    for name, value in numbers.items():
+        if isinstance(value, dict) and "median" in value:
+            found.append((name, value))
+        elif name in ("coupled_over_parts", "real_time"):
+            found += [(f"{name}.{case}", spread) for case, spread in value.items()]
+    return found
+
+
+def _numbers(found: dict[str, Any]) -> str:
+    told = f"{found['median']:.4g} ({found['low']:.4g} ... {found['high']:.4g})"
+    if "error" in found:
+        told += f"  error {found['error']:.1e}"
+    if "error_of_peer" in found:
+        told += f", theirs {found['error_of_peer']:.1e}"
+    if "bar" in found:
+        told += f"  bar {found['bar']}: {'holds' if found['holds'] else 'MISSED'}"
+    return told

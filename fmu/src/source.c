@@ -1,0 +1,207 @@
+#include "source.h"
+
+#include <math.h>
+
+/* A current that misses its target by less than this part of the current limit has met it. */
+static const double MET = 1e-12;
+
+static int has_eddy(const Model *m)
+{
+    return m->r.eddy_inductance > 0.0;
+}
+
+static double loop_resistance(const Model *m)
+{
+    return m->r.coil_resistance + m->n.coil_count * m->r.sense_resistance;
+}
+
+static double limit_of_coil(const Model *m)
+{
+    return m->r.current_limit / m->n.coil_count;
+}
+
+static double command_slope(const Model *m, int s)
+{
+    return s ? m->r.command_2_slope : m->r.command_slope;
+}
+
+static double commanded(const Model *m, int s, double tau)
+{
+    return ((s ? m->r.command_2 : m->r.command) + command_slope(m, s) * tau) /
+           (m->r.sense_resistance * m->n.coil_count);
+}
+
+static double commanded_rate(const Model *m, int s)
+{
+    return command_slope(m, s) / (m->r.sense_resistance * m->n.coil_count);
+}
+
+static double target(const Model *m, const Mode *mode, int s, double tau)
+{
+    return mode->limited ? mode->limited * limit_of_coil(m) : commanded(m, s, tau);
+}
+
+static double target_rate(const Model *m, const Mode *mode, int s)
+{
+    return mode->limited ? 0.0 : commanded_rate(m, s);
+}
+
+static double eddy_voltage(const Model *m, const double y[N_STATES])
+{
+    return has_eddy(m) ? m->r.eddy_resistance * (y[I_COIL] - y[I_EDDY]) : 0.0;
+}
+
+/* Output voltage less that of the inductance, V. */
+static double output_at_rest(const Model *m, const double y[N_STATES])
+{
+    return loop_resistance(m) * y[I_COIL] + eddy_voltage(m, y) +
+           force_factor_at(m, y[Q]) * y[U];
+}
+
+/* Output voltage that it takes to follow the target, V. */
+static double needed(const Model *m, const Mode *mode, const double y[N_STATES], int s)
+{
+    return output_at_rest(m, y) + m->r.inductance * target_rate(m, mode, s);
+}
+
+static double output_limit(const Model *m, int side)
+{
+    return side > 0 ? m->r.output_high : m->r.output_low;
+}
+
+double coil_current(const Model *m, const double y[N_STATES], int s, double tau)
+{
+    if (m->n.source)
+        return y[I_COIL];
+    return s ? m->r.current_2 + m->r.current_2_slope * tau : m->r.current + m->r.current_slope * tau;
+}
+
+double coil_current_rate(const Model *m, const Mode *mode, const double y[N_STATES], int s)
+{
+    if (!m->n.source)
+        return s ? m->r.current_2_slope : m->r.current_slope;
+    if (mode->output == 0)
+        return target_rate(m, mode, s);
+    return (output_limit(m, mode->output) - output_at_rest(m, y)) / m->r.inductance;
+}
+
+double coil_voltage(const Model *m, const Mode *mode, const double y[N_STATES], int s)
+{
+    const double output =
+        mode->output ? output_limit(m, mode->output) : needed(m, mode, y, s);
+    return output - m->n.coil_count * m->r.sense_resistance * y[I_COIL];
+}
+
+void source_rates(const Model *m, const Mode *mode, const double y[N_STATES], int s,
+                  double dy[N_STATES])
+{
+    dy[I_COIL] = dy[I_EDDY] = dy[E_OUTPUT] = dy[E_COPPER] = 0.0;
+    if (!m->n.source)
+        return;
+    const double i = y[I_COIL], eddy = eddy_voltage(m, y);
+    const double output =
+        mode->output ? output_limit(m, mode->output) : needed(m, mode, y, s);
+    dy[I_COIL] = coil_current_rate(m, mode, y, s);
+    if (has_eddy(m))
+        dy[I_EDDY] = eddy / m->r.eddy_inductance;
+    dy[E_OUTPUT] = output * i;
+    dy[E_COPPER] = loop_resistance(m) * i * i + eddy * (i - y[I_EDDY]);
+}
+
+int source_events(const Model *m, const double y[N_STATES], int s, double tau, double emf_rate,
+                  EventFunction functions[MAX_EVENT_FUNCTIONS], int n)
+{
+    const Mode *mode = m->mode + s;
+    const double limit = limit_of_coil(m), asked = commanded(m, s, tau), slope = commanded_rate(m, s);
+    const double amperes = 1e-15 * limit, volts = 1e-14 * (m->r.output_high - m->r.output_low);
+#define ADD(k, v, r, e)                                                                            \
+    functions[n++] =                                                                               \
+        (EventFunction){.kind = k, .surface = s, .value = v, .rate = r, .noise = e}
+    if (mode->limited) {
+        ADD(EVENT_COMMAND_BACK, mode->limited * asked - limit, mode->limited * slope, amperes);
+    } else {
+        ADD(EVENT_COMMAND_HIGH, limit - asked, -slope, amperes);
+        ADD(EVENT_COMMAND_LOW, limit + asked, slope, amperes);
+    }
+    const double rate = coil_current_rate(m, mode, y, s);
+    if (mode->output) {
+        ADD(EVENT_CURRENT_MET, mode->output * (target(m, mode, s, tau) - y[I_COIL]),
+            mode->output * (target_rate(m, mode, s) - rate), amperes);
+    } else {
+        const double wanted = needed(m, mode, y, s);
+        double growth = loop_resistance(m) * rate + emf_rate;
+        if (has_eddy(m))
+            growth += m->r.eddy_resistance * (rate - eddy_voltage(m, y) / m->r.eddy_inductance);
+        ADD(EVENT_OUTPUT_HIGH, m->r.output_high - wanted, -growth, volts);
+        ADD(EVENT_OUTPUT_LOW, wanted - m->r.output_low, growth, volts);
+    }
+#undef ADD
+    return n;
+}
+
+void source_apply(Model *m, int s, double tau, EventKind kind)
+{
+    Mode *mode = m->mode + s;
+    switch (kind) {
+    case EVENT_COMMAND_HIGH:
+        mode->limited = 1;
+        break;
+    case EVENT_COMMAND_LOW:
+        mode->limited = -1;
+        break;
+    case EVENT_COMMAND_BACK:
+        mode->limited = 0;
+        break;
+    case EVENT_CURRENT_MET:
+        mode->output = 0;
+        break;
+    case EVENT_OUTPUT_HIGH:
+        mode->output = 1; /* not to be settled again: it is as near to following as not */
+        return;
+    case EVENT_OUTPUT_LOW:
+        mode->output = -1;
+        return;
+    default:
+        return;
+    }
+    if (mode->output == 0)
+        m->y[s * N_STATES + I_COIL] = target(m, mode, s, tau); /* to the last bit, and not as near as time is */
+    source_settle_output(m, s, tau);
+}
+
+void source_settle_command(Model *m, int s, double tau)
+{
+    if (!m->n.source)
+        return;
+    const double asked = commanded(m, s, tau);
+    m->mode[s].limited = fabs(asked) <= limit_of_coil(m) ? 0 : asked > 0.0 ? 1 : -1;
+}
+
+void source_settle_output(Model *m, int s, double tau)
+{
+    if (!m->n.source)
+        return;
+    Mode *mode = m->mode + s;
+    double *y = m->y + s * N_STATES;
+    const double gap = target(m, mode, s, tau) - y[I_COIL];
+    if (fabs(gap) > MET * limit_of_coil(m)) {
+        mode->output = gap > 0.0 ? 1 : -1;
+        return;
+    }
+    y[I_COIL] = target(m, mode, s, tau);
+    const double wanted = needed(m, mode, y, s);
+    mode->output = wanted > m->r.output_high ? 1 : wanted < m->r.output_low ? -1 : 0;
+}
+
+double coil_voltage_per_slope(const Model *m, int s)
+{
+    if (!m->n.source || m->mode[s].output || m->mode[s].limited)
+        return 0.0;
+    return m->r.inductance / (m->r.sense_resistance * m->n.coil_count);
+}
+
+double magnetic_energy(const Model *m, const double y[N_STATES])
+{
+    return 0.5 * (m->r.inductance * y[I_COIL] * y[I_COIL] +
+                  m->r.eddy_inductance * y[I_EDDY] * y[I_EDDY]);
+}

@@ -1,0 +1,21 @@
+"""Steps of ngspice that a scene has unless it says otherwise."""
+
+import pytest
+
+from cosim.scene import load
+
+NETLIST = "circuit.netlist=circuits/examples/h_bridge.cir"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "step"),
+    [
+        ([], 5e-5),
+        (["circuit.model=full"], 5e-5),
+        (["mechanics.contact=rigid"], 2e-5),
+        (["circuit.model=file", NETLIST], 2e-5),
+        (["mechanics.contact=rigid", "circuit.max_step=1e-4"], 1e-4),
+    ],
+)
+def test_largest_step(overrides: list[str], step: float) -> None:
+    assert load("paper", overrides).circuit.max_step == step
