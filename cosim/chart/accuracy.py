@@ -14,7 +14,6 @@ from statistics import median
 
 import numpy as np
 
-import cosim.bench
 from cosim.chart.cases import CASES, Case
 from cosim.chart.solvers import SOLVERS, Outcome, Solver
 from cosim.chart.study import Row, write
@@ -72,9 +71,7 @@ def reference(name: str) -> Reference:
 def measure(case: Case, solvers: Sequence[Solver], rounds: int) -> list[Run]:
     """All settings of all solvers on a scene, interleaved; times are medians over the rounds."""
     scene = load("paper", case.overrides)
-    plan = [
-        (solver, value) for solver in solvers if _at_hand(solver) for value in solver.values(case)
-    ]
+    plan = [(solver, value) for solver in solvers for value in solver.values(case)]
     seconds: list[list[float]] = [[] for _ in plan]
     outcomes: list[Outcome | str] = []
     for turn in range(rounds):
@@ -87,11 +84,6 @@ def measure(case: Case, solvers: Sequence[Solver], rounds: int) -> list[Run]:
             if not turn:
                 outcomes.append(outcome)
     return _judged(case, plan, outcomes, [median(s) if s else nan for s in seconds])
-
-
-def _at_hand(solver: Solver) -> bool:
-    """The peers come with the benchmark's."""
-    return solver.family != "peers" or hasattr(cosim.bench, "__path__")
 
 
 def _attempt(solver: Solver, scene: Scene, case: Case, value: float) -> Outcome | str:

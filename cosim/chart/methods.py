@@ -20,7 +20,6 @@ METHODS: dict[str, Callable[[Any, Any], Joint]] = {
     "EMF's slope, mean current": lambda a, b: GaussSeidel(a, b, 1, "mean", True),
     "EMF's slope, linear current": lambda a, b: GaussSeidel(a, b, 1, 1, True),
     "companion": Companion,
-    # Beyond the tolerance of the FMU's own solver there is nothing to agree on.
     "iterated, plain": lambda a, b: Iterated(a, b, "plain", tolerance=1e-9),
     "iterated, Newton": lambda a, b: Iterated(a, b, "newton", tolerance=1e-9),
 }
