@@ -14,6 +14,7 @@ from statistics import median
 
 import numpy as np
 
+from cosim.chart import friction
 from cosim.chart.cases import CASES, Case
 from cosim.chart.solvers import SOLVERS, Outcome, Solver
 from cosim.chart.study import Row, write
@@ -180,10 +181,14 @@ def run(out: Path, quick: bool) -> None:
     tables = {"Runs": _rows(runs), "Orders, fitted over the last four halvings": fitted}
     write(out, "accuracy", "Speed against accuracy", tables, notes)
     draw(runs, out)
+    friction.run(out)
     for row in fitted:
         print(
             "  ".join(
                 f"{cell!s:<32}" if k == 0 else f"{cell!s:>6}" for k, cell in enumerate(row.values())
             )
         )
-    print(f"Written to {out}: accuracy.csv, accuracy.md, accuracy.json, accuracy.png")
+    print(
+        f"Written to {out}: accuracy.csv, accuracy.md, accuracy.json, accuracy.png, "
+        "accuracy-steps.png, friction.csv, friction.md, friction.json"
+    )
