@@ -54,8 +54,10 @@ def draw(runs: Sequence["Run"], folder: Path) -> None:
             _panel(axis, [run for run in runs if run.case == case], name == "accuracy")
             axis.set_title(CASES[case].title, fontsize=11, loc="left")
             axis.set(xlabel=label, ylabel="error / range")
-        handles, labels = axes.flat[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
+        known = {}
+        for axis in axes.flat:
+            known |= dict(zip(*axis.get_legend_handles_labels()[::-1], strict=True))
+        figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=4, fontsize=9)
         with whole(folder / f"{name}.png") as temporary:
             figure.savefig(temporary, format="png")
 
@@ -69,4 +71,5 @@ def _panel(axis: Axes, runs: Sequence["Run"], over_time: bool) -> None:
         axis.loglog(x, y, color=color, ls=line, lw=width, marker=".", ms=5, label=label)
         bad = [k for k, run in enumerate(own) if run.failure and not isnan(run.error)]
         axis.loglog([x[k] for k in bad], [y[k] for k in bad], "x", color=color, ms=8, mew=2)
+    axis.plot([], [], "x", color="0.3", ms=8, mew=2, label="diverged or not monotone")
     axis.grid(alpha=0.3)
