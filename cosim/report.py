@@ -25,10 +25,17 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
     rows += [
         ("impacts", f"{summary['impacts']}"),
         ("stick-slip events", f"{summary['stick_slip_events']}"),
+        ("circuit taken", _taken(summary)),
         ("energy unaccounted for", _residual(summary["energy_residual"])),
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
     ]
     return "\n".join(f"  {name:<24}{value}" for name, value in rows if value)
+
+
+def _taken(summary: dict[str, Any]) -> str:
+    if "circuit_model" not in summary:
+        return ""
+    return f"{summary['circuit_model']}: {summary['circuit_model_why']}"
 
 
 def _residual(share: float) -> str:

@@ -1,0 +1,1 @@
+"""The studies: speed against accuracy, and where methods fail."""
