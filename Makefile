@@ -4,8 +4,8 @@
 #   make test        sets up and runs the quick tests   (ARGS='-k name' for some of them)
 #   make test-all    the slow ones too
 #   make setup       sets up: system packages, .venv from the hashed lock, the FMU
-#   make charts      remakes the README's figures, results/*.png; `make test` writes
-#                    results/datasheet.*
+#   make charts      remakes the README's figures and tables in results/, some minutes;
+#                    `make test` writes results/datasheet.*
 #   make bench       remakes results/bench.json, some minutes (ARGS='--trials DIR')
 #   make check       ruff and pyright
 #   make lock        remakes requirements.lock with uv  (ARGS=--upgrade for newer versions)
@@ -78,6 +78,8 @@ charts: setup
 	@cp results/ideal-current-sweep/figure.png results/sweep.png
 	@$(VENV)/bin/cosim chart stability
 	@$(VENV)/bin/cosim chart accuracy
+	@$(VENV)/bin/cosim chart limits
+	@$(VENV)/bin/cosim chart ladder paper regime-10 gripper
 
 bench: setup
 	@$(VENV)/bin/cosim bench $(ARGS)

@@ -184,15 +184,29 @@ def _parser() -> argparse.ArgumentParser:
     )
     export.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: the run)")
 
-    bench = commands.add_parser("bench", help="speed ratios, taken side by side in one run")
-    bench.add_argument("--trials", type=Path, metavar="DIR", help="folder of tracked trials")
-    bench.add_argument("--quick", action="store_true", help="fewer rounds: under a minute")
-    bench.add_argument(
-        "--out", type=Path, default=Path("results/bench"), metavar="DIR", help="where to write"
-    )
-
     chart = commands.add_parser("chart", help="the studies, as tables and a figure")
-    charts = chart.add_subparsers(dest="chart", required=True, metavar="accuracy|stability")
+    charts = chart.add_subparsers(
+        dest="chart", required=True, metavar="accuracy|stability|ladder|limits"
+    )
+    for name, text, given in (
+        ("ladder", "what each rung of a circuit costs, and how far it is from the top", "paper"),
+        ("limits", "which limit of the circuit binds", "paper at three settings"),
+    ):
+        one = charts.add_parser(name, help=text, allow_abbrev=False)
+        one.add_argument(
+            "scenes",
+            metavar="SCENE",
+            nargs="*",
+            help=f"built-in scenes or TOML files (default: {given})",
+        )
+        _add_overrides(one)
+        one.add_argument(
+            "--out",
+            type=Path,
+            default=Path("results"),
+            metavar="DIR",
+            help="where to write (default: results)",
+        )
     for name, text in (
         ("accuracy", "error of every coupling method over its run time"),
         ("stability", "largest stable macro step of every coupling method"),
@@ -208,6 +222,13 @@ def _parser() -> argparse.ArgumentParser:
             metavar="DIR",
             help="where to write (default: results)",
         )
+
+    bench = commands.add_parser("bench", help="speed ratios, taken side by side in one run")
+    bench.add_argument("--trials", type=Path, metavar="DIR", help="folder of tracked trials")
+    bench.add_argument("--quick", action="store_true", help="fewer rounds: under a minute")
+    bench.add_argument(
+        "--out", type=Path, default=Path("results/bench"), metavar="DIR", help="where to write"
+    )
 
     fmu = commands.add_parser("fmu", help="build or check the FMU files of the mechanics")
     actions = fmu.add_subparsers(dest="action", required=True, metavar="build|check")
@@ -260,11 +281,14 @@ def _dispatch(arguments: argparse.Namespace) -> int:
         commands.compare(arguments.run, arguments.overrides, arguments.trial, arguments.out)
     elif arguments.command == "export":
         commands.export(arguments.run, arguments.forms, arguments.out)
+    elif arguments.command == "chart" and arguments.chart in ("accuracy", "stability"):
+        studies = {"accuracy": commands.chart_accuracy, "stability": commands.chart_stability}
+        studies[arguments.chart](arguments.out, arguments.quick)
+    elif arguments.command == "chart":
+        chosen = {"ladder": commands.chart_ladder, "limits": commands.chart_limits}
+        chosen[arguments.chart](arguments.scenes, arguments.overrides, arguments.out)
     elif arguments.command == "bench":
         commands.bench(arguments.out, arguments.trials, arguments.quick)
-    elif arguments.command == "chart":
-        chosen = {"accuracy": commands.chart_accuracy, "stability": commands.chart_stability}
-        chosen[arguments.chart](arguments.out, arguments.quick)
     elif arguments.action == "build":
         commands.fmu_build(arguments.force)
     else:

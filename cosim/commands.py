@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -210,6 +210,49 @@ def _tune(
     print(table(numbers))
     print(f"Written to {folder}: tune.json, tune.csv, best.toml")
     print(f"Figure: {folder / 'figure.png'}")
+
+
+def chart_ladder(sources: list[str], overrides: list[str], folder: Path) -> None:
+    """Cost and error of each rung on each scene."""
+    scenes = [load(source, overrides) for source in sources or ["paper"]]
+    with _writable(folder):
+        from cosim.chart import ladder, ladder_report
+
+        with _bar("ladder", ladder.runs_in_all() * len(scenes)) as step:
+            found = [(scene, ladder.ladder(scene, step)) for scene in scenes]
+        print(ladder_report.write(folder, found))
+
+
+def chart_limits(sources: list[str], overrides: list[str], folder: Path) -> None:
+    """Which limit binds, on each scene."""
+    asked = [(source, overrides) for source in sources]
+    fast = ["drive.frequency=50.8", "drive.amplitude=9", "drive.offset=-1.2"]
+    slow = ["drive.frequency=20", "drive.amplitude=4.7"]
+    settings = [fast, [*fast, "mechanics.contact=rigid"], slow]
+    asked = asked or [("paper", [*own, *overrides]) for own in settings]
+    scenes = [load(source, changes) for source, changes in asked]
+    with _writable(folder):
+        from cosim.chart import limits, limits_report
+
+        turns = [number == 0 for number in range(len(scenes))]
+        with _bar("limits", sum(limits.runs_in_all(turn) for turn in turns)) as step:
+            found = [limits.study(*pair, step) for pair in zip(scenes, turns, strict=True)]
+        print(limits_report.write(folder, found))
+
+
+@contextmanager
+def _bar(name: str, total: int) -> Iterator[Callable[[], None]]:
+    """A progress bar; gives what advances it by one."""
+    from tqdm import tqdm
+
+    with tqdm(
+        total=total, desc=name, unit="run", leave=False, file=sys.stderr, disable=None
+    ) as bar:
+
+        def step() -> None:
+            bar.update()
+
+        yield step
 
 
 @contextmanager

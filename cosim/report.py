@@ -25,6 +25,7 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
     rows += [
         ("impacts", f"{summary['impacts']}"),
         ("stick-slip events", f"{summary['stick_slip_events']}"),
+        ("circuit taken", _taken(summary)),
         ("energy unaccounted for", _residual(summary["energy_residual"])),
         ("error of the path", _error(scene, summary)),
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
@@ -43,6 +44,12 @@ def _error(scene: Scene, summary: dict[str, Any]) -> str:
     if coupling.method != "step-locked":
         chosen += f", macro_step {coupling.macro_step:g} s"
     return f"{summary['error_estimate']:.1e} of its range, with {chosen}"
+
+
+def _taken(summary: dict[str, Any]) -> str:
+    if "circuit_model" not in summary:
+        return ""
+    return f"{summary['circuit_model']}: {summary['circuit_model_why']}"
 
 
 def _residual(share: float) -> str:

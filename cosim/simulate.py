@@ -18,7 +18,7 @@ from cosim.drive import Command, command, commands
 from cosim.isolation import isolated
 from cosim.mechanics import Mechanics
 from cosim.recorder import Recorder
-from cosim.scene import WITHOUT_NGSPICE, Scene
+from cosim.scene import WITHOUT_NGSPICE, Scene, changed
 from cosim.scene.tables import LED
 from cosim.summary import summarise
 
@@ -82,6 +82,8 @@ def simulate(
     has given up in this one. Raises BadInput for a netlist that cannot be used, SimulationFailed
     with where, when, and what to try.
     """
+    if scene.circuit.model == "auto":
+        return _by_itself(scene, progress, fmi_version, compiled)
     if scene.surface_is_given:
         from cosim.prescribed import simulate_part
 
@@ -96,6 +98,25 @@ def simulate(
     if _needs_own_process(scene):
         return isolated(_simulate, scene, progress, fmi_version=fmi_version, compiled=compiled)
     return _simulate(scene, progress, fmi_version, compiled)
+
+
+def _by_itself(
+    scene: Scene, progress: Callable[[float], None], fmi_version: int, compiled: bool
+) -> Result:
+    """The run of the cheapest rung that suffices; what it took to find it is part of its time."""
+    from cosim.rungs import choose
+
+    began = time.perf_counter()
+    choice = choose(scene)
+    taken = changed(scene, {"circuit.model": choice.model}, "auto")
+    result = simulate(taken, progress, fmi_version, compiled)
+    found = {
+        "circuit_model": choice.model,
+        "circuit_model_why": choice.why,
+        "circuit_model_errors": choice.errors,
+        "wall_time": time.perf_counter() - began,
+    }
+    return Result(taken, result.waveforms, result.summary | found)
 
 
 def _needs_own_process(scene: Scene) -> bool:

@@ -64,7 +64,7 @@ def load(source: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scene
     return scene
 
 
-def changed(scene: Scene, values: Mapping[str, float | int | str], origin: str) -> Scene:
+def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin: str) -> Scene:
     """``scene`` with other values for some keys ("table.key", SI), checked like a loaded one.
 
     ``origin`` names in messages where the values come from. Raises :class:`BadInput`.

@@ -204,11 +204,11 @@ class Drive(Table):
 class Circuit(Table):
     """What turns V1 into current."""
 
-    model: Literal["full", "amplifier", "limited", "ideal", "none", "file"] = _choice(
+    model: Literal["full", "amplifier", "limited", "ideal", "auto", "none", "file"] = _choice(
         "amplifier",
         "Schematic with its difference amplifier, behavioural current source, the same reduced to "
-        "its limits and the coil, current = command, no drive at all, or the netlist named in "
-        "circuit.netlist",
+        "its limits and the coil, current = command, the cheapest of the last three within "
+        "run.tolerance, no drive at all, or the netlist named in circuit.netlist",
     )
     netlist: str | None = _choice(None, "A netlist of one's own, seen from the scene's file")
     supply: float = _number(18.0, "V", 0.1, 1e3, "Supply voltage, both signs")
@@ -259,7 +259,7 @@ class Circuit(Table):
 
     @model_validator(mode="after")
     def _check(self) -> "Circuit":
-        swing = self.model in ("amplifier", "limited", "file")
+        swing = self.model in ("amplifier", "limited", "auto", "file")
         for key in ("swing_loss_high", "swing_loss_low"):
             if swing and (loss := getattr(self, key)) >= self.supply:
                 raise fault(
@@ -425,6 +425,7 @@ CIRCUIT_KEYS: dict[str, set[str]] = {
     "amplifier": _OF_NGSPICE - {"current_limit"},
     "limited": {"supply", "sense_resistance", "current_limit", "swing_loss_high", "swing_loss_low"},
     "ideal": {"sense_resistance"},
+    "auto": _OF_NGSPICE,
     "none": set(),
     "file": _OF_NGSPICE,
 }
@@ -444,7 +445,9 @@ def acts(table: str, key: str, model: str, waveform: str, method: str = "step-lo
     if key in ("model", "waveform"):
         return True
     if table == "coupling":
-        return model in LED and key in COUPLING_KEYS[method]
+        return (model in LED or model == "auto") and key in COUPLING_KEYS[method]
+    if (table, key) == ("run", "tolerance"):
+        return model not in ("none", "file")  # which are no rungs to choose from
     if table == "circuit":
         steered = method == "auto" and key in CHOSEN_BY_AUTO
         return key in CIRCUIT_KEYS[model] and not steered
@@ -468,6 +471,14 @@ class Run(Table):
         1.0, "s", 0.0, 1e5, "Time left out of the averages; half of the duration unless given"
     )
     output_step: float = _number(5e-5, "s", 1e-9, 1e3, "Time between the rows of the waveforms")
+    tolerance: float = _number(
+        0.01,
+        "1",
+        1e-6,
+        1.0,
+        'Relative error of v_average that a simpler circuit may make: for circuit.model = "auto", '
+        "and for the ladder",
+    )
 
     @model_validator(mode="before")
     @classmethod
