@@ -74,7 +74,8 @@ def idle(key: Key, model: str, waveform: str) -> str:
     at = f'circuit.model = "{model}"'
     if key.table == "drive" and model == "none":
         at += f' and drive.waveform = "{waveform}"'
-    where = [m for m in CIRCUIT_KEYS if acts(key.table, key.name, m, "sawtooth")]
+    models = [name for name in CIRCUIT_KEYS if name != "auto"]  # which becomes one of the others
+    where = [name for name in models if acts(key.table, key.name, name, "sawtooth")]
     if where:
         return f"{key.full} has no effect with {at}; it acts in {listed(where)}"
     waveforms = [name for name, known in GIVEN_SURFACES.items() if key.name in known]

@@ -88,7 +88,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "mu_plate": 0,
     },
     "coupling": {"method": "step-locked"},
-    "run": {"duration": 2.0, "settle": 1.0, "output_step": 5e-5},
+    "run": {"duration": 2.0, "settle": 1.0, "output_step": 5e-5, "tolerance": 0.01},
 }
 
 
