@@ -91,7 +91,8 @@ def idle(key: Key, model: str, waveform: str, method: str) -> str:
             f'{key.full} has no effect with coupling.method = "{method}"; it acts in '
             f"{listed(others)}"
         )
-    where = [m for m in CIRCUIT_KEYS if acts(key.table, key.name, m, "sawtooth", method)]
+    models = [name for name in CIRCUIT_KEYS if name != "auto"]  # which becomes one of the others
+    where = [name for name in models if acts(key.table, key.name, name, "sawtooth", method)]
     if where or key.table == "coupling":
         where = where or list(LED)
         return f"{key.full} has no effect with {at}; it acts in {listed(where)}"

@@ -69,7 +69,7 @@ FILES = [
     ("[circuit]\nmodel = 'limitd'", "did you mean limited?"),
     (
         "[circuit]\nmodel = 'spice'",
-        'must be one of "full", "amplifier", "limited", "ideal", "none", "file"',
+        'must be one of "full", "amplifier", "limited", "ideal", "auto", "none", "file"',
     ),
     ("[circuit]\nmodel = 'file'", "circuit.netlist must be given together"),
     ("[circuit]\nnetlist = 'a.cir'", 'circuit.model = "file" and circuit.netlist must be given'),
