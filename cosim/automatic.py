@@ -44,7 +44,7 @@ CLEARLY = 0.8
 def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> Result:
     """The cheapest run that meets ``coupling.tolerance``, with the scene as it was then run.
 
-    Its summary also has ``error_estimate``, and as ``wall_time`` that of all runs, s. ``run`` runs
+    Its summary also has ``error_estimate`` and ``coupling_taken``, and as ``wall_time`` that of all runs, s. ``run`` runs
     a scene. Raises SimulationFailed where no level meets the tolerance.
     """
     seconds = 0.0
@@ -66,7 +66,16 @@ def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> R
         off = difference(found, finer)
         if off <= scene.coupling.tolerance and _cost(found) < min(CLEARLY * usual, _cost(best)):
             best, error = found, off
-    summary = best.summary | {"wall_time": seconds, "error_estimate": error}
+    circuit, coupling = best.scene.circuit, best.scene.coupling
+    taken: dict[str, Any] = {
+        "coupling.method": coupling.method,
+        "circuit.reltol": circuit.reltol,
+        "circuit.max_step": circuit.max_step,
+    }
+    if coupling.method != "step-locked":
+        taken["coupling.macro_step"] = coupling.macro_step
+    found = {"wall_time": seconds, "error_estimate": error, "coupling_taken": taken}
+    summary = best.summary | found
     return Result(best.scene, best.waveforms, summary)
 
 

@@ -55,7 +55,6 @@ def _run(scene: Scene, folder: Path) -> None:
         bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.2f} of {total:g} s, {remaining} left",
     ) as bar:
         result = simulate(scene, progress=progress)
-    scene = result.scene  # with the method and steps that were chosen, if they were to be
     from cosim import figure
     from cosim.simulate import UNITS
     from cosim.waveforms import write_csv, write_netcdf

@@ -27,22 +27,20 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
         ("stick-slip events", f"{summary['stick_slip_events']}"),
         ("circuit taken", _taken(summary)),
         ("energy unaccounted for", _residual(summary["energy_residual"])),
-        ("error of the path", _error(scene, summary)),
+        ("error of the path", _error(summary)),
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
     ]
     return "\n".join(f"  {name:<24}{value}" for name, value in rows if value)
 
 
-def _error(scene: Scene, summary: dict[str, Any]) -> str:
+def _error(summary: dict[str, Any]) -> str:
     """Of a run whose method and steps were chosen by its error: that error, and the choice."""
     if "error_estimate" not in summary:
         return ""
-    circuit, coupling = scene.circuit, scene.coupling
-    chosen = (
-        f"{coupling.method}, circuit.reltol {circuit.reltol:g}, max_step {circuit.max_step:g} s"
+    taken = summary["coupling_taken"]
+    chosen = ", ".join(
+        value if isinstance(value, str) else f"{key} {value:g}" for key, value in taken.items()
     )
-    if coupling.method != "step-locked":
-        chosen += f", macro_step {coupling.macro_step:g} s"
     return f"{summary['error_estimate']:.1e} of its range, with {chosen}"
 
 
