@@ -38,9 +38,8 @@ def _error(summary: dict[str, Any]) -> str:
     if "error_estimate" not in summary:
         return ""
     taken = summary["coupling_taken"]
-    chosen = ", ".join(
-        value if isinstance(value, str) else f"{key} {value:g}" for key, value in taken.items()
-    )
+    words = (v if isinstance(v, str) else f"{key} {v:g}" for key, v in taken.items())
+    chosen = ", ".join(words)
     return f"{summary['error_estimate']:.1e} of its range, with {chosen}"
 
 
