@@ -45,7 +45,8 @@ def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> R
     """The cheapest run that meets ``coupling.tolerance``, with the scene as it was then run.
 
     Its summary also has ``error_estimate`` and ``coupling_taken``, and as ``wall_time``
-    that of all runs, s. ``run`` runs a scene. Raises SimulationFailed where no level meets the tolerance.
+    that of all runs, s. ``run`` runs a scene. Raises SimulationFailed where no level meets the
+    tolerance.
     """
     seconds = 0.0
 
