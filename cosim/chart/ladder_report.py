@@ -8,9 +8,9 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cosim.chart import tables
 from cosim.chart.ladder import Rung, cheapest
-from cosim.chart.tables import Row
+from cosim.chart.study import Row
+from cosim.chart.study import write as write_tables
 from cosim.scene import Scene
 from cosim.waveforms import whole
 
@@ -28,7 +28,7 @@ def write(folder: Path, found: Found) -> str:
     content: dict[str, Sequence[Row]] = {
         "Cost and error of each rung": [row for pair in found for row in rows(*pair)]
     }
-    tables.write(folder, "ladder", "Model no more than a scene needs", content, said)
+    write_tables(folder, "ladder", "Model no more than a scene needs", content, said)
     with whole(folder / "ladder.png") as temporary:
         draw(found, temporary)
     printed: list[str] = []

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from math import nan
 from pathlib import Path
 
-from cosim.chart import limits_figure, tables
+from cosim.chart import limits_figure
 from cosim.chart.limits import LIMITS, TREMBLES, UNTOLD, Study, name_of
-from cosim.chart.tables import Row
+from cosim.chart.study import Row
+from cosim.chart.study import write as write_tables
 from cosim.waveforms import whole
 
 MATTERED = 1.05
@@ -24,7 +25,7 @@ def write(folder: Path, studies: Sequence[Study]) -> str:
         if study.turned:
             found[f"Each limit turned: {name}"] = turned(study)
         said.append(words(study))
-    tables.write(folder, "limits", "Which limit binds?", found, said)
+    write_tables(folder, "limits", "Which limit binds?", found, said)
     with whole(folder / "limits.png") as temporary:
         limits_figure.draw(studies, temporary)
     printed: list[str] = []

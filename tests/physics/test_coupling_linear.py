@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cosim.coupling.companion import Companion
 from cosim.coupling.gauss_seidel import GaussSeidel
-from cosim.coupling.iterated import Iterated
+from cosim.coupling.iterated import Acceleration, Iterated
 from cosim.coupling.jacobi import Jacobi
 from cosim.coupling.joint import Joint
 from cosim.coupling.linear import LinearParticipant, coil
@@ -47,7 +48,7 @@ def slopes(errors: list[float]) -> list[float]:
 
 @pytest.mark.parametrize("method", [Jacobi, GaussSeidel])
 @pytest.mark.parametrize("order", [0, 1, 2])
-def test_order_on_the_oscillator(method: type[Joint], order: int) -> None:
+def test_order_on_the_oscillator(method: Any, order: int) -> None:
     """The greatest error over time: T = 1 is a turning point, where it vanishes in first order."""
     errors = []
     for n in HALVINGS:
@@ -113,9 +114,13 @@ def test_an_accelerated_iteration_has_no_limit_and_a_plain_one_has() -> None:
     plain = largest(lambda: Iterated(*direct_drive(), "plain"))
     gauss_seidel = largest(lambda: GaussSeidel(*direct_drive()))
     assert plain < 2.0 * gauss_seidel
-    for acceleration in ("aitken", "anderson", "newton"):
-        make = lambda a=acceleration: Iterated(*direct_drive(), a)  # noqa: E731
-        assert largest(make, 0.02) == 0.02
+    accelerations: tuple[Acceleration, ...] = ("aitken", "anderson", "newton")
+    for acceleration in accelerations:
+
+        def accelerated(by: Acceleration = acceleration) -> Joint:
+            return Iterated(*direct_drive(), by)
+
+        assert largest(accelerated, 0.02) == 0.02
 
 
 def test_a_heavy_ram_leaves_jacobi_and_gauss_seidel_their_rule_of_thumb() -> None:
