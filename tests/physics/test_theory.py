@@ -389,6 +389,8 @@ def test_the_misprints_as_text():
 def test_the_exact_simulation_agrees_with_this_one(f_n, peak):
     mu_s, mu_k = Fraction(7, 10), Fraction(3, 5)
     phases = [(Fraction(1, 2), peak / 3), (Fraction(1, 5), -peak), (Fraction(3, 10), peak / 9)]
+    # At the very limit of sticking rounding decides, and there is no rounding in rational numbers.
+    assume(all(abs(a + 1) != mu_s * f_n for _, a in phases))
     run = exact.simulate(phases, exact.Contact.coulomb(mu_s, mu_k, f_n), 4, lag=Fraction(1, 7))
     times = [0.0, 0.5, 0.7, 1.0]
     start = exact.start_velocity(phases)
