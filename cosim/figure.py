@@ -1,6 +1,7 @@
 """The figure of a run: what the circuit did, and what the mechanics made of it."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,9 @@ SECOND_SURFACE: dict[str, Any] = {
     "color": SECOND, "lw": 1.1, "ls": "--", "label": "second"
 }  # fmt: skip
 PERIODS_SHOWN = 3
+_MOST_ROWS = 200_000
+"""Of a curve that is drawn as it is."""
+_STRETCHES = 4000
 
 
 def draw(result: Result, path: Path) -> None:
@@ -67,7 +71,21 @@ def _last_periods(result: Result) -> slice:
     else:
         span = PERIODS_SHOWN / scene.drive.frequency
     first = int(np.searchsorted(time, time[-1] - span))
-    return slice(min(first, max(0, len(time) - 2)), None)
+    return slice(max(min(first, len(time) - 2), len(time) - _MOST_ROWS, 0), None)
+
+
+def _outline(time: Array, values: Array) -> tuple[Array, Array]:
+    """A curve of fewer points that covers the same pixels: of each of many short stretches the
+    smallest and the largest value. One of not so many points stays as it is.
+    """
+    if len(time) <= _MOST_ROWS:
+        return time, values
+    starts = np.linspace(0, len(time), _STRETCHES + 1).astype(int)
+    found = [
+        (values[begin:end].min(), values[begin:end].max())
+        for begin, end in pairwise(starts.tolist())
+    ]
+    return np.repeat(time[starts[:-1]], 2), np.array(found).ravel()
 
 
 def _title(result: Result) -> str:
@@ -90,8 +108,10 @@ def _title(result: Result) -> str:
 
 def _whole_run(axis: Axes, result: Result) -> None:
     waves = result.waveforms
-    axis.plot(waves["time"], waves["z_surface"] * 1e3, color=SURFACE, lw=0.5, label="surface")
-    axis.plot(waves["time"], waves["z_part"] * 1e3, color=PART, lw=1.2, label="part")
+    time, height = _outline(waves["time"], waves["z_surface"])
+    axis.plot(time, height * 1e3, color=SURFACE, lw=0.5, label="surface")
+    time, height = _outline(waves["time"], waves["z_part"])
+    axis.plot(time, height * 1e3, color=PART, lw=1.2, label="part")
     if result.scene.run.settle > 0:
         axis.axvspan(0, result.scene.run.settle, color="0.93", zorder=0, label="settling")
     axis.set_xlim(0, result.scene.run.duration)
@@ -100,7 +120,8 @@ def _whole_run(axis: Axes, result: Result) -> None:
     curves, _ = axis.get_legend_handles_labels()
     if "normal_force" in waves:
         right = axis.twinx()
-        right.plot(waves["time"], waves["normal_force"], color=GRIP, lw=1.0, label="grip (right)")
+        force = _outline(waves["time"], waves["normal_force"])
+        right.plot(*force, color=GRIP, lw=1.0, label="grip (right)")
         right.set(ylabel="normal force [N]", ylim=(0.0, None))
         curves += right.get_lines()
     _head(axis, "Whole run", curves)
@@ -215,10 +236,10 @@ def _shade_sticking(axis: Axes, time: Array, sticking: Array) -> None:
 
 def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
     waves = result.waveforms
-    time = waves["time"]
-    axis.plot(time[shown] * 1e3, waves["a_surface"][shown], color=SURFACE, lw=0.8, label="true")
-    frames = np.arange(np.ceil(time[shown][0] * FRAME_RATE), time[-1] * FRAME_RATE) / FRAME_RATE
-    heights = np.interp(frames, time, waves["z_surface"])
+    time = waves["time"][shown]
+    axis.plot(time * 1e3, waves["a_surface"][shown], color=SURFACE, lw=0.8, label="true")
+    frames = np.arange(np.ceil(time[0] * FRAME_RATE), time[-1] * FRAME_RATE) / FRAME_RATE
+    heights = np.interp(frames, time, waves["z_surface"][shown])
     if len(frames) > 2:
         read = np.diff(heights, 2) * FRAME_RATE**2
         axis.plot(
