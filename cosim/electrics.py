@@ -93,12 +93,11 @@ def from_circuit(
         settled = current[time >= settle]
         most, least = settled.max(initial=most), settled.min(initial=least)
         stop = len(rows) if time[-1] == end else int(np.searchsorted(rows, time[-1]))
-        at = rows[done:stop]
+        known = [current, out - sense, *([part["v(v1)"]] if made else [])]
+        for here in blocks(stop - done):
+            at = rows[done:stop][here]
+            waves.append(np.stack([np.interp(at, time, values) for values in known], axis=1))
         done = stop
-        columns = [np.interp(at, time, current), np.interp(at, time, out - sense)]
-        if made:
-            columns.append(np.interp(at, time, part["v(v1)"]))
-        waves.append(np.stack(columns, axis=1))
     return Electrics(
         command=waves.column(2) if made else commanded(command, rows),
         current=waves.column(0),
@@ -180,17 +179,18 @@ def from_command(
         squares += _total(h, start**2 + start * end + end**2)
         slope = (end - start) / h
         stop = len(rows) if part.stop == count else int(np.searchsorted(rows, edges[-1]))
-        at_rows, force = rows[done:stop], emf[done:stop]
-        done = stop
-        at = np.clip(np.searchsorted(edges, at_rows, side="right") - 1, 0, len(h) - 1)
-        current = start[at] + slope[at] * (at_rows - edges[at])
-        voltage = coil.resistance * current + coil.inductance * slope[at] + force
         branch = eddy.follow(h, start, end)
-        if branch is not None:
-            lag = slope[at] * eddy.tau
-            rest = start[at] - branch[at] - lag
-            voltage += eddy.resistance * (lag + rest * np.exp(-(at_rows - edges[at]) / eddy.tau))
-        waves.append(np.stack([current, voltage], axis=1))
+        for few in blocks(stop - done):
+            row = rows[done:stop][few]
+            at = np.clip(np.searchsorted(edges, row, side="right") - 1, 0, len(h) - 1)
+            current = start[at] + slope[at] * (row - edges[at])
+            voltage = coil.resistance * current + coil.inductance * slope[at] + emf[done:stop][few]
+            if branch is not None:
+                lag = slope[at] * eddy.tau
+                rest = start[at] - branch[at] - lag
+                voltage += eddy.resistance * (lag + rest * np.exp(-(row - edges[at]) / eddy.tau))
+            waves.append(np.stack([current, voltage], axis=1))
+        done = stop
         if part.start <= settled < part.stop:
             here = settled - part.start
             most = least = start[here] + slope[here] * (settle - edges[here])
