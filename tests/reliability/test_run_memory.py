@@ -1,0 +1,151 @@
+"""The memory of a run does not grow with its duration, where it ends up on disk.
+
+Counted is anonymous memory: pages that are mapped from files the system may drop at any moment.
+"""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim import recorder, simulate, tape
+from cosim.circuit import run
+from cosim.scene import load
+from cosim.waveforms import csv_content, netcdf_content
+
+pytestmark = pytest.mark.skipif(
+    not Path("/proc/self/status").exists(), reason="memory is read from /proc"
+)
+
+
+def peak(folder: Path, duration: float, *overrides: str) -> float:
+    """MB of anonymous memory of ``cosim run paper``, at most."""
+    settings = [*overrides, f"run.duration={duration}"]
+    command = [sys.executable, "-m", "cosim", "run", "paper", "--out", str(folder)]
+    command += [word for setting in settings for word in ("--set", setting)]
+    most = 0.0
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+        while process.poll() is None:
+            status = Path(f"/proc/{process.pid}/status").read_text().splitlines()
+            known = [line.split()[1] for line in status if line.startswith("RssAnon")]
+            most = max(most, *(float(size) / 1024 for size in known), 0.0)
+            time.sleep(0.005)
+    assert process.returncode == 0
+    for name in ("waveforms.csv", "waveforms.nc"):
+        (folder / name).unlink()
+    assert sorted(os.listdir(folder)) == ["figure.png", "scene.toml", "summary.json"]
+    return most
+
+
+@pytest.mark.parametrize(
+    ("model", "durations", "rows"),
+    [
+        ("ideal", (4, 40), 5e-5),
+        pytest.param("limited", (20, 200), 5e-5, marks=pytest.mark.slow),
+        pytest.param("amplifier", (10, 100), 5e-5, marks=pytest.mark.slow),
+        ("amplifier", (2, 20), 2e-4),
+    ],
+)
+def test_memory_is_bounded(
+    model: str, durations: tuple[float, float], rows: float, tmp_path: Path
+) -> None:
+    settings = (f"circuit.model={model}", f"run.output_step={rows}")
+    short, long = (peak(tmp_path, duration, *settings) for duration in durations)
+    # What the rows alone would take, if they were all in memory, is several times as much.
+    assert long - short < 20.0, f"{short:.1f} MB for {durations[0]} s, {long:.1f} MB for more"
+
+
+CASES = {
+    "amplifier": ("paper", ["run.duration=0.2"]),
+    "ideal, with eddy currents": (
+        "ideal-current",
+        ["run.duration=0.2", "coil.eddy_inductance=1e-3", "coil.eddy_resistance=4"],
+    ),
+    "limited": ("paper", ["circuit.model=limited", "run.duration=0.2"]),
+    "full": ("paper-full", ["run.duration=0.02"]),
+    "two surfaces": ("two-surfaces", ["run.duration=0.1"]),
+    "changing grip": ("closed-loop-grasp", ["run.duration=0.1", "run.output_step=1.7e-4"]),
+    "many frames to a row": ("ideal-current", ["run.duration=0.5", "run.output_step=0.04"]),
+}
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("name", CASES)
+def test_blocks_and_disk_change_nothing(
+    name: str, compiled: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = load(*CASES[name])
+    whole = simulate.simulate(scene, compiled=compiled)
+    monkeypatch.setattr(tape, "IN_MEMORY", 0)
+    monkeypatch.setattr(tape, "BLOCK", 97)
+    monkeypatch.setattr(recorder, "ENTRIES", 50)
+    monkeypatch.setattr(simulate, "_INTERVALS", 3)
+    monkeypatch.setattr(run, "_POINTS", 11)
+    with tape.on_disk_in(tmp_path):
+        parts = simulate.simulate(scene, compiled=compiled)
+    assert not os.listdir(tmp_path)
+    assert list(parts.waveforms) == list(whole.waveforms)
+    for column, values in whole.waveforms.items():
+        assert values.tobytes() == parts.waveforms[column].tobytes(), column
+    for key, value in whole.summary.items():
+        if key == "energy_residual":  # the difference of numbers that are nearly one
+            assert parts.summary[key] == pytest.approx(value, abs=1e-12)
+        elif isinstance(value, float) and key != "wall_time":
+            assert parts.summary[key] == pytest.approx(value, rel=1e-12), key
+        elif key != "wall_time":
+            assert parts.summary[key] == value, key
+
+
+def test_files_are_those_of_other_writers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bytes of scipy's netCDF and of numpy's CSV."""
+    from io import BytesIO
+
+    from scipy.io import netcdf_file
+
+    monkeypatch.setattr(tape, "BLOCK", 100)
+    random = np.random.default_rng(1)
+    time_ = np.arange(2345) * 5e-5
+    waves = {"time": time_, "z": random.normal(size=2345) * 1e-9, "sticking": np.round(time_)}
+    units = {"time": "s", "z": "m", "sticking": "1"}
+    about = {"title": "fünf", "scene": "a = 1\nb = 2\n"}
+    content = BytesIO()
+    with netcdf_file(content, "w", version=2) as file:
+        for name, text in about.items():
+            setattr(file, name, text.encode())
+        file.createDimension("time", len(time_))
+        for name, values in waves.items():
+            variable = file.createVariable(name, "f8", ("time",))
+            variable[:] = values
+            variable.units = units[name]
+        file.flush()
+        assert netcdf_content(waves, units, about) == content.getvalue()
+    table = BytesIO()
+    header = "time [s],z [m],sticking [1]"
+    np.savetxt(
+        table, np.column_stack(list(waves.values())), "%.10g", ",", header=header, comments=""
+    )
+    assert csv_content(waves, units) == table.getvalue()
+
+
+def test_disk_that_takes_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A full disk is told in one sentence, and is not met as a signal or a half-known run."""
+    from cosim.errors import BadInput
+
+    monkeypatch.setattr(tape, "IN_MEMORY", 0)
+
+    class Full:
+        def write(self, content: bytes) -> int:
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(tape.tempfile, "TemporaryFile", lambda **_: Full())
+    for name in ("paper", "ideal-current"):
+        for compiled in (True, False):
+            with (
+                tape.on_disk_in(tmp_path),
+                pytest.raises(BadInput, match=r"cannot hold the waveforms .*No space left"),
+            ):
+                simulate.simulate(load(name, ["run.duration=0.1"]), compiled=compiled)
