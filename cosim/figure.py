@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from cosim.published import FRAME_RATE
 from cosim.simulate import Result
+from cosim.tape import release
 
 Array = npt.NDArray[np.float64]
 
@@ -81,10 +82,10 @@ def _outline(time: Array, values: Array) -> tuple[Array, Array]:
     if len(time) <= _MOST_ROWS:
         return time, values
     starts = np.linspace(0, len(time), _STRETCHES + 1).astype(int)
-    found = [
-        (values[begin:end].min(), values[begin:end].max())
-        for begin, end in pairwise(starts.tolist())
-    ]
+    found = []
+    for begin, end in pairwise(starts.tolist()):
+        found.append((values[begin:end].min(), values[begin:end].max()))
+        release()
     return np.repeat(time[starts[:-1]], 2), np.array(found).ravel()
 
 

@@ -3,12 +3,14 @@
 What is on disk lies in a file that has no name, so nothing is left of it however the process ends.
 """
 
+import mmap
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import IO
+from weakref import WeakSet
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +24,8 @@ IN_MEMORY = 8 << 20
 
 BLOCK = 1 << 16
 """Rows that are looked at at a time where all of them need not be in memory at once."""
+
+_mapped: "WeakSet[mmap.mmap]" = WeakSet()
 
 _folder: ContextVar[Path | None] = ContextVar("folder", default=None)
 
@@ -84,8 +88,9 @@ class Tape:
         if self._array is None:
             shape = (self._rows, self._columns)
             if self._file is not None:
-                mapped = np.memmap(self._file, np.float64, mode="r+", shape=shape)
-                self._array = mapped.view(np.ndarray)
+                mapped = mmap.mmap(self._file.fileno(), self._rows * self._columns * 8)
+                _mapped.add(mapped)
+                self._array = np.frombuffer(mapped, np.float64).reshape(shape)
             else:
                 self._array = np.concatenate([np.empty((0, self._columns)), *self._blocks])
                 self._blocks = [self._array]
@@ -97,6 +102,16 @@ class Tape:
 
 
 def blocks(count: int) -> Iterator[slice]:
-    """Slices of BLOCK rows that together are ``count`` rows."""
+    """Slices of BLOCK rows that together are ``count`` rows; what was read of tapes for one does
+    not stay in memory for the next.
+    """
     for start in range(0, count, BLOCK):
         yield slice(start, min(start + BLOCK, count))
+        release()
+
+
+def release() -> None:
+    """Take what was read of tapes on disk out of this process's memory; it can be read again."""
+    if hasattr(mmap, "MADV_DONTNEED"):
+        for mapped in list(_mapped):
+            mapped.madvise(mmap.MADV_DONTNEED)

@@ -64,10 +64,12 @@ def _csv(file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str]) ->
     file.write(f"{header}\n".encode())
     columns = list(waveforms.values())
     row = ",".join(["%.10g"] * len(columns)) + "\n"
-    for start in range(0, len(columns[0]), _CSV_ROWS):
-        table = np.column_stack([values[start : start + _CSV_ROWS] for values in columns])
-        # Many rows in one go: several times as fast as numpy's savetxt.
-        file.write((row * len(table) % tuple(table.ravel().tolist())).encode())
+    for part in blocks(len(columns[0])):
+        for start in range(part.start, part.stop, _CSV_ROWS):
+            few = slice(start, min(start + _CSV_ROWS, part.stop))
+            table = np.column_stack([values[few] for values in columns])
+            # Many rows in one go: several times as fast as numpy's savetxt.
+            file.write((row * len(table) % tuple(table.ravel().tolist())).encode())
 
 
 def read_csv(path: Path) -> dict[str, Array]:

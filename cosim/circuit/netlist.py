@@ -91,7 +91,7 @@ def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
     run, circuit = scene.run, scene.circuit
     deck += [
         f".options reltol={circuit.reltol!r}",
-        # All vectors are sent step by step, and ngspice keeps none of them, which would take memory.
+        # All vectors are sent step by step; ngspice is to keep none, which would take memory.
         ".save none",
         f".tran {circuit.max_step!r} {run.duration!r} 0 {circuit.max_step!r}",
         ".end",
