@@ -15,11 +15,8 @@ from cosim.circuit import run
 from cosim.scene import load
 from cosim.waveforms import csv_content, netcdf_content
 
-pytestmark = pytest.mark.skipif(
-    not Path("/proc/self/status").exists(), reason="memory is read from /proc"
-)
 
-
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")
 @pytest.mark.parametrize(
     ("model", "durations", "rows"),
     [
