@@ -90,9 +90,10 @@ def _outline(time: Array, values: Array) -> tuple[Array, Array]:
     starts = np.linspace(0, len(time), _STRETCHES + 1).astype(int)
     found = []
     for begin, end in pairwise(starts.tolist()):
-        found.append((values[begin:end].min(), values[begin:end].max()))
+        found.append((time[begin], values[begin:end].min(), values[begin:end].max()))
         release()
-    return np.repeat(time[starts[:-1]], 2), np.array(found).ravel()
+    begins, *ends = np.array(found).T
+    return np.repeat(begins, 2), np.stack(ends, axis=1).ravel()
 
 
 def _title(result: Result) -> str:

@@ -29,12 +29,12 @@ _FINER_TOLERANCE, _FINER_STEP = 100.0, 10.0
 
 def swings(log: dict[str, Array]) -> Array:
     """Times (s) at which the output has crossed from one end of its range to the other."""
-    parts = list(blocks(len(log["time"])))
-    low = min(float(log["v(out)"][part].min()) for part in parts)
-    high = max(float(log["v(out)"][part].max()) for part in parts)
+    count = len(log["time"])
+    low = min(float(log["v(out)"][part].min()) for part in blocks(count))
+    high = max(float(log["v(out)"][part].max()) for part in blocks(count))
     edge = 0.15 * (high - low)
     found, last = [], np.empty(0, np.int64)  # the end at which the output was last
-    for part in parts:
+    for part in blocks(count):
         out = log["v(out)"][part]
         at_end = np.where(out > high - edge, 1, np.where(out < low + edge, -1, 0))
         known = at_end != 0
