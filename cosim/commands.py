@@ -40,20 +40,24 @@ def _run(scene: Scene, folder: Path) -> None:
     from tqdm import tqdm
 
     from cosim.simulate import simulate
+    from cosim.tape import on_disk_in
 
     def progress(time: float) -> None:
         bar.update(time - bar.n)
 
-    with tqdm(
-        total=scene.run.duration,
-        desc=scene.name,
-        unit="s",
-        delay=1.0,
-        leave=False,
-        file=sys.stderr,
-        disable=None,
-        bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.2f} of {total:g} s, {remaining} left",
-    ) as bar:
+    with (
+        tqdm(
+            total=scene.run.duration,
+            desc=scene.name,
+            unit="s",
+            delay=1.0,
+            leave=False,
+            file=sys.stderr,
+            disable=None,
+            bar_format="{desc} {percentage:3.0f}% |{bar}| {n:.2f} of {total:g} s, {remaining} left",
+        ) as bar,
+        on_disk_in(folder),
+    ):
         result = simulate(scene, progress=progress)
     from cosim import figure
     from cosim.simulate import UNITS

@@ -7,13 +7,13 @@ the fields of `native/coupled.h`.
 
 import ctypes
 from collections.abc import Callable
-from ctypes import POINTER, c_double, c_int32, c_int64, c_uint, c_void_p
+from ctypes import CFUNCTYPE, POINTER, c_double, c_int32, c_int64, c_uint, c_void_p
 from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.errors import BadInput, SimulationFailed
+from cosim.errors import BadInput
 from cosim.mechanics import COUNTERS, Mechanics
 from cosim.native import coupled_library
 from cosim.recorder import Z_SURFACE, Recorder
@@ -23,6 +23,9 @@ Array = npt.NDArray[np.float64]
 
 BLOCK = 4096
 """Steps between two looks at what Python has to do, about ten milliseconds."""
+
+
+_CALLBACK = CFUNCTYPE(None)
 
 
 class Fmu(ctypes.Structure):
@@ -52,6 +55,7 @@ class State(ctypes.Structure):
         ("settle", c_double),
         ("times", c_void_p),
         ("what", c_void_p),
+        ("n_times", c_int64),
         ("next", c_int64),
         ("rows", c_void_p),
         ("frames", c_void_p),
@@ -63,6 +67,8 @@ class State(ctypes.Structure):
         ("extremes", c_double * 8),
         ("began", c_double),
         ("inside", c_int64),
+        ("plan", _CALLBACK),
+        ("stopped", c_int64),
     )
 
 
@@ -83,28 +89,52 @@ class CompiledRecorder(Recorder):
     ) -> None:
         self._library = coupled_library()
         self._told = -1.0
+        self._fault: BaseException | None = None
         self._totals = (c_double * len(mechanics.total_names))()
         self._counters = (c_int32 * len(COUNTERS))()
         super().__init__(scene, mechanics, progress)
 
     def _begin(self) -> None:
-        times, what = self.agenda
         self.fmu = Fmu(**self.mechanics.shared())
         self.state = State(
             fmu=ctypes.pointer(self.fmu),
             settle=self._settle,
-            times=times.ctypes.data,
-            what=what.ctypes.data,
-            rows=self.rows.ctypes.data,
-            frames=self.frames.ctypes.data,
+            rows=self._new_rows.ctypes.data,
+            frames=self._new_frames.ctypes.data,
             z_surface=Z_SURFACE,
             totals_at_settle=self._totals,
             counters_at_settle=self._counters,
             extremes=(c_double * 8)(*self.extremes),
+            plan=_CALLBACK(self._planned),
         )
+        self._reached = 0.0
+        self._plan()
         if not self._library.recorder_begin(ctypes.byref(self.state)):
             raise self.failure()
         self.tell()
+
+    def _plan(self) -> None:
+        self._take()
+        if self.state.next:
+            self._reached = float(self._agenda[0][self.state.next - 1])
+        self._agenda = next(self._agendas)
+        times, what = self._agenda
+        state = self.state
+        state.times, state.what = times.ctypes.data, what.ctypes.data
+        state.n_times, state.next = len(times), 0
+
+    def _planned(self) -> None:
+        # An exception cannot pass through C.
+        try:
+            self._plan()
+        except BaseException as fault:
+            self._fault = fault
+            self.state.stopped = 1
+
+    def _take(self) -> None:
+        self._n_rows, self._n_frames = self.state.n_rows, self.state.n_frames
+        super()._take()
+        self.state.n_rows = self.state.n_frames = 0
 
     def advance(self, time: float, value: float, value_end: float) -> None:
         self.follow(*(np.array([number]) for number in (time, value, value_end)))
@@ -127,20 +157,23 @@ class CompiledRecorder(Recorder):
 
     def tell(self) -> None:
         """Tell how far the agenda has been worked off, where that is news."""
-        reached = float(self.agenda[0][self.state.next - 1])
+        done = self.state.next
+        reached = float(self._agenda[0][done - 1]) if done else self._reached
         if reached > self._told:
             self._told = reached
             self._progress(reached)
 
     def finish(self) -> None:
         """Put what the compiled steps have done where the plain recorder has it."""
-        self.n_rows, self.extremes = self.state.n_rows, self.state.extremes[: len(self.extremes)]
+        self.extremes = self.state.extremes[: len(self.extremes)]
         self.mechanics.time, self.mechanics.steps = self.fmu.time, self.fmu.steps
         totals = (*self._totals, *self._counters)
         self.at_settle = dict(zip((*self.mechanics.total_names, *COUNTERS), totals, strict=True))
 
-    def failure(self) -> SimulationFailed:
-        """What to raise for the call of the FMU that has failed."""
+    def failure(self) -> BaseException:
+        """What to raise for the call of the FMU that has failed, or what failed in Python."""
+        if self._fault is not None:
+            return self._fault
         fmu = self.fmu
         self.mechanics.time = fmu.time
         calls = ("set_reals", "do_step", "get_reals", "get_integers")

@@ -3,6 +3,7 @@
 Energies are those of all ``coil.count`` coils, J; currents and voltages those of one coil.
 """
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +14,7 @@ from cosim.drive import Command
 from cosim.errors import BadInput
 from cosim.recorder import Recorder
 from cosim.scene import Scene
+from cosim.tape import Tape, blocks
 
 Array = npt.NDArray[np.float64]
 
@@ -47,54 +49,81 @@ def from_circuit(
     command: Command,
     log: dict[str, Array],
     rows: Array,
-    limits: dict[str, npt.NDArray[np.bool_]],
+    limits_at_work: Callable[[dict[str, Array]], dict[str, npt.NDArray[np.bool_]]],
 ) -> Electrics:
-    """From the vectors at the accepted points of a circuit, and which limits acted there.
+    """From the vectors at the accepted points of a circuit; ``limits_at_work`` tells of points of
+    the log which limits acted there.
 
     Energies are sums of step times means over the step: for them the trapezoidal companion of an
     inductance, which ngspice integrates with, balances exactly.
     """
-    coil, circuit = scene.coil, scene.circuit
-    time, total, out, sense = (log[k] for k in ("time", "i(vemf)", "v(out)", "v(sense)"))
-    current = total / coil.count
-    h = np.diff(time)
-    mean = 0.5 * (total[1:] + total[:-1])
+    coil, circuit, settle = scene.coil, scene.circuit, scene.run.settle
     copper = coil.resistance / coil.count
-    delivered = out
     if circuit.netlist is None:
         copper += circuit.sense_resistance
-    else:
-        # What lies beyond the coil's ends is the netlist's own affair.
-        delivered = out - sense
-    mean_delivered = 0.5 * (delivered[1:] + delivered[:-1])
-    eddy_heat, eddy_current = 0.0, 0.0
-    if coil.eddy_inductance and coil.eddy_resistance:
-        eddy_heat, eddy_current = _eddy(
-            coil.eddy_inductance, coil.eddy_resistance, h, current[:-1], current[1:]
-        )
-    spent = h * (time[1:] > scene.run.settle)
-    spent /= spent.sum()
-    # A step that only begins or ends at the limit counts half.
-    limited = {
-        name: _total(spent, 0.5 * acts[1:] + 0.5 * acts[:-1]) for name, acts in limits.items()
-    }
-    at_limit = [acts for name, acts in limits.items() if name != "slew"]
-    if at_limit:
-        acts = np.any(at_limit, axis=0)
-        limited["output"] = _total(spent, 0.5 * acts[1:] + 0.5 * acts[:-1])
     made = "v(v1)" in log and circuit.model != "amplifier"  # by the circuit, not given to it
-    settled = current[time >= scene.run.settle]
+    after = sum(
+        float((np.diff(part["time"]) * (part["time"][1:] > settle)).sum()) for part in _points(log)
+    )
+    delivered, squares, eddy = 0.0, 0.0, _Eddy(scene)
+    most, least = -np.inf, np.inf
+    limited: dict[str, float] = {}
+    waves, done = Tape(3 if made else 2), 0
+    end = log["time"][-1]
+    for part in _points(log):
+        time, total, out, sense = (part[k] for k in ("time", "i(vemf)", "v(out)", "v(sense)"))
+        current = total / coil.count
+        h = np.diff(time)
+        mean = 0.5 * (total[1:] + total[:-1])
+        # What lies beyond the coil's ends is the netlist's own affair.
+        lost = out if circuit.netlist is None else out - sense
+        delivered += _total(h, mean * (0.5 * (lost[1:] + lost[:-1])))
+        squares += _total(h, mean**2)
+        eddy.follow(h, current[:-1], current[1:])
+        spent = h * (time[1:] > settle)
+        spent /= after
+        limits = limits_at_work(part)
+        at_limit = [acts for name, acts in limits.items() if name != "slew"]
+        if at_limit:
+            limits["output"] = np.any(at_limit, axis=0)
+        for name, acts in limits.items():
+            # A step that only begins or ends at the limit counts half.
+            share = _total(spent, 0.5 * acts[1:] + 0.5 * acts[:-1])
+            limited[name] = limited.get(name, 0.0) + share
+        settled = current[time >= settle]
+        most, least = settled.max(initial=most), settled.min(initial=least)
+        stop = len(rows) if time[-1] == end else int(np.searchsorted(rows, time[-1]))
+        known = [current, out - sense, *([part["v(v1)"]] if made else [])]
+        for here in blocks(stop - done):
+            at = rows[done:stop][here]
+            waves.append(np.stack([np.interp(at, time, values) for values in known], axis=1))
+        done = stop
     return Electrics(
-        command=np.interp(rows, time, log["v(v1)"]) if made else command.values(rows),
-        current=np.interp(rows, time, current),
-        coil_voltage=np.interp(rows, time, out - sense),
-        energy_in=_total(h, mean * mean_delivered),
-        energy_copper=copper * _total(h, mean**2) + coil.count * eddy_heat,
-        energy_magnetic=_magnetic(scene, float(current[-1]), eddy_current),
-        current_max=float(settled.max()),
-        current_min=float(settled.min()),
+        command=waves.column(2) if made else commanded(command, rows),
+        current=waves.column(0),
+        coil_voltage=waves.column(1),
+        energy_in=delivered,
+        energy_copper=copper * squares + coil.count * eddy.heat,
+        energy_magnetic=_magnetic(scene, float(log["i(vemf)"][-1] / coil.count), eddy.current),
+        current_max=float(most),
+        current_min=float(least),
         limited=limited,
     )
+
+
+def _points(log: dict[str, Array]) -> Iterator[dict[str, Array]]:
+    """The log in parts, each with the first point of the next one as its last."""
+    for part in blocks(len(log["time"]) - 1):
+        reach = slice(part.start, part.stop + 1)
+        yield {name: np.ascontiguousarray(values[reach]) for name, values in log.items()}
+
+
+def commanded(command: Command, rows: Array) -> Array:
+    """V1 (V) at the times of the rows (s)."""
+    made = Tape(1)
+    for part in blocks(len(rows)):
+        made.append(command.values(rows[part]))
+    return made.column()
 
 
 def refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
@@ -107,17 +136,20 @@ def refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
     coil = scene.coil
     if coil.eddy_inductance:
         return
-    time, current = log["time"], log["i(vemf)"] / coil.count
-    h = np.diff(time)
-    mean = 0.5 * (current[1:] + current[:-1])
-    voltage = log["v(out)"] - log["v(sense)"]
-    expected = coil.resistance * mean * h + coil.inductance * np.diff(current)
-    given = 0.5 * (voltage[1:] + voltage[:-1]) * h
-    emf = 0.5 * (log["emf"][1:] + log["emf"][:-1]) * h
-    # Running sums: single steps of a stiff circuit need not obey to the digit.
-    missing = np.cumsum(given - expected - emf)
-    swept = np.abs(given).sum() + np.abs(emf).sum()
-    if np.abs(missing).max() > 0.01 * swept + 1e-12:
+    missing, worst, swept = 0.0, 0.0, 0.0
+    for part in _points(log):
+        current = part["i(vemf)"] / coil.count
+        h = np.diff(part["time"])
+        mean = 0.5 * (current[1:] + current[:-1])
+        voltage = part["v(out)"] - part["v(sense)"]
+        expected = coil.resistance * mean * h + coil.inductance * np.diff(current)
+        given = 0.5 * (voltage[1:] + voltage[:-1]) * h
+        emf = 0.5 * (part["emf"][1:] + part["emf"][:-1]) * h
+        # Running sums: single steps of a stiff circuit need not obey to the digit.
+        sums = missing + np.cumsum(given - expected - emf)
+        missing, worst = float(sums[-1]), max(worst, float(np.abs(sums).max()))
+        swept += float(np.abs(given).sum() + np.abs(emf).sum())
+    if worst > 0.01 * swept + 1e-12:
         raise BadInput(
             f"{scene.circuit.netlist}: v(out) - v(sense) is not the voltage of the scene's coil at "
             "the current i(Vemf): Vemf must be in series with the coil, + towards out, and the "
@@ -134,40 +166,50 @@ def from_command(
     ``emf`` is the back-EMF (V) at the rows, ``motion`` the work (J) that one coil did. The source
     gives whatever voltage the current takes, so what it delivers is the sum of where it goes.
     """
-    coil = scene.coil
-    edges, start, end = log["time"], log["start"], log["end"]
-    h = np.diff(edges)
-    squares = _total(h, start**2 + start * end + end**2) / 3.0
-    slope = (end - start) / h
-    at = np.clip(np.searchsorted(edges, rows, side="right") - 1, 0, len(h) - 1)
-    current = start[at] + slope[at] * (rows - edges[at])
-    voltage = coil.resistance * current + coil.inductance * slope[at] + emf
-    eddy_heat, eddy_current = 0.0, 0.0
-    if coil.eddy_inductance and coil.eddy_resistance:
-        branch = np.empty(len(h) + 1)
-        eddy_heat, eddy_current = _eddy(
-            coil.eddy_inductance, coil.eddy_resistance, h, start, end, branch
-        )
-        tau = coil.eddy_inductance / coil.eddy_resistance
-        lag = slope[at] * tau
-        rest = start[at] - branch[at] - lag
-        voltage += coil.eddy_resistance * (lag + rest * np.exp(-(rows - edges[at]) / tau))
-    heat = (coil.resistance + coil.count * scene.circuit.sense_resistance) * squares
-    copper = coil.count * (heat + eddy_heat)
-    magnetic = _magnetic(scene, float(end[-1]), eddy_current)
+    coil, settle = scene.coil, scene.run.settle
+    times, count = log["time"], len(log["start"])
+    squares, eddy = 0.0, _Eddy(scene)
+    most, least = -np.inf, np.inf
+    waves, done = Tape(2), 0
     # At the corners, and where settling ends.
-    settled = max(0, int(np.searchsorted(edges, scene.run.settle, side="right")) - 1)
-    at_settle = start[settled] + slope[settled] * (scene.run.settle - edges[settled])
-    after = np.concatenate([[at_settle], end[settled:], start[settled + 1 :]])
+    settled = max(0, int(np.searchsorted(times, settle, side="right")) - 1)
+    for part in blocks(count):
+        edges, start, end = times[part.start : part.stop + 1], log["start"][part], log["end"][part]
+        h = np.diff(edges)
+        squares += _total(h, start**2 + start * end + end**2)
+        slope = (end - start) / h
+        stop = len(rows) if part.stop == count else int(np.searchsorted(rows, edges[-1]))
+        branch = eddy.follow(h, start, end)
+        for few in blocks(stop - done):
+            row = rows[done:stop][few]
+            at = np.clip(np.searchsorted(edges, row, side="right") - 1, 0, len(h) - 1)
+            current = start[at] + slope[at] * (row - edges[at])
+            voltage = coil.resistance * current + coil.inductance * slope[at] + emf[done:stop][few]
+            if branch is not None:
+                lag = slope[at] * eddy.tau
+                rest = start[at] - branch[at] - lag
+                voltage += eddy.resistance * (lag + rest * np.exp(-(row - edges[at]) / eddy.tau))
+            waves.append(np.stack([current, voltage], axis=1))
+        done = stop
+        if part.start <= settled < part.stop:
+            here = settled - part.start
+            most = least = start[here] + slope[here] * (settle - edges[here])
+        after = [end[max(settled - part.start, 0) :], start[max(settled + 1 - part.start, 0) :]]
+        most = max(most, *(values.max(initial=-np.inf) for values in after))
+        least = min(least, *(values.min(initial=np.inf) for values in after))
+    squares /= 3.0
+    heat = (coil.resistance + coil.count * scene.circuit.sense_resistance) * squares
+    copper = coil.count * (heat + eddy.heat)
+    magnetic = _magnetic(scene, float(log["end"][-1]), eddy.current)
     return Electrics(
-        command=command.values(rows),
-        current=current,
-        coil_voltage=voltage,
+        command=commanded(command, rows),
+        current=waves.column(0),
+        coil_voltage=waves.column(1),
         energy_in=copper + magnetic + coil.count * motion,
         energy_copper=copper,
         energy_magnetic=magnetic,
-        current_max=float(after.max()),
-        current_min=float(after.min()),
+        current_max=float(most),
+        current_min=float(least),
         limited={"output": 0.0},
     )
 
@@ -199,7 +241,7 @@ def from_source(scene: Scene, command: Command, recorder: Recorder) -> Electrics
         )
     }
     return Electrics(
-        command=command.values(recorder.time),
+        command=commanded(command, recorder.time),
         current=recorder.rows[:, columns.index("coil_current")],
         coil_voltage=recorder.rows[:, columns.index("coil_voltage")],
         energy_in=count * totals["energy_output"],
@@ -222,33 +264,37 @@ def _magnetic(scene: Scene, current: float, eddy_current: float) -> float:
     return coil.count * (own + 0.5 * (coil.eddy_inductance or 0.0) * eddy_current**2)
 
 
-def _eddy(
-    inductance: float,
-    resistance: float,
-    h: Array,
-    start: Array,
-    end: Array,
-    branch: Array | None = None,
-) -> tuple[float, float]:
-    """Heat in the eddy resistance (J) and current of the eddy inductance at the end (A).
+class _Eddy:
+    """The LR2 branch of one coil, whose current is linear on intervals; solved exactly."""
 
-    For a coil current that is linear on intervals of lengths ``h`` between ``start`` and ``end``;
-    the LR2 branch is then solved exactly. ``branch`` receives its current at the edges.
-    """
-    tau = inductance / resistance
-    heat, own = 0.0, 0.0
-    for k in range(len(h)):
-        if branch is not None:
+    def __init__(self, scene: Scene) -> None:
+        inductance = scene.coil.eddy_inductance or 0.0
+        self.resistance = scene.coil.eddy_resistance or 0.0
+        self.tau = inductance / self.resistance if self.resistance else 0.0
+        """Its time constant, s; 0 where the coil has no such branch."""
+        self.heat = 0.0
+        """In its resistance so far, J."""
+        self.current = 0.0
+        """In its inductance at the end, A."""
+
+    def follow(self, h: Array, start: Array, end: Array) -> Array | None:
+        """Go on through intervals of lengths ``h`` (s), the coil's current (A) between ``start``
+        and ``end``; gives the branch's current at the beginning of each.
+        """
+        if not self.tau:
+            return None
+        tau, own, heat = self.tau, self.current, self.heat
+        branch = np.empty(len(h))
+        for k in range(len(h)):
             branch[k] = own
-        lag = (end[k] - start[k]) / h[k] * tau
-        rest = start[k] - own - lag
-        decay = np.exp(-h[k] / tau)
-        heat += resistance * (
-            lag**2 * h[k]
-            + 2.0 * lag * rest * tau * (1.0 - decay)
-            + 0.5 * rest**2 * tau * (1.0 - decay**2)
-        )
-        own = end[k] - lag - rest * decay
-    if branch is not None:
-        branch[len(h)] = own
-    return float(heat), float(own)
+            lag = (end[k] - start[k]) / h[k] * tau
+            rest = start[k] - own - lag
+            decay = np.exp(-h[k] / tau)
+            heat += self.resistance * (
+                lag**2 * h[k]
+                + 2.0 * lag * rest * tau * (1.0 - decay)
+                + 0.5 * rest**2 * tau * (1.0 - decay**2)
+            )
+            own = end[k] - lag - rest * decay
+        self.current, self.heat = float(own), float(heat)
+        return branch

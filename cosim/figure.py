@@ -1,6 +1,7 @@
 """The figure of a run: what the circuit did, and what the mechanics made of it."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 
 from cosim.published import FRAME_RATE
 from cosim.simulate import Result
+from cosim.tape import release
 
 Array = npt.NDArray[np.float64]
 
@@ -24,15 +26,24 @@ SECOND_SURFACE: dict[str, Any] = {
     "color": SECOND, "lw": 1.1, "ls": "--", "label": "second"
 }  # fmt: skip
 PERIODS_SHOWN = 3
+_MOST_ROWS = 200_000
+"""Of a curve that is drawn as it is."""
+_STRETCHES = 4000
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def draw(result: Result, path: Path) -> None:
     """Draw the run into ``path`` (a PNG)."""
     waves = result.waveforms
     given = result.scene.surface_is_given
-    figure = Figure(figsize=(13.0, 5.8 if given else 8.2), dpi=110, layout="constrained")
+    height = 5.8 if given else 8.2
+    figure = Figure(figsize=(13.0, height), dpi=110)
     FigureCanvasAgg(figure)
     axes = figure.subplots(2 if given else 3, 2)
+    # Room that was measured once: a layout engine would double the time of a short run.
+    figure.subplots_adjust(
+        left=0.06, right=0.985, bottom=0.5 / height, top=1 - 0.62 / height, wspace=0.29, hspace=0.4
+    )
     shown = _last_periods(result)
     time = waves["time"][shown] * 1e3
     cut = {name: values[shown] for name, values in waves.items()}
@@ -52,7 +63,7 @@ def draw(result: Result, path: Path) -> None:
         axis.set_xlabel("time [ms]")
     for axis in axes.flat:
         axis.grid(alpha=0.25)
-    figure.suptitle(_title(result), fontsize=12)
+    figure.suptitle(_title(result), fontsize=12, y=1 - 0.08 / height, va="top")
     figure.savefig(path, format="png")
 
 
@@ -67,7 +78,22 @@ def _last_periods(result: Result) -> slice:
     else:
         span = PERIODS_SHOWN / scene.drive.frequency
     first = int(np.searchsorted(time, time[-1] - span))
-    return slice(min(first, max(0, len(time) - 2)), None)
+    return slice(max(min(first, len(time) - 2), len(time) - _MOST_ROWS, 0), None)
+
+
+def _outline(time: Array, values: Array) -> tuple[Array, Array]:
+    """A curve of fewer points that covers the same pixels: of each of many short stretches the
+    smallest and the largest value. One of not so many points stays as it is.
+    """
+    if len(time) <= _MOST_ROWS:
+        return time, values
+    starts = np.linspace(0, len(time), _STRETCHES + 1).astype(int)
+    found = []
+    for begin, end in pairwise(starts.tolist()):
+        found.append((time[begin], values[begin:end].min(), values[begin:end].max()))
+        release()
+    begins, *ends = np.array(found).T
+    return np.repeat(begins, 2), np.stack(ends, axis=1).ravel()
 
 
 def _title(result: Result) -> str:
@@ -90,8 +116,10 @@ def _title(result: Result) -> str:
 
 def _whole_run(axis: Axes, result: Result) -> None:
     waves = result.waveforms
-    axis.plot(waves["time"], waves["z_surface"] * 1e3, color=SURFACE, lw=0.5, label="surface")
-    axis.plot(waves["time"], waves["z_part"] * 1e3, color=PART, lw=1.2, label="part")
+    time, height = _outline(waves["time"], waves["z_surface"])
+    axis.plot(time, height * 1e3, color=SURFACE, lw=0.5, label="surface")
+    time, height = _outline(waves["time"], waves["z_part"])
+    axis.plot(time, height * 1e3, color=PART, lw=1.2, label="part")
     if result.scene.run.settle > 0:
         axis.axvspan(0, result.scene.run.settle, color="0.93", zorder=0, label="settling")
     axis.set_xlim(0, result.scene.run.duration)
@@ -100,7 +128,8 @@ def _whole_run(axis: Axes, result: Result) -> None:
     curves, _ = axis.get_legend_handles_labels()
     if "normal_force" in waves:
         right = axis.twinx()
-        right.plot(waves["time"], waves["normal_force"], color=GRIP, lw=1.0, label="grip (right)")
+        force = _outline(waves["time"], waves["normal_force"])
+        right.plot(*force, color=GRIP, lw=1.0, label="grip (right)")
         right.set(ylabel="normal force [N]", ylim=(0.0, None))
         curves += right.get_lines()
     _head(axis, "Whole run", curves)
@@ -213,12 +242,20 @@ def _shade_sticking(axis: Axes, time: Array, sticking: Array) -> None:
     )
 
 
+def _power_of_ten(value: float, _: float) -> str:
+    """A tick of a symmetric logarithmic axis, without the parser of formulas, which takes long."""
+    if value == 0.0:
+        return "0"
+    power = f"{np.log10(abs(value)):.0f}".translate(_RAISED)
+    return f"{'−' if value < 0.0 else ''}10{power}"
+
+
 def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
     waves = result.waveforms
-    time = waves["time"]
-    axis.plot(time[shown] * 1e3, waves["a_surface"][shown], color=SURFACE, lw=0.8, label="true")
-    frames = np.arange(np.ceil(time[shown][0] * FRAME_RATE), time[-1] * FRAME_RATE) / FRAME_RATE
-    heights = np.interp(frames, time, waves["z_surface"])
+    time = waves["time"][shown]
+    axis.plot(time * 1e3, waves["a_surface"][shown], color=SURFACE, lw=0.8, label="true")
+    frames = np.arange(np.ceil(time[0] * FRAME_RATE), time[-1] * FRAME_RATE) / FRAME_RATE
+    heights = np.interp(frames, time, waves["z_surface"][shown])
     if len(frames) > 2:
         read = np.diff(heights, 2) * FRAME_RATE**2
         axis.plot(
@@ -231,6 +268,7 @@ def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
             label=f"read from {FRAME_RATE:.0f} frames/s",
         )
     axis.set_yscale("symlog", linthresh=100.0)
+    axis.yaxis.set_major_formatter(_power_of_ten)
     _at_least(axis, 2.0)
     axis.set(ylabel="acceleration [m/s²]")
     rigid = result.scene.mechanics.contact == "rigid" and not result.scene.surface_is_given

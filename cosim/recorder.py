@@ -4,7 +4,7 @@ Rows of the waveforms, frames of the camera and the end of settling are communic
 their own: what stands in a row is a state of the mechanics, never an interpolation.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from cosim.mechanics import SAMPLE_OUTPUTS, Mechanics
 from cosim.published import FRAME_RATE
 from cosim.scene import Scene
+from cosim.tape import BLOCK, Tape
 
 Array = npt.NDArray[np.float64]
 
@@ -19,13 +20,15 @@ _SAME_TIME = 1e-12  # s; communication points closer than this are one
 Z_SURFACE = SAMPLE_OUTPUTS.index("z_surface")
 
 
+ENTRIES = 1 << 14
+"""Rows and frames of the camera that are planned, and taken, at a time."""
+
+
 class Recorder:
     """The waveforms of the mechanics, filled as ``advance`` is called.
 
-    ``time`` are the times of the rows (s), ``rows`` their values (a column for each of the
-    mechanics' ``columns``), ``frames`` the surface's height (m) at each frame of the camera after
-    settling, ``extremes`` the largest and smallest acceleration (m/s²), velocity (m/s) and height
-    (m) of the surface after it, and of the coil's current (A) where the mechanics have the source.
+    ``extremes`` are the largest and smallest acceleration (m/s²), velocity (m/s) and height (m) of
+    the surface after settling, and of the coil's current (A) where the mechanics have the source.
     """
 
     def __init__(
@@ -35,17 +38,18 @@ class Recorder:
         self.mechanics = mechanics
         self._settle = run.settle
         self._progress = progress
-        self.time = grid(run.output_step, run.duration)
-        self.rows = np.empty((len(self.time) + 1, len(mechanics.columns)))[:-1]
-        frame_times = grid(1.0 / FRAME_RATE, run.duration)
-        frame_times = frame_times[frame_times >= run.settle]
-        self.frames = np.empty(len(frame_times))
-        self.n_rows = 0
-        self._n_frames = 0
+        width = len(mechanics.columns)
+        self._step_of_rows = run.output_step
+        self._rows, self._frames, self._time = Tape(width), Tape(1), Tape(1)
+        # What is not on the tapes yet. The compiled twin puts a frame's sample behind the last row.
+        self._new_rows = np.empty((ENTRIES + 1, width))
+        self._new_frames = np.empty(ENTRIES + 1)
+        self._n_rows = self._n_frames = 0
         grip = mechanics.normal_force
         corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
-        self.agenda = _agenda(self.time, frame_times, run.settle, [*corners, run.duration])
-        """Times (s) at which something is to be written down, and what; an endless one last."""
+        self._agendas = _agendas(
+            run.output_step, run.duration, run.settle, [*corners, run.duration]
+        )
         self.extremes = [-np.inf, np.inf] * (4 if mechanics.has_source else 3)
         self.at_settle: dict[str, float] = {}
         """Totals of the mechanics when settling ends."""
@@ -53,9 +57,41 @@ class Recorder:
 
     def _begin(self) -> None:
         """Write down what the agenda has for time 0."""
-        times, what = self.agenda
-        self._times, self._what, self._next = times.tolist(), what.tolist(), 0
+        self._plan()
         self._visit()
+
+    def _plan(self) -> None:
+        """Take what was written down away, and look up what is next to be."""
+        self._take()
+        times, what = next(self._agendas)
+        self._times, self._what, self._next = times.tolist(), what.tolist(), 0
+
+    def _take(self) -> None:
+        """Put what was written down on the tapes."""
+        self._rows.append(self._new_rows[: self._n_rows])
+        self._frames.append(self._new_frames[: self._n_frames])
+        self._n_rows = self._n_frames = 0
+
+    @property
+    def rows(self) -> Array:
+        """A row for each time, a column for each of the mechanics' ``columns``, SI."""
+        self._take()
+        return self._rows.array()
+
+    @property
+    def frames(self) -> Array:
+        """The surface's height (m) at each frame of the camera after settling."""
+        self._take()
+        return self._frames.column()
+
+    @property
+    def time(self) -> Array:
+        """Times of the rows, s."""
+        self._take()
+        for start in range(len(self._time), len(self._rows), BLOCK):
+            stop = min(start + BLOCK, len(self._rows))
+            self._time.append(self._step_of_rows * np.arange(start, stop, dtype=np.float64))
+        return self._time.column()
 
     def column(self, name: str) -> Array:
         """The values of one of the mechanics' ``columns`` in the rows."""
@@ -75,13 +111,12 @@ class Recorder:
         mechanics = self.mechanics
         start = mechanics.time
         slope = (value_end - value) / (time - start)
-        times = self._times
-        while times[self._next] < time - _SAME_TIME:
-            stop = times[self._next]
+        while self._times[self._next] < time - _SAME_TIME:
+            stop = self._times[self._next]
             self._step(stop, value + slope * (mechanics.time - start), slope)
             self._visit()
         self._step(time, value + slope * (mechanics.time - start), slope)
-        if times[self._next] <= time + _SAME_TIME:
+        if self._times[self._next] <= time + _SAME_TIME:
             self._visit()
 
     def _step(self, time: float, value: float, slope: float) -> None:
@@ -117,15 +152,18 @@ class Recorder:
         if what & (_ROW | _FRAME):
             sample = self.mechanics.sample()
             if what & _ROW:
-                self.rows[self.n_rows] = sample
-                self.n_rows += 1
+                self._new_rows[self._n_rows] = sample
+                self._n_rows += 1
             if what & _FRAME:
-                self.frames[self._n_frames] = sample[Z_SURFACE]
+                self._new_frames[self._n_frames] = sample[Z_SURFACE]
                 self._n_frames += 1
+        if self._next == len(self._times):
+            self._plan()
         self._progress(self.mechanics.time)
 
 
 _ROW, _FRAME, _SETTLED = 1, 2, 4
+_NEVER = 1 << 80  # multiples of _SAME_TIME
 
 
 def grid(step: float, end: float) -> Array:
@@ -133,14 +171,46 @@ def grid(step: float, end: float) -> Array:
     return step * np.arange(int(end / step * (1 + 1e-12)) + 1, dtype=np.float64)
 
 
-def _agenda(
-    rows: Array, frames: Array, settle: float, stops: list[float]
-) -> tuple[Array, npt.NDArray[np.int32]]:
-    groups = ((rows, _ROW), (frames, _FRAME), ([settle], _SETTLED), (stops, 0))
-    times = np.concatenate([group for group, _ in groups])
-    what = np.repeat([kind for _, kind in groups], [len(group) for group, _ in groups])
-    # Of times that are one the first is taken.
-    _, first, place = np.unique(np.rint(times / _SAME_TIME), return_index=True, return_inverse=True)
-    joined = np.zeros(len(first) + 1, np.int32)
-    np.bitwise_or.at(joined, place, what.astype(np.int32))
-    return np.append(times[first], np.inf), joined
+def _agendas(
+    row_step: float, duration: float, settle: float, stops: list[float]
+) -> Iterator[tuple[Array, npt.NDArray[np.int32]]]:
+    """Times (s) at which something is to be written down, and what, part after part; not more than
+    ENTRIES rows and frames in one. The last time of all is endless.
+    """
+    frame_step = 1.0 / FRAME_RATE
+    extra, kinds = np.array([settle, *stops]), np.array([_SETTLED, *[0] * len(stops)], np.int32)
+    # Whole numbers of _SAME_TIME, so that no part ends between times that are one.
+    length = max(1, int(ENTRIES / 3 * min(row_step, frame_step) / _SAME_TIME))
+    last = int(np.rint(duration / _SAME_TIME)) + 1
+    for begin in range(0, last, length):
+        # To the last one belongs what rounding puts behind the end.
+        end = begin + length if begin + length < last else _NEVER
+        rows = _within(row_step, duration, begin, end)
+        frames = _within(frame_step, duration, begin, end)
+        frames = frames[frames >= settle]
+        here = (np.rint(extra / _SAME_TIME) >= begin) & (np.rint(extra / _SAME_TIME) < end)
+        times = np.concatenate([rows, frames, extra[here]])
+        what = np.concatenate(
+            [np.repeat(np.array([_ROW, _FRAME], np.int32), [len(rows), len(frames)]), kinds[here]]
+        )
+        # Of times that are one the first is taken.
+        _, first, place = np.unique(
+            np.rint(times / _SAME_TIME), return_index=True, return_inverse=True
+        )
+        joined = np.zeros(len(first), np.int32)
+        np.bitwise_or.at(joined, place, what)
+        if end == _NEVER:
+            yield np.append(times[first], np.inf), np.append(joined, np.int32(0))
+        elif len(first):
+            yield times[first], joined
+
+
+def _within(step: float, duration: float, begin: int, end: int) -> Array:
+    """What :func:`grid` has from ``begin`` until before ``end``, multiples of _SAME_TIME."""
+    count = int(duration / step * (1 + 1e-12)) + 1
+    # One more at either side, and then those that rounding puts there.
+    low = max(0, int(begin * _SAME_TIME / step) - 1)
+    high = min(count, int(end * _SAME_TIME / step) + 2)
+    times = step * np.arange(low, high, dtype=np.float64)
+    place = np.rint(times / _SAME_TIME)
+    return times[(place >= begin) & (place < end)]

@@ -21,11 +21,15 @@ from cosim.recorder import Recorder
 from cosim.scene import WITHOUT_NGSPICE, Scene, changed
 from cosim.scene.tables import LED
 from cosim.summary import summarise
+from cosim.tape import Tape, blocks
 
 if TYPE_CHECKING:
     from cosim.circuit.run import CircuitRun
 
 Array = npt.NDArray[np.float64]
+
+_INTERVALS = 4096
+"""How many intervals of a command are prepared at a time."""
 
 UNITS = {
     "time": "s",
@@ -60,7 +64,10 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Result:
-    """A finished run: the scene, its waveforms (arrays of equal length, SI) and its summary."""
+    """A finished run: the scene, its waveforms (arrays of equal length, SI) and its summary.
+
+    The arrays of a long run are mapped from a file that goes with them.
+    """
 
     scene: Scene
     waveforms: dict[str, Array]
@@ -172,10 +179,9 @@ def _simulate(
             refuse_false(scene, log, lambda finer: _circuit_log(finer, fmi_version, compiled))
             if scene.circuit.netlist is not None:
                 electrics.refuse_foreign_coil(scene, log)
-            limits = limits_at_work(log)
-            electric = electrics.from_circuit(scene, drive, log, recorder.time, limits)
+            electric = electrics.from_circuit(scene, drive, log, recorder.time, limits_at_work)
         for command_2 in second_drive:
-            second["command_2"] = command_2.values(recorder.time)
+            second["command_2"] = electrics.commanded(command_2, recorder.time)
         totals = mechanics.totals()
         steps = mechanics.steps
     finally:
@@ -242,28 +248,38 @@ def _prescribe(
     ``limited`` the command itself.
     """
     duration = scene.run.duration
-    edges = [0.0]
-    ends: list[list[tuple[float, float]]] = [[] for _ in drives]
-    while edges[-1] < duration:
-        begin = edges[-1]
-        stop = min(
-            duration,
-            *(drive.next_corner(begin) for drive in drives),
-            *(begin + drive.longest_straight for drive in drives),
-        )
-        edges.append(stop)
-        for drive, log in zip(drives, ends, strict=True):
-            log.append((share * drive.value(begin), share * drive.value_before(stop)))
-    times = np.array(edges)
-    logs = [np.array(log).T for log in ends]
-    if len(logs) == 1:
-        recorder.follow(times[1:], *logs[0])
-    else:
-        for k, stop in enumerate(edges[1:]):
-            value, value_end = ends[1][k]
-            recorder.mechanics.give_second(value, (value_end - value) / (stop - edges[k]))
-            recorder.advance(stop, *ends[0][k])
-    return [dict(zip(("time", "start", "end"), (times, *log), strict=True)) for log in logs]
+    times, logs = Tape(1), [Tape(2) for _ in drives]
+    times.append(0.0)
+    reached = 0.0
+    while reached < duration:
+        edges = [reached]
+        ends: list[list[tuple[float, float]]] = [[] for _ in drives]
+        while edges[-1] < duration and len(edges) <= _INTERVALS:
+            begin = edges[-1]
+            stop = min(
+                duration,
+                *(drive.next_corner(begin) for drive in drives),
+                *(begin + drive.longest_straight for drive in drives),
+            )
+            edges.append(stop)
+            for drive, values in zip(drives, ends, strict=True):
+                values.append((share * drive.value(begin), share * drive.value_before(stop)))
+        reached = edges[-1]
+        _follow(recorder, edges, ends)
+        times.append(edges[1:])
+        for log, values in zip(logs, ends, strict=True):
+            log.append(values)
+    return [{"time": times.column(), "start": log.column(0), "end": log.column(1)} for log in logs]
+
+
+def _follow(recorder: Recorder, edges: list[float], ends: list[list[tuple[float, float]]]) -> None:
+    if len(ends) == 1:
+        recorder.follow(np.array(edges[1:]), *np.array(ends[0]).T)
+        return
+    for k, stop in enumerate(edges[1:]):
+        value, value_end = ends[1][k]
+        recorder.mechanics.give_second(value, (value_end - value) / (stop - edges[k]))
+        recorder.advance(stop, *ends[0][k])
 
 
 def _waveforms(
@@ -272,20 +288,22 @@ def _waveforms(
     electric: electrics.Electrics | None,
     second: dict[str, Array],
 ) -> dict[str, Array]:
-    n = recorder.n_rows
-    known = {"time": recorder.time[:n]} | second
+    known = {"time": recorder.time} | second
     if electric is not None:
         known["command"] = electric.command
         known["current"] = electric.current
         known["coil_voltage"] = electric.coil_voltage
     columns = recorder.mechanics.columns
-    known |= {name: recorder.rows[:n, k] for k, name in enumerate(columns) if name in UNITS}
+    known |= {name: recorder.rows[:, k] for k, name in enumerate(columns) if name in UNITS}
     if electric is None:
         del known["back_emf"]
     if scene.mechanics.actuator == "direct":
         del known["z_ram"], known["v_ram"]
     if (force := recorder.mechanics.normal_force) is not None:
-        known["normal_force"] = np.array([force.value(t) for t in known["time"].tolist()])
+        forces = Tape(1)
+        for part in blocks(len(known["time"])):
+            forces.append([force.value(t) for t in known["time"][part].tolist()])
+        known["normal_force"] = forces.column()
     return {name: known[name] for name in UNITS if name in known}
 
 

@@ -3,11 +3,13 @@
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim.electrics import Electrics
 from cosim.published import FRAME_RATE
 from cosim.recorder import Recorder
 from cosim.scene import Scene
+from cosim.tape import blocks
 
 UNITS = {
     "v_average": "m/s",
@@ -40,7 +42,7 @@ def summarise(
     run, before = scene.run, recorder.at_settle
     span = run.duration - run.settle
     v_average = (totals["z_part"] - before["z_part"]) / span
-    camera = np.diff(recorder.frames, 2) * FRAME_RATE**2
+    seen_max, seen_min = _seen(recorder.frames)
     rigid = scene.mechanics.contact == "rigid"
     a_max, a_min, v_max, v_min, z_max, z_min = recorder.extremes[:6]
     driven = scene.circuit.model != "none"
@@ -50,8 +52,8 @@ def summarise(
         "stick_fraction": (totals["stick_time"] - before["stick_time"]) / span,
         "a_surface_max": None if rigid else a_max,
         "a_surface_min": None if rigid else a_min,
-        "a_camera_max": float(camera.max()) if camera.size else None,
-        "a_camera_min": float(camera.min()) if camera.size else None,
+        "a_camera_max": seen_max,
+        "a_camera_min": seen_min,
         "v_surface_max": v_max,
         "v_surface_min": v_min,
         "z_surface_pp": z_max - z_min,
@@ -66,6 +68,15 @@ def summarise(
     for counter in ("impacts", "stick_slip_events"):
         result[counter] = totals[counter] - before[counter]
     return result | _energies(scene, totals, electric)
+
+
+def _seen(frames: npt.NDArray[np.float64]) -> tuple[float, float] | tuple[None, None]:
+    """The largest and smallest acceleration (m/s²) that a camera reads from heights (m)."""
+    most, least = -np.inf, np.inf
+    for part in blocks(len(frames) - 2):
+        read = np.diff(frames[part.start : part.stop + 2], 2) * FRAME_RATE**2
+        most, least = max(most, float(read.max())), min(least, float(read.min()))
+    return (most, least) if len(frames) > 2 else (None, None)
 
 
 def _energies(

@@ -6,13 +6,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from struct import pack
+from typing import IO
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import BadInput
+from cosim.tape import blocks
 
 Array = npt.NDArray[np.float64]
+
+_CSV_ROWS = 1024
 
 
 @contextmanager
@@ -43,20 +48,28 @@ def _umask() -> int:
 
 def write_csv(path: Path, waveforms: dict[str, Array], units: dict[str, str]) -> None:
     """Comma-separated values: a header row ``name [unit]``, then a row for each time."""
-    content = csv_content(waveforms, units)
-    with whole(path) as temporary:
-        temporary.write_bytes(content)
+    with whole(path) as temporary, open(temporary, "wb") as file:
+        _csv(file, waveforms, units)
 
 
 def csv_content(waveforms: dict[str, Array], units: dict[str, str]) -> bytes:
     """What :func:`write_csv` writes."""
-    header = ",".join(f"{name} [{units[name]}]" for name in waveforms)
-    table = np.column_stack(list(waveforms.values()))
     content = BytesIO()
-    np.savetxt(
-        content, table, fmt="%.10g", delimiter=",", header=header, comments="", encoding="utf-8"
-    )
+    _csv(content, waveforms, units)
     return content.getvalue()
+
+
+def _csv(file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str]) -> None:
+    header = ",".join(f"{name} [{units[name]}]" for name in waveforms)
+    file.write(f"{header}\n".encode())
+    columns = list(waveforms.values())
+    row = ",".join(["%.10g"] * len(columns)) + "\n"
+    for part in blocks(len(columns[0])):
+        for start in range(part.start, part.stop, _CSV_ROWS):
+            few = slice(start, min(start + _CSV_ROWS, part.stop))
+            table = np.column_stack([values[few] for values in columns])
+            # Many rows in one go: several times as fast as numpy's savetxt.
+            file.write((row * len(table) % tuple(table.ravel().tolist())).encode())
 
 
 def read_csv(path: Path) -> dict[str, Array]:
@@ -78,29 +91,68 @@ def write_netcdf(
     path: Path, waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
 ) -> None:
     """NetCDF (classic format) with the dimension ``time``; each variable has its ``units``."""
-    # By way of memory: scipy's file tries again, and complains, when a full disk has failed it.
-    content = netcdf_content(waveforms, units, attributes)
-    with whole(path) as temporary:
-        temporary.write_bytes(content)
+    with whole(path) as temporary, open(temporary, "wb") as file:
+        _netcdf(file, waveforms, units, attributes)
 
 
 def netcdf_content(
     waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
 ) -> bytes:
     """What :func:`write_netcdf` writes."""
-    from scipy.io import netcdf_file
-
     content = BytesIO()
-    with netcdf_file(content, "w", version=2) as file:
-        for name, text in attributes.items():
-            setattr(file, name, text.encode())  # as text, scipy takes ASCII only
-        file.createDimension("time", len(waveforms["time"]))
-        for name, values in waveforms.items():
-            variable = file.createVariable(name, "f8", ("time",))
-            variable[:] = values
-            variable.units = units[name]
-        file.flush()
-        return content.getvalue()
+    _netcdf(content, waveforms, units, attributes)
+    return content.getvalue()
+
+
+_DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12
+_CHARACTERS, _DOUBLES = 2, 6
+
+
+def _netcdf(
+    file: IO[bytes],
+    waveforms: dict[str, Array],
+    units: dict[str, str],
+    attributes: dict[str, str],
+) -> None:
+    """The classic format with 64-bit offsets, a block of all columns at a time.
+
+    After NetCDF Classic Format Specification, Unidata; scipy's writer has the same bytes, but
+    needs all columns in memory.
+    """
+    count = len(waveforms["time"])
+    head = b"CDF\x02" + pack(">i", 0)
+    head += pack(">ii", _DIMENSIONS, 1) + _name("time") + pack(">i", count)
+    head += _attributes(attributes) + pack(">ii", _VARIABLES, len(waveforms))
+    about = [
+        # One dimension, the first; the type; the size; then the offset.
+        _name(name) + pack(">ii", 1, 0) + _attributes({"units": units[name]})
+        + pack(">ii", _DOUBLES, 8 * count)
+        for name in waveforms
+    ]  # fmt: skip
+    start = len(head) + sum(len(text) + 8 for text in about)
+    starts = [start + 8 * count * k for k in range(len(waveforms))]
+    for text, offset in zip(about, starts, strict=True):
+        head += text + pack(">q", offset)
+    file.write(head)
+    for part in blocks(count):
+        for values, offset in zip(waveforms.values(), starts, strict=True):
+            file.seek(offset + 8 * part.start)
+            file.write(values[part].astype(">f8").tobytes())
+
+
+def _name(text: str) -> bytes:
+    """Its length, then its bytes filled up to whole words."""
+    content = text.encode()
+    return pack(">i", len(content)) + content + b"\0" * (-len(content) % 4)
+
+
+def _attributes(texts: dict[str, str]) -> bytes:
+    if not texts:
+        return bytes(8)
+    found = pack(">ii", _ATTRIBUTES, len(texts))
+    return found + b"".join(
+        _name(name) + pack(">i", _CHARACTERS) + _name(text) for name, text in texts.items()
+    )
 
 
 def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str, str]]:

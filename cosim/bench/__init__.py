@@ -10,6 +10,7 @@ import numpy as np
 
 from cosim.bench.bars import held, table
 from cosim.bench.instructions import compiler_version, per_period
+from cosim.bench.memory import growth
 from cosim.bench.parts import coupled_over_parts
 from cosim.bench.peers import compare
 from cosim.bench.rungs import cost_exponent, real_time
@@ -61,6 +62,7 @@ def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
         "cost_exponent": cost_exponent(
             2 if quick else 5, (20, 60, 200) if quick else (10, 100, 1000)
         ),
+        "memory_growth": growth(1 if quick else 3, (20, 200) if quick else (100, 1000)),
         "instructions_per_period": per_period(),
         "part": {**seconds, "trials": len(found), "measured": trials is not None},
         "sweep_over_bare_loop": throughput(scene, offsets, 3 if quick else 7),

@@ -117,7 +117,6 @@ class CompiledRun(CircuitRun):
             self._attend()
             self._recorder.finish()
             self.attempts = state.attempts
-            self._time = float(self._log[-2 - len(self._saved)]) if self._log else 0.0
         if state.status == FMU_FAILED:
             raise self._recorder.failure()
         if state.status == NOT_FINITE:
@@ -138,7 +137,9 @@ class CompiledRun(CircuitRun):
     def _attend(self) -> None:
         """Take the log away."""
         filled = self._state.n_log
-        self._log.frombytes(self._block[:filled].tobytes())
+        if filled:
+            self._time = float(self._block[filled - 1, 0])
+        self._log.append(self._block[:filled])
         self._state.n_log = 0
         self._recorder.tell()
 

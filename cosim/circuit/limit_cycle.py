@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene
+from cosim.tape import blocks
 
 Array = npt.NDArray[np.float64]
 
@@ -28,13 +29,20 @@ _FINER_TOLERANCE, _FINER_STEP = 100.0, 10.0
 
 def swings(log: dict[str, Array]) -> Array:
     """Times (s) at which the output has crossed from one end of its range to the other."""
-    out = log["v(out)"]
-    low, high = float(out.min()), float(out.max())
+    count = len(log["time"])
+    low = min(float(log["v(out)"][part].min()) for part in blocks(count))
+    high = max(float(log["v(out)"][part].max()) for part in blocks(count))
     edge = 0.15 * (high - low)
-    at_end = np.where(out > high - edge, 1, np.where(out < low + edge, -1, 0))
-    known = at_end != 0
-    changed = np.flatnonzero(np.diff(at_end[known])) + 1
-    return log["time"][known][changed]
+    found, last = [], np.empty(0, np.int64)  # the end at which the output was last
+    for part in blocks(count):
+        out = log["v(out)"][part]
+        at_end = np.where(out > high - edge, 1, np.where(out < low + edge, -1, 0))
+        known = at_end != 0
+        ends = np.concatenate([last, at_end[known]])
+        changed = np.flatnonzero(np.diff(ends)) + 1 - len(last)
+        found.append(log["time"][part][known][changed])
+        last = ends[-1:]
+    return np.concatenate(found)
 
 
 def burst_ends(times: npt.NDArray[np.floating[Any]]) -> float | None:

@@ -1,7 +1,7 @@
 """One run of a circuit in ngspice, coupled to whatever gives it a back-EMF."""
 
-from array import array
 from collections.abc import Callable, Sequence
+from itertools import chain
 from math import isfinite
 
 import numpy as np
@@ -13,6 +13,7 @@ from cosim.coupling import Coupling
 from cosim.drive import Command
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene
+from cosim.tape import Tape
 
 _AFTER_JUMP = 1e-7
 """s; longest step after a jump of the command: what ngspice remembers of the slopes before it
@@ -20,6 +21,9 @@ misleads its choice of the step. The start is one too: V1 leaves 0 at once."""
 
 _ON_TIME = 1e-13
 """s; ngspice's own sums of steps reach a time of ours only within rounding."""
+
+_POINTS = 4096
+"""How many points go into the log at a time."""
 
 
 class CircuitRun:
@@ -37,14 +41,16 @@ class CircuitRun:
         self._time = 0.0
         self._deck, self._saved = self._netlist()
         self._motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else None
-        self._log = array("d")
+        self._log = Tape(2 + len(self._saved))
+        self._new: list[tuple[float, ...]] = []
+        """Points that are not in the log yet."""
         self.attempts = 0
         """Steps that ngspice tried."""
 
     @property
     def steps(self) -> int:
         """Steps that ngspice accepted."""
-        return max(0, len(self._log) // (2 + len(self._saved)) - 1)
+        return max(0, len(self._log) + len(self._new) - 1)
 
     @property
     def ngspice(self) -> str:
@@ -54,8 +60,12 @@ class CircuitRun:
     def log(self) -> dict[str, npt.NDArray[np.float64]]:
         """Time (s), the back-EMF given (V) and the saved vectors (A, V) at the accepted points."""
         names = ("time", "emf", *self._saved)
-        table = np.array(self._log).reshape(-1, len(names))
-        return dict(zip(names, table.T, strict=True))
+        self._keep()
+        return dict(zip(names, self._log.array().T, strict=True))
+
+    def _keep(self) -> None:
+        self._log.append(np.fromiter(chain.from_iterable(self._new), np.float64))
+        self._new = []
 
     def run(self) -> None:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
@@ -113,10 +123,10 @@ class CircuitRun:
     def accepted(self, time: float, values: Sequence[float], next_step: float) -> float:
         if not isfinite(sum(values)):
             raise out_of_range(time)
-        self._log.append(time)
         motional = 0.0 if self._motional is None else values[self._motional]
-        self._log.append(self._coupling.back_emf(time) + motional)
-        self._log.extend(values)
+        self._new.append((time, self._coupling.back_emf(time) + motional, *values))
+        if len(self._new) == _POINTS:
+            self._keep()
         self._time = time
         if time <= 0.0:
             return _AFTER_JUMP

@@ -34,17 +34,19 @@ enum { ROW = 1, FRAME = 2, SETTLED = 4 }; /* what is to be written down at a tim
 typedef struct {
     Fmu *fmu;
     double settle;
-    const double *times; /* at which something is to be written down; the last is endless */
+    const double *times; /* at which something is to be written down; the last of all is endless */
     const int32_t *what;
-    int64_t next;
+    int64_t n_times, next;
     double *rows, *frames; /* a row: the samples, then sticking */
-    int64_t n_rows, n_frames;
+    int64_t n_rows, n_frames; /* since Python took them away */
     int64_t z_surface; /* its place among the samples */
     double *totals_at_settle;
     int32_t *counters_at_settle;
     double extremes[8]; /* those that the step's outputs have */
     double began;   /* of the interval under way */
     int64_t inside; /* whether one is */
+    void (*plan)(void); /* Python takes rows and frames away, and gives the next times */
+    int64_t stopped;    /* by Python: it failed there */
 } Recorder;
 
 /* Advance through `n` intervals that end at `edges`, the input going linearly between its two ends;

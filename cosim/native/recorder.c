@@ -113,6 +113,10 @@ static int visit(Recorder *r)
         if (what & ROW)
             r->n_rows++;
     }
+    if (r->next == r->n_times) {
+        r->plan();
+        return !r->stopped;
+    }
     return 1;
 }
 
