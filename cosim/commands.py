@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Literal
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, SimulationFailed
 from cosim.report import table
 from cosim.scene import Scene, list_scenes, load, to_toml
 from cosim.scene.messages import plain
@@ -141,6 +141,9 @@ def _sweep(
     print(table(scene, data))
     print(f"Written to {folder}: sweep.nc")
     print(f"Figure: {folder / 'figure.png'}")
+    reasons = [str(reason) for reason in data["failure"].values.flat]
+    if all(reasons):
+        raise SimulationFailed(f"No point could be run; the first one: {reasons[0]}")
 
 
 def tune(

@@ -26,6 +26,9 @@ SECOND_SURFACE: dict[str, Any] = {
     "color": SECOND, "lw": 1.1, "ls": "--", "label": "second"
 }  # fmt: skip
 PERIODS_SHOWN = 3
+
+LINEAR = 100.0
+"""Acceleration, m/s², up to which its axis is linear: impacts are far above it."""
 _MOST_ROWS = 200_000
 """Of a curve that is drawn as it is."""
 _STRETCHES = 4000
@@ -267,8 +270,9 @@ def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
             ms=4,
             label=f"read from {FRAME_RATE:.0f} frames/s",
         )
-    axis.set_yscale("symlog", linthresh=100.0)
-    axis.yaxis.set_major_formatter(_power_of_ten)
+    if max(map(abs, axis.get_ylim())) > LINEAR:
+        axis.set_yscale("symlog", linthresh=LINEAR)
+        axis.yaxis.set_major_formatter(_power_of_ten)
     _at_least(axis, 2.0)
     axis.set(ylabel="acceleration [m/s²]")
     rigid = result.scene.mechanics.contact == "rigid" and not result.scene.surface_is_given

@@ -7,12 +7,10 @@ the forces, the fitted numbers with all their digits, and the bounds of the fit.
 weights of the part, m g, for the trials 1…10.
 """
 
-PART_MASS = 0.009  # kg
 GRAVITY = 9.81  # m/s²
 FRAME_RATE = 960.0  # of the camera, 1/s
 
 MU_S = 0.72  # measured, and kept in the fit
-MU_K_MEASURED = 0.59
 MU_K_FITTED = 0.6234
 
 FORCES_MEASURED = (11.089, 16.901, 5.278, 5.278, 5.278, 5.278, 5.278, 5.278, 5.278, 22.841)

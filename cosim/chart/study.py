@@ -80,7 +80,7 @@ def markdown(rows: Sequence[Row]) -> list[str]:
 
 def _short(cell: Any) -> str:
     if isinstance(cell, float):
-        return f"{cell:.3g}" if isfinite(cell) else "-"
+        return f"{cell:.4g}" if isfinite(cell) else "-"
     return str(cell)
 
 

@@ -342,8 +342,8 @@ class Friction(Table):
     normal_force: float = _number(0.5, "N", 0.0, 1e9, "Normal force of one surface on the part")
     normal_force_file: str | None = _choice(
         None,
-        "CSV with time [s] and normal_force [N], linear in between, its last value kept; instead "
-        "of normal_force",
+        "CSV with time [s] and normal_force [N], linear in between, its first and last values kept "
+        "before and after; instead of normal_force",
     )
     mu_plate: float = _number(0.0, "1", 0.0, 1e3, "Coefficient of the springed plate on the part")
 

@@ -54,7 +54,8 @@ def draw(tuning: Tuning, path: Path) -> None:
         turn_axis.plot(np.array(turns)[order], heights, color=color, marker="o", ms=4, label=key)
     turn_axis.set(xlabel="turned by [% of the key's range]", ylabel=label)
     turn_axis.set_title("The neighbourhood of the best", loc="left", fontsize=10.5)
-    turn_axis.legend(fontsize=8.5)
+    if tuning.neighbours:
+        turn_axis.legend(fontsize=8.5)
 
     keys = list(tuning.ranges)[:MOST_KEYS]
     for axis, key in zip(np.atleast_1d(bottom.subplots(1, len(keys))), keys, strict=True):

@@ -43,7 +43,9 @@ def write(folder: Path, tuning: Tuning, seed: int) -> dict[str, Any]:
         "summary": tuning.best.outcome.numbers,
     }
     write_runs(folder / "tune.csv", tuning.runs, tuning.quantity)
-    scene = tuning.scene.model_copy(update={"name": f"{tuning.scene.name}-tuned"[:64]})
+    aim = f"{'largest' if tuning.largest else 'least'} {tuning.quantity}"
+    found = {"name": f"{tuning.scene.name}-tuned"[:64], "description": f"Tuned for the {aim}"}
+    scene = tuning.scene.model_copy(update=found)
     for name, text in (
         ("tune.json", json.dumps(_plain(numbers), indent=2) + "\n"),
         ("best.toml", to_toml(scene)),
@@ -82,10 +84,8 @@ def robustness(tuning: Tuning) -> str:
         if lost == inf:
             cost = "leads to a run that fails"
         said.append(f"turning one key by {turn:.0%} of its range {cost}")
-    better = [value for row in tuning.neighbours.values() for value in row if value is not None]
-    most = max(better, default=best) if tuning.largest else min(better, default=best)
-    if most != best and (most > best) == tuning.largest:
-        said.append(f"a turn leads on to {most:.5g}, where the budget ended: a larger one may help")
+    if not tuning.neighbours:
+        said.append("the budget ended before its neighbourhood was heard: a larger one may help")
     return "; ".join(said)
 
 

@@ -51,8 +51,9 @@ class Run:
 class Tuning:
     """What a search has found.
 
-    ``best`` is the best run about which every key was turned. ``neighbours`` gives for each key the
-    value at each of TURNS, None beyond the end of its range or where the run failed.
+    ``neighbours`` gives for each key the value at each of TURNS about the best run, None beyond the
+    end of its range or where the run failed; empty where turning led on to this best run and the
+    budget ended there.
     """
 
     quantity: str
@@ -109,6 +110,11 @@ def tune(
     Raises BadInput for keys, ranges and quantities that are none; SimulationFailed where every run
     failed.
     """
+    if not over and scene.drive.waveform != "sawtooth":
+        raise BadInput(
+            f'scene {scene.name}: drive.waveform = "{scene.drive.waveform}" has no knobs; name '
+            "what to tune with --over table.key=low:high."
+        )
     ranges = _checked(over or KNOBS)
     turned = len(TURNS) * len(ranges)
     least = FEWEST_RUNS + turned
@@ -133,6 +139,8 @@ def tune(
         best, neighbours = trial.best, _turned(trial, trial.best)
         while trial.best is not best and len(trial.known) + turned <= budget:
             best, neighbours = trial.best, _turned(trial, trial.best)
+        if trial.best is not best:
+            best, neighbours = trial.best, {}
     runs = list(trial.known.values())
     tuned = changed(scene, best.values, "tune")
     if whole_periods:

@@ -226,3 +226,11 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out
     assert "6 points, 0 failed" in said and "fastest up" in said
     assert {path.name for path in tmp_path.iterdir()} == {"sweep.nc", "sweep.journal", "figure.png"}
+
+
+def test_no_point_could_be_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A failed simulation, exit code 3; the failures with their reasons are kept."""
+    over = ["--over", "drive.phase_deg=0:90:2", "--set", "run.duration=0.1"]
+    assert main(["sweep", "paper", *over, "--workers", "1", "--out", str(tmp_path)]) == 3
+    assert "No point could be run; the first one: --over: " in capsys.readouterr().err
+    assert (tmp_path / "sweep.nc").exists()

@@ -50,7 +50,9 @@ def test_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*arguments, *over, "--workers", "2", "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     numbers = json.loads((tmp_path / "tune.json").read_text(encoding="utf-8"))
-    assert "turning one key by 1% of its range" in said and " Hz)" in said
+    assert (
+        "turning one key by 1% of its range" in said or "budget ended" in said
+    ) and " Hz)" in said
     best: Any = simulate(load(tmp_path / "best.toml")).summary
     assert best["v_average"] == pytest.approx(numbers["value"], rel=1e-6)
     with open(tmp_path / "tune.csv", encoding="utf-8", newline="") as file:
@@ -58,7 +60,7 @@ def test_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert len(rows) == numbers["runs"] <= 40
     assert numbers["value"] in [float(row["v_average"]) for row in rows]
     best_seen = max(float(row["v_average"]) for row in rows)
-    assert best_seen == numbers["value"] or f"leads on to {best_seen:.5g}" in said
+    assert best_seen == numbers["value"]
     assert {path.name for path in tmp_path.iterdir()} == {
         "tune.json", "tune.csv", "best.toml", "figure.png",
     }  # fmt: skip
@@ -77,6 +79,7 @@ BAD = [
     (["--maximise", "v_average", "--over", "drive.offset=0:1e9"], "from -100 to 100 V"),
     (["--maximise", "v_average", "--over", "circuit.model=0:1"], "not a number"),
     (["--maximise", "v_average", "--minimise", "v_average"], "not allowed with"),
+    (["--maximise", "v_average", "--set", "drive.waveform=sine"], "has no knobs"),
     ([], "--maximise"),
     (["--maximise", "v_average", "--workers", "0"], "--workers 0"),
     (["--maximise", "v_average", "--seed", "-1"], "--seed -1"),

@@ -80,4 +80,4 @@ def test_tables(tmp_path: Path) -> None:
     assert content["tables"]["Runs"][1] == {"method": "b", "error [1]": None}
     assert content["machine"]["cores"] >= 1
     text = (tmp_path / "study.md").read_text()
-    assert "| a | 0.333 |" in text and "| b | - |" in text and "A note." in text
+    assert "| a | 0.3333 |" in text and "| b | - |" in text and "A note." in text
