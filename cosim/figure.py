@@ -270,7 +270,7 @@ def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
             ms=4,
             label=f"read from {FRAME_RATE:.0f} frames/s",
         )
-    if max(map(abs, axis.get_ylim())) > LINEAR:
+    if np.abs(axis.dataLim.intervaly).max() > LINEAR:
         axis.set_yscale("symlog", linthresh=LINEAR)
         axis.yaxis.set_major_formatter(_power_of_ten)
     _at_least(axis, 2.0)
