@@ -15,9 +15,10 @@ from cosim.errors import SimulationFailed
 from cosim.scene import Scene
 from cosim.tape import Tape
 
-_AFTER_JUMP = 1e-7
-"""s; longest step after a jump of the command: what ngspice remembers of the slopes before it
-misleads its choice of the step. The start is one too: V1 leaves 0 at once."""
+_AFTER_JUMP, _SHARE_AFTER_JUMP = 1e-7, 1e-2
+"""Longest step after a jump of the command, in s and in ``circuit.max_step``: what ngspice remembers
+of the slopes before it misleads its choice of the step. The start is one too: V1 leaves 0 at once.
+This step is of first order and nothing judges it, so finer runs must shorten it too."""
 
 _ON_TIME = 1e-13
 """s; ngspice's own sums of steps reach a time of ours only within rounding."""
@@ -38,6 +39,7 @@ class CircuitRun:
         self._coupling = coupling
         self._count = scene.coil.count
         self._jump = command.next_jump(0.0)
+        self._after_jump = min(_AFTER_JUMP, _SHARE_AFTER_JUMP * scene.circuit.max_step)
         self._time = 0.0
         self._deck, self._saved = self._netlist()
         self._motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else None
@@ -129,11 +131,11 @@ class CircuitRun:
             self._keep()
         self._time = time
         if time <= 0.0:
-            return _AFTER_JUMP
+            return self._after_jump
         longest = self._coupling.accepted(time, values[0] / self._count, motional)
         if time >= self._jump - _ON_TIME:
             self._jump = self._command.next_jump(self._jump)
-            longest = min(longest, _AFTER_JUMP)
+            longest = min(longest, self._after_jump)
         return min(next_step, longest, self._jump - time)
 
 

@@ -11,7 +11,7 @@
 #include <stddef.h>
 #include <string.h>
 
-static const double ON_TIME = 1e-13, AFTER_JUMP = 1e-7; /* s; as in cosim/circuit/run.py */
+static const double ON_TIME = 1e-13; /* s; as in cosim/circuit/run.py */
 static const double PI = 3.141592653589793;
 
 enum { LEVEL, RISE, FALL, SINE };
@@ -35,6 +35,7 @@ typedef struct Circuit {
     int64_t n_pieces, piece;
     double gain, v_offset;       /* of the difference amplifier; mean voltage of the pin, V */
     double count;                /* of coils */
+    double after_jump;           /* s; longest step after a jump of the command */
     double time, current, emf, slope; /* at the last accepted point; of one coil */
     double jump;                 /* s; the next one */
     double command_before, dac_before, pin_before; /* V; left limits there */
@@ -185,7 +186,7 @@ static double accepted(Circuit *c, double time, double next_step)
     const double current = values[0] / c->count;
     write_down(c, time);
     if (time <= 0.0)
-        return AFTER_JUMP;
+        return c->after_jump;
     const double *outputs;
     if (c->replay) {
         outputs = c->replay;
@@ -203,7 +204,7 @@ static double accepted(Circuit *c, double time, double next_step)
     double longest = INFINITY;
     if (time >= c->jump - ON_TIME) {
         expect_jump(c, c->jump);
-        longest = AFTER_JUMP;
+        longest = c->after_jump;
     }
     const double left = c->jump - time;
     next_step = longest < next_step ? longest : next_step;
