@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import BadInput
+from cosim.interrupts import caught_signals
 from cosim.mechanics import COUNTERS, Mechanics
 from cosim.native import coupled_library
 from cosim.recorder import Z_SURFACE, Recorder
@@ -109,8 +110,9 @@ class CompiledRecorder(Recorder):
         )
         self._reached = 0.0
         self._plan()
-        if not self._library.recorder_begin(ctypes.byref(self.state)):
-            raise self.failure()
+        with caught_signals(self._stop):
+            if not self._library.recorder_begin(ctypes.byref(self.state)) or self._fault:
+                raise self.failure()
         self.tell()
 
     def _plan(self) -> None:
@@ -128,8 +130,11 @@ class CompiledRecorder(Recorder):
         try:
             self._plan()
         except BaseException as fault:
-            self._fault = fault
-            self.state.stopped = 1
+            self._stop(fault)
+
+    def _stop(self, fault: BaseException) -> None:
+        self._fault = fault
+        self.state.stopped = 1
 
     def _take(self) -> None:
         self._n_rows, self._n_frames = self.state.n_rows, self.state.n_frames
@@ -142,17 +147,20 @@ class CompiledRecorder(Recorder):
     def follow(self, edges: Array, start: Array, end: Array) -> None:
         arrays = [np.ascontiguousarray(values) for values in (edges, start, end)]
         done = 0
-        while done < len(edges):
-            taken = self._library.recorder_follow(
-                ctypes.byref(self.state),
-                len(edges) - done,
-                *(values.ctypes.data + 8 * done for values in arrays),
-                BLOCK,
-            )
-            if taken < 0:
-                raise self.failure()
-            done += taken
-            self.tell()
+        with caught_signals(self._stop):
+            while done < len(edges):
+                taken = self._library.recorder_follow(
+                    ctypes.byref(self.state),
+                    len(edges) - done,
+                    *(values.ctypes.data + 8 * done for values in arrays),
+                    BLOCK,
+                )
+                if taken < 0:
+                    raise self.failure()
+                done += taken
+                self.tell()
+                if self._fault:
+                    raise self._fault
         self.finish()
 
     def tell(self) -> None:

@@ -10,9 +10,7 @@ Importing this module loads PySpice, which takes a while: only runs with a circu
 import logging
 import os
 import re
-import signal
 import sys
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from ctypes import byref, c_void_p, cast
@@ -20,13 +18,13 @@ from ctypes.util import find_library
 from functools import cache
 from math import nan
 from tempfile import TemporaryDirectory
-from types import FrameType
 from typing import Any, Protocol
 
 from PySpice.Spice.NgSpice import Shared
 
 from cosim.compiled import library
 from cosim.errors import BadInput, SimulationFailed
+from cosim.interrupts import caught_signals
 from cosim.native import coupled_library
 
 _ACCEPTED = 0
@@ -103,27 +101,6 @@ def _find_library() -> str | None:
     return found
 
 
-@contextmanager
-def _caught_signals(fail: Callable[[BaseException], None]) -> Iterator[None]:
-    """Hand what Ctrl-C raises to ``fail``: raised outside a callback's try, C would swallow it."""
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
-        yield
-        return
-
-    def interrupted(number: int, frame: FrameType | None) -> None:
-        try:
-            before(number, frame)
-        except BaseException as failure:
-            fail(failure)
-
-    signal.signal(signal.SIGINT, interrupted)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
 class Engine(Shared.NgSpiceShared):
     """One ngspice library, with the callbacks of the run under way.
 
@@ -145,7 +122,7 @@ class Engine(Shared.NgSpiceShared):
         self._values: list[float] = []
         self._time_place = -1
         self._time = self._told = 0.0
-        with _caught_signals(self.fail), _nowhere():
+        with caught_signals(self.fail), _nowhere():
             super().__init__(ngspice_id=0, send_data=True)
             self._library: Any = self._ngspice_shared
             # PySpice leaves GetSyncData out; a second call puts it in beside its own.
@@ -212,7 +189,7 @@ class Engine(Shared.NgSpiceShared):
         self._time, self._told = 0.0, 0.0
         self.clear_output()
         try:
-            with _caught_signals(self.fail):
+            with caught_signals(self.fail):
                 # Not PySpice's load_circuit and run: they take any word on stderr, and any node
                 # with "error" in its name, for a failure. What fails is known by what is missing.
                 self._load(deck)

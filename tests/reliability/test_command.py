@@ -16,6 +16,7 @@ import pytest
 
 import cosim
 from cosim.cli import main
+from cosim.compiled import CompiledRecorder
 from cosim.coupling.step_locked import StepLocked
 from cosim.drive import Sawtooth
 from cosim.errors import SimulationFailed
@@ -272,6 +273,30 @@ def test_interrupt(scene: str, tmp_path: Path) -> None:
         for process, _ in running:
             process.kill()
             process.communicate()
+
+
+@posix
+def test_interrupt_where_compiled_code_calls_back(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Between the call and its first line nothing in the callback itself can catch it."""
+    planned = CompiledRecorder._planned
+
+    def struck(self: CompiledRecorder) -> None:
+        signal.raise_signal(signal.SIGINT)
+        planned(self)
+
+    monkeypatch.setattr(CompiledRecorder, "_planned", struck)
+    arguments = [
+        "run",
+        "ideal-current",
+        "--set",
+        "run.duration=100",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    assert main(arguments) == 130
+    assert capsys.readouterr().err == "cosim: interrupted.\n"
 
 
 @posix
