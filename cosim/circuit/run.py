@@ -15,9 +15,9 @@ from cosim.errors import SimulationFailed
 from cosim.scene import Scene
 
 _AFTER_JUMP, _SHARE_AFTER_JUMP = 1e-7, 1e-2
-"""Longest step after a jump of the command, in s and in ``circuit.max_step``: what ngspice remembers
-of the slopes before it misleads its choice of the step. The start is one too: V1 leaves 0 at once.
-This step is of first order and nothing judges it, so finer runs must shorten it too."""
+"""Longest step after a jump of the command, in s and as a share of ``circuit.max_step``: what
+ngspice remembers of the slopes before it misleads its choice of the step. The start is one too: V1
+leaves 0 at once. This step is of first order and nothing judges it: finer runs must shorten it."""
 
 _ON_TIME = 1e-13
 """s; ngspice's own sums of steps reach a time of ours only within rounding."""
