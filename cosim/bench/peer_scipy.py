@@ -16,7 +16,6 @@ from cosim.drive import Command, command
 from cosim.scene import Scene
 
 _SCALES = np.array([1.0, 10.0, *[1e-3, 0.1] * 3])
-"""Absolute tolerances over the relative one, SI."""
 
 _BEYOND = 1e-9
 """m/s and V; an event lies this far behind its boundary, since the next piece begins on it."""
@@ -30,6 +29,9 @@ CURRENT, VA, Q, DQ, Z, V, W, U = range(8)
 
 class Machine:
     """Right-hand sides and events in one set of modes."""
+
+    scales = _SCALES
+    """Size of what matters in each state; absolute tolerances over the relative one, SI."""
 
     def __init__(self, scene: Scene, drive: Command) -> None:
         self._scene = scene
@@ -70,9 +72,8 @@ class Machine:
 
     def rates(self, t: float, y: Any) -> list[float]:
         m, coil = self._scene.mechanics, self._scene.coil
-        ram, surface, friction = self.forces(y)
-        if self.slip:
-            friction = self.slip * self._scene.friction.mu_k * self._scene.friction.normal_force
+        ram, surface, held = self.forces(y)
+        friction, *more = self.friction(y, held)
         a_surface = (surface - friction) / m.surface_mass
         a_part = friction / m.part_mass - m.gravity
         resistance = coil.resistance + self._scene.circuit.sense_resistance
@@ -86,7 +87,13 @@ class Machine:
             a_surface,
             y[U],
             a_surface - a_part if self.slip else 0.0,
+            *more,
         ]
+
+    def friction(self, y: Any, held: float) -> list[float]:
+        """Friction (N), which is ``held`` while the part sticks, and rates of its own states."""
+        given = self._scene.friction
+        return [self.slip * given.mu_k * given.normal_force if self.slip else held]
 
     def events(self) -> list[Callable[[float, Any], float]]:
         """One of friction, one of the output; each falls through zero."""
@@ -108,13 +115,7 @@ class Machine:
 
     def choose(self, t: float, y: Any) -> None:
         """The modes that hold from here on."""
-        friction = self.forces(y)[2]
-        limit = self._scene.friction.mu_s * self._scene.friction.normal_force
-        if abs(y[U]) > 1e-9:
-            self.slip = 1 if y[U] > 0 else -1
-        else:
-            y[U] = 0.0
-            self.slip = 0 if abs(friction) < limit * (1 - 1e-9) else (1 if friction > 0 else -1)
+        self.choose_friction(y)
         wish = self.wish(t, y)
         if y[VA] >= self.high - 2 * _BEYOND and wish > _CLEAR:
             self.rail, y[VA] = 1, self.high
@@ -123,9 +124,23 @@ class Machine:
         else:
             self.rail = 0
 
+    def choose_friction(self, y: Any) -> None:
+        """Stick or slip."""
+        friction = self.forces(y)[2]
+        limit = self._scene.friction.mu_s * self._scene.friction.normal_force
+        if abs(y[U]) > 1e-9:
+            self.slip = 1 if y[U] > 0 else -1
+        else:
+            y[U] = 0.0
+            self.slip = 0 if abs(friction) < limit * (1 - 1e-9) else (1 if friction > 0 else -1)
+
 
 def run(
-    scene: Scene, times: Sequence[float], rest: Sequence[float], rtol: float
+    scene: Scene,
+    times: Sequence[float],
+    rest: Sequence[float],
+    rtol: float,
+    make: Callable[[Scene, Command], Machine] = Machine,
 ) -> tuple[float, npt.NDArray[np.float64]]:
     """CPU seconds, and the part's height (m) at ``times`` (s).
 
@@ -135,9 +150,10 @@ def run(
 
     began = process_time()
     drive = command(scene)
-    machine = Machine(scene, drive)
+    machine = make(scene, drive)
     z, z_ram = rest
-    y = np.array([0.0, 0.0, z_ram - z, 0.0, z, 0.0, 0.0, 0.0])
+    y = np.zeros(len(machine.scales))
+    y[Q], y[Z] = z_ram - z, z
     t, found = 0.0, [np.empty((2, 0))]
     wanted = np.asarray(times)
     while t < scene.run.duration:
@@ -153,7 +169,7 @@ def run(
             t_eval=np.append(at, held),
             events=machine.events(),
             rtol=rtol,
-            atol=rtol * _SCALES,
+            atol=rtol * machine.scales,
         )
         if at.size and len(done.t):
             path = np.vstack([done.t, done.y[Z] - done.y[W]])

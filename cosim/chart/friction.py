@@ -20,8 +20,13 @@ from typing import Any
 
 import numpy as np
 
+from cosim.bench.peer_scipy import Machine, U
+from cosim.bench.peer_scipy import run as run_machine
+from cosim.chart.cases import CASES
 from cosim.chart.study import Row, write
-from cosim.scene import load
+from cosim.drive import Command
+from cosim.mechanics import SAMPLE_OUTPUTS, Mechanics
+from cosim.scene import Scene, load
 
 FREQUENCY, ACCELERATION, SLIP = 40.0, 15.0, 0.02
 """Of the surface, Hz and m/s²; of the surface against the part at first, m/s."""
@@ -33,51 +38,131 @@ Law = Callable[[float, float, float], tuple[float, float]]
 would keep the part on the surface."""
 
 
+LAWS = {
+    "tanh": (1e-2, 1e-3, 1e-4, 1e-5),
+    "Karnopp": (1e-2, 1e-3, 1e-4),
+    "LuGre": (1e4, 1e5, 1e6),
+}
+"""Laws with their widths: m/s, or N/m for the bristle's stiffness."""
+_HELD = LAWS | {"tanh": (1e-3, 1e-4, 1e-5, 1e-6), "Karnopp": (1e-3, 1e-4, 1e-5)}
+_IN_THE_MACHINE = ("tanh", "LuGre")
+COULOMB = "Coulomb with events"
+_RTOLS = (1e-4, 1e-5, 1e-6, 1e-7)
+_RTOL_OF_LAWS = 1e-6
+
+
 def run(out: Path) -> None:
-    """Write ``friction`` as csv, md and json into ``out``."""
-    note = (
-        "A part of the scene paper slips down at 20 mm/s at first, comes to rest on a surface that "
-        "vibrates at 40 Hz with 15 m/s², and is then held at six tenths of what static friction "
-        "can carry. Creep is what it still slips. Smoothed laws are solved by LSODA."
+    """Write ``friction`` as png, csv, md and json into ``out``."""
+    from cosim.chart.friction_figure import draw
+
+    notes = [
+        "A held part: a part of the scene paper slips down at 20 mm/s at first, comes to rest on a "
+        "surface that vibrates at 40 Hz with 15 m/s², and is then held at six tenths of what "
+        "static friction can carry. Creep is what it still slips. Smoothed laws are solved by "
+        "LSODA.",
+        "In the machine: the whole scene stick-slip as one ODE, solved by LSODA with each law in "
+        "the place of set-valued Coulomb friction, against the reference solution with that. So "
+        "this error is the law's and not the solver's, but for Coulomb with events. Karnopp's band "
+        "is left out there: LSODA comes to a stop at its edges.",
+    ]
+    held, moved = list(creep()), list(in_the_machine())
+    write(
+        out, "friction", "Laws of friction", {"A held part": held, "In the machine": moved}, notes
     )
-    tables = {"A held part": list(creep())}
-    write(out, "friction", "Laws of friction: creep and cost", tables, [note])
+    draw(held, moved, out)
+
+
+def law_of(name: str, width: float, scene: Scene) -> Law:
+    """A smoothed law with a scene's coefficients; ``width`` as in :data:`LAWS`."""
+    f, mu_s, mu_k = scene.friction.normal_force, scene.friction.mu_s, scene.friction.mu_k
+
+    def smooth(u: float, z: float, load: float) -> tuple[float, float]:
+        falling = (u / (30.0 * width)) ** 2
+        fallen = exp(-falling) if falling < 700.0 else 0.0
+        return f * tanh(u / width) * (mu_k + (mu_s - mu_k) * fallen), 0.0
+
+    def karnopp(u: float, z: float, load: float) -> tuple[float, float]:
+        if abs(u) < width:
+            return min(max(load, -mu_s * f), mu_s * f), 0.0
+        return (mu_k * f if u > 0.0 else -mu_k * f), 0.0
+
+    damping, stribeck = 2.0 * sqrt(width * scene.mechanics.part_mass), 1e-3
+
+    def lugre(u: float, z: float, load: float) -> tuple[float, float]:
+        falling = (u / stribeck) ** 2
+        bound = f * (mu_k + (mu_s - mu_k) * (exp(-falling) if falling < 700.0 else 0.0))
+        rate = u - width * abs(u) / bound * z
+        return width * z + damping * rate, rate
+
+    return {"tanh": smooth, "Karnopp": karnopp, "LuGre": lugre}[name]
+
+
+class _Smoothed(Machine):
+    """The whole machine with a law in the place of sticking and slipping; a bristle besides."""
+
+    scales = np.append(Machine.scales, 1e-6)
+
+    def __init__(self, scene: Scene, drive: Command, law: Law) -> None:
+        super().__init__(scene, drive)
+        self._law = law
+        self.slip = 1  # never held by a mode
+
+    def friction(self, y: Any, held: float) -> list[float]:
+        return list(self._law(y[U], y[-1], held))
+
+    def choose_friction(self, y: Any) -> None:
+        """There is nothing to choose."""
+
+    def events(self) -> list[Callable[[float, Any], float]]:
+        never, output = super().events()
+
+        def friction(t: float, y: Any) -> float:
+            return 1.0
+
+        vars(friction).update(vars(never))
+        return [friction, output]
+
+
+def in_the_machine() -> Iterator[Row]:
+    """Of each law: error of the part's path on the scene ``stick-slip`` over its range, CPU s."""
+    from cosim.chart.accuracy import reference
+
+    case = CASES["stick-slip"]
+    scene = load("paper", [*case.overrides, f"run.duration={case.duration!r}"])
+    mechanics = Mechanics(scene)
+    try:
+        row = dict(zip(SAMPLE_OUTPUTS, mechanics.sample(), strict=False))
+    finally:
+        mechanics.close()
+    rest = (row["z_surface"], row["z_ram"])
+
+    def measured(rtol: float, make: Callable[[Scene, Command], Machine]) -> Row:
+        seconds, path = run_machine(scene, case.times(), rest, rtol, make)
+        error = reference(case.name).error(path[np.newaxis])
+        return {"tolerance": rtol, "error": error, "CPU time [s]": seconds}
+
+    for rtol in _RTOLS:
+        yield {"law": COULOMB, "width": "-"} | measured(rtol, Machine)
+    for name, widths in LAWS.items():
+        for width in widths if name in _IN_THE_MACHINE else ():
+            law = law_of(name, width, scene)
+            found = measured(_RTOL_OF_LAWS, lambda s, d, law=law: _Smoothed(s, d, law))
+            yield {"law": name, "width": _width(name, width)} | found
+
+
+def _width(name: str, width: float) -> str:
+    return f"{width:g} {'N/m' if name == 'LuGre' else 'm/s'}"
 
 
 def creep() -> Iterator[Row]:
     """Of each law: creep (µm/s), error in where the part comes to rest (µm), evaluations."""
     paper = load("paper")
     m, g = paper.mechanics.part_mass, paper.mechanics.gravity
-    f, mu_s, mu_k = paper.friction.normal_force, paper.friction.mu_s, paper.friction.mu_k
 
     def acceleration(t: float) -> float:
         return ACCELERATION * cos(2.0 * pi * FREQUENCY * t)
 
-    def smooth(v0: float) -> Law:
-        return lambda u, z, load: (
-            f * tanh(u / v0) * (mu_k + (mu_s - mu_k) * exp(-((u / (30.0 * v0)) ** 2))),
-            0.0,
-        )
-
-    def karnopp(band: float) -> Law:
-        def law(u: float, z: float, load: float) -> tuple[float, float]:
-            if abs(u) < band:
-                return min(max(load, -mu_s * f), mu_s * f), 0.0
-            return (mu_k * f if u > 0.0 else -mu_k * f), 0.0
-
-        return law
-
-    def lugre(stiffness: float) -> Law:
-        damping, stribeck = 2.0 * sqrt(stiffness * m), 1e-3
-
-        def law(u: float, z: float, load: float) -> tuple[float, float]:
-            bound = f * (mu_k + (mu_s - mu_k) * exp(-((u / stribeck) ** 2)))
-            rate = u - stiffness * abs(u) / bound * z
-            return stiffness * z + damping * rate, rate
-
-        return law
-
-    truth = _stops(acceleration, m, g, mu_k * f)
+    truth = _stops(acceleration, m, g, paper.friction.mu_k * paper.friction.normal_force)
     yield {
         "law": "Coulomb, exact",
         "width": "-",
@@ -85,17 +170,13 @@ def creep() -> Iterator[Row]:
         "error of the stop [um]": 0.0,
         "evaluations": "-",
     }
-    for name, make, widths in (
-        ("tanh", smooth, (1e-3, 1e-4, 1e-5, 1e-6)),
-        ("Karnopp", karnopp, (1e-3, 1e-4, 1e-5)),
-        ("LuGre", lugre, (1e4, 1e5, 1e6)),
-    ):
-        unit = "N/m" if name == "LuGre" else "m/s"
+    for name, widths in _HELD.items():
         for width in widths:
-            settled, end, evaluations = _solved(make(width), acceleration, m, g)
+            law = law_of(name, width, paper)
+            settled, end, evaluations = _solved(law, acceleration, m, g)
             yield {
                 "law": name,
-                "width": f"{width:g} {unit}",
+                "width": _width(name, width),
                 "creep [um/s]": 1e6 * (end - settled) / (DURATION - SETTLED),
                 "error of the stop [um]": 1e6 * (settled - truth),
                 "evaluations": evaluations,

@@ -13,9 +13,11 @@ from cosim.chart.cases import Case, participants
 from cosim.chart.methods import METHODS, ORDERS
 from cosim.coupling.error_control import ErrorControlled
 from cosim.coupling.event_aware import EventAware
+from cosim.coupling.iterated import Iterated
 from cosim.coupling.jacobi import Jacobi
 from cosim.coupling.joint import Joint
 from cosim.coupling.polynomials import Array
+from cosim.coupling.predictor_corrector import PredictorCorrector
 from cosim.drive import command
 from cosim.mechanics import SAMPLE_OUTPUTS, Mechanics
 from cosim.scene import Scene, load
@@ -77,14 +79,22 @@ def _macro(make: Make, events: bool = False) -> Callable[[Scene, Case, float], O
     return run
 
 
-def _controlled(scene: Scene, case: Case, tolerance: float) -> Outcome:
+def _audited(scene: Scene, case: Case, tolerance: float) -> Outcome:
+    return _controlled(scene, case, tolerance, energy_share=_AUDITED * tolerance ** (2.0 / 3.0))
+
+
+def _controlled(
+    scene: Scene, case: Case, tolerance: float, energy_share: float | None = None
+) -> Outcome:
     """Jacobi k = 1 with Richardson's estimate, cut at jumps of the command and at samples."""
     jumps = _Jumps(scene)
     circuit, mechanics = participants(scene)
     began, rows = process_time(), []
     try:
         method = Jacobi(circuit, mechanics, 1)
-        control = ErrorControlled(method, 1, 1e-5, tolerance, tolerance, shortest=1e-9)
+        control = ErrorControlled(
+            method, 1, 1e-5, tolerance, tolerance, shortest=1e-9, energy_share=energy_share
+        )
         for time in case.times():
             while method.time < time - _SAME_TIME:
                 control.run(min(time, jumps.next))
@@ -205,7 +215,16 @@ def _macro_steps(case: Case) -> Sequence[float]:
 _FINE = ("circuit.reltol=1e-6", "circuit.max_step=1e-5")
 """Of ngspice under macro steps, so that these decide."""
 
+_AUDITED = 0.5
+"""Share of the power that the audit lets be lost, over the tolerance's power of 2/3: a residual is
+of order 2 in a step that goes with the cube root of the tolerance."""
+
 _EVENT_AWARE = METHODS["EMF's slope, linear current"]
+
+_ITERATED: dict[str, Make] = {
+    "Aitken": lambda a, b: Iterated(a, b, "aitken", tolerance=1e-9),
+    "Anderson": lambda a, b: Iterated(a, b, "anderson", tolerance=1e-9),
+}
 
 SOLVERS = (
     *(
@@ -214,7 +233,20 @@ SOLVERS = (
         if name != "iterated, plain"
     ),
     Solver("event-aware", "macro steps", "macro step [s]", _macro(_EVENT_AWARE, True), _steps),
+    Solver(
+        "predictor-corrector",
+        "macro steps",
+        "macro step [s]",
+        _macro(PredictorCorrector),
+        _steps,
+        2,
+    ),
+    *(
+        Solver(f"iterated, {name}", "macro steps", "macro step [s]", _macro(make), _steps, 2)
+        for name, make in _ITERATED.items()
+    ),
     Solver("error-controlled", "macro steps", "tolerance", _controlled, _control),
+    Solver("error-controlled, audited", "macro steps", "tolerance", _audited, _control),
     Solver(
         "step-locked (default), max_step",
         "ngspice leads",

@@ -24,6 +24,7 @@ from cosim.coupling.iterated import Iterated
 from cosim.coupling.jacobi import Jacobi
 from cosim.coupling.joint import Joint
 from cosim.coupling.mechanical import FmuMechanics
+from cosim.coupling.predictor_corrector import PredictorCorrector
 from cosim.mechanics import SAMPLE_OUTPUTS
 from cosim.scene import load
 from cosim.simulate import simulate
@@ -84,6 +85,7 @@ METHODS: dict[str, tuple[Make, float]] = {
     },
     "Jacobi k = 1, slopes": (lambda a, b: Jacobi(a, b, 1, slopes=True), 2.0),
     "held EMF, linear current": (lambda a, b: GaussSeidel(a, b, 0, feed=1), 1.0),
+    "predictor-corrector": (PredictorCorrector, 2.0),
     "iterated, Anderson, mean": (lambda a, b: Iterated(a, b, "anderson", "mean"), 2.0),
 }
 """Methods and their orders."""

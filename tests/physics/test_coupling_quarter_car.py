@@ -7,13 +7,13 @@ rejections are 1610/18, 402/20 and 210/20 with Richardson's estimate, and 1612/1
 with a modified one that repeats less. Sides solved exactly, as here, make no difference between the
 two, so both rows are held against the same runs.
 
-Taken from the literature: masses, stiffnesses and damping of the car. Guessed and the same for all
-numbers: the tolerance, which was fitted. Chosen as plain, not known to be the authors': a step of
-0.1 m at t = 0, 4 s, wheel and chassis each fed the other's displacement and velocity, the plain
-difference of the two solutions as the estimate (no division by 2^(k+1) - 1), a safety of 0.9, and a
-pair of steps counted as one. Quite other choices come as near once their tolerance is fitted, so
-this confirms how the steps go with k, not the authors' set-up. Steps come within 3 % of all six,
-rejections within 9.
+The masses, stiffnesses and damping are those usual with these authors, not checked against the
+paper. All else is a guess, the same for all numbers, and was picked from a scan of some
+thousand such choices because it comes near: a step of 0.1 m at t = 0, 4 s, wheel and chassis each
+fed the other's displacement and velocity, the difference of the two solutions undivided as the
+estimate, a safety of 0.9, a pair of steps counted as one, and the tolerance, which was fitted. Many
+quite other choices come as near. So this confirms how the steps go with k, not the set-up.
+Steps come within 3 % of all six, rejections within 9.
 """
 
 import numpy as np
