@@ -200,13 +200,6 @@ def _parser() -> argparse.ArgumentParser:
             help=f"built-in scenes or TOML files (default: {given})",
         )
         _add_overrides(one)
-        one.add_argument(
-            "--out",
-            type=Path,
-            default=Path("results"),
-            metavar="DIR",
-            help="where to write (default: results)",
-        )
     for name, text in (
         ("accuracy", "error of every coupling method over its run time"),
         ("stability", "largest stable macro step of every coupling method"),
@@ -215,6 +208,8 @@ def _parser() -> argparse.ArgumentParser:
         one.add_argument(
             "--quick", action="store_true", help="a part of it, in a fraction of the time"
         )
+
+    for one in charts.choices.values():
         one.add_argument(
             "--out",
             type=Path,

@@ -104,14 +104,6 @@ def coil(resistance: float, inductance: float, current: float = 0.0) -> LinearPa
     return LinearParticipant(*_coil(resistance, inductance), state=[current])
 
 
-def driven_coil(
-    resistance: float, inductance: float, amplitude: float, frequency: float
-) -> LinearParticipant:
-    """The same coil on a voltage ``amplitude`` sin(2π ``frequency`` t), V, at rest at t = 0."""
-    matrices = _coil(resistance, inductance)
-    return _on_sine(matrices, [1.0 / inductance], amplitude, frequency)
-
-
 def regulated_coil(
     resistance: float,
     inductance: float,
