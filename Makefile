@@ -32,7 +32,7 @@ VENV_READY := $(shell test -x $(PY) && test "$$(cat $(VENV)/.created 2>/dev/null
 # What the FMU is built from, and what builds it.
 FMU_SOURCES := $(shell find fmu -name build -prune -o -type f \
 	\( -name '*.[ch]' -o -name '*.xml' -o -name '*.def' -o -name '*.py' -o -name '*.toml' \) -print) \
-	cosim/fmu.py cosim/compiler.py
+	cosim/mechanics/package.py cosim/toolchain/compiler.py
 
 .PHONY: help run test test-all setup charts bench check lock clean FORCE
 

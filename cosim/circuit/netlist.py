@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from cosim.circuit.checks import REQUIRED as AGREED
-from cosim.circuit.checks import check
-from cosim.circuit.deck import Line, read, refuse
-from cosim.circuit.elements import Element
-from cosim.circuit.words import definitions
-from cosim.resources import circuits
+from cosim.circuit.lint.checks import REQUIRED as AGREED
+from cosim.circuit.lint.checks import check
+from cosim.circuit.lint.deck import Line, read, refuse
+from cosim.circuit.lint.elements import Element
+from cosim.circuit.lint.words import definitions
+from cosim.files.resources import circuits
 from cosim.scene import Scene
 
 Array = npt.NDArray[np.float64]

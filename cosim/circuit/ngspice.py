@@ -22,10 +22,10 @@ from typing import Any, Protocol
 
 from PySpice.Spice.NgSpice import Shared
 
-from cosim.compiled import library
+from cosim.coupling.loop.compiled import library
 from cosim.errors import BadInput, SimulationFailed
-from cosim.interrupts import caught_signals
-from cosim.native import coupled_library
+from cosim.toolchain.interrupts import caught_signals
+from cosim.toolchain.libraries import coupled_library
 
 _ACCEPTED = 0
 """Location of a GetSyncData call that follows an accepted step."""

@@ -37,7 +37,7 @@ class _Layer:
 def list_scenes() -> list[tuple[str, str]]:
     """Name and description of every built-in scene, the paper's first."""
     found = []
-    for entry in (resources.files("cosim") / "scenes").iterdir():
+    for entry in (resources.files("cosim.scene") / "library").iterdir():
         if entry.name.endswith(".toml"):
             data = tomllib.loads(entry.read_text(encoding="utf-8"))
             found.append((entry.name.removesuffix(".toml"), str(data.get("description", ""))))
@@ -88,7 +88,7 @@ def _layers(source: str) -> list[_Layer]:
     builtin = [name for name, _ in list_scenes()]
     if source in builtin:
         origin = f"scene {source}"
-        entry = resources.files("cosim") / "scenes" / f"{source}.toml"
+        entry = resources.files("cosim.scene") / "library" / f"{source}.toml"
         data = tomllib.loads(entry.read_text(encoding="utf-8"))
         data.setdefault("name", source)
         folder = Path(str(entry)).parent

@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from cosim import firmware
+from cosim.scene import firmware
 from cosim.scene.describe import Key, keys
 from cosim.scene.tables import (
     GIVEN_SURFACES,

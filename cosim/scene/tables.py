@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from cosim import firmware
+from cosim.scene import firmware
 
 
 def _number(default: Any, unit: str, low: float, high: float, text: str) -> Any:

@@ -1,5 +1,5 @@
-"""Writes cosim/bench/reference.json: the part's path in the scene `paper`, which `cosim bench`
-takes for the truth.
+"""Writes cosim/studies/bench/reference.json: the part's path in the scene `paper`, which `cosim
+bench` takes for the truth.
 
     python -m tests.reference.generate_bench
 """
@@ -33,7 +33,7 @@ def main() -> None:
             "z_part": path.tolist(),
             "spread": float(np.abs(path - other).max() / np.ptp(path)),
         }
-    target = Path(cosim.__file__).parent / "bench" / "reference.json"
+    target = Path(cosim.__file__).parent / "studies" / "bench" / "reference.json"
     target.write_text(json.dumps(found) + "\n", encoding="utf-8")
 
 

@@ -1,4 +1,5 @@
-"""Writes cosim/chart/reference.json: the solutions that `cosim chart accuracy` measures against.
+"""Writes cosim/studies/accuracy/reference.json: the solutions that `cosim chart accuracy` measures
+against.
 
     python -m tests.reference.generate_charts
 
@@ -18,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.chart.cases import CASES, Case, reference_parameters
 from cosim.scene import load
+from cosim.studies.accuracy.cases import CASES, Case, reference_parameters
 from tests.reference import monolithic
 
 TOL, OTHER_TOL, OTHER_METHOD = 1e-13, 1e-12, "BDF"
@@ -27,7 +28,7 @@ NUDGE = 1e-9
 REST_SPEED = 1e-8
 """Rigid rebounds slower than this, m/s, end in resting contact. The solver's own 1e-6 is a floor of
 5e-7 under every error on the scene ``impact``."""
-PATH = Path(__file__).parents[2] / "cosim" / "chart" / "reference.json"
+PATH = Path(__file__).parents[2] / "cosim" / "studies" / "accuracy" / "reference.json"
 
 
 def solve(case: Case, known: dict[str, Any]) -> dict[str, Any]:

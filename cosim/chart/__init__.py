@@ -1,1 +1,0 @@
-"""The studies: speed against accuracy, and where methods fail."""

@@ -1,0 +1,89 @@
+"""False limit cycles: an output that swings from rail to rail only because steps are too coarse.
+
+With a loose tolerance the time stepping of an amplifier with feedback can fall into an oscillation
+that the converged solution does not have. It looks like a result. What gives it away is a burst of
+fast swings over the output's whole range; whether a burst is real (an unstable loop, a switching
+stage) or false is decided by solving up to it again with finer steps.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.errors import SimulationFailed
+from cosim.files.spill import blocks
+from cosim.scene import Scene
+
+Array = npt.NDArray[np.float64]
+
+BURST = 12
+"""Swings in a row that make a burst. The ringing after a flyback, of a loop with 4° of phase
+margin, stays below half of that."""
+FAST = 1e-3
+"""s; swings further apart are no burst."""
+
+_FINER_TOLERANCE, _FINER_STEP = 100.0, 10.0
+
+
+def swings(log: dict[str, Array]) -> Array:
+    """Times (s) at which the output has crossed from one end of its range to the other."""
+    count = len(log["time"])
+    low = min(float(log["v(out)"][part].min()) for part in blocks(count))
+    high = max(float(log["v(out)"][part].max()) for part in blocks(count))
+    edge = 0.15 * (high - low)
+    found, last = [], np.empty(0, np.int64)  # the end at which the output was last
+    for part in blocks(count):
+        out = log["v(out)"][part]
+        at_end = np.where(out > high - edge, 1, np.where(out < low + edge, -1, 0))
+        known = at_end != 0
+        ends = np.concatenate([last, at_end[known]])
+        changed = np.flatnonzero(np.diff(ends)) + 1 - len(last)
+        found.append(log["time"][part][known][changed])
+        last = ends[-1:]
+    return np.concatenate(found)
+
+
+def burst_ends(times: npt.NDArray[np.floating[Any]]) -> float | None:
+    """When the first burst of swings is complete, s; None where there is none."""
+    if len(times) < BURST:
+        return None
+    fast = np.diff(times) < FAST
+    run = np.convolve(fast, np.ones(BURST - 1), mode="valid") >= BURST - 1
+    return float(times[np.argmax(run) + BURST - 1]) if run.any() else None
+
+
+def refuse_false(
+    scene: Scene, log: dict[str, Array], solve: Callable[[Scene], dict[str, Array]]
+) -> None:
+    """Raise SimulationFailed where the run's output is in a false limit cycle.
+
+    ``solve`` gives the log of another run of the circuit, with its mechanics.
+    """
+    times = swings(log)
+    end = burst_ends(times)
+    if end is None:
+        return
+    circuit, run = scene.circuit, scene.run
+    finer = {
+        "reltol": max(circuit.reltol / _FINER_TOLERANCE, 1e-9),
+        "max_step": circuit.max_step / _FINER_STEP,
+    }
+    until = {"duration": end, "settle": 0.0, "output_step": min(run.output_step, end / 2)}
+    truth = solve(
+        scene.model_copy(
+            update={
+                "circuit": circuit.model_copy(update=finer),
+                "run": run.model_copy(update=until),
+            }
+        )
+    )
+    found, true = int((times <= end).sum()), len(swings(truth))
+    if true <= found // 2:
+        raise SimulationFailed(
+            f"A false limit cycle: until t = {end:.4g} s the output swings {found} times over its "
+            f"whole range, but only {true} times with finer steps. circuit.reltol = "
+            f"{circuit.reltol:g} and circuit.max_step = {circuit.max_step:g} s are too coarse for "
+            f"this circuit; try circuit.reltol = {circuit.reltol / 100:g}."
+        )

@@ -1,0 +1,291 @@
+"""What a netlist's lines say: scopes, elements and the words of a line, as ngspice reads them.
+
+Nothing is evaluated; whatever cannot be decided without its value stays undecided.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from cosim.circuit.lint.deck import Line, refuse, shown
+from cosim.circuit.lint.words import definitions, split_assignments, words
+
+GROUND = "0"
+
+NODES = dict.fromkeys("rclvibefgh", 2) | {"d": 2, "s": 4, "w": 2, "t": 4, "o": 4, "k": 0}
+"""Nodes right after the name, where their number is fixed (controlling nodes apart)."""
+MODEL_PLACES = {"d": (2, 3), "q": (3, 5), "m": (3, 7), "j": (3, 4), "z": (3, 3)}
+"""The least and the most nodes before the model's name."""
+MODEL_TYPES = {
+    "r": {"r", "res"},
+    "c": {"c"},
+    "l": {"l"},
+    "d": {"d"},
+    "q": {"npn", "pnp"},
+    "m": {"nmos", "pmos", "vdmos"},
+    "j": {"njf", "pjf"},
+    "z": {"nmf", "pmf"},
+    "s": {"sw"},
+    "w": {"csw"},
+    "o": {"ltra"},
+}
+
+_SPECIAL = {"table", "laplace", "freq", "value", "vol", "cur", "and", "nand", "or", "nor"}
+"""First words of controlled sources that have no controlling nodes."""
+
+
+@dataclass
+class Element:
+    """An element; ``words`` follow the nodes, and may begin with controlling nodes or a model."""
+
+    name: str
+    nodes: list[str]
+    words: list[str]
+    line: Line
+    conditional: bool
+    model: str | None = None
+    controls: list[str] = field(default_factory=list)
+    """Nodes that it only senses."""
+
+    @property
+    def kind(self) -> str:
+        return self.name[0]
+
+    @property
+    def behavioural(self) -> bool:
+        """Whether an expression gives its value."""
+        first = self.words[0] if self.words else ""
+        return self.kind == "b" or first.startswith(
+            ("value", "vol=", "cur=", "table", "laplace", "freq", "{")
+        )
+
+
+@dataclass
+class Scope:
+    """The top level, or a subcircuit."""
+
+    name: str
+    line: Line
+    parent: "Scope | None" = None
+    conditional: bool = False
+    pins: list[str] = field(default_factory=list)
+    parameters: set[str] = field(default_factory=set)
+    functions: set[str] = field(default_factory=set)
+    models: dict[str, set[str]] = field(default_factory=dict)
+    names: set[str] = field(default_factory=set)
+    elements: list[Element] = field(default_factory=list)
+    subcircuits: dict[str, list["Scope"]] = field(default_factory=dict)
+    lines: list[tuple[Line, Element | None]] = field(default_factory=list)
+    globals: set[str] = field(default_factory=set)
+    used: bool = False
+
+    def chain(self) -> "Iterator[Scope]":
+        scope: Scope | None = self
+        while scope is not None:
+            yield scope
+            scope = scope.parent
+
+    def model_types(self, name: str) -> set[str] | None:
+        """The types of the model that ``name`` means here, None if there is none."""
+        for scope in self.chain():
+            if types := scope.models.get(name):
+                return types
+        return None
+
+    def subcircuit(self, name: str) -> "list[Scope] | None":
+        return next((s.subcircuits[name] for s in self.chain() if name in s.subcircuits), None)
+
+    def in_use(self) -> "Iterator[Scope]":
+        """The scope and the subcircuits within that are called; ngspice drops the others unread."""
+        if self.used:
+            yield self
+        for alternatives in self.subcircuits.values():
+            for scope in alternatives:
+                yield from scope.in_use()
+
+
+def node(name: str) -> str:
+    return GROUND if name in ("0", "gnd") else name
+
+
+def parse(lines: Sequence[Line]) -> Scope:
+    """The netlist's scopes. Raises BadInput where lines are incomplete or do not nest."""
+    return _Parser(lines).top
+
+
+class _Parser:
+    def __init__(self, lines: Sequence[Line]) -> None:
+        self.top = self.scope = Scope("", lines[0])
+        self.ifs: list[Line] = []
+        self.outer_ifs: list[int] = []
+        for line in lines[1:]:
+            _check_brackets(line)
+            self._take(line)
+        if self.scope is not self.top:
+            refuse(self.scope.line, f".subckt {shown(self.scope.name)} has no .ends")
+        if self.ifs:
+            refuse(self.ifs[-1], ".if has no .endif")
+        self._place_nodes()
+
+    def _take(self, line: Line) -> None:
+        found = words(line.text)
+        handlers: dict[str, Callable[[Line, list[str]], None]] = {
+            ".subckt": self._subckt,
+            ".ends": self._ends,
+            ".if": self._conditional,
+            ".elseif": self._conditional,
+            ".else": self._conditional,
+            ".endif": self._conditional,
+            ".param": self._param,
+            ".func": self._func,
+            ".model": self._model,
+            ".global": self._global,
+        }
+        if not line.text.startswith("."):
+            element = Element(found[0], [], found[1:], line, bool(self.ifs))
+            self.scope.elements.append(element)
+            self.scope.names.add(element.name)
+            self.scope.lines.append((line, element))
+            return
+        word = re.match(r"\.\w*", line.text)
+        if handler := handlers.get(word[0].lower() if word else ""):
+            handler(line, found)
+        if self.scope.line is not line:
+            self.scope.lines.append((line, None))
+
+    def _subckt(self, line: Line, found: list[str]) -> None:
+        positional, assigned = split_assignments(found[1:])
+        if not positional:
+            refuse(line, ".subckt has no name")
+        name, *pins = positional
+        scope = Scope(name, line, self.scope, bool(self.ifs), [node(pin) for pin in pins])
+        scope.parameters = {word.partition("=")[0] for word in assigned}
+        scope.lines.append((line, None))
+        self.scope.subcircuits.setdefault(name, []).append(scope)
+        self.outer_ifs.append(len(self.ifs))
+        self.scope = scope
+
+    def _ends(self, line: Line, found: list[str]) -> None:
+        if self.scope.parent is None:
+            refuse(line, ".ends has no .subckt")
+        if len(found) > 1 and found[1] != self.scope.name:
+            refuse(line, f".ends {shown(found[1])} ends .subckt {shown(self.scope.name)}")
+        if len(self.ifs) != self.outer_ifs.pop():
+            refuse(line, ".if and .endif must stand in the same subcircuit")
+        self.scope = self.scope.parent
+
+    def _conditional(self, line: Line, found: list[str]) -> None:
+        word = found[0].partition("{")[0].partition("'")[0]
+        if word == ".if":
+            self.ifs.append(line)
+        elif len(self.ifs) <= (self.outer_ifs[-1] if self.outer_ifs else 0):
+            refuse(line, f"{shown(word)} has no .if")
+        elif word == ".endif":
+            self.ifs.pop()
+
+    def _param(self, line: Line, found: list[str]) -> None:
+        names = [definition[0] for definition in definitions(line.text)]
+        if not names:
+            refuse(line, ".param gives no name a value")
+        for name, formal in names:
+            (self.scope.parameters if formal is None else self.scope.functions).add(name)
+
+    def _func(self, line: Line, found: list[str]) -> None:
+        match = re.match(r"\.func\s+([a-z_]\w*)\s*\(", line.text, re.IGNORECASE)
+        if match is None:
+            refuse(line, f"{shown(line.text)} is no complete .func line")
+        self.scope.functions.add(match[1].lower())
+
+    def _model(self, line: Line, found: list[str]) -> None:
+        if len(found) < 3:
+            refuse(line, f"{shown(line.text)} is no complete .model line")
+        self.scope.models.setdefault(found[1], set()).add(found[2])
+
+    def _global(self, line: Line, found: list[str]) -> None:
+        self.top.globals.update(found[1:])
+
+    def _place_nodes(self) -> None:
+        waiting = [self.top]
+        while waiting:
+            scope = waiting.pop()
+            if scope.used:
+                continue
+            scope.used = True
+            for element in scope.elements:
+                _place(element, scope)
+                if element.kind == "x":
+                    waiting += scope.subcircuit(element.model or "") or ()
+
+
+def _check_brackets(line: Line) -> None:
+    if line.text.count("'") % 2:
+        refuse(line, "a quote is not closed, so the line may be cut short")
+    depth = {"{": 0, "(": 0}
+    for char in line.text:
+        if char in "{(":
+            depth[char] += 1
+        elif char in "})":
+            opening = "{" if char == "}" else "("
+            depth[opening] -= 1
+            if depth[opening] < 0:
+                refuse(line, f"{char} closes nothing")
+    for opening, open_ones in depth.items():
+        if open_ones:
+            refuse(line, f"{opening} is not closed, so the line may be cut short")
+
+
+def _place(element: Element, scope: Scope) -> None:
+    """Tell nodes from what follows them."""
+    kind, line = element.kind, element.line
+    if kind == "x":
+        element.nodes, element.model, element.words = _call(element)
+    elif kind in MODEL_PLACES:
+        least, most = MODEL_PLACES[kind]
+        places = range(least, min(most + 1, len(element.words)))
+        if not places:
+            refuse(line, f"{shown(element.name)} has too few nodes or no model")
+        known = (i for i in places if scope.model_types(element.words[i]) is not None)
+        place = next(known, None)
+        if place is None:
+            # Numbers and letters before a "key=" are nodes as likely as models.
+            name = element.words[least + 1 if kind == "m" and len(element.words) > 4 else least]
+            refuse(line, f"{shown(element.name)}: no model {shown(name)} is defined here")
+        _split(element, place)
+        element.model = element.words.pop(0)
+    else:
+        _split(element, NODES[kind])
+    element.nodes = [node(name) for name in element.nodes]
+    if kind == "s":
+        element.controls, element.nodes = element.nodes[2:], element.nodes[:2]
+    if kind in "eg":
+        _controls(element)
+
+
+def _split(element: Element, count: int) -> None:
+    element.nodes, element.words = element.words[:count], element.words[count:]
+    if len(element.nodes) < count or any("=" in name or "{" in name for name in element.nodes):
+        refuse(element.line, f"{shown(element.name)} has too few nodes")
+
+
+def _call(element: Element) -> tuple[list[str], str, list[str]]:
+    positional, assigned = split_assignments(element.words)
+    if not positional:
+        refuse(element.line, f"{shown(element.name)} names no subcircuit")
+    return positional[:-1], positional[-1], assigned
+
+
+def _controls(element: Element) -> None:
+    """The controlling nodes of a linear or polynomial voltage-controlled source."""
+    first = element.words[0] if element.words else ""
+    count, start = 1, 0
+    if first == "poly":
+        if len(element.words) < 2 or not element.words[1].isdigit():
+            return
+        count, start = int(element.words[1]), 2
+    elif not first or not re.fullmatch(r"[^={}']+", first) or first in _SPECIAL:
+        return
+    end = start + 2 * count
+    if len(element.words) <= end or any("=" in word for word in element.words[start:end]):
+        refuse(element.line, f"{shown(element.name)} has too few nodes or no value")
+    element.controls = [node(name) for name in element.words[start:end]]
+    element.words = element.words[end:]

@@ -1,0 +1,366 @@
+"""The names that a netlist's expressions use, and which of them are defined.
+
+An undefined parameter does not only fail the run: ngspice gives up for the rest of the process.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+
+from cosim.circuit.lint.deck import Line, refuse, shown, word_set
+from cosim.circuit.lint.elements import Element, Scope
+from cosim.circuit.lint.words import closing, definitions
+
+_RANDOM = {"agauss": 3, "gauss": 3, "aunif": 2, "unif": 2, "limit": 2}
+_COMMON = word_set(
+    """abs acos acosh asin asinh atan atanh ceil cos cosh exp floor ln log log10 nint sgn sin sinh
+    sqrt tan tanh"""
+)
+PARAMETRIC = (
+    dict.fromkeys(_COMMON | word_set("arctan int sqr"), 1)
+    | dict.fromkeys(word_set("max min pow pwr"), 2)
+    | {"ternary_fcn": 3}
+    | _RANDOM
+)
+"""Functions of ngspice 39's parameters, which are numbers before a run, and how many arguments each
+takes: with too many or too few ngspice calculates something else in silence."""
+BEHAVIOURAL = (
+    dict.fromkeys(_COMMON | word_set("ddt eq0 ge0 gt0 le0 lt0 ne0 u u2 uramp"), 1)
+    | dict.fromkeys(word_set("max min pow pwr"), 2)
+    | {"ternary_fcn": 3}
+    | _RANDOM
+)
+"""Those of its behavioural sources, ``pwl`` (with any number of points) apart. The random ones are
+replaced by a number as the netlist is read."""
+CONSTANTS = word_set("time temper hertz")
+BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
+
+_INSTEAD = {
+    "limit": "limit() is no limiter in ngspice; write max(low, min(high, x))",
+    "if": "there is no if() in ngspice; write (condition ? yes : no)",
+    "table": "there is no table() in ngspice; write pwl(x, x1, y1, x2, y2, ...) in a B source",
+}
+_VARYING = re.compile(r"\b(?:[vi]\s*\(|(?:time|temper|hertz)\b)", re.IGNORECASE)
+_PLAIN = re.compile(r"\s*\{?\s*[+-]?\s*[\w.]+(?:(?<=\de)[+-]?\d+)?\s*\}?\s*", re.IGNORECASE)
+_TOKEN = re.compile(
+    r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?[a-z]*|@[\w.#]+\[\w+\]|[a-z_][\w.$#]*|.", re.S
+)
+_ASSIGNMENT = re.compile(r"([a-z_]\w*)=([a-z_]\w*)\b(?!\s*\()", re.IGNORECASE)
+_DROPPABLE = re.compile(r"\.model ([^\s(]+)|\.func (\w+)")
+_CALLED = re.compile(r"(\w+)\s*\(")
+_FUNC = re.compile(r"\.func\s+([a-z_]\w*)\s*\(([^()]*)\)\s*=?(.*)", re.S)
+_KEY = re.compile(r"\s*=(?!=)")
+_CALL = re.compile(r"\s*\(")
+_BODY = re.compile(r"\b[vi]\s*=(?!=)", re.IGNORECASE)
+_NEXT_KEY = re.compile(r"\b[a-z_]\w*\s*(?<![<>=!])=(?!=)", re.IGNORECASE)
+_SOURCE = re.compile(r"\b(?:value|vol|cur)\s*=?\s*$", re.IGNORECASE)
+_SPACED = re.compile(r"([a-z_]\w*)\s+\(", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class _Function:
+    """A function that the netlist defines."""
+
+    name: str
+    formals: tuple[str, ...]
+    body: str
+    line: Line
+
+
+@dataclass(frozen=True)
+class _Place:
+    """An expression, and which of ngspice's two parsers evaluates it."""
+
+    text: str
+    behavioural: bool
+
+
+class Names:
+    """What may be used where: ngspice also looks up the parameters of a subcircuit's callers."""
+
+    def __init__(self, top: Scope) -> None:
+        self.parameters: dict[int, set[str]] = {}
+        self.functions: dict[int, set[str]] = {}
+        scopes = list(top.in_use())
+        for scope in scopes:
+            chain = list(scope.chain())
+            self.parameters[id(scope)] = set().union(*(s.parameters for s in chain))
+            self.functions[id(scope)] = set().union(*(s.functions for s in chain))
+        lines = [line.text.lower() for s in scopes for line, _ in s.lines]
+        self.definitions: dict[str, list[_Function]] = {}
+        """Of the user's functions, whatever their scope."""
+        for scope in scopes:
+            for line, _ in scope.lines:
+                for function in _functions(line):
+                    self.definitions.setdefault(function.name, []).append(function)
+        self.mentioned = {word for s in scopes for e in s.elements for word in [e.model, *e.words]}
+        self.called = {
+            name
+            for text in lines
+            for name in _CALLED.findall(
+                text.partition(")")[2] if text.startswith(".func") else text
+            )
+        }
+        growing = True
+        while growing:
+            growing = sum(self._inherit(scope) for scope in scopes) > 0
+
+    def _inherit(self, caller: Scope) -> bool:
+        grew = False
+        for element in caller.elements:
+            for called in caller.subcircuit(element.model or "") or ():
+                for table in (self.parameters, self.functions):
+                    before = len(table[id(called)])
+                    table[id(called)] |= table[id(caller)]
+                    grew = grew or len(table[id(called)]) > before
+        return grew
+
+    def drops(self, line: Line) -> bool:
+        """Whether ngspice drops the line unread: a model or function that nothing mentions."""
+        match = _DROPPABLE.match(line.text.lower())
+        if match is None:
+            return False
+        model, function = match.groups()
+        return function not in self.called if function else model not in self.mentioned
+
+    def is_parameter(self, scope: Scope, name: str) -> bool:
+        return name in self.parameters[id(scope)] or name in CONSTANTS
+
+
+def check_names(scope: Scope, names: Names) -> None:
+    """Raise BadInput where an expression of the scope's lines uses an undefined name."""
+    parameters = names.parameters[id(scope)] | CONSTANTS
+    own = names.functions[id(scope)]
+    for line, element in scope.lines:
+        if names.drops(line):
+            continue
+        formal = _formal(line)
+        known = parameters | formal if formal else parameters
+        defines = any(True for _ in _functions(line))
+        for place in _expressions(line, element):
+            loose = place.behavioural or (element is not None and element.kind in "beg")
+            # Where a function's own definition will be evaluated is not known there.
+            behavioural = place.behavioural or (None if defines else False)
+            for name, arguments in used(place.text):
+                if arguments is None:
+                    if name not in known and not (loose and name in BEHAVIOURAL_CONSTANTS):
+                        refuse(line, f"the parameter {shown(name)} is not defined")
+                elif name in own:
+                    _check_own(line, name, arguments, names, behavioural, set())
+                else:
+                    _check_call(line, name, arguments, behavioural)
+        if element is not None and element.kind == "b":
+            _check_blanks(line, own)
+
+
+def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str | None:
+    """What is wrong with calling one of ngspice's functions like this, if anything; None for
+    ``behavioural`` stands for either parser."""
+    if behavioural is None:
+        reasons = [_misused(name, arguments, parser) for parser in (False, True)]
+        return reasons[name not in PARAMETRIC] if all(reasons) else None
+    known, other = (BEHAVIOURAL, PARAMETRIC) if behavioural else (PARAMETRIC, BEHAVIOURAL)
+    count = len(arguments)
+    if name == "pwl" and behavioural:
+        if count >= 5 and count % 2:
+            return None
+        return "pwl() takes a value and at least two points, each of two numbers"
+    if name == "limit" and count != 2:
+        return _INSTEAD[name]
+    if name not in known:
+        if name in _INSTEAD:
+            return _INSTEAD[name]
+        if name in other or name == "pwl":
+            where = "where all is known before the run" if behavioural else "in B sources"
+            return f"the function {name} works only {where}"
+        return f"the function {shown(name)} is not defined"
+    if count != known[name]:
+        return f"the function {name} takes {_counted(known[name])}, not {count}"
+    if name in _RANDOM and behavioural and not all(map(_is_plain, arguments)):
+        return _INSTEAD.get(
+            name, f"in a B source {name}() takes plain numbers only; write it in a .param line"
+        )
+    return None
+
+
+def _check_call(line: Line, name: str, arguments: list[str], behavioural: bool | None) -> None:
+    if reason := _misused(name, arguments, behavioural):
+        refuse(line, reason)
+
+
+def _check_own(
+    line: Line,
+    name: str,
+    arguments: list[str],
+    names: Names,
+    behavioural: bool | None,
+    met: set[str],
+) -> None:
+    """Check a call of the netlist's own function, whose body ngspice puts in its place."""
+    found = names.definitions.get(name, [])
+    if len(found) != 1 or name in met:  # which one is meant is not known
+        return
+    function = found[0]
+    if len(arguments) != len(function.formals):
+        wanted = _counted(len(function.formals))
+        refuse(line, f"the function {shown(name)} takes {wanted}, not {len(arguments)}")
+    for inner, inner_arguments in used(function.body):
+        if inner_arguments is None:
+            continue
+        if inner in names.definitions:
+            below = met | {name}
+            _check_own(function.line, inner, inner_arguments, names, behavioural, below)
+        else:
+            _check_call(function.line, inner, inner_arguments, behavioural)
+
+
+def _check_blanks(line: Line, own: set[str]) -> None:
+    """In a B source ngspice takes a name before a blank for a parameter, and gives up."""
+    for match in _SPACED.finditer(_unbraced(body(line))):
+        name = match[1].lower()
+        if name in own or name in BEHAVIOURAL or name == "pwl":
+            refuse(line, f"write {shown(name)}( without a blank, which ngspice cannot read here")
+
+
+def _counted(count: int) -> str:
+    return f"{count} argument{'' if count == 1 else 's'}"
+
+
+def _is_plain(argument: str) -> bool:
+    return _PLAIN.fullmatch(argument) is not None and not _VARYING.search(argument)
+
+
+def check_circles(top: Scope) -> None:
+    """Raise BadInput where top-level parameters depend on themselves."""
+    uses: dict[str, set[str]] = {}
+    lines: dict[str, Line] = {}
+    if any(line.text.lower().startswith(".if") for line, _ in top.lines):
+        return
+    for line, _ in top.lines:
+        if line.text.lower().startswith(".param"):
+            for (name, formal), expression in definitions(line.text):
+                if formal is None and name not in uses:
+                    uses[name] = {n for n, arguments in used(expression) if arguments is None}
+                    lines[name] = line
+    try:
+        TopologicalSorter(uses).prepare()
+    except CycleError as error:
+        name = next(name for name in error.args[1] if name in lines)
+        refuse(lines[name], f"the parameter {shown(name)} depends on itself")
+
+
+def used(expression: str) -> Iterator[tuple[str, list[str] | None]]:
+    """The names in an expression, each with its arguments if it is called; nodes and sources are
+    left out."""
+    text = expression.lower()
+    place = 0
+    while match := _TOKEN.match(text, place):
+        token, place = match[0], match.end()
+        if not (token[0].isalpha() or token[0] == "_"):
+            continue
+        if _KEY.match(text, place):
+            continue
+        call = _CALL.match(text, place)
+        if call is None:
+            yield token, None
+        elif token in ("v", "i"):
+            place = closing(text, call.end() - 1)
+        else:
+            yield token, _arguments(text[call.end() : closing(text, call.end() - 1) - 1])
+
+
+def _arguments(text: str) -> list[str]:
+    """What commas part, outside brackets."""
+    found = [""]
+    place = 0
+    while place < len(text):
+        end = closing(text, place) if text[place] in "({'" else place + 1
+        if text[place] == ",":
+            found.append("")
+        else:
+            found[-1] += text[place:end]
+        place = end
+    return found if text.strip() else []
+
+
+def sensed(text: str, kind: str) -> Iterator[str]:
+    """The nodes (``kind`` v) or sources (i) that expressions in a line's text read."""
+    for match in re.finditer(rf"(?<![\w.]){kind}\s*\(([^()]*)\)", text.lower()):
+        yield from (name for name in re.split(r"[\s,]+", match[1]) if name)
+
+
+def body(line: Line) -> str:
+    """The expression of a B source."""
+    match = _BODY.search(line.text)
+    return line.text[match.end() :] if match else ""
+
+
+def _expressions(line: Line, element: Element | None) -> Iterator[_Place]:
+    text = line.text
+    word = text.split()[0].lower()
+    if word == ".param":
+        for _, expression in definitions(text):
+            yield _place(expression)
+        return
+    if word.startswith((".if", ".elseif")):
+        yield _place(text[text.lower().index("if") + 2 :])
+        return
+    end = 0
+    if element is not None and element.kind == "b":
+        # Braces make no difference there, up to the next key.
+        start = len(text) - len(body(line))
+        key = _NEXT_KEY.search(_masked(text), start)
+        end = key.start() if key else len(text)
+        yield _Place(text[start:end], True)
+    place = end
+    while place < len(text):
+        if text[place] in "{'":
+            after = closing(text, place)
+            inside = text[place + 1 : after - 1]
+            source = element is not None and _SOURCE.search(text[:place]) is not None
+            yield _Place(inside, True) if source else _place(inside)
+            place = after
+        else:
+            place += 1
+    if element is None and word not in (".model", ".subckt"):
+        return
+    if element is None or element.kind != "b":
+        for _, name in _ASSIGNMENT.findall(re.sub(r"\s*=\s*", "=", _unbraced(text))):
+            yield _place(name)
+
+
+def _place(expression: str) -> _Place:
+    """An expression outside a B source: what varies during a run makes it one."""
+    return _Place(expression, _VARYING.search(expression) is not None)
+
+
+def _functions(line: Line) -> Iterator[_Function]:
+    """The functions that a line defines."""
+    lower = line.text.lower()
+    if lower.startswith(".func"):
+        match = _FUNC.match(lower)
+        if match:
+            yield _Function(match[1], _formals(match[2]), match[3].strip().strip("{}'"), line)
+    elif lower.startswith(".param"):
+        for (name, formal), expression in definitions(lower):
+            if formal is not None:
+                yield _Function(name, _formals(formal), expression.strip("{}'"), line)
+
+
+def _formals(text: str) -> tuple[str, ...]:
+    return tuple(re.findall(r"\w+", text))
+
+
+def _masked(text: str) -> str:
+    """The text with what is in braces or quotes blanked out, place by place."""
+    return re.sub(r"\{[^{}]*\}|'[^']*'", lambda match: " " * len(match[0]), text)
+
+
+def _unbraced(text: str) -> str:
+    return re.sub(r"\{[^{}]*\}|'[^']*'", "{}", text)
+
+
+def _formal(line: Line) -> set[str]:
+    """The formal parameters of functions that a line defines."""
+    return {name for function in _functions(line) for name in function.formals}

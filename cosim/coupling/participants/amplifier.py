@@ -1,0 +1,194 @@
+"""The behavioural amplifier with coil, solved exactly piece by piece: it can repeat its steps.
+
+The same equations as ``circuits/amplifier.cir``: one pole whose output v_a obeys
+dv_a/dt = clip(2π GBW (V1 - R_s i) - 2π GBW v_a / A_ol, ±slew) and stays within its swing, then coil
+and sense resistor. While no limit begins or ceases to act it is linear and advanced by a matrix
+exponential; where one does is found by looking at points a fraction of the loop's ringing apart.
+Input: back-EMF of one coil (V); output: its current (A). Commands of straight pieces only.
+"""
+
+from collections import OrderedDict
+from typing import Any, Literal
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+from cosim.coupling.participant import Signal
+from cosim.coupling.polynomials import Array, shifted, value
+from cosim.drive.command import Command
+from cosim.errors import SimulationFailed
+from cosim.scene import Scene
+
+_SAME_TIME = 1e-13  # s
+_LOOKS_PER_RADIAN = 4.0
+_MOST_PIECES = 10_000  # in one step
+_REMEMBERED = 64  # stacks of propagators
+_SIZE = 9
+_I, _VA, _Q, _E, _DE, _DDE, _V1, _DV1, _ONE = range(_SIZE)
+
+Mode = tuple[Literal["linear", "slew", "clamp"], int]
+"""What acts, and with which sign."""
+
+
+class Amplifier:
+    """The circuit of a scene with its command, from rest at t = 0."""
+
+    def __init__(self, scene: Scene, command: Command) -> None:
+        circuit, coil = scene.circuit, scene.coil
+        self._command = command
+        self._sense = circuit.sense_resistance * coil.count  # as one coil's current sees it
+        self._loop = coil.resistance + self._sense
+        self._inductance = coil.inductance
+        self._pole = 2.0 * np.pi * circuit.gain_bandwidth
+        self._leak = 10.0 ** (-circuit.open_loop_gain / 20.0)
+        self._slew = circuit.slew_rate
+        high, low = circuit.swing_loss_high, circuit.swing_loss_low
+        self._limits = {1: circuit.supply - high, -1: low - circuit.supply}
+        ringing = np.sqrt(self._pole * self._sense / self._inductance)
+        self._look = 1.0 / (_LOOKS_PER_RADIAN * ringing)
+        self._known: OrderedDict[tuple[float, Mode, float], Array] = OrderedDict()
+        self.time = 0.0
+        self.mean: Array = np.zeros(1)
+        self._x = np.zeros(_SIZE)
+        self._x[_ONE] = 1.0
+        self._mode: Mode = ("linear", 0)
+        self._corner = 0.0
+        self._straight()
+
+    def advance(self, h: float, inputs: Array, gain: float = 0.0) -> None:
+        start, end = self.time, self.time + h
+        self._x[_Q] = 0.0
+        polynomial = inputs.reshape(len(inputs))
+        for _ in range(_MOST_PIECES):
+            now = shifted(polynomial, self.time - start)
+            self._x[_E:_V1] = 0.0
+            self._x[_E : _E + len(now)] = now
+            self._x[_DDE] *= 2.0
+            length = min(self._corner, end) - self.time
+            used = self._piece(length, gain)
+            self.time = end if end - self.time - used <= _SAME_TIME else self.time + used
+            if self.time >= self._corner - _SAME_TIME:
+                self._straight()
+            if self.time == end:
+                break
+        else:
+            raise SimulationFailed(f"The amplifier chatters at t = {self.time:.6g} s.")
+        charge = float(self._x[_Q])
+        self.mean = np.array([charge / h])
+        self._x[_E] = float(value(polynomial, h)) + gain * charge
+
+    def _straight(self) -> None:
+        """Take the straight piece of the command that begins now."""
+        command, now = self._command, max(self.time, self._corner)
+        self._corner = min(command.next_corner(now), now + command.longest_straight)
+        first, last = command.value(now), command.value_before(self._corner)
+        self._x[_V1], self._x[_DV1] = first, (last - first) / (self._corner - now)
+        self._choose()
+
+    def _choose(self) -> None:
+        """The mode after a jump of the command, or on leaving a limit."""
+        rate = self._rate(self._x)
+        side = 1 if rate > 0.0 else -1
+        if side * self._x[_VA] >= side * self._limits[side]:
+            self._mode = ("clamp", side)
+        else:
+            self._mode = ("slew", side) if abs(rate) > self._slew else ("linear", 0)
+
+    def _rate(self, x: Array) -> Any:
+        """Slope that is asked of v_a, V/s; of each row of ``x``."""
+        return self._pole * (x[..., _V1] - self._sense * x[..., _I] - self._leak * x[..., _VA])
+
+    def _margins(self, x: Array) -> list[Array]:
+        """What is positive, in each row of ``x``, as long as the mode lasts."""
+        kind, side = self._mode
+        rate = self._rate(x)
+        if kind == "clamp":
+            return [side * rate]
+        swing = [self._limits[1] - x[..., _VA], x[..., _VA] - self._limits[-1]]
+        if kind == "slew":
+            return [side * rate - self._slew, *swing]
+        return [self._slew - np.abs(rate), *swing]
+
+    def _piece(self, length: float, gain: float) -> float:
+        """Go on by at most ``length`` s in one mode, and change it where it ends; time used, s."""
+        stack = self._propagators(length, gain)
+        states = stack @ self._x
+        ended = np.min(self._margins(states), axis=0) < 0.0
+        if not ended.any():
+            self._x = states[-1]
+            return length
+        k = int(np.argmax(ended))
+        step = length / len(stack)
+        before = self._x if k == 0 else states[k - 1]
+        a = self._matrix(gain)
+
+        def then(s: float) -> Array:
+            return np.asarray(expm(a * s) @ before, np.float64)
+
+        def least(s: float) -> float:
+            return float(np.min(self._margins(then(s))))
+
+        # A margin that begins at zero, as where a limit was just left, may dip by rounding.
+        rest = step
+        if least(0.0) > 0.0:
+            rest = float(brentq(least, 0.0, step, xtol=1e-16))  # pyright: ignore[reportArgumentType]
+        self._x = then(rest)
+        values = [float(m) for m in self._margins(self._x)]
+        self._turn(values.index(min(values)))
+        return k * step + rest
+
+    def _turn(self, ended: int) -> None:
+        """Change the mode, in which margin ``ended`` has reached zero."""
+        kind, _ = self._mode
+        if ended:
+            side = 1 if ended == 1 else -1
+            self._x[_VA] = self._limits[side]
+            outward = side * self._rate(self._x) > 0.0
+            self._mode = ("clamp", side) if outward else ("linear", 0)
+        elif kind == "linear":
+            self._mode = ("slew", 1 if self._rate(self._x) > 0.0 else -1)
+        else:
+            self._mode = ("linear", 0)
+
+    def _matrix(self, gain: float) -> Array:
+        kind, side = self._mode
+        a = np.zeros((_SIZE, _SIZE))
+        a[_I, [_I, _VA, _E, _Q]] = np.array([-self._loop, 1.0, -1.0, -gain]) / self._inductance
+        a[_Q, _I] = a[_E, _DE] = a[_DE, _DDE] = a[_V1, _DV1] = 1.0
+        if kind == "linear":
+            a[_VA, [_V1, _I, _VA]] = self._pole * np.array([1.0, -self._sense, -self._leak])
+        elif kind == "slew":
+            a[_VA, _ONE] = side * self._slew
+        return a
+
+    def _propagators(self, length: float, gain: float) -> Array:
+        """exp(A s) at the equally spaced looks s up to ``length``."""
+        key = (length, self._mode, gain)
+        if key in self._known:
+            self._known.move_to_end(key)
+            return self._known[key]
+        looks = max(1, int(np.ceil(length / self._look)))
+        first = expm(self._matrix(gain) * (length / looks))
+        found = np.empty((looks, _SIZE, _SIZE))
+        found[0] = first
+        for k in range(1, looks):
+            found[k] = first @ found[k - 1]
+        self._known[key] = found
+        if len(self._known) > _REMEMBERED:
+            self._known.popitem(last=False)
+        return found
+
+    def outputs(self, inputs: Signal | None = None) -> Signal:
+        x = self._x
+        if inputs is not None:
+            x[_E] = float(inputs[0][0])
+        slope = (x[_VA] - self._loop * x[_I] - x[_E]) / self._inductance
+        return np.array([x[_I]]), np.array([slope])
+
+    def save(self) -> Any:
+        return (self.time, self._x.copy(), self._mode, self.mean, self._corner)
+
+    def restore(self, saved: Any) -> None:
+        self.time, x, self._mode, self.mean, self._corner = saved
+        self._x = x.copy()

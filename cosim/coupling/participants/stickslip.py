@@ -1,0 +1,101 @@
+"""The FMU as a participant: input the current of one coil (A), output its back-EMF (V)."""
+
+from ctypes import c_double, c_int, c_void_p
+from typing import Any
+
+import numpy as np
+
+from cosim.coupling.participant import Signal
+from cosim.coupling.polynomials import Array, projected, value
+from cosim.coupling.polynomials import slope as slope_of
+from cosim.errors import SimulationFailed
+from cosim.mechanics.fmi import places
+from cosim.mechanics.stickslip import Mechanics
+from cosim.scene import Scene
+
+_EVENTS = ("impacts", "stick_slip_events", "wall_contact")
+
+
+class FmuMechanics(Mechanics):
+    """The mechanics of a scene, from rest, that can go back to a state saved before.
+
+    The FMU takes linear inputs; a parabola is replaced by the line with the same integral and first
+    moment (:func:`cosim.coupling.polynomials.projected`).
+    """
+
+    def __init__(self, scene: Scene, fmi_version: int = 3) -> None:
+        super().__init__(scene, fmi_version)
+        coil = scene.coil
+        self._flux_terms = (coil.force_factor, coil.b1, coil.b2)
+        self._q_place = places(fmi_version, ("q",))
+        self._q = (c_double * 1)()
+        self._event_places = places(fmi_version, _EVENTS)
+        self._event_counts = (c_int * len(_EVENTS))()
+        self._touches = 0
+        self._free: list[c_void_p] = []
+        self.mean: Array = np.zeros(1)
+        """Mean back-EMF of the last step, V: the coil's flux linkage changed so much by time."""
+
+    def advance(self, h: float, inputs: Array, gain: float = 0.0) -> None:
+        if gain:
+            raise NotImplementedError("the companion belongs to the circuit's side")
+        before, was = self._flux(), self._read_events()
+        line = projected(inputs, h, 1)
+        rise = float(line[1, 0]) if len(line) > 1 else 0.0
+        self.step_to(self.time + h, float(line[0, 0]), rise)
+        if len(inputs) > 2:
+            # The slope of the output answers to the current itself, not to the line in its stead.
+            self.refresh(float(value(inputs, h)[0]), float(slope_of(inputs, h)[0]))
+        self.mean = np.array([(self._flux() - before) / h])
+        self._touches += self._read_events() != was
+
+    def outputs(self, inputs: Signal | None = None) -> Signal:
+        if inputs is not None:
+            self.refresh(float(inputs[0][0]), float(inputs[1][0]))
+        return np.array([self.step_outputs[0]]), np.array([self.step_outputs[1]])
+
+    def _flux(self) -> float:
+        """∫ Bl(q) dq from the centre, V s."""
+        self._fmi.get_reals(self._q_place, self._q)
+        q, (bl, b1, b2) = self._q[0], self._flux_terms
+        return bl * q * (1.0 + q * (b1 / 2.0 + q * b2 / 3.0))
+
+    def _read_events(self) -> tuple[int, ...]:
+        """Counters of impacts and stick-slip changes, and which wall is touched."""
+        self._fmi.get_integers(self._event_places, self._event_counts)
+        return tuple(self._event_counts)
+
+    def events(self) -> int:
+        """Number of steps so far in which a mode changed: stick, slip, a wall met or left."""
+        return self._touches
+
+    def save(self) -> Any:
+        handle = self._free.pop() if self._free else c_void_p()
+        self._fmi.get_state(handle)
+        rest = (self.time, tuple(self.step_outputs), self.mean, self._touches)
+        return _Saved(handle, self._free, rest)
+
+    def restore(self, saved: Any) -> None:
+        try:
+            self._fmi.set_state(saved.handle)
+        except Exception as error:
+            raise SimulationFailed(f"The mechanics cannot go back: {error}") from error
+        self.time, outputs, self.mean, self._touches = saved.rest
+        self.step_outputs[:] = outputs
+
+    def close(self) -> None:
+        for handle in self._free:
+            self._fmi.free_state(handle)
+        self._free.clear()
+        super().close()
+
+
+class _Saved:
+    """A saved state, whose memory is used again once nobody knows it any more."""
+
+    def __init__(self, handle: c_void_p, pool: list[c_void_p], rest: tuple[Any, ...]) -> None:
+        self.handle, self.rest = handle, rest
+        self._pool = pool
+
+    def __del__(self) -> None:
+        self._pool.append(self.handle)

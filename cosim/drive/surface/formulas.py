@@ -1,0 +1,274 @@
+"""The paper's conditions and closed forms; see :mod:`cosim.studies.paper` for the symbols.
+
+Numbers in brackets, as in (3), are the paper's equations.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from cosim.errors import BadInput
+
+GRAVITY = 9.81  # m/s²
+
+LEAST, GREATEST = 1e-30, 1e30  # of any quantity: nothing computed here overflows
+
+Direction = Literal["up", "down"]
+
+
+class Friction(NamedTuple):
+    """Coefficients of friction, without unit."""
+
+    static: float
+    kinetic: float
+
+
+# The conditions (1) to (5)
+
+
+def sticking_range(mu_s: float, f_n: float, gravity: float = GRAVITY) -> tuple[float, float]:
+    """(1) The surface's least and greatest acceleration with which a part at rest on it stays so.
+
+    −µ_s F_n/m_P − g ≤ z̈_S ≤ µ_s F_n/m_P − g, in m/s².
+    """
+    positive(mu_s=mu_s, f_n=f_n, gravity=gravity)
+    return -(mu_s * f_n + 1.0) * gravity, (mu_s * f_n - 1.0) * gravity
+
+
+def slipping_acceleration(
+    mu_k: float, f_n: float, relative_velocity: float, gravity: float = GRAVITY
+) -> float:
+    """(2) The slipping part's acceleration (µ_k F_n/m_P) sgn(ż_S − ż_P) − g, in m/s².
+
+    ``relative_velocity`` is ż_S − ż_P, of which only the sign counts.
+    """
+    positive(mu_k=mu_k, f_n=f_n, gravity=gravity)
+    if not relative_velocity or math.isnan(relative_velocity):
+        raise BadInput("relative_velocity must not be 0: then the part does not slip.")
+    return (math.copysign(mu_k * f_n, relative_velocity) - 1.0) * gravity
+
+
+def least_force_ratio(mu_s: float) -> float:
+    """(3) The ratio F_n/(m_P g) = 1/µ_s above which a resting surface holds the part."""
+    positive(mu_s=mu_s)
+    return 1.0 / mu_s
+
+
+def least_peak_acceleration(mu_s: float, f_n: float, gravity: float = GRAVITY) -> float:
+    """(4) The acceleration µ_s F_n/m_P + g, in m/s², that a_max must exceed to shake it loose."""
+    return -sticking_range(mu_s, f_n, gravity)[0]
+
+
+def least_peak_acceleration_at_any_force(gravity: float = GRAVITY) -> float:
+    """(5) The bound 2 g, in m/s², on a_max that (3) and (4) leave whatever friction and force."""
+    positive(gravity=gravity)
+    return 2.0 * gravity
+
+
+def conditions(
+    mu_s: float, mu_k: float, a_max: float, f_n: float, gravity: float = GRAVITY
+) -> dict[str, bool]:
+    """Which conditions for transport upwards are fulfilled; those for the robust variant too."""
+    _friction(mu_s, mu_k)
+    positive(a_max=a_max, f_n=f_n, gravity=gravity)
+    loose = a_max > least_peak_acceleration(mu_s, f_n, gravity)
+    return {
+        "held_at_rest": f_n > least_force_ratio(mu_s),
+        "shaken_loose": loose,
+        "peak_above_2g": a_max > least_peak_acceleration_at_any_force(gravity),
+        "robust_possible": loose and mu_k * f_n > 1.0,
+    }
+
+
+# The mapping to horizontal transport
+
+
+def horizontal_equivalent(
+    mu_s: float, mu_k: float, f_n: float, direction: Direction = "up", robust: bool = False
+) -> Friction:
+    """The coefficients µ̃_s, µ̃_k with which horizontal transport moves in the same way.
+
+    Up: µ̃_s = µ_s F_n/(m_P g) − 1 and µ̃_k = µ_k F_n/(m_P g) + 1; down, + and − exchanged.
+    Unlike true coefficients µ̃_s is below µ̃_k, for transport up, when
+    F_n/(m_P g) < 2/(µ_s − µ_k). The ``robust`` variant has µ_k in µ̃_s too.
+    """
+    _friction(mu_s, mu_k)
+    positive(f_n=f_n)
+    weight = sign_of(direction)
+    return Friction((mu_k if robust else mu_s) * f_n - weight, mu_k * f_n + weight)
+
+
+def horizontal_velocity(
+    mu_s: float, mu_k: float, a_max: float, period: float, gravity: float = GRAVITY
+) -> float:
+    """Mean velocity, m/s, in optimal horizontal transport with the coefficients given.
+
+    v = µ_s² (A² − µ_k²) g T/(4 A (µ_s + µ_k)²); nought where a_max = µ_k g. The first phase is at
+    µ_s g; where a_max is less it is at a_max, so that A stands for µ_s.
+    """
+    positive(mu_s=mu_s, mu_k=mu_k, a_max=a_max, period=period, gravity=gravity)
+    peak = a_max / gravity
+    if peak < mu_k:
+        raise BadInput(
+            f"a_max = {a_max:g} m/s² is too small: only mu_k g = {mu_k * gravity:g} m/s² or more "
+            "moves a surface away from a part that slips."
+        )
+    share = min(mu_s, peak) / (min(mu_s, peak) + mu_k)
+    return share * share * (1.0 - mu_k / peak) * (1.0 + mu_k / peak) * a_max * period / 4.0
+
+
+# The optimal waveform
+
+
+def optimal_times(
+    mu_s: float,
+    mu_k: float,
+    a_max: float,
+    f_n: float,
+    period: float,
+    *,
+    direction: Direction = "up",
+    robust: bool = False,
+    gravity: float = GRAVITY,
+) -> tuple[float, float]:
+    """The ends T1, T2, in s, of the optimal waveform's first and second phase.
+
+    T1 = T µ̃_k/(µ̃_s + µ̃_k), T2 = T1 + T (A + µ̃_k) µ̃_s/(2 A (µ̃_s + µ̃_k)), with the coefficients
+    of :func:`horizontal_equivalent`. On [0, T1] the surface accelerates at µ̃_s g and the part
+    sticks; on [T1, T2] at −a_max, on [T2, T] at +a_max, and the part slips.
+    """
+    pair = admissible(mu_s, mu_k, a_max, f_n, period, direction, robust, gravity)
+    peak, total = a_max / gravity, pair.static + pair.kinetic
+    first = pair.kinetic / total
+    second = (1.0 + pair.kinetic / peak) * pair.static / (2.0 * total)
+    return first * period, (first + second) * period
+
+
+def average_velocity(
+    mu_s: float,
+    mu_k: float,
+    a_max: float,
+    f_n: float,
+    period: float,
+    *,
+    direction: Direction = "up",
+    robust: bool = False,
+    gravity: float = GRAVITY,
+) -> float:
+    """v_ave, the part's mean velocity, m/s, with the optimal waveform; negative downwards.
+
+    Up: (µ_s f − 1)² (A² − (µ_k f + 1)²) g T/(4 A (µ_s + µ_k)² f²) with f = F_n/(m_P g). The
+    ``robust`` variant, first phase at (µ_k f − 1) g, gives less, but loses nothing when part and
+    surface meet a little too early.
+    """
+    pair = admissible(mu_s, mu_k, a_max, f_n, period, direction, robust, gravity)
+    return sign_of(direction) * horizontal_velocity(*pair, a_max, period, gravity)
+
+
+# The limits and the optimum of the normal force
+
+
+def largest_force_ratio_sticking(mu_s: float, a_max: float, gravity: float = GRAVITY) -> float:
+    """The ratio F_n/(m_P g) = (A − 1)/µ_s from which a part that sticks cannot be shaken loose."""
+    return _largest(mu_s, a_max, gravity)
+
+
+def largest_force_ratio_sliding(mu_k: float, a_max: float, gravity: float = GRAVITY) -> float:
+    """f_n,max = (A − 1)/µ_k, where −µ_k F_n/m_P − g = −a_max on [T1, T2], and v_ave is nought.
+
+    That holds for a part that slides already. One that sticks stops at the lesser ratio of
+    :func:`largest_force_ratio_sticking`, where v_ave is not nought yet.
+    """
+    return _largest(mu_k, a_max, gravity)
+
+
+def cubic_force_ratio(mu_s: float, mu_k: float, a_max: float, gravity: float = GRAVITY) -> float:
+    """The ratio f = F_n/(m_P g) where the formula of v_ave has its maximum.
+
+    It solves µ_s µ_k² f³ + µ_s µ_k f² + µ_k f + 1 = A², and grows as A^(2/3).
+    """
+    _friction(mu_s, mu_k)
+    peak = _largest(1.0, a_max, gravity) + 1.0
+    ratio, low, high = mu_s / mu_k, 0.0, peak - 1.0
+    # In x = µ_k f: (x + 1)(x² µ_s/µ_k + 1) = A² has one positive root, below A − 1 as µ_s ≥ µ_k.
+    while (middle := 0.5 * (low + high)) not in (low, high):
+        below = (middle + 1.0) / peak * ((ratio * middle * middle + 1.0) / peak) < 1.0
+        low, high = (middle, high) if below else (low, middle)
+    return middle / mu_k
+
+
+def optimal_force_ratio(mu_s: float, mu_k: float, a_max: float, gravity: float = GRAVITY) -> float:
+    """The ratio F_n/(m_P g) at which the part is transported upwards fastest.
+
+    The root of :func:`cubic_force_ratio`. Where µ_k is far below µ_s that root exceeds what a
+    sticking part allows; then the optimum is the least upper bound of the ratios allowed.
+    """
+    cubic = cubic_force_ratio(mu_s, mu_k, a_max, gravity)
+    return min(cubic, largest_force_ratio_sticking(mu_s, a_max, gravity))
+
+
+# What is admissible
+
+
+def admissible(
+    mu_s: float,
+    mu_k: float,
+    a_max: float,
+    f_n: float,
+    period: float,
+    direction: Direction = "up",
+    robust: bool = False,
+    gravity: float = GRAVITY,
+) -> Friction:
+    """The equivalent horizontal coefficients; BadInput where there is no such transport."""
+    _friction(mu_s, mu_k)
+    positive(a_max=a_max, f_n=f_n, period=period, gravity=gravity)
+    if f_n <= least_force_ratio(mu_s):
+        raise BadInput(
+            f"f_n = {f_n:g} is too small: a surface at rest holds the part only above "
+            f"F_n/(m_P g) = 1/mu_s = {1.0 / mu_s:.6g}."
+        )
+    least = least_peak_acceleration(mu_s, f_n, gravity)
+    if a_max <= least:
+        raise BadInput(
+            f"a_max = {a_max:g} m/s² is too small: at f_n = {f_n:g} only more than "
+            f"mu_s F_n/m_P + g = {least:.6g} m/s² shakes the part loose."
+        )
+    pair = horizontal_equivalent(mu_s, mu_k, f_n, direction, robust)
+    if min(pair) <= 0.0:
+        what = "robust transport" if direction == "up" else "transport downwards"
+        raise BadInput(
+            f"f_n = {f_n:g} is too small for {what}: a slipping part is slowed only above "
+            f"F_n/(m_P g) = 1/mu_k = {1.0 / mu_k:.6g}."
+        )
+    return pair
+
+
+def _largest(mu: float, a_max: float, gravity: float) -> float:
+    positive(mu=mu, a_max=a_max, gravity=gravity)
+    least = least_peak_acceleration_at_any_force(gravity)
+    if a_max <= least:
+        raise BadInput(
+            f"a_max = {a_max:g} m/s² is too small: transport upwards needs more than "
+            f"2 g = {least:g} m/s²."
+        )
+    return (a_max / gravity - 1.0) / mu
+
+
+def _friction(mu_s: float, mu_k: float) -> None:
+    positive(mu_s=mu_s, mu_k=mu_k)
+    if mu_k > mu_s:
+        raise BadInput(f"mu_k = {mu_k:g} must not exceed mu_s = {mu_s:g}.")
+
+
+def positive(**values: float) -> None:
+    """BadInput unless all these are above 0, and within what can be computed with."""
+    for name, value in values.items():
+        if not LEAST <= value <= GREATEST:
+            raise BadInput(f"{name} = {value:g} must be above 0, from {LEAST:g} to {GREATEST:g}.")
+
+
+def sign_of(direction: Direction) -> float:
+    """1 for up, −1 for down."""
+    if direction not in ("up", "down"):
+        raise BadInput(f'direction = "{direction}" must be "up" or "down".')
+    return 1.0 if direction == "up" else -1.0

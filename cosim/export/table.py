@@ -1,9 +1,0 @@
-"""The run's own CSV, for another folder: a header ``name [unit]``, ten digits a number."""
-
-from cosim.export.source import Exported, Run
-from cosim.waveforms import csv_content
-
-
-def content(run: Run) -> Exported:
-    """The same bytes as the run's ``waveforms.csv``."""
-    return Exported(csv_content(run.waveforms, run.units), "comma-separated, ten digits")

@@ -1,0 +1,63 @@
+"""The normal force of a grip that changes in time, as a file gives it."""
+
+from bisect import bisect_left, bisect_right
+from pathlib import Path
+
+from cosim.errors import BadInput
+from cosim.files.columns import read_timetable
+from cosim.scene import Scene
+from cosim.scene.messages import plain
+
+_SAME_TIME = 1e-12  # s; times closer than this are one, as in the recorder
+
+
+class NormalForce:
+    """Normal force of one surface, N, linear between its ``corners`` (s), where it may jump.
+
+    Before the first corner and after the last it keeps their value.
+    """
+
+    def __init__(self, times: list[float], forces: list[float]) -> None:
+        self.corners = times
+        self._forces = forces
+
+    def value(self, time: float) -> float:
+        """The force at ``time`` (s), N; at a jump the one after it."""
+        return self._between(bisect_right(self.corners, time + _SAME_TIME), time)
+
+    def value_before(self, time: float) -> float:
+        """Left limit of the force at ``time`` (s), N."""
+        return self._between(bisect_left(self.corners, time - _SAME_TIME), time)
+
+    def _between(self, after: int, time: float) -> float:
+        """The force on the straight that ends at the corner with the index ``after``."""
+        corners, forces = self.corners, self._forces
+        if after == 0 or after == len(corners):
+            return forces[max(0, after - 1)]
+        start, end = corners[after - 1], corners[after]
+        share = min(max((time - start) / (end - start), 0.0), 1.0)
+        return (1.0 - share) * forces[after - 1] + share * forces[after]
+
+
+def normal_force(scene: Scene) -> NormalForce | None:
+    """The force in ``friction.normal_force_file``, or None where it is constant.
+
+    The file is a CSV with a header that has ``time [s]`` and ``normal_force [N]``, or the same
+    without units. Raises BadInput.
+    """
+    file = scene.friction.normal_force_file
+    if file is None:
+        return None
+    table = read_timetable(Path(file), ("time [s]", "time"), ("normal_force [N]", "normal_force"))
+    name = plain(file)
+    if table is None:
+        raise BadInput(f"{name}: the header must have the columns time [s] and normal_force [N].")
+    times, forces = table.T.tolist()
+    low, high = 0.0, 1e9
+    for row, force in enumerate(forces, start=2):
+        if not low <= force <= high:
+            raise BadInput(
+                f"{name}, row {row}: the normal force of {force:g} N must be a number from "
+                f"{low:g} to {high:g} N."
+            )
+    return NormalForce(times, forces)

@@ -1,0 +1,272 @@
+"""Motion of a part that is pressed against a surface whose velocity is prescribed.
+
+The part of mass m is pressed with a constant normal force F_n; the surface's velocity is linear
+between knots (time, v), and a time given twice is a jump of it. Coulomb's law is set-valued: the
+part sticks while that needs no more friction than µ_s F_n, |a_surface + g| ≤ µ_s F_n/m, else it
+slips and the surface pulls it with µ_k F_n. The springed plate behind it may rub with µ_p F_n
+against the part's own velocity, set-valued at rest. Units: s, m, m/s, m/s².
+
+`exact` goes from event to event in closed form. `threshold` and `moreau` step through the time, for
+comparison; `published` is `threshold` as in the simulation of Yako, Nowak, Yuan and Salisbury.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.errors import BadInput
+from cosim.toolchain.libraries import part_library
+
+Array = npt.NDArray[np.float64]
+Real = npt.ArrayLike
+
+PUBLISHED_STEP = 1e-4  # s
+PUBLISHED_V_MIN = 1e-5  # m/s
+MOST_STEPS = 100_000_000
+
+
+@dataclass(frozen=True)
+class PartMotion:
+    """Height [m] and velocity [m/s] of the part at ``time`` [s].
+
+    ``sticking`` is the share of each interval between two times in which the part stuck, one value
+    fewer than times (0 where the interval is empty). ``stick_slip_events`` counts the changes
+    between sticking and slipping.
+    """
+
+    time: Array
+    z: Array
+    v: Array
+    sticking: Array
+    stick_slip_events: int
+
+    @property
+    def stick_fraction(self) -> float:
+        """The share of all the time in which the part stuck."""
+        span = self.time[-1] - self.time[0]
+        return float(self.sticking @ np.diff(self.time) / span) if span > 0 else 0.0
+
+
+def exact(
+    time: Real,
+    v_surface: Real,
+    *,
+    mu_s: float,
+    mu_k: float,
+    force_per_mass: float,
+    gravity: float = 9.81,
+    mu_plate: float = 0.0,
+    z0: float = 0.0,
+    v0: float | None = None,
+    periods: int = 1,
+    output: Real | None = None,
+) -> PartMotion:
+    """The exact motion at the knots, or at the times ``output``.
+
+    ``force_per_mass`` is F_n/m [m/s²]; ``gravity`` acts along the motion, downwards. The part
+    starts at ``z0`` with the velocity ``v0``, by default the surface's. The knots are run through
+    ``periods`` times, each following on the last.
+
+    A needed friction that exceeds µ_s F_n by no more than the rounding of the knots counts as
+    equal to it.
+    """
+    case = _Case(time, v_surface, mu_s, mu_k, force_per_mass, gravity, mu_plate, v0, periods)
+    at = None if output is None else case.times(output)
+    times = case.all_knots() if at is None else at
+    rows = np.empty((3, len(times)))
+    z, v, stuck = rows
+    events = part_library().part_exact(
+        *case.arguments(z0),
+        *(len(times), None if at is None else at.ctypes.data),
+        *(z.ctypes.data, v.ctypes.data, stuck.ctypes.data),
+    )
+    return PartMotion(times, z, v, _shares(times, stuck), events)
+
+
+def threshold(
+    time: Real,
+    v_surface: Real,
+    *,
+    mu_s: float,
+    mu_k: float,
+    force_per_mass: float,
+    step: float,
+    v_min: float,
+    gravity: float = 9.81,
+    mu_plate: float = 0.0,
+    z0: float = 0.0,
+    v0: float | None = None,
+    periods: int = 1,
+    output: Real | None = None,
+) -> PartMotion:
+    """Fixed steps of Bogacki and Shampine's third-order method, with a velocity threshold.
+
+    The part counts as sticking while it differs from the surface by less than ``v_min`` [m/s], and
+    the surface's acceleration is the difference quotient of its velocity since the last step.
+    Arguments as in `exact`; without ``output`` the times are the steps', with it heights and
+    velocities are interpolated linearly between them.
+    """
+    case = _Case(time, v_surface, mu_s, mu_k, force_per_mass, gravity, mu_plate, v0, periods)
+    if not v_min >= 0:
+        raise BadInput(f"The velocity threshold must not be negative, and is {v_min:g} m/s.")
+    steps = case.steps(step)
+    rows = np.empty((3, steps + 1))
+    z, v, stuck = rows
+    events = part_library().part_threshold(
+        *case.arguments(z0), step, v_min, steps, z.ctypes.data, v.ctypes.data, stuck.ctypes.data
+    )
+    return case.stepped(step, rows, events, output)
+
+
+def published(
+    time: Real,
+    v_surface: Real,
+    *,
+    mu_s: float,
+    mu_k: float,
+    force_per_mass: float,
+    gravity: float = 9.81,
+    mu_plate: float = 0.0,
+    z0: float = 0.0,
+    v0: float | None = None,
+    periods: int = 1,
+    output: Real | None = None,
+) -> PartMotion:
+    """The authors' scheme: `threshold` with a step of 0.1 ms and 10 µm/s.
+
+    It stands for their Simulink model: solver ode3, no zero crossings, the tracked velocity
+    interpolated and differentiated by a Derivative block.
+    """
+    return threshold(
+        time,
+        v_surface,
+        mu_s=mu_s,
+        mu_k=mu_k,
+        force_per_mass=force_per_mass,
+        step=PUBLISHED_STEP,
+        v_min=PUBLISHED_V_MIN,
+        gravity=gravity,
+        mu_plate=mu_plate,
+        z0=z0,
+        v0=v0,
+        periods=periods,
+        output=output,
+    )
+
+
+def moreau(
+    time: Real,
+    v_surface: Real,
+    *,
+    mu_s: float,
+    mu_k: float,
+    force_per_mass: float,
+    step: float,
+    gravity: float = 9.81,
+    mu_plate: float = 0.0,
+    z0: float = 0.0,
+    v0: float | None = None,
+    periods: int = 1,
+    output: Real | None = None,
+) -> PartMotion:
+    """Fixed steps that are implicit in the friction (Moreau); arguments as in `threshold`."""
+    case = _Case(time, v_surface, mu_s, mu_k, force_per_mass, gravity, mu_plate, v0, periods)
+    steps = case.steps(step)
+    rows = np.empty((3, steps + 1))
+    z, v, stuck = rows
+    events = part_library().part_moreau(
+        *case.arguments(z0), step, steps, z.ctypes.data, v.ctypes.data, stuck.ctypes.data
+    )
+    return case.stepped(step, rows, events, output)
+
+
+def friction_law(
+    mu_s: float, mu_k: float, force_per_mass: float, gravity: float, mu_plate: float
+) -> Array:
+    """The numbers of the law as the compiled routines take them, all in m/s²."""
+    force = force_per_mass
+    if not 0 <= mu_k <= mu_s:
+        raise BadInput(f"µ_k must lie between 0 and µ_s = {mu_s:g}, and is {mu_k:g}.")
+    if not (force >= 0 and mu_plate >= 0):
+        raise BadInput("The normal force and the friction of the plate must not be negative.")
+    law = np.array([mu_s * force, mu_k * force, mu_plate * force, gravity])
+    if not np.isfinite(law).all():
+        raise BadInput("Friction, normal force and gravity must be finite.")
+    return law
+
+
+class _Case:
+    """Arguments that have been checked, as the compiled routines take them."""
+
+    def __init__(
+        self,
+        time: Real,
+        v_surface: Real,
+        mu_s: float,
+        mu_k: float,
+        force_per_mass: float,
+        gravity: float,
+        mu_plate: float,
+        v0: float | None,
+        periods: int,
+    ) -> None:
+        self.time = np.ascontiguousarray(time, dtype=np.float64)
+        self.v = np.ascontiguousarray(v_surface, dtype=np.float64)
+        if self.time.ndim != 1 or self.time.shape != self.v.shape or len(self.time) < 2:
+            raise BadInput("The surface needs two knots or more, each a time and a velocity.")
+        if not (np.isfinite(self.time).all() and np.isfinite(self.v).all()):
+            raise BadInput("The surface's times and velocities must be finite.")
+        if (self.time[1:] < self.time[:-1]).any() or not self.time[-1] > self.time[0]:
+            raise BadInput("The times of the surface's knots must not decrease.")
+        if periods < 1:
+            raise BadInput(f"The knots are to be run through {periods} times, not once or more.")
+        self.law = friction_law(mu_s, mu_k, force_per_mass, gravity, mu_plate)
+        self.v0 = float(self.v[0] if v0 is None else v0)
+        self.periods = periods
+        self.period = float(self.time[-1] - self.time[0])
+        self.end = float(self.time[0]) + periods * self.period
+
+    def arguments(self, z0: float) -> tuple[int | float, ...]:
+        if not (np.isfinite(z0) and np.isfinite(self.v0)):
+            raise BadInput("The part's first height and velocity must be finite.")
+        surface = (len(self.time), self.time.ctypes.data, self.v.ctypes.data, self.periods)
+        return (*surface, self.law.ctypes.data, z0, self.v0)
+
+    def all_knots(self) -> Array:
+        if self.periods == 1:
+            return self.time
+        return (np.arange(self.periods)[:, None] * self.period + self.time).ravel()
+
+    def times(self, output: Real) -> Array:
+        at = np.ascontiguousarray(output, dtype=np.float64)
+        edge = 1e-9 * (self.end - self.time[0])
+        if at.ndim != 1 or len(at) == 0 or (at[1:] < at[:-1]).any() or np.isnan(at).any():
+            raise BadInput("The times of the output must be a list that does not decrease.")
+        if at[0] < self.time[0] - edge or at[-1] > self.end + edge:
+            raise BadInput(
+                f"The times of the output must lie between {self.time[0]:g} and {self.end:g} s."
+            )
+        return at
+
+    def steps(self, step: float) -> int:
+        """How many steps there are until the end, where the last whole one stops short of it."""
+        span = self.end - self.time[0]
+        if not step > 0 or span / step > MOST_STEPS:
+            raise BadInput(f"The step must be positive, and no less than {span / MOST_STEPS:g} s.")
+        return int(np.floor(span / step + 1e-6))
+
+    def stepped(self, step: float, rows: Array, events: int, output: Real | None) -> PartMotion:
+        z, v, stuck = rows
+        times = self.time[0] + np.arange(len(z)) * step
+        if output is not None:
+            at = self.times(output)
+            z, v, stuck = (np.interp(at, times, values) for values in rows)
+            times = at
+        return PartMotion(times, z, v, _shares(times, stuck), events)
+
+
+def _shares(times: Array, stuck: Array) -> Array:
+    lengths = np.diff(times)
+    shares = np.divide(np.diff(stuck), lengths, out=np.zeros_like(lengths), where=lengths > 0)
+    return np.clip(shares, 0.0, 1.0)

@@ -1,0 +1,97 @@
+"""``circuit.model = "auto"``: the cheapest circuit that a scene can do with.
+
+The rungs without ngspice run the whole scene; the behavioural amplifier, which they simplify, runs
+only the first part of it, beside the rung "limited". What separates "limited" from the amplifier is
+small and always there, so a part shows it; what separates "ideal" from "limited" shows in the whole
+runs. What the rungs differ in acts on the current: where a ten-thousandth more or less of it moves
+v_average much, the motion being chaotic or near another one, no simpler rung can be relied on.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from cosim.errors import BadInput
+from cosim.scene import Scene, changed
+
+TOP = "amplifier"
+
+PART = 0.25
+"""Share of the run that the amplifier is tried for; averages leave out its first half."""
+
+FEWEST_PERIODS = 4
+"""That the trial averages over."""
+
+TREMBLE = 1e-4
+"""Relative change of the coil's force that regular motion answers with no more than its like."""
+
+LEAST = 1e-4
+"""m/s: errors of v_average are relative to no less than this."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The rung to take, why, and the relative error of v_average found for each simpler one."""
+
+    model: str
+    why: str
+    errors: dict[str, float]
+
+
+def choose(scene: Scene) -> Choice:
+    """The cheapest rung of a scene whose v_average is within ``run.tolerance`` of the amplifier's.
+
+    Raises what :func:`cosim.simulation.simulate.simulate` does.
+    """
+    tolerance = scene.run.tolerance
+    try:
+        limited = _few_rows(changed(scene, {"circuit.model": "limited"}, "auto"))
+    except BadInput:  # too fast a coil
+        return Choice(TOP, "the rung limited cannot solve this coil", {})
+    own = _v_average(limited)
+    force = scene.coil.force_factor
+    near = [
+        changed(limited, {"coil.force_factor": force * (1.0 + change)}, "auto")
+        for change in (-TREMBLE, TREMBLE)
+    ]
+    moved = max(relative_error(_v_average(other), own) for other in near)
+    if moved > tolerance:
+        why = f"a ten-thousandth of the coil's force moves v_average by {moved:.2%}"
+        return Choice(TOP, why, {"limited": moved, "ideal": moved})
+    part = _part(limited)
+    expected = _v_average(changed(part, {"circuit.model": TOP}, "auto"))
+    errors = {"limited": max(moved, relative_error(_v_average(part), expected))}
+    ideal = _v_average(changed(limited, {"circuit.model": "ideal"}, "auto"))
+    errors["ideal"] = relative_error(ideal, own) + errors["limited"]
+    for model in ("ideal", "limited"):
+        if errors[model] <= tolerance:
+            return Choice(model, f"about {errors[model]:.2%} off the amplifier", errors)
+    why = f"limited is about {errors['limited']:.2%} off, ideal {errors['ideal']:.2%}"
+    return Choice(TOP, why, errors)
+
+
+def relative_error(value: float, reference: float) -> float:
+    """Of a mean velocity, m/s, relative to ``reference`` or LEAST."""
+    return abs(value - reference) / max(abs(reference), LEAST)
+
+
+def _few_rows(scene: Scene) -> Scene:
+    return changed(scene, {"run.output_step": scene.run.duration / 2.0}, "auto")
+
+
+def _part(scene: Scene) -> Scene:
+    """The first whole periods of a run."""
+    from cosim.studies.sweep.point import drive_period
+
+    period = drive_period(scene)
+    count = max(FEWEST_PERIODS, round(0.5 * PART * scene.run.duration / period))
+    if 2 * count * period >= scene.run.duration:
+        return scene
+    times = {"run.settle": count * period, "run.duration": 2 * count * period}
+    return changed(scene, times | {"run.output_step": count * period}, "auto")
+
+
+def _v_average(scene: Scene) -> float:
+    from cosim.simulation.simulate import simulate
+
+    summary: dict[str, Any] = simulate(scene).summary
+    return summary["v_average"]

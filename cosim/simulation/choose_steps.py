@@ -1,0 +1,132 @@
+"""``coupling.method = "auto"``: the cheapest method and steps that keep a scene's tolerance.
+
+The error of a run is the greatest over time of the part's height, in units of its range. Runs of
+the whole scene become finer until one differs from the next but one by no more than
+``coupling.tolerance``; that difference is its error, measured and not guessed. (The very next would
+not do: where both are limited alike, by their tolerance or by their longest step, they err alike.)
+Then macro steps are tried with the same steps of ngspice, and kept where they are clearly cheaper
+and meet the tolerance too.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from cosim.errors import SimulationFailed
+from cosim.scene import Scene
+from cosim.simulation.simulate import Result
+
+LEVELS = (
+    (1e-3, 1e-4),
+    (1e-5, 1e-4),
+    (1e-6, 3e-5),
+    (1e-7, 1e-5),
+    (1e-7, 3e-6),
+    (1e-8, 1e-6),
+    (1e-9, 3e-7),
+)
+"""circuit.reltol and circuit.max_step (s), from coarse to fine."""
+
+_APART = 2  # levels between a run and the one that judges it
+
+OTHERS: tuple[dict[str, Any], ...] = (
+    {"method": "mean-current", "macro_step": 1e-3},
+    {"method": "mean-current", "macro_step": 2e-4},
+    {"method": "companion", "macro_step": 2e-4},
+)
+"""Keys of ``[coupling]`` that are tried beside the default method."""
+
+CLEARLY = 0.8
+"""Share of the default method's run time below which another one counts as cheaper."""
+
+
+def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> Result:
+    """The cheapest run that meets ``coupling.tolerance``, with the scene as it was then run.
+
+    Its summary also has ``error_estimate`` and ``coupling_taken``, and as ``wall_time``
+    that of all runs, s. ``run`` runs a scene. Raises SimulationFailed where no level meets the
+    tolerance.
+    """
+    seconds = 0.0
+
+    def timed(*settings: Any) -> Result:
+        nonlocal seconds
+        result = run(_with(scene, *settings))
+        seconds += _cost(result)
+        return result
+
+    level, best, finer = _meeting(scene.coupling.tolerance, timed)
+    error = difference(best, finer)
+    usual = _cost(best)
+    for other in OTHERS:
+        try:
+            found = timed(level, other)
+        except SimulationFailed:
+            continue
+        off = difference(found, finer)
+        if off <= scene.coupling.tolerance and _cost(found) < min(CLEARLY * usual, _cost(best)):
+            best, error = found, off
+    circuit, coupling = best.scene.circuit, best.scene.coupling
+    taken: dict[str, Any] = {
+        "coupling.method": coupling.method,
+        "circuit.reltol": circuit.reltol,
+        "circuit.max_step": circuit.max_step,
+    }
+    if coupling.method != "step-locked":
+        taken["coupling.macro_step"] = coupling.macro_step
+    found = {"wall_time": seconds, "error_estimate": error, "coupling_taken": taken}
+    summary = best.summary | found
+    return Result(best.scene, best.waveforms, summary)
+
+
+def _meeting(
+    tolerance: float, run: Callable[..., Result]
+) -> tuple[tuple[float, float], Result, Result]:
+    """The first level that meets the tolerance, its result and that of the next but one."""
+    done: list[tuple[tuple[float, float], Result]] = []
+    reached, failure = float("inf"), None
+    for level in LEVELS:
+        try:
+            result = run(level, {"method": "step-locked"})
+        except SimulationFailed as error:
+            done.clear()
+            failure = error
+            continue
+        if len(done) >= _APART:
+            coarse = done[-_APART]
+            reached = difference(coarse[1], result)
+            if reached <= tolerance:
+                return *coarse, result
+        done.append((level, result))
+    if failure is not None and not np.isfinite(reached):
+        raise failure
+    raise SimulationFailed(
+        f"coupling.tolerance = {tolerance:g} is not met: the finest runs still differ by "
+        f"{reached:.2g}. Either it is too small, or the scene is chaotic, where no path can be "
+        "met; try a shorter run.duration or a larger tolerance."
+    )
+
+
+def difference(result: Result, truth: Result) -> float:
+    """Greatest over time of the part's height, in units of the range of ``truth``."""
+    path, true = result.waveforms["z_part"], truth.waveforms["z_part"]
+    off, span = float(np.abs(path - true).max()), float(np.ptp(true))
+    return off / span if span else (0.0 if off == 0.0 else np.inf)
+
+
+def _with(scene: Scene, level: tuple[float, float], coupling: dict[str, Any]) -> Scene:
+    reltol, max_step = level
+    return scene.model_copy(
+        update={
+            "circuit": scene.circuit.model_copy(update={"reltol": reltol, "max_step": max_step}),
+            "coupling": scene.coupling.model_copy(update=coupling),
+        }
+    )
+
+
+def _cost(result: Result) -> float:
+    """Run time, s."""
+    seconds = result.summary["wall_time"]
+    assert isinstance(seconds, float)
+    return seconds

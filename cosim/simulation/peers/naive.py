@@ -1,0 +1,112 @@
+"""A peer: PySpice's own callbacks and fmpy's own calls with lists, as their manuals show them.
+
+PySpice hands every value over as a Python object after each accepted step; the mechanics follow
+with the step's mean current, and the circuit sees the back-EMF of the last step held. It needs a
+process of its own, since a process has one ngspice and ours has other callbacks.
+"""
+
+from collections.abc import Callable, Sequence
+from time import process_time
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from fmpy.fmi3 import FMU3Slave
+from PySpice.Spice.NgSpice.Shared import NgSpiceShared
+
+from cosim.circuit.netlist import prepare
+from cosim.circuit.ngspice import library_name
+from cosim.mechanics.fmi import references
+from cosim.mechanics.package import MODEL, token, unpacked
+from cosim.mechanics.stickslip import parameters
+from cosim.scene import Scene
+from cosim.toolchain.isolation import isolated
+
+_FALL = 1e-9
+"""s; time of the sawtooth's fall, which ngspice's own source wants above 0."""
+
+
+def run(
+    scene: Scene, times: Sequence[float], rounds: int
+) -> tuple[list[float], npt.NDArray[np.float64]]:
+    """CPU seconds of each round, and the part's height (m) at ``times`` (s)."""
+    return isolated(_rounds, scene, lambda _: None, times=times, rounds=rounds)
+
+
+class Shared(NgSpiceShared):
+    """ngspice with the two callbacks that PySpice means to be replaced."""
+
+    def __init__(self) -> None:
+        self.LIBRARY_PATH = library_name()
+        known = references(3)
+        self.inputs = [known["current"]]
+        self.outputs = [known["back_emf"], known["z_part"]]
+        super().__init__(send_data=True)
+
+    def begin(self, fmu: FMU3Slave) -> None:
+        """At rest, at time 0."""
+        self.fmu = fmu
+        self.time = self.current = self.emf = 0.0
+        self.path: list[tuple[float, float]] = []
+
+    def get_vsrc_data(self, voltage: Any, time: float, node: str, ngspice_id: int) -> Literal[0]:
+        voltage[0] = self.emf
+        return 0
+
+    def send_data(
+        self, actual_vector_values: dict[str, complex], number_of_vectors: int, ngspice_id: int
+    ) -> Literal[0]:
+        time = actual_vector_values["time"].real
+        current = actual_vector_values["vemf#branch"].real
+        if time > self.time:
+            self.fmu.setFloat64(self.inputs, [0.5 * (current + self.current)])
+            self.fmu.doStep(self.time, time - self.time)
+            self.emf, height = self.fmu.getFloat64(self.outputs)
+            self.path.append((time, height))
+        self.time, self.current = time, current
+        return 0
+
+
+def _rounds(
+    scene: Scene, progress: Callable[[float], None], times: Sequence[float], rounds: int
+) -> tuple[list[float], npt.NDArray[np.float64]]:
+    shared, deck = Shared(), _deck(scene)
+    taken, found = [], np.empty(0)
+    for done in range(rounds):
+        began = process_time()
+        shared.begin(_instance(scene))
+        shared.load_circuit(deck)
+        shared.run()
+        shared.destroy()
+        shared.remove_circuit()
+        shared.fmu.freeInstance()
+        path = np.array(shared.path)
+        found = np.interp(times, path[:, 0], path[:, 1])
+        taken.append(process_time() - began)
+        progress(float(done + 1))
+    return taken, found
+
+
+def _instance(scene: Scene) -> FMU3Slave:
+    fmu = FMU3Slave(
+        guid=token(), unzipDirectory=str(unpacked(3)), modelIdentifier=MODEL, instanceName="peer"
+    )
+    known = references(3)
+    reals, integers = parameters(scene)
+    fmu.instantiate()
+    fmu.enterInitializationMode()
+    fmu.setFloat64([known[name] for name in reals], list(reals.values()))
+    fmu.setInt32([known[name] for name in integers], list(integers.values()))
+    fmu.exitInitializationMode()
+    return fmu
+
+
+def _deck(scene: Scene) -> str:
+    """The netlist with a sawtooth of ngspice's own."""
+    drive, (deck, _) = scene.drive, prepare(scene)
+    low, high = (drive.offset + half * drive.amplitude for half in (-0.5, 0.5))
+    rise = 1 / drive.frequency - 2 * _FALL
+    pulse = f"PULSE({low!r} {high!r} 0 {rise!r} {_FALL} {_FALL} {1 / drive.frequency!r})"
+    lines = deck.replace("vcommand v1 0 external", f"vcommand v1 0 {pulse}").splitlines()
+    # As with our own command, all is at rest before it begins.
+    return "\n".join(f"{line} uic" if line.startswith(".tran ") else line for line in lines)

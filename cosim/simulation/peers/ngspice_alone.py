@@ -1,0 +1,116 @@
+"""A peer: the whole machine as one netlist, as a user of ngspice alone would write it.
+
+Mechanics as capacitors and B sources, in mm and mm/s: friction made smooth by tanh, walls by
+Hunt-Crossley as in the FMU. The command comes from the same compiled source as in our own run, and
+the same compiled log takes what ngspice sends, so only the mechanics differ.
+"""
+
+from collections.abc import Sequence
+from time import process_time
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.circuit.netlist import prepare
+from cosim.coupling.loop.compiled import CompiledRecorder
+from cosim.coupling.loop.compiled_run import CompiledRun
+from cosim.drive.command import command
+from cosim.mechanics.stickslip import Mechanics
+from cosim.scene import Scene
+
+CREEP = 5e-7
+"""m/s; the slip velocity at which the smoothed friction is at 76 % of its value."""
+
+STRIBECK = 30 * CREEP
+"""m/s; over which it falls from the static to the kinetic coefficient. Narrower ones lower the
+break-away force, wider ones lose more to the friction in between."""
+
+_MOST_STEPS = 5_000_000
+
+_MECHANICS = """\
+Vemf c3 emf 0
+Bemf emf sense V={force_factor}*1e-3*(v(ram)-v(surface))
+Bslip slip 0 V=v(surface)-v(part)
+Bfriction friction 0 V={force}*tanh(v(slip)/{creep})*({mu_k}+{more}*exp(-(v(slip)/{stribeck})**2))
+Bwall wall 0 V={wall}
+Bdrive drive 0 V={force_factor}*i(Vemf)+v(wall)-{suspension}
+Bram 0 ram I=1e3*(v(drive)-{ram_mass}*{gravity})
+Bsurface 0 surface I=-1e3*(v(drive)+1e-3*({flexure_stiffness}*v(z)+{flexure_damping}*v(surface))\
++v(friction)+{surface_mass}*{gravity})
+Bpart 0 part I=1e3*(v(friction)-{part_mass}*{gravity})
+Bq 0 q I=v(ram)-v(surface)
+Bz 0 z I=v(surface)
+Bp 0 p I=v(part)
+Cram ram 0 {ram_mass} ic=0
+Csurface surface 0 {surface_mass} ic=0
+Cpart part 0 {part_mass} ic=0
+Cq q 0 1 ic={q}
+Cz z 0 1 ic={z}
+Cp p 0 1 ic={z}"""
+
+
+class Monolithic(CompiledRun):
+    """The run of such a netlist."""
+
+    def __init__(self, scene: Scene, recorder: CompiledRecorder) -> None:
+        super().__init__(scene, command(scene), recorder, np.zeros((_MOST_STEPS, 2)))
+
+    def _netlist(self) -> tuple[str, tuple[str, ...]]:
+        deck, _ = prepare(self._scene)
+        saved = ("i(vemf)", "v(p)")
+        lines = deck.splitlines()
+        place = next(k for k, line in enumerate(lines) if line.startswith("vemf "))
+        lines[place] = _mechanics(self._scene)
+        place = next(k for k, line in enumerate(lines) if line.startswith(".save "))
+        lines[place] = f".save {' '.join(saved)}"
+        place = next(k for k, line in enumerate(lines) if line.startswith(".tran "))
+        lines[place] += " uic"
+        # The trapezoidal rule is the better one for a mechanism.
+        return "\n".join(lines).replace("method=gear", "method=trap"), saved
+
+
+def run(scene: Scene, times: Sequence[float]) -> tuple[float, npt.NDArray[np.float64]]:
+    """CPU seconds, and the part's height (m) at ``times`` (s)."""
+    began = process_time()
+    mechanics = Mechanics(scene)
+    try:
+        circuit = Monolithic(scene, CompiledRecorder(scene, mechanics, lambda _: None))
+        circuit.run()
+    finally:
+        mechanics.close()
+    log = circuit.log()
+    path = np.interp(times, log["time"], 1e-3 * log["v(p)"])
+    return process_time() - began, path
+
+
+def _mechanics(scene: Scene) -> str:
+    table = scene.mechanics
+    total = table.ram_mass + table.surface_mass + table.part_mass
+    upper = f"uramp(v(q)-{1e3 * table.travel!r})"
+    lower = f"uramp(-v(q)-{1e3 * table.travel!r})"
+    rate = f"{table.contact_damping!r}*1e-3*(v(ram)-v(surface))"
+    stiffness = table.contact_stiffness * 1e-3**1.5
+    return _MECHANICS.format(
+        **table.model_dump(exclude={"contact"}),
+        force_factor=repr(scene.coil.force_factor),
+        force=repr(scene.friction.normal_force),
+        mu_k=repr(scene.friction.mu_k),
+        more=repr(scene.friction.mu_s - scene.friction.mu_k),
+        creep=repr(1e3 * CREEP),
+        stribeck=repr(1e3 * STRIBECK),
+        wall=f"{stiffness!r}*({lower}**1.5*uramp(1-{rate})-{upper}**1.5*uramp(1+{rate}))",
+        suspension=(
+            f"(1e-3*v(q)*({table.suspension_k1!r}+1e-3*v(q)*({table.suspension_k2!r}"
+            f"+1e-3*v(q)*{table.suspension_k3!r}))"
+            f"+{table.suspension_damping!r}*1e-3*(v(ram)-v(surface)))"
+        ),
+        q=repr(1e3 * _rest(scene)),
+        z=repr(-1e3 * total * table.gravity / table.flexure_stiffness),
+    )
+
+
+def _rest(scene: Scene) -> float:
+    """Where the ram hangs, relative to the surface, m."""
+    m = scene.mechanics
+    roots = np.roots([m.suspension_k3, m.suspension_k2, m.suspension_k1, m.ram_mass * m.gravity])
+    return float(min(roots[np.abs(roots.imag) < 1e-12].real, key=abs))

@@ -1,0 +1,134 @@
+"""The scenes of the studies, and the participants that can go back to run them with."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from cosim.coupling.participants.amplifier import Amplifier
+from cosim.coupling.participants.linear import LinearParticipant, driven_regulated_coil
+from cosim.coupling.participants.stickslip import FmuMechanics
+from cosim.drive.command import command
+from cosim.errors import BadInput
+from cosim.scene import Scene
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene: what differs from ``paper``, how long it is studied and how often sampled, s."""
+
+    name: str
+    title: str
+    overrides: tuple[str, ...]
+    duration: float
+    sampled: float = 2.5e-3
+    judged: tuple[str, ...] = ("z_part",)
+    """What is compared; near impacts velocities would tell of nothing but the impacts' times."""
+    netlist: bool = False
+    """Whether its reference has the leak of the netlist's pole, which tells at low bandwidth."""
+
+    @property
+    def smooth(self) -> bool:
+        """Whether nothing jumps, so that orders can be measured."""
+        return self.name.startswith("smooth")
+
+    def times(self) -> list[float]:
+        """When it is compared, s."""
+        count = round(self.duration / self.sampled)
+        return [self.duration * k / count for k in range(1, count + 1)]
+
+
+_SMOOTH = Case(
+    "smooth",
+    "smooth: sine, slow amplifier, no wall met, the part sticks",
+    (
+        "drive.waveform=sine",
+        "drive.frequency=40",
+        "drive.amplitude=1",
+        "drive.offset=0",
+        "circuit.gain_bandwidth=1e3",
+        "coil.force_factor=3",
+        "mechanics.travel=1e-2",
+        "friction.normal_force=5",
+    ),
+    0.02,
+    1e-3,
+    ("z_surface", "z_ram", "v_ram", "current"),
+)
+
+CASES = {
+    case.name: case
+    for case in (
+        _SMOOTH,
+        replace(_SMOOTH, name="smooth, netlist", netlist=True),
+        Case(
+            "stick-slip",
+            "stick-slip: no wall met, the part sticks and slips",
+            (
+                "drive.frequency=20",
+                "drive.amplitude=3",
+                "drive.offset=0",
+                "coil.force_factor=3",
+                "mechanics.travel=2e-2",
+                "mechanics.suspension_k1=4000",
+                "mechanics.suspension_k3=0",
+            ),
+            0.2,
+        ),
+        Case(
+            "impact",
+            "impact: rigid walls, the part sticks",
+            ("mechanics.contact=rigid", "friction.normal_force=20"),
+            0.2,
+        ),
+        Case("paper", "paper: compliant walls, stick and slip", (), 0.2),
+    )
+}
+
+
+def participants(scene: Scene) -> tuple[LinearParticipant | Amplifier, FmuMechanics]:
+    """The circuit and the mechanics of a scene, both at rest and able to go back.
+
+    Raises BadInput for other rungs than ``amplifier``.
+    """
+    circuit, coil, drive = scene.circuit, scene.coil, scene.drive
+    if circuit.model != "amplifier":
+        raise BadInput(
+            f'circuit.model = "{circuit.model}" cannot go back; the studies take "amplifier".'
+        )
+    mechanics = FmuMechanics(scene)
+    if drive.waveform == "sine" and drive.offset == 0.0:
+        # Without limits, and exact, where the command is no straight line.
+        side = driven_regulated_coil(
+            coil.resistance,
+            coil.inductance,
+            circuit.sense_resistance * coil.count,
+            circuit.gain_bandwidth,
+            10.0 ** (circuit.open_loop_gain / 20.0),
+            0.5 * drive.amplitude,
+            drive.frequency,
+        )
+        return side, mechanics
+    return Amplifier(scene, command(scene)), mechanics
+
+
+_OF_THE_REFERENCE = {
+    "drive": ("waveform", "frequency", "amplitude", "offset"),
+    "circuit": (
+        "supply",
+        "sense_resistance",
+        "gain_bandwidth",
+        "open_loop_gain",
+        "slew_rate",
+        "swing_loss_high",
+        "swing_loss_low",
+    ),
+    "coil": ("resistance", "inductance", "force_factor", "b1", "b2", "count"),
+    "friction": ("mu_s", "mu_k", "normal_force", "mu_plate"),
+}
+
+
+def reference_parameters(scene: Scene) -> dict[str, Any]:
+    """A scene's numbers by the names of the reference solution's parameters, SI."""
+    flat = scene.mechanics.model_dump(exclude={"contact", "actuator"})
+    for table, names in _OF_THE_REFERENCE.items():
+        flat |= getattr(scene, table).model_dump(include=set(names))
+    return flat

@@ -1,0 +1,112 @@
+"""Where a scene is chaotic: statistics over an ensemble in the place of single paths.
+
+A scene is chaotic where a change of the normal force by 1e-9 of itself moves the part's path by
+more than :data:`CHAOTIC` times as much. No method can follow such a path, whatever its steps. What
+can be compared is an ensemble: the same runs from normal forces a little apart, of which each
+method must give the same mean velocity, share of sticking and counts of events, within what the
+ensemble's own spread leaves open.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot, sqrt
+from pathlib import Path
+from statistics import mean, stdev
+
+import numpy as np
+
+from cosim.scene import load
+from cosim.simulation.simulate import Result, simulate
+from cosim.studies.study import Row, write
+
+CHAOTIC = 1e4
+"""Growth of a small difference from which on single paths are not compared."""
+NUDGE, APART = 1e-9, 1e-6
+"""Relative changes of the normal force: of the run that tells of chaos, and between the ensemble's
+members."""
+MEMBERS, DURATION, SETTLE = 12, 1.0, 0.5
+STATISTICS = ("v_average", "stick_fraction", "impacts", "stick_slip_events")
+SCENE = ("drive.pot_max=0.508", "drive.pot_frequency=0.5452", "drive.pot_offset=0.5565")
+"""What differs from ``paper``: three knobs of its signal generator."""
+METHODS = {
+    "step-locked, fine steps": ("circuit.reltol=1e-6", "circuit.max_step=2e-5"),
+    "step-locked (default)": (),
+    "Gauss-Seidel, 0.1 ms": ("coupling.method=gauss-seidel", "coupling.macro_step=1e-4"),
+    "mean current, 0.2 ms": ("coupling.method=mean-current", "coupling.macro_step=2e-4"),
+}
+"""What is compared with the first of them."""
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Values of each statistic, one a member."""
+
+    name: str
+    values: dict[str, list[float]]
+
+    def mean(self, statistic: str) -> tuple[float, float]:
+        """Mean and its standard error."""
+        found = self.values[statistic]
+        return mean(found), stdev(found) / sqrt(len(found))
+
+    def apart(self, other: "Ensemble", statistic: str) -> float:
+        """Distance of two means in units of the standard error of their difference."""
+        (a, ea), (b, eb) = self.mean(statistic), other.mean(statistic)
+        return abs(a - b) / (hypot(ea, eb) or 1.0)
+
+
+def solved(scene: Sequence[str], more: Sequence[str], change: float = 0.0) -> Result:
+    """A run of ``paper`` with overrides, its normal force greater by the share ``change``."""
+    force = load("paper", list(scene)).friction.normal_force * (1.0 + change)
+    short = [f"run.duration={DURATION!r}", f"run.settle={SETTLE!r}", "run.output_step=1e-3"]
+    return simulate(load("paper", [*scene, *short, f"friction.normal_force={force!r}", *more]))
+
+
+def growth(scene: Sequence[str], more: Sequence[str] = ()) -> float:
+    """How many times a small relative change of the normal force is found again in the path."""
+    path, nudged = (solved(scene, more, c).waveforms["z_part"] for c in (0.0, NUDGE))
+    return float(np.abs(nudged - path).max() / np.ptp(path)) / NUDGE
+
+
+def ensemble(name: str, scene: Sequence[str], more: Sequence[str], members: int) -> Ensemble:
+    """The statistics of runs with normal forces apart by :data:`APART`."""
+    found: dict[str, list[float]] = {name: [] for name in STATISTICS}
+    for k in range(members):
+        summary = solved(scene, more, APART * k).summary
+        for statistic in STATISTICS:
+            value = summary[statistic]
+            assert isinstance(value, int | float)
+            found[statistic].append(float(value))
+    return Ensemble(name, found)
+
+
+def run(out: Path) -> None:
+    """Write ``chaos`` as png, csv, md and json into ``out``."""
+    from cosim.studies.accuracy.chaos_figure import draw
+
+    grown = growth(SCENE)
+    ensembles = [ensemble(name, SCENE, more, MEMBERS) for name, more in METHODS.items()]
+    note = (
+        f"The scene paper with {', '.join(SCENE)}. A change of the normal force by {NUDGE:g} of "
+        f"itself moves the path by {grown:.1e} times as much: chaotic (from {CHAOTIC:g}), so "
+        f"statistics are compared and not paths. Means over {MEMBERS} runs of {DURATION:g} s whose "
+        f"normal forces are apart by {APART:g}, with their standard errors; apart: distance from "
+        "the first method's mean, in standard errors of the difference."
+    )
+    write(out, "chaos", "A chaotic scene", {"Ensembles": list(rows(ensembles))}, [note])
+    draw(ensembles, grown, out)
+
+
+def rows(ensembles: Sequence[Ensemble]) -> list[Row]:
+    """A row a method and statistic."""
+    return [
+        {
+            "method": one.name,
+            "statistic": statistic,
+            "mean": one.mean(statistic)[0],
+            "standard error": one.mean(statistic)[1],
+            "apart": one.apart(ensembles[0], statistic),
+        }
+        for statistic in STATISTICS
+        for one in ensembles
+    ]

@@ -1,0 +1,228 @@
+"""Laws of friction side by side, on a part that a vibrating surface holds: creep and cost.
+
+A part of the scene ``paper`` begins to slip down at 20 mm/s, comes to rest on the surface, which
+moves up and down at 40 Hz with 15 m/s², and is then held at six tenths of what static friction can
+carry. Each law is solved as its users do, by SciPy's LSODA. Creep is what a held part still slips:
+by set-valued Coulomb friction, nothing.
+
+``tanh``    F = µ(u) F_n tanh(u/v0), with µ falling from µ_s to µ_k over 30 v0
+``Karnopp`` within a band of velocity friction balances the load (Karnopp, "Computer simulation of
+            stick-slip friction", J. Dyn. Syst. Meas. Control 107 (1985) 100); a solver that chooses
+            its own steps cannot reset the velocity there, so what is left of it stays
+``LuGre``   a bristle of stiffness σ0 and damping σ1 (Canudas de Wit et al., "A new model for
+            control of systems with friction", IEEE Trans. Autom. Control 40 (1995) 419)
+"""
+
+from collections.abc import Callable, Iterator
+from math import cos, exp, pi, sqrt, tanh
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.drive.command import Command
+from cosim.mechanics.stickslip import SAMPLE_OUTPUTS, Mechanics
+from cosim.scene import Scene, load
+from cosim.simulation.peers.lsoda import Machine, U
+from cosim.simulation.peers.lsoda import run as run_machine
+from cosim.studies.accuracy.cases import CASES
+from cosim.studies.study import Row, write
+
+FREQUENCY, ACCELERATION, SLIP = 40.0, 15.0, 0.02
+"""Of the surface, Hz and m/s²; of the surface against the part at first, m/s."""
+SETTLED, DURATION = 0.5, 1.0
+_RTOL = 1e-8
+
+Law = Callable[[float, float, float], tuple[float, float]]
+"""Friction (N) and the bristle's rate (m/s), from slip velocity u, bristle z, and the load (N) that
+would keep the part on the surface."""
+
+
+LAWS = {
+    "tanh": (1e-2, 1e-3, 1e-4, 1e-5),
+    "Karnopp": (1e-2, 1e-3, 1e-4),
+    "LuGre": (1e4, 1e5, 1e6),
+}
+"""Laws with their widths: m/s, or N/m for the bristle's stiffness."""
+_HELD = LAWS | {"tanh": (1e-3, 1e-4, 1e-5, 1e-6), "Karnopp": (1e-3, 1e-4, 1e-5)}
+_IN_THE_MACHINE = ("tanh", "LuGre")
+COULOMB = "Coulomb with events"
+_RTOLS = (1e-4, 1e-5, 1e-6, 1e-7)
+_RTOL_OF_LAWS = 1e-6
+
+
+def run(out: Path) -> None:
+    """Write ``friction`` as png, csv, md and json into ``out``."""
+    from cosim.studies.accuracy.friction_figure import draw
+
+    notes = [
+        "A held part: a part of the scene paper slips down at 20 mm/s at first, comes to rest on a "
+        "surface that vibrates at 40 Hz with 15 m/s², and is then held at six tenths of what "
+        "static friction can carry. Creep is what it still slips. Smoothed laws are solved by "
+        "LSODA.",
+        "In the machine: the whole scene stick-slip as one ODE, solved by LSODA with each law in "
+        "the place of set-valued Coulomb friction, against the reference solution with that. So "
+        "this error is the law's and not the solver's, but for Coulomb with events. Karnopp's band "
+        "is left out there: LSODA comes to a stop at its edges.",
+    ]
+    held, moved = list(creep()), list(in_the_machine())
+    write(
+        out, "friction", "Laws of friction", {"A held part": held, "In the machine": moved}, notes
+    )
+    draw(held, moved, out)
+
+
+def law_of(name: str, width: float, scene: Scene) -> Law:
+    """A smoothed law with a scene's coefficients; ``width`` as in :data:`LAWS`."""
+    f, mu_s, mu_k = scene.friction.normal_force, scene.friction.mu_s, scene.friction.mu_k
+
+    def smooth(u: float, z: float, load: float) -> tuple[float, float]:
+        falling = (u / (30.0 * width)) ** 2
+        fallen = exp(-falling) if falling < 700.0 else 0.0
+        return f * tanh(u / width) * (mu_k + (mu_s - mu_k) * fallen), 0.0
+
+    def karnopp(u: float, z: float, load: float) -> tuple[float, float]:
+        if abs(u) < width:
+            return min(max(load, -mu_s * f), mu_s * f), 0.0
+        return (mu_k * f if u > 0.0 else -mu_k * f), 0.0
+
+    damping, stribeck = 2.0 * sqrt(width * scene.mechanics.part_mass), 1e-3
+
+    def lugre(u: float, z: float, load: float) -> tuple[float, float]:
+        falling = (u / stribeck) ** 2
+        bound = f * (mu_k + (mu_s - mu_k) * (exp(-falling) if falling < 700.0 else 0.0))
+        rate = u - width * abs(u) / bound * z
+        return width * z + damping * rate, rate
+
+    return {"tanh": smooth, "Karnopp": karnopp, "LuGre": lugre}[name]
+
+
+class _Smoothed(Machine):
+    """The whole machine with a law in the place of sticking and slipping; a bristle besides."""
+
+    scales = np.append(Machine.scales, 1e-6)
+
+    def __init__(self, scene: Scene, drive: Command, law: Law) -> None:
+        super().__init__(scene, drive)
+        self._law = law
+        self.slip = 1  # never held by a mode
+
+    def friction(self, y: Any, held: float) -> list[float]:
+        return list(self._law(y[U], y[-1], held))
+
+    def choose_friction(self, y: Any) -> None:
+        """There is nothing to choose."""
+
+    def events(self) -> list[Callable[[float, Any], float]]:
+        never, output = super().events()
+
+        def friction(t: float, y: Any) -> float:
+            return 1.0
+
+        vars(friction).update(vars(never))
+        return [friction, output]
+
+
+def in_the_machine() -> Iterator[Row]:
+    """Of each law: error of the part's path on the scene ``stick-slip`` over its range, CPU s."""
+    from cosim.studies.accuracy.accuracy import reference
+
+    case = CASES["stick-slip"]
+    scene = load("paper", [*case.overrides, f"run.duration={case.duration!r}"])
+    mechanics = Mechanics(scene)
+    try:
+        row = dict(zip(SAMPLE_OUTPUTS, mechanics.sample(), strict=False))
+    finally:
+        mechanics.close()
+    rest = (row["z_surface"], row["z_ram"])
+
+    def measured(rtol: float, make: Callable[[Scene, Command], Machine]) -> Row:
+        seconds, path = run_machine(scene, case.times(), rest, rtol, make)
+        error = reference(case.name).error(path[np.newaxis])
+        return {"tolerance": rtol, "error": error, "CPU time [s]": seconds}
+
+    for rtol in _RTOLS:
+        yield {"law": COULOMB, "width": "-"} | measured(rtol, Machine)
+    for name, widths in LAWS.items():
+        for width in widths if name in _IN_THE_MACHINE else ():
+            law = law_of(name, width, scene)
+            found = measured(_RTOL_OF_LAWS, lambda s, d, law=law: _Smoothed(s, d, law))
+            yield {"law": name, "width": _width(name, width)} | found
+
+
+def _width(name: str, width: float) -> str:
+    return f"{width:g} {'N/m' if name == 'LuGre' else 'm/s'}"
+
+
+def creep() -> Iterator[Row]:
+    """Of each law: creep (µm/s), error in where the part comes to rest (µm), evaluations."""
+    paper = load("paper")
+    m, g = paper.mechanics.part_mass, paper.mechanics.gravity
+
+    def acceleration(t: float) -> float:
+        return ACCELERATION * cos(2.0 * pi * FREQUENCY * t)
+
+    truth = _stops(acceleration, m, g, paper.friction.mu_k * paper.friction.normal_force)
+    yield {
+        "law": "Coulomb, exact",
+        "width": "-",
+        "creep [um/s]": 0.0,
+        "error of the stop [um]": 0.0,
+        "evaluations": "-",
+    }
+    for name, widths in _HELD.items():
+        for width in widths:
+            law = law_of(name, width, paper)
+            settled, end, evaluations = _solved(law, acceleration, m, g)
+            yield {
+                "law": name,
+                "width": _width(name, width),
+                "creep [um/s]": 1e6 * (end - settled) / (DURATION - SETTLED),
+                "error of the stop [um]": 1e6 * (settled - truth),
+                "evaluations": evaluations,
+            }
+
+
+def _stops(acceleration: Callable[[float], float], m: float, g: float, force: float) -> float:
+    """Slip (m) until a part with set-valued friction is at rest, in closed form but for its time.
+
+    With Ω the surface's angular frequency u = u0 + (A/Ω) sin Ωt - (force/m - g) t.
+    """
+    from scipy.optimize import brentq
+
+    omega, rate = 2.0 * pi * FREQUENCY, force / m - g
+
+    def u(t: float) -> float:
+        return SLIP + ACCELERATION / omega * np.sin(omega * t) - rate * t
+
+    # Friction is stronger than the load throughout the slip, so the first zero is its end.
+    t: Any = next(t for t in np.arange(1e-4, 0.1, 1e-5) if u(t) < 0.0)
+    stop: Any = brentq(u, t - 1e-5, t, xtol=1e-15)  # pyright: ignore[reportArgumentType]
+    return float(
+        SLIP * stop + ACCELERATION / omega**2 * (1.0 - cos(omega * stop)) - 0.5 * rate * stop**2
+    )
+
+
+def _solved(
+    law: Law, acceleration: Callable[[float], float], m: float, g: float
+) -> tuple[float, float, int]:
+    """Slip (m) once settled and at the end, and the number of evaluations."""
+    from scipy.integrate import solve_ivp
+
+    def rates(t: float, y: Any) -> list[float]:
+        _, u, z = y
+        load = m * (acceleration(t) + g)
+        force, rate = law(u, z, load)
+        return [u, acceleration(t) - force / m + g, rate]
+
+    found = solve_ivp(
+        rates,
+        (0.0, DURATION),
+        [0.0, SLIP, 0.0],
+        "LSODA",
+        t_eval=(SETTLED, DURATION),
+        rtol=_RTOL,
+        atol=(1e-12, 1e-12, 1e-14),
+        max_step=1e-3,
+    )
+    return float(found.y[0][0]), float(found.y[0][1]), int(found.nfev)

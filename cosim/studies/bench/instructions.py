@@ -1,0 +1,79 @@
+"""Instructions that the FMU executes, counted by callgrind: a number without any noise.
+
+The mechanics of the scene `paper` follow its command as a current, on a fixed grid of about the
+steps that ngspice takes.
+"""
+
+import re
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+
+from cosim.drive.command import command
+from cosim.errors import BadInput
+from cosim.mechanics.fmi import references
+from cosim.mechanics.package import MODEL, token, unpacked
+from cosim.mechanics.stickslip import parameters
+from cosim.scene import load
+from cosim.toolchain.compiler import COMPILE_FLAGS, compiler, execute
+
+PERIODS, STEPS_PER_PERIOD = 4, 1600
+
+
+def per_period() -> int | None:
+    """Instructions of the FMU per period of `paper`; None without valgrind or a compiler."""
+    valgrind = shutil.which("valgrind")
+    if valgrind is None:
+        return None
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        program, points = folder / "replay", folder / "points"
+        try:
+            source = str(Path(__file__).with_name("replay.c"))
+            execute([*compiler(), *COMPILE_FLAGS, source, "-o", str(program), "-ldl"], "the replay")
+        except BadInput:
+            return None
+        _write(points)
+        library = unpacked(3) / "binaries" / fmpy.platform_tuple
+        library /= MODEL + fmpy.sharedLibraryExtension
+        done = subprocess.run(
+            [
+                *(valgrind, "--tool=callgrind", "--callgrind-out-file=/dev/null"),
+                *("--collect-atstart=no", "--toggle-collect=replay"),
+                *(str(program), str(library), token(), str(points)),
+            ],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    found = re.search(r"Collected : (\d+)", done.stderr)
+    if done.returncode or not found or int(found[1]) == 0:
+        return None
+    return round(int(found[1]) / PERIODS)
+
+
+def compiler_version() -> str:
+    """The first line of what the C compiler says of itself."""
+    return execute([*compiler(), "--version"], "nothing").decode(errors="replace").split("\n")[0]
+
+
+def _write(path: Path) -> None:
+    scene = load("paper")
+    drive, known = command(scene), references(3)
+    reals, integers = parameters(scene)
+    h = 1 / (scene.drive.frequency * STEPS_PER_PERIOD)
+    starts = h * np.arange(PERIODS * STEPS_PER_PERIOD)
+    current = drive.values(starts) / scene.circuit.sense_resistance
+    slope = np.full(len(starts), (drive.value(2 * h) - drive.value(h)) / h)
+    slope /= scene.circuit.sense_resistance
+    names = (*reals, *integers, "current", "current_slope", "back_emf", "back_emf_slope")
+    head = [len(reals), len(integers), len(starts), *(known[name] for name in names)]
+    body = [*reals.values(), *integers.values()]
+    steps = np.column_stack([np.full(len(starts), h), current, slope])
+    path.write_bytes(
+        np.array(head, np.int64).tobytes() + np.array(body, float).tobytes() + steps.tobytes()
+    )

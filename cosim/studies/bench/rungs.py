@@ -1,0 +1,96 @@
+"""Simulated seconds per second of each rung, with its error; and how the cost grows."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import log
+from typing import Any
+
+import numpy as np
+
+from cosim.scene import Scene, load
+from cosim.scene.tables import CIRCUIT_KEYS
+from cosim.simulation.given_surface import force_per_mass
+from cosim.simulation.simulate import simulate
+from cosim.studies import paper as theory
+from cosim.studies.bench.sampling import spread, take_turns
+from cosim.studies.bench.truth import BRIEF_FULL, brief, error, heights
+
+_FINER = ("circuit.reltol=1e-6", "circuit.max_step=5e-6")
+"""What the schematic, of which there is no reference, is compared with itself at."""
+
+
+_LONG_PART = ("run.duration=100", "run.output_step=1e-2")
+"""So long, and so few rows, that neither the start nor the writing of rows is what is measured."""
+
+
+def real_time(rounds: int) -> dict[str, Any]:
+    """Spread of the simulated seconds per CPU second of whole runs; ``error`` of each.
+
+    The errors of ``amplifier``, ``ideal`` and ``limited`` are those of the part's path against the
+    reference (for ``limited`` that of the amplifier); ``full`` is compared with finer steps, and
+    the part alone with the closed form of its mean velocity.
+    """
+    cases: dict[str, tuple[Scene, Callable[[], float]]] = {
+        "full": (load("paper-full", BRIEF_FULL), _error_of_full),
+        "amplifier": (load("paper"), lambda: _error("amplifier", "amplifier")),
+        "ideal": (load("paper", ["circuit.model=ideal"]), lambda: _error("ideal", "ideal")),
+        "part": (load("optimal", _LONG_PART), _error_of_part),
+    }
+    if _has("limited"):
+        scene = load("paper", ["circuit.model=limited"])
+        cases["limited"] = (scene, lambda: _error("limited", "amplifier"))
+    calls = {name: partial(simulate, scene) for name, (scene, _) in cases.items()}
+    taken = take_turns(calls, rounds)
+    return {
+        name: {
+            **spread([scene.run.duration / seconds for seconds in taken[name]]),
+            "error": measured(),
+        }
+        for name, (scene, measured) in cases.items()
+    }
+
+
+def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
+    """Exponent with which the CPU time of `paper` grows with its duration, by least squares."""
+    scenes = {str(n): load("paper", [f"run.duration={n / 20}"]) for n in periods}
+    calls = {name: partial(simulate, scene) for name, scene in scenes.items()}
+    taken = take_turns(calls, rounds)
+    lengths = [log(n) for n in periods]
+    found = [
+        np.polyfit(lengths, [log(taken[str(n)][turn]) for n in periods], 1)[0]
+        for turn in range(rounds)
+    ]
+    return {**spread([float(value) for value in found]), "periods": list(periods)}
+
+
+def _has(model: str) -> bool:
+    return model in CIRCUIT_KEYS
+
+
+def _error(circuit: str, reference: str) -> float:
+    found = simulate(brief(f"circuit.model={circuit}"))
+    return error(heights(found.waveforms), reference)
+
+
+def _error_of_full() -> float:
+    path, finer = (
+        simulate(load("paper-full", [*BRIEF_FULL, *more])).waveforms["z_part"]
+        for more in ((), _FINER)
+    )
+    return float(np.abs(path - finer).max() / np.ptp(finer))
+
+
+def _error_of_part() -> float:
+    scene = load("optimal", _LONG_PART)
+    friction, drive, gravity = scene.friction, scene.drive, scene.mechanics.gravity
+    true = theory.average_velocity(
+        friction.mu_s,
+        friction.mu_k,
+        drive.acceleration_max,
+        force_per_mass(scene) / gravity,
+        1 / drive.frequency,
+        gravity=gravity,
+    )
+    found = simulate(scene).summary["v_average"]
+    assert isinstance(found, float)
+    return abs(found / true - 1)

@@ -1,0 +1,95 @@
+"""The ladder: what each rung of a circuit costs on a scene, and how far it is from the top."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+from cosim.errors import BadInput, SimulationFailed
+from cosim.scene import Scene, changed
+from cosim.simulation.choose_rung import relative_error
+from cosim.simulation.simulate import simulate
+from cosim.studies.sweep.point import periods_made_whole
+
+RUNGS = ("ideal", "limited", "amplifier", "full")
+"""Cheapest first. "full" has the data sheet's output stage and the firmware's staircase besides."""
+
+MOST, REPEATS = 3, {"full": 1}
+"""Runs of a rung, for the median of its cost, and of those that take long."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One circuit on one scene. ``cost`` are seconds of computing per simulated second: median,
+    least, most. Errors are of v_average, relative; ``fall`` is the surface's greatest downward
+    acceleration, m/s², None with rigid walls."""
+
+    model: str
+    cost: tuple[float, float, float]
+    v_average: float
+    fall: float | None
+    off_top: float
+    off_amplifier: float
+
+
+def runs_in_all() -> int:
+    """How many runs a ladder takes."""
+    return sum(REPEATS.get(model, MOST) for model in RUNGS)
+
+
+def ladder(scene: Scene, progress: Callable[[], None] = lambda: None) -> list[Rung]:
+    """Run a scene on each rung in turn, and again for the cost. Raises BadInput, SimulationFailed.
+
+    Averages are over whole periods; few rows are written, so that the cost is the rung's own.
+    """
+    runs = {model: _on(scene, model) for model in RUNGS}
+    spent: dict[str, list[float]] = {model: [] for model in RUNGS}
+    numbers: dict[str, dict[str, Any]] = {}
+    simulate(runs["limited"])  # loads and builds what the first run would wait for
+    for repeat in range(MOST):
+        for model in RUNGS:
+            if repeat >= REPEATS.get(model, MOST):
+                continue
+            began = time.perf_counter()
+            try:
+                numbers[model] = simulate(runs[model]).summary
+            except SimulationFailed as error:
+                raise SimulationFailed(f'With circuit.model = "{model}": {error}') from error
+            spent[model].append((time.perf_counter() - began) / runs[model].run.duration)
+            progress()
+    return [_rung(model, spent[model], numbers) for model in RUNGS]
+
+
+def cheapest(rungs: list[Rung], tolerance: float) -> Rung:
+    """The cheapest one whose v_average is within ``tolerance`` (relative) of the top's."""
+    return next(rung for rung in rungs if rung.off_top <= tolerance)
+
+
+def _on(scene: Scene, model: str) -> Scene:
+    if scene.circuit.model in ("none", "file"):
+        raise BadInput(
+            f'scene {scene.name}: circuit.model = "{scene.circuit.model}" is no rung of the '
+            f"ladder; it must be one of {', '.join(RUNGS)} or auto."
+        )
+    # The schematic's command is the firmware's staircase; the others follow the same one smoothed.
+    staircase = model == "full" and scene.drive.waveform == "sawtooth"
+    settings: dict[str, Any] = {"circuit.model": model, "drive.pwm_ripple": False}
+    if staircase and not scene.drive.reset_time:
+        settings["drive.quantised"] = True
+    there = changed(scene, settings, f"scene {scene.name}")
+    times = periods_made_whole(there)
+    return changed(there, times | {"run.output_step": times["run.duration"] / 2.0}, "ladder")
+
+
+def _rung(model: str, spent: list[float], numbers: dict[str, dict[str, Any]]) -> Rung:
+    v_average = numbers[model]["v_average"]
+    fall = numbers[model]["a_surface_min"]
+    return Rung(
+        model,
+        (median(spent), min(spent), max(spent)),
+        v_average,
+        None if fall is None else -fall,
+        relative_error(v_average, numbers["full"]["v_average"]),
+        relative_error(v_average, numbers["amplifier"]["v_average"]),
+    )

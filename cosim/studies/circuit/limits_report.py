@@ -1,0 +1,151 @@
+"""The limits in words, tables and a figure."""
+
+from collections.abc import Sequence
+from math import nan
+from pathlib import Path
+
+from cosim.files.atomic import whole
+from cosim.studies.circuit import limits_figure
+from cosim.studies.circuit.limits import LIMITS, TREMBLES, UNTOLD, Study, name_of
+from cosim.studies.study import Row
+from cosim.studies.study import write as write_tables
+
+MATTERED = 1.05
+"""Least factor by which the ideal current must be off for the circuit to be said to matter."""
+
+
+def write(folder: Path, studies: Sequence[Study]) -> str:
+    """Write limits.csv, .md, .json and .png into ``folder``; gives what is printed."""
+    said: list[str] = []
+    found: dict[str, Sequence[Row]] = {}
+    for study in studies:
+        name = name_of(study.scene)
+        found[f"Which limit binds: {name}"] = rows(study)
+        found[f"Two lifted together: {name}"] = pairs(study)
+        if study.turned:
+            found[f"Each limit turned: {name}"] = turned(study)
+        said.append(words(study))
+    write_tables(folder, "limits", "Which limit binds?", found, said)
+    with whole(folder / "limits.png") as temporary:
+        limits_figure.draw(studies, temporary)
+    printed: list[str] = []
+    for study, sentence in zip(studies, said, strict=True):
+        printed += [sentence, ""]
+        for row in rows(study):
+            name, verdict, v_average, change, *_ = row.values()
+            printed.append(f"  {name:<20}{verdict:<18}{v_average:+8.3f} mm/s ({change:+.3f})")
+        printed.append("")
+    printed.append(f"Written to {folder}: limits.csv, limits.md, limits.json")
+    return "\n".join([*printed, f"Figure: {folder / 'limits.png'}"])
+
+
+def rows(study: Study) -> list[Row]:
+    """The ranked table: which limit binds here."""
+    gap = study.ideal.v_average - study.own.v_average
+    found = []
+    for name in study.ranked():
+        without = study.without[name]
+        found.append(
+            {
+                "limit": name,
+                "verdict": study.verdict(name),
+                "v_average without it [mm/s]": without.v_average * 1e3,
+                "change [mm/s]": study.gain(name) * 1e3,
+                "change on the rung limited [mm/s]": study.reduced_gain.get(name, nan) * 1e3,
+                "of the way to the ideal current [%]": 100.0 * study.gain(name) / gap,
+                "peak downward acceleration without it [m/s2]": without.fall,
+                "output at a limit without it [% of the time]": without.saturated * 100.0,
+            }
+        )
+    return found
+
+
+def pairs(study: Study) -> list[Row]:
+    """Two limits lifted together, the pair that gains most first."""
+    ranked = sorted(
+        study.pairs, key=lambda pair: -abs(study.pairs[pair].v_average - study.own.v_average)
+    )
+    return [
+        {
+            "limits": " + ".join(pair),
+            "v_average without both [mm/s]": study.pairs[pair].v_average * 1e3,
+            "change [mm/s]": (study.pairs[pair].v_average - study.own.v_average) * 1e3,
+            "more than one by one [mm/s]": study.together(pair) * 1e3,
+        }
+        for pair in ranked
+    ]
+
+
+def turned(study: Study) -> list[Row]:
+    """Each limit turned, as numbers."""
+    return [
+        {
+            "limit": name,
+            "times its own": factor,
+            "v_average [mm/s]": motion.v_average * 1e3,
+            "peak downward acceleration [m/s2]": motion.fall,
+            "output at a limit [% of the time]": motion.saturated * 100.0,
+        }
+        for name, row in study.turned.items()
+        for factor, motion in sorted(row.items())
+    ]
+
+
+def words(study: Study) -> str:
+    """The answer in a few sentences."""
+    own, ideal = study.own.v_average, study.ideal.v_average
+    said = [
+        f"{name_of(study.scene)}: the circuit moves the part at {own * 1e3:+.3g} mm/s, an ideal "
+    ]
+    said[0] += f"current source at {ideal * 1e3:+.3g} mm/s{_ratio(own, ideal)}."
+    by_verdict = {verdict: _named(study, verdict) for verdict in ("binds", "acts a little")}
+    if by_verdict["binds"]:
+        said.append(f"What binds: {_listed(by_verdict['binds'])}.")
+    else:
+        said.append("No limit binds.")
+    if by_verdict["acts a little"]:
+        said.append(f"Little: {_listed(by_verdict['acts a little'])}.")
+    rest = [limit.name for limit in LIMITS if study.verdict(limit.name) == "does not matter"]
+    if rest:
+        said.append(f"The {_listed(rest)} {'do' if len(rest) > 1 else 'does'} not matter.")
+    untold = [name for name in study.ranked() if study.verdict(name) in UNTOLD]
+    if untold:
+        said.append(
+            f"Of the {_listed(untold)} nothing can be told: without it the part goes over to "
+            "another motion, or not, by how it started."
+        )
+    if study.all_gone is not None and not study.all_gone.failure:
+        said.append(f"Without any of them: {study.all_gone.v_average * 1e3:+.3g} mm/s.")
+    said.append(
+        f"The part slips where the surface falls away faster than {study.needed:.3g} m/s²; it "
+        f"reaches {study.contact.between_impacts:.3g} m/s² without its walls' help"
+        + (f" and {study.contact.at_all:.3g} m/s² with it." if study.contact.at_all else ".")
+    )
+    if study.unsteady > 0.01 * max(abs(own), abs(ideal)):
+        said.append(
+            f"v_average is unsteady here: {max(TREMBLES):g} more normal force or coil's force, "
+            f"relative, moves it by up to {study.unsteady * 1e3:.2g} mm/s."
+        )
+    return " ".join(said)
+
+
+def _ratio(own: float, ideal: float) -> str:
+    if own * ideal <= 0.0:
+        return ""
+    more = ideal / own
+    if 1.0 / MATTERED < more < MATTERED:
+        return f", {abs(more - 1.0):.1%} {'more' if more > 1.0 else 'less'}"
+    return f", {more:.3g} times as fast" if more > 1.0 else f", only {more:.2g} times as fast"
+
+
+def _named(study: Study, verdict: str) -> list[str]:
+    return [
+        f"{name} ({study.gain(name) * 1e3:+.3g} mm/s without it)"
+        for name in study.ranked()
+        if study.verdict(name) == verdict
+    ]
+
+
+def _listed(names: list[str]) -> str:
+    *rest, last = names
+    return f"{', '.join(rest)} and {last}" if rest else last

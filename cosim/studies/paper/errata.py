@@ -1,0 +1,233 @@
+"""The paper's misprints, each with a proof that is computed when it is asked for.
+
+The proofs do not use the closed forms of this package: they follow the part exactly from event to
+event (:mod:`cosim.studies.paper.exact`). In the paper's units: f = F_n/(m_P g), A = a_max/g, times
+in periods, velocities in g T; µ_s = 0.7 and µ_k = 0.6 as in its figures.
+"""
+
+import math
+import textwrap
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+from cosim.studies.paper.exact import Contact, Phase, closed_cycle, simulate
+
+MU_S, MU_K = Fraction(7, 10), Fraction(6, 10)
+SCENE_F, SCENE_A = Fraction(5), Fraction(10)  # the paper's figure 3
+
+WIDTH = 92  # of the text, in characters
+
+
+@dataclass(frozen=True)
+class Erratum:
+    """A misprint: what stands there, what should, and what a simulation says."""
+
+    where: str
+    printed: str
+    right: str
+    proof: str
+    numbers: dict[str, float]  # those of the proof
+    confirmed: bool  # the simulation agrees with ``right`` and not with ``printed``
+
+
+def errata() -> list[Erratum]:
+    """The misprints; computing the proofs takes about a second."""
+    return [
+        _first_phase(),
+        _interval(),
+        _force_limit(),
+        _sticking_limit(),
+        _force_guideline(),
+        _order_of_coefficients(),
+        _growth(),
+    ]
+
+
+def errata_text() -> str:
+    """The misprints for a reader."""
+    found = errata()
+    head = (
+        "Misprints in Yako, Nowak, Yuan, Salisbury, “Vertical Vibratory Transport of Grasped Parts "
+        "Using Impacts”, with proofs computed now, by exact event-driven simulation. "
+        "f = F_n/(m_P g), A = a_max/g; mu_s = 0.7, mu_k = 0.6."
+    )
+    blocks = [textwrap.fill(head, WIDTH)]
+    for number, item in enumerate(found, start=1):
+        rows = [f"{number}. {item.where}"]
+        verdict = "confirmed" if item.confirmed else "NOT CONFIRMED"
+        for name, words in (
+            ("printed", item.printed),
+            ("right", item.right),
+            ("proof", f"{item.proof} — {verdict}."),
+        ):
+            indent = " " * 12
+            rows.append(
+                textwrap.fill(f"   {name + ':':<9}{words}", WIDTH, subsequent_indent=indent)
+            )
+        blocks.append("\n".join(rows))
+    return "\n\n".join(blocks) + "\n"
+
+
+def _first_phase() -> Erratum:
+    f, peak = SCENE_F, SCENE_A
+    right = _optimal(f, peak)
+    printed: list[Phase] = [(right[0][0], MU_K * f - 1), *right[1:]]
+    gain = float(simulate(printed, _contact(f), 1).surface_gain[0])
+    moved, closed = _moved(right, f), float(simulate(right, _contact(f), 1).surface_gain[0])
+    return Erratum(
+        where="Acceleration of the optimal waveform's first phase, with T1 and T2 as printed",
+        printed="(µ_k F_n/m_P − g) on [0, T1]",
+        right="(µ_s F_n/m_P − g) on [0, T1]",
+        proof=f"at f = 5, A = 10 the printed waveform does not close: the surface's velocity gains "
+        f"{gain:.6f} g T a period; the right one gains {closed:.6f} g T, and the part moves at "
+        f"{moved:.10f} g T",
+        numbers={"printed_gain": gain, "right_gain": closed, "right_velocity": moved},
+        confirmed=abs(gain) > 0.1 and closed == 0.0 and moved > 0.3,
+    )
+
+
+def _interval() -> Erratum:
+    f, peak = SCENE_F, SCENE_A
+    first, slowed = MU_S * f - 1, MU_K * f + 1
+    best = _moved(_optimal(f, peak), f)
+    less_down = _moved(closed_cycle(first, slowed, peak / 2, peak), f)
+    less_up = _moved(closed_cycle(first, slowed, peak, peak / 2), f)
+    return Erratum(
+        where="The interval that the surface's acceleration is taken from",
+        printed="(its ends are misprinted)",
+        right="[−a_max, a_max]",
+        proof=f"at f = 5 the part moves at {best:.6f} g T with the cycle that reaches both ends "
+        f"of [−10 g, 10 g], at {less_down:.6f} g T within [−5 g, 10 g] and at {less_up:.6f} g T "
+        "within [−10 g, 5 g]: both ends are used",
+        numbers={"both": best, "less_down": less_down, "less_up": less_up},
+        confirmed=best > max(less_down, less_up) and min(less_down, less_up) > 0.0,
+    )
+
+
+def _force_limit() -> Erratum:
+    peak = SCENE_A
+    cap = (peak - 1) / MU_K
+    below, at = (_moved(_optimal(f, peak), f, _sliding(f)) for f in (cap - Fraction(1, 10), cap))
+    down = float(-MU_K * cap - 1)
+    return Erratum(
+        where="The condition at f_n,max",
+        printed="(its sign and interval are misprinted)",
+        right="−µ_k F_n/m_P − g = −a_max, on [T1, T2]",
+        proof=f"at A = 10 and f = {float(cap):g} a part that slides is slowed at {down:g} g, as "
+        f"the surface on [T1, T2]: it moves at {at:.6f} g T on average; at f = "
+        f"{float(cap) - 0.1:g}, at {below:.2e} g T",
+        numbers={"f": float(cap), "slowed": down, "at": at, "below": below},
+        confirmed=down == -10.0 and at == 0.0 and below > 0.0,
+    )
+
+
+def _sticking_limit() -> Erratum:
+    peak = SCENE_A
+    cap, printed = (peak - 1) / MU_S, (peak - 1) / MU_K
+    small = Fraction(1, 1000)
+    below, above = (_moved(_optimal(f, peak), f) for f in (cap - small, cap + small))
+    return Erratum(
+        where="The largest normal force at which a part that sticks is transported",
+        printed="f_n,max = (A − 1)/µ_k",
+        right="(A − 1)/µ_s; (A − 1)/µ_k holds only for a part that slides already",
+        proof=f"at A = 10 the part moves at {below:+.6f} g T at f = {float(cap - small):.3f}, but "
+        f"at {above:+.6f} g T at f = {float(cap + small):.3f}, far below {float(printed):g}: "
+        "there it sticks on [T1, T2] too, and slips when the surface rises at a_max",
+        numbers={"f": float(cap), "below": below, "above": above, "printed_f": float(printed)},
+        confirmed=below > 0.0 > above,
+    )
+
+
+def _force_guideline() -> Erratum:
+    peaks = (Fraction(10), Fraction(50))
+    best = [_best_f(peak) for peak in peaks]
+    right = [float(MU_S) * f for f in best]
+    printed = [f / float(MU_S) for f in best]
+    return Erratum(
+        where="The guideline for the normal force",
+        printed="4–16 times µ_s m_P g",
+        right="µ_s F_n = 4–16 times m_P g",
+        proof=f"the simulated transport is fastest at f = {best[0]:.4f} (A = 10) and {best[1]:.4f} "
+        f"(A = 50): µ_s F_n/(m_P g) = {right[0]:.2f} and {right[1]:.2f}, within 4…16, but "
+        f"F_n/(µ_s m_P g) = {printed[0]:.2f} and {printed[1]:.2f}, not",
+        numbers={"f_10": best[0], "f_50": best[1], "right_10": right[0], "right_50": right[1]},
+        confirmed=4 <= min(right) <= max(right) <= 16 < max(printed),
+    )
+
+
+def _order_of_coefficients() -> Erratum:
+    limit, peak = 2 / (MU_S - MU_K), Fraction(50)
+    below, above = (
+        float(simulate(_optimal(f, peak), _contact(f)).stuck[-1]) for f in (limit - 5, limit + 5)
+    )
+    return Erratum(
+        where="µ̃_s < µ̃_k in the mapping to horizontal transport",
+        printed="without a condition on the normal force",
+        right="only for f < 2/(µ_s − µ_k)",
+        proof=f"the part sticks for the share µ̃_k/(µ̃_s + µ̃_k) of the time, more than half only if "
+        f"µ̃_s < µ̃_k; simulated at A = 50: {below:.4f} at f = {float(limit) - 5:g}, {above:.4f} at "
+        f"f = {float(limit) + 5:g}; the limit is {float(limit):g}",
+        numbers={"limit": float(limit), "below": below, "above": above},
+        confirmed=below > 0.5 > above,
+    )
+
+
+def _growth() -> Erratum:
+    peaks = (Fraction(1000), Fraction(8000))
+    best = [_best_f(peak) for peak in peaks]
+    exponent = math.log(best[1] / best[0]) / math.log(8.0)
+    return Erratum(
+        where="How the optimal normal force grows with a_max",
+        printed="quadratically",
+        right="as a_max^(2/3): µ_s µ_k² f³ + µ_s µ_k f² + µ_k f + 1 = A²",
+        proof=f"the simulated transport is fastest at f = {best[0]:.3f} (A = 1000) and "
+        f"{best[1]:.3f} (A = 8000): an exponent of {exponent:.4f}",
+        numbers={"f_1000": best[0], "f_8000": best[1], "exponent": exponent},
+        confirmed=abs(exponent - 2 / 3) < 0.01,
+    )
+
+
+def _contact(f: Fraction) -> Contact:
+    return Contact.coulomb(MU_S, MU_K, f)
+
+
+def _sliding(f: Fraction) -> Contact:
+    """A part that, once it is not pushed up, offers no more than kinetic friction."""
+    contact = _contact(f)
+    return Contact(contact.down, contact.held_high, contact.up, contact.down)
+
+
+def _optimal(f: Fraction, peak: Fraction) -> list[Phase]:
+    return closed_cycle(MU_S * f - 1, MU_K * f + 1, peak)
+
+
+def _moved(phases: list[Phase], f: Fraction, contact: Contact | None = None) -> float:
+    """The part's simulated mean velocity, g T, in the third period."""
+    return float(simulate(phases, contact or _contact(f)).travelled[-1])
+
+
+def _best_f(peak: Fraction) -> float:
+    """The ratio at which the simulated transport is fastest, by golden section."""
+
+    def moved(f: float) -> float:
+        exact = Fraction(f).limit_denominator(10**8)
+        return _moved(_optimal(exact, peak), exact)
+
+    return _maximiser(moved, float(1 / MU_S), float((peak - 1) / MU_S))
+
+
+def _maximiser(function: Callable[[float], float], low: float, high: float) -> float:
+    share = (math.sqrt(5.0) - 1.0) / 2.0
+    inner = [high - share * (high - low), low + share * (high - low)]
+    values = [function(f) for f in inner]
+    while high - low > 1e-7 * high:
+        if values[0] > values[1]:
+            high, inner[1], values[1] = inner[1], inner[0], values[0]
+            inner[0] = high - share * (high - low)
+            values[0] = function(inner[0])
+        else:
+            low, inner[0], values[0] = inner[0], inner[1], values[1]
+            inner[1] = low + share * (high - low)
+            values[1] = function(inner[1])
+    return 0.5 * (low + high)

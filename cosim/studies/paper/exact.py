@@ -1,0 +1,106 @@
+"""A part on a vibrating surface, solved exactly: rational numbers, from event to event.
+
+Written for :mod:`cosim.studies.paper.errata` to judge printed formulas by, so it shares nothing
+with the closed forms. Accelerations are in g, times in periods, velocities in g T.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+Phase = tuple[Fraction, Fraction]  # length, the surface's acceleration
+
+
+@dataclass
+class Contact:
+    """Friction between part and surface: Coulomb's, with the weight; accelerations in g."""
+
+    held_low: Fraction  # the part sticks if the surface's acceleration is in this range
+    held_high: Fraction
+    up: Fraction  # the slipping part's acceleration where the surface is faster
+    down: Fraction  # and where it is slower
+
+    @classmethod
+    def coulomb(cls, mu_s: Fraction, mu_k: Fraction, f_n: Fraction) -> "Contact":
+        """Of the coefficients, and of F_n/(m_P g)."""
+        return cls(-mu_s * f_n - 1, mu_s * f_n - 1, mu_k * f_n - 1, -mu_k * f_n - 1)
+
+
+@dataclass
+class Run:
+    """What was reached, period by period."""
+
+    travelled: list[Fraction] = field(default_factory=list)  # by the part
+    stuck: list[Fraction] = field(default_factory=list)  # time
+    surface_gain: list[Fraction] = field(default_factory=list)  # of the surface's velocity
+
+
+def simulate(
+    phases: Sequence[Phase],
+    contact: Contact,
+    periods: int = 3,
+    lag: Fraction = Fraction(0),
+) -> Run:
+    """Follow the part over ``periods`` repetitions of ``phases``.
+
+    The surface starts with the velocity that brings it back after one period, the part with
+    ``lag`` less (0: it sticks).
+    """
+    surface = start_velocity(phases)
+    slip = lag  # surface minus part
+    run = Run()
+    for _ in range(periods):
+        travelled = stuck = Fraction(0)
+        before = surface
+        for length, acceleration in phases:
+            left = length
+            while left > 0:
+                part = _part_acceleration(slip, acceleration, contact)
+                step = _until_they_meet(slip, acceleration - part, left)
+                travelled += step * (surface - slip + part * step / 2)
+                stuck += step if slip == 0 and part == acceleration else 0
+                slip += (acceleration - part) * step
+                surface += acceleration * step
+                left -= step
+        run.travelled.append(travelled)
+        run.stuck.append(stuck)
+        run.surface_gain.append(surface - before)
+    return run
+
+
+def start_velocity(phases: Sequence[Phase]) -> Fraction:
+    """The surface's velocity at the period's start with which the period ends at its height."""
+    velocity = travelled = total = Fraction(0)
+    for length, acceleration in phases:
+        travelled += length * (velocity + acceleration * length / 2)
+        velocity += acceleration * length
+        total += length
+    return -travelled / total
+
+
+def closed_cycle(
+    first: Fraction, slowed: Fraction, fall: Fraction, rise: Fraction | None = None
+) -> list[Phase]:
+    """Three phases, at ``first``, −``fall`` and +``rise`` (= fall), that bring velocities back.
+
+    What the part gains at ``first`` while it sticks it loses at ``slowed`` in the rest of the
+    period.
+    """
+    rise = fall if rise is None else rise
+    stick = slowed / (first + slowed)
+    falling = (rise * (1 - stick) + first * stick) / (fall + rise)
+    return [(stick, first), (falling, -fall), (1 - stick - falling, rise)]
+
+
+def _part_acceleration(slip: Fraction, surface: Fraction, contact: Contact) -> Fraction:
+    if slip == 0 and contact.held_low <= surface <= contact.held_high:
+        return surface
+    faster = slip > 0 or (slip == 0 and surface > contact.held_high)
+    return contact.up if faster else contact.down
+
+
+def _until_they_meet(slip: Fraction, rate: Fraction, left: Fraction) -> Fraction:
+    """The time until the slip is 0, at most ``left``."""
+    if slip * rate >= 0:
+        return left
+    return min(left, -slip / rate)

@@ -1,0 +1,86 @@
+"""The points of a sweep on a Dask cluster (the extra ``dask``)."""
+
+import threading
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from typing import Any
+
+from cosim.errors import BadInput
+from cosim.scene import Scene
+from cosim.studies.sweep.point import Outcome, evaluate
+from cosim.studies.sweep.pool import Point
+
+PATIENCE = 15.0
+"""s in which the cluster must answer."""
+
+_IN_FLIGHT = 4
+"""Points at the cluster for each of its threads: enough to keep it busy, whatever the number."""
+
+_ALONE = threading.Lock()
+"""A process has one ngspice, and Dask may run several threads in it."""
+
+
+def run_on_cluster(
+    base: Scene, points: Iterable[Point], address: str, whole_periods: bool
+) -> Iterator[tuple[int, Outcome]]:
+    """The outcome of each point, in the order in which the cluster at ``address`` finishes them.
+
+    Its workers must have this version of cosim. Raises BadInput where there is no such cluster.
+    """
+    client = _client(address)
+    try:
+        threads = sum(client.nthreads().values())
+        if not threads:
+            raise BadInput(f"--dask {address}: this cluster has no workers.")
+        yield from _run(client, base, iter(points), _IN_FLIGHT * threads, whole_periods)
+    finally:
+        client.close()
+
+
+def _client(address: str) -> Any:
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise BadInput(
+            "--dask needs the package distributed: install cosim with its extra dask."
+        ) from error
+    try:
+        return Client(address, timeout=PATIENCE)
+    except (OSError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise BadInput(f"--dask {address}: no cluster answers there ({reason}).") from error
+
+
+def _run(
+    client: Any, base: Scene, points: Iterator[Point], in_flight: int, whole_periods: bool
+) -> Iterator[tuple[int, Outcome]]:
+    from distributed import as_completed
+
+    shared = client.scatter(base, broadcast=True)
+
+    def submit(point: Point) -> Any:
+        number, values = point
+        future = client.submit(_evaluate, shared, dict(values), whole_periods, pure=False)
+        numbers[future.key] = number
+        return future
+
+    numbers: dict[str, int] = {}
+    running = as_completed([submit(point) for point in islice(points, in_flight)])
+    for future in running:
+        number = numbers.pop(future.key)
+        failure = future.exception()
+        if failure is not None:
+            # Its worker died with it, again and again, or something else that no scene explains.
+            words = " ".join(str(failure).split())
+            outcome = Outcome({}, f"The cluster gave it up: {type(failure).__name__}: {words}")
+        else:
+            outcome = future.result()
+        following = next(points, None)
+        if following is not None:
+            running.add(submit(following))
+        yield number, outcome
+
+
+def _evaluate(base: Scene, values: dict[str, float], whole_periods: bool) -> Outcome:
+    with _ALONE:
+        return evaluate(base, values, whole_periods)

@@ -1,0 +1,175 @@
+"""Which settings a sweep visits: a grid of axes, or a sample of the ranges that they span."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, prod
+
+import numpy as np
+
+from cosim.errors import BadInput
+from cosim.scene import Key, keys
+from cosim.scene.messages import ended, plain, suggestion
+from cosim.studies.sweep.point import Number
+
+MOST_POINTS = 10_000_000
+
+FREQUENCIES = ("drive.frequency", "drive.pot_frequency")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A key and the values that it takes, SI; a sample spans them from least to greatest."""
+
+    key: Key
+    values: tuple[Number, ...]
+
+
+@dataclass(frozen=True)
+class Design:
+    """The points of a sweep, in order: of a grid the last axis runs fastest.
+
+    ``sample`` are the rows of a sample, one column an axis, or None for a grid.
+    """
+
+    axes: tuple[Axis, ...]
+    sample: tuple[tuple[Number, ...], ...] | None = None
+
+    def __len__(self) -> int:
+        return prod(self.shape)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each axis, or of points of a sample."""
+        if self.sample is not None:
+            return (len(self.sample),)
+        return tuple(len(axis.values) for axis in self.axes)
+
+    def point(self, index: int) -> dict[str, Number]:
+        """The settings of a point: ``table.key`` and value, SI."""
+        if self.sample is not None:
+            row = self.sample[index]
+        else:
+            places = np.unravel_index(index, self.shape)
+            row = tuple(axis.values[int(k)] for axis, k in zip(self.axes, places, strict=True))
+        return {axis.key.full: value for axis, value in zip(self.axes, row, strict=True)}
+
+    @property
+    def changes_frequency(self) -> bool:
+        """Whether the period differs from point to point."""
+        return any(axis.key.full in FREQUENCIES for axis in self.axes)
+
+
+def grid(over: Mapping[str, Sequence[Number]]) -> Design:
+    """Every combination of the values of each ``table.key``. Raises BadInput."""
+    axes = tuple(_axis(name, values) for name, values in over.items())
+    if not axes:
+        raise BadInput("--over: a sweep needs at least one key.")
+    if (count := prod(len(axis.values) for axis in axes)) > MOST_POINTS:
+        raise BadInput(f"--over: this grid has {count} points; it may have {MOST_POINTS}.")
+    return Design(axes)
+
+
+def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: bool) -> Design:
+    """``count`` settings spread over the ranges of the axes, the same for the same ``seed``.
+
+    A Latin hypercube (McKay, Beckman, Conover, Technometrics 21 (1979)): each axis, cut into
+    ``count`` equal parts, has a point in every part. With ``random`` each point is independent.
+    """
+    from scipy.stats import qmc
+
+    axes = grid(over).axes
+    if not 1 <= count <= MOST_POINTS:
+        raise BadInput(f"--samples {count}: must be a whole number from 1 to {MOST_POINTS}.")
+    for axis in axes:
+        if len(set(axis.values)) < 2:
+            raise BadInput(
+                f"--over {axis.key.full}: a sample needs a range, from one value to another."
+            )
+    generator = np.random.default_rng(seed)
+    unit = (
+        generator.random((count, len(axes)))
+        if random
+        else qmc.LatinHypercube(len(axes), rng=generator).random(count)
+    )
+    columns = []
+    for axis, column in zip(axes, unit.T, strict=True):
+        low, high = min(axis.values), max(axis.values)
+        if axis.key.kind is int:
+            columns.append([low + int(u * (high - low + 1)) for u in column])
+        else:
+            columns.append([float(low + u * (high - low)) for u in column])
+    return Design(axes, tuple(zip(*columns, strict=True)))
+
+
+def parse(options: Sequence[str]) -> dict[str, tuple[Number, ...]]:
+    """The axes that ``--over table.key=start:stop:n`` or ``table.key=a,b,c`` options give."""
+    axes: dict[str, tuple[Number, ...]] = {}
+    for text in options:
+        name, equals, right = (part.strip() for part in text.partition("="))
+        if not (equals and name and right):
+            raise BadInput(
+                f"--over {plain(text)}: must be table.key=start:stop:n or table.key=a,b,c."
+            )
+        if name in axes:
+            raise BadInput(f"--over {plain(name)}: this key is given twice.")
+        key = numeric_key(name, "--over")
+        axes[name] = _range(text, right, key) if ":" in right else _list(text, right, key)
+    return axes
+
+
+def numeric_key(name: str, option: str) -> Key:
+    """The key with this full name. Raises BadInput for one that is unknown or no number."""
+    numeric = [key for key in keys() if key.kind in (int, float) and not key.choices]
+    found = next((key for key in numeric if key.full == name), None)
+    if found is not None:
+        return found
+    if any(key.full == name for key in keys()):
+        raise BadInput(f"{option} {plain(name)}: this key is not a number.")
+    bare = [key.full for key in numeric if key.name == name]
+    hint = f"; did you mean {bare[0]}?" if bare else suggestion(name, [k.full for k in numeric])
+    raise BadInput(ended(f"{option} {plain(name)}: there is no such key{hint}"))
+
+
+def _axis(name: str, values: Sequence[Number]) -> Axis:
+    key = numeric_key(name, "--over")
+    if len(values) == 0:
+        raise BadInput(f"--over {name}: has no value.")
+    if len(set(values)) < len(values):
+        raise BadInput(f"--over {name}: a value stands there twice.")
+    for value in values:
+        assert key.low is not None and key.high is not None
+        if not (isfinite(value) and key.low <= value <= key.high):
+            raise BadInput(f"--over {name}: {value:g} must be {key.allowed}.")
+        if key.kind is int and value != int(value):
+            raise BadInput(f"--over {name}: {value:g} must be {key.allowed}.")
+    kind = int if key.kind is int else float
+    return Axis(key, tuple(kind(value) for value in values))
+
+
+def _range(text: str, right: str, key: Key) -> tuple[Number, ...]:
+    parts = right.split(":")
+    if len(parts) != 3 or not parts[2].strip().isdecimal() or not 2 <= int(parts[2]) <= MOST_POINTS:
+        raise BadInput(
+            f"--over {plain(text)}: must be {key.full}=start:stop:n with n a whole number from 2."
+        )
+    start, stop = _number(text, parts[0]), _number(text, parts[1])
+    if key.kind is int:
+        spread = [
+            round(start + (stop - start) * k / (int(parts[2]) - 1)) for k in range(int(parts[2]))
+        ]
+        return tuple(dict.fromkeys(spread))
+    return tuple(float(value) for value in np.linspace(start, stop, int(parts[2])))
+
+
+def _list(text: str, right: str, key: Key) -> tuple[Number, ...]:
+    return tuple(_number(text, part) for part in right.split(","))
+
+
+def _number(text: str, part: str) -> float:
+    try:
+        value = float(part)
+    except ValueError:
+        value = float("nan")
+    if not isfinite(value):
+        raise BadInput(f"--over {plain(text)}: “{plain(part.strip())}” is not a number.")
+    return value

@@ -1,0 +1,301 @@
+"""Pictures of a sweep: maps over two keys, curves over one, and clouds of a sample."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator
+
+from cosim.scene import firmware
+from cosim.studies.sweep.dataset import FAILURE, POINT
+
+Array = npt.NDArray[np.float64]
+
+STAYS = 0.05e-3
+"""m/s; a part that moves more slowly than this counts as not transported."""
+
+MOST_SLICES = 4
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a panel shows: a number of the summary, in the units of the bench."""
+
+    name: str
+    title: str
+    unit: str
+    scale: float
+
+
+V_AVERAGE = Quantity("v_average", "Mean velocity of the part", "mm/s", 1e3)
+OTHERS = (
+    Quantity("stick_fraction", "Sticking, share of the time", "%", 100.0),
+    Quantity("a_camera_max", "Peak acceleration, read by a camera", "m/s²", 1.0),
+    Quantity("a_surface_max", "Peak acceleration, true", "m/s²", 1.0),
+)
+
+
+def draw(data: xr.Dataset, title: str, path: Path) -> None:
+    """Draw the dataset of a sweep into ``path`` (a PNG)."""
+    figure = Figure(figsize=(13.0, 8.4), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    if POINT in data.dims:
+        names = [str(name) for name in data.coords]
+        _clouds(figure, data, names)
+    else:
+        names = [str(name) for name in data.dims]
+        varied = sorted((n for n in names if data.sizes[n] > 1), key=names.index) or names[:1]
+        if len(varied) == 1:
+            _curves(figure, data.squeeze([n for n in names if n != varied[0]]), varied[0])
+        else:
+            _maps(figure, data, varied)
+    failed = int(np.sum(data[FAILURE].values != ""))
+    words = f"{data[FAILURE].size} points" + (f", {failed} failed (×)" if failed else "")
+    if len(data.squeeze().dims) > 1:
+        words += f"; hatched: the part stays (below {STAYS * 1e3:g} mm/s)"
+    figure.suptitle(f"{title}: {words}", fontsize=12)
+    figure.savefig(path, format="png")
+
+
+def _row(rows: Any, number: int, count: int) -> list[Axes]:
+    """``count`` axes beside each other in one of the subfigures."""
+    return list(np.atleast_1d(rows[number].subplots(1, count)))
+
+
+def _values(data: xr.Dataset, quantity: Quantity) -> xr.DataArray:
+    if quantity.name not in data:
+        return xr.full_like(data[FAILURE], np.nan, dtype=np.float64)
+    return data[quantity.name] * quantity.scale
+
+
+def _curves(figure: Figure, data: xr.Dataset, name: str) -> None:
+    axes = figure.subplots(2, 2)
+    x = data[name].values
+    for axis, quantity in zip(axes.flat, (V_AVERAGE, *OTHERS), strict=True):
+        axis.plot(x, _values(data, quantity).values, color="#1f6fb2", marker=".", lw=1.3)
+        _mark_failures(axis, x, np.full(len(x), 0.02), data, axis.get_xaxis_transform())
+        _x_axis(axis, data, name)
+        axis.set(ylabel=f"[{quantity.unit}]")
+        axis.set_title(quantity.title, loc="left", fontsize=10.5)
+        axis.grid(alpha=0.25)
+        _tell_absent(axis, _values(data, quantity).values)
+    axes[0, 0].axhline(0.0, color="0.3", lw=0.8)
+
+
+def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
+    """Two keys span the maps; a third gives slices; any further one stands at the best point."""
+    best = _best(data)
+    *fixed, third, y, x = ["", *names] if len(names) == 2 else names
+    said = []
+    for name in [str(dim) for dim in data.dims if dim not in (x, y, third)]:
+        data = data.isel({name: int(best[name])})
+        if name in fixed:
+            said.append(_setting(data, name))
+    slices = [data]
+    here = data
+    if third:
+        count = min(MOST_SLICES, data.sizes[third])
+        places = np.unique(np.linspace(0, data.sizes[third] - 1, count).round().astype(int))
+        slices = [data.isel({third: int(k)}) for k in places]
+        here = data.isel({third: int(best[third])})
+        rows = figure.subfigures(2, 1)
+        top, others = _row(rows, 0, len(slices)), _row(rows, 1, len(OTHERS))
+        panels = list(zip(top, slices, strict=True))
+    else:
+        first, *others = figure.subplots(2, 2).flat
+        panels = [(first, data)]
+    norm = _two_sided(np.concatenate([_values(part, V_AVERAGE).values.ravel() for part in slices]))
+    for k, (axis, part) in enumerate(panels):
+        head = f"at {_setting(part, third)}" if third else V_AVERAGE.title
+        shown = _map(axis, part, V_AVERAGE, x, y, "RdBu", norm)
+        _boundary(axis, part, x, y)
+        axis.set_title(head, loc="left", fontsize=10.5)
+        if k == len(panels) - 1:
+            label = f"{V_AVERAGE.title} [mm/s]" if third else "[mm/s]"
+            axis.figure.colorbar(shown, ax=[p[0] for p in panels], label=label)
+    for axis, quantity in zip(others, OTHERS, strict=True):
+        values = _values(here, quantity).values
+        shown = _map(axis, here, quantity, x, y, "viridis", _one_sided(values, quantity))
+        axis.set_title(quantity.title, loc="left", fontsize=10.5)
+        if not _tell_absent(axis, values):
+            axis.figure.colorbar(shown, ax=axis, label=f"[{quantity.unit}]")
+    said += [_setting(here, third)] if third else []
+    if said:
+        others[0].set_title(f"{OTHERS[0].title}\nat {', '.join(said)}", loc="left", fontsize=10.5)
+
+
+def _clouds(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
+    """The velocity over each key, and the four quantities over the first two keys."""
+    rows = figure.subfigures(2, 1)
+    v = _values(data, V_AVERAGE).values
+    norm = _two_sided(v)
+    top = _row(rows, 0, min(len(names), MOST_SLICES))
+    for axis, name in zip(top, names, strict=False):
+        x = data[name].values
+        axis.scatter(x, v, c=v, cmap="RdBu", norm=norm, s=14, edgecolors="0.4", linewidths=0.3)
+        _mark_failures(axis, x, np.full(len(x), 0.02), data, axis.get_xaxis_transform())
+        _x_axis(axis, data, name)
+        axis.axhline(0.0, color="0.3", lw=0.8)
+        axis.grid(alpha=0.25)
+    top[0].set_ylabel(f"{V_AVERAGE.title} [mm/s]")
+    if len(names) < 2:
+        return
+    x, y = data[names[0]].values, data[names[1]].values
+    for axis, quantity in zip(_row(rows, 1, 3), (V_AVERAGE, *OTHERS[1:]), strict=True):
+        values = _values(data, quantity).values
+        signed = quantity is V_AVERAGE
+        shown = axis.scatter(
+            x,
+            y,
+            c=values,
+            cmap="RdBu" if signed else "viridis",
+            norm=norm if signed else _one_sided(values, quantity),
+            s=22,
+            edgecolors="0.4",
+            linewidths=0.3,
+        )
+        _mark_failures(axis, x, y, data)
+        _x_axis(axis, data, names[0])
+        _turned_ticks(names[1], axis.get_ylim, axis.set_ylim, axis.set_yticks)
+        axis.set_ylabel(_label(data, names[1]))
+        axis.set_title(quantity.title, loc="left", fontsize=10.5)
+        if not _tell_absent(axis, values):
+            axis.figure.colorbar(shown, ax=axis, label=f"[{quantity.unit}]")
+
+
+def _map(
+    axis: Axes, data: xr.Dataset, quantity: Quantity, x: str, y: str, colors: str, norm: Normalize
+) -> Any:
+    values = _values(data, quantity).transpose(y, x).values
+    xs, ys = data[x].values, data[y].values
+    shown = axis.pcolormesh(xs, ys, values, cmap=colors, norm=norm, shading="nearest")
+    if min(values.shape) > 1 and np.isfinite(values).sum() > 3:
+        ordered = np.argsort(xs), np.argsort(ys)
+        levels = _levels(norm)
+        if levels:
+            lines = axis.contour(
+                xs[ordered[0]],
+                ys[ordered[1]],
+                values[np.ix_(ordered[1], ordered[0])],
+                levels=levels,
+                colors="0.15",
+                linewidths=0.7,
+            )
+            axis.clabel(lines, fontsize=7.5, fmt=lambda level: f"{level:.4g}")
+    failed = data[FAILURE].transpose(y, x).values != ""
+    rows, columns = np.nonzero(failed)
+    axis.plot(xs[columns], ys[rows], "x", color="#d1495b", ms=6)
+    _x_axis(axis, data, x)
+    _turned_ticks(y, axis.get_ylim, axis.set_ylim, axis.set_yticks)
+    axis.set_ylabel(_label(data, y))
+    return shown
+
+
+def _boundary(axis: Axes, data: xr.Dataset, x: str, y: str) -> None:
+    """Where transport ends: hatched where the part stays."""
+    values = np.abs(data["v_average"].transpose(y, x).values) if "v_average" in data else None
+    if values is None or min(values.shape) < 2 or not (values < STAYS).any():
+        return
+    xs, ys = np.sort(data[x].values), np.sort(data[y].values)
+    ordered = values[np.ix_(np.argsort(data[y].values), np.argsort(data[x].values))]
+    axis.contourf(xs, ys, ordered, levels=[0.0, STAYS], colors="none", hatches=["////"])
+    axis.contour(xs, ys, ordered, levels=[STAYS], colors="k", linewidths=1.4)
+
+
+def _mark_failures(axis: Axes, x: Array, y: Array, data: xr.Dataset, transform: Any = None) -> None:
+    failed = data[FAILURE].values != ""
+    if failed.any():
+        options = {} if transform is None else {"transform": transform}
+        axis.plot(x[failed], y[failed], "x", color="#d1495b", ms=6, **options)
+
+
+def _two_sided(values: Array) -> Normalize:
+    """Red below zero, blue above, white at zero."""
+    known = values[np.isfinite(values)]
+    low, high = known.min(initial=0.0), known.max(initial=0.0)
+    least = 0.02 * (high - low) or 1.0
+    return TwoSlopeNorm(0.0, min(low, -least), max(high, least))
+
+
+def _one_sided(values: Array, quantity: Quantity) -> Normalize:
+    known = values[np.isfinite(values)]
+    if quantity.unit == "%":
+        return Normalize(0.0, 100.0)
+    low, high = (known.min(), known.max()) if known.size else (1.0, 2.0)
+    if low > 0 and high > 20 * low:
+        return LogNorm(low, high)
+    return Normalize(low, high if high > low else low + 1.0)
+
+
+def _levels(norm: Normalize) -> list[float]:
+    low, high = float(norm.vmin or 0.0), float(norm.vmax or 1.0)
+    ticks = (
+        LogLocator(10.0, (1.0, 3.0)) if isinstance(norm, LogNorm) else MaxNLocator(7)
+    ).tick_values(low, high)
+    # Zero is a plateau where the part stays; its edge is drawn as such.
+    return [float(level) for level in ticks if low < level < high and level != 0.0]
+
+
+def _tell_absent(axis: Axes, values: Array) -> bool:
+    """Say so where there is nothing to show, as of a peak that rigid walls do not have."""
+    absent = not np.isfinite(values).any()
+    if absent:
+        axis.text(0.5, 0.5, "there is none here", transform=axis.transAxes, ha="center")
+    return absent
+
+
+def _best(data: xr.Dataset) -> dict[str, int]:
+    """Place of the greatest mean velocity along each dimension."""
+    values = _values(data, V_AVERAGE).values
+    place = np.nanargmax(values) if np.isfinite(values).any() else 0
+    return dict(
+        zip(map(str, data.dims), map(int, np.unravel_index(place, values.shape)), strict=True)
+    )
+
+
+def _label(data: xr.Dataset, name: str) -> str:
+    unit = data[name].attrs.get("units", "1")
+    return name if unit == "1" else f"{name} [{unit}]"
+
+
+def _setting(data: xr.Dataset, name: str) -> str:
+    value = float(data[name])
+    unit = data[name].attrs.get("units", "1")
+    turned = _turned(name, value)
+    return (
+        f"{name} = {value:.4g}" + ("" if unit == "1" else f" {unit}") + turned.replace("\n", ", ")
+    )
+
+
+def _turned(name: str, value: float) -> str:
+    """What a knob at ``value`` stands for, below it."""
+    if name == "drive.pot_frequency":
+        return f"\n{firmware.knob_frequency(value):.3g} Hz"
+    if name == "drive.pot_max":
+        return f"\n{firmware.knob_amplitude(value):.3g} V"
+    return ""
+
+
+def _x_axis(axis: Axes, data: xr.Dataset, name: str) -> None:
+    axis.set_xlabel(_label(data, name))
+    axis.xaxis.set_major_locator(MaxNLocator(6))
+    _turned_ticks(name, axis.get_xlim, axis.set_xlim, axis.set_xticks)
+
+
+def _turned_ticks(name: str, limits: Any, set_limits: Any, set_ticks: Any) -> None:
+    """Write below the numbers of a knob what they stand for."""
+    if not _turned(name, 0.5):
+        return
+    low, high = limits()
+    shown = [tick for tick in np.linspace(0.0, 1.0, 6) if low <= tick <= high]
+    if len(shown) > 1:
+        set_ticks(shown, [f"{tick:.1f}{_turned(name, tick)}" for tick in shown], fontsize=8.5)
+        set_limits(low, high)

@@ -1,0 +1,76 @@
+"""One point of a sweep: the scene with some keys changed, run for the numbers of its summary."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import ceil, nan
+
+from cosim.errors import CosimError
+from cosim.scene import Scene, changed
+
+Number = float | int
+
+UNREPEATABLE = ("wall_time",)
+"""Numbers of a summary that differ from run to run of the same scene."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a point: the numbers of its summary (SI; NaN: it has none), or why not."""
+
+    numbers: dict[str, float]
+    failure: str = ""
+
+
+def evaluate(
+    base: Scene,
+    values: Mapping[str, Number],
+    whole_periods: bool,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Outcome:
+    """Run ``base`` with ``values`` (``table.key``: number, SI). Whatever is wrong is an outcome.
+
+    Waveforms are not made: the rows of a run are communication points too, so the numbers agree
+    with those of `cosim run` within rounding, and the run is several times as fast.
+    """
+    from cosim.simulation.simulate import simulate
+
+    try:
+        if not base.surface_is_given:  # whose peaks are those of the rows
+            few_rows = values.get("run.duration", base.run.duration) / 2.0
+            values = {"run.output_step": few_rows, **values}
+        scene = changed(base, values, "--over")
+        if whole_periods:
+            scene = changed(scene, periods_made_whole(scene), "--over")
+        summary = simulate(scene, progress).summary
+    except CosimError as error:
+        return Outcome({}, " ".join(str(error).split()))
+    numbers = {
+        name: nan if value is None else float(value)
+        for name, value in summary.items()
+        if name not in UNREPEATABLE and (value is None or isinstance(value, int | float))
+    }
+    return Outcome(numbers)
+
+
+def periods_made_whole(scene: Scene) -> dict[str, Number]:
+    """``run.settle`` and ``run.duration``, s, at least as long as now and whole periods apart.
+
+    The mean over a broken period is off by per cents, which differ from frequency to frequency.
+    """
+    period = drive_period(scene)
+    settle = _at_least(scene.run.settle, period)
+    span = _at_least(scene.run.duration - scene.run.settle, period)
+    return {"run.settle": settle * period, "run.duration": (settle + span) * period}
+
+
+def drive_period(scene: Scene) -> float:
+    """Period of the command, s; that of the firmware's staircase differs from 1 / frequency."""
+    if scene.surface_is_given:
+        return 1.0 / scene.drive.frequency
+    from cosim.drive.command import command
+
+    return getattr(command(scene), "period", 1.0 / scene.drive.frequency)
+
+
+def _at_least(time: float, period: float) -> int:
+    return max(1, ceil(time / period - 1e-9))

@@ -1,0 +1,249 @@
+"""Tunes a scene: searches its settings, then turns each key a little about the best."""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from math import inf, isfinite
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.errors import BadInput, SimulationFailed
+from cosim.scene import WITHOUT_NGSPICE, Scene, changed
+from cosim.studies.sweep.design import FREQUENCIES, numeric_key
+from cosim.studies.sweep.point import Number, Outcome, periods_made_whole
+from cosim.studies.sweep.pool import Pool, workers_asked
+from cosim.studies.tune.search import apart, search
+
+Array = npt.NDArray[np.float64]
+
+KNOBS: dict[str, tuple[float, float]] = {
+    f"drive.{knob}": (0.0, 1.0) for knob in ("pot_max", "pot_frequency", "pot_offset")
+}
+"""What is tuned unless told otherwise: the three potentiometers, from end to end."""
+
+TURNS = (-0.05, -0.01, 0.01, 0.05)
+"""How far each key is turned about the best, as shares of its range."""
+
+SEARCHED = 0.93
+"""Most that the search has of the runs; the rest turns one key after another about its best."""
+
+FEWEST_RUNS = 20
+"""Of the search."""
+
+SCOUTS = 5
+"""Runs without ngspice that go ahead of each run with it: some ten times cheaper each."""
+
+HINTS, HINTS_APART = 25, 0.02
+"""Best scouts that are run again with ngspice, and how far apart, as a share of the ranges."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One simulation of a search: its settings (SI), its summary, and the value asked for."""
+
+    values: dict[str, Number]
+    outcome: Outcome
+    value: float | None
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What a search has found.
+
+    ``neighbours`` gives for each key the value at each of TURNS about the best run, None beyond the
+    end of its range or where the run failed; empty where turning led on to this best run and the
+    budget ended there.
+    """
+
+    quantity: str
+    largest: bool
+    ranges: dict[str, tuple[float, float]]
+    runs: list[Run]
+    best: Run
+    neighbours: dict[str, list[float | None]]
+    scene: Scene
+    """The scene at the best settings."""
+    scouts: int
+    """Runs on the rung "limited" that went ahead; 0 where the scene needs no ngspice itself."""
+
+    def lost(self, turn: float) -> float | None:
+        """Greatest loss when one key is turned by ``turn`` of its range either way.
+
+        As a share of the best value; inf where such a run failed; None where there is none.
+        """
+        assert self.best.value is not None
+        losses = []
+        for key, values in self.neighbours.items():
+            for place, value in zip(TURNS, values, strict=True):
+                if abs(place) != turn or not self._within(key, place):
+                    continue
+                change = inf if value is None else self.best.value - value
+                losses.append(change if self.largest or value is None else -change)
+        return max(losses) / (abs(self.best.value) or 1.0) if losses else None
+
+    def _within(self, key: str, turn: float) -> bool:
+        low, high = self.ranges[key]
+        return low <= self.best.values[key] + turn * (high - low) <= high
+
+
+def tune(
+    scene: Scene,
+    quantity: str,
+    largest: bool = True,
+    over: Mapping[str, tuple[float, float]] | None = None,
+    budget: int = 200,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: Callable[[Run, Run | None], None] = lambda run, best: None,
+    scouting: Callable[[Run, Run | None], None] = lambda run, best: None,
+) -> Tuning:
+    """Search ``scene`` for the largest (or least) ``quantity`` of its summary, in ``budget`` runs.
+
+    ``over`` gives the range of each ``table.key``, SI; by default the three knobs. Where the scene
+    needs ngspice, SCOUTS times as many runs on the rung "limited" look first where it is worth
+    while. After the search each key is turned a little about the best, which moves on while that
+    helps and the budget lasts. The same for the same ``seed``, whatever the number of ``workers``.
+    ``progress`` is told each run and the best so far, as they finish, ``scouting`` each one ahead.
+    Where the frequency is tuned, each run lasts whole periods.
+
+    Raises BadInput for keys, ranges and quantities that are none; SimulationFailed where every run
+    failed.
+    """
+    if not over and scene.drive.waveform != "sawtooth":
+        raise BadInput(
+            f'scene {scene.name}: drive.waveform = "{scene.drive.waveform}" has no knobs; name '
+            "what to tune with --over table.key=low:high."
+        )
+    ranges = _checked(over or KNOBS)
+    turned = len(TURNS) * len(ranges)
+    least = FEWEST_RUNS + turned
+    if budget < least:
+        raise BadInput(f"--budget {budget}: must be a whole number from {least} for these keys.")
+    whole_periods = any(key in FREQUENCIES for key in ranges)
+    searched = min(round(SEARCHED * budget), budget - turned)
+    scouts, hints = 0, None
+    ahead = _simplified(scene)
+    # Quantities that only the scene's own rung has find no scouts.
+    with suppress(BadInput), Pool(ahead or scene, workers_asked(workers), whole_periods) as pool:
+        if ahead is not None:
+            trial = _Trial(pool, quantity, largest, ranges, scouting)
+            search(trial.costs, len(ranges), SCOUTS * searched, seed)
+            scouts, hints = len(trial.known), apart(trial.ranked(), HINTS_APART)[:HINTS]
+    with Pool(scene, workers_asked(workers), whole_periods) as pool:
+        trial = _Trial(pool, quantity, largest, ranges, progress)
+        search(trial.costs, len(ranges), searched, seed, hints)
+        if trial.best is None:
+            reason = next(iter(trial.known.values())).outcome.failure
+            raise SimulationFailed(f"No setting could be run; the first one: {reason}")
+        best, neighbours = trial.best, _turned(trial, trial.best)
+        while trial.best is not best and len(trial.known) + turned <= budget:
+            best, neighbours = trial.best, _turned(trial, trial.best)
+        if trial.best is not best:
+            best, neighbours = trial.best, {}
+    runs = list(trial.known.values())
+    tuned = changed(scene, best.values, "tune")
+    if whole_periods:
+        tuned = changed(tuned, periods_made_whole(tuned), "tune")
+    return Tuning(quantity, largest, ranges, runs, best, neighbours, tuned, scouts)
+
+
+def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    for name, (low, high) in over.items():
+        key = numeric_key(name, "--over")
+        assert key.low is not None and key.high is not None
+        if not (isfinite(low) and isfinite(high) and key.low <= low < high <= key.high):
+            raise BadInput(f"--over {name}={low:g}:{high:g}: must be a range, of {key.allowed}.")
+    return dict(over)
+
+
+def _simplified(scene: Scene) -> Scene | None:
+    """The scene without ngspice; None where it is so already, or cannot be."""
+    if scene.circuit.model == "file" or scene.circuit.model in WITHOUT_NGSPICE:
+        return None
+    try:
+        return changed(scene, {"circuit.model": "limited", "drive.pwm_ripple": False}, "tune")
+    except BadInput:
+        return None
+
+
+class _Trial:
+    """Runs settings, each once, and remembers them in the order in which they were asked for."""
+
+    def __init__(
+        self,
+        pool: Pool,
+        quantity: str,
+        largest: bool,
+        ranges: dict[str, tuple[float, float]],
+        progress: Callable[[Run, Run | None], None],
+    ) -> None:
+        self.ranges = ranges
+        self.known: dict[tuple[float, ...], Run] = {}
+        self._pool, self._quantity, self._largest = pool, quantity, largest
+        self._progress = progress
+
+    @property
+    def best(self) -> Run | None:
+        """The first of the best runs."""
+        found = [run for run in self.known.values() if run.value is not None]
+        return min(found, key=lambda run: self._cost(run.value), default=None)
+
+    def ranked(self) -> Array:
+        """Points of the unit cube that have a value, the best first."""
+        found = [place for place, run in self.known.items() if run.value is not None]
+        found.sort(key=lambda place: self._cost(self.known[place].value))
+        return np.array(found).reshape(-1, len(self.ranges))
+
+    def costs(self, points: Array) -> tuple[Array, int]:
+        """The cost of each point of the unit cube (rows), and how many of them were run for it."""
+        # The search comes back with what it has heard, but for rounding.
+        places = [tuple(float(x) for x in np.round(row, 9)) for row in points]
+        new = [place for place in dict.fromkeys(places) if place not in self.known]
+        runs: dict[int, Run] = {}
+        settings = [self.settings(place) for place in new]
+        for number, outcome in self._pool.run(enumerate(settings)):
+            runs[number] = Run(settings[number], outcome, self._value(outcome))
+            self._progress(runs[number], self.best)
+        for number, place in enumerate(new):
+            self.known[place] = runs[number]
+        return np.array([self._cost(self.known[place].value) for place in places]), len(new)
+
+    def settings(self, place: tuple[float, ...]) -> dict[str, Number]:
+        """The keys' values at a point of the unit cube."""
+        settings: dict[str, Number] = {}
+        for (name, (low, high)), share in zip(self.ranges.items(), place, strict=True):
+            value = min(max(low + share * (high - low), low), high)
+            settings[name] = round(value) if numeric_key(name, "--over").kind is int else value
+        return settings
+
+    def _value(self, outcome: Outcome) -> float | None:
+        if outcome.failure:
+            return None
+        if self._quantity not in outcome.numbers:
+            names = ", ".join(outcome.numbers)
+            raise BadInput(f"{self._quantity} is not a number of this scene's summary ({names}).")
+        value = outcome.numbers[self._quantity]
+        return value if isfinite(value) else None
+
+    def _cost(self, value: float | None) -> float:
+        if value is None:
+            return inf
+        return -value if self._largest else value
+
+
+def _turned(trial: _Trial, best: Run) -> dict[str, list[float | None]]:
+    """The value asked for with each key turned about the best."""
+    place = next(place for place, run in trial.known.items() if run is best)
+    found: dict[str, list[float | None]] = {}
+    for k, key in enumerate(trial.ranges):
+        row: list[tuple[float, ...] | None] = []
+        for turn in TURNS:
+            share = place[k] + turn
+            inside = 0.0 <= share <= 1.0
+            row.append((*place[:k], round(share, 9), *place[k + 1 :]) if inside else None)
+        inside = [point for point in row if point is not None]
+        if inside:
+            trial.costs(np.array(inside))
+        found[key] = [None if point is None else trial.known[point].value for point in row]
+    return found

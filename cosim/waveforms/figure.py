@@ -1,0 +1,279 @@
+"""The figure of a run: what the circuit did, and what the mechanics made of it."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from cosim.files.spill import release
+from cosim.simulation.simulate import Result
+from cosim.trials.published import FRAME_RATE
+
+Array = npt.NDArray[np.float64]
+
+SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
+GRIP = "#7a5195"
+SECOND = "#6fb7e9"
+"""The second surface, where two move by themselves; its curves are dashed."""
+SECOND_SURFACE: dict[str, Any] = {
+    "color": SECOND, "lw": 1.1, "ls": "--", "label": "second"
+}  # fmt: skip
+PERIODS_SHOWN = 3
+
+LINEAR = 100.0
+"""Acceleration, m/s², up to which its axis is linear: impacts are far above it."""
+_MOST_ROWS = 200_000
+"""Of a curve that is drawn as it is."""
+_STRETCHES = 4000
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def draw(result: Result, path: Path) -> None:
+    """Draw the run into ``path`` (a PNG)."""
+    waves = result.waveforms
+    given = result.scene.surface_is_given
+    height = 5.8 if given else 8.2
+    figure = Figure(figsize=(13.0, height), dpi=110)
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(2 if given else 3, 2)
+    # Room that was measured once: a layout engine would double the time of a short run.
+    figure.subplots_adjust(
+        left=0.06, right=0.985, bottom=0.5 / height, top=1 - 0.62 / height, wspace=0.29, hspace=0.4
+    )
+    shown = _last_periods(result)
+    time = waves["time"][shown] * 1e3
+    cut = {name: values[shown] for name, values in waves.items()}
+
+    _whole_run(axes[0, 0], result)
+    _positions(axes[0, 1], time, cut)
+    if given:
+        _velocities(axes[1, 0], time, cut)
+        _acceleration(axes[1, 1], result, shown)
+    else:
+        _command(axes[1, 0], result, time, cut)
+        _voltages(axes[2, 0], time, cut)
+        _velocities(axes[1, 1], time, cut)
+        _acceleration(axes[2, 1], result, shown)
+    for axis in (*axes[1:, 0], *axes[:, 1]):
+        axis.set_xlim(time[0], time[-1])
+        axis.set_xlabel("time [ms]")
+    for axis in axes.flat:
+        axis.grid(alpha=0.25)
+    figure.suptitle(_title(result), fontsize=12, y=1 - 0.08 / height, va="top")
+    figure.savefig(path, format="png")
+
+
+def _last_periods(result: Result) -> slice:
+    """The rows of the last few periods; of the last part of the run where nothing is driven."""
+    time = result.waveforms["time"]
+    scene, run = result.scene, result.scene.run
+    if scene.drive.file is not None:
+        span = run.duration
+    elif scene.circuit.model == "none" and not scene.surface_is_given:
+        span = run.duration / 10
+    else:
+        span = PERIODS_SHOWN / scene.drive.frequency
+    first = int(np.searchsorted(time, time[-1] - span))
+    return slice(max(min(first, len(time) - 2), len(time) - _MOST_ROWS, 0), None)
+
+
+def _outline(time: Array, values: Array) -> tuple[Array, Array]:
+    """A curve of fewer points that covers the same pixels: of each of many short stretches the
+    smallest and the largest value. One of not so many points stays as it is.
+    """
+    if len(time) <= _MOST_ROWS:
+        return time, values
+    starts = np.linspace(0, len(time), _STRETCHES + 1).astype(int)
+    found = []
+    for begin, end in pairwise(starts.tolist()):
+        found.append((time[begin], values[begin:end].min(), values[begin:end].max()))
+        release()
+    begins, *ends = np.array(found).T
+    return np.repeat(begins, 2), np.stack(ends, axis=1).ravel()
+
+
+def _title(result: Result) -> str:
+    scene, numbers = result.scene, result.summary
+    drive = scene.drive
+    words = f"{scene.name}: part moves at {numbers['v_average'] * 1e3:+.2f} mm/s"  # pyright: ignore
+    if drive.file is not None:
+        return f"{words}; the surface moves as in {Path(drive.file).name}"
+    if scene.surface_is_given:
+        limit = f", at most {drive.acceleration_max:.4g} m/s²" if drive.waveform != "sine" else ""
+        return f"{words}; the surface is given: {drive.waveform}, {drive.frequency:.4g} Hz{limit}"
+    if scene.circuit.model == "none":
+        return f"{words}; no drive"
+    late = "" if drive.phase_deg is None else f", second coil {drive.phase_deg:.4g}° late"
+    return (
+        f"{words}; {drive.waveform} {drive.frequency:.4g} Hz, {drive.amplitude:.3g} V "
+        f"peak-to-peak, offset {drive.offset:+.3g} V{late}, circuit “{scene.circuit.model}”"
+    )
+
+
+def _whole_run(axis: Axes, result: Result) -> None:
+    waves = result.waveforms
+    time, height = _outline(waves["time"], waves["z_surface"])
+    axis.plot(time, height * 1e3, color=SURFACE, lw=0.5, label="surface")
+    time, height = _outline(waves["time"], waves["z_part"])
+    axis.plot(time, height * 1e3, color=PART, lw=1.2, label="part")
+    if result.scene.run.settle > 0:
+        axis.axvspan(0, result.scene.run.settle, color="0.93", zorder=0, label="settling")
+    axis.set_xlim(0, result.scene.run.duration)
+    axis.set(xlabel="time [s]", ylabel="height [mm]")
+    _at_least(axis, 0.01)
+    curves, _ = axis.get_legend_handles_labels()
+    if "normal_force" in waves:
+        right = axis.twinx()
+        force = _outline(waves["time"], waves["normal_force"])
+        right.plot(*force, color=GRIP, lw=1.0, label="grip (right)")
+        right.set(ylabel="normal force [N]", ylim=(0.0, None))
+        curves += right.get_lines()
+    _head(axis, "Whole run", curves)
+
+
+def _head(axis: Axes, title: str, handles: Sequence[Artist] | None = None) -> None:
+    """The title on the left, and the legend above the axes, where it covers no curve."""
+    axis.set_title(title, loc="left", fontsize=10.5)
+    if handles is None:
+        handles, _ = axis.get_legend_handles_labels()
+    if handles:
+        axis.legend(
+            handles=handles,
+            loc="lower right",
+            bbox_to_anchor=(1.0, 0.99),
+            ncols=len(handles),
+            fontsize=8,
+            frameon=False,
+            borderpad=0.1,
+            columnspacing=1.2,
+        )
+
+
+def _at_least(axis: Axes, span: float) -> None:
+    """Widen the vertical range to ``span``: what stands still is not to show its rounding."""
+    low, high = axis.get_ylim()
+    if high - low < span:
+        middle = 0.5 * (low + high)
+        axis.set_ylim(middle - span / 2, middle + span / 2)
+
+
+def _no_drive(axis: Axes, title: str, unit: str) -> None:
+    axis.text(0.5, 0.5, "no drive", transform=axis.transAxes, ha="center", color="0.4")
+    axis.set(ylabel=unit, yticks=[])
+    _head(axis, title)
+
+
+def _command(axis: Axes, result: Result, time: Array, cut: dict[str, Array]) -> None:
+    title = "Command and current"
+    if "command" not in cut:
+        _no_drive(axis, title, "current [A]")
+        return
+    axis.plot(time, cut["current"], color=DRIVE, lw=1.3, label="one coil (left)")
+    axis.set(ylabel="current [A]")
+    right = axis.twinx()
+    right.plot(time, cut["command"], color="0.45", lw=0.9, ls="--", label="V1 (right)")
+    if "current_2" in cut:
+        axis.plot(time, cut["current_2"], color=SECOND, lw=1.1, ls="--", label="second (left)")
+    right.set_ylabel("V1 [V]")
+    # On these scales the two curves coincide where the source does what it is told.
+    scale = result.scene.circuit.sense_resistance * result.scene.coil.count
+    both = np.concatenate([cut["current"], cut["command"] / scale])
+    edge = 0.05 * max(np.ptp(both), 1e-9)
+    low, high = both.min() - edge, both.max() + edge
+    axis.set_ylim(low, high)
+    right.set_ylim(low * scale, high * scale)
+    _head(axis, title, [*axis.get_lines(), *right.get_lines()])
+
+
+def _voltages(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
+    title = "Coil voltage and back-EMF"
+    if "coil_voltage" not in cut:
+        _no_drive(axis, title, "voltage [V]")
+        return
+    axis.plot(time, cut["coil_voltage"], color="0.35", lw=0.9, label="coil voltage")
+    axis.plot(time, cut["back_emf"], color=EMF, lw=1.2, label="back-EMF")
+    axis.set(ylabel="voltage [V]")
+    _head(axis, title)
+
+
+def _positions(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
+    for name, color, width in (("surface", SURFACE, 1.2), ("part", PART, 1.6)):
+        height = cut[f"z_{name}"]
+        axis.plot(time, (height - height[0]) * 1e3, color=color, lw=width, label=name)
+    if "z_surface_2" in cut:
+        height = cut["z_surface_2"]
+        axis.plot(time, (height - height[0]) * 1e3, **SECOND_SURFACE)
+    axis.set(ylabel="height [mm]")
+    _shade_sticking(axis, time, cut["sticking"])
+    _at_least(axis, 0.01)
+    _head(axis, "Heights, each from its first")
+
+
+def _velocities(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
+    if "v_ram" in cut:
+        relative = (cut["v_ram"] - cut["v_surface"]) * 1e3
+        axis.plot(time, relative, color=RAM, lw=0.8, label="ram, relative")
+    axis.plot(time, cut["v_surface"] * 1e3, color=SURFACE, lw=1.2, label="surface")
+    if "v_surface_2" in cut:
+        axis.plot(time, cut["v_surface_2"] * 1e3, **SECOND_SURFACE)
+    axis.plot(time, cut["v_part"] * 1e3, color=PART, lw=1.6, label="part")
+    axis.set(ylabel="velocity [mm/s]")
+    _at_least(axis, 1.0)
+    _shade_sticking(axis, time, cut["sticking"])
+    _head(axis, "Velocities")
+
+
+def _shade_sticking(axis: Axes, time: Array, sticking: Array) -> None:
+    axis.fill_between(
+        time,
+        0,
+        1,
+        where=sticking > 0.5,
+        transform=axis.get_xaxis_transform(),
+        color="#f4e3c1",
+        alpha=0.6,
+        lw=0,
+        zorder=0,
+        label="sticking",
+    )
+
+
+def _power_of_ten(value: float, _: float) -> str:
+    """A tick of a symmetric logarithmic axis, without the parser of formulas, which takes long."""
+    if value == 0.0:
+        return "0"
+    power = f"{np.log10(abs(value)):.0f}".translate(_RAISED)
+    return f"{'−' if value < 0.0 else ''}10{power}"
+
+
+def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
+    waves = result.waveforms
+    time = waves["time"][shown]
+    axis.plot(time * 1e3, waves["a_surface"][shown], color=SURFACE, lw=0.8, label="true")
+    frames = np.arange(np.ceil(time[0] * FRAME_RATE), time[-1] * FRAME_RATE) / FRAME_RATE
+    heights = np.interp(frames, time, waves["z_surface"][shown])
+    if len(frames) > 2:
+        read = np.diff(heights, 2) * FRAME_RATE**2
+        axis.plot(
+            frames[1:-1] * 1e3,
+            read,
+            color="0.2",
+            lw=0.9,
+            marker=".",
+            ms=4,
+            label=f"read from {FRAME_RATE:.0f} frames/s",
+        )
+    if np.abs(axis.dataLim.intervaly).max() > LINEAR:
+        axis.set_yscale("symlog", linthresh=LINEAR)
+        axis.yaxis.set_major_formatter(_power_of_ten)
+    _at_least(axis, 2.0)
+    axis.set(ylabel="acceleration [m/s²]")
+    rigid = result.scene.mechanics.contact == "rigid" and not result.scene.surface_is_given
+    _head(axis, "Acceleration of the surface" + (", without its jumps" if rigid else ""))

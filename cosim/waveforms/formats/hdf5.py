@@ -1,0 +1,30 @@
+"""HDF5, laid out as netCDF-4 wants it, so that netCDF4 and xarray open it with its dimension."""
+
+from io import BytesIO
+
+from cosim.errors import BadInput
+from cosim.waveforms.formats.source import Exported, Run
+
+
+def content(run: Run) -> Exported:
+    """A dataset for each column with its ``units``, over the dimension scale ``time``; the root has
+    ``title`` and ``scene``.
+    """
+    try:
+        import h5py
+    except ImportError:
+        raise BadInput(
+            "--as hdf5 needs the package h5py, which the extra hdf5 of this project installs."
+        ) from None
+    file = BytesIO()
+    # netCDF-4 knows its variables by the order in which they were made.
+    with h5py.File(file, "w", track_order=True) as root:
+        root.attrs.update(run.attributes)
+        time = root.create_dataset("time", data=run.waveforms["time"])
+        time.make_scale("time")
+        for name, values in run.waveforms.items():
+            dataset = time if name == "time" else root.create_dataset(name, data=values)
+            dataset.attrs["units"] = run.units[name]
+            if dataset is not time:
+                dataset.dims[0].attach_scale(time)
+    return Exported(file.getvalue(), "HDF5 that netCDF4 and xarray open too")

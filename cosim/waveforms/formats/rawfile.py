@@ -1,0 +1,42 @@
+"""ngspice's raw file, binary: a header of lines, then the numbers row by row, eight bytes each.
+
+Voltages are named ``v(column)`` and currents ``i(column)``, as the viewers of ngspice's files
+expect them; motion keeps its column's name and has no type, since the format knows none for it.
+"""
+
+import numpy as np
+
+from cosim.waveforms.formats.source import Exported, Run
+
+TYPES = {"s": ("time", "{}"), "V": ("voltage", "v({})"), "A": ("current", "i({})")}
+"""The type and the form of the name that go with a unit."""
+
+TITLE_BYTES = 400
+"""ngspice reads lines of 511 bytes, and takes the rest of a longer one for a line of its own, which
+can be a command.
+"""
+
+
+def content(run: Run) -> Exported:
+    """One plot, a transient analysis over the run's rows; the date is that of the run."""
+    names = list(run.waveforms)
+    lines = [
+        f"Title: {_line(run.title)}",
+        f"Date: {run.written:%a %b %d %H:%M:%S %Y}",
+        "Plotname: Transient Analysis",
+        "Flags: real",
+        f"No. Variables: {len(names)}",
+        f"No. Points: {len(run.waveforms['time'])}",
+        "Variables:",
+    ]
+    for number, name in enumerate(names):
+        kind, form = TYPES.get(run.units[name], ("notype", "{}"))
+        lines.append(f"\t{number}\t{form.format(name)}\t{kind}")
+    header = "\n".join([*lines, "Binary:\n"]).encode()
+    rows = np.column_stack(list(run.waveforms.values())).astype("<f8")
+    return Exported(header + rows.tobytes(), "ngspice's binary raw file: v(…), i(…), motion")
+
+
+def _line(text: str) -> str:
+    """One line that is short enough."""
+    return " ".join(text.split()).encode()[:TITLE_BYTES].decode(errors="ignore") or "cosim"

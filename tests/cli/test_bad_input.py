@@ -1,0 +1,291 @@
+"""Whatever a scene or an override holds: a scene, or one sentence that helps; never a traceback."""
+
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cosim.errors import BadInput
+from cosim.scene import Scene, keys, list_scenes, load
+
+pytestmark = pytest.mark.reliability
+
+
+def complaint(source: str | Path, *overrides: str) -> str:
+    with pytest.raises(BadInput) as caught:
+        load(source, overrides)
+    return checked(caught.value)
+
+
+def checked(error: BadInput) -> str:
+    """The message, if it is one sentence on one line."""
+    message = str(error)
+    assert error.exit_code == 2
+    assert message.isprintable() and len(message) < 600
+    assert message.endswith((".", "?"))
+    assert "Traceback" not in message and "pydantic" not in message
+    return message
+
+
+FILES = [
+    # what the file says; what the sentence must say
+    ("[drive]\nfrequency = -1", "drive.frequency = -1 must be a number from 0.01 to 100000 Hz"),
+    ("[drive]\nfrequency = true", "drive.frequency = true must be a number"),
+    ('[drive]\nfrequency = "20"', 'drive.frequency = "20" must be a number'),
+    ("[drive]\nfrequency = nan", "drive.frequency = nan must be a number"),
+    ("[drive]\nfrequency = inf", "drive.frequency = inf must be a number"),
+    ("[drive]\nfrequency = [20]", "drive.frequency = [20] must be a number"),
+    ("[drive]\nfrequency = 2020-01-01", "drive.frequency = 2020-01-01 must be a number"),
+    (f"[drive]\nfrequency = 1{'0' * 400}", "must be a number from 0.01"),
+    (f"[run]\nduration = 1{'0' * 400}", "must be a number from 1e-06"),
+    (f"[run]\nduration = 1{'0' * 4000}", "must be a number from 1e-06"),
+    (f"[run]\nduration = 1{'0' * 5000}", "not TOML"),
+    ("[drive.frequency]\nx = 1", "drive.frequency = "),
+    ("[drive]\nwaveform = 'quad'", 'must be one of "sawtooth", "sine", "square"'),
+    ("[drive]\nwaveform = 'quaid'", "gives the surface its velocity, which needs circuit.model"),
+    ("[drive]\nfile = 'a.csv'", 'drive.file is for drive.waveform = "file", not for "sawtooth"'),
+    ("[drive]\nwaveform = 'sawtoth'", "did you mean sawtooth?"),
+    ("[drive]\nwaveform = 3", "drive.waveform = 3 must be one of"),
+    ("[drive]\nquantised = 1", "drive.quantised = 1 must be true or false"),
+    ("[drive]\nfrequncy = 3", "did you mean drive.frequency?"),
+    ("[drive]\ngravity = 3", "did you mean mechanics.gravity?"),
+    ("[drive]\nxyzzy = 3", "keys of drive: waveform, "),
+    ("[drv]\nfrequency = 3", "did you mean drive?"),
+    ("[xyzzy]\n", "tables: drive, circuit"),
+    ("frequency = 3", "did you mean drive.frequency?"),
+    ("drive = 3", "drive = 3 must be a table"),
+    ("[[drive]]\nfrequency = 3", "must be a table"),
+    ("base = 'papr'", "did you mean paper?"),
+    ("base = 3", "base = 3 must be a built-in scene"),
+    ("base = ['paper']", "must be a built-in scene"),
+    ("[base]", "must be a built-in scene"),
+    ("base = 'paper'\n[name]\nx = 1", "name = "),
+    ("name = 3", "name = 3 must be at most 64 letters"),
+    ("name = '../../etc'", "name = "),
+    ("name = ''", "name = "),
+    ("description = 'a\\nb'", None),
+    ('description = "a\\nb"', "must be one line"),
+    ("[circuit]\nmodel = 'limitd'", "did you mean limited?"),
+    (
+        "[circuit]\nmodel = 'spice'",
+        'must be one of "full", "amplifier", "limited", "ideal", "auto", "none", "file"',
+    ),
+    ("[circuit]\nmodel = 'file'", "circuit.netlist must be given together"),
+    ("[circuit]\nnetlist = 'a.cir'", 'circuit.model = "file" and circuit.netlist must be given'),
+    ("[circuit]\nnetlist = 7", "circuit.netlist = 7 must be the path of a file"),
+    ("[circuit]\nswing_loss_high = 18", "must be below circuit.supply = 18 V"),
+    ("[coil]\ncount = 1.0", "coil.count = 1.0 must be a whole number from 1 to 16"),
+    ("[coil]\ncount = true", "coil.count = true must be a whole number"),
+    ("[coil]\neddy_inductance = 1e-3", "coil.eddy_inductance needs coil.eddy_resistance"),
+    ("[coil]\neddy_resistance = 1", "coil.eddy_resistance needs coil.eddy_inductance"),
+    ("[circuit]\nsnubber_resistance = 10", "needs circuit.snubber_capacitance"),
+    ("[circuit]\nsnubber_capacitance = 1e-7", "needs circuit.snubber_resistance"),
+    ("[drive]\npwm_ripple = true", 'drive.pwm_ripple = true needs circuit.model = "full"'),
+    ("[drive]\nloop_time = 22e-6", "drive.loop_time = 2.2e-05 s must be 0, or"),
+    ("[drive]\nwaveform = 'sine'\nloop_time = 22e-6", 'for drive.waveform = "sawtooth" only'),
+    ("[mechanics]\ntravel = 0", "mechanics.travel = 0 must be a number from 1e-09 to 1000 m"),
+    ("[mechanics]\nrestitution = 1.1", "must be a number from 0 to 1."),
+    ("[mechanics]\nn_surfaces = 0", "must be a whole number from 1 to 16"),
+    ("[mechanics]\npart_mass = -0.009", "mechanics.part_mass = -0.009 must be"),
+    ("[friction]\nlaw = 'lugre'", 'friction.law = "lugre" must be "coulomb"'),
+    ("[friction]\nmu_k = 0.8", "friction.mu_k = 0.8 must be at most friction.mu_s = 0.72"),
+    ("[friction]\nmu_s = 0.5", "friction.mu_k = 0.59 must be at most friction.mu_s = 0.5"),
+    ("[coupling]\nmethod = 'jacoby'", "did you mean jacobi?"),
+    ("[coupling]\nmethod = 'iterated'", 'coupling.method = "iterated" repeats steps'),
+    ("[coupling]\nmacro_step = 0", "must be a number from 1e-07 to 0.01 s"),
+    ("[coupling]\norder = 3", "must be a whole number from 0 to 2"),
+    ("[run]\nsettle = 2", "run.settle = 2 s must be below run.duration = 2 s"),
+    ("[run]\noutput_step = 3", "run.output_step = 3 s must be below run.duration"),
+    ("[run]\noutput_step = 1e-9", "must be at least 1e-07 s"),
+    ("[drive]\namplitude = -1", "drive.amplitude = -1 must be a number from 0 to 100 V"),
+    ("[drive]\nreset_time = 0.05", "below the period of 0.05 s"),
+    ("[drive]\nreset_time = 1e-12", "must be 0, or at least 1e-09 s"),
+    ("[drive]\nwaveform = 'sine'\nquantised = true", 'for drive.waveform = "sawtooth" only'),
+    ("[drive]\nwaveform = 'sine'\npot_max = 0.5", 'for drive.waveform = "sawtooth" only'),
+    ("[drive]\nquantised = true\nreset_time = 1e-3", "drive.reset_time = 0.001 s must be 0"),
+    ("[drive]\nquantised = true\nfrequency = 2e4", "from 0.1 to 10000 Hz"),
+    ("[drive]\npot_max = 1.5", "drive.pot_max = 1.5 must be a number from 0 to 1."),
+    ("[drive]\npot_max = 'x'", 'drive.pot_max = "x" must be a number from 0 to 1.'),
+    ("[drive]\npot_max = 1\namplitude = 3", "drive.pot_max and drive.amplitude say the same"),
+    ("[drive]\npot_frequency = 1\nfrequency = 3", "drive.pot_frequency and drive.frequency"),
+    ("[drive]\npot_offset = 1\noffset = 3", "drive.pot_offset and drive.offset"),
+    (f"[drive]\npot_offset = 1\namplitude = 1{'0' * 400}", "must be a number from 0 to 100 V"),
+    ("base = 'paper-full'\n[drive]\namplitude = 11", "from 0 to 10.53 V with circuit.model"),
+    (
+        "base = 'paper-full'\n[drive]\noffset = -4.5",
+        "drive.offset = -4.5 V must be a number from -4",
+    ),
+    ("[drive]\nquantised = true\noffset = 7", "to 6.532 V with drive.quantised = true"),
+    # broken TOML
+    ("[drive]\nfrequency 20", ", line 2, column 11: this is not TOML"),
+    ("[drive]\nfrequency = ", ", line 2, column 13: this is not TOML"),
+    ("[drive\n", ", line 1, column 7: this is not TOML"),
+    ("[drive]\n[drive]\n", ", line 2, column 7: this is not TOML"),
+    ("[drive]\nfrequency = 1\nfrequency = 2", ", line 3, column 14: this is not TOML"),
+    ("[drive]\nwaveform = 'sine", ", line 2, column "),
+    ("x = " + "[" * 100_000, "not TOML"),
+    ("a.b.c\x00d = 1", "not TOML"),
+]
+
+
+@pytest.mark.parametrize(("text", "part"), FILES, ids=[text[:40] for text, _ in FILES])
+def test_file(text: str, part: str | None, tmp_path: Path) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(text, encoding="utf-8")
+    if part is None:
+        load(path)
+        return
+    message = complaint(path)
+    assert message.startswith(str(path))
+    assert part in message
+
+
+OVERRIDES = [
+    ("run.duration=-1", "--set: run.duration = -1 must be"),
+    ("run.duration=", "has no value"),
+    ("run.duration", "must be table.key=value"),
+    ("duration=3", "did you mean run.duration?"),
+    ("=3", "must be table.key=value"),
+    ("", "must be table.key=value"),
+    (".=3", "must be table.key=value"),
+    ("run.=3", "must be table.key=value"),
+    ("run.duration.x=3", 'no key "run.duration.x"'),
+    ("runs.duration=3", "did you mean run?"),
+    ("run.durations=3", "did you mean run.duration?"),
+    ("run.duration=abc", 'run.duration = "abc" must be a number'),
+    ("run.duration=1 2", 'run.duration = "1 2" must be a number'),
+    ("run.duration=1\nsettle = 3", "must be a number"),
+    ('run.duration="3"', 'run.duration = "3" must be a number'),
+    ("run.duration={x=1}", "must be a number"),
+    ("run.duration=" + "[" * 100_000, "must be a number"),
+    ("run.duration=" + "9" * 100_000, "must be a number"),
+    ("drive.quantised=yes", 'drive.quantised = "yes" must be true or false'),
+    ("circuit.model=ampliflier", "did you mean amplifier?"),
+    ("friction.mu_k=0.8", "--set: friction.mu_k = 0.8 must be at most"),
+    ("circuit.model=\x1b[31m", "must be one of"),
+]
+
+
+@pytest.mark.parametrize(("text", "part"), OVERRIDES, ids=[text[:40] for text, _ in OVERRIDES])
+def test_override(text: str, part: str) -> None:
+    message = complaint("paper", text)
+    assert message.startswith("--set")
+    assert part in message
+
+
+def test_the_layer_at_fault_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("[friction]\nmu_k = 0.7\n[run]\nduration = 3\n", encoding="utf-8")
+    assert complaint(path, "friction.mu_s=0.6").startswith("--set: friction.mu_k = 0.7")
+    path.write_text("[friction]\nmu_k = 0.8\n", encoding="utf-8")
+    assert complaint(path, "run.duration=1").startswith(f"{path}: friction.mu_k = 0.8")
+
+
+@pytest.mark.parametrize(
+    ("source", "part"),
+    [
+        ("papre", "did you mean the built-in scene paper?"),
+        ("xyzzy", "built-in: paper, "),
+        ("", "no built-in scene"),
+        ("paper.toml", "did you mean the built-in scene paper?"),
+        ("no/such/file.toml", "there is no such file"),
+        ("../scenes/paper", "there is no such file; did you mean the built-in scene paper?"),
+        ("a\x00b", "not a possible file name"),
+        ("a\udcffb", "there is no"),
+        ("x" * 5000, "cannot be read"),
+        ("/dev/null/x", "cannot be read"),
+        ("two\nlines", "there is no"),
+    ],
+)
+def test_source(source: str, part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert part in complaint(source)
+
+
+def test_directory(tmp_path: Path) -> None:
+    assert complaint(tmp_path) == f"{tmp_path}: this is a directory, not a scene file."
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_pipe_does_not_hang(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.toml")
+    assert "not a regular file" in complaint(tmp_path / "pipe.toml")
+
+
+def test_unreadable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:  # a mode of 0 would not stop root
+        raise PermissionError(13, "Permission denied")
+
+    path = tmp_path / "secret.toml"
+    path.touch()
+    monkeypatch.setattr("cosim.scene.loading.open", refuse, raising=False)
+    assert complaint(path) == f"{path}: cannot be read (Permission denied)."
+
+
+def test_link_to_itself(tmp_path: Path) -> None:
+    path = tmp_path / "loop.toml"
+    path.symlink_to(path)
+    assert "cannot be read" in complaint(path)
+
+
+@pytest.mark.parametrize(
+    ("raw", "part"),
+    [
+        ("description = 'µ'".encode("latin-1"), "line 1: this is not UTF-8 text"),
+        (b"[run]\n\xff", "line 2: this is not UTF-8 text"),
+        ("[run]".encode("utf-16"), "this is not UTF-8 text"),
+        (bytes(range(256)), "not"),
+        (b"#" * (1 << 20) + b"#", "larger than a scene file may be"),
+    ],
+)
+def test_bytes(raw: bytes, part: str, tmp_path: Path) -> None:
+    path = tmp_path / "bytes.toml"
+    path.write_bytes(raw)
+    assert part in complaint(path)
+
+
+@pytest.mark.parametrize("raw", [b"", b"\xef\xbb\xbf[run]\r\nduration = 3\r\n", b"# only this"])
+def test_odd_but_good_bytes(raw: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "bytes.toml"
+    path.write_bytes(raw)
+    assert isinstance(load(path), Scene)
+
+
+def loads_or_complains(source: str, overrides: list[str]) -> None:
+    try:
+        assert isinstance(load(source, overrides), Scene)
+    except BadInput as error:
+        checked(error)
+
+
+MARKS = ["[", "]", "=", ".", "\n", '"', "'", "{", "}", ",", "#", " ", "1", "-", "e", "true", "nan"]
+WORDS = ["base", "name", "paper", *{key.table for key in keys()}, *{key.name for key in keys()}]
+TOML_LIKE = st.lists(st.sampled_from(MARKS + sorted(WORDS)), max_size=30).map("".join)
+
+
+@settings(max_examples=300, deadline=None)
+@given(raw=st.one_of(st.binary(max_size=200), TOML_LIKE.map(str.encode)))
+def test_any_file(raw: bytes) -> None:
+    with tempfile.TemporaryDirectory() as directory:
+        path = Path(directory) / "any.toml"
+        path.write_bytes(raw)
+        loads_or_complains(str(path), [])
+
+
+VALUE = st.one_of(
+    st.text(max_size=30), TOML_LIKE, st.floats().map(repr), st.integers().map(repr),
+    st.sampled_from(["true", "false", "full", "none", "sine", "rigid"]),
+)  # fmt: skip
+OPTION = st.one_of(
+    st.text(max_size=30),
+    st.builds("{}={}".format, st.sampled_from([key.full for key in keys()]), VALUE),
+)
+
+
+@settings(max_examples=500, deadline=None)
+@given(scene=st.sampled_from(list_scenes()), options=st.lists(OPTION, max_size=4))
+def test_any_override(scene: tuple[str, str], options: list[str]) -> None:
+    loads_or_complains(scene[0], options)

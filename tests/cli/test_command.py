@@ -1,0 +1,493 @@
+"""The command from outside: exit codes, one sentence for whatever goes wrong, nothing left over."""
+
+import ctypes
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cosim
+from cosim.cli.main import main
+from cosim.coupling.loop.compiled import CompiledRecorder
+from cosim.coupling.loop.step_locked import StepLocked
+from cosim.drive.command import Sawtooth
+from cosim.errors import SimulationFailed
+from cosim.mechanics.stickslip import Mechanics
+from cosim.scene import load
+from cosim.simulation.simulate import simulate
+
+COMMAND = [sys.executable, "-m", "cosim"]
+QUICK = ["--set", "run.duration=0.02", "--set", "run.output_step=1e-3"]
+# One internal step after another: the mechanics give up within a second.
+TOO_FAST = ["--set", "coil.force_factor=1000", "--set", "mechanics.ram_mass=1e-9"]
+
+posix = pytest.mark.skipif(os.name != "posix", reason="needs POSIX")
+
+
+def command(
+    *arguments: str | Path,
+    cwd: Path,
+    prepare: Callable[[], object] | None = None,
+    **environment: str,
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*COMMAND, *map(str, arguments)], cwd=cwd, env=os.environ | environment,
+        preexec_fn=prepare, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+
+
+def complaint(done: subprocess.CompletedProcess[str], code: int = 2) -> str:
+    """What stderr says, if it is one sentence in one line, and stdout is empty."""
+    assert done.returncode == code, done.stderr
+    assert done.stdout == ""
+    assert done.stderr.startswith("cosim: ")
+    assert done.stderr.count("\n") == 1 and done.stderr.endswith((".\n", "?\n"))
+    return done.stderr
+
+
+# --- bad input -------------------------------------------------------------------
+
+BAD = [
+    # arguments; what the sentence must hold
+    ([], ["COMMAND"]),
+    (["frobnicate"], ["'frobnicate'", "run"]),
+    (["run"], ["SCENE"]),
+    (["run", "held", "--frobnicate"], ["--frobnicate"]),
+    (["run", "held", "--two\nlines"], ["--two lines"]),
+    (["run", "held", "--set"], ["--set"]),
+    (["run", "held", "--out"], ["--out"]),
+    (["run", "held", "more"], ["more"]),
+    (["fmu", "eat"], ["'eat'", "build", "check"]),
+    (["run", "papre"], ["papre", "did you mean the built-in scene paper?"]),
+    (["run", "no/such.toml"], ["no/such.toml", "no such file"]),
+    (["run", "."], ["directory"]),
+    (["run", "held", "--set", "runs.duration=3"], ["runs", "did you mean run?"]),
+    (["run", "held", "--set", "run.durations=3"], ["did you mean run.duration?"]),
+    (["run", "held", "--set", "run.duration=long"], ['run.duration = "long"', "a number from"]),
+    (["run", "held", "--set", "run.duration=-1"], ["run.duration = -1", "1e-06 to 100000 s"]),
+    (["run", "held", "--set", "run.duration=nan"], ["run.duration = nan", "a number from"]),
+    (["run", "held", "--set", "drive.amplitude=inf"], ["drive.amplitude = inf", "0 to 100 V"]),
+    (["run", "held", "--set", "friction.mu_k=0.8"], ["mu_k = 0.8", "friction.mu_s = 0.72"]),
+    (["run", "held", "--set", "run.settle=3"], ["run.settle = 3 s", "run.duration = 2 s"]),
+    (["run", "held", "--set", "mechanics.contact=soft"], ['"soft"', '"compliant", "rigid"']),
+]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"), BAD, ids=[" ".join(arguments) or "nothing" for arguments, _ in BAD]
+)
+def test_bad_input(arguments: list[str], parts: list[str], tmp_path: Path) -> None:
+    said = complaint(command(*arguments, cwd=tmp_path))
+    for part in parts:
+        assert part in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_broken_file(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("[run]\nduration 3\n")
+    said = complaint(command("run", "mine.toml", cwd=tmp_path))
+    assert "mine.toml, line 2, column 10: this is not TOML" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
+
+
+@pytest.mark.parametrize("out", ["file", "file/below"])
+def test_out_is_a_file(out: str, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    said = complaint(command("run", "held", *QUICK, "--out", out, cwd=tmp_path))
+    assert said.startswith(f"cosim: {out}: ")
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def obey_modes() -> None:
+    """Make root, too, heed the modes of files: without CAP_DAC_OVERRIDE in what is executed."""
+    if os.geteuid() == 0 and ctypes.CDLL(None).prctl(24, 1, 0, 0, 0):
+        raise OSError("the capability stays")
+
+
+@posix
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux") and os.name == "posix" and os.geteuid() == 0,
+    reason="root may write everywhere",
+)
+@pytest.mark.parametrize("out", ["shut", "shut/below"])
+def test_folder_without_leave_to_write(out: str, tmp_path: Path) -> None:
+    (tmp_path / "shut").mkdir(mode=0o555)
+    done = command("run", "held", *QUICK, "--out", out, cwd=tmp_path, prepare=obey_modes)
+    assert complaint(done) == f"cosim: {out}: cannot be written to (Permission denied).\n"
+    assert not list((tmp_path / "shut").iterdir())
+
+
+def test_missing_ngspice(tmp_path: Path) -> None:
+    done = command("run", "paper", cwd=tmp_path, NGSPICE_LIBRARY_PATH="/nonexistent")
+    assert "/nonexistent: this ngspice library cannot be loaded" in complaint(done)
+    assert not list(tmp_path.iterdir())
+
+
+def test_scenes_without_a_circuit_need_no_ngspice(tmp_path: Path) -> None:
+    done = command("run", "held", *QUICK, cwd=tmp_path, NGSPICE_LIBRARY_PATH="/nonexistent")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """A copy of the checkout without anything built; Python run in it imports the copy."""
+    root = Path(cosim.__file__).parents[1]
+    if not (root / "fmu" / "src").is_dir():
+        pytest.skip("cosim does not run from a checkout")
+    folder = tmp_path / "copy"
+    for name in ("cosim", "fmu", "circuits"):
+        leave_out = shutil.ignore_patterns("build", "__pycache__")
+        shutil.copytree(root / name, folder / name, ignore=leave_out)
+    shutil.copy(root / "LICENSE", folder)
+    return folder
+
+
+def test_missing_compiler(copy: Path) -> None:
+    done = command("run", "held", *QUICK, "--out", "out", cwd=copy, CC="/nonexistent/cc")
+    assert "/nonexistent/cc cannot be run" in complaint(done)
+    assert not (copy / "out").exists()
+    build = copy / "fmu" / "build"
+    assert not build.exists() or not list(build.iterdir())
+
+
+def test_broken_netlist(copy: Path) -> None:
+    netlist = copy / "circuits" / "amplifier.cir"
+    text, number = re.subn(r"(?m)^Rcoil .*", "X1 out c1 nosuch", netlist.read_text())
+    assert number == 1
+    netlist.write_text(text)
+    done = command("run", "paper", *QUICK, "--out", "out", cwd=copy)
+    assert re.search(r"amplifier\.cir:\d+: .*nosuch", complaint(done, 2))
+    assert not (copy / "out").exists()
+
+
+def test_failing_mechanics(tmp_path: Path) -> None:
+    done = command("run", "ideal-current", *TOO_FAST, "--out", "out", cwd=tmp_path)
+    said = complaint(done, 3)
+    assert "The mechanics failed at t = " in said and "internal steps" in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_failing_run_keeps_the_older_one(tmp_path: Path) -> None:
+    (tmp_path / "waveforms.csv").write_text("old")
+    done = command("run", "ideal-current", *TOO_FAST, "--out", tmp_path, cwd=tmp_path)
+    complaint(done, 3)
+    assert [path.name for path in tmp_path.iterdir()] == ["waveforms.csv"]
+    assert (tmp_path / "waveforms.csv").read_text() == "old"
+
+
+# --- full disks, closed pipes, other alphabets -----------------------------------
+
+
+@posix
+@pytest.mark.parametrize(("size", "file"), [(3000, "waveforms.csv"), (40_000, "figure.png")])
+def test_full_disk(size: int, file: str, tmp_path: Path) -> None:
+    import resource
+
+    run = ("run", "held", *QUICK, "--set", "run.output_step=2e-4", "--out", "out")
+    good = command(*run, cwd=tmp_path)
+    assert good.returncode == 0, good.stderr
+    before = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+
+    def prepare() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    done = command(*run, cwd=tmp_path, prepare=prepare, PYTHONDONTWRITEBYTECODE="1")
+    assert complaint(done) == f"cosim: out/{file}: cannot be written (File too large).\n"
+    after = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    del before["summary.json"], after["summary.json"]  # the time it took
+    assert after == before
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_output_cannot_be_written(tmp_path: Path) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [*COMMAND, "scenes"], cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert done.returncode == 2
+    assert done.stderr == "cosim: The output cannot be written: No space left on device.\n"
+
+
+@posix
+def test_reader_has_left(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [*COMMAND, "scenes"], cwd=tmp_path, stdout=writer, stderr=subprocess.PIPE, text=True
+    )
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_plain_ascii_output(tmp_path: Path) -> None:
+    done = command("run", "held", *QUICK, cwd=tmp_path, PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.isascii() and "Written to" in done.stdout
+
+
+def test_default_folder(tmp_path: Path) -> None:
+    done = command("run", "held", *QUICK, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "results" / "held" / "summary.json").exists()
+
+
+# --- Ctrl-C ----------------------------------------------------------------------
+
+
+def heed_interrupts() -> None:
+    """A shell's background jobs ignore Ctrl-C, and so would their children."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@posix
+@pytest.mark.parametrize("scene", ["paper", "paper-full", "ideal-current"])
+def test_interrupt(scene: str, tmp_path: Path) -> None:
+    """At several moments at once: while it loads, while it simulates."""
+    running = []
+    for number in range(4):
+        out = tmp_path / str(number)
+        arguments = ["run", scene, "--set", "run.duration=100", "--out", str(out)]
+        process = subprocess.Popen(
+            [*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            preexec_fn=heed_interrupts,
+        )  # fmt: skip
+        running.append((process, out))
+    try:
+        time.sleep(1.5)
+        for process, _ in running:
+            time.sleep(0.5)
+            process.send_signal(signal.SIGINT)
+        for process, out in running:
+            said = process.communicate(timeout=10)
+            assert (process.returncode, *said) == (130, "", "cosim: interrupted.\n")
+            assert not out.exists()
+    finally:
+        for process, _ in running:
+            process.kill()
+            process.communicate()
+
+
+@posix
+def test_interrupt_where_compiled_code_calls_back(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Between the call and its first line nothing in the callback itself can catch it."""
+    planned = CompiledRecorder._planned
+
+    def struck(self: CompiledRecorder) -> None:
+        signal.raise_signal(signal.SIGINT)
+        planned(self)
+
+    monkeypatch.setattr(CompiledRecorder, "_planned", struck)
+    arguments = [
+        "run",
+        "ideal-current",
+        "--set",
+        "run.duration=100",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job may ignore it
+    try:
+        assert main(arguments) == 130
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert capsys.readouterr().err == "cosim: interrupted.\n"
+
+
+@posix
+def test_interrupt_within_an_executed_string_is_130_too(tmp_path: Path) -> None:
+    """As where Ctrl-C strikes while a library is imported that makes code of text."""
+    program = (
+        "import sys\nfrom cosim.cli import main as cli\n"
+        "cli._dispatch = lambda arguments: exec('raise KeyboardInterrupt')\n"
+        "sys.exit(cli.main(['scenes']))\n"
+    )
+    (tmp_path / "struck.py").write_text(program)
+    # As a module: only then does Python look at what it remembers.
+    run = [sys.executable, "-m", "struck"]
+    done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "cosim: interrupted.\n")
+
+
+def test_interrupt_while_writing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What was complete stays; of the rest there is nothing."""
+
+    def interrupted(result: object, path: Path) -> None:
+        path.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.waveforms.figure.draw", interrupted)
+    assert main(["run", "held", *QUICK, "--out", str(tmp_path / "out")]) == 130
+    assert capsys.readouterr().err == "cosim: interrupted.\n"
+    kept = {path.name for path in (tmp_path / "out").iterdir()}
+    assert kept == {"waveforms.csv", "waveforms.nc", "scene.toml", "summary.json"}
+
+
+# --- failures in the middle of a run, in one process -----------------------------
+
+SHORT = ["run.duration=0.06"]
+
+
+class Trouble(Exception):
+    pass
+
+
+def bits(scene: str = "paper") -> dict[str, bytes]:
+    return {k: v.tobytes() for k, v in simulate(load(scene, SHORT)).waveforms.items()}
+
+
+def after_calls(number: int, original: Callable, failure: BaseException) -> Callable:
+    """The function, which raises at one call in the middle of a run."""
+    calls = iter(range(number))
+
+    def function(*arguments: object) -> object:
+        if next(calls, None) is None:
+            raise failure
+        return original(*arguments)
+
+    return function
+
+
+@pytest.mark.parametrize("scene", ["paper", "ideal-current"])
+def test_mechanics_fail(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = bits(scene)
+    failure = SimulationFailed("The mechanics failed at t = 0.01 s: as the test wants it.")
+    with monkeypatch.context() as patch:
+        patch.setattr(Mechanics, "step_to", after_calls(500, Mechanics.step_to, failure))
+        with pytest.raises(SimulationFailed, match="as the test wants it"):
+            simulate(load(scene, SHORT), compiled=False)
+    assert bits(scene) == before
+
+
+@pytest.mark.parametrize(
+    ("owner", "name"),
+    [(StepLocked, "back_emf"), (StepLocked, "accepted"), (Sawtooth, "value")],
+)
+@pytest.mark.parametrize("calls", [0, 1, 300])
+def test_callback_fails(
+    owner: type, name: str, calls: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = bits()
+    with monkeypatch.context() as patch:
+        patch.setattr(owner, name, after_calls(calls, getattr(owner, name), Trouble("here")))
+        with pytest.raises(Trouble, match="here"):
+            simulate(load("paper", SHORT), compiled=False)
+    assert bits() == before
+
+
+def test_callback_gives_nonsense(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = bits()
+    with monkeypatch.context() as patch:
+        patch.setattr(StepLocked, "back_emf", lambda self, time: np.nan if time > 0.01 else 0.0)
+        with pytest.raises(SimulationFailed, match=r"ngspice stopped at t = 0\.0(0999|1)"):
+            simulate(load("paper", SHORT), compiled=False)
+    assert bits() == before
+
+
+INTERRUPTED = """
+import os, signal, threading, time
+from cosim.scene import load
+from cosim.simulation.simulate import simulate
+
+pytestmark = pytest.mark.reliability
+
+
+def bits():
+    return simulate(load("paper", ["run.duration=0.02"])).waveforms["z_part"].tobytes()
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
+    before = bits()
+    for number in range(20):
+        # a true signal: it reaches the main thread in the midst of ngspice's C
+        strike = (os.getpid(), signal.SIGINT)
+        timer = threading.Timer(0.1 + 0.00822 * number, os.kill, strike)
+        began = time.perf_counter()
+        try:
+            timer.start()
+            simulate(load("paper", ["run.duration=10"]), compiled=number % 2 == 0)
+        except KeyboardInterrupt:
+            assert time.perf_counter() - began < 5
+        else:
+            raise AssertionError(f"interrupt {number} was lost")
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert bits() == before
+"""
+
+
+@posix
+def test_interrupted_anywhere(tmp_path: Path) -> None:
+    """Ctrl-C is not lost, wherever in a callback of ngspice it strikes."""
+    # In a process of its own: the test libraries' hooks into Python would swallow some.
+    (tmp_path / "interrupted.py").write_text(INTERRUPTED)
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "interrupted.py")], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+# --- light commands --------------------------------------------------------------
+
+LIGHT = """
+import sys
+from cosim.cli.main import main
+
+try:
+    main({arguments!r})
+finally:
+    heavy = {{"matplotlib", "scipy", "fmpy", "PySpice", "tqdm"}}
+    print("loaded:", *sorted(heavy & sys.modules.keys()), file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize(
+    "arguments", [["scenes"], ["--help"], ["run", "--help"], ["run", "papre"]], ids=" ".join
+)
+def test_light_commands_load_nothing_heavy(arguments: list[str], tmp_path: Path) -> None:
+    program = LIGHT.format(arguments=arguments)
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.stderr.splitlines()[-1] == "loaded:"
+
+
+def test_scenes(tmp_path: Path) -> None:
+    done = command("scenes", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    names = [line.split()[0] for line in done.stdout.splitlines()]
+    assert names == [
+        "paper", "paper-full", "paper-limited", "closed-loop-grasp", "direct-drive",
+        "direct-drive-stops", "down-grip", "down-waveform", "gripper", "gripper-169g",
+        "gripper-17g", "held", "ideal-current", "optimal", "quaid", "regime-01", "regime-02",
+        "regime-03", "regime-04", "regime-05", "regime-06", "regime-07", "regime-08", "regime-09",
+        "regime-10", "square", "trial", "two-surfaces", "umbanhowar",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_help_and_version(option: str, tmp_path: Path) -> None:
+    done = command(option, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "cosim" in done.stdout
+
+
+def test_a_key_without_effect_is_a_note(tmp_path: Path) -> None:
+    done = command(
+        *("run", "held", "--set", "run.duration=0.02", "--set", "drive.amplitude=9"),
+        *("--out", "out"),
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0
+    (said,) = done.stderr.splitlines()
+    assert said.startswith("cosim: note: --set: drive.amplitude has no effect with circuit.model")

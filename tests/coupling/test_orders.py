@@ -1,0 +1,161 @@
+"""Orders of the coupling methods on the bench's own participants, against the reference.
+
+The smooth scene: a sine drives an amplifier so slow that the back-EMF tells, the ram swings on its
+hardening suspension without meeting a wall, and the part sticks throughout.
+"""
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("sksundae")
+
+from cosim.coupling.participants.stickslip import FmuMechanics
+from cosim.coupling.rewind.error_control import ErrorControlled
+from cosim.coupling.rewind.event_aware import EventAware
+from cosim.coupling.rewind.gauss_seidel import GaussSeidel
+from cosim.coupling.rewind.iterated import Iterated
+from cosim.coupling.rewind.jacobi import Jacobi
+from cosim.coupling.rewind.joint import Joint
+from cosim.coupling.rewind.methods import METHODS as METHODS_OF_STUDIES
+from cosim.coupling.rewind.methods import ORDERS
+from cosim.coupling.rewind.predictor_corrector import PredictorCorrector
+from cosim.mechanics.stickslip import SAMPLE_OUTPUTS
+from cosim.scene import load
+from cosim.simulation.simulate import simulate
+from cosim.studies.accuracy.cases import CASES, participants, reference_parameters
+from tests.reference import monolithic
+
+pytestmark = pytest.mark.physics
+
+SMOOTH = CASES["smooth"]
+JUDGED = ("z_surface", "z_ram", "v_ram", "current")
+SAMPLES = 20
+
+
+def reference(duration: float, **changes: Any) -> dict[str, np.ndarray]:
+    """The judged signals at equally spaced times, the last at ``duration`` (s)."""
+    times = [duration * k / SAMPLES for k in range(1, SAMPLES + 1)]
+    parameters = reference_parameters(load("paper", SMOOTH.overrides)) | changes
+    found = monolithic.simulate(parameters, duration, 0.0, tol=1e-14, times=times)
+    return {name: found.samples[name] for name in JUDGED}
+
+
+def error(found: dict[str, np.ndarray], expected: dict[str, np.ndarray]) -> float:
+    """Greatest over time and signals, each in units of its own range."""
+    return max(
+        float(np.abs(found[name] - expected[name]).max() / np.ptp(expected[name]))
+        for name in JUDGED
+    )
+
+
+def slopes(errors: list[float]) -> list[float]:
+    return [math.log2(a / b) for a, b in pairwise(errors)]
+
+
+Make = Callable[[Any, FmuMechanics], Joint]
+DURATION = 0.01
+EXPECTED = reference(DURATION)
+
+
+def joined_error(make: Make, steps: int) -> float:
+    circuit, mechanics = participants(load("paper", SMOOTH.overrides))
+    found: dict[str, list[float]] = {name: [] for name in JUDGED}
+    try:
+        joint = make(circuit, mechanics)
+        for k in range(steps):
+            joint.step(DURATION / steps)
+            if (k + 1) % (steps // SAMPLES) == 0:
+                row: dict[str, float] = dict(zip(SAMPLE_OUTPUTS, mechanics.sample(), strict=False))
+                row["current"] = float(joint.of_first.value[0])
+                for name in JUDGED:
+                    found[name].append(row[name])
+    finally:
+        mechanics.close()
+    return error({name: np.array(values) for name, values in found.items()}, EXPECTED)
+
+
+METHODS: dict[str, tuple[Make, float]] = {
+    **{
+        name: (METHODS_OF_STUDIES[name], float(order))
+        for name, order in ORDERS.items()
+        if name != "iterated, plain"  # has the solution of the accelerated one
+    },
+    "Jacobi k = 1, slopes": (lambda a, b: Jacobi(a, b, 1, slopes=True), 2.0),
+    "held EMF, linear current": (lambda a, b: GaussSeidel(a, b, 0, feed=1), 1.0),
+    "predictor-corrector": (PredictorCorrector, 2.0),
+    "iterated, Anderson, mean": (lambda a, b: Iterated(a, b, "anderson", "mean"), 2.0),
+}
+"""Methods and their orders."""
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_order_on_the_smooth_scene(name: str) -> None:
+    make, order = METHODS[name]
+    # A parabola through older points needs shorter steps until its order shows.
+    first = 800 if name == "Gauss-Seidel k = 2" else 400
+    errors = [joined_error(make, first * 2**k) for k in range(5)]
+    assert slopes(errors) == pytest.approx([order] * 4, abs=0.1), errors
+
+
+def test_the_default_method_is_of_second_order() -> None:
+    """ngspice leads with steps held at their maximum; over the smooth scene's whole length."""
+    duration = 0.05
+    # The netlist's pole, 1 uF, leaks through 1 Gohm too, as if the open-loop gain were less.
+    scene = load("paper", SMOOTH.overrides)
+    rate = 2.0 * math.pi * scene.circuit.gain_bandwidth
+    leak = 10.0 ** (-scene.circuit.open_loop_gain / 20.0) + 1e-3 / rate
+    expected = reference(duration, open_loop_gain=-20.0 * math.log10(leak))
+    errors = []
+    for max_step in (1.6e-4, 8e-5, 4e-5, 2e-5, 1e-5):
+        overrides = [
+            *SMOOTH.overrides,
+            f"run.duration={duration!r}",
+            f"run.output_step={duration / SAMPLES!r}",
+            f"circuit.max_step={max_step!r}",
+            "circuit.reltol=1e-2",
+        ]
+        waves = simulate(load("paper", overrides)).waveforms
+        errors.append(error({name: waves[name][1:] for name in JUDGED}, expected))
+    assert slopes(errors) == pytest.approx([2.0] * 4, abs=0.1), errors
+
+
+def test_error_control_keeps_to_its_tolerance_and_the_audit_rejects() -> None:
+    """A hundredth of the tolerance costs 100^(1/3) as many steps with k = 1; with the audit that
+    is set at a share that its tolerance alone does not keep, steps are put back by it."""
+
+    def taken(tolerance: float, share: float | None = None) -> ErrorControlled:
+        circuit, mechanics = participants(load("paper", SMOOTH.overrides))
+        try:
+            joint = Jacobi(circuit, mechanics, 1)
+            control = ErrorControlled(joint, 1, 1e-5, tolerance, tolerance, energy_share=share)
+            control.run(DURATION)
+        finally:
+            mechanics.close()
+        return control
+
+    coarse, fine = taken(1e-4), taken(1e-6)
+    assert fine.accepted / coarse.accepted == pytest.approx(100.0 ** (1.0 / 3.0), rel=0.2)
+    assert coarse.rejected_by_audit == 0
+    audited = taken(1e-4, 1e-4)
+    assert audited.rejected_by_audit > 0
+    assert audited.accepted > coarse.accepted
+
+
+def test_events_are_met_by_cutting_steps() -> None:
+    """At the first event of the paper's scene, a slip at the command's fall, the step is cut."""
+    circuit, mechanics = participants(load("paper"))
+    try:
+        method = EventAware(Jacobi(circuit, mechanics, 1), within=1e-8)
+        before = method.time
+        while not method.events:
+            before = method.time
+            method.step(1e-4)
+        assert before < method.time
+        assert mechanics.events() == method.events
+    finally:
+        mechanics.close()

@@ -1,0 +1,434 @@
+"""The command V1(t): shapes, exact jumps, no drift, and the firmware's staircase."""
+
+from fractions import Fraction
+from math import floor, inf, nextafter, pi
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from cosim.drive.command import (
+    Command,
+    Constant,
+    Lagging,
+    Sawtooth,
+    Sine,
+    Square,
+    Staircase,
+    WithPwm,
+    command,
+    commands,
+)
+from cosim.scene import load
+from cosim.scene.firmware import passes, staircase
+
+GAIN = 15 / 4.7
+
+
+def made(*overrides: str, scene: str = "paper") -> Command:
+    return command(load(scene, overrides))
+
+
+@pytest.mark.parametrize(
+    ("t", "v1"), [(0.0, -5.2), (0.0125, -3.2), (0.025, -1.2), (0.049, 2.64), (0.05, -5.2)]
+)
+def test_paper_sawtooth(t: float, v1: float) -> None:
+    drive = made()
+    assert drive.value(t) == pytest.approx(v1)
+
+
+def test_paper_sawtooth_jumps() -> None:
+    drive = made()
+    assert drive.next_jump(0.0) == 0.05
+    assert drive.value_before(0.05) == pytest.approx(2.8)
+    assert drive.value_before(0.03) == drive.value(0.03)
+    assert drive.next_corner(0.01) == 0.05
+
+
+def test_slow_reset() -> None:
+    drive = made("drive.reset_time=0.01")
+    times = [0.0, 0.02, 0.04, 0.045, 0.05]
+    assert drive.values(times) == pytest.approx([-5.2, -1.2, 2.8, -1.2, -5.2])
+    assert drive.next_jump(0.0) == inf
+    assert [drive.next_corner(t) for t in (0.0, 0.04, 0.05)] == pytest.approx([0.04, 0.05, 0.09])
+
+
+def test_sine() -> None:
+    drive = made("drive.waveform=sine")
+    assert drive.values([0, 0.0125, 0.025, 0.0375]) == pytest.approx([-1.2, 2.8, -1.2, -5.2])
+    assert drive.next_jump(0.0) == inf
+    assert drive.value(1000 * 0.05 + 0.0125) == pytest.approx(2.8, abs=1e-12)
+
+
+def test_square() -> None:
+    drive = made("drive.waveform=square")
+    assert drive.values([0, 0.0249, 0.025, 0.0499]) == pytest.approx([2.8, 2.8, -5.2, -5.2])
+    assert drive.next_jump(0.0) == 0.025
+    assert drive.next_jump(0.025) == 0.05
+    assert drive.value_before(0.05) == pytest.approx(-5.2)
+    assert drive.value_before(0.0) == pytest.approx(-5.2)
+
+
+def test_no_drive() -> None:
+    drive = made(scene="held")
+    assert isinstance(drive, Constant)
+    assert (drive.value(0.3), drive.next_jump(0.0)) == (0.0, inf)
+
+
+@pytest.mark.parametrize("waveform", ["sawtooth", "square"])
+def test_no_amplitude_no_jump(waveform: str) -> None:
+    drive = made(f"drive.waveform={waveform}", "drive.amplitude=0")
+    assert drive.next_jump(0.0) == inf
+    assert drive.value(0.05) == drive.value_before(0.05) == -1.2
+
+
+# --- the firmware's staircase -----------------------------------------------------------------
+
+
+def firmware(maximum: int, frequency: float, number: type, steps: int) -> list[int]:
+    """What the device does, pass by pass of its loop (1 us each): DAC codes amid the 50 us steps.
+
+    Its rules: decrement when 50 us have passed and the counter is above zero; else, when the
+    counter is not above zero, write the maximum and start over after 1 us.
+    """
+    top, counter = number(maximum), number(0)
+    decrement = top / (number(1_000_000) / number(frequency) / number(50))
+    since_decrement, since_high, high = 50, 0, False
+    dac, codes, start = 0, [], None
+    now = 0
+    while len(codes) < steps:
+        if since_decrement >= 50 and counter > 0:
+            counter -= decrement
+            dac = max(0, int(counter))
+            since_decrement = 0
+        elif counter <= 0:
+            if not high:
+                high, since_high, dac = True, 0, maximum
+            if since_high >= 1:
+                high, counter = False, top
+                if start is None:  # from here on each step is 50 us
+                    start, since_decrement = now, 0
+        if start is not None and (now - start) % 50 == 25:
+            codes.append(dac)
+        now, since_decrement, since_high = now + 1, since_decrement + 1, since_high + 1
+    return codes
+
+
+def device(maximum: int, frequency: float, loop_time: Fraction, count: int) -> list[int]:
+    """The same rules with passes of ``loop_time`` s: the DAC code after each, from a reset on.
+
+    A timer is read in whole microseconds. The code written is truncated and never below 0.
+    """
+    counter, dac, high = Fraction(0), 0, False
+    decremented = raised = Fraction(0)
+    codes: list[int] = []
+    before = 0
+    for n in range(1, 10**6):
+        now = n * loop_time
+        if floor((now - decremented) * 10**6) >= 50 and counter > 0:
+            counter -= maximum * Fraction(frequency) / 20_000
+            dac, decremented = max(0, int(counter)), now
+        elif counter <= 0:
+            if not high:
+                high, raised, dac = True, now, maximum
+            if floor((now - raised) * 10**6) >= 1:
+                high, counter = False, Fraction(maximum)
+        # the first reset after the start is like all later ones
+        if codes or (dac == maximum and n > 10 and before == 0):
+            codes.append(dac)
+        if len(codes) == count:
+            return codes
+        before = dac
+    raise AssertionError
+
+
+CASES = [(778, 20.0), (1023, 50.8), (100, 99.5), (1, 30.0), (512, 7.3)]
+
+
+@pytest.mark.parametrize(("maximum", "frequency"), CASES)
+def test_staircase_is_the_firmware(maximum: int, frequency: float) -> None:
+    codes = staircase(maximum, frequency)
+    there = firmware(maximum, frequency, Fraction, 2 * len(codes) + 5)
+    assert there == [codes[k % len(codes)] for k in range(len(there))]
+
+
+@pytest.mark.parametrize(("maximum", "frequency"), CASES)
+def test_staircase_is_close_to_single_precision(maximum: int, frequency: float) -> None:
+    codes = staircase(maximum, frequency)
+    there = firmware(maximum, frequency, np.float32, len(codes) + 1)
+    assert max(abs(a - b) for a, b in zip(codes, there, strict=False)) <= 1
+    # one step more, should the counter end just above zero
+    assert there[len(codes)] in (maximum, 0)
+
+
+@pytest.mark.parametrize("loop_time", [5e-6, 22e-6, 25e-6, 32e-6, 60e-6])
+@pytest.mark.parametrize(("maximum", "frequency"), [(778, 20.0), (1023, 50.8), (100, 99.5)])
+def test_loop_time_is_the_firmware(maximum: int, frequency: float, loop_time: float) -> None:
+    codes = passes(staircase(maximum, frequency), loop_time)
+    exact = Fraction(round(loop_time * 1e6), 10**6)
+    there = device(maximum, frequency, exact, 2 * len(codes) + 5)
+    assert there == [codes[k % len(codes)] for k in range(len(there))]
+
+
+def test_loop_time_lowers_the_frequency() -> None:
+    drive = made("drive.loop_time=22e-6", scene="paper-full")
+    assert isinstance(drive, Staircase)
+    # by hand: 50 us are reached at the third pass; 999 steps of three passes, the maximum for two
+    # passes and 0 for one
+    assert drive.period == pytest.approx((999 * 3 + 2 + 1) * 22e-6)
+    assert drive.v_dac(0.0) == pytest.approx(778 / 1024 * 3.3)
+    assert drive.next_jump(0.0) == pytest.approx(44e-6)
+    assert drive.next_jump(44e-6 + 1e-9) == pytest.approx(110e-6)
+    reset = drive.period
+    assert drive.v_dac(reset - 11e-6) == 0.0
+    assert drive.v_dac(reset + 11e-6) == drive.v_dac(0.0)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "steps"), [(20.0, 1000), (50.8, 394), (99.9, 201), (100.0, 200), (30.0, 667)]
+)
+def test_real_period_is_rounded_up_to_whole_steps(frequency: float, steps: int) -> None:
+    drive = made("drive.quantised=true", f"drive.frequency={frequency}")
+    assert isinstance(drive, Staircase)
+    assert drive.period == pytest.approx(steps * 50e-6)
+    # the reset is the one downward jump of V1
+    jumps = [0.0]
+    while len(jumps) < 5000:
+        jumps.append(drive.next_jump(jumps[-1]))
+    falls = [t for t in jumps if drive.value(t) < drive.value_before(t)]
+    assert np.diff(falls) == pytest.approx(drive.period)
+
+
+def test_staircase_of_the_paper() -> None:
+    drive = made(scene="paper-full")
+    # by hand: 8 V / 3.1915 = 2.5067 V -> code 778; offset pin 2.8 V / 3.1915 -> code 272
+    assert drive.v_dac(0.0) == pytest.approx(778 / 1024 * 3.3)
+    assert drive.v_offset == pytest.approx(272 / 1024 * 3.3)
+    assert drive.value(0.0) == pytest.approx(GAIN * (272 - 778) / 1024 * 3.3)
+    # after k steps the counter has lost 0.778 k and is truncated
+    assert drive.v_dac(10.5 * 50e-6) == pytest.approx(770 / 1024 * 3.3)
+    assert drive.next_jump(0.0) == 50e-6
+    assert drive.v_dac_before(50e-6) == drive.v_dac(0.0)
+    smooth = made()
+    times = np.arange(0, 0.2, 1e-5)
+    assert np.abs(drive.values(times) - smooth.values(times)).max() < 0.03
+
+
+def test_few_codes_jump_seldom() -> None:
+    drive = made(
+        "drive.quantised=true", "drive.pot_max=0.002", "drive.frequency=1", "drive.pot_offset=0.1"
+    )
+    assert isinstance(drive, Staircase) and max(drive.codes) == 2
+    # in exact arithmetic code 2 lasts one step, 1 half of the period, 0 the rest
+    jumps = [drive.next_jump(t) for t in (0.0, 50e-6, 0.6)]
+    assert jumps == pytest.approx([50e-6, 0.5 + 50e-6, 1.0])
+
+
+def test_silent_knob() -> None:
+    drive = made("drive.quantised=true", "drive.pot_max=0", "drive.pot_offset=0.25")
+    assert drive.next_jump(0.0) == inf
+    assert drive.value(0.3) == pytest.approx(GAIN * 3.3 / 4)
+
+
+def test_knobs_reach_the_pins() -> None:
+    drive = made("drive.pot_max=0.7", "drive.pot_offset=0.4", scene="paper-full")
+    assert drive.v_dac(0.0) == pytest.approx(716 / 1024 * 3.3)
+    assert drive.v_offset == pytest.approx(409 / 1024 * 3.3)
+
+
+# --- the offset pin's PWM ---------------------------------------------------------------------
+
+PWM = 488.28125
+
+
+def test_pwm_of_the_paper() -> None:
+    drive = made("drive.pwm_ripple=true", scene="paper-full")
+    # by hand: code 272 of 1024, a period of 2048 us; a pulse is 544 us wide, its middle at 0
+    mean = 272 / 1024 * 3.3
+    assert drive.v_offset == pytest.approx(mean)
+    assert drive.v_offset_at(-1.0) == drive.v_offset_before(0.0) == drive.v_offset
+    levels = [drive.v_offset_at(t * 1e-6) for t in (0, 271, 273, 1775, 1777, 2319, 2321)]
+    assert levels == [3.3, 3.3, 0.0, 0.0, 3.3, 3.3, 0.0]
+    edges, t = [], 0.0
+    while t < 0.1:
+        t = drive.next_jump(t)
+        if drive.v_offset_before(t) != drive.v_offset_at(t):
+            edges.append(t)
+    expected = [272e-6, *((k * 2048 + s * 272) * 1e-6 for k in range(1, 49) for s in (-1, 1))]
+    assert edges[: len(expected)] == pytest.approx(expected, abs=1e-12)
+
+
+def test_pwm_changes_nothing_else() -> None:
+    plain, drive = made(scene="paper-full"), made("drive.pwm_ripple=true", scene="paper-full")
+    times = np.linspace(0, 0.2, 7001)
+    assert list(drive.values(times)) == list(plain.values(times))
+    for t in map(float, times[:300]):
+        for name in ("value_before", "v_dac", "v_dac_before"):
+            assert getattr(drive, name)(t) == getattr(plain, name)(t)
+
+
+@pytest.mark.parametrize("pot", [0, 1])
+def test_pwm_without_edges(pot: int) -> None:
+    drive = made("drive.pwm_ripple=true", "drive.pot_max=0", f"drive.pot_offset={pot}",
+                 scene="paper-full")  # fmt: skip
+    assert drive.next_jump(0.0) == (inf if pot == 0 else 1023 / 1024 / 2 / PWM)
+    assert drive.v_offset_at(0.3) in (0.0, 3.3)
+
+
+def test_pwm_edges_do_not_stand_beside_those_of_the_staircase() -> None:
+    # every 25 periods an edge meets one of the 50 us steps, within rounding
+    drive = made("drive.pwm_ripple=true", "drive.pot_max=1", "drive.pot_offset=0.2442",
+                 "drive.frequency=20", scene="paper-full")  # fmt: skip
+    gaps, both, t = [], 0, 0.0
+    while t < 3.0:
+        before, t = t, drive.next_jump(t)
+        gaps.append(t - before)
+        both += drive.v_offset_before(t) != drive.v_offset_at(t) and (
+            drive.v_dac_before(t) != drive.v_dac(t)
+        )
+    assert min(gaps) > 1e-9
+    assert both > 50
+
+
+@given(code=st.integers(1, 1023), inner=st.sampled_from(["sawtooth", "square", "staircase"]),
+       t=st.floats(0, 1e4))  # fmt: skip
+def test_pwm_edges_are_exact(code: int, inner: str, t: float) -> None:
+    pin = code / 1024 * 3.3
+    command: Command = {
+        "sawtooth": Sawtooth(20.0, 8.0, -1.2),
+        "square": Square(31.7, 8.0, -1.2),
+        "staircase": Staircase(staircase(778, 20.0), pin),
+    }[inner]
+    command.v_offset = pin
+    drive, fresh = WithPwm(command), WithPwm(command)
+    for _ in range(5):
+        jump = drive.next_jump(t)
+        assert jump > t
+        old, new = drive.v_offset_before(jump), drive.v_offset_at(jump)
+        assert old != new or drive.value_before(jump) != drive.value(jump)
+        left, right = nextafter(jump, -inf), nextafter(jump, inf)
+        assert drive.v_offset_at(left) == drive.v_offset_before(left) == old
+        assert drive.v_offset_at(right) == drive.v_offset_before(right) == new
+        assert {old, new} <= {0.0, 3.3}
+        assert drive.next_jump(left) == jump
+        assert fresh.v_offset_at(t) == drive.v_offset_at(t)  # whatever was asked before
+        t = jump
+
+
+# --- a second surface's command ---------------------------------------------------------------
+
+
+def test_a_lagging_command_is_the_other_one_later() -> None:
+    first, second = commands(load("two-surfaces", ["drive.phase_deg=90"]))
+    times = np.linspace(1e-5, 0.3, 997)
+    np.testing.assert_allclose(second.values(times + 0.0125), first.values(times), atol=1e-9)
+    assert second.next_jump(0.0) == 0.0125
+    assert (second.value_before(0.0125), second.value(0.0125)) == pytest.approx((2.8, -5.2))
+    assert len(commands(load("paper"))) == 1
+
+
+def test_a_staircase_lags_by_a_share_of_its_own_period() -> None:
+    staircase_of = ["drive.quantised=true", "drive.phase_deg=180"]
+    first, second = commands(load("two-surfaces", staircase_of))
+    assert isinstance(first, Staircase)
+    times = np.linspace(1e-5, 0.1, 333)
+    late = second.values(times + 0.5 * first.period)
+    np.testing.assert_allclose(late, first.values(times), atol=1e-9)
+
+
+# --- everything at once -----------------------------------------------------------------------
+
+FREQUENCY = st.floats(0.5, 2000)
+AMPLITUDE = st.floats(0.1, 10)
+OFFSET = st.floats(-5, 5)
+COMMANDS = st.one_of(
+    st.builds(Sawtooth, FREQUENCY, AMPLITUDE, OFFSET),
+    st.builds(lambda f, a, o, r: Sawtooth(f, a, o, r / f), FREQUENCY, AMPLITUDE, OFFSET,
+              st.floats(1e-3, 0.9)),
+    st.builds(Sine, FREQUENCY, AMPLITUDE, OFFSET),
+    st.builds(Square, FREQUENCY, AMPLITUDE, OFFSET),
+    st.builds(lambda m, f, v: Staircase(staircase(m, f), v), st.integers(0, 1023), FREQUENCY,
+              st.floats(0, 3.3)),
+    st.builds(lambda f, a, o, lag: Lagging(Square(f, a, o), lag / f), FREQUENCY, AMPLITUDE, OFFSET,
+              st.floats(0, 1)),
+)  # fmt: skip
+TIME = st.floats(0, 1e4)
+
+
+def steepest(drive: Command) -> float:
+    """Largest |dV1/dt| apart from jumps, V/s."""
+    if isinstance(drive, Sine):
+        return pi * drive.amplitude * drive.frequency
+    if isinstance(drive, Sawtooth):
+        rise = 1 / drive.frequency - drive.reset_time
+        return drive.amplitude / min(rise, drive.reset_time or rise)
+    return 0.0
+
+
+@given(drive=COMMANDS, t=TIME)
+@example(drive=Sawtooth(20.0, 8.0, -1.2), t=50.0)
+@example(drive=Sawtooth(0.1 + 0.2, 8.0, -1.2), t=1e4)
+def test_jumps_are_exact(drive: Command, t: float) -> None:
+    for _ in range(5):
+        jump = drive.next_jump(t)
+        assert jump > t
+        assert t < drive.next_corner(t) <= jump
+        if jump == inf:
+            return
+        left, right = nextafter(jump, -inf), nextafter(jump, inf)
+        old, new = drive.value_before(jump), drive.value(jump)
+        assert old != new
+        slack = 1e-9 + 4 * steepest(drive) * (right - left)
+        assert drive.value(left) == pytest.approx(old, abs=slack)
+        assert drive.value_before(left) == drive.value(left)
+        assert drive.value(right) == pytest.approx(new, abs=slack)
+        assert drive.value_before(right) == drive.value(right)
+        assert drive.next_jump(left) == jump
+        assert drive.next_jump(jump) > right
+        t = jump
+
+
+@given(drive=COMMANDS, t=TIME, share=st.floats(0, 1))
+def test_smooth_between_corners(drive: Command, t: float, share: float) -> None:
+    end = drive.next_corner(t)
+    end = min(end, t + 0.01)
+    late = min(t + share * (end - t), nextafter(end, -inf))
+    if isinstance(drive, Sawtooth):
+        middle = drive.value(0.5 * (t + late))
+        slack = 1e-9 + 1e-9 * steepest(drive) * t
+        mean = 0.5 * (drive.value(t) + drive.value(late))
+        assert middle == pytest.approx(mean, abs=slack)
+    elif isinstance(drive, Sine):
+        change = abs(drive.value(late) - drive.value(t))
+        assert change <= 1e-9 + steepest(drive) * (late - t) * 1.001
+    else:
+        assert drive.value(late) == drive.value(t)
+
+
+@given(drive=COMMANDS, times=st.lists(st.floats(-0.02, 0.02), max_size=9), ripple=st.booleans())
+def test_values_are_those_of_each_time(drive: Command, times: list[float], ripple: bool) -> None:
+    edge = drive.next_jump(0.0)
+    times += [t for t in (edge, nextafter(edge, -inf)) if t < 0.05]
+    made = WithPwm(drive) if ripple else drive
+    expected = [drive.value(t) for t in times]
+    assert made.values(times) == pytest.approx(expected, rel=1e-15, abs=1e-15)
+
+
+@given(drive=COMMANDS, t=TIME)
+def test_pins_make_the_command(drive: Command, t: float) -> None:
+    assert GAIN * (drive.v_offset - drive.v_dac(t)) == pytest.approx(drive.value(t), abs=1e-9)
+    before = GAIN * (drive.v_offset - drive.v_dac_before(t))
+    assert before == pytest.approx(drive.value_before(t), abs=1e-9)
+    assert drive.v_dac(t) >= -1e-9
+
+
+@pytest.mark.parametrize("frequency", [20.0, 50.8, 1 / 3, 21.37])
+def test_no_drift_after_many_periods(frequency: float) -> None:
+    drive = Sawtooth(frequency, 8.0, -1.2)
+    t = 0.0
+    for n in range(1, 2001):
+        t = drive.next_jump(t)
+        assert t == n / frequency
+    late = float(Fraction(100_000) / Fraction(frequency) + Fraction(1, 4) / Fraction(frequency))
+    assert drive.value(late) == pytest.approx(-3.2, abs=1e-6)

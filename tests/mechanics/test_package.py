@@ -1,0 +1,269 @@
+"""The FMU files as files: their table of variables, their bytes, and what stops a build."""
+
+import ctypes
+import hashlib
+import os
+import re
+import shutil
+import stat
+import subprocess
+import zipfile
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import fmpy
+import pytest
+from fmpy.validation import validate_fmu
+
+from cosim.errors import BadInput
+from cosim.files.resources import circuits, fmu_sources, licence
+from cosim.mechanics import package as fmu
+from cosim.toolchain.compiler import compiler
+
+ROW = re.compile(r'^(INT_)?(PARAMETER|INPUT|OUTPUT)\((\w+), (.*)"(.*)"\)$', re.MULTILINE)
+
+
+def table() -> list[dict[str, Any]]:
+    """variables.def, read by other means than the C compiler."""
+    rows = []
+    for integer, kind, name, fields, text in ROW.findall(
+        (fmu_sources() / "src" / "variables.def").read_text()
+    ):
+        values = [field.strip().strip('"') for field in fields.split(",") if field.strip()]
+        unit = None if integer else values.pop(0)
+        rows.append(
+            {"name": name, "causality": kind.lower(), "unit": unit, "text": text}
+            | dict(zip(("start", "min", "max"), map(float, values), strict=False))
+        )
+    return rows
+
+
+def description_xml(path: Path) -> ElementTree.Element:
+    with zipfile.ZipFile(path) as archive:
+        return ElementTree.fromstring(archive.read("modelDescription.xml"))
+
+
+@pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
+def version(request: pytest.FixtureRequest) -> int:
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    return fmu.build(out_dir=tmp_path_factory.mktemp("built"))
+
+
+@pytest.fixture
+def own_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the sources that a test may spoil."""
+    copy = tmp_path / "sources"
+    shutil.copytree(fmu_sources(), copy, ignore=shutil.ignore_patterns("build"))
+    monkeypatch.setattr(fmu, "fmu_sources", lambda: copy)
+    monkeypatch.setattr(fmu, "token", fmu.token.__wrapped__)
+    return copy
+
+
+def test_the_description_is_the_table(built: dict[int, Path], version: int) -> None:
+    description = fmpy.read_model_description(str(built[version]))
+    time, *variables = description.modelVariables
+    rows = table()
+    assert (time.name, time.causality, time.valueReference) == ("time", "independent", 0)
+    assert len(rows) > 50
+    assert [v.name for v in variables] == [row["name"] for row in rows]
+    for variable, row in zip(variables, rows, strict=True):
+        assert variable.causality == row["causality"]
+        assert variable.unit == row["unit"]
+        assert variable.description == row["text"]
+        for key in ("start", "min", "max"):
+            found = getattr(variable, key)
+            assert (None if found is None else float(found)) == row.get(key)
+        if row["causality"] == "parameter":
+            assert variable.variability == "fixed"
+    reals = [v.valueReference for v in variables if v.type in ("Real", "Float64")]
+    integers = [v.valueReference for v in variables if v.type in ("Integer", "Int32")]
+    assert reals == list(range(1, len(reals) + 1))
+    assert integers == list(range(1001, 1001 + len(integers)))
+
+
+# Bureau international des poids et mesures, The International System of Units, table 4.
+@pytest.mark.parametrize(
+    ("unit", "expected"),
+    [
+        ("N/A", {"kg": 1, "m": 1, "s": -2, "A": -1}),
+        ("N.s/m", {"kg": 1, "s": -1}),
+        ("V/s", {"kg": 1, "m": 2, "s": -4, "A": -1}),
+        ("J", {"kg": 1, "m": 2, "s": -2}),
+        ("1/m2", {"m": -2}),
+        ("1", {}),
+    ],
+)
+def test_units_are_si(built: dict[int, Path], version: int, unit: str, expected: dict) -> None:
+    description = fmpy.read_model_description(str(built[version]))
+    found = {u.name: u.baseUnit for u in description.unitDefinitions}[unit]
+    assert found is not None
+    bases = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+    assert {b: getattr(found, b) for b in bases if getattr(found, b)} == expected
+
+
+def test_abilities(built: dict[int, Path], version: int) -> None:
+    names = {
+        2: ["canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"],
+        3: ["canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"],
+    }
+    ability = description_xml(built[version]).find("CoSimulation")
+    assert ability is not None
+    assert ability.get("modelIdentifier") == "stickslip"
+    for name in ["canHandleVariableCommunicationStepSize", *names[version]]:
+        assert ability.get(name) == "true"
+    for name in ["needsExecutionTool", "canBeInstantiatedOnlyOncePerProcess"]:
+        assert ability.get(name) == "false"
+
+
+def test_the_same_sources_give_the_same_bytes(built: dict[int, Path], tmp_path: Path) -> None:
+    again = fmu.build(out_dir=tmp_path / "elsewhere")
+    for version, path in built.items():
+        assert again[version].read_bytes() == path.read_bytes()
+    leftovers = {path.name for path in (tmp_path / "elsewhere").iterdir()}
+    assert leftovers == {"stickslip-fmi2.fmu", "stickslip-fmi3.fmu"}
+
+
+def test_contents(built: dict[int, Path], version: int) -> None:
+    with zipfile.ZipFile(built[version]) as archive:
+        names = set(archive.namelist())
+        sources = {name.removeprefix("sources/") for name in names if name.startswith("sources/")}
+        text = archive.read("documentation/licenses/license.txt")
+    assert text == licence().read_bytes()
+    assert {"fmi2.c", "fmi3.c", "model.c", "variables.def", "token.h", "fmi2Functions.h"} <= sources
+    assert "describe.c" not in sources
+    assert ("buildDescription.xml" in sources) == (version == 3)
+    assert len([name for name in names if name.startswith("binaries/")]) == 1
+    if version == 3:
+        description = fmpy.read_model_description(str(built[version]))
+        listed = description.buildConfigurations[0].sourceFileSets[0].sourceFiles
+    else:
+        files = description_xml(built[version]).findall("CoSimulation/SourceFiles/File")
+        listed = [file.get("name") for file in files]
+    assert set(listed) == {name for name in sources if name.endswith(".c")}
+
+
+def test_the_sources_inside_build_by_themselves(
+    built: dict[int, Path], version: int, tmp_path: Path
+) -> None:
+    fmu.extract(built[version], tmp_path)
+    sources = tmp_path / "sources"
+    library = tmp_path / "own.so"
+    command = compiler()
+    files = sorted(str(path) for path in sources.glob("*.c"))
+    subprocess.run([*command, "-shared", "-fPIC", *files, "-lm", "-o", str(library)], check=True)
+    instantiate = ctypes.CDLL(str(library)).fmi2Instantiate
+    instantiate.restype = ctypes.c_void_p
+    arguments = (None, None, False, False)
+    assert instantiate(b"own", 1, fmu.token().encode(), *arguments)
+    assert not instantiate(b"own", 1, b"other", *arguments)
+
+
+def test_only_fmi_functions_are_exported(built: dict[int, Path], tmp_path: Path) -> None:
+    nm = shutil.which("nm")
+    if not nm or fmpy.system != "linux":
+        pytest.skip("needs nm on Linux")
+    fmu.extract(built[2], tmp_path)
+    library = next(tmp_path.glob("binaries/*/*"))
+    listing = subprocess.run(
+        [nm, "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True
+    )
+    names = {line.split()[-1] for line in listing.stdout.splitlines()}
+    assert {name for name in names if not name.startswith(("fmi2", "fmi3"))} == set()
+
+
+def test_what_is_up_to_date_is_left_alone(tmp_path: Path) -> None:
+    paths = fmu.build(out_dir=tmp_path)
+    before = {path: path.stat().st_mtime_ns for path in paths.values()}
+    fmu.build(out_dir=tmp_path)
+    assert {path: path.stat().st_mtime_ns for path in paths.values()} == before
+    digest = hashlib.sha256(paths[2].read_bytes()).digest()
+    paths[2].write_bytes(paths[2].read_bytes()[:1000])
+    fmu.build(out_dir=tmp_path)
+    assert hashlib.sha256(paths[2].read_bytes()).digest() == digest
+    fmu.build(force=True, out_dir=tmp_path)
+    assert hashlib.sha256(paths[2].read_bytes()).digest() == digest
+
+
+def test_changed_sources_are_another_fmu(own_sources: Path, tmp_path: Path) -> None:
+    before = fmu.token()
+    definition = own_sources / "src" / "variables.def"
+    text = definition.read_text()
+    odd = r"\"A\" < B & C > 'D'"
+    definition.write_text(text.replace("Mass of the ram", odd))
+    assert fmu.token() != before
+    for path in fmu.build(out_dir=tmp_path / "out").values():
+        assert validate_fmu(str(path)) == []
+        variables = fmpy.read_model_description(str(path)).modelVariables
+        description = {v.name: v.description for v in variables}["ram_mass"]
+        assert description == "\"A\" < B & C > 'D'"
+
+
+def test_an_unknown_unit_stops_the_build(own_sources: Path, tmp_path: Path) -> None:
+    definition = own_sources / "src" / "variables.def"
+    definition.write_text(definition.read_text().replace('"kg"', '"lb"'))
+    with pytest.raises(BadInput):
+        fmu.build(out_dir=tmp_path / "out")
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_a_missing_compiler_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(BadInput, match="No C compiler") as caught:
+        fmu.build(out_dir=tmp_path / "out")
+    assert caught.value.exit_code == 2
+    monkeypatch.setenv("CC", str(tmp_path / "none"))
+    with pytest.raises(BadInput, match="cannot be run"):
+        fmu.build(out_dir=tmp_path / "out")
+
+
+def test_the_compiler_is_that_of_cc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = tmp_path / "my cc"
+    script.write_text('#!/bin/sh\necho "x.c:1: error: not today" >&2\nexit 1\n')
+    script.chmod(script.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("CC", f"'{script}' -m64")
+    with pytest.raises(BadInput, match="not today"):
+        fmu.build(out_dir=tmp_path / "out")
+
+
+def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BadInput, match="Cannot write"):
+        fmu.build(out_dir=tmp_path / "file" / "out")
+
+
+def test_outside_a_checkout_the_cache_is_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if os.name != "posix" or fmpy.system != "linux":
+        pytest.skip("the place differs by system")
+    monkeypatch.setattr("cosim.toolchain.compiler.REPOSITORY", tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert fmu.build_directory() == tmp_path / "cache" / "cosim" / "fmu"
+    folder = fmu.unpacked(3)
+    assert folder.parent == tmp_path / "cache" / "cosim" / "fmu"
+    assert folder == fmu.unpacked(3)
+    assert (folder / "modelDescription.xml").is_file()
+
+
+@pytest.mark.parametrize("name", ["../out", "/out", "a/../../out", "C:/out", "a\\b"])
+def test_unsafe_archives_are_refused(tmp_path: Path, name: str) -> None:
+    archive = tmp_path / "bad.fmu"
+    with zipfile.ZipFile(archive, "w") as out:
+        info = zipfile.ZipInfo("x")
+        info.filename = name
+        out.writestr(info, b"")
+    with pytest.raises(BadInput, match="unsafe"):
+        fmu.extract(archive, tmp_path / "folder")
+
+
+def test_data_folders_are_found() -> None:
+    assert (fmu_sources() / "src" / "variables.def").is_file()
+    assert circuits().is_dir()

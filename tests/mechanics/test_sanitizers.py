@@ -1,0 +1,49 @@
+"""The FMU's C under the address and undefined-behaviour sanitizers, with a harness in C."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from cosim.files.resources import fmu_sources
+from cosim.mechanics import package as fmu
+from cosim.toolchain.compiler import COMPILE_FLAGS, compiler
+
+pytestmark = pytest.mark.reliability
+
+SANITIZE = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O1"]
+HARNESS = Path(__file__).with_name("fmu_harness.c")
+LEAK = "#include <stdlib.h>\nint main(void) { char *volatile p = malloc(9); p = 0; return !!p; }\n"
+
+
+def compile_with_sanitizers(sources: list[Path], program: Path) -> subprocess.CompletedProcess:
+    root = fmu_sources()
+    includes = [f"-I{root / 'include'}", f"-I{root / 'src'}", "-DFMU_TOKEN=harness"]
+    command = [*compiler(), *COMPILE_FLAGS, *SANITIZE, *includes, *map(str, sources)]
+    return subprocess.run([*command, "-o", str(program), "-lm"], capture_output=True, text=True)
+
+
+def run(program: Path, leaks: bool) -> subprocess.CompletedProcess:
+    options = f"detect_leaks={int(leaks)}:detect_stack_use_after_return=1"
+    environment = os.environ | {"ASAN_OPTIONS": options, "UBSAN_OPTIONS": "print_stacktrace=1"}
+    return subprocess.run([str(program)], capture_output=True, text=True, env=environment)
+
+
+@pytest.fixture(scope="module")
+def finds_leaks(tmp_path_factory: pytest.TempPathFactory) -> bool:
+    """Whether leaks are found on this machine; skips where the sanitizers are missing."""
+    folder = tmp_path_factory.mktemp("probe")
+    (folder / "leak.c").write_text(LEAK)
+    built = compile_with_sanitizers([folder / "leak.c"], folder / "leak")
+    if built.returncode or run(folder / "leak", leaks=False).returncode:
+        pytest.skip("this compiler's address and undefined-behaviour sanitizers do not work here")
+    return "LeakSanitizer: detected memory leaks" in run(folder / "leak", leaks=True).stderr
+
+
+def test_random_and_senseless_calls(finds_leaks: bool, tmp_path: Path) -> None:
+    built = compile_with_sanitizers([*fmu._sources(), HARNESS], tmp_path / "harness")
+    assert built.returncode == 0, built.stderr
+    assert "warning" not in built.stderr
+    done = run(tmp_path / "harness", finds_leaks)
+    assert done.returncode == 0, done.stderr[-4000:]

@@ -1,0 +1,414 @@
+"""Scenes: defaults, layers, overrides, knobs, and the way to text and back."""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cosim.errors import BadInput, NoEffect
+from cosim.scene import Key, Scene, keys, list_scenes, load, to_toml
+
+# The table of the design, written down once more: an accidental change of a default shows here.
+DEFAULTS: dict[str, dict[str, Any]] = {
+    "drive": {
+        "waveform": "sawtooth",
+        "frequency": 20,
+        "amplitude": 8.0,
+        "offset": -1.2,
+        "reset_time": 0,
+        "phase_deg": None,
+        "acceleration_max": 98.1,
+        "optimum": "up",
+        "velocity_amplitude": 0.1,
+        "file": None,
+        "quantised": False,
+        "loop_time": 0,
+        "pwm_ripple": False,
+        "pot_max": None,
+        "pot_frequency": None,
+        "pot_offset": None,
+    },
+    "circuit": {
+        "model": "amplifier",
+        "supply": 18,
+        "netlist": None,
+        "sense_resistance": 4,
+        "current_limit": 2.504,
+        "gain_bandwidth": 1e6,
+        "open_loop_gain": 98,
+        "slew_rate": 10e6,
+        "swing_loss_high": 4.0,
+        "swing_loss_low": 4.0,
+        "output_resistance": 0,
+        "snubber_resistance": None,
+        "snubber_capacitance": None,
+        "reltol": 1e-5,
+        "max_step": 5e-5,
+    },
+    "coil": {
+        "resistance": 7.1,
+        "inductance": 1.2e-3,
+        "eddy_inductance": None,
+        "eddy_resistance": None,
+        "force_factor": 0.6,
+        "b1": 0,
+        "b2": 0,
+        "count": 1,
+    },
+    "mechanics": {
+        "actuator": "ram",
+        "ram_mass": 0.004,
+        "surface_mass": 0.0145,
+        "part_mass": 0.009,
+        "flexure_stiffness": 560,
+        "flexure_damping": 0.84,
+        "suspension_k1": 40,
+        "suspension_k2": 0,
+        "suspension_k3": 1.5e7,
+        "suspension_damping": 0.02,
+        "travel": 1.9e-3,
+        "contact": "compliant",
+        "restitution": 0.75,
+        "contact_stiffness": 1e8,
+        "contact_damping": 0.38,
+        "n_surfaces": 1,
+        "gravity": 9.81,
+    },
+    "friction": {
+        "law": "coulomb",
+        "mu_s": 0.72,
+        "mu_k": 0.59,
+        "normal_force": 0.5,
+        "normal_force_file": None,
+        "mu_plate": 0,
+    },
+    "coupling": {"method": "step-locked", "macro_step": 1e-4, "order": 1, "tolerance": 1e-3},
+    "run": {"duration": 2.0, "settle": 1.0, "output_step": 5e-5, "tolerance": 1e-2},
+}
+
+
+def written(directory: Path, text: str, name: str = "mine.toml") -> Path:
+    path = directory / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_paper_is_the_defaults() -> None:
+    scene = load("paper")
+    assert {table: getattr(scene, table).model_dump() for table in DEFAULTS} == DEFAULTS
+    bare = {"name": scene.name, "description": scene.description}
+    assert scene == Scene.model_validate(bare)
+
+
+FILES = ("circuit.netlist", "drive.file", "friction.normal_force_file")
+
+
+def test_every_key_is_described() -> None:
+    assert {(key.table, key.name) for key in keys()} == {
+        (table, name) for table, names in DEFAULTS.items() for name in names
+    }
+    for key in keys():
+        assert key.text and "\n" not in key.text
+        assert key.default == DEFAULTS[key.table][key.name]
+        numeric = key.kind in (int, float)
+        assert bool(key.unit) == numeric, key.full
+        if numeric:
+            assert key.low is not None and key.high is not None and key.low < key.high
+            assert key.default is None or key.low <= float(key.default) <= key.high
+        else:
+            free = key.kind is bool or key.full in FILES
+            assert free or (key.choices and key.default in key.choices)
+
+
+def test_built_in_scenes() -> None:
+    scenes = dict(list_scenes())
+    assert next(iter(scenes)) == "paper"
+    assert set(scenes) == {
+        "paper", "paper-full", "paper-limited", "gripper", "ideal-current", "held",
+        "optimal", "quaid", "trial", "umbanhowar",
+        "direct-drive", "direct-drive-stops", "gripper-17g", "gripper-169g", "square",
+        "down-grip", "down-waveform", "closed-loop-grasp", "two-surfaces",
+        *(f"regime-{n:02}" for n in range(1, 11)),
+    }  # fmt: skip
+    for name, description in scenes.items():
+        scene = load(name)
+        assert (scene.name, scene.description) == (name, description)
+        assert description
+    assert load("paper-full").circuit.model == "full"
+    assert load("paper-limited").circuit.model == "limited"
+    assert load("ideal-current").circuit.model == "ideal"
+    assert load("held").circuit.model == "none"
+    gripper = load("gripper")
+    assert (gripper.coil.count, gripper.mechanics.n_surfaces) == (2, 2)
+    weight = gripper.mechanics.part_mass / 2 * gripper.mechanics.gravity
+    assert weight < gripper.friction.mu_s * gripper.friction.normal_force
+
+
+def test_staircase_is_the_default_of_the_full_circuit_only(tmp_path: Path) -> None:
+    assert load("paper-full").drive.quantised
+    assert load("paper", ["circuit.model=full"]).drive.quantised
+    assert not load("paper-full", ["circuit.model=amplifier"]).drive.quantised
+    assert not load("paper-full", ["drive.quantised=false"]).drive.quantised
+    assert load("paper", ["drive.quantised=true"]).drive.quantised
+    # where there is no staircase, none is assumed
+    assert not load("paper-full", ["drive.waveform=sine"]).drive.quantised
+    assert not load("paper-full", ["drive.reset_time=1e-3"]).drive.quantised
+    resolved = written(tmp_path, to_toml(load("paper", ["circuit.model=full"])))
+    assert load(resolved).drive.quantised
+
+
+def test_file_changes_only_its_keys(tmp_path: Path) -> None:
+    path = written(tmp_path, "[mechanics]\ntravel = 2e-3\n[coil]\nforce_factor = 1\n")
+    scene = load(str(path))
+    assert scene.name == "mine"
+    assert scene.mechanics.travel == 2e-3
+    assert scene.coil.force_factor == 1.0 and isinstance(scene.coil.force_factor, float)
+    assert scene.mechanics.model_copy(update={"travel": 1.9e-3}) == load("paper").mechanics
+
+
+def test_file_on_a_base(tmp_path: Path) -> None:
+    path = written(tmp_path, 'base = "gripper"\n[drive]\nfrequency = 30\n', "my scene.toml")
+    scene, gripper = load(path), load("gripper")
+    assert scene.name == "my-scene"
+    assert scene.description == ""
+    assert scene.drive.frequency == 30.0
+    assert scene.drive.amplitude == gripper.drive.amplitude
+    assert scene.mechanics == gripper.mechanics
+
+
+@pytest.mark.parametrize(
+    ("option", "table", "key", "value"),
+    [
+        ("run.duration=3", "run", "duration", 3.0),
+        ("run.duration = 3e0", "run", "duration", 3.0),
+        ("circuit.model=ideal", "circuit", "model", "ideal"),
+        ('circuit.model="ideal"', "circuit", "model", "ideal"),
+        ("mechanics.contact='rigid'", "mechanics", "contact", "rigid"),
+        ("drive.quantised=true", "drive", "quantised", True),
+        ("drive.offset=-0.5", "drive", "offset", -0.5),
+        ("coil.count=2", "coil", "count", 2),
+        ("mechanics.suspension_k3=1_000_000", "mechanics", "suspension_k3", 1e6),
+    ],
+)
+def test_override(option: str, table: str, key: str, value: object) -> None:
+    assert getattr(getattr(load("paper", [option]), table), key) == value
+
+
+def test_last_override_wins() -> None:
+    assert load("paper", ["run.duration=3", "run.duration=4"]).run.duration == 4.0
+
+
+def test_settle_is_half_of_the_duration_unless_given() -> None:
+    assert load("paper", ["run.duration=0.5"]).run.settle == 0.25
+    assert load("paper", ["run.duration=0.5", "run.settle=0.1"]).run.settle == 0.1
+
+
+def test_knobs_stand_for_values() -> None:
+    scene = load("paper", ["drive.pot_max=0.75", "drive.pot_frequency=0.5", "drive.pot_offset=0.3"])
+    # by hand: readings 768, 512 and 307 of 1024; 3.3 V full scale; 15/4.7 of gain
+    assert scene.drive.amplitude == pytest.approx(0.75 * 3.3 * 15 / 4.7)
+    assert scene.drive.frequency == 50.5
+    top = 307 / 1024 * 3.3 * 15 / 4.7
+    assert scene.drive.offset == pytest.approx(top - scene.drive.amplitude / 2)
+
+
+@pytest.mark.parametrize(
+    ("pot", "frequency"), [(0.0, 100.0), (0.25, 75.25), (0.9999, 1.0966796875), (1, 1.0966796875)]
+)
+def test_frequency_knob(pot: float, frequency: float) -> None:
+    assert load("paper", [f"drive.pot_frequency={pot}"]).drive.frequency == frequency
+
+
+def test_knob_and_value_replace_each_other_between_layers(tmp_path: Path) -> None:
+    path = written(tmp_path, "[drive]\npot_max = 0.5\n")
+    assert load(path).drive.amplitude == pytest.approx(5.266, abs=1e-3)
+    scene = load(path, ["drive.amplitude=3"])
+    assert (scene.drive.amplitude, scene.drive.pot_max) == (3.0, None)
+    with pytest.raises(BadInput, match=r"drive\.pot_max and drive\.amplitude"):
+        load("paper", ["drive.pot_max=0.5", "drive.amplitude=3"])
+
+
+def test_text_is_deterministic_and_complete() -> None:
+    text = to_toml(load("paper"))
+    assert text == to_toml(load("paper"))
+    for key in keys():
+        assert (f"\n{key.name} = " in text) == (key.default is not None), key.full
+        (line,) = (line for line in text.splitlines() if line.endswith(key.text))
+        assert line.startswith((f"{key.name} = ", f"# {key.name} =   # "))
+        assert key.unit in ("", "1") or f"  # {key.unit}; {key.text}" in line
+    assert "\nfrequency = 20.0  # Hz; Frequency; " in text
+
+
+def test_text_tells_what_a_knob_stands_for(tmp_path: Path) -> None:
+    scene = load("paper", ["drive.pot_max=0.7"])
+    text = to_toml(scene)
+    assert "\n# amplitude = 7.364112367021276  # V; Peak-to-peak voltage at V1\n" in text
+    assert "instead of amplitude; amplitude 7.364 V\n" in text
+    assert load(written(tmp_path, text, "paper.toml")) == scene.model_copy(update={"name": "paper"})
+
+
+@pytest.mark.parametrize("name", [name for name, _ in list_scenes()])
+def test_built_in_scenes_come_back(name: str, tmp_path: Path) -> None:
+    scene = load(name)
+    assert load(written(tmp_path, to_toml(scene))) == scene
+
+
+def _values(key: Key) -> st.SearchStrategy[Any]:
+    if key.choices:
+        return st.sampled_from(key.choices)
+    if key.kind is bool:
+        return st.booleans()
+    if key.kind is str:
+        return st.just("/somewhere/own.cir")
+    if key.kind is int:
+        return st.integers(int(key.low or 0), int(key.high or 0))
+    assert key.low is not None and key.high is not None
+    return st.floats(key.low, key.high)
+
+
+TEXT = st.text(st.characters(exclude_categories=["Cc", "Cs"]), max_size=50)
+SOME_KEYS = st.lists(st.sampled_from(keys()), max_size=6, unique=True)
+
+
+@settings(max_examples=150, deadline=None)
+@given(chosen=SOME_KEYS, description=TEXT, data=st.data())
+def test_any_scene_comes_back(chosen: list[Key], description: str, data: st.DataObject) -> None:
+    tables: dict[str, Any] = {"name": "any", "description": description}
+    for key in chosen:
+        tables.setdefault(key.table, {})[key.name] = data.draw(_values(key), label=key.full)
+    try:
+        scene = Scene.model_validate(tables)
+    except ValueError:
+        return  # values that do not go together
+    with tempfile.TemporaryDirectory() as directory:
+        assert load(written(Path(directory), to_toml(scene))) == scene
+    assert Scene.model_validate(scene.as_dict()) == scene
+
+
+def test_netlist_is_seen_from_the_file_that_names_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "deep").mkdir()
+    monkeypatch.chdir(tmp_path)
+    text = '[circuit]\nmodel = "file"\nnetlist = "my.cir"\n'
+    (tmp_path / "deep" / "rig.toml").write_text(text, encoding="utf-8")
+    assert load("deep/rig.toml").circuit.netlist == str(tmp_path / "deep" / "my.cir")
+    given = load("paper", ["circuit.model=file", "circuit.netlist=my.cir"])
+    assert given.circuit.netlist == str(tmp_path / "my.cir")
+
+
+OF_THE_LIMIT = 'it acts in "full", "limited" or "file".'
+ALL_BUT_NONE = 'it acts in "full", "amplifier", "limited", "ideal" or "file".'
+
+
+@pytest.mark.parametrize(
+    ("scene", "change", "why"),
+    [
+        ("paper", "circuit.current_limit=3", f'circuit.model = "amplifier"; {OF_THE_LIMIT}'),
+        ("paper-full", "circuit.swing_loss_low=3", 'it acts in "amplifier", "limited" or "file".'),
+        (
+            "ideal-current",
+            "circuit.supply=3",
+            'it acts in "full", "amplifier", "limited" or "file".',
+        ),
+        ("paper-limited", "circuit.slew_rate=1e5", 'it acts in "full", "amplifier" or "file".'),
+        ("paper-limited", "circuit.gain_bandwidth=1e5", 'in "full", "amplifier" or "file".'),
+        ("ideal-current", "circuit.reltol=1e-4", 'it acts in "full", "amplifier" or "file".'),
+        ("held", "circuit.sense_resistance=5", f'circuit.model = "none"; {ALL_BUT_NONE}'),
+        ("held", "coil.resistance=5", f'circuit.model = "none"; {ALL_BUT_NONE}'),
+        ("held", "drive.frequency=30", f'drive.waveform = "sawtooth"; {ALL_BUT_NONE}'),
+        ("optimal", "drive.amplitude=3", f'drive.waveform = "optimal"; {ALL_BUT_NONE}'),
+        ("quaid", "drive.velocity_amplitude=3", 'in "none" with drive.waveform = "sine".'),
+        ("paper", "drive.acceleration_max=3", 'drive.waveform = "optimal" or "quaid".'),
+    ],
+)
+def test_keys_of_no_effect_are_told(tmp_path: Path, scene: str, change: str, why: str) -> None:
+    full, _, value = change.partition("=")
+    table, _, key = full.partition(".")
+    path = written(tmp_path, f'base = "{scene}"\n[{table}]\n{key} = {value}\n')
+    for source, options, origin in ((scene, [change], "--set"), (path, [], str(path))):
+        with pytest.warns(NoEffect) as caught:
+            load(source, options)
+        (said,) = [str(warning.message) for warning in caught]
+        assert said.startswith(f"{origin}: {full} has no effect with circuit.model = ")
+        assert said.endswith(why)
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes"),
+    [
+        ("paper", ["circuit.current_limit=2.504"]),  # changes nothing
+        ("paper", ["circuit.model=full", "circuit.current_limit=3"]),
+        ("paper-limited", ["circuit.current_limit=3", "circuit.supply=20", "coil.resistance=6"]),
+        ("ideal-current", ["circuit.sense_resistance=5", "coil.inductance=1e-3"]),
+        ("gripper", ["circuit.model=none"]),  # the base's own keys
+        ("held", ["drive.waveform=sine", "drive.frequency=3", "drive.velocity_amplitude=0.2"]),
+        ("optimal", ["drive.optimum=down", "drive.acceleration_max=50"]),
+        ("trial", ["drive.file=trial.csv"]),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_keys_of_use_are_not_told(tmp_path: Path, scene: str, changes: list[str]) -> None:
+    resolved = written(tmp_path, to_toml(load(scene, changes)), "resolved.toml")
+    for model in ("full", "amplifier", "limited", "ideal", "none"):
+        waveform = load(resolved).drive.waveform
+        if model != "none" and waveform != "sawtooth":
+            continue
+        assert load(resolved, [f"circuit.model={model}"]).circuit.model == model
+
+
+def test_swing_losses_bound_the_supply_only_where_they_act() -> None:
+    assert load("paper-full", ["circuit.supply=3"]).circuit.supply == 3
+    for scene in ("paper", "paper-limited"):
+        with pytest.raises(BadInput, match=r"swing_loss_high = 4 V must be below"):
+            load(scene, ["circuit.supply=3"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        (["coil.inductance=1e-5"], "coil.inductance = 1e-05 H must be at least 1.11e-05 H"),
+        (
+            ["coil.eddy_inductance=1e-6", "coil.eddy_resistance=5"],
+            "coil.eddy_inductance = 1e-06 H must be at least 5e-06 H",
+        ),
+        (
+            ["coil.eddy_inductance=1e-2", "coil.eddy_resistance=2000"],
+            "coil.inductance = 0.0012 H must be at least 0.00201 H",
+        ),
+    ],
+)
+def test_a_coil_too_fast_to_solve_with_the_mechanics_is_refused(
+    changes: list[str], why: str
+) -> None:
+    load("paper", changes)
+    with pytest.raises(BadInput) as caught:
+        load("paper-limited", changes)
+    assert f'--set: {why} with circuit.model = "limited"' in str(caught.value)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_file_of_ones_own_runs_with_another_circuit_on_top(tmp_path: Path) -> None:
+    text = '[circuit]\nmodel = "full"\ncurrent_limit = 3\n[drive]\nfrequency = 30\n'
+    path = written(tmp_path, text)
+    for model in ("amplifier", "limited", "ideal", "none"):
+        assert load(path, [f"circuit.model={model}"]).circuit.current_limit == 3
+
+
+def test_scenes_are_frozen() -> None:
+    with pytest.raises(ValueError):
+        load("paper").run.duration = 3.0  # type: ignore[misc]
+
+
+def test_nothing_heavy_is_imported() -> None:
+    code = (
+        "import sys, cosim.scene, cosim.drive.command\n"
+        "print(*{'matplotlib', 'scipy', 'fmpy', 'PySpice'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""

@@ -1,0 +1,225 @@
+"""No failure of a netlist, of ngspice or of PySpice passes as a result.
+
+Each case: what is injected, what the reader is told (one sentence, with the netlist's line where it
+is known), with which exit code. After each, a good run in the same process gives what it gave
+before.
+"""
+
+import itertools
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.circuit import ngspice
+from cosim.coupling.loop import run, step_locked
+from cosim.errors import BadInput, CosimError, SimulationFailed
+from cosim.files.resources import circuits
+from cosim.scene import load
+from cosim.simulation.simulate import simulate
+from cosim.toolchain import isolation
+
+pytestmark = pytest.mark.reliability
+
+SHORT = ["run.duration=0.01", "run.settle=0.005"]
+AMPLIFIER = (circuits() / "amplifier.cir").read_text(encoding="utf-8")
+
+
+def good_run() -> np.ndarray:
+    return simulate(load("paper", SHORT)).waveforms["z_part"]
+
+
+@pytest.fixture(scope="module")
+def before() -> np.ndarray:
+    return good_run()
+
+
+def edited(old: str, new: str) -> str:
+    assert old in AMPLIFIER, old
+    return AMPLIFIER.replace(old, new)
+
+
+SENSE = "Rsense sense 0 {sense_resistance}"
+NETLISTS = {
+    "undefined parameter": (edited(SENSE, "Rsense sense 0 {lost}"), r"own\.cir:\d+: .*lost"),
+    "unknown model": (edited(SENSE, f"{SENSE}\nD1 out 0 nomodel"), r"own\.cir:\d+: .*nomodel"),
+    "unknown subcircuit": (edited(SENSE, f"{SENSE}\nX1 out 0 nosub"), r"own\.cir:\d+: .*nosub"),
+    "missing include": (edited(SENSE, f"{SENSE}\n.include gone.lib"), r"own\.cir:\d+: .*gone\.lib"),
+    "resistor without value": (edited(SENSE, "Rsense sense 0"), r"own\.cir:\d+: .*rsense"),
+    "floating node": (edited(SENSE, f"{SENSE}\nC9 out adrift 1u\nC8 adrift 0 1u"), r"adrift"),
+    "no source of the back-EMF": (edited("Vemf c3 sense 0", "R9 c3 sense 1m"), r"Vemf"),
+    "no source of the command": (edited("Vcommand v1 0", "Vother v1 0"), r"Vcommand"),
+    "truncated in a bracket": (AMPLIFIER[: AMPLIFIER.index("{1e-3*slew}") + 5], r"own\.cir"),
+    "truncated in a subcircuit": (edited("\n.end", "\n.subckt cut a b\nR1 a b 1\n.end"), r"\.ends"),
+    "back-EMF the wrong way round": (edited("Vemf c3 sense", "Vemf sense c3"), r"in series with"),
+    "back-EMF beside the coil": (
+        edited("Vemf c3 sense 0", "R9 c3 sense 1m\nR8 x8 0 1k\nVemf x8 0 0"),
+        r"in series with",
+    ),
+    "a coil of the netlist's own": (edited("{coil_resistance/count}", "5"), r"coil_resistance"),
+    "command in the netlist": (
+        edited(SENSE, f"{SENSE}\n.control\nshell touch marker\n.endc"),
+        r"own\.cir:\d+: .*control",
+    ),
+}  # fmt: skip
+
+SIMULATIONS = {
+    "no step succeeds": (
+        edited(SENSE, f"{SENSE}\nB9 x 0 V=time>1m ? (V(x)>0.5 ? 0 : 1) : 0\nR9 x 0 1"),
+        r"stopped at t = 0\.00[01]\d*.*s of 0\.01 s|range of numbers|hangs",
+    ),
+}
+
+
+def own(tmp_path: Path, text: str) -> list[str]:
+    path = tmp_path / "own.cir"
+    path.write_text(text, encoding="utf-8")
+    return ["circuit.model=file", f"circuit.netlist={path}", *SHORT]
+
+
+@pytest.mark.parametrize("name", NETLISTS)
+def test_bad_netlist(name: str, tmp_path: Path, before: np.ndarray) -> None:
+    text, told = NETLISTS[name]
+    with pytest.raises(BadInput, match=rf"(?i){told}") as caught:
+        simulate(load("paper", own(tmp_path, text)))
+    assert caught.value.exit_code == 2
+    assert "\n" not in str(caught.value)
+    assert np.array_equal(good_run(), before)
+
+
+@pytest.mark.parametrize("name", SIMULATIONS)
+def test_failing_circuit(name: str, tmp_path: Path, before: np.ndarray) -> None:
+    text, told = SIMULATIONS[name]
+    with pytest.raises(SimulationFailed, match=told) as caught:
+        simulate(load("paper", own(tmp_path, text)))
+    assert caught.value.exit_code == 3
+    assert np.array_equal(good_run(), before)
+
+
+@pytest.mark.parametrize("harm", ["os._exit(7)", "os.kill(os.getpid(), 11)", "time.sleep(60)"])
+def test_dying_or_hanging_process(harm: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(isolation, "PATIENCE", 5.0)
+    told = {"o": r"died.*(exit code 7|SIGSEGV)", "t": r"hangs"}[harm[0]]
+    with pytest.raises(SimulationFailed, match=told):
+        isolation.isolated(_harmful, harm, lambda _: None)
+
+
+def _harmful(harm: str, progress: object) -> None:
+    import time  # noqa: F401 (harm may use it)
+
+    exec(harm)
+
+
+def test_spoilt_library_is_left_behind(before: np.ndarray) -> None:
+    # In a process of its own, since nothing else can run in it afterwards.
+    after = isolation.isolated(_spoil_and_run, None, lambda _: None)
+    assert np.array_equal(after, before)
+
+
+def _spoil_and_run(nothing: None, progress: object) -> np.ndarray:
+    deck = "spoilt\nV1 a 0 1\nR1 a 0 {nothing}\n.tran 1u 1m\n.end"
+    ngspice.engine().run_transient(deck, ("v(a)",), _Nobody())
+    assert ngspice.spoilt()
+    return good_run()
+
+
+class _Nobody:
+    def source(self, name: str) -> Callable[[float], float]:
+        raise AssertionError(name)
+
+    def attempted(self) -> None: ...
+
+    def accepted(self, time: float, values: object, next_step: float) -> float:
+        return next_step
+
+
+@pytest.mark.parametrize("failure", [ValueError("a fault"), KeyboardInterrupt()])
+@pytest.mark.parametrize(
+    "owner, name",
+    [(step_locked.StepLocked, "back_emf"), (run.CircuitRun, "accepted")],
+    ids=["in a source", "after a step"],
+)
+def test_exception_in_a_callback(
+    owner: type,
+    name: str,
+    failure: BaseException,
+    monkeypatch: pytest.MonkeyPatch,
+    before: np.ndarray,
+) -> None:
+    original = getattr(owner, name)
+    calls = itertools.count()
+
+    def fail(*arguments: object) -> float:
+        if next(calls) > 100:
+            raise failure
+        return original(*arguments)
+
+    monkeypatch.setattr(owner, name, fail)
+    with pytest.raises(type(failure)):
+        simulate(load("paper", SHORT), compiled=False)
+    monkeypatch.undo()
+    assert np.array_equal(good_run(), before)
+
+
+def test_not_a_number_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndarray) -> None:
+    original = run.CircuitRun.accepted
+    monkeypatch.setattr(
+        run.CircuitRun,
+        "accepted",
+        lambda self, t, values, step: original(self, t, [np.nan, *values[1:]], step),
+    )
+    with pytest.raises(SimulationFailed, match="range of numbers"):
+        simulate(load("paper", SHORT), compiled=False)
+    monkeypatch.undo()
+    assert np.array_equal(good_run(), before)
+
+
+def test_early_end_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndarray) -> None:
+    original = run.prepare
+
+    def shortened(scene: object) -> object:
+        deck, saved = original(scene)  # pyright: ignore[reportArgumentType]
+        return deck.replace(" 0.01 0 ", " 0.004 0 "), saved
+
+    monkeypatch.setattr(run, "prepare", shortened)
+    with pytest.raises(SimulationFailed, match=r"stopped at t = 0\.004 s of 0\.01 s"):
+        simulate(load("paper", SHORT))
+    monkeypatch.undo()
+    assert np.array_equal(good_run(), before)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        edited("Rcoil out c1", "Rcoil out error_amp").replace("Lcoil c1", "Lcoil error_amp"),
+        edited(SENSE, f"{SENSE}\nV8 aborted 0 1\nR8 aborted 0 1k"),
+    ],
+    ids=["a node called error_amp", "a node called aborted"],
+)
+def test_false_alarms_do_not_fail_a_run(text: str, tmp_path: Path, before: np.ndarray) -> None:
+    as_built_in = "circuit.max_step=5e-5"  # which a netlist of one's own has finer
+    result = simulate(load("paper", [*own(tmp_path, text), as_built_in]))
+    assert np.allclose(result.waveforms["z_part"], before, rtol=0, atol=1e-9)
+
+
+def test_startup_file_in_the_working_folder_is_not_run(tmp_path: Path) -> None:
+    # Read when the library starts: hence in a fresh process.
+    marker = tmp_path / "marker"
+    (tmp_path / ".spiceinit").write_text(f"shell touch {marker}\n", encoding="utf-8")
+    here = Path.cwd()
+    os.chdir(tmp_path)
+    try:
+        isolation.isolated(_run_scene, ["paper", SHORT], lambda _: None)
+    finally:
+        os.chdir(here)
+    assert not marker.exists()
+
+
+def _run_scene(arguments: list, progress: object) -> None:
+    simulate(load(arguments[0], arguments[1]))
+
+
+def test_every_failure_is_one_of_ours() -> None:
+    assert issubclass(BadInput, CosimError) and issubclass(SimulationFailed, CosimError)

@@ -1,0 +1,47 @@
+"""Many runs in one process: equal to the bit, and without a leak."""
+
+import gc
+
+import numpy as np
+import pytest
+
+from cosim.scene import load
+from cosim.simulation.simulate import simulate
+
+pytestmark = pytest.mark.reliability
+
+MIXED = [
+    load("ideal-current", ["run.duration=0.02"]),
+    load("paper", ["run.duration=0.004", "run.output_step=1e-4"]),
+    load("paper-full", ["run.duration=0.001", "run.output_step=1e-4"]),
+    load("gripper", ["run.duration=0.004", "mechanics.contact=rigid"]),
+]
+
+
+def resident() -> float:
+    """Memory of this process, MB."""
+    with open("/proc/self/status", encoding="ascii") as status:
+        line = next(line for line in status if line.startswith("VmRSS"))
+    return int(line.split()[1]) / 1024
+
+
+def run_all() -> list[np.ndarray]:
+    return [np.column_stack(list(simulate(scene).waveforms.values())) for scene in MIXED]
+
+
+@pytest.mark.parametrize("rounds", [10, pytest.param(125, marks=pytest.mark.slow)])
+def test_mixed_runs(rounds: int) -> None:
+    first = run_all()
+    for _ in range(3):  # libraries loaded, caches and the allocator's arenas filled
+        run_all()
+    gc.collect()
+    try:
+        before = resident()
+    except FileNotFoundError:
+        before = None
+    for _ in range(rounds):
+        for again, known in zip(run_all(), first, strict=True):
+            assert again.tobytes() == known.tobytes()
+    gc.collect()
+    if before is not None:
+        assert resident() - before < 20.0

@@ -1,0 +1,128 @@
+"""The memory of a run does not grow with its duration, where it ends up on disk.
+
+Counted is all that is in RAM at a time, mapped files included.
+"""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.coupling.loop import recorder, run
+from cosim.files import spill as tape
+from cosim.scene import load
+from cosim.simulation import simulate
+from cosim.studies.bench.memory import peak
+from cosim.waveforms.storage import csv_content, netcdf_content
+
+pytestmark = pytest.mark.reliability
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")
+@pytest.mark.parametrize(
+    ("model", "durations", "rows"),
+    [
+        ("ideal", (4, 40), 5e-5),
+        pytest.param("limited", (20, 200), 5e-5, marks=pytest.mark.slow),
+        pytest.param("amplifier", (10, 100), 5e-5, marks=pytest.mark.slow),
+        ("amplifier", (2, 30), 5e-4),
+    ],
+)
+def test_memory_is_bounded(model: str, durations: tuple[float, float], rows: float) -> None:
+    settings = (f"circuit.model={model}", f"run.output_step={rows}")
+    short, long = (peak(*settings, f"run.duration={duration}") for duration in durations)
+    # All rows, or all points of the circuit, take 50 MiB more and their copies as much again.
+    assert long - short < 30.0, f"{short:.1f} MiB for {durations[0]} s, {long:.1f} MiB for more"
+
+
+CASES = {
+    "amplifier": ("paper", ["run.duration=0.2"]),
+    "ideal, with eddy currents": (
+        "ideal-current",
+        ["run.duration=0.2", "coil.eddy_inductance=1e-3", "coil.eddy_resistance=4"],
+    ),
+    "limited": ("paper", ["circuit.model=limited", "run.duration=0.2"]),
+    "full": ("paper-full", ["run.duration=0.02"]),
+    "two surfaces": ("two-surfaces", ["run.duration=0.1"]),
+    "changing grip": ("closed-loop-grasp", ["run.duration=0.1", "run.output_step=1.7e-4"]),
+    "many frames to a row": ("ideal-current", ["run.duration=0.5", "run.output_step=0.04"]),
+}
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("name", CASES)
+def test_blocks_and_disk_change_nothing(
+    name: str, compiled: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = load(*CASES[name])
+    whole = simulate.simulate(scene, compiled=compiled)
+    monkeypatch.setattr(tape, "IN_MEMORY", 0)
+    monkeypatch.setattr(tape, "BLOCK", 97)
+    monkeypatch.setattr(recorder, "ENTRIES", 50)
+    monkeypatch.setattr(simulate, "_INTERVALS", 3)
+    monkeypatch.setattr(run, "_POINTS", 11)
+    with tape.on_disk_in(tmp_path):
+        parts = simulate.simulate(scene, compiled=compiled)
+    assert not os.listdir(tmp_path)
+    assert list(parts.waveforms) == list(whole.waveforms)
+    for column, values in whole.waveforms.items():
+        assert values.tobytes() == parts.waveforms[column].tobytes(), column
+    for key, value in whole.summary.items():
+        if key == "energy_residual":  # the difference of numbers that are nearly one
+            assert parts.summary[key] == pytest.approx(value, abs=1e-12)
+        elif isinstance(value, float) and key != "wall_time":
+            assert parts.summary[key] == pytest.approx(value, rel=1e-12), key
+        elif key != "wall_time":
+            assert parts.summary[key] == value, key
+
+
+def test_files_are_those_of_other_writers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bytes of scipy's netCDF and of numpy's CSV."""
+    from io import BytesIO
+
+    from scipy.io import netcdf_file
+
+    monkeypatch.setattr(tape, "BLOCK", 100)
+    random = np.random.default_rng(1)
+    time_ = np.arange(2345) * 5e-5
+    waves = {"time": time_, "z": random.normal(size=2345) * 1e-9, "sticking": np.round(time_)}
+    units = {"time": "s", "z": "m", "sticking": "1"}
+    about = {"title": "fünf", "scene": "a = 1\nb = 2\n"}
+    content = BytesIO()
+    with netcdf_file(content, "w", version=2) as file:
+        for name, text in about.items():
+            setattr(file, name, text.encode())
+        file.createDimension("time", len(time_))
+        for name, values in waves.items():
+            variable = file.createVariable(name, "f8", ("time",))
+            variable[:] = values
+            variable.units = units[name]
+        file.flush()
+        assert netcdf_content(waves, units, about) == content.getvalue()
+    table = BytesIO()
+    header = "time [s],z [m],sticking [1]"
+    np.savetxt(
+        table, np.column_stack(list(waves.values())), "%.10g", ",", header=header, comments=""
+    )
+    assert csv_content(waves, units) == table.getvalue()
+
+
+def test_disk_that_takes_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A full disk is told in one sentence, and is not met as a signal or a half-known run."""
+    from cosim.errors import BadInput
+
+    monkeypatch.setattr(tape, "IN_MEMORY", 0)
+
+    class Full:
+        def write(self, content: bytes) -> int:
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(tape.tempfile, "TemporaryFile", lambda **_: Full())
+    for name in ("paper", "ideal-current"):
+        for compiled in (True, False):
+            with (
+                tape.on_disk_in(tmp_path),
+                pytest.raises(BadInput, match=r"cannot hold the waveforms .*No space left"),
+            ):
+                simulate.simulate(load(name, ["run.duration=0.1"]), compiled=compiled)

@@ -1,0 +1,30 @@
+"""Where single paths cannot be compared, the statistics of ensembles can."""
+
+from collections.abc import Sequence
+
+import pytest
+
+from cosim.studies.accuracy.chaos import CHAOTIC, METHODS, SCENE, ensemble, growth
+
+pytestmark = pytest.mark.physics
+
+
+def test_a_chaotic_scene_is_told_from_one_that_is_not() -> None:
+    assert growth(SCENE) > CHAOTIC > growth(())
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        ("circuit.reltol=3e-6",),
+        pytest.param(METHODS["mean current, 0.2 ms"], marks=pytest.mark.slow),
+    ],
+)
+def test_methods_agree_in_what_an_ensemble_leaves_certain(other: Sequence[str]) -> None:
+    """And a coil a third weaker does not: the spread does not hide everything."""
+    default = ensemble("default", SCENE, (), 6)
+    assert max(default.values["v_average"]) > min(default.values["v_average"])
+    same = ensemble("same", SCENE, other, 6)
+    weaker = ensemble("weaker", SCENE, ("coil.force_factor=0.4",), 6)
+    assert default.apart(same, "stick_fraction") < 5.0
+    assert default.apart(weaker, "stick_fraction") > 5.0

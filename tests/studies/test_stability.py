@@ -1,0 +1,32 @@
+"""The stability study: predicted from the linear map, observed with the FMU."""
+
+import pytest
+
+from cosim.studies.stability.machines import DIRECT, PAPER
+from cosim.studies.stability.stability import LONGEST, Regime, observed, predicted
+
+pytestmark = pytest.mark.physics
+
+
+@pytest.mark.parametrize(
+    ("method", "regime"),
+    [
+        ("Jacobi k = 0", Regime(DIRECT, "saturated")),
+        ("Gauss-Seidel k = 1", Regime(DIRECT, "saturated")),
+        ("EMF's slope, linear current", Regime(PAPER, "saturated", slips=True)),
+        ("EMF's slope, linear current", Regime(PAPER, "saturated", cut="coil in mechanics")),
+    ],
+)
+def test_prediction_and_observation_agree(method: str, regime: Regime) -> None:
+    expected = predicted(method, regime)
+    assert observed(method, regime, expected) == pytest.approx(expected, rel=0.1)
+
+
+def test_explicit_coupling_of_the_direct_drive_fails_at_a_millisecond_and_the_companion_not() -> (
+    None
+):
+    regime = Regime(DIRECT, "saturated")
+    assert predicted("Jacobi k = 0", regime) < 1e-3
+    explicit = predicted("Gauss-Seidel k = 1", regime)
+    assert explicit < 1.5e-3
+    assert observed("companion", regime, LONGEST) >= 10.0 * explicit

@@ -1,0 +1,236 @@
+"""Sweeps: what they find, what they make of points that fail, and where they run."""
+
+import os
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import pytest
+
+from cosim.cli.main import main
+from cosim.errors import BadInput
+from cosim.scene import load
+from cosim.simulation.simulate import simulate
+from cosim.studies.sweep import Design, grid, sample, sweep
+from cosim.studies.sweep.dataset import read
+from cosim.studies.sweep.point import Outcome, evaluate
+from cosim.studies.sweep.pool import Pool
+
+SHORT = ["run.duration=0.1", "run.settle=0.05"]
+# Fourteen impacts a millisecond by a ram of nothing: the mechanics give up.
+TOO_FAST = ["coil.force_factor=1000", "mechanics.ram_mass=1e-9"]
+
+
+def test_closed_form(tmp_path: Path) -> None:
+    """The paper's optimal waveform at A = 10: v/(g T) over f_n, from its closed form."""
+    table = {2.0: 0.0563076923, 3.0: 0.1832899408, 5.0: 0.3106508876, 8.0: 0.3245602811}
+    scene = load("optimal", ["friction.mu_s=0.7", "friction.mu_k=0.6"])
+    g, mass = scene.mechanics.gravity, scene.mechanics.part_mass
+    forces = [ratio * mass * g for ratio in table]
+    data = sweep(scene, grid({"friction.normal_force": forces}), tmp_path, workers=2)
+    found = data["v_average"].values * scene.drive.frequency / g
+    # As the surface is given per force, the drive's optimum follows the force.
+    assert found == pytest.approx(list(table.values()), rel=1e-6)
+    assert data["friction.normal_force"].attrs["units"] == "N"
+    assert data["v_average"].attrs["units"] == "m/s"
+
+
+def test_agrees_with_single_runs(tmp_path: Path) -> None:
+    design = grid({"drive.amplitude": [6.0, 8.0], "drive.offset": [-1.5, -1.0, -0.5]})
+    scene = load("ideal-current", SHORT)
+    data = sweep(scene, design, tmp_path, workers=2)
+    assert data.sizes == {"drive.amplitude": 2, "drive.offset": 3}
+    for amplitude in (6.0, 8.0):
+        for offset in (-1.5, -1.0, -0.5):
+            values = {"drive.amplitude": amplitude, "drive.offset": offset}
+            point = data.sel(values)
+            alone = simulate(
+                load("ideal-current", [*SHORT, *(f"{k}={v}" for k, v in values.items())])
+            ).summary
+            for name in ("v_average", "stick_fraction", "a_camera_max", "energy_in"):
+                assert float(point[name]) == pytest.approx(alone[name], rel=1e-6, abs=1e-12)
+            assert int(point["impacts"]) == alone["impacts"]
+
+
+def test_read_by_others(tmp_path: Path) -> None:
+    """The netCDF library, which this project does not write with, reads the same."""
+    design = grid({"drive.frequency": [10.0, 20.0], "drive.amplitude": [3.0, 99.0]})
+    scene = load("ideal-current", [*SHORT, "drive.quantised=true"])
+    data = sweep(scene, design, tmp_path, workers=1)
+    with netCDF4.Dataset(tmp_path / "sweep.nc") as file:
+        assert file["v_average"].dimensions == ("drive.frequency", "drive.amplitude")
+        assert file["v_average"].units == "m/s" and file["drive.frequency"].units == "Hz"
+        np.testing.assert_array_equal(file["v_average"][:].filled(np.nan), data["v_average"])
+        assert file["failure"][:].tolist() == data["failure"].values.tolist()
+    assert np.isnan(data["v_average"].sel({"drive.amplitude": 99.0})).all()
+    assert "drive.amplitude = 99" in str(data["failure"].values[0, 1])
+    assert read(tmp_path / "sweep.nc").identical(data)
+
+
+def test_frequencies_last_whole_periods() -> None:
+    base = load("ideal-current", ["run.duration=0.5", "run.settle=0.25"])
+    broken = evaluate(base, {"drive.frequency": 14.0}, False).numbers["v_average"]
+    whole = evaluate(base, {"drive.frequency": 14.0}, True).numbers["v_average"]
+    # Seven whole periods of 1/14 s, written out by hand.
+    known: Any = simulate(
+        load(
+            "ideal-current",
+            [f"run.duration={8 / 14}", f"run.settle={4 / 14}", "drive.frequency=14"],
+        )
+    ).summary["v_average"]
+    assert whole == pytest.approx(known, rel=1e-9)
+    assert abs(broken - known) > 1e-3 * abs(known)
+
+
+def test_failures_cost_only_themselves(tmp_path: Path) -> None:
+    """Scenes that cannot be, mechanics that give up and a circuit without a solution."""
+    netlist = tmp_path / "floating.cir"
+    good = Path("circuits/examples/h_bridge.cir").resolve()
+    text = good.read_text(encoding="utf-8")
+    netlist.write_text(text.replace("\n.end", "\nBno nowhere 0 I = v(nowhere)**2 + 1\n.end"))
+    for source, over, lost in (
+        (["circuit.model=ideal", *SHORT, TOO_FAST[0]], {"mechanics.ram_mass": [0.004, 1e-9]}, 1),
+        (["circuit.model=ideal", *SHORT], {"friction.mu_k": [0.5, 0.9]}, 1),
+    ):
+        data = sweep(
+            load("paper", source),
+            grid(over),
+            tmp_path / str(lost) / str(len(over)) / next(iter(over)),
+            workers=1,
+        )
+        assert data["failure"].values.tolist()[0] == ""
+        assert data["failure"].values.tolist()[lost] != ""
+        assert np.isfinite(data["v_average"].values[0]) and np.isnan(data["v_average"].values[lost])
+    scene = load("paper", ["circuit.model=file", f"circuit.netlist={netlist}", *SHORT])
+    data = sweep(scene, grid({"drive.offset": [-1.2]}), tmp_path / "circuit", workers=1)
+    assert str(data["failure"].values[0]) != ""
+
+
+def test_worker_that_keeps_dying() -> None:
+    """A point whose worker dies again and again is a failure; the others do not notice."""
+    scene = load("ideal-current", SHORT)
+    points = [
+        (0, {"run.duration": 2000.0}),
+        *((k, {"drive.offset": -0.1 * k}) for k in range(1, 6)),
+    ]
+    with Pool(scene, 1) as pool:
+        outcomes: dict[int, Outcome] = {}
+
+        def kill() -> None:
+            while 0 not in outcomes:
+                for worker in list(pool._workers):
+                    if worker.began and worker.point is not None and worker.point[0] == 0:
+                        worker.process.kill()
+                time.sleep(0.05)
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        for number, outcome in pool.run(points):
+            outcomes[number] = outcome
+        killer.join()
+    assert outcomes[0].failure == "The worker process died (SIGKILL)."
+    for number, values in points[1:]:
+        assert outcomes[number] == evaluate(scene, values, False)
+
+
+def test_dask(tmp_path: Path) -> None:
+    from distributed import LocalCluster
+
+    design = sample({"drive.offset": [-2.0, 0.0], "drive.frequency": [15.0, 40.0]}, 12, 3, False)
+    scene = load("ideal-current", SHORT)
+    here = sweep(scene, design, tmp_path / "here", workers=2)
+    running: Any = LocalCluster(
+        n_workers=2, threads_per_worker=2, dashboard_address="", host="127.0.0.1"
+    )
+    with running as cluster:
+        there = sweep(scene, design, tmp_path / "there", dask=cluster.scheduler_address)
+    assert there.identical(here)
+    assert (tmp_path / "there/sweep.nc").read_bytes() == (tmp_path / "here/sweep.nc").read_bytes()
+
+
+def test_no_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cosim.studies.sweep.cluster.PATIENCE", 0.5)
+    with pytest.raises(BadInput, match="no cluster answers"):
+        sweep(load("held"), grid({"friction.mu_s": [0.7]}), tmp_path, dask="tcp://127.0.0.1:9")
+
+
+def test_folder_of_another_sweep(tmp_path: Path) -> None:
+    scene = load("held", ["run.duration=0.01"])
+    sweep(scene, grid({"friction.mu_s": [0.7]}), tmp_path, workers=1)
+    before = (tmp_path / "sweep.nc").read_bytes()
+    with pytest.raises(BadInput, match="another sweep"):
+        sweep(scene, grid({"friction.mu_s": [0.8]}), tmp_path, workers=1)
+    assert (tmp_path / "sweep.nc").read_bytes() == before
+    (tmp_path / "sweep.journal").write_bytes(b'{"sweep": "torn')
+    with pytest.raises(BadInput, match="another sweep"):
+        sweep(scene, grid({"friction.mu_s": [0.7]}), tmp_path, workers=1)
+
+
+def test_latin_hypercube() -> None:
+    """Each of N equal parts of each range holds one point; whole numbers stay whole."""
+    over = {"drive.frequency": [10.0, 60.0], "mechanics.n_surfaces": [1, 4]}
+    design = sample(over, 40, 1, False)
+    assert design == sample(over, 40, 1, False) != sample(over, 40, 2, False)
+    frequencies = [design.point(k)["drive.frequency"] for k in range(40)]
+    assert sorted(int((f - 10.0) / 50.0 * 40) for f in frequencies) == list(range(40))
+    counts = [design.point(k)["mechanics.n_surfaces"] for k in range(40)]
+    assert {n: counts.count(n) for n in (1, 2, 3, 4)} == dict.fromkeys((1, 2, 3, 4), 10)
+
+
+def test_last_axis_runs_fastest() -> None:
+    design: Design = grid({"drive.frequency": [10.0, 20.0], "drive.offset": [0.0, 1.0, 2.0]})
+    assert [tuple(design.point(k).values()) for k in (0, 1, 3)] == [(10, 0), (10, 1), (20, 0)]
+
+
+BAD = [
+    ([], "needs at least one key"),
+    (["--over", "drive.offset"], "must be table.key=start:stop:n"),
+    (["--over", "drive.ofset=1,2"], "did you mean drive.offset?"),
+    (["--over", "offset=1,2"], "did you mean drive.offset?"),
+    (["--over", "circuit.model=1,2"], "not a number"),
+    (["--over", "drive.offset=1:2"], "start:stop:n"),
+    (["--over", "drive.offset=1:2:1"], "start:stop:n"),
+    (["--over", "drive.offset=1:2:x"], "start:stop:n"),
+    (["--over", "drive.offset=1,x"], "“x” is not a number"),
+    (["--over", "drive.offset=1,nan"], "not a number"),
+    (["--over", "drive.offset=1,1"], "twice"),
+    (["--over", "drive.offset=1,200"], "a number from -100 to 100 V"),
+    (["--over", "mechanics.n_surfaces=1.5,2"], "a whole number from 1 to 16"),
+    (["--over", "drive.offset=1,2", "--over", "drive.offset=3,4"], "given twice"),
+    (["--over", "drive.offset=1,2", "--samples", "0"], "--samples 0"),
+    (["--over", "drive.offset=1", "--samples", "5"], "needs a range"),
+    (["--over", "drive.offset=1,2", "--random"], "--random needs --samples"),
+    (["--over", "drive.offset=1,2", "--workers", "0"], "--workers 0"),
+    (["--over", "drive.offset=0:1:9999", "--over", "drive.amplitude=0:1:9999"], "points"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "words"), BAD)
+def test_bad_input(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["sweep", "held", *arguments, "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1
+    assert not out.exists() or not os.listdir(out)
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["sweep", "ideal-current", "--set", "run.duration=0.1", "--workers", "2"]
+    over = ["--over", "drive.offset=-2:0:3", "--over", "drive.amplitude=6,8"]
+    assert main([*arguments, *over, "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "6 points, 0 failed" in said and "fastest up" in said
+    assert {path.name for path in tmp_path.iterdir()} == {"sweep.nc", "sweep.journal", "figure.png"}
+
+
+def test_no_point_could_be_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A failed simulation, exit code 3; the failures with their reasons are kept."""
+    over = ["--over", "drive.phase_deg=0:90:2", "--set", "run.duration=0.1"]
+    assert main(["sweep", "paper", *over, "--workers", "1", "--out", str(tmp_path)]) == 3
+    assert "No point could be run; the first one: --over: " in capsys.readouterr().err
+    assert (tmp_path / "sweep.nc").exists()

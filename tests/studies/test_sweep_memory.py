@@ -1,0 +1,32 @@
+"""A sweep's parent does not grow with the number of points."""
+
+import gc
+from pathlib import Path
+
+import psutil
+import pytest
+
+from cosim.scene import load
+from cosim.studies.sweep.design import grid
+from cosim.studies.sweep.journal import Journal
+from cosim.studies.sweep.pool import Pool
+
+pytestmark = pytest.mark.reliability
+
+
+@pytest.mark.slow
+def test_parent_stays_flat(tmp_path: Path) -> None:
+    scene = load("held", ["run.duration=0.002", "run.settle=0.001"])
+    design = grid({"friction.mu_s": [0.6 + 1e-5 * k for k in range(6000)]})
+    process = psutil.Process()
+    sizes = []
+    with Journal(tmp_path / "journal", "test") as journal, Pool(scene, 2) as pool:
+        points = ((k, design.point(k)) for k in range(len(design)))
+        for number, outcome in pool.run(points):
+            assert not outcome.failure
+            journal.add(number, outcome)
+            if len(journal.done) % 1000 == 0:
+                gc.collect()
+                sizes.append(process.memory_info().rss / 1e6)
+    # The numbers of the points that are done are remembered: 60 bytes each.
+    assert sizes[-1] - sizes[0] < 2.0, f"MB after each 1,000 points: {sizes}"

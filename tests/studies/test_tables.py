@@ -1,0 +1,83 @@
+"""What the accuracy study makes of its runs, on runs with known errors."""
+
+import csv
+import json
+from math import isnan, nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.errors import SimulationFailed
+from cosim.scene import Scene
+from cosim.studies.accuracy.accuracy import Run, measure, order, reference
+from cosim.studies.accuracy.cases import CASES, Case
+from cosim.studies.accuracy.solvers import Outcome, Solver
+from cosim.studies.study import write
+
+PAPER = CASES["paper"]
+STEPS = [1e-3 / 2**k for k in range(6)]
+
+
+def solver(errors: dict[float, float | str]) -> Solver:
+    """One whose error at each setting is given, as a share of the range; or its failure."""
+    true = reference("paper").signals
+
+    def run(scene: Scene, case: Case, setting: float) -> Outcome:
+        error = errors[setting]
+        if isinstance(error, str):
+            raise SimulationFailed(error)
+        return Outcome(true + error * np.ptp(true), 0.01, 7)
+
+    return Solver("a method", "macro steps", "macro step [s]", run, lambda case: list(errors))
+
+
+def test_error_and_order_of_known_runs() -> None:
+    runs = measure(PAPER, [solver({h: 30.0 * h**1.5 for h in STEPS})], rounds=2)
+    assert [run.error for run in runs] == pytest.approx([30.0 * h**1.5 for h in STEPS], rel=1e-6)
+    assert order(runs) == pytest.approx(1.5, abs=1e-6)
+    assert not any(run.failure for run in runs)
+    assert isnan(order(runs[:4]))
+
+
+def test_failures_are_marked() -> None:
+    found = measure(
+        PAPER,
+        [
+            solver(
+                {
+                    8.0: "A false limit cycle: until t = ...",
+                    4.0: "something else",
+                    2.0: 3.0,
+                    1.0: 0.1,
+                    0.5: 0.01,
+                    0.25: 0.02,
+                    0.125: nan,
+                }
+            )
+        ],
+        rounds=1,
+    )
+    assert [run.failure for run in found] == [
+        "false limit cycle",
+        "failed",
+        "diverged",
+        "",
+        "",
+        "not monotone",
+        "diverged",
+    ]
+    assert isinstance(found[0], Run) and isnan(found[0].error)
+
+
+def test_tables(tmp_path: Path) -> None:
+    rows = [{"method": "a", "error [1]": 1.0 / 3.0}, {"method": "b", "error [1]": nan}]
+    write(tmp_path, "study", "A study", {"Runs": rows}, ["A note."])
+    with (tmp_path / "study.csv").open() as file:
+        read = list(csv.DictReader(file))
+    assert float(read[0]["error [1]"]) == 1.0 / 3.0
+    content = json.loads((tmp_path / "study.json").read_text())
+    assert content["tables"]["Runs"][1] == {"method": "b", "error [1]": None}
+    assert content["machine"]["cores"] >= 1
+    text = (tmp_path / "study.md").read_text()
+    assert "| a | 0.3333 |" in text and "| b | - |" in text and "A note." in text

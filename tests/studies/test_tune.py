@@ -1,0 +1,138 @@
+"""Tuning: against the theory's optimum, a grid, and what must not matter."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cosim.cli.main import main
+from cosim.errors import BadInput, SimulationFailed
+from cosim.scene import changed, load
+from cosim.simulation.simulate import simulate
+from cosim.studies.sweep.point import periods_made_whole
+from cosim.studies.tune import tune
+
+
+def test_theory_s_optimum() -> None:
+    """At A = 10, mu 0.7 and 0.6: v/(g T) = 0.3356265876 at f_n = 6.7083044169 (closed form)."""
+    scene = load("optimal", ["friction.mu_s=0.7", "friction.mu_k=0.6"])
+    weight = scene.mechanics.part_mass * scene.mechanics.gravity
+    over = {"friction.normal_force": (0.5 * weight, 13.0 * weight)}
+    found = tune(scene, "v_average", over=over, budget=80, workers=2)
+    assert found.best.value is not None
+    reached = found.best.value * scene.drive.frequency / scene.mechanics.gravity
+    assert 0.3356265876 * (1 - 2e-4) < reached < 0.3356265876 * (1 + 1e-9)
+    ratio = found.best.values["friction.normal_force"] / weight
+    assert ratio == pytest.approx(6.7083044169, rel=0.03)  # flat, so less sharp
+    assert 0.0 < (found.lost(0.01) or 0.0) < (found.lost(0.05) or 0.0) < 0.2
+
+
+def test_same_for_any_number_of_workers() -> None:
+    scene = load("ideal-current", ["run.duration=0.2", "run.settle=0.1"])
+    over = {"drive.offset": (-2.0, 0.0), "mechanics.n_surfaces": (1.0, 3.0)}
+    first, second = (
+        tune(scene, "v_average", False, over, budget=60, seed=4, workers=n) for n in (1, 2)
+    )
+    assert first == second
+    assert first.best.value is not None
+    searched = [run.value for run in first.runs[:-8]]  # the last round turns two keys
+    assert first.best.value <= min(value for value in searched if value is not None)
+    assert all(isinstance(run.values["mechanics.n_surfaces"], int) for run in first.runs)
+    assert first != tune(scene, "v_average", False, over, budget=60, seed=5, workers=2)
+
+
+def test_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """best.toml makes the run that was found; every run stands in the table."""
+    arguments = ["tune", "ideal-current", "--maximise", "v_average", "--budget", "40"]
+    over = ["--over", "drive.pot_frequency=0.6:0.9", "--set", "run.duration=0.2"]
+    assert main([*arguments, *over, "--workers", "2", "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    numbers = json.loads((tmp_path / "tune.json").read_text(encoding="utf-8"))
+    assert (
+        "turning one key by 1% of its range" in said or "budget ended" in said
+    ) and " Hz)" in said
+    best: Any = simulate(load(tmp_path / "best.toml")).summary
+    assert best["v_average"] == pytest.approx(numbers["value"], rel=1e-6)
+    with open(tmp_path / "tune.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == numbers["runs"] <= 40
+    assert numbers["value"] in [float(row["v_average"]) for row in rows]
+    best_seen = max(float(row["v_average"]) for row in rows)
+    assert best_seen == numbers["value"]
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "tune.json", "tune.csv", "best.toml", "figure.png",
+    }  # fmt: skip
+
+
+def test_all_runs_fail() -> None:
+    with pytest.raises(SimulationFailed, match=r"the first one: --over: friction\.mu_k = 0\.[89]"):
+        tune(load("held"), "v_average", over={"friction.mu_k": (0.8, 0.9)}, budget=30, workers=2)
+
+
+BAD = [
+    (["--maximise", "speed"], "speed is not a number of this scene's summary"),
+    (["--maximise", "v_average", "--budget", "20"], "--budget 20"),
+    (["--maximise", "v_average", "--over", "drive.offset"], "table.key=low:high"),
+    (["--maximise", "v_average", "--over", "drive.offset=1:0"], "must be a range"),
+    (["--maximise", "v_average", "--over", "drive.offset=0:1e9"], "from -100 to 100 V"),
+    (["--maximise", "v_average", "--over", "circuit.model=0:1"], "not a number"),
+    (["--maximise", "v_average", "--minimise", "v_average"], "not allowed with"),
+    (["--maximise", "v_average", "--set", "drive.waveform=sine"], "has no knobs"),
+    ([], "--maximise"),
+    (["--maximise", "v_average", "--workers", "0"], "--workers 0"),
+    (["--maximise", "v_average", "--seed", "-1"], "--seed -1"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), BAD)
+def test_bad_input(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    quick = ["--set", "run.duration=0.02"]
+    assert main(["tune", "held", *quick, *arguments, "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1 and not out.exists()
+
+
+def test_keys_twice() -> None:
+    with pytest.raises(BadInput, match="twice"):
+        from cosim.studies.tune.files import ranges_of
+
+        ranges_of(["drive.offset=0:1", "drive.offset=0:2"])
+
+
+def test_scouts_without_ngspice() -> None:
+    """They go ahead where the scene needs ngspice, are counted apart, and lead on."""
+    quick = ["run.duration=0.3", "run.settle=0.1", "circuit.max_step=5e-5"]
+    ahead: list[float | None] = []
+    scene = load("paper", quick)
+    found = tune(
+        scene, "v_average", budget=40, workers=2, scouting=lambda run, best: ahead.append(run.value)
+    )
+    assert found.scouts == len(ahead) > 100 and len(found.runs) <= 40
+    assert found.scene.circuit.model == "amplifier"
+    best = max(value for value in ahead if value is not None)
+    first = next(run.value for run in found.runs if run.value is not None)
+    assert first == pytest.approx(best, rel=0.2)  # the same knobs, run with ngspice
+
+
+GRID_BEST = 37.598e-3
+"""m/s: the fastest of `cosim sweep paper --set circuit.max_step=5e-5` over the three knobs, each at
+ten places from 0 to 1, at (8/9, 4/9, 3/9)."""
+
+
+@pytest.mark.slow
+def test_beats_a_grid() -> None:
+    """Over the three knobs: better than the best of 1,000 points, with a fifth of the runs."""
+    knobs = {"pot_max": 8 / 9, "pot_frequency": 4 / 9, "pot_offset": 3 / 9}
+    scene = load("paper", ["circuit.max_step=5e-5"])
+    there = changed(scene, {f"drive.{knob}": place for knob, place in knobs.items()}, "test")
+    whole = changed(there, periods_made_whole(there), "test")
+    summary: Any = simulate(whole).summary
+    assert summary["v_average"] == pytest.approx(GRID_BEST, rel=2e-3)
+    found = tune(scene, "v_average", budget=200, workers=2)
+    assert len(found.runs) <= 200
+    assert found.best.value is not None and found.best.value > GRID_BEST
