@@ -24,6 +24,8 @@ from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 
+pytestmark = pytest.mark.reliability
+
 COMMAND = [sys.executable, "-m", "cosim"]
 QUICK = ["--set", "run.duration=0.02", "--set", "run.output_step=1e-3"]
 # One internal step after another: the mechanics give up within a second.
@@ -399,8 +401,6 @@ INTERRUPTED = """
 import os, signal, threading, time
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-
-pytestmark = pytest.mark.reliability
 
 
 def bits():
