@@ -14,8 +14,7 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from cosim.coupling.participant import Signal
-from cosim.coupling.polynomials import Array, shifted, value
+from cosim.coupling.polynomials import Array, Signal, shifted, value
 from cosim.drive.command import Command
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene
