@@ -1,8 +1,9 @@
 """The mechanical participant: the FMU with the scene's parameters.
 
-Names of parameters and outputs are those of ``fmu/src/variables.def``. The input is linear within
-a step: its value at the start and its slope are set before each step. It is the current of one coil
-(A) or, where the FMU has the current source too (circuit.model "limited"), the command (V).
+Names of parameters and outputs are those of ``fmu/src/physics/variables.def``. The input is linear
+within a step: its value at the start and its slope are set before each step. It is the current of
+one coil (A) or, where the FMU has the current source too (circuit.model "limited"), the command
+(V).
 """
 
 from collections.abc import Sequence
