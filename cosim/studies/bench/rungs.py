@@ -65,12 +65,12 @@ def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
 
 def _error(circuit: str, reference: str) -> float:
     found = simulate(brief(f"circuit.model={circuit}"))
-    return error(heights(found.waveforms), reference)
+    return error(heights(found.columns), reference)
 
 
 def _error_of_full() -> float:
     path, finer = (
-        simulate(load("paper-full", [*BRIEF_FULL, *more])).waveforms["z_part"]
+        simulate(load("paper-full", [*BRIEF_FULL, *more])).columns["z_part"]
         for more in ((), _FINER)
     )
     return float(np.abs(path - finer).max() / np.ptp(finer))
