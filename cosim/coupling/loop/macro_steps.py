@@ -16,6 +16,7 @@ from cosim.coupling.methods import methods
 from cosim.coupling.polynomials import projected
 from cosim.drive.command import command
 from cosim.scene import Scene
+from cosim.scene.methods import METHODS
 
 _ON_TIME = 1e-13
 """s; times of the circuit this close to a macro point are on it."""
@@ -27,8 +28,8 @@ def coupled(scene: Scene, recorder: Recorder) -> Lead:
     chosen = scene.coupling
     if chosen.method != "step-locked":
         kind = methods()[chosen.method]
-        method = kind() if chosen.method == "companion" else kind(chosen.order)
-        lead.method = MacroSteps(scene, lead, recorder, method)
+        degree = {"degree": chosen.order} if "order" in METHODS[chosen.method].keys else {}
+        MacroSteps(scene, lead, recorder, kind(**degree))
     return lead
 
 
