@@ -13,8 +13,8 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from ctypes.util import find_library
+from dataclasses import dataclass
 from functools import cache
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
@@ -73,7 +73,7 @@ class Leader(Protocol):
 
 @cache
 def engine(callbacks: Callbacks) -> "Engine":
-    """The process's one ngspice, with its callbacks. Raises BadInput where the library is missing."""
+    """The process's one ngspice, which calls back. Raises BadInput where the library is missing."""
     name = library_name()
     try:
         return Engine(name, callbacks)
@@ -120,7 +120,7 @@ class Engine(Shared.NgSpiceShared):
         self._leader: Leader | None = None
         self._failure: BaseException | None = None
         self._save: tuple[str, ...] = ()
-        self._data = _ffi.cast("SendData *", callbacks.data)
+        self._data = callbacks.data
         with caught_signals(self.fail), _nowhere():
             super().__init__(ngspice_id=0, send_data=True)
             self._library: Any = self._ngspice_shared
@@ -138,13 +138,13 @@ class Engine(Shared.NgSpiceShared):
     @property
     def _send_data_c(self) -> Any:
         """What PySpice gives to ngspice for SendData when the library starts, and never again."""
-        return self._data
+        return _ffi.cast("SendData *", self._data)
 
     @_send_data_c.setter
     def _send_data_c(self, plain: Any) -> None:
         """PySpice sets its own."""
 
-    def run(self, deck: str, save: tuple[str, ...], leader: Leader) -> None:
+    def transient(self, deck: str, save: tuple[str, ...], leader: Leader) -> None:
         """Run the transient analysis of ``deck``; ``save`` are its saved vectors, in this order.
 
         Raises what was given to ``fail``, or SimulationFailed for a vector that is not there.

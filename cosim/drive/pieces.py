@@ -53,6 +53,10 @@ class Piece(Structure):
         """V1 at ``t`` in the piece, V."""
         return _formula().command_value(byref(self), t)
 
+    def before(self, t: float) -> float:
+        """Left limit of V1 at ``t``, V, after the begin of the piece."""
+        return self.end if t >= self.until else self.value(t)
+
     def dac_at(self, t: float, pin_mean: float) -> float:
         """Voltage of the DAC at ``t``, V, whose mean pin voltage is ``pin_mean``."""
         return self.dac if self.kind == LEVEL else pin_mean - self.value(t) / GAIN
@@ -87,7 +91,7 @@ class Command(ABC):
 
     @abstractmethod
     def piece(self, t: float) -> Piece:
-        """The piece that holds at ``t``; its ``begin`` is left to whoever strings pieces together."""
+        """The piece that holds at ``t``, without its ``begin``."""
 
     def value(self, t: float) -> float:
         """V1 at ``t``, V; at a jump the value after it."""
@@ -97,14 +101,13 @@ class Command(ABC):
         """Time of the first discontinuity of V1 or of a pin strictly after ``t``, s, or inf."""
         return self.piece(t).jump
 
-    def before(self, t: float) -> Piece:
+    def piece_before(self, t: float) -> Piece:
         """The piece that holds just before ``t``."""
         return self.piece(nextafter(t, -inf))
 
     def value_before(self, t: float) -> float:
         """Left limit of V1 at ``t``, V; differs from ``value`` at jumps only."""
-        piece = self.before(t)
-        return piece.end if piece.until <= t else piece.value(t)
+        return self.piece_before(t).before(t)
 
     def pieces(self, begin: float, end: float, most: int | None = None) -> list[Piece]:
         """The pieces from ``begin`` until ``end`` (s) is within the last, at most ``most`` of

@@ -16,9 +16,7 @@ _TOGETHER = 4096
 """How many straights are prepared at a time."""
 
 
-def straights(
-    commands: Sequence[Command], duration: float
-) -> Iterator[tuple[Array, Array, Array]]:
+def straights(commands: Sequence[Command], duration: float) -> Iterator[tuple[Array, Array, Array]]:
     """Times (s), the first one where the last ones ended, and V1 (V, a column a command) at the
     start and the end of each interval between two of them, until ``duration``, block after block.
     """
@@ -27,8 +25,8 @@ def straights(
     rows: list[tuple[list[float], list[float]]] = []
     while edges[-1] < duration:
         begin = edges[-1]
-        stop = min(duration, *(_end(piece, begin) for piece in pieces))
-        rows.append(([p.value(begin) for p in pieces], [_before(p, stop) for p in pieces]))
+        stop = min(duration, *(end_of_straight(piece, begin) for piece in pieces))
+        rows.append(([p.value(begin) for p in pieces], [p.before(stop) for p in pieces]))
         edges.append(stop)
         pieces = [
             piece if stop < piece.until else command.piece(stop)
@@ -40,12 +38,8 @@ def straights(
             edges, rows = edges[-1:], []
 
 
-def _end(piece: Piece, begin: float) -> float:
-    """Where a straight that starts at ``begin`` ends."""
+def end_of_straight(piece: Piece, begin: float) -> float:
+    """Where the straight that starts at ``begin`` (s) ends, s."""
     if piece.kind == SINE:
         return min(piece.until, begin + 1.0 / _CHORDS / piece.rate)
     return piece.until
-
-
-def _before(piece: Piece, t: float) -> float:
-    return piece.end if piece.until <= t else piece.value(t)

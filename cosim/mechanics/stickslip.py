@@ -155,7 +155,7 @@ class Mechanics:
         self.instance.get_integers(self.places[wholes], counts)
         return [*numbers, *counts]
 
-    def gain(self, time: float) -> float:
+    def inertial_gain(self, time: float) -> float:
         """d(back-EMF slope)/d(current) now, at ``time`` (s), V/(A s): Bl² over the mass that the
         coil feels, as the part sticks or slips and the ram is free or rests on a wall."""
         try:

@@ -50,6 +50,7 @@ _ARGUMENTS = {
     ),
 }
 
+
 @cache
 def part_library() -> ctypes.CDLL:
     """The routines of ``part.c``, built where that is still to do."""

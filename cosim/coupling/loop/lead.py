@@ -43,23 +43,19 @@ _PIECES = 512
 
 
 class Lead:
-    """ngspice leads; ``macro_point`` moves the mechanics and says what the circuit sees next.
-
-    ``macro_point`` is one of the compiled functions, by its name, until ``use`` gives another.
-    """
+    """ngspice leads; the mechanics follow each of its accepted steps, or as ``use`` says."""
 
     def __init__(
         self,
         scene: Scene,
         command: Command,
         recorder: Recorder,
-        macro_point: str = "macro_point_step_locked",
         deck: tuple[str, tuple[str, ...]] | None = None,
         replay: npt.NDArray[np.float64] | None = None,
     ) -> None:
-        """``deck`` and its saved vectors replace the scene's. ``replay`` holds pairs of back-EMF
-        (V) and slope (V/s) after each step, for ``macro_point_replayed``: there are no mechanics
-        then, and the circuit takes the steps of the run that these are from.
+        """``deck`` and its saved vectors replace the scene's. With ``replay``, pairs of back-EMF
+        (V) and slope (V/s) after each step, there are no mechanics: the circuit takes the steps of
+        the run that these are from.
         """
         self._duration = scene.run.duration
         self._command = command
@@ -76,7 +72,7 @@ class Lead:
         motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else -1
         self.state = LeadState(
             recorder=ctypes.pointer(recorder.state),
-            macro_point=address(macro_point),
+            macro_point=address(f"macro_point_{'step_locked' if replay is None else 'replayed'}"),
             replay=None if replay is None else replay.ctypes.data,
             gain=GAIN,
             v_offset=command.v_offset,
@@ -100,7 +96,7 @@ class Lead:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         state = self.state
         try:
-            _engine().run(self._deck, self._saved, self)
+            _engine().transient(self._deck, self._saved, self)
         finally:
             self._attend()
         if state.status == FMU_FAILED:
@@ -111,9 +107,7 @@ class Lead:
             )
         if state.status == UNKNOWN_SOURCE:
             name = state.source.decode().lower()
-            raise SimulationFailed(
-                f"The netlist has an external source {name} that nothing feeds."
-            )
+            raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
         if self._time < self._duration * (1 - 1e-9):
             raise SimulationFailed(
                 f"ngspice stopped at t = {self._time:.6g} s of {self._duration:g} s: "

@@ -28,8 +28,8 @@ def coupled(scene: Scene, recorder: Recorder) -> Lead:
     chosen = scene.coupling
     if chosen.method != "step-locked":
         kind = methods()[chosen.method]
-        degree = {"degree": chosen.order} if "order" in METHODS[chosen.method].keys else {}
-        MacroSteps(scene, lead, recorder, kind(**degree))
+        has_degree = "order" in METHODS[chosen.method].keys
+        MacroSteps(scene, lead, recorder, kind(chosen.order) if has_degree else kind())
     return lead
 
 
@@ -69,7 +69,7 @@ class MacroSteps:
         if state.at_jump:
             past.restart()
         if self._method.carries_inertia:
-            past.gain = self._recorder.mechanics.gain(time)
+            past.gain = self._recorder.mechanics.inertial_gain(time)
             # The circuit's share starts from what it stands at, and leaks away.
             past.carried = state.carried
             past.carried_slope = past.gain * current - state.carried / LEAK_TIME

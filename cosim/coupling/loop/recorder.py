@@ -55,21 +55,17 @@ class Recorder:
         self._library.fmu_bind(ctypes.byref(self._fmu), mechanics.instance.version)
         grip = mechanics.normal_force
         corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
-        self._agendas = agendas(
-            run.output_step, run.duration, run.settle, [*corners, run.duration]
-        )
+        self._agendas = agendas(run.output_step, run.duration, run.settle, [*corners, run.duration])
+        self._corners = np.array([grip.corners, grip.forces] if grip else [])
         schedule = None
         if grip:
-            self._corners = np.array([grip.corners, grip.forces])
-            schedule = ctypes.pointer(
-                Schedule(self._corners[0].ctypes.data, self._corners[1].ctypes.data, len(grip.corners))
-            )
+            schedule = Schedule(*(row.ctypes.data for row in self._corners), len(grip.corners))
         places = mechanics.places
         self.state = RecorderState(
             fmu=ctypes.pointer(self._fmu),
             input_places=places["inputs"],
             ports=len(mechanics.ports),
-            schedule=schedule,
+            schedule=schedule and ctypes.pointer(schedule),
             step_places=places["step_outputs"],
             step_outputs=len(mechanics.step_outputs),
             real_places=places["reals"],

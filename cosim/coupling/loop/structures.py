@@ -1,4 +1,4 @@
-"""The structures and functions of ``loop.h``, which says what they hold: same fields, same order."""
+"""The structures and functions of ``loop.h``, which says what they hold."""
 
 from ctypes import (
     CDLL,
@@ -154,6 +154,5 @@ def loop() -> CDLL:
 
 def address(name: str) -> int:
     """Where a function of the compiled loop lies."""
-
 
     return cast(getattr(loop(), name), c_void_p).value or 0

@@ -26,6 +26,4 @@ class Jacobi(Method):
         return past.current.polynomial(self.degree)
 
 
-Jacobi.variants = {
-    f"Jacobi k = {k}": partial(Jacobi, k, slopes=False) for k in range(3)
-}
+Jacobi.variants = {f"Jacobi k = {k}": partial(Jacobi, k, slopes=False) for k in range(3)}

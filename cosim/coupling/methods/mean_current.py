@@ -1,9 +1,10 @@
 """Mean current: as Gauss-Seidel, but the mechanics are fed the mean of the circuit's current.
 
 The mean over the step carries its exact charge, so nothing that the circuit does between two
-communication points is lost to the mechanics (exchange of integrals: Benedikt and Hofer, "Guidelines
-for the application of a coupling method for non-iterative co-simulation", EUROSIM 2013). Order 1
-with the back-EMF held, 2 with its slope or more. Known limits: those of Gauss-Seidel.
+communication points is lost to the mechanics (exchange of integrals: Benedikt and Hofer,
+"Guidelines for the application of a coupling method for non-iterative co-simulation", EUROSIM
+2013). Order 1 with the back-EMF held, 2 with its slope or more. Known limits: those of
+Gauss-Seidel.
 """
 
 from functools import partial

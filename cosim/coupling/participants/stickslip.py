@@ -42,9 +42,8 @@ class FmuMechanics(Mechanics):
         if gain:
             raise NotImplementedError("the companion belongs to the circuit's side")
         before, was = self._flux(), self._read_events()
-        line = projected(inputs, h, 1)
-        rise = float(line[1][0]) if len(line) > 1 else 0.0
-        self._step(h, float(line[0][0]), rise)
+        first, *rise = projected(tuple(inputs), h, 1)
+        self._step(h, float(first[0]), float(rise[0][0]) if rise else 0.0)
         if len(inputs) > 2:
             # The slope of the output answers to the current itself, not to the line in its stead.
             self._refresh(float(value(inputs, h)[0]), float(slope_of(inputs, h)[0]))
@@ -86,6 +85,10 @@ class FmuMechanics(Mechanics):
         """Counters of impacts and stick-slip changes, and which wall is touched."""
         self.instance.get_integers(self._event_places, self._event_counts)
         return tuple(self._event_counts)
+
+    def gain(self) -> float:
+        """Bl²/m_eff now, V/(A s)."""
+        return self.inertial_gain(self.time)
 
     def events(self) -> int:
         """Number of steps so far in which a mode changed: stick, slip, a wall met or left."""

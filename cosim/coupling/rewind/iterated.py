@@ -18,9 +18,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cosim.coupling.participant import Follower, Participant
 from cosim.coupling.methods.gauss_seidel import GaussSeidel
 from cosim.coupling.methods.mean_current import MeanCurrent
+from cosim.coupling.participant import Follower, Participant
 from cosim.coupling.polynomials import Array
 from cosim.coupling.rewind.joint import Joint
 from cosim.errors import SimulationFailed

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cosim.scene import Scene, load
-from cosim.simulation.given_surface import force_per_mass
+from cosim.simulation.rungs.given_surface import force_per_mass
 from cosim.simulation.simulate import simulate
 from cosim.studies import paper as theory
 from cosim.studies.bench.sampling import spread, take_turns

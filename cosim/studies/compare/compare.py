@@ -17,7 +17,7 @@ from cosim.errors import BadInput
 from cosim.files.atomic import whole
 from cosim.scene import Scene, load
 from cosim.scene.messages import plain
-from cosim.simulation.given_surface import knots
+from cosim.simulation.rungs.given_surface import knots
 from cosim.simulation.simulate import simulate
 from cosim.trials.published import FRAME_RATE
 from cosim.trials.tracked import Trial, read
