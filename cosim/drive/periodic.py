@@ -30,6 +30,7 @@ class Sawtooth(Command):
         self.frequency = frequency
         self.amplitude = amplitude
         self.offset = offset
+        self.reset_time = reset_time
         self.v_offset = offset_pin(offset, amplitude)
         self._fall = reset_time * frequency
         self._rise = 1.0 - self._fall

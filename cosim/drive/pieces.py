@@ -57,10 +57,6 @@ class Piece(Structure):
         """Left limit of V1 at ``t``, V, after the begin of the piece."""
         return self.end if t >= self.until else self.value(t)
 
-    def dac_at(self, t: float, pin_mean: float) -> float:
-        """Voltage of the DAC at ``t``, V, whose mean pin voltage is ``pin_mean``."""
-        return self.dac if self.kind == LEVEL else pin_mean - self.value(t) / GAIN
-
 
 def level(until: float, value: float, pin: float, dac: float | None = None) -> Piece:
     """A constant piece that ends with a jump, if it ends."""

@@ -11,7 +11,7 @@ from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.mechanics import part
 from cosim.scene import Scene, load
-from cosim.simulation import given_surface as prescribed
+from cosim.simulation.rungs import given_surface as prescribed
 from cosim.simulation.simulate import simulate
 from cosim.studies import paper as theory
 from tests.helpers.fmu_bench import Bench

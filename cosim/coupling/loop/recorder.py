@@ -7,7 +7,7 @@ from ctypes import c_double, c_int32
 import numpy as np
 import numpy.typing as npt
 
-from cosim.coupling.loop.agenda import ENTRIES, agendas
+from cosim.coupling.loop import agenda
 from cosim.coupling.loop.structures import CALLBACK, Fmu, RecorderState, Schedule, loop
 from cosim.files.spill import BLOCK, Tape
 from cosim.mechanics.stickslip import COUNTERS, Mechanics
@@ -42,8 +42,8 @@ class Recorder:
         self._step_of_rows = run.output_step
         self._rows, self._frames, self._time = Tape(width), Tape(1), Tape(1)
         # What is not on the tapes yet. A frame's sample goes behind the last row.
-        self._new_rows = np.empty((ENTRIES + 1, width))
-        self._new_frames = np.empty(ENTRIES + 1)
+        self._new_rows = np.empty((agenda.ENTRIES + 1, width))
+        self._new_frames = np.empty(agenda.ENTRIES + 1)
         self._totals = (c_double * len(mechanics.total_names))()
         self._counters = (c_int32 * len(COUNTERS))()
         extremes = len(mechanics.step_outputs) - 2
@@ -55,7 +55,9 @@ class Recorder:
         self._library.fmu_bind(ctypes.byref(self._fmu), mechanics.instance.version)
         grip = mechanics.normal_force
         corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
-        self._agendas = agendas(run.output_step, run.duration, run.settle, [*corners, run.duration])
+        self._agendas = agenda.agendas(
+            run.output_step, run.duration, run.settle, [*corners, run.duration]
+        )
         self._corners = np.array([grip.corners, grip.forces] if grip else [])
         schedule = None
         if grip:
