@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from cosim.errors import BadInput
 from cosim.scene.messages import plain
-from cosim.waveforms.formats.source import Exported, Run
+from cosim.waveforms.formats.source import Exported, Format, Run
 
 RATE = 48000  # Hz
 LARGEST = 32767
@@ -84,3 +84,6 @@ def _wave(samples: npt.NDArray[np.int16], about: dict[str, str]) -> bytes:
 def _chunk(name: str, data: bytes) -> bytes:
     """Name, length and data, filled to an even length."""
     return name.encode() + struct.pack("<I", len(data)) + data + b"\0" * (len(data) % 2)
+
+
+FORMAT = Format("wav", "surface.wav", "the surface's velocity as sound", content)
