@@ -1,7 +1,7 @@
 """What several commands share: options, the folder to write into, and the progress bar."""
 
 import sys
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -13,11 +13,20 @@ from cosim.errors import BadInput
 if TYPE_CHECKING:
     from tqdm import tqdm
 
+    from cosim.scene import Scene
+
 
 def add_scene(parser: ArgumentParser) -> None:
     """SCENE and ``--set``."""
     parser.add_argument("scene", metavar="SCENE", help="a built-in scene or a TOML file")
     add_overrides(parser)
+
+
+def scene_of(arguments: Namespace) -> "Scene":
+    """The scene that the options of :func:`add_scene` name."""
+    from cosim.scene import load
+
+    return load(arguments.scene, arguments.overrides)
 
 
 def add_scenes(parser: ArgumentParser, default: str) -> None:

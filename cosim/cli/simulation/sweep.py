@@ -2,15 +2,10 @@
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from cosim.cli.command import Command
-from cosim.cli.options import add_out, add_scene, add_workers, progress_bar, writable
+from cosim.cli.options import add_out, add_scene, add_workers, progress_bar, scene_of, writable
 from cosim.errors import BadInput, SimulationFailed
-
-if TYPE_CHECKING:
-    from cosim.scene import Scene
-    from cosim.studies.sweep import Design
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -39,10 +34,10 @@ def _options(parser: ArgumentParser) -> None:
 
 
 def _run(arguments: Namespace) -> None:
-    from cosim.scene import load
+    from cosim.studies import sweep
     from cosim.studies.sweep import design
 
-    scene = load(arguments.scene, arguments.overrides)
+    scene = scene_of(arguments)
     count = arguments.samples
     if count is None and arguments.random:
         raise BadInput("--random needs --samples N.")
@@ -52,16 +47,6 @@ def _run(arguments: Namespace) -> None:
         if count is None
         else design.sample(axes, count, arguments.seed, arguments.random)
     )
-    folder = arguments.out or Path("results") / f"{scene.name}-sweep"
-    with writable(folder):
-        _write(scene, chosen, arguments.workers, arguments.dask, folder)
-
-
-def _write(
-    scene: "Scene", design: "Design", workers: int | None, dask: str | None, folder: Path
-) -> None:
-    from cosim.files.atomic import whole
-    from cosim.studies import sweep
 
     def progress(done: int, failed: int, total: int) -> None:
         if bar.n == 0:
@@ -70,19 +55,21 @@ def _write(
         if failed:
             bar.set_postfix_str(f"{failed} failed", refresh=False)
 
-    with progress_bar(scene.name, len(design), "point") as bar:
-        data = sweep.sweep(scene, design, folder, workers, dask, progress)
-    from cosim.studies.sweep import figure
-    from cosim.studies.sweep.report import table
+    folder = arguments.out or Path("results") / f"{scene.name}-sweep"
+    with writable(folder):
+        with progress_bar(scene.name, len(chosen), "point") as bar:
+            data = sweep.sweep(scene, chosen, folder, arguments.workers, arguments.dask, progress)
+        from cosim.files.atomic import whole
+        from cosim.studies.sweep import figure, report
 
-    with whole(folder / "figure.png") as temporary:
-        figure.draw(data, scene.name, temporary)
-    print(table(scene, data))
-    print(f"Written to {folder}: sweep.nc")
-    print(f"Figure: {folder / 'figure.png'}")
-    reasons = [str(reason) for reason in data["failure"].values.flat]
-    if all(reasons):
-        raise SimulationFailed(f"No point could be run; the first one: {reasons[0]}")
+        with whole(folder / "figure.png") as temporary:
+            figure.draw(data, scene.name, temporary)
+        print(report.table(scene, data))
+        print(f"Written to {folder}: sweep.nc")
+        print(f"Figure: {folder / 'figure.png'}")
+        reasons = [str(reason) for reason in data["failure"].values.flat]
+        if all(reasons):
+            raise SimulationFailed(f"No point could be run; the first one: {reasons[0]}")
 
 
 COMMAND = Command("sweep", "run a scene over a grid or a sample of settings", _run, _options)

@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim.cli.command import Command
-from cosim.cli.options import add_out, add_scene, add_workers, progress_bar, writable
+from cosim.cli.options import add_out, add_scene, add_workers, progress_bar, scene_of, writable
 from cosim.errors import BadInput
 
 if TYPE_CHECKING:
-    from cosim.scene import Scene
     from cosim.studies.tune.run import Run
 
 
@@ -36,26 +35,16 @@ def _options(parser: ArgumentParser) -> None:
 
 
 def _run(arguments: Namespace) -> None:
-    from cosim.scene import load
-    from cosim.studies.tune.files import ranges_of
+    from cosim.studies.tune import files, tune
 
-    scene = load(arguments.scene, arguments.overrides)
-    ranges = ranges_of(arguments.over)
-    if arguments.seed < 0:
-        raise BadInput(f"--seed {arguments.seed}: must be a whole number from 0.")
-    folder = arguments.out or Path("results") / f"{scene.name}-tune"
-    with writable(folder):
-        _write(scene, ranges, arguments, folder)
-
-
-def _write(
-    scene: "Scene", ranges: dict[str, tuple[float, float]], arguments: Namespace, folder: Path
-) -> None:
-    from cosim.files.atomic import whole
-    from cosim.studies.tune import tune
-    from cosim.studies.tune.files import table, write, write_runs
-
+    scene = scene_of(arguments)
+    ranges = files.ranges_of(arguments.over)
+    budget, seed = arguments.budget, arguments.seed
+    if seed < 0:
+        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
+    largest = arguments.maximise is not None
     quantity = arguments.maximise or arguments.minimise
+    folder = arguments.out or Path("results") / f"{scene.name}-tune"
     runs: list[Run] = []
 
     def scouting(run: "Run", best: "Run | None") -> None:
@@ -69,28 +58,21 @@ def _write(
             bar.set_postfix_str(f"{quantity} {best.value:.4g}", refresh=False)
         bar.update()
 
-    with progress_bar(scene.name, arguments.budget, "run") as bar:
-        try:
-            found = tune(
-                scene,
-                quantity,
-                arguments.maximise is not None,
-                ranges,
-                arguments.budget,
-                arguments.seed,
-                arguments.workers,
-                progress,
-                scouting,
-            )
-        except KeyboardInterrupt:
-            write_runs(folder / "tune.csv", runs, quantity)
-            raise
-    numbers = write(folder, found, arguments.seed)
-    from cosim.studies.tune import figure
+    with writable(folder):
+        with progress_bar(scene.name, budget, "run") as bar:
+            try:
+                asked = (scene, quantity, largest, ranges, budget, seed, arguments.workers)
+                found = tune(*asked, progress, scouting)
+            except KeyboardInterrupt:
+                files.write_runs(folder / "tune.csv", runs, quantity)
+                raise
+        numbers = files.write(folder, found, seed)
+        from cosim.files.atomic import whole
+        from cosim.studies.tune import figure
 
-    with whole(folder / "figure.png") as temporary:
-        figure.draw(found, temporary)
-    print(table(numbers))
+        with whole(folder / "figure.png") as temporary:
+            figure.draw(found, temporary)
+    print(files.table(numbers))
     print(f"Written to {folder}: tune.json, tune.csv, best.toml")
     print(f"Figure: {folder / 'figure.png'}")
 
