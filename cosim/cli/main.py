@@ -48,7 +48,7 @@ def _dispatch(argv: list[str]) -> int:
 def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     if isinstance(sys.stdout, TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # rather a question mark than no result
+        sys.stdout.reconfigure(errors="replace")  # prints ? for what the encoding lacks
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("always", NoEffect)
@@ -58,7 +58,7 @@ def main(argv: list[str] | None = None) -> int:
         return code
     except CosimError as error:
         return _told(str(error), error.exit_code)
-    except BrokenPipeError:  # whoever read the output has seen enough
+    except BrokenPipeError:  # the reader closed the pipe
         _discard_output()
         return 0
     except OSError as error:
@@ -67,8 +67,8 @@ def main(argv: list[str] | None = None) -> int:
         where = f"{error.filename}: " if error.filename else "The output cannot be written: "
         return _told(f"{where}{error.strerror or error}.", BadInput.exit_code)
     except KeyboardInterrupt:
-        # One that struck while a library executed a string, as dataclasses do, is remembered by
-        # Python as not handled, and would end the process by the signal; another string clears it.
+        # After an interrupt within exec(), as dataclasses use it, Python ends the process by the
+        # signal although it is handled here; another exec() clears that flag.
         exec("")
         return _told("interrupted.", INTERRUPTED)
 
@@ -81,7 +81,7 @@ def _note(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Tell a warning in one line, without where in the program it was raised."""
+    """Print a warning on one line, without its place in the program."""
     print("cosim: note:", " ".join(str(message).split()), file=sys.stderr)
 
 
@@ -93,7 +93,7 @@ def _told(sentence: str, code: int) -> int:
 
 
 def _discard_output() -> None:
-    """Keep Python from trying at its end to write what could not be written."""
+    """Keep Python from flushing stdout again, and failing again, at exit."""
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, sys.stdout.fileno())
     os.close(null)

@@ -59,7 +59,7 @@ def _both_or_neither(table: str, values: BaseModel, *pair: str) -> None:
 
 
 def is_number(value: object) -> bool:
-    """Whether a value that is not validated yet can be calculated with: no huge int, no NaN."""
+    """Whether an unvalidated value is a number of ordinary size: no huge int, no NaN."""
     return isinstance(value, int | float) and not isinstance(value, bool) and -1e9 < value < 1e9
 
 

@@ -1,4 +1,4 @@
-"""The command from outside: exit codes, one sentence for whatever goes wrong, nothing left over."""
+"""The command as a process: exit codes, one sentence for every failure, no files left behind."""
 
 import ctypes
 import os
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.reliability
 
 COMMAND = [sys.executable, "-m", "cosim"]
 QUICK = ["--set", "run.duration=0.02", "--set", "run.output_step=1e-3"]
-# One internal step after another: the mechanics give up within a second.
+# The steps of the integration become so short that the FMU gives up within a second.
 TOO_FAST = ["--set", "coil.force_factor=1000", "--set", "mechanics.ram_mass=1e-9"]
 
 posix = pytest.mark.skipif(os.name != "posix", reason="needs POSIX")
