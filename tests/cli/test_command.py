@@ -1,4 +1,4 @@
-"""The command from outside: exit codes, one sentence for whatever goes wrong, nothing left over."""
+"""The command as a process: exit codes, one sentence for every failure, no files left behind."""
 
 import ctypes
 import os
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.reliability
 
 COMMAND = [sys.executable, "-m", "cosim"]
 QUICK = ["--set", "run.duration=0.02", "--set", "run.output_step=1e-3"]
-# One internal step after another: the mechanics give up within a second.
+# The steps of the integration become so short that the FMU gives up within a second.
 TOO_FAST = ["--set", "coil.force_factor=1000", "--set", "mechanics.ram_mass=1e-9"]
 
 posix = pytest.mark.skipif(os.name != "posix", reason="needs POSIX")
@@ -437,7 +437,9 @@ finally:
 
 
 @pytest.mark.parametrize(
-    "arguments", [["scenes"], ["--help"], ["run", "--help"], ["run", "papre"]], ids=" ".join
+    "arguments",
+    [["scenes"], ["--help"], ["run", "--help"], ["chart", "limits", "--help"], ["run", "papre"]],
+    ids=" ".join,
 )
 def test_light_commands_load_nothing_heavy(arguments: list[str], tmp_path: Path) -> None:
     program = LIGHT.format(arguments=arguments)
@@ -458,6 +460,36 @@ def test_scenes(tmp_path: Path) -> None:
         "regime-03", "regime-04", "regime-05", "regime-06", "regime-07", "regime-08", "regime-09",
         "regime-10", "square", "trial", "two-surfaces", "umbanhowar",
     ]  # fmt: skip
+
+
+def folder_of(*parts: str) -> Path:
+    return Path(cosim.__file__).parent.joinpath(*parts)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "folders"),
+    [
+        (["--help"], [("cli", "simulation"), ("cli", "studies")]),
+        (["chart", "--help"], [("cli", "charts")]),
+    ],
+)
+def test_every_file_of_the_folders_is_a_command(
+    arguments: list[str], folders: list[tuple[str, ...]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(arguments)
+    listed = set(re.findall(r"(?m)^    (\w+) ", capsys.readouterr().out))
+    files = {path.stem for parts in folders for path in folder_of(*parts).glob("*.py")}
+    assert listed == files - {"__init__"}
+
+
+def test_export_tells_every_format(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["export", "--help"])
+    told = capsys.readouterr().out.split("--as")[-1].partition("repeatable")[0]
+    listed = re.findall(r"(\w+)\s+\(", told)
+    modules = {path.stem for path in folder_of("waveforms", "formats").glob("*.py")}
+    assert len(listed) == len(modules - {"__init__", "source"})
 
 
 @pytest.mark.parametrize("option", ["--help", "--version"])

@@ -9,7 +9,8 @@ import pytest
 from cosim.cli.main import main
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.compare.compare import compare, differences, explained, hermite, through_camera
+from cosim.studies.compare.compare import compare, explained
+from cosim.trials.camera import differences, hermite, through_camera
 from cosim.trials.published import FRAME_RATE
 from cosim.trials.tracked import read
 

@@ -18,10 +18,10 @@ from cosim.studies.bench.parts import coupled_over_parts
 from cosim.studies.bench.peers import compare
 from cosim.studies.bench.rungs import cost_exponent, real_time
 from cosim.studies.bench.truth import BRIEF, BRIEF_FULL
-from cosim.studies.compare.compare import through_camera
 from cosim.studies.fit.cases import Case
 from cosim.studies.fit.timing import solvers
 from cosim.studies.sweep.timing import throughput
+from cosim.trials.camera import through_camera
 from cosim.trials.tracked import Track, Trial, read_folder
 
 _OFFSETS = [-2.0 + 0.05 * k for k in range(40)]

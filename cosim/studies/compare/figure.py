@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cosim.studies.compare.compare import Frames, Metrics
+from cosim.studies.compare.compare import Metrics
+from cosim.trials.camera import Frames
 from cosim.waveforms.figure import PART, SURFACE
 
 MEASURED: dict[str, Any] = {

@@ -12,10 +12,16 @@ import numpy.typing as npt
 from cosim.errors import BadInput
 from cosim.scene import load
 from cosim.scene.messages import plain
-from cosim.studies.compare.compare import differences, laid_over, through_camera, visible_frames
+from cosim.trials.camera import (
+    differences,
+    laid_over,
+    second_differences,
+    through_camera,
+    visible_frames,
+)
 from cosim.trials.published import FRAME_RATE
 from cosim.trials.tracked import FEWEST_ROWS
-from cosim.waveforms.formats.source import Exported, Run
+from cosim.waveforms.formats.source import Exported, Format, Run
 
 Array = npt.NDArray[np.float64]
 
@@ -49,15 +55,11 @@ def content(run: Run) -> Exported:
     return Exported(text.encode(), f"{n} frames at {FRAME_RATE:g} frames/s from {start:g} s on")
 
 
-def second_differences(z: Array) -> Array:
-    """Acceleration by the tracker's differences, over five frames; NaN in the two at either end."""
-    a = np.full(len(z), np.nan)
-    a[2:-2] = (2 * z[4:] - z[3:-1] - 2 * z[2:-2] - z[1:-3] + 2 * z[:-4]) * FRAME_RATE**2 / 7.0
-    return a
-
-
 def number(value: float) -> str:
     """Seven digits, and eight places after the point, as the published trials have them."""
     if np.isnan(value):
         return MISSING
     return f"{float(f'{value:.7g}'):.8f}".replace("-0.00000000", "0.00000000")
+
+
+FORMAT = Format("tracker", "tracker.csv", "a tracked trial", content)

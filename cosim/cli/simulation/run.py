@@ -1,0 +1,56 @@
+"""``cosim run``."""
+
+import json
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from cosim.cli.command import Command
+from cosim.cli.options import add_out, add_scene, progress_bar, scene_of, writable
+
+_BAR = "{desc} {percentage:3.0f}% |{bar}| {n:.2f} of {total:g} s, {remaining} left"
+
+
+def _options(parser: ArgumentParser) -> None:
+    add_scene(parser)
+    add_out(parser, "results/<scene>", known=False)
+
+
+def _run(arguments: Namespace) -> None:
+    scene = scene_of(arguments)
+    folder = arguments.out or Path("results") / scene.name
+    with writable(folder):
+        from cosim.files.atomic import whole
+        from cosim.files.spill import on_disk_in
+        from cosim.scene import to_toml
+        from cosim.simulation.simulate import UNITS, simulate
+        from cosim.waveforms.report import table
+
+        def progress(time: float) -> None:
+            bar.update(time - bar.n)
+
+        with (
+            progress_bar(scene.name, scene.run.duration, "s", delay=1.0, bar_format=_BAR) as bar,
+            on_disk_in(folder),
+        ):
+            result = simulate(scene, progress=progress)
+        from cosim.waveforms import figure
+        from cosim.waveforms.storage import write_csv, write_netcdf
+
+        write_csv(folder / "waveforms.csv", result.waveforms, UNITS)
+        attributes = {"title": scene.description or scene.name, "scene": to_toml(scene)}
+        write_netcdf(folder / "waveforms.nc", result.waveforms, UNITS, attributes)
+        for name, text in (
+            ("scene.toml", to_toml(scene)),
+            ("summary.json", json.dumps(result.summary, indent=2, allow_nan=False) + "\n"),
+        ):
+            with whole(folder / name) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+        with whole(folder / "figure.png") as temporary:
+            figure.draw(result, temporary)
+    print(f"{scene.name}: {scene.description}" if scene.description else scene.name)
+    print(table(scene, result.summary))
+    print(f"Written to {folder}: waveforms.csv, waveforms.nc, summary.json, scene.toml")
+    print(f"Figure: {folder / 'figure.png'}")
+
+
+COMMAND = Command("run", "run a scene; write waveforms, summary and figure", _run, _options)
