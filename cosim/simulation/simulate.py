@@ -20,7 +20,7 @@ from cosim.scene import WITHOUT_NGSPICE, Scene, changed
 from cosim.scene.tables import LED
 from cosim.simulation import electrics
 from cosim.simulation.summary import summarise
-from cosim.toolchain.isolation import isolated
+from cosim.toolchain.processes import isolated
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.result import Result
 

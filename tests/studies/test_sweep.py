@@ -123,7 +123,7 @@ def test_worker_that_keeps_dying() -> None:
             while 0 not in outcomes:
                 for worker in list(pool._workers):
                     if worker.began and worker.point is not None and worker.point[0] == 0:
-                        worker.process.kill()
+                        worker._process.kill()
                 time.sleep(0.05)
 
         killer = threading.Thread(target=kill)
