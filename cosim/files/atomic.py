@@ -30,7 +30,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file of text (UTF-8), whole or not at all. Raises BadInput."""
+    """Write a text as UTF-8."""
     with whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
