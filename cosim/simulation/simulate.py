@@ -16,8 +16,7 @@ from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import Command, command, commands
 from cosim.files.spill import Tape, blocks
 from cosim.mechanics.stickslip import Mechanics
-from cosim.scene import WITHOUT_NGSPICE, Scene, changed
-from cosim.scene.tables import LED
+from cosim.scene import Scene, changed
 from cosim.simulation import electrics
 from cosim.simulation.summary import summarise
 from cosim.toolchain.processes import isolated
@@ -48,14 +47,14 @@ def simulate(
     has given up in this one. Raises BadInput for a netlist that cannot be used, SimulationFailed
     with where, when, and what to try.
     """
-    if scene.circuit.model == "auto":
+    if scene.rung.automatic:
         return _by_itself(scene, progress, fmi_version, compiled)
     if scene.surface_is_given:
         from cosim.simulation.given_surface import simulate_part
 
         waveforms, summary = simulate_part(scene, progress)
         return Result(scene, waveforms, summary | {"versions": versions()})
-    if scene.coupling.method == "auto" and scene.circuit.model in LED:
+    if scene.coupling.method == "auto" and scene.rung.ngspice:
         from cosim.simulation.choose_steps import simulate_within_tolerance
 
         return simulate_within_tolerance(
@@ -86,9 +85,8 @@ def _by_itself(
 
 
 def _needs_own_process(scene: Scene) -> bool:
-    model = scene.circuit.model
-    if model == "file" or model in WITHOUT_NGSPICE:
-        return model == "file"
+    if scene.rung.own_netlist or not scene.rung.ngspice:
+        return scene.rung.own_netlist
     # PySpice and ngspice are loaded only for those who run a circuit.
     from cosim.circuit.ngspice import spoilt
 
@@ -158,10 +156,9 @@ def _simulate(
 
 
 def _method(scene: Scene) -> str:
-    model = scene.circuit.model
-    if model == "limited":
+    if scene.rung.source_in_fmu:
         return "monolithic"
-    return "uncoupled" if model in WITHOUT_NGSPICE else scene.coupling.method
+    return scene.coupling.method if scene.rung.ngspice else "uncoupled"
 
 
 def _recorder(
@@ -170,7 +167,7 @@ def _recorder(
     # The compiled steps have one input, and are those of the default coupling.
     if mechanics.has_second or mechanics.normal_force is not None:
         compiled = False
-    if scene.circuit.model in LED and scene.coupling.method != "step-locked":
+    if scene.rung.ngspice and scene.coupling.method != "step-locked":
         compiled = False
     made = CompiledRecorder if compiled and library() is not None else Recorder
     return made(scene, mechanics, progress)

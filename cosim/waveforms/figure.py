@@ -72,7 +72,7 @@ def _last_periods(scene: Scene, time: Array) -> slice:
     run = scene.run
     if scene.drive.file is not None:
         span = run.duration
-    elif scene.circuit.model == "none" and not scene.surface_is_given:
+    elif not (scene.rung.driven or scene.surface_is_given):
         span = run.duration / 10
     else:
         span = PERIODS_SHOWN / scene.drive.frequency
@@ -103,7 +103,7 @@ def _title(scene: Scene, numbers: dict[str, Any]) -> str:
     if scene.surface_is_given:
         limit = f", at most {drive.acceleration_max:.4g} m/s²" if drive.waveform != "sine" else ""
         return f"{words}; the surface is given: {drive.waveform}, {drive.frequency:.4g} Hz{limit}"
-    if scene.circuit.model == "none":
+    if not scene.rung.driven:
         return f"{words}; no drive"
     late = "" if drive.phase_deg is None else f", second coil {drive.phase_deg:.4g}° late"
     return (

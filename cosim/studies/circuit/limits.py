@@ -248,7 +248,7 @@ def study(
 
 def prepared(scene: Scene) -> Scene:
     """The scene on the rung "amplifier", its knobs resolved into volts and hertz."""
-    if scene.circuit.model in ("none", "file"):
+    if not scene.rung.on_ladder:
         raise BadInput(
             f'scene {scene.name}: circuit.model = "{scene.circuit.model}" has no limits to lift; '
             'it must be "full", "amplifier", "limited", "ideal" or "auto".'

@@ -11,7 +11,7 @@ from functools import partial
 from multiprocessing.connection import wait
 
 from cosim.errors import BadInput, SimulationFailed
-from cosim.scene import WITHOUT_NGSPICE, Scene
+from cosim.scene import Scene
 from cosim.studies.sweep.point import Number, Outcome, evaluate
 from cosim.toolchain.processes import PATIENCE, Worker
 
@@ -147,7 +147,7 @@ def _fault(error: Exception) -> Outcome:
 
 
 def _library_spoilt(base: Scene) -> bool:
-    if base.circuit.model == "file" or base.circuit.model in WITHOUT_NGSPICE:
+    if base.rung.own_netlist or not base.rung.ngspice:
         return False
     from cosim.circuit.ngspice import spoilt
 
