@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Literal
@@ -294,11 +294,12 @@ def theory(out: Path, errata: bool, given: dict[str, float]) -> None:
     if errata:
         print(closed_forms.errata_text())
         return
+    case = replace(closed_forms.FIGURE_3, **given)
     with _writable(out):
-        numbers = closed_forms.write(out, **(closed_forms.DEFAULTS | given))
+        numbers = closed_forms.write(out, case)
         from cosim.studies.paper import knife_edge
 
-        knife_edge.write(out, **(closed_forms.DEFAULTS | given))
+        knife_edge.write(out, case)
     print(closed_forms.table(numbers))
     print(f"Written to {out}: theory.json, knife_edge.csv")
     print(

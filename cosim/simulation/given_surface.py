@@ -47,7 +47,7 @@ def knots(scene: Scene) -> tuple[Array, Array, int]:
 
 def _period(scene: Scene) -> tuple[Array, Array]:
     from cosim.drive.surface import waveforms as theory
-    from cosim.drive.surface.formulas import sticking_range
+    from cosim.drive.surface.formulas import Transport
 
     drive, friction = scene.drive, scene.friction
     period = 1.0 / drive.frequency
@@ -56,23 +56,17 @@ def _period(scene: Scene) -> tuple[Array, Array]:
         return times, drive.velocity_amplitude * np.sin(2 * np.pi * times / period)
     gravity = max(scene.mechanics.gravity, NO_GRAVITY)
     ratio = force_per_mass(scene) / gravity
-    pair = (friction.mu_s, friction.mu_k)
-    down = drive.optimum == "down"
+    direction = "down" if drive.optimum == "down" else "up"
     if drive.waveform == "quaid":
-        low, high = sticking_range(friction.mu_s, ratio, gravity)
-        stick = -low if down else high
-        return theory.quaid_waveform(
-            stick * (1 - 1e-9), drive.acceleration_max, period, "down" if down else "up"
-        )
-    return theory.optimal_waveform(
-        *pair,
-        drive.acceleration_max,
-        ratio,
-        period,
-        direction="down" if down else "up",
+        stick = theory.quaid_limit(friction.mu_s, ratio, direction, gravity) * (1 - 1e-9)
+        return theory.quaid_cycle(stick, drive.acceleration_max, period, direction).knots()
+    case = Transport(
+        *(friction.mu_s, friction.mu_k, drive.acceleration_max, ratio, period),
+        direction=direction,
         robust=drive.optimum == "robust",
         gravity=gravity,
     )
+    return theory.optimal_cycle(case, theory.ROUNDING_MARGIN).knots()
 
 
 def force_per_mass(scene: Scene) -> float:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from cosim.drive.surface.formulas import Transport, average_velocity
 from cosim.scene import Scene, load
 from cosim.simulation.given_surface import force_per_mass
 from cosim.simulation.simulate import simulate
-from cosim.studies import paper as theory
 from cosim.studies.bench.sampling import spread, take_turns
 from cosim.studies.bench.truth import BRIEF_FULL, brief, error, heights
 
@@ -38,6 +38,10 @@ def real_time(rounds: int) -> dict[str, Any]:
             lambda: _error("limited", "amplifier"),
         ),
         "part": (load("optimal", _LONG_PART), _error_of_part),
+        "limited": (
+            load("paper", ["circuit.model=limited"]),
+            lambda: _error("limited", "amplifier"),
+        ),
     }
     calls = {name: partial(simulate, scene) for name, (scene, _) in cases.items()}
     taken = take_turns(calls, rounds)
@@ -79,14 +83,11 @@ def _error_of_full() -> float:
 def _error_of_part() -> float:
     scene = load("optimal", _LONG_PART)
     friction, drive, gravity = scene.friction, scene.drive, scene.mechanics.gravity
-    true = theory.average_velocity(
-        friction.mu_s,
-        friction.mu_k,
-        drive.acceleration_max,
-        force_per_mass(scene) / gravity,
-        1 / drive.frequency,
+    case = Transport(
+        *(friction.mu_s, friction.mu_k, drive.acceleration_max),
+        *(force_per_mass(scene) / gravity, 1 / drive.frequency),
         gravity=gravity,
     )
     found = simulate(scene).summary["v_average"]
     assert isinstance(found, float)
-    return abs(found / true - 1)
+    return abs(found / average_velocity(case) - 1)
