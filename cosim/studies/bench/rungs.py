@@ -38,10 +38,6 @@ def real_time(rounds: int) -> dict[str, Any]:
             lambda: _error("limited", "amplifier"),
         ),
         "part": (load("optimal", _LONG_PART), _error_of_part),
-        "limited": (
-            load("paper", ["circuit.model=limited"]),
-            lambda: _error("limited", "amplifier"),
-        ),
     }
     calls = {name: partial(simulate, scene) for name, (scene, _) in cases.items()}
     taken = take_turns(calls, rounds)
