@@ -19,7 +19,7 @@ from cosim.files.columns import read_timetable
 from cosim.mechanics import part
 from cosim.scene import Scene
 from cosim.scene.messages import plain
-from cosim.trials.published import FRAME_RATE
+from cosim.trials.camera import FRAME_RATE, three_point_accelerations
 
 Array = npt.NDArray[np.float64]
 
@@ -149,7 +149,7 @@ def simulate_part(scene: Scene, progress: Callable[[float], None]) -> tuple[dict
     span = run.duration - run.settle
     v_average = float(motion.z[-1] - motion.z[after][0]) / span
     peaks = surface.extremes(run.settle, run.duration)
-    camera = np.diff(z[np.searchsorted(wanted, frames)], 2) * FRAME_RATE**2
+    camera = three_point_accelerations(z[np.searchsorted(wanted, frames)])
     shares = motion.sticking[after[:-1]]
     periodic = scene.drive.file is None
     summary = {

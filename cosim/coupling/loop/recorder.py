@@ -12,7 +12,7 @@ import numpy.typing as npt
 from cosim.files.spill import BLOCK, Tape
 from cosim.mechanics.stickslip import SAMPLE_OUTPUTS, Mechanics
 from cosim.scene import Scene
-from cosim.trials.published import FRAME_RATE
+from cosim.trials.camera import FRAME_RATE
 
 Array = npt.NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from cosim.scene import Scene, load
 from cosim.scene.messages import plain
 from cosim.simulation.given_surface import knots
 from cosim.simulation.simulate import simulate
-from cosim.trials.published import FRAME_RATE
+from cosim.trials.camera import FRAME_RATE, Frames, film, frame_count
 from cosim.trials.tracked import Trial, read
 from cosim.waveforms.storage import read_csv, write_csv
 
@@ -62,17 +62,6 @@ class Metrics:
 
 
 @dataclass(frozen=True)
-class Frames:
-    """What a camera sees: heights (m) and velocities (m/s, by central differences) at frames."""
-
-    time: Array
-    z_surface: Array
-    v_surface: Array
-    z_part: Array
-    v_part: Array
-
-
-@dataclass(frozen=True)
 class CameraError:
     """What the camera alone makes of a run: mean distances of the run's rows from the straight
     lines between the frames, as scripts that interpolate a trial draw them.
@@ -84,41 +73,6 @@ class CameraError:
     """Of the part's height."""
     camera_velocity: float
     """Of the surface's velocity, m/s."""
-
-
-def through_camera(waveforms: dict[str, Array], start: float, frames: int) -> Frames:
-    """The run as a camera reads it from ``start`` (s) on."""
-    time = start + np.arange(frames) / FRAME_RATE
-    heights = {
-        body: hermite(time, waveforms["time"], waveforms[f"z_{body}"], waveforms[f"v_{body}"])
-        for body in ("surface", "part")
-    }
-    speeds = {body: differences(z) for body, z in heights.items()}
-    return Frames(
-        time - start, heights["surface"], speeds["surface"], heights["part"], speeds["part"]
-    )
-
-
-def visible_frames(waveforms: dict[str, Array], start: float) -> int:
-    """How many frames the camera takes from ``start`` (s) to the run's end."""
-    return max(0, int((waveforms["time"][-1] - start) * FRAME_RATE + 1e-6) + 1)
-
-
-def differences(z: Array) -> Array:
-    """Velocity, m/s, by the tracker's central differences; NaN in the first and last frame."""
-    v = np.full(len(z), np.nan)
-    v[1:-1] = (z[2:] - z[:-2]) * FRAME_RATE / 2.0
-    return v
-
-
-def hermite(at: Array, time: Array, z: Array, v: Array) -> Array:
-    """Cubic interpolation of heights with known velocities."""
-    k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
-    h = time[k + 1] - time[k]
-    s = (at - time[k]) / h
-    left = (1 + 2 * s) * (1 - s) ** 2 * z[k] + s * (1 - s) ** 2 * h * v[k]
-    right = s**2 * (3 - 2 * s) * z[k + 1] + s**2 * (s - 1) * h * v[k + 1]
-    return left + right
 
 
 def run(source: str, overrides: list[str], trial_path: Path, out: Path) -> Metrics:
@@ -186,10 +140,10 @@ def compare(
         )
     latest = earliest if own else max(earliest, min(room, earliest + period))
     starts = np.linspace(earliest, latest, SHIFTS)
-    candidates = (through_camera(waveforms, float(start), n) for start in starts)
+    candidates = (film(waveforms, float(start), n) for start in starts)
     fits = [explained(frames.v_surface, measured.v_surface) for frames in candidates]
     start = float(starts[int(np.argmax(fits))])
-    simulated = through_camera(waveforms, start, n)
+    simulated = film(waveforms, start, n)
     moved = simulated.z_part - simulated.z_part[0], measured.z_part - measured.z_part[0]
     error = float(np.nanmean(np.abs(moved[0] - moved[1])))
     span = float(measured.time[-1] - measured.time[0])
@@ -233,9 +187,9 @@ def camera_error(waveforms: dict[str, Array], trial: Trial, start: float) -> Cam
 def _own(waveforms: dict[str, Array], trial: Trial, start: float) -> bool:
     """Whether the trial's heights are this run's from ``start`` (s) on, to a trial's digits."""
     n = len(trial.time)
-    if n > visible_frames(waveforms, start):
+    if n > frame_count(waveforms, start):
         return False
-    seen, tracked = through_camera(waveforms, start, n), _of_trial(trial)
+    seen, tracked = film(waveforms, start, n), _of_trial(trial)
     # A trial has seven digits, and eight places of a second or millimetre.
     return np.allclose(seen.time, tracked.time, rtol=6e-7, atol=6e-9) and all(
         np.allclose(mine, theirs, rtol=6e-7, atol=6e-12)
