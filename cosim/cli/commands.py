@@ -3,13 +3,12 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Literal
 
 from cosim.errors import BadInput, SimulationFailed
-from cosim.files.atomic import whole
 from cosim.scene import Scene, list_scenes, load
 from cosim.scene.messages import plain
 from cosim.waveforms.report import table
@@ -133,33 +132,14 @@ def tune(
     out: Path | None,
 ) -> None:
     """Search a scene's settings for the best, and write the search."""
-    from cosim.studies.tune.files import ranges_of
-
-    scene = load(source, overrides)
-    ranges = ranges_of(over)
-    if seed < 0:
-        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
-    folder = out or Path("results") / f"{scene.name}-tune"
-    with _writable(folder):
-        _tune(scene, quantity, largest, ranges, budget, seed, workers, folder)
-
-
-def _tune(
-    scene: Scene,
-    quantity: str,
-    largest: bool,
-    ranges: dict[str, tuple[float, float]],
-    budget: int,
-    seed: int,
-    workers: int | None,
-    folder: Path,
-) -> None:
     from tqdm import tqdm
 
-    from cosim.studies.tune import tune
-    from cosim.studies.tune.files import table, write, write_runs
-    from cosim.studies.tune.run import Run
+    import cosim
+    from cosim.studies.tune.files import ranges_of, write_runs
+    from cosim.studies.tune.found import Run
 
+    scene = load(source, overrides)
+    folder = out or Path("results") / f"{scene.name}-tune"
     runs: list[Run] = []
 
     def scouting(run: Run, best: Run | None) -> None:
@@ -173,22 +153,29 @@ def _tune(
             bar.set_postfix_str(f"{quantity} {best.value:.4g}", refresh=False)
         bar.update()
 
-    with tqdm(
-        total=budget, desc=scene.name, unit="run", leave=False, file=sys.stderr, disable=None
-    ) as bar:
+    with (
+        _writable(folder),
+        tqdm(
+            total=budget, desc=scene.name, unit="run", leave=False, file=sys.stderr, disable=None
+        ) as bar,
+    ):
         try:
-            found = tune(
-                scene, quantity, largest, ranges, budget, seed, workers, progress, scouting
+            found = cosim.tune(
+                scene,
+                maximise=quantity if largest else None,
+                minimise=None if largest else quantity,
+                over=ranges_of(over),
+                budget=budget,
+                seed=seed,
+                workers=workers,
+                progress=progress,
+                scouting=scouting,
             )
         except KeyboardInterrupt:
             write_runs(folder / "tune.csv", runs, quantity)
             raise
-    numbers = write(folder, found, seed)
-    from cosim.studies.tune import figure
-
-    with whole(folder / "figure.png") as temporary:
-        figure.draw(found, temporary)
-    print(table(numbers))
+        found.save(folder)
+    print(found)
     print(f"Written to {folder}: tune.json, tune.csv, best.toml")
     print(f"Figure: {folder / 'figure.png'}")
 
@@ -279,18 +266,16 @@ def fmu_check() -> int:
 
 def theory(out: Path, errata: bool, given: dict[str, float]) -> None:
     """Write the paper's closed forms, or print its misprints."""
-    from cosim.studies import paper as closed_forms
+    import cosim
+    from cosim.studies.paper import errata_text
 
     if errata:
-        print(closed_forms.errata_text())
+        print(errata_text())
         return
-    case = replace(closed_forms.FIGURE_3, **given)
+    found = cosim.theory(**given)
     with _writable(out):
-        numbers = closed_forms.write(out, case)
-        from cosim.studies.paper import knife_edge
-
-        knife_edge.write(out, case)
-    print(closed_forms.table(numbers))
+        found.save(out)
+    print(found)
     print(f"Written to {out}: theory.json, knife_edge.csv")
     print(
         "Figures: " + ", ".join(str(out / f"{n}.png") for n in ("figure3", "figure4", "knife_edge"))
@@ -305,20 +290,25 @@ def fit(
     plate: bool,
 ) -> None:
     """Fit friction and normal forces to tracked trials, or evaluate the published ones."""
-    from cosim.studies.fit import fit as fitting
+    import cosim
 
     with _writable(out):
-        numbers = fitting.run(trials, out, evaluate=evaluate, solver=solver, plate=plate)
-    print(fitting.table(numbers))
+        found = cosim.fit(trials, evaluate=evaluate, solver=solver, plate=plate)
+        found.save(out)
+    print(found)
     print(f"Written to {out}: fit.json, fit.csv and figures")
 
 
 def compare(source: str, overrides: list[str], trial: Path, out: Path) -> None:
     """Lay a run, or a scene that is run for it, over a tracked trial."""
-    from cosim.studies.compare import compare as comparison
+    import cosim
 
     with _writable(out):
-        comparison.run(source, overrides, trial, out)
+        found = cosim.compare(source, trial, overrides)
+        found.save(out)
+    print(found)
+    print(f"Written to {out}: compare.json, compare.csv, frames.csv")
+    print(f"Figure: {out / 'compare.png'}")
 
 
 def export(run: Path, forms: list[str], out: Path | None) -> None:

@@ -9,7 +9,7 @@ import pytest
 from cosim.cli.main import main
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.compare.compare import compare, explained
+from cosim.studies.compare.compare import explained, measure
 from cosim.trials.camera import FRAME_RATE, film, hermite, velocities
 from cosim.trials.tracked import read
 
@@ -29,7 +29,7 @@ def test_a_run_compared_with_itself_through_the_camera(tmp_path: Path) -> None:
     waves = simulate(scene).columns
     frames = film(waves, 0.3125, 300)
     write_trial(tmp_path / "own.csv", frames.time, frames.z_surface, frames.z_part)
-    metrics, simulated, measured = compare(waves, read(tmp_path / "own.csv"), 0.3, 0.05)
+    metrics, simulated, measured = measure(waves, read(tmp_path / "own.csv"), 0.3, 0.05)
     # The phase is searched on a grid of an eighth of a millisecond; the true one is on it.
     assert metrics.start == pytest.approx(0.3125, abs=1.3e-4)
     assert metrics.velocity_r2 > 0.999
@@ -46,7 +46,7 @@ def test_metrics_of_a_known_difference(tmp_path: Path) -> None:
     frames = film(waves, 0.3, 300)
     slower = frames.z_part - 2e-3 * frames.time  # drifts 2 mm/s less
     write_trial(tmp_path / "own.csv", frames.time, frames.z_surface, slower)
-    metrics, _, _ = compare(waves, read(tmp_path / "own.csv"), 0.3, 0.05)
+    metrics, _, _ = measure(waves, read(tmp_path / "own.csv"), 0.3, 0.05)
     assert metrics.drift_error == pytest.approx(2e-3, abs=1e-4)
     span = 299 / FRAME_RATE
     assert metrics.mean_error_mm == pytest.approx(2.0 * span / 2, rel=0.03)

@@ -39,7 +39,7 @@ def trials(results: "TrialResults") -> Picture:
     rows = math.ceil(len(results.cases) / columns)
     figure = blank(13.0, 1.0 + 2.35 * rows)
     axes = figure.subplots(rows, columns, squeeze=False)
-    result = results.result
+    result = results.numbers
     for axis, case, motion, row in zip(
         axes.flat, results.cases, results.motions, result["trials"], strict=False
     ):
@@ -83,7 +83,7 @@ def _trial(axis: Axes, case: Case, motion: PartMotion, row: dict[str, Any]) -> N
 
 def profile(results: "TrialResults", fit: Fit) -> Picture:
     """The mean error over µ_k, each normal force fitted anew, and the error of each trial."""
-    result = results.result
+    result = results.numbers
     figure = blank(9.0, 5.2)
     axis = figure.subplots()
     line, error = fit.profile()
@@ -107,7 +107,7 @@ def profile(results: "TrialResults", fit: Fit) -> Picture:
 
 def forces(results: "TrialResults") -> Picture:
     """Fitted against measured normal forces, trial by trial, with the bounds of the fit."""
-    result = results.result
+    result = results.numbers
     rows = result["trials"]
     figure = blank(8.0, 4.6)
     axis = figure.subplots()

@@ -1,10 +1,6 @@
-"""Fits the part's motion to tracked trials, or evaluates the published parameters on them.
+"""Fits the part's motion to tracked trials, or evaluates the published parameters on them."""
 
-`run` writes `fit.json`, `fit.csv` and the figures `fit-trials.png`, `fit-profile.png` and
-`fit-forces.png`. The measure of the error is the authors' (`cosim.studies.fit.cases`), the search
-separable (`cosim.studies.fit.search`).
-"""
-
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -14,6 +10,7 @@ import numpy.typing as npt
 
 from cosim.errors import BadInput
 from cosim.files.atomic import write_json, write_text
+from cosim.files.picture import Picture
 from cosim.mechanics.part import PartMotion
 from cosim.studies.fit.cases import Case, Parameters, Solver
 from cosim.studies.fit.search import Fit, search
@@ -27,7 +24,7 @@ RESAMPLES = 2000  # of the trials, for the interval of µ_k
 NEAR = 1.05  # over the best mean error: µ_k with less are reported as about as good
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class TrialResults:
     """Trials with their parameters and simulated motions; ``fit`` if they were fitted."""
 
@@ -35,60 +32,64 @@ class TrialResults:
     parameters: list[Parameters]
     motions: list[PartMotion]
     fit: Fit | None
-    result: dict[str, Any]  # what fit.json holds
+    numbers: dict[str, Any]
+    """What ``fit.json`` holds; millimetres, m_P g and shares in per cent as the names say."""
+
+    def plot(self) -> Picture:
+        """Measured and simulated height of the part, a panel for each trial."""
+        from cosim.studies.fit import figures
+
+        return figures.trials(self)
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Write ``fit.json``, ``fit.csv`` and the figures ``fit-*.png``."""
+        from cosim.studies.fit import figures
+
+        out = Path(folder)
+        write_json(out / "fit.json", self.numbers)
+        write_text(out / "fit.csv", _csv(self.numbers["trials"]))
+        figures.draw_all(self, out)
+
+    def __repr__(self) -> str:
+        return table(self.numbers)
 
 
-def run(
-    trials_dir: Path,
-    out_dir: Path,
-    evaluate: Literal["published"] | None = None,
-    solver: Solver = "exact",
-    plate: bool = False,
-) -> dict[str, Any]:
-    """Fit or evaluate the trials of a folder, write the files, and return what `fit.json` holds.
-
-    ``evaluate="published"`` takes the paper's µ_k and normal forces instead of fitting them;
-    ``plate`` fits the friction of the springed plate too; ``solver`` is the exact solution or the
-    authors' scheme.
-    """
-    from cosim.studies.fit.figures import draw_all
-
-    results = compute(trials_dir, evaluate, solver, plate)
-    write_json(out_dir / "fit.json", results.result)
-    write_text(out_dir / "fit.csv", _csv(results.result["trials"]))
-    draw_all(results, out_dir)
-    return results.result
-
-
-def compute(
-    trials_dir: Path,
+def fit(
+    trials: str | os.PathLike[str],
+    *,
     evaluate: Literal["published"] | None = None,
     solver: Solver = "exact",
     plate: bool = False,
 ) -> TrialResults:
-    """`run` without the files."""
+    """Fit friction and normal forces to the tracked trials (CSVs) of a folder.
+
+    ``evaluate="published"`` takes the paper's µ_k and normal forces instead of fitting them;
+    ``plate`` fits the friction of the springed plate too; ``solver`` is the exact solution or the
+    authors' scheme. The measure of the error is the authors' (:mod:`cosim.studies.fit.cases`), the
+    search separable (:mod:`cosim.studies.fit.search`). Raises BadInput.
+    """
     if evaluate not in (None, "published"):
         raise BadInput(f"Only “published” parameters can be evaluated, not “{evaluate}”.")
     if solver not in ("exact", "published"):
         raise BadInput(f"The solver is exact or published, not “{solver}”.")
-    cases = [Case(trial) for trial in read_folder(trials_dir)]
-    fit = None
+    cases = [Case(trial) for trial in read_folder(Path(trials))]
+    found = None
     if evaluate:
         if plate:
             raise BadInput("The published parameters know no friction of the springed plate.")
-        parameters = _published(cases, trials_dir)
+        parameters = _published(cases, Path(trials))
     else:
-        fit = search(cases, solver, plate)
+        found = search(cases, solver, plate)
         parameters = [
-            Parameters(fit.mu_k, float(force), mu_plate=fit.mu_plate)
-            for force in fit.forces[fit.best]
+            Parameters(found.mu_k, float(force), mu_plate=found.mu_plate)
+            for force in found.forces[found.best]
         ]
     motions = [case.motion(p, solver) for case, p in zip(cases, parameters, strict=True)]
     result = _result(cases, parameters, motions, solver, evaluate)
-    if fit:
-        result |= _certainty(fit)
+    if found:
+        result |= _certainty(found)
     result["sensitivity"] = _sensitivity(cases, parameters, solver)
-    return TrialResults(cases, parameters, motions, fit, result)
+    return TrialResults(cases, parameters, motions, found, result)
 
 
 def table(result: dict[str, Any]) -> str:

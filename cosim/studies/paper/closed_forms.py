@@ -32,9 +32,9 @@ def write(out_dir: Path, case: Transport) -> dict[str, Any]:
     from cosim.studies.paper import figures  # with matplotlib, which a mere formula does not need
 
     write_json(out_dir / "theory.json", numbers)
-    figures.draw_cycle(out_dir / "figure3.png", case)
+    figures.draw_cycle(case).write(out_dir / "figure3.png")
     peaks = [row["a_max"] for row in numbers["figure4"]]
-    figures.draw_velocities(out_dir / "figure4.png", case, peaks)
+    figures.draw_velocities(case, peaks).write(out_dir / "figure4.png")
     return numbers
 
 

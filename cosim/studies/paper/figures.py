@@ -1,7 +1,6 @@
 """The paper's figures 3 and 4, drawn from the corrected closed forms."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +10,7 @@ from matplotlib.lines import Line2D
 from cosim.drive.surface import formulas
 from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import Cycle, optimal_cycle
-from cosim.studies.figures import blank, save
+from cosim.files.picture import Picture
 
 Array = npt.NDArray[np.float64]
 
@@ -22,11 +21,11 @@ DASHED, BEYOND = (0, (5, 2)), (0, (4, 3))
 POINTS = 400
 
 
-def draw_cycle(path: Path, case: Transport) -> None:
-    """Figure 3: one period of the optimal waveform, surface and part, into ``path`` (a PNG)."""
+def draw_cycle(case: Transport) -> Picture:
+    """Figure 3: one period of the optimal waveform, surface and part."""
     cycle, mean, gravity = optimal_cycle(case), formulas.average_velocity(case), case.gravity
     slowed = formulas.slipping_acceleration(case.mu_k, case.f_n, -1.0, gravity)
-    figure = blank(8.4, 8.6)
+    figure = Picture(8.4, 8.6, "constrained")
     axes = figure.subplots(3, 1, sharex=True)
     _accelerations(axes[0], cycle, slowed, gravity)
     _motions(axes[1], axes[2], cycle, slowed)
@@ -45,7 +44,7 @@ def draw_cycle(path: Path, case: Transport) -> None:
         f"T = {case.period * 1e3:.5g} ms",
         fontsize=12,
     )
-    save(figure, path)
+    return figure
 
 
 def _accelerations(axis: Axes, cycle: Cycle, slowed: float, gravity: float) -> None:
@@ -88,9 +87,9 @@ def _name_phases(above: Axes, between: Axes, cycle: Cycle) -> None:
         between.text(time, 1.015, f"T$_{name}$", transform=axis, ha=place, fontsize=10)
 
 
-def draw_velocities(path: Path, case: Transport, peaks: Sequence[float]) -> None:
-    """Figure 4: v_ave over the normal force for several a_max, m/s², into ``path`` (a PNG)."""
-    figure = blank(9.0, 6.0)
+def draw_velocities(case: Transport, peaks: Sequence[float]) -> Picture:
+    """Figure 4: v_ave over the normal force for several a_max, m/s²."""
+    figure = Picture(9.0, 6.0, "constrained")
     axis = figure.subplots()
     for peak, color in zip(peaks, CURVES, strict=False):
         _curve(axis, case, peak, color)
@@ -109,7 +108,7 @@ def draw_velocities(path: Path, case: Transport, peaks: Sequence[float]) -> None
     )
     title = f"Fastest transport upwards: {_friction(case)}, T = {case.period * 1e3:.5g} ms"
     axis.set_title(title, fontsize=12)
-    save(figure, path)
+    return figure
 
 
 def _curve(axis: Axes, case: Transport, peak: float, color: str) -> None:

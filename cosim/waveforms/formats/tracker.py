@@ -12,8 +12,7 @@ import numpy.typing as npt
 from cosim.errors import BadInput
 from cosim.scene import load
 from cosim.scene.messages import plain
-from cosim.studies.compare.compare import laid_over
-from cosim.trials.camera import FRAME_RATE, accelerations, film, frame_count, velocities
+from cosim.trials.camera import FRAME_RATE, accelerations, film, frame_count, laid_over, velocities
 from cosim.trials.tracked import FEWEST_ROWS
 from cosim.waveforms.formats.source import Exported, Run
 
