@@ -103,7 +103,7 @@ def writable(folder: Path) -> Iterator[None]:
         raise
 
 
-def progress_bar(name: str, total: float, unit: str, **more: Any) -> "tqdm[Any]":
+def progress_bar(name: str, total: float | None, unit: str, **more: Any) -> "tqdm[Any]":
     """A progress bar on stderr, where that is a terminal; gone at its end."""
     from tqdm import tqdm
 

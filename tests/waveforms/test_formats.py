@@ -20,7 +20,7 @@ import xarray
 from scipy.io import loadmat
 
 from cosim.cli.main import main
-from cosim.trials.camera import differences, second_differences
+from cosim.trials.camera import accelerations, velocities
 from cosim.trials.tracked import read
 from cosim.waveforms.formats import formats
 from cosim.waveforms.formats.tracker import number
@@ -311,8 +311,8 @@ def test_the_published_trials_have_this_form(name: str) -> None:
     frames: dict[str, tuple[str, ...]] = dict(zip(TRIAL.split(","), columns, strict=True))
     # Tracker differences heights of more digits than it writes.
     for quantity, differenced, unsure in (
-        ("v", differences, 1e-3),
-        ("a", second_differences, 1.0),
+        ("v", velocities, 1e-3),
+        ("a", accelerations, 1.0),
     ):
         for body in ("zp", "zo", "xo", "zs"):
             mm = np.array(frames[body], float)

@@ -1,6 +1,5 @@
 """``cosim run``."""
 
-import json
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
@@ -19,10 +18,8 @@ def _run(arguments: Namespace) -> None:
     scene = scene_of(arguments)
     folder = arguments.out or Path("results") / scene.name
     with writable(folder):
-        from cosim.files.atomic import whole
+        import cosim
         from cosim.files.spill import on_disk_in
-        from cosim.scene import to_toml
-        from cosim.simulation.simulate import UNITS, simulate
         from cosim.waveforms.report import table
 
         def progress(time: float) -> None:
@@ -32,23 +29,10 @@ def _run(arguments: Namespace) -> None:
             progress_bar(scene.name, scene.run.duration, "s", delay=1.0, bar_format=_BAR) as bar,
             on_disk_in(folder),
         ):
-            result = simulate(scene, progress=progress)
-        from cosim.waveforms import figure
-        from cosim.waveforms.storage import write_csv, write_netcdf
-
-        write_csv(folder / "waveforms.csv", result.waveforms, UNITS)
-        attributes = {"title": scene.description or scene.name, "scene": to_toml(scene)}
-        write_netcdf(folder / "waveforms.nc", result.waveforms, UNITS, attributes)
-        for name, text in (
-            ("scene.toml", to_toml(scene)),
-            ("summary.json", json.dumps(result.summary, indent=2, allow_nan=False) + "\n"),
-        ):
-            with whole(folder / name) as temporary:
-                temporary.write_text(text, encoding="utf-8")
-        with whole(folder / "figure.png") as temporary:
-            figure.draw(result, temporary)
+            result = cosim.run(scene, progress=progress)
+        result.save(folder)
     print(f"{scene.name}: {scene.description}" if scene.description else scene.name)
-    print(table(scene, result.summary))
+    print(table(result.scene, result.summary))
     print(f"Written to {folder}: waveforms.csv, waveforms.nc, summary.json, scene.toml")
     print(f"Figure: {folder / 'figure.png'}")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from cosim.cli.command import Command
 from cosim.cli.options import add_out, add_scene, add_workers, progress_bar, scene_of, writable
-from cosim.errors import BadInput, SimulationFailed
+from cosim.errors import SimulationFailed
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -34,42 +34,38 @@ def _options(parser: ArgumentParser) -> None:
 
 
 def _run(arguments: Namespace) -> None:
-    from cosim.studies import sweep
-    from cosim.studies.sweep import design
+    import cosim
+    from cosim.studies.sweep import design, report
 
-    scene = scene_of(arguments)
-    count = arguments.samples
-    if count is None and arguments.random:
-        raise BadInput("--random needs --samples N.")
-    axes = design.parse(arguments.over)
-    chosen = (
-        design.grid(axes)
-        if count is None
-        else design.sample(axes, count, arguments.seed, arguments.random)
-    )
+    scene, axes = scene_of(arguments), design.parse(arguments.over)
+    folder = arguments.out or Path("results") / f"{scene.name}-sweep"
 
     def progress(done: int, failed: int, total: int) -> None:
-        if bar.n == 0:
+        if bar.total is None:
+            bar.reset(total)
             bar.initial = done  # those of an earlier run tell nothing of the rate
         bar.update(done - bar.n)
         if failed:
             bar.set_postfix_str(f"{failed} failed", refresh=False)
 
-    folder = arguments.out or Path("results") / f"{scene.name}-sweep"
-    with writable(folder):
-        with progress_bar(scene.name, len(chosen), "point") as bar:
-            data = sweep.sweep(scene, chosen, folder, arguments.workers, arguments.dask, progress)
-        from cosim.files.atomic import whole
-        from cosim.studies.sweep import figure, report
-
-        with whole(folder / "figure.png") as temporary:
-            figure.draw(data, scene.name, temporary)
-        print(report.table(scene, data))
-        print(f"Written to {folder}: sweep.nc")
-        print(f"Figure: {folder / 'figure.png'}")
-        reasons = [str(reason) for reason in data["failure"].values.flat]
-        if all(reasons):
-            raise SimulationFailed(f"No point could be run; the first one: {reasons[0]}")
+    with writable(folder), progress_bar(scene.name, None, "point") as bar:
+        data = cosim.sweep(
+            scene,
+            axes,
+            samples=arguments.samples,
+            random=arguments.random,
+            seed=arguments.seed,
+            out=folder,
+            workers=arguments.workers,
+            dask=arguments.dask,
+            progress=progress,
+        )
+    print(report.table(scene.name, data))
+    print(f"Written to {folder}: sweep.nc")
+    print(f"Figure: {folder / 'figure.png'}")
+    reasons = [str(reason) for reason in data["failure"].values.flat]
+    if all(reasons):
+        raise SimulationFailed(f"No point could be run; the first one: {reasons[0]}")
 
 
 COMMAND = Command("sweep", "run a scene over a grid or a sample of settings", _run, _options)

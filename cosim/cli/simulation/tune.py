@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 
 from cosim.cli.command import Command
 from cosim.cli.options import add_out, add_scene, add_workers, progress_bar, scene_of, writable
-from cosim.errors import BadInput
 
 if TYPE_CHECKING:
-    from cosim.studies.tune.run import Run
+    from cosim.studies.tune.found import Run
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -35,14 +34,10 @@ def _options(parser: ArgumentParser) -> None:
 
 
 def _run(arguments: Namespace) -> None:
-    from cosim.studies.tune import files, tune
+    import cosim
+    from cosim.studies.tune.files import ranges_of, write_runs
 
-    scene = scene_of(arguments)
-    ranges = files.ranges_of(arguments.over)
-    budget, seed = arguments.budget, arguments.seed
-    if seed < 0:
-        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
-    largest = arguments.maximise is not None
+    scene, ranges = scene_of(arguments), ranges_of(arguments.over)
     quantity = arguments.maximise or arguments.minimise
     folder = arguments.out or Path("results") / f"{scene.name}-tune"
     runs: list[Run] = []
@@ -58,21 +53,24 @@ def _run(arguments: Namespace) -> None:
             bar.set_postfix_str(f"{quantity} {best.value:.4g}", refresh=False)
         bar.update()
 
-    with writable(folder):
-        with progress_bar(scene.name, budget, "run") as bar:
-            try:
-                asked = (scene, quantity, largest, ranges, budget, seed, arguments.workers)
-                found = tune(*asked, progress, scouting)
-            except KeyboardInterrupt:
-                files.write_runs(folder / "tune.csv", runs, quantity)
-                raise
-        numbers = files.write(folder, found, seed)
-        from cosim.files.atomic import whole
-        from cosim.studies.tune import figure
-
-        with whole(folder / "figure.png") as temporary:
-            figure.draw(found, temporary)
-    print(files.table(numbers))
+    with writable(folder), progress_bar(scene.name, arguments.budget, "run") as bar:
+        try:
+            found = cosim.tune(
+                scene,
+                maximise=arguments.maximise,
+                minimise=arguments.minimise,
+                over=ranges,
+                budget=arguments.budget,
+                seed=arguments.seed,
+                workers=arguments.workers,
+                progress=progress,
+                scouting=scouting,
+            )
+        except KeyboardInterrupt:
+            write_runs(folder / "tune.csv", runs, quantity)
+            raise
+        found.save(folder)
+    print(found)
     print(f"Written to {folder}: tune.json, tune.csv, best.toml")
     print(f"Figure: {folder / 'figure.png'}")
 

@@ -15,10 +15,15 @@ def _options(parser: ArgumentParser) -> None:
 
 
 def _run(arguments: Namespace) -> None:
-    from cosim.studies.compare import compare
+    import cosim
 
-    with writable(arguments.out):
-        compare.run(arguments.run, arguments.overrides, arguments.trial, arguments.out)
+    out: Path = arguments.out
+    with writable(out):
+        found = cosim.compare(arguments.run, arguments.trial, arguments.overrides)
+        found.save(out)
+    print(found)
+    print(f"Written to {out}: compare.json, compare.csv, frames.csv")
+    print(f"Figure: {out / 'compare.png'}")
 
 
 COMMAND = Command(

@@ -27,17 +27,17 @@ def _options(parser: ArgumentParser) -> None:
 
 
 def _run(arguments: Namespace) -> None:
-    from cosim.studies.fit import fit
+    import cosim
 
     with writable(arguments.out):
-        numbers = fit.run(
+        found = cosim.fit(
             arguments.trials,
-            arguments.out,
             evaluate=arguments.evaluate,
             solver=arguments.solver,
             plate=arguments.plate,
         )
-    print(fit.table(numbers))
+        found.save(arguments.out)
+    print(found)
     print(f"Written to {arguments.out}: fit.json, fit.csv and figures")
 
 

@@ -34,20 +34,19 @@ def _options(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from cosim.studies import paper
+    import cosim
 
     if arguments.errata:
-        print(paper.errata_text())
+        from cosim.studies.paper import errata_text
+
+        print(errata_text())
         return
     out: Path = arguments.out
-    values = {name: getattr(arguments, name) for name, _, _ in _GIVEN}
-    case = paper.DEFAULTS | {name: value for name, value in values.items() if value is not None}
+    given = {name: getattr(arguments, name) for name, _, _ in _GIVEN}
     with writable(out):
-        numbers = paper.write(out, **case)
-        from cosim.studies.paper import knife_edge
-
-        knife_edge.write(out, **case)
-    print(paper.table(numbers))
+        found = cosim.theory(**{name: value for name, value in given.items() if value is not None})
+        found.save(out)
+    print(found)
     print(f"Written to {out}: theory.json, knife_edge.csv")
     figures = (str(out / f"{name}.png") for name in ("figure3", "figure4", "knife_edge"))
     print(f"Figures: {', '.join(figures)}")

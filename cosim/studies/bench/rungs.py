@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from cosim.drive.surface.formulas import Transport, average_velocity
 from cosim.scene import Scene, load
 from cosim.simulation.rungs.given_surface import force_per_mass
 from cosim.simulation.simulate import simulate
-from cosim.studies import paper as theory
 from cosim.studies.bench.sampling import spread, take_turns
 from cosim.studies.bench.truth import BRIEF_FULL, brief, error, heights
 
@@ -79,14 +79,11 @@ def _error_of_full() -> float:
 def _error_of_part() -> float:
     scene = load("optimal", _LONG_PART)
     friction, drive, gravity = scene.friction, scene.drive, scene.mechanics.gravity
-    true = theory.average_velocity(
-        friction.mu_s,
-        friction.mu_k,
-        drive.acceleration_max,
-        force_per_mass(scene) / gravity,
-        1 / drive.frequency,
+    case = Transport(
+        *(friction.mu_s, friction.mu_k, drive.acceleration_max),
+        *(force_per_mass(scene) / gravity, 1 / drive.frequency),
         gravity=gravity,
     )
     found = simulate(scene).summary["v_average"]
     assert isinstance(found, float)
-    return abs(found / true - 1)
+    return abs(found / average_velocity(case) - 1)

@@ -12,14 +12,7 @@ import numpy.typing as npt
 from cosim.errors import BadInput
 from cosim.scene import load
 from cosim.scene.messages import plain
-from cosim.trials.camera import (
-    differences,
-    laid_over,
-    second_differences,
-    through_camera,
-    visible_frames,
-)
-from cosim.trials.published import FRAME_RATE
+from cosim.trials.camera import FRAME_RATE, accelerations, film, frame_count, laid_over, velocities
 from cosim.trials.tracked import FEWEST_ROWS
 from cosim.waveforms.formats.source import Exported, Format, Run
 
@@ -35,7 +28,7 @@ MISSING = "\ufffd"
 def content(run: Run) -> Exported:
     """Platform p, part o and springed plate s, mm, frame by frame."""
     start, _ = laid_over(load(run.folder / "scene.toml"))
-    n = visible_frames(run.waveforms, start)
+    n = frame_count(run.waveforms, start)
     if not FEWEST_ROWS <= n <= MOST_FRAMES:
         shortest, longest = ((rows - 1) / FRAME_RATE for rows in (FEWEST_ROWS, MOST_FRAMES))
         raise BadInput(
@@ -43,11 +36,11 @@ def content(run: Run) -> Exported:
             f"the camera sees {n} of this run; run.duration must be {shortest:.4g} s to "
             f"{longest:.4g} s more than {start:g} s."
         )
-    frames = through_camera(run.waveforms, start, n)
+    frames = film(run.waveforms, start, n)
     columns = {"t": frames.time}
     rest = np.zeros(n)
     for body, z in (("p", frames.z_surface), ("o", frames.z_part), ("s", rest)):
-        for kind, of in (("", np.copy), ("v", differences), ("a", second_differences)):
+        for kind, of in (("", np.copy), ("v", velocities), ("a", accelerations)):
             columns[f"{kind}x{body}"] = of(rest)
             columns[f"{kind}z{body}"] = of(1e3 * z)
     rows = zip(*(map(number, values.tolist()) for values in columns.values()), strict=True)
