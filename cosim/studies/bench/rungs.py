@@ -15,11 +15,10 @@ from cosim.studies.bench.sampling import spread, take_turns
 from cosim.studies.bench.truth import BRIEF_FULL, brief, error, heights
 
 _FINER = ("circuit.reltol=1e-6", "circuit.max_step=5e-6")
-"""What the schematic, of which there is no reference, is compared with itself at."""
-
+"""There is no reference of the schematic: it is compared with itself at these steps."""
 
 _LONG_PART = ("run.duration=100", "run.output_step=1e-2")
-"""So long, and so few rows, that neither the start nor the writing of rows is what is measured."""
+"""So long, and so few rows, that starting and writing rows cost next to nothing."""
 
 
 def real_time(rounds: int) -> dict[str, Any]:

@@ -8,7 +8,7 @@ current that is commanded is found here by lifting one limit after another, whic
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import combinations
-from math import nan
+from math import comb, nan
 
 import numpy as np
 
@@ -180,24 +180,12 @@ class Study:
 
 def runs_in_all(turn: bool) -> int:
     """How many runs a study takes."""
+    alone = 3 + 2 * len(TREMBLES) + len(LIMITS) + sum(limit.reduced for limit in LIMITS)
     turned = sum(limit.factors for limit in LIMITS) * len(FACTORS)
-    reduced = sum(limit.reduced for limit in LIMITS)
-    return (
-        3
-        + 2 * len(TREMBLES)
-        + len(LIMITS)
-        + reduced
-        + turn * turned
-        + PAIRED * (PAIRED - 1) // 2
-        + 1
-    )
+    return alone + turn * turned + comb(PAIRED, 2) + 1
 
 
-def study(
-    scene: Scene,
-    turn: bool,
-    progress: Callable[[], None] = lambda: None,
-) -> Study:
+def study(scene: Scene, turn: bool, progress: Callable[[], None] = lambda: None) -> Study:
     """Lift each limit of a scene's circuit alone and in pairs and, on request, turn each.
 
     The circuit is the behavioural amplifier, where all of them but the current limit act; that one
@@ -205,8 +193,7 @@ def study(
     kind, SimulationFailed where the scene itself does not run.
     """
     base, workers = prepared(scene), workers_asked(None)
-    runs: list[tuple[str, Settings]] = [("amplifier", {})]
-    runs += [("ideal", {}), ("limited", {})]
+    runs: list[tuple[str, Settings]] = [("amplifier", {}), ("ideal", {}), ("limited", {})]
     runs += [
         ("amplifier", _times(key)(base, 1.0 + change))
         for key in ("friction.normal_force", "coil.force_factor")
