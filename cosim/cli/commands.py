@@ -1,22 +1,18 @@
 """What each command does, apart from reading its options."""
 
-import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.files.atomic import whole
-from cosim.scene import Scene, list_scenes, load, to_toml
+from cosim.scene import Scene, list_scenes, load
 from cosim.scene.messages import plain
 from cosim.waveforms.report import table
-
-if TYPE_CHECKING:
-    from cosim.studies.sweep import Design
 
 
 def scenes() -> None:
@@ -39,8 +35,8 @@ def _run(scene: Scene, folder: Path) -> None:
     # From here on with the heavy libraries.
     from tqdm import tqdm
 
+    import cosim
     from cosim.files.spill import on_disk_in
-    from cosim.simulation.simulate import simulate
 
     def progress(time: float) -> None:
         bar.update(time - bar.n)
@@ -58,24 +54,10 @@ def _run(scene: Scene, folder: Path) -> None:
         ) as bar,
         on_disk_in(folder),
     ):
-        result = simulate(scene, progress=progress)
-    from cosim.simulation.simulate import UNITS
-    from cosim.waveforms import figure
-    from cosim.waveforms.storage import write_csv, write_netcdf
-
-    write_csv(folder / "waveforms.csv", result.waveforms, UNITS)
-    attributes = {"title": scene.description or scene.name, "scene": to_toml(scene)}
-    write_netcdf(folder / "waveforms.nc", result.waveforms, UNITS, attributes)
-    for name, text in (
-        ("scene.toml", to_toml(scene)),
-        ("summary.json", json.dumps(result.summary, indent=2, allow_nan=False) + "\n"),
-    ):
-        with whole(folder / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-    with whole(folder / "figure.png") as temporary:
-        figure.draw(result, temporary)
+        result = cosim.run(scene, progress=progress)
+    result.save(folder)
     print(f"{scene.name}: {scene.description}" if scene.description else scene.name)
-    print(table(scene, result.summary))
+    print(table(result.scene, result.summary))
     print(f"Written to {folder}: waveforms.csv, waveforms.nc, summary.json, scene.toml")
     print(f"Figure: {folder / 'figure.png'}")
 
@@ -99,46 +81,39 @@ def sweep(
     out: Path | None,
 ) -> None:
     """Run a scene over many settings and write their summaries as one dataset."""
-    from cosim.studies.sweep import design
-
-    scene = load(source, overrides)
-    if sampling.count is None and sampling.random:
-        raise BadInput("--random needs --samples N.")
-    axes = design.parse(over)
-    chosen = (
-        design.grid(axes)
-        if sampling.count is None
-        else design.sample(axes, sampling.count, sampling.seed, sampling.random)
-    )
-    folder = out or Path("results") / f"{scene.name}-sweep"
-    with _writable(folder):
-        _sweep(scene, chosen, workers, dask, folder)
-
-
-def _sweep(
-    scene: Scene, design: "Design", workers: int | None, dask: str | None, folder: Path
-) -> None:
     from tqdm import tqdm
 
-    from cosim.studies import sweep
+    import cosim
+    from cosim.studies.sweep import design
+    from cosim.studies.sweep.report import table
+
+    scene, axes = load(source, overrides), design.parse(over)
+    folder = out or Path("results") / f"{scene.name}-sweep"
 
     def progress(done: int, failed: int, total: int) -> None:
-        if bar.n == 0:
+        if bar.total is None:
+            bar.reset(total)
             bar.initial = done  # those of an earlier run tell nothing of the rate
         bar.update(done - bar.n)
         if failed:
             bar.set_postfix_str(f"{failed} failed", refresh=False)
 
-    with tqdm(
-        total=len(design), desc=scene.name, unit="point", leave=False, file=sys.stderr, disable=None
-    ) as bar:
-        data = sweep.sweep(scene, design, folder, workers, dask, progress)
-    from cosim.studies.sweep import figure
-    from cosim.studies.sweep.report import table
-
-    with whole(folder / "figure.png") as temporary:
-        figure.draw(data, scene.name, temporary)
-    print(table(scene, data))
+    with (
+        _writable(folder),
+        tqdm(desc=scene.name, unit="point", leave=False, file=sys.stderr, disable=None) as bar,
+    ):
+        data = cosim.sweep(
+            scene,
+            axes,
+            samples=sampling.count,
+            random=sampling.random,
+            seed=sampling.seed,
+            out=folder,
+            workers=workers,
+            dask=dask,
+            progress=progress,
+        )
+    print(table(scene.name, data))
     print(f"Written to {folder}: sweep.nc")
     print(f"Figure: {folder / 'figure.png'}")
     reasons = [str(reason) for reason in data["failure"].values.flat]

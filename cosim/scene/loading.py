@@ -15,9 +15,10 @@ from pydantic import ValidationError
 
 from cosim.errors import BadInput, NoEffect
 from cosim.scene import messages
-from cosim.scene.describe import keys
+from cosim.scene.describe import acts, keys
+from cosim.scene.methods import METHODS
 from cosim.scene.model import Scene
-from cosim.scene.tables import CHOSEN_BY_AUTO, KNOBS, NORMAL_FORCES, TABLES, acts
+from cosim.scene.tables import KNOBS, NORMAL_FORCES, TABLES
 
 PATHS = (("circuit", "netlist"), ("drive", "file"), ("friction", "normal_force_file"))
 """The keys that name files."""
@@ -44,16 +45,28 @@ def list_scenes() -> list[tuple[str, str]]:
     return sorted(found, key=lambda scene: (not scene[0].startswith("paper"), scene[0]))
 
 
-def load(source: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scene:
-    """The checked scene of a built-in name or TOML file, with ``table.key=value`` overrides.
+Overrides = Mapping[str, Any] | Iterable[str]
+"""Values for keys: ``{"table.key": value}``, SI, or ``"table.key=value"`` as the command has it."""
+
+
+def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None = None) -> Scene:
+    """The checked scene of a built-in name, a TOML file or another scene, with ``overrides`` on
+    top: ``{"table.key": value}``, SI, or strings ``"table.key=value"``.
 
     A file may name a built-in scene as its ``base``; each layer changes only the keys that it
     gives. A knob of the device replaces its value from the layers below, and the other way round.
     Raises :class:`BadInput` with one sentence on the first thing that is wrong.
     """
-    layers = _layers(os.fspath(source))
-    if changes := _overrides(overrides):
-        layers.append(_Layer("--set", changes))
+    if isinstance(source, Scene):
+        layers = [_Layer(f"scene {source.name}", source.as_dict())]
+    else:
+        layers = _layers(os.fspath(source))
+    if isinstance(overrides, str):
+        raise BadInput("overrides: must be a mapping or a list of strings, not one string.")
+    origin = "overrides" if isinstance(overrides, Mapping) else "--set"
+    changes = _given(overrides) if isinstance(overrides, Mapping) else _overrides(overrides or ())
+    if changes:
+        layers.append(_Layer(origin, changes))
     merged, origins = _merge(layers)
     try:
         scene = Scene.model_validate(merged)
@@ -187,9 +200,7 @@ def _overrides(overrides: Iterable[str]) -> dict[str, Any]:
         left, equals, right = text.partition("=")
         table, dot, key = left.strip().partition(".")
         if not (equals and dot and table and key):
-            bare = left.strip()
-            full = next((k.full for k in keys() if k.name == bare), None)
-            hint = f"; did you mean {full}?" if full else ""
+            hint = _full_name(left.strip())
             raise BadInput(
                 messages.ended(f"--set {messages.plain(text)}: must be table.key=value{hint}")
             )
@@ -197,6 +208,28 @@ def _overrides(overrides: Iterable[str]) -> dict[str, Any]:
             raise BadInput(f"--set {messages.plain(text)}: has no value.")
         _check_names({table: {key: None}}, "--set")
         tables.setdefault(table, {})[key] = _value(right.strip())
+    _find_files(tables, Path())
+    return tables
+
+
+def _full_name(bare: str) -> str:
+    full = next((key.full for key in keys() if key.name == bare), None)
+    return f"; did you mean {full}?" if full else ""
+
+
+def _given(overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables that a mapping from ``table.key`` to values gives."""
+    tables: dict[str, Any] = {}
+    for full, value in overrides.items():
+        table, dot, key = full.partition(".")
+        if not dot:
+            hint = _full_name(full)
+            raise BadInput(messages.ended(f"overrides: {full} must be table.key{hint}"))
+        _check_names({table: {key: None}}, "overrides")
+        if isinstance(value, os.PathLike):
+            value = os.fspath(value)
+        # numpy's numbers are no Python numbers
+        tables.setdefault(table, {})[key] = value.item() if hasattr(value, "item") else value
     _find_files(tables, Path())
     return tables
 
@@ -249,21 +282,21 @@ def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int,
     Only where the user, with that circuit and waveform chosen, gave the key another value: a file
     may be run with another circuit on top, and a resolved scene holds every key.
     """
-    model, waveform, method = scene.circuit.model, scene.drive.waveform, scene.coupling.method
+    chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
     resolved = [_is_resolved(layer.tables) for layer in layers]
     for key in keys():
         rank, origin = origins.get(key.full, (-1, ""))
         choices = ["circuit.model"]
         choices += ["drive.waveform"] * (key.table == "drive")
-        steered = key.table == "circuit" and key.name in CHOSEN_BY_AUTO
-        choices += ["coupling.method"] * (steered or key.full.startswith("coupling."))
-        chosen = max(origins.get(choice, (-1, ""))[0] for choice in choices)
-        if rank < max(chosen, 0) or layers[rank].builtin or resolved[rank]:
+        steered = key.table == "circuit" and key.name in METHODS[scene.coupling.method].chooses
+        choices += ["coupling.method"] * (steered or key.table == "coupling")
+        latest = max(origins.get(choice, (-1, ""))[0] for choice in choices)
+        if rank < max(latest, 0) or layers[rank].builtin or resolved[rank]:
             continue
         given = [layer.tables.get(key.table, {}) for layer in layers[: rank + 1]]
         values = [key.default, *(table[key.name] for table in given if key.name in table)]
-        if values[-1] != values[-2] and not acts(key.table, key.name, model, waveform, method):
-            sentence = f"{origin}: {messages.idle(key, model, waveform, method)}."
+        if values[-1] != values[-2] and not acts(key, *chosen):
+            sentence = f"{origin}: {messages.idle(key, *chosen)}."
             warnings.warn(sentence, NoEffect, stacklevel=3)
 
 

@@ -2,17 +2,14 @@
 
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
-from cosim.files.atomic import whole
+from cosim.files.picture import Picture
 
 
-def blank(width: float, height: float) -> Figure:
+def blank(width: float, height: float) -> Picture:
     """An empty figure, sizes in inches."""
-    return Figure(figsize=(width, height), dpi=110, layout="constrained")
+    return Picture(width, height, "constrained")
 
 
-def save(figure: Figure, path: Path) -> None:
+def save(figure: Picture, path: Path) -> None:
     """Write a figure as a PNG."""
-    with whole(path) as temporary:
-        figure.savefig(temporary, format="png")
+    figure.write(path)

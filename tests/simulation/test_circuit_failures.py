@@ -19,7 +19,7 @@ from cosim.errors import BadInput, CosimError, SimulationFailed
 from cosim.files.resources import circuits
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.toolchain import isolation
+from cosim.toolchain import processes
 
 pytestmark = pytest.mark.reliability
 
@@ -28,7 +28,7 @@ AMPLIFIER = (circuits() / "amplifier.cir").read_text(encoding="utf-8")
 
 
 def good_run() -> np.ndarray:
-    return simulate(load("paper", SHORT)).waveforms["z_part"]
+    return simulate(load("paper", SHORT)).columns["z_part"]
 
 
 @pytest.fixture(scope="module")
@@ -100,10 +100,10 @@ def test_failing_circuit(name: str, tmp_path: Path, before: np.ndarray) -> None:
 
 @pytest.mark.parametrize("harm", ["os._exit(7)", "os.kill(os.getpid(), 11)", "time.sleep(60)"])
 def test_dying_or_hanging_process(harm: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(isolation, "PATIENCE", 5.0)
+    monkeypatch.setattr(processes, "PATIENCE", 5.0)
     told = {"o": r"died.*(exit code 7|SIGSEGV)", "t": r"hangs"}[harm[0]]
     with pytest.raises(SimulationFailed, match=told):
-        isolation.isolated(_harmful, harm, lambda _: None)
+        processes.isolated(_harmful, harm, lambda _: None)
 
 
 def _harmful(harm: str, progress: object) -> None:
@@ -114,7 +114,7 @@ def _harmful(harm: str, progress: object) -> None:
 
 def test_spoilt_library_is_left_behind(before: np.ndarray) -> None:
     # In a process of its own, since nothing else can run in it afterwards.
-    after = isolation.isolated(_spoil_and_run, None, lambda _: None)
+    after = processes.isolated(_spoil_and_run, None, lambda _: None)
     assert np.array_equal(after, before)
 
 
@@ -201,7 +201,7 @@ def test_early_end_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndar
 def test_false_alarms_do_not_fail_a_run(text: str, tmp_path: Path, before: np.ndarray) -> None:
     as_built_in = "circuit.max_step=5e-5"  # which a netlist of one's own has finer
     result = simulate(load("paper", [*own(tmp_path, text), as_built_in]))
-    assert np.allclose(result.waveforms["z_part"], before, rtol=0, atol=1e-9)
+    assert np.allclose(result.columns["z_part"], before, rtol=0, atol=1e-9)
 
 
 def test_startup_file_in_the_working_folder_is_not_run(tmp_path: Path) -> None:
@@ -211,7 +211,7 @@ def test_startup_file_in_the_working_folder_is_not_run(tmp_path: Path) -> None:
     here = Path.cwd()
     os.chdir(tmp_path)
     try:
-        isolation.isolated(_run_scene, ["paper", SHORT], lambda _: None)
+        processes.isolated(_run_scene, ["paper", SHORT], lambda _: None)
     finally:
         os.chdir(here)
     assert not marker.exists()

@@ -20,7 +20,7 @@ from cosim.mechanics.fmi import references
 from cosim.mechanics.package import MODEL, token, unpacked
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
-from cosim.toolchain.isolation import isolated
+from cosim.toolchain.processes import isolated
 
 _FALL = 1e-9
 """s; time of the sawtooth's fall, which ngspice's own source wants above 0."""

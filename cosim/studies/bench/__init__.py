@@ -74,7 +74,7 @@ def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
 
 def _made_up(number: int) -> Trial:
     scene = load("ideal-current", ["run.duration=0.8", "run.settle=0.4"])
-    frames = film(simulate(scene).waveforms, 0.4 + 0.003 * number, FRAMES)
+    frames = film(simulate(scene).columns, 0.4 + 0.003 * number, FRAMES)
     nothing = np.full(FRAMES, np.nan)
     surface = Track(frames.z_surface, frames.v_surface, nothing, nothing)
     part = Track(frames.z_part, frames.v_part, nothing, nothing)

@@ -32,11 +32,11 @@ def real_time(rounds: int) -> dict[str, Any]:
         "full": (load("paper-full", BRIEF_FULL), _error_of_full),
         "amplifier": (load("paper"), lambda: _error("amplifier", "amplifier")),
         "ideal": (load("paper", ["circuit.model=ideal"]), lambda: _error("ideal", "ideal")),
-        "part": (load("optimal", _LONG_PART), _error_of_part),
         "limited": (
             load("paper", ["circuit.model=limited"]),
             lambda: _error("limited", "amplifier"),
         ),
+        "part": (load("optimal", _LONG_PART), _error_of_part),
     }
     calls = {name: partial(simulate, scene) for name, (scene, _) in cases.items()}
     taken = take_turns(calls, rounds)
@@ -64,12 +64,12 @@ def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
 
 def _error(circuit: str, reference: str) -> float:
     found = simulate(brief(f"circuit.model={circuit}"))
-    return error(heights(found.waveforms), reference)
+    return error(heights(found.columns), reference)
 
 
 def _error_of_full() -> float:
     path, finer = (
-        simulate(load("paper-full", [*BRIEF_FULL, *more])).waveforms["z_part"]
+        simulate(load("paper-full", [*BRIEF_FULL, *more])).columns["z_part"]
         for more in ((), _FINER)
     )
     return float(np.abs(path - finer).max() / np.ptp(finer))

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
+from cosim.files.picture import Picture
 from cosim.mechanics.part import PartMotion
 from cosim.studies.figures import blank, save
 from cosim.studies.fit.cases import Case
@@ -33,7 +33,7 @@ def _words(result: dict[str, Any]) -> str:
     return f"{result['parameters']} parameters, {solver}: µ_k {result['mu_k']:.3g}{plate}"
 
 
-def trials(results: "TrialResults") -> Figure:
+def trials(results: "TrialResults") -> Picture:
     """Measured and simulated height of the part, and the surface's, a panel for each trial."""
     columns = min(2, len(results.cases))
     rows = math.ceil(len(results.cases) / columns)
@@ -81,7 +81,7 @@ def _trial(axis: Axes, case: Case, motion: PartMotion, row: dict[str, Any]) -> N
     )
 
 
-def profile(results: "TrialResults", fit: Fit) -> Figure:
+def profile(results: "TrialResults", fit: Fit) -> Picture:
     """The mean error over µ_k, each normal force fitted anew, and the error of each trial."""
     result = results.result
     figure = blank(9.0, 5.2)
@@ -105,7 +105,7 @@ def profile(results: "TrialResults", fit: Fit) -> Figure:
     return figure
 
 
-def forces(results: "TrialResults") -> Figure:
+def forces(results: "TrialResults") -> Picture:
     """Fitted against measured normal forces, trial by trial, with the bounds of the fit."""
     result = results.result
     rows = result["trials"]
