@@ -32,11 +32,11 @@ def real_time(rounds: int) -> dict[str, Any]:
         "full": (load("paper-full", BRIEF_FULL), _error_of_full),
         "amplifier": (load("paper"), lambda: _error("amplifier", "amplifier")),
         "ideal": (load("paper", ["circuit.model=ideal"]), lambda: _error("ideal", "ideal")),
+        "part": (load("optimal", _LONG_PART), _error_of_part),
         "limited": (
             load("paper", ["circuit.model=limited"]),
             lambda: _error("limited", "amplifier"),
         ),
-        "part": (load("optimal", _LONG_PART), _error_of_part),
     }
     calls = {name: partial(simulate, scene) for name, (scene, _) in cases.items()}
     taken = take_turns(calls, rounds)
