@@ -1,8 +1,8 @@
-"""A peer: PySpice's own callbacks and fmpy's own calls with lists, as their manuals show them.
+"""A peer: PySpice's callbacks and fmpy's calls with lists, as their manuals show them.
 
-PySpice hands every value over as a Python object after each accepted step; the mechanics follow
-with the step's mean current, and the circuit sees the back-EMF of the last step held. It needs a
-process of its own, since a process has one ngspice and ours has other callbacks.
+After each accepted step PySpice passes every value as a Python object; the mechanics step with the
+mean current, and the circuit keeps the back-EMF of the last step. It needs a process of its own,
+since a process has one ngspice and ours has other callbacks.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,7 +1,7 @@
-"""What the coupling itself costs: a coupled run over the sum of its two parts, each alone.
+"""The cost of the coupling itself: a coupled run over the circuit alone plus the mechanics alone.
 
-The circuit alone replays the back-EMF of the coupled run from a table, so that ngspice takes the
-same steps; the mechanics alone replay its current.
+The circuit alone gets the back-EMF of the coupled run from a table, so that ngspice takes the same
+steps; the mechanics alone get its current.
 """
 
 from contextlib import closing

@@ -1,4 +1,7 @@
-"""Against what users would write, on `paper`; each peer as coarse as its error allows."""
+"""The time of what users would write, over ours, on `paper`.
+
+Each peer runs at its coarsest setting whose error is no larger than ours.
+"""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -12,10 +15,10 @@ from cosim.studies.bench.sampling import cpu, ratios
 from cosim.studies.bench.truth import brief, error, heights, times
 
 Peer = Callable[[int], tuple[list[float], npt.NDArray[np.float64]]]
-"""Runs as often as it is told; gives the CPU seconds of each and the part's heights, m."""
+"""Takes how often to run; gives the CPU seconds of each run and the part's heights, m."""
 
 LSODA_ERROR = 5e-4
-"""The error at which LSODA is compared; below it, it costs only more."""
+"""The error at which LSODA is compared: a smaller one only costs more."""
 
 
 def compare(rounds: int) -> dict[str, Any]:
