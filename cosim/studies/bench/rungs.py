@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from math import log
 from typing import Any
 
 import numpy as np
@@ -54,12 +53,9 @@ def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
     scenes = {str(n): load("paper", [f"run.duration={n / 20}"]) for n in periods}
     calls = {name: partial(simulate, scene) for name, scene in scenes.items()}
     taken = take_turns(calls, rounds)
-    lengths = [log(n) for n in periods]
-    found = [
-        np.polyfit(lengths, [log(taken[str(n)][turn]) for n in periods], 1)[0]
-        for turn in range(rounds)
-    ]
-    return {**spread([float(value) for value in found]), "periods": list(periods)}
+    costs = np.log([taken[str(n)] for n in periods])
+    exponents = np.polyfit(np.log(periods), costs, 1)[0]
+    return {**spread(exponents.tolist()), "periods": list(periods)}
 
 
 def _error(circuit: str, reference: str) -> float:
