@@ -45,7 +45,7 @@ def _call(case: Case, solver: Solver) -> Callable[[], int]:
         function = part_library().part_threshold
         asked = (part.PUBLISHED_STEP, part.PUBLISHED_V_MIN, steps)
 
-    def call(_: object = (law, rows)) -> int:  # which must live as long as the call
+    def call(_: object = (law, rows)) -> int:  # the buffers live as long as the call
         return function(*given, *asked, *motion)
 
     return call

@@ -34,15 +34,14 @@ def draw(
     left.set_xticks([-1e-2, -1e-4, -1e-6, -1e-8, 0, 1e-8, 1e-6, 1e-4, 1e-2])
     left.set(
         xlabel="first phase ends later than the optimum by [periods]",
-        ylabel="mean velocity of the part [mm/s]",
         title="A part that meets the surface early loses most of the transport",
     )
     right.set(
         xlabel="normal force over the part's weight, f_n",
-        ylabel="mean velocity of the part [mm/s]",
         title="A solver with a velocity threshold meets it early by itself",
     )
     for axis in (left, right):
+        axis.set_ylabel("mean velocity of the part [mm/s]")
         axis.grid(alpha=0.25)
         axis.axhline(0.0, color="0.5", lw=0.6)
         axis.legend(fontsize=8)
