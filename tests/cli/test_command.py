@@ -23,6 +23,7 @@ from cosim.errors import SimulationFailed
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
+from tests.helpers import needs
 
 pytestmark = pytest.mark.reliability
 
@@ -30,8 +31,6 @@ COMMAND = [sys.executable, "-m", "cosim"]
 QUICK = ["--set", "run.duration=0.02", "--set", "run.output_step=1e-3"]
 # One internal step after another: the mechanics give up within a second.
 TOO_FAST = ["--set", "coil.force_factor=1000", "--set", "mechanics.ram_mass=1e-9"]
-
-posix = pytest.mark.skipif(os.name != "posix", reason="needs POSIX")
 
 
 def command(
@@ -114,7 +113,7 @@ def obey_modes() -> None:
         raise OSError("the capability stays")
 
 
-@posix
+@needs.posix
 @pytest.mark.skipif(
     not sys.platform.startswith("linux") and os.name == "posix" and os.geteuid() == 0,
     reason="root may write everywhere",
@@ -188,7 +187,7 @@ def test_failing_run_keeps_the_older_one(tmp_path: Path) -> None:
 # --- full disks, closed pipes, other alphabets -----------------------------------
 
 
-@posix
+@needs.posix
 @pytest.mark.parametrize(("size", "file"), [(3000, "waveforms.csv"), (40_000, "figure.png")])
 def test_full_disk(size: int, file: str, tmp_path: Path) -> None:
     import resource
@@ -218,7 +217,7 @@ def test_output_cannot_be_written(tmp_path: Path) -> None:
     assert done.stderr == "cosim: The output cannot be written: No space left on device.\n"
 
 
-@posix
+@needs.posix
 def test_reader_has_left(tmp_path: Path) -> None:
     reader, writer = os.pipe()
     os.close(reader)
@@ -249,7 +248,7 @@ def heed_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-@posix
+@needs.posix
 @pytest.mark.parametrize("scene", ["paper", "paper-full", "ideal-current"])
 def test_interrupt(scene: str, tmp_path: Path) -> None:
     """At several moments at once: while it loads, while it simulates."""
@@ -277,7 +276,7 @@ def test_interrupt(scene: str, tmp_path: Path) -> None:
             process.communicate()
 
 
-@posix
+@needs.posix
 def test_interrupt_where_compiled_code_calls_back(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -305,7 +304,7 @@ def test_interrupt_where_compiled_code_calls_back(
     assert capsys.readouterr().err == "cosim: interrupted.\n"
 
 
-@posix
+@needs.posix
 def test_interrupt_within_an_executed_string_is_130_too(tmp_path: Path) -> None:
     """As where Ctrl-C strikes while a library is imported that makes code of text."""
     program = (
@@ -426,7 +425,7 @@ if __name__ == "__main__":
 """
 
 
-@posix
+@needs.posix
 def test_interrupted_anywhere(tmp_path: Path) -> None:
     """Ctrl-C is not lost, wherever in a callback of ngspice it strikes."""
     # In a process of its own: the test libraries' hooks into Python would swallow some.

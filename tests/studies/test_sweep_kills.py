@@ -11,6 +11,8 @@ from pathlib import Path
 import psutil
 import pytest
 
+from tests.helpers import needs
+
 pytestmark = pytest.mark.reliability
 
 KNOBS = ("drive.pot_max", "drive.pot_frequency", "drive.pot_offset")
@@ -34,7 +36,7 @@ def lines(out: Path) -> int:
         return 0
 
 
-@pytest.mark.skipif(os.name != "posix", reason="needs SIGKILL")
+@needs.posix
 @pytest.mark.parametrize("points", [4, pytest.param(10, marks=pytest.mark.slow)])
 def test_killed(points: int, tmp_path: Path) -> None:
     calm, wild = tmp_path / "calm", tmp_path / "wild"
@@ -68,7 +70,7 @@ def test_killed(points: int, tmp_path: Path) -> None:
     assert lines(wild) == total + 1, "a point was repeated or lost"
 
 
-@pytest.mark.skipif(os.name != "posix", reason="needs SIGINT")
+@needs.posix
 def test_interrupted(tmp_path: Path) -> None:
     """Ctrl-C reaches parent and workers; what was complete is kept."""
     process = subprocess.Popen(
