@@ -7,6 +7,7 @@ must know. The floors follow from the imports, so there is no list to keep.
 import ast
 from collections import defaultdict
 from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -80,7 +81,7 @@ def order(found: Arrows) -> list[str]:
         return [*TopologicalSorter(graph).static_order()]
     except CycleError as error:
         circle = error.args[1][::-1]  # from the one that imports to the one imported
-        steps = zip(circle, circle[1:], strict=False)
+        steps = pairwise(circle)
         told = [f"{a} -> {b}: {', '.join(found[a, b])}" for a, b in steps]
         pytest.fail("a circle of imports:\n" + "\n".join(told), pytrace=False)
 
@@ -110,7 +111,7 @@ def test_folders_have_no_circle_and_few_floors() -> None:
     while path[-1] in below:
         path.append(below[path[-1]])
     assert len(path) <= FLOORS, "the longest way down:\n" + "\n".join(
-        f"{a} -> {b}: {', '.join(found[a, b])}" for a, b in zip(path, path[1:], strict=False)
+        f"{a} -> {b}: {', '.join(found[a, b])}" for a, b in pairwise(path)
     )
 
 

@@ -435,8 +435,8 @@ def commands(scene: Scene) -> list[Command]:
 
 
 def command(scene: Scene) -> Command:
-    """The command of a scene; 0 V for ever where its circuit is "none"."""
-    if scene.circuit.model == "none":
+    """The command of a scene; 0 V for ever where nothing drives the coil."""
+    if not scene.rung.driven:
         return Constant()
     made = _shape(scene)
     return WithPwm(made) if scene.drive.pwm_ripple else made

@@ -1,8 +1,9 @@
 """The mechanical participant: the FMU with the scene's parameters.
 
-Names of parameters and outputs are those of ``fmu/src/variables.def``. The input is linear within
-a step: its value at the start and its slope are set before each step. It is the current of one coil
-(A) or, where the FMU has the current source too (circuit.model "limited"), the command (V).
+Names of parameters and outputs are those of ``fmu/src/physics/variables.def``. The input is linear
+within a step: its value at the start and its slope are set before each step. It is the current of
+one coil (A) or, where the FMU has the current source too (circuit.model "limited"), the command
+(V).
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from typing import Any
 from cosim.errors import SimulationFailed
 from cosim.mechanics.fmi import borrow, give_back, places
 from cosim.mechanics.normal_force import normal_force
-from cosim.scene import Scene
+from cosim.scene import Scene, keys
 
 STEP_OUTPUTS = (
     "back_emf",
@@ -91,7 +92,7 @@ class Mechanics:
         """Number of steps so far."""
         self._fmi_version = fmi_version
         self._fmi = borrow(fmi_version)
-        self.has_source = scene.circuit.model == "limited"
+        self.has_source = scene.rung.source_in_fmu
         """Whether the input is the command of the FMU's own source, V, and not a current, A."""
         step_outputs, sampled, self.total_names = STEP_OUTPUTS, SAMPLE_OUTPUTS, TOTALS
         if self.has_source:
@@ -243,30 +244,18 @@ class Mechanics:
 
 def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
     """Real and integer parameters of the FMU, with the scene's normal force."""
-    table: dict[str, Any] = scene.mechanics.model_dump()
+    reals: dict[str, float] = {}
     integers = {
-        "contact": CONTACT_LAWS[table.pop("contact")],
-        "n_surfaces": table.pop("n_surfaces"),
-        "ram_fixed": int(table.pop("actuator") == "direct"),
+        "contact": CONTACT_LAWS[scene.mechanics.contact],
+        "ram_fixed": int(scene.mechanics.actuator == "direct"),
         "independent": int(scene.drive.phase_deg is not None),
+        "source": int(scene.rung.source_in_fmu),
     }
-    friction = scene.friction.model_dump(exclude={"law", "normal_force_file"})
-    coil = scene.coil.model_dump(include={"force_factor", "b1", "b2"})
-    if scene.circuit.model == "limited":
-        coil |= _source_parameters(scene)
-        integers |= {"source": 1, "coil_count": scene.coil.count}
-    return {**table, **friction, **coil}, integers
-
-
-def _source_parameters(scene: Scene) -> dict[str, float]:
-    circuit, coil = scene.circuit, scene.coil
-    return {
-        "coil_resistance": coil.resistance,
-        "inductance": coil.inductance,
-        "eddy_inductance": coil.eddy_inductance or 0.0,
-        "eddy_resistance": coil.eddy_resistance or 0.0,
-        "sense_resistance": circuit.sense_resistance,
-        "output_high": circuit.supply - circuit.swing_loss_high,
-        "output_low": circuit.swing_loss_low - circuit.supply,
-        "current_limit": circuit.current_limit,
-    }
+    for key in keys():
+        if key.variable and (value := getattr(getattr(scene, key.table), key.name)) is not None:
+            (integers if key.kind is int else reals)[key.variable] = value
+    if scene.rung.source_in_fmu:
+        circuit = scene.circuit
+        reals["output_high"] = circuit.supply - circuit.swing_loss_high
+        reals["output_low"] = circuit.swing_loss_low - circuit.supply
+    return reals, integers

@@ -3,7 +3,6 @@
 import platform
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
@@ -17,11 +16,12 @@ from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import Command, command, commands
 from cosim.files.spill import Tape, blocks
 from cosim.mechanics.stickslip import Mechanics
-from cosim.scene import WITHOUT_NGSPICE, Scene, changed
-from cosim.scene.tables import LED
+from cosim.scene import Scene, changed
 from cosim.simulation import electrics
 from cosim.simulation.summary import summarise
 from cosim.toolchain.isolation import isolated
+from cosim.waveforms.columns import COLUMNS
+from cosim.waveforms.result import Result
 
 if TYPE_CHECKING:
     from cosim.coupling.loop.run import CircuitRun
@@ -30,48 +30,6 @@ Array = npt.NDArray[np.float64]
 
 _INTERVALS = 4096
 """How many intervals of a command are prepared at a time."""
-
-UNITS = {
-    "time": "s",
-    "command": "V",
-    "current": "A",
-    "coil_voltage": "V",
-    "back_emf": "V",
-    "z_surface": "m",
-    "v_surface": "m/s",
-    "a_surface": "m/s2",
-    "z_ram": "m",
-    "v_ram": "m/s",
-    "z_part": "m",
-    "v_part": "m/s",
-    "friction_force": "N",
-    "sticking": "1",
-    "normal_force": "N",
-    "command_2": "V",
-    "current_2": "A",
-    "coil_voltage_2": "V",
-    "back_emf_2": "V",
-    "z_surface_2": "m",
-    "v_surface_2": "m/s",
-    "a_surface_2": "m/s2",
-    "z_ram_2": "m",
-    "v_ram_2": "m/s",
-    "friction_force_2": "N",
-    "sticking_2": "1",
-}
-"""The columns of the waveforms, in order, and their units. Absent participants have none."""
-
-
-@dataclass(frozen=True)
-class Result:
-    """A finished run: the scene, its waveforms (arrays of equal length, SI) and its summary.
-
-    The arrays of a long run are mapped from a file that goes with them.
-    """
-
-    scene: Scene
-    waveforms: dict[str, Array]
-    summary: dict[str, object]
 
 
 def simulate(
@@ -89,14 +47,14 @@ def simulate(
     has given up in this one. Raises BadInput for a netlist that cannot be used, SimulationFailed
     with where, when, and what to try.
     """
-    if scene.circuit.model == "auto":
+    if scene.rung.automatic:
         return _by_itself(scene, progress, fmi_version, compiled)
     if scene.surface_is_given:
         from cosim.simulation.given_surface import simulate_part
 
         waveforms, summary = simulate_part(scene, progress)
         return Result(scene, waveforms, summary | {"versions": versions()})
-    if scene.coupling.method == "auto" and scene.circuit.model in LED:
+    if scene.coupling.method == "auto" and scene.rung.ngspice:
         from cosim.simulation.choose_steps import simulate_within_tolerance
 
         return simulate_within_tolerance(
@@ -123,13 +81,12 @@ def _by_itself(
         "circuit_model_errors": choice.errors,
         "wall_time": time.perf_counter() - began,
     }
-    return Result(taken, result.waveforms, result.summary | found)
+    return Result(taken, result.columns, result.summary | found)
 
 
 def _needs_own_process(scene: Scene) -> bool:
-    model = scene.circuit.model
-    if model == "file" or model in WITHOUT_NGSPICE:
-        return model == "file"
+    if scene.rung.own_netlist or not scene.rung.ngspice:
+        return scene.rung.own_netlist
     # PySpice and ngspice are loaded only for those who run a circuit.
     from cosim.circuit.ngspice import spoilt
 
@@ -199,10 +156,9 @@ def _simulate(
 
 
 def _method(scene: Scene) -> str:
-    model = scene.circuit.model
-    if model == "limited":
+    if scene.rung.source_in_fmu:
         return "monolithic"
-    return "uncoupled" if model in WITHOUT_NGSPICE else scene.coupling.method
+    return scene.coupling.method if scene.rung.ngspice else "uncoupled"
 
 
 def _recorder(
@@ -211,7 +167,7 @@ def _recorder(
     # The compiled steps have one input, and are those of the default coupling.
     if mechanics.has_second or mechanics.normal_force is not None:
         compiled = False
-    if scene.circuit.model in LED and scene.coupling.method != "step-locked":
+    if scene.rung.ngspice and scene.coupling.method != "step-locked":
         compiled = False
     made = CompiledRecorder if compiled and library() is not None else Recorder
     return made(scene, mechanics, progress)
@@ -294,7 +250,7 @@ def _waveforms(
         known["current"] = electric.current
         known["coil_voltage"] = electric.coil_voltage
     columns = recorder.mechanics.columns
-    known |= {name: recorder.rows[:, k] for k, name in enumerate(columns) if name in UNITS}
+    known |= {name: recorder.rows[:, k] for k, name in enumerate(columns) if name in COLUMNS}
     if electric is None:
         del known["back_emf"]
     if scene.mechanics.actuator == "direct":
@@ -304,7 +260,7 @@ def _waveforms(
         for part in blocks(len(known["time"])):
             forces.append([force.value(t) for t in known["time"][part].tolist()])
         known["normal_force"] = forces.column()
-    return {name: known[name] for name in UNITS if name in known}
+    return {name: known[name] for name in COLUMNS if name in known}
 
 
 def versions() -> dict[str, str]:

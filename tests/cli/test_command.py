@@ -324,11 +324,11 @@ def test_interrupt_while_writing(
 ) -> None:
     """What was complete stays; of the rest there is nothing."""
 
-    def interrupted(result: object, path: Path) -> None:
+    def interrupted(figure: object, path: Path, **_: object) -> None:
         path.write_bytes(b"half")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("cosim.waveforms.figure.draw", interrupted)
+    monkeypatch.setattr("cosim.files.picture.Picture.savefig", interrupted)
     assert main(["run", "held", *QUICK, "--out", str(tmp_path / "out")]) == 130
     assert capsys.readouterr().err == "cosim: interrupted.\n"
     kept = {path.name for path in (tmp_path / "out").iterdir()}
@@ -345,7 +345,7 @@ class Trouble(Exception):
 
 
 def bits(scene: str = "paper") -> dict[str, bytes]:
-    return {k: v.tobytes() for k, v in simulate(load(scene, SHORT)).waveforms.items()}
+    return {k: v.tobytes() for k, v in simulate(load(scene, SHORT)).columns.items()}
 
 
 def after_calls(number: int, original: Callable, failure: BaseException) -> Callable:
@@ -403,7 +403,7 @@ from cosim.simulation.simulate import simulate
 
 
 def bits():
-    return simulate(load("paper", ["run.duration=0.02"])).waveforms["z_part"].tobytes()
+    return simulate(load("paper", ["run.duration=0.02"])).columns["z_part"].tobytes()
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it

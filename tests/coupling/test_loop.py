@@ -14,8 +14,9 @@ from cosim.errors import SimulationFailed
 from cosim.files.resources import circuits
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, load
-from cosim.simulation.simulate import Result, simulate
+from cosim.simulation.simulate import simulate
 from cosim.toolchain.libraries import coupled_library
+from cosim.waveforms.result import Result
 
 LAST = ["run.duration=0.06", "run.settle=0.021"]
 BRIEF = ["run.duration=0.02", "run.settle=0.0049", "run.output_step=3.1e-5"]
@@ -48,10 +49,10 @@ def both(scene: Scene, fmi_version: int = 3) -> tuple[Result, Result]:
 
 
 def assert_same(fast: Result, plain: Result) -> None:
-    assert list(fast.waveforms) == list(plain.waveforms)
-    for name, values in plain.waveforms.items():
+    assert list(fast.columns) == list(plain.columns)
+    for name, values in plain.columns.items():
         assert np.isfinite(values).all(), name
-        assert values.tobytes() == fast.waveforms[name].tobytes(), name
+        assert values.tobytes() == fast.columns[name].tobytes(), name
     numbers = [{**result.summary, "wall_time": 0} for result in (fast, plain)]
     assert numbers[0] == numbers[1]
 

@@ -119,7 +119,7 @@ def test_the_default_method_is_of_second_order() -> None:
             f"circuit.max_step={max_step!r}",
             "circuit.reltol=1e-2",
         ]
-        waves = simulate(load("paper", overrides)).waveforms
+        waves = simulate(load("paper", overrides)).columns
         errors.append(error({name: waves[name][1:] for name in JUDGED}, expected))
     assert slopes(errors) == pytest.approx([2.0] * 4, abs=0.1), errors
 

@@ -22,7 +22,7 @@ FREE_BODIES: dict[str, float] = {
 
 
 class Bench:
-    """Steps an instance from time 0. All values SI, names as in ``fmu/src/variables.def``."""
+    """Steps an instance from time 0. All values SI; names as in ``variables.def``."""
 
     def __init__(self, version: int = 3, /, **start: float) -> None:
         """Set parameters and first inputs, then initialise."""

@@ -28,7 +28,7 @@ AMPLIFIER = (circuits() / "amplifier.cir").read_text(encoding="utf-8")
 
 
 def good_run() -> np.ndarray:
-    return simulate(load("paper", SHORT)).waveforms["z_part"]
+    return simulate(load("paper", SHORT)).columns["z_part"]
 
 
 @pytest.fixture(scope="module")
@@ -201,7 +201,7 @@ def test_early_end_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndar
 def test_false_alarms_do_not_fail_a_run(text: str, tmp_path: Path, before: np.ndarray) -> None:
     as_built_in = "circuit.max_step=5e-5"  # which a netlist of one's own has finer
     result = simulate(load("paper", [*own(tmp_path, text), as_built_in]))
-    assert np.allclose(result.waveforms["z_part"], before, rtol=0, atol=1e-9)
+    assert np.allclose(result.columns["z_part"], before, rtol=0, atol=1e-9)
 
 
 def test_startup_file_in_the_working_folder_is_not_run(tmp_path: Path) -> None:

@@ -65,9 +65,9 @@ def test_blocks_and_disk_change_nothing(
     with tape.on_disk_in(tmp_path):
         parts = simulate.simulate(scene, compiled=compiled)
     assert not os.listdir(tmp_path)
-    assert list(parts.waveforms) == list(whole.waveforms)
-    for column, values in whole.waveforms.items():
-        assert values.tobytes() == parts.waveforms[column].tobytes(), column
+    assert list(parts.columns) == list(whole.columns)
+    for column, values in whole.columns.items():
+        assert values.tobytes() == parts.columns[column].tobytes(), column
     for key, value in whole.summary.items():
         if key == "energy_residual":  # the difference of numbers that are nearly one
             assert parts.summary[key] == pytest.approx(value, abs=1e-12)

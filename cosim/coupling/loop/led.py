@@ -8,8 +8,6 @@ methods in :mod:`cosim.coupling.rewind.jacobi`, :mod:`cosim.coupling.rewind.gaus
 :mod:`cosim.coupling.rewind.companion`; since the mechanics take a linear current, at most 2.
 """
 
-from typing import Literal
-
 import numpy as np
 
 from cosim.circuit.netlist import LEAK_TIME
@@ -20,8 +18,6 @@ from cosim.drive.command import Command
 _ON_TIME = 1e-13
 """s; times of the circuit this close to a macro point are on it."""
 
-Kind = Literal["jacobi", "gauss-seidel", "mean-current", "companion"]
-
 
 class Led:
     """Couples through the recorder, which moves the mechanics and writes down what they do."""
@@ -30,7 +26,7 @@ class Led:
         self,
         recorder: Recorder,
         command: Command,
-        kind: Kind,
+        kind: str,
         macro_step: float,
         order: int,
         duration: float,

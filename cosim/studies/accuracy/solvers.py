@@ -143,7 +143,7 @@ def _led(*overrides: str) -> Callable[[Scene, Case, float], Outcome]:
         seconds = process_time() - began
         steps = result.summary["circuit_steps"]
         assert isinstance(steps, int)
-        found = [result.waveforms[name][1 : len(times) + 1] for name in case.judged]
+        found = [result.columns[name][1 : len(times) + 1] for name in case.judged]
         return Outcome(np.array(found), seconds, steps)
 
     return run

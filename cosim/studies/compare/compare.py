@@ -282,7 +282,7 @@ def _waveforms(
         if scene.drive.waveform == "file":
             longer = {"duration": float(knots(scene)[0][-1]), "settle": 0.0}
         scene = scene.model_copy(update={"run": scene.run.model_copy(update=longer)})
-        waveforms = simulate(scene).waveforms
+        waveforms = simulate(scene).columns
     elif overrides:
         raise BadInput(f"--set cannot change {plain(source)}, which is a finished run.")
     else:
