@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from cosim.errors import plain
 from cosim.scene.describe import Key, acts, keys
 from cosim.scene.methods import METHODS, CouplingMethod
 from cosim.scene.model import toml_value
@@ -26,11 +27,6 @@ def shown(value: object, limit: int = 60) -> str:
         text = "an endless number"
     text = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
     return text if len(text) <= limit else text[: limit - 1] + "…"
-
-
-def plain(text: str, limit: int = 200) -> str:
-    """A name or path on one line, without the quotes of :func:`shown`."""
-    return shown(text, limit + 2).removeprefix('"').removesuffix('"')
 
 
 def suggestion(word: str, known: Iterable[str], what: str = "") -> str:

@@ -1,7 +1,6 @@
 """Runs with a given surface: against the theory, and against the FMU in its prescribed mode."""
 
 import json
-import os
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,6 @@ from cosim.simulation.simulate import simulate
 from tests.helpers.fmu_bench import Bench
 
 pytestmark = pytest.mark.physics
-
-TRIALS = os.environ.get("COSIM_TRIALS")
 
 
 def fmu_part(
@@ -75,10 +72,8 @@ def test_fmu_follows_the_closed_form(seed: int, mu_plate: float) -> None:
 
 
 @pytest.mark.parametrize("number", range(1, 11))
-def test_fmu_follows_every_trial(number: int) -> None:
-    if TRIALS is None:
-        pytest.skip("COSIM_TRIALS names no folder with the tracked trials")
-    times, velocities = prescribed.read_surface(Path(TRIALS) / f"Trial #{number}.csv")
+def test_fmu_follows_every_trial(number: int, trials: Path) -> None:
+    times, velocities = prescribed.read_surface(trials / f"Trial #{number}.csv")
     exact = part.exact(times, velocities, mu_s=0.72, mu_k=0.59, force_per_mass=7.0 * 9.81)
     found = fmu_part(times, velocities, mu_s=0.72, mu_k=0.59, normal_force=7.0 * 9.81 * 0.009)
     np.testing.assert_allclose(found, exact.z, rtol=0, atol=1e-9)

@@ -1,13 +1,7 @@
-"""Fits of the ten published trials, against what their authors printed.
-
-The trials belong to their authors and are no part of this project: clone
-clyako/vertical-vibratory-transport-of-grasped-parts-using-impacts, and let COSIM_TRIALS name its
-folder matlab/data.
-"""
+"""Fits of the ten published trials, against what their authors printed."""
 
 import csv
 import json
-import os
 import shutil
 from pathlib import Path
 from time import perf_counter
@@ -28,26 +22,19 @@ from cosim.trials.tracked import read_folder
 
 pytestmark = pytest.mark.physics
 
-if "COSIM_TRIALS" not in os.environ:
-    pytest.skip(
-        "the published trials are not at hand: COSIM_TRIALS names no folder with them",
-        allow_module_level=True,
-    )
-TRIALS = Path(os.environ["COSIM_TRIALS"])
+
+@pytest.fixture(scope="module")
+def fitted(trials: Path) -> TrialResults:
+    return fit(trials)
 
 
 @pytest.fixture(scope="module")
-def fitted() -> TrialResults:
-    return fit(TRIALS)
+def cases(trials: Path) -> list[Case]:
+    return [Case(trial) for trial in read_folder(trials)]
 
 
-@pytest.fixture(scope="module")
-def cases() -> list[Case]:
-    return [Case(trial) for trial in read_folder(TRIALS)]
-
-
-def test_the_authors_scheme_gives_every_digit_that_they_printed():
-    result = fit(TRIALS, evaluate="published", solver="published").numbers
+def test_the_authors_scheme_gives_every_digit_that_they_printed(trials: Path):
+    result = fit(trials, evaluate="published", solver="published").numbers
     assert f"{result['mean_error_mm']:.3f}" == "0.161"
     assert f"{result['mean_error_percent']:.2f}" == "11.87"
     change = result["normal_force_change_median_percent"]
@@ -59,15 +46,15 @@ def test_the_authors_scheme_gives_every_digit_that_they_printed():
     assert result["mean_error_percent"] == pytest.approx(11.87003, abs=1e-5)
 
 
-def test_the_authors_scheme_hardly_ever_sticks():
-    chattering = fit(TRIALS, evaluate="published", solver="published").numbers["trials"]
-    truth = fit(TRIALS, evaluate="published").numbers["trials"]
+def test_the_authors_scheme_hardly_ever_sticks(trials: Path):
+    chattering = fit(trials, evaluate="published", solver="published").numbers["trials"]
+    truth = fit(trials, evaluate="published").numbers["trials"]
     assert max(row["stick_fraction"] for row in chattering) < 0.04
     assert min(row["stick_fraction"] for row in truth) > 0.25
 
 
-def test_the_same_parameters_solved_exactly():
-    result = fit(TRIALS, evaluate="published").numbers
+def test_the_same_parameters_solved_exactly(trials: Path):
+    result = fit(trials, evaluate="published").numbers
     assert f"{result['mean_error_mm']:.4f}" == "0.1569"
     assert f"{result['mean_error_percent']:.2f}" == "9.14"
 
@@ -131,14 +118,14 @@ def test_one_search_against_a_fine_grid(cases: list[Case]):
         assert case.bounds[0] <= force <= case.bounds[1]
 
 
-def test_with_friction_of_the_springed_plate():
-    result = fit(TRIALS, plate=True).numbers
+def test_with_friction_of_the_springed_plate(trials: Path):
+    result = fit(trials, plate=True).numbers
     assert result["mean_error_mm"] <= 0.100
     assert 0.05 < result["mu_plate"] < 0.18
 
 
-def test_the_files(tmp_path: Path):
-    found = fit(TRIALS)
+def test_the_files(trials: Path, tmp_path: Path):
+    found = fit(trials)
     found.save(tmp_path / "out")
     result = found.numbers
     assert json.loads((tmp_path / "out" / "fit.json").read_text(encoding="utf-8")) == result
@@ -153,17 +140,17 @@ def test_the_files(tmp_path: Path):
     assert "leave-one-out" in repr(found)
 
 
-def test_an_evaluation_has_no_profile(tmp_path: Path):
-    found = fit(TRIALS, evaluate="published", solver="published")
+def test_an_evaluation_has_no_profile(trials: Path, tmp_path: Path):
+    found = fit(trials, evaluate="published", solver="published")
     found.save(tmp_path)
     assert "fit-profile.png" not in [path.name for path in tmp_path.iterdir()]
     assert "33.78 % mean, 26.99 % median" in repr(found)
 
 
-def test_trials_that_nobody_published(tmp_path: Path):
+def test_trials_that_nobody_published(trials: Path, tmp_path: Path):
     for n in (3, 6):
-        shutil.copy(TRIALS / f"Trial #{n}.csv", tmp_path / f"trial {n + 50}.csv")
-    shutil.copy(TRIALS / "Trial #2.csv", tmp_path / "trial.csv")
+        shutil.copy(trials / f"Trial #{n}.csv", tmp_path / f"trial {n + 50}.csv")
+    shutil.copy(trials / "Trial #2.csv", tmp_path / "trial.csv")
     result = fit(tmp_path).numbers
     assert [row["trial"] for row in result["trials"]] == [53, 56, "trial"]
     assert result["normal_force_change_mean_percent"] is None
@@ -172,13 +159,13 @@ def test_trials_that_nobody_published(tmp_path: Path):
         fit(tmp_path, evaluate="published")
 
 
-def test_options_that_do_not_exist():
+def test_options_that_do_not_exist(trials: Path):
     with pytest.raises(BadInput, match="know no friction of the springed plate"):
-        fit(TRIALS, evaluate="published", plate=True)
+        fit(trials, evaluate="published", plate=True)
     with pytest.raises(BadInput, match="can be evaluated"):
-        fit(TRIALS, evaluate="mine")  # pyright: ignore[reportArgumentType]
+        fit(trials, evaluate="mine")  # pyright: ignore[reportArgumentType]
     with pytest.raises(BadInput, match="exact or published"):
-        fit(TRIALS, solver="other")  # pyright: ignore[reportArgumentType]
+        fit(trials, solver="other")  # pyright: ignore[reportArgumentType]
 
 
 def test_exact_is_faster_than_the_authors_scheme(cases: list[Case]):

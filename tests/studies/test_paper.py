@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import minimize_scalar
@@ -34,6 +34,7 @@ from cosim.errors import BadInput
 from cosim.studies import paper
 from cosim.studies.paper import exact
 from cosim.studies.paper.errata import errata
+from tests.helpers.examples import examples
 
 pytestmark = pytest.mark.physics
 
@@ -179,7 +180,7 @@ def cases(draw, beyond=0.0):
     return mu_s, mu_k, peak * G, f_n, draw(st.floats(1e-3, 10.0))
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(cases())
 def test_upwards_as_simulated(case):
     mu_s, mu_k, a_max, f_n, period = case
@@ -188,7 +189,7 @@ def test_upwards_as_simulated(case):
     assert reached == pytest.approx(expected, rel=1e-8, abs=1e-9 * a_max * period * 1e-3)
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(cases(beyond=1.0), st.sampled_from([("down", False), ("down", True), ("up", True)]))
 def test_downwards_and_robust_as_simulated(case, variant):
     mu_s, mu_k, a_max, f_n, period = case
@@ -200,7 +201,7 @@ def test_downwards_and_robust_as_simulated(case, variant):
     assert (expected > 0) == (variant[0] == "up")
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(cases(), st.floats(0.01, 1.0))
 def test_quaid_as_simulated(case, share):
     mu_s, mu_k, a_max, f_n, period = case
@@ -211,7 +212,7 @@ def test_quaid_as_simulated(case, share):
     assert expected <= formulas.average_velocity(Transport(*case)) * (1 + 1e-12)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(cases(beyond=1.0))
 def test_quaid_downwards_as_simulated(case):
     mu_s, mu_k, a_max, f_n, period = case
@@ -221,7 +222,7 @@ def test_quaid_downwards_as_simulated(case):
     assert simulated(Part(mu_s, mu_k, f_n), waveform) == pytest.approx(expected, rel=1e-8)
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(cases(beyond=1.0), st.sampled_from(["up", "down"]))
 def test_the_horizontal_equivalent_moves_alike(case, direction):
     # A part on a level surface, pressed by its own weight, with the coefficients of the mapping.
@@ -260,7 +261,7 @@ def test_the_optimum_is_a_knife_edge_and_the_robust_variant_is_not():
     assert moved(2.0, +1e-9) == pytest.approx(0.2333333333, abs=1e-8)
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(cases(), st.lists(st.tuples(st.floats(0.01, 1.0), st.floats(-1, 1)), min_size=2, max_size=6))
 def test_no_other_waveform_is_faster(case, phases):
     # Any periodic waveform of piecewise constant acceleration, once the part's motion repeats.
@@ -283,7 +284,7 @@ def test_no_other_waveform_is_faster(case, phases):
 # The waveform as a function of time
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(cases(beyond=1.0), st.sampled_from(["up", "down"]), st.booleans())
 def test_the_waveform_repeats_and_its_functions_agree(case, direction, robust):
     *_, a_max, _, period = case
@@ -323,7 +324,7 @@ def test_the_margin_delays_the_meeting_by_that_share_of_the_period():
 # The optimum and the limits of the normal force
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(st.floats(0.05, 2.0), st.floats(0.05, 1.0), st.floats(2.01, 1000.0))
 def test_the_cubics_root_is_the_maximiser(mu_s, ratio, peak):
     mu_k = mu_s * ratio
@@ -401,7 +402,7 @@ def test_the_misprints_as_text():
     assert max(len(line) for line in text.splitlines()) <= 92
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(st.fractions(1, 20, max_denominator=50), st.fractions(4, 40, max_denominator=50))
 def test_the_exact_simulation_agrees_with_this_one(f_n, peak):
     mu_s, mu_k = Fraction(7, 10), Fraction(3, 5)

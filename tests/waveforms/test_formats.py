@@ -297,14 +297,10 @@ def test_a_run_as_a_tracked_trial(run: Path, tmp_path: Path) -> None:
     assert max(map(len, digits)) == 7
 
 
-TRIALS = os.environ.get("COSIM_TRIALS")
-
-
-@pytest.mark.skipif(not TRIALS, reason="COSIM_TRIALS names no folder with the tracked trials")
 @pytest.mark.parametrize("name", ["Trial #1.csv", "Trial #5.csv", "Trial #10.csv"])
-def test_the_published_trials_have_this_form(name: str) -> None:
+def test_the_published_trials_have_this_form(name: str, trials: Path) -> None:
     """Their header, their digits, and velocities and accelerations by the same differences."""
-    text = (Path(TRIALS or "") / name).read_bytes().decode()
+    text = (trials / name).read_bytes().decode()
     header, *lines = text.split("\r\n")
     assert header == TRIAL and lines[-1]
     columns = zip(*csv.reader(lines), strict=True)
