@@ -25,7 +25,6 @@ from PySpice.Spice.NgSpice import Shared
 from cosim.coupling.loop.compiled import library
 from cosim.errors import BadInput, SimulationFailed
 from cosim.toolchain.interrupts import caught_signals
-from cosim.toolchain.libraries import coupled_library
 
 _ACCEPTED = 0
 """Location of a GetSyncData call that follows an accepted step."""
@@ -136,11 +135,7 @@ class Engine(Shared.NgSpiceShared):
         """What PySpice gives to ngspice for SendData. It must be given when the library starts, so
         the compiled one stands there for good, and hands on where it is not wanted.
         """
-        compiled = library()
-        if compiled is None:
-            return self._plain_data
-        address = int(_ffi.cast("uintptr_t", self._plain_data))
-        compiled.coupled_hand_on(address)
+        library().coupled_hand_on(int(_ffi.cast("uintptr_t", self._plain_data)))
         return _compiled("SendData", "coupled_data")
 
     @_send_data_c.setter
@@ -166,7 +161,7 @@ class Engine(Shared.NgSpiceShared):
 
         What it finds wrong stands in ``circuit.status``.
         """
-        compiled = coupled_library()
+        compiled = library()
         self._circuit, self._circuit_places = circuit, places
         self._call_back(
             _compiled("GetVSRCData", "coupled_source"), _compiled("GetSyncData", "coupled_step")
@@ -314,7 +309,7 @@ def _nowhere() -> Iterator[None]:
 
 def _compiled(kind: str, name: str) -> Any:
     """A function of the compiled library as a callback of ngspice."""
-    address = cast(getattr(coupled_library(), name), c_void_p).value
+    address = cast(getattr(library(), name), c_void_p).value
     return _ffi.cast(f"{kind} *", address)
 
 

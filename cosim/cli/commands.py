@@ -287,11 +287,11 @@ def _writable(folder: Path) -> Iterator[None]:
         raise
 
 
-def fmu_build(force: bool) -> None:
-    """Build the FMU files."""
+def fmu_build(out: Path) -> None:
+    """Write the FMU files."""
     from cosim.mechanics import package as fmu
 
-    for path in fmu.build(force=force).values():
+    for path in fmu.pack(out).values():
         print(path)
 
 

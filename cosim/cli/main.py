@@ -227,8 +227,10 @@ def _parser() -> argparse.ArgumentParser:
 
     fmu = commands.add_parser("fmu", help="build or check the FMU files of the mechanics")
     actions = fmu.add_subparsers(dest="action", required=True, metavar="build|check")
-    build = actions.add_parser("build", help="build stickslip-fmi2.fmu and stickslip-fmi3.fmu")
-    build.add_argument("--force", action="store_true", help="build even if they are up to date")
+    build = actions.add_parser("build", help="write stickslip-fmi2.fmu and stickslip-fmi3.fmu")
+    build.add_argument(
+        "--out", type=Path, default=Path("results/fmu"), metavar="DIR", help="where to write"
+    )
     actions.add_parser("check", help="validate the FMU files and run them")
     return parser
 
@@ -285,7 +287,7 @@ def _dispatch(arguments: argparse.Namespace) -> int:
     elif arguments.command == "bench":
         commands.bench(arguments.out, arguments.trials, arguments.quick)
     elif arguments.action == "build":
-        commands.fmu_build(arguments.force)
+        commands.fmu_build(arguments.out)
     else:
         return commands.fmu_check()
     return 0

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.coupling.loop import coupling
-from cosim.coupling.loop.compiled import CompiledRecorder, library
+from cosim.coupling.loop.compiled import CompiledRecorder
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import Command, command, commands
 from cosim.files.spill import Tape, blocks
@@ -213,7 +213,7 @@ def _recorder(
         compiled = False
     if scene.circuit.model in LED and scene.coupling.method != "step-locked":
         compiled = False
-    made = CompiledRecorder if compiled and library() is not None else Recorder
+    made = CompiledRecorder if compiled else Recorder
     return made(scene, mechanics, progress)
 
 

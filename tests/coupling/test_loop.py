@@ -15,7 +15,6 @@ from cosim.files.resources import circuits
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, load
 from cosim.simulation.simulate import Result, simulate
-from cosim.toolchain.libraries import coupled_library
 
 LAST = ["run.duration=0.06", "run.settle=0.021"]
 BRIEF = ["run.duration=0.02", "run.settle=0.0049", "run.output_step=3.1e-5"]
@@ -89,18 +88,8 @@ def test_no_step_goes_through_python(monkeypatch: pytest.MonkeyPatch) -> None:
         simulate(load(scene, BRIEF))
 
 
-def test_without_a_compiler_it_is_the_plain_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = load("ideal-current", BRIEF)
-    fast = simulate(scene)
-    monkeypatch.setattr("cosim.simulation.simulate.library", lambda: None)
-    monkeypatch.setattr(
-        "cosim.coupling.loop.compiled.coupled_library", lambda: pytest.fail("built after all")
-    )
-    assert_same(fast, simulate(scene))
-
-
 def test_structures_have_the_size_of_their_twins() -> None:
-    size = coupled_library().coupled_size
+    size = compiled.library().coupled_size
     found = [ctypes.sizeof(kind) for kind in (Fmu, State, compiled_run.Circuit)]
     assert [*found, compiled_run.PIECE.itemsize] == [size(k) for k in range(4)]
 

@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.files.resources import fmu_sources
-from cosim.mechanics import package as fmu
-from cosim.toolchain.compiler import COMPILE_FLAGS, compiler
+from build_c import FLAGS, FMU, compiler, fmu_sources
 
 pytestmark = pytest.mark.reliability
 
@@ -18,9 +16,8 @@ LEAK = "#include <stdlib.h>\nint main(void) { char *volatile p = malloc(9); p = 
 
 
 def compile_with_sanitizers(sources: list[Path], program: Path) -> subprocess.CompletedProcess:
-    root = fmu_sources()
-    includes = [f"-I{root / 'include'}", f"-I{root / 'src'}", "-DFMU_TOKEN=harness"]
-    command = [*compiler(), *COMPILE_FLAGS, *SANITIZE, *includes, *map(str, sources)]
+    includes = [f"-I{FMU / 'include'}", f"-I{FMU / 'src'}", "-DFMU_TOKEN=harness"]
+    command = [*compiler(), *FLAGS, *SANITIZE, *includes, *map(str, sources)]
     return subprocess.run([*command, "-o", str(program), "-lm"], capture_output=True, text=True)
 
 
@@ -42,7 +39,7 @@ def finds_leaks(tmp_path_factory: pytest.TempPathFactory) -> bool:
 
 
 def test_random_and_senseless_calls(finds_leaks: bool, tmp_path: Path) -> None:
-    built = compile_with_sanitizers([*fmu._sources(), HARNESS], tmp_path / "harness")
+    built = compile_with_sanitizers([*fmu_sources(), HARNESS], tmp_path / "harness")
     assert built.returncode == 0, built.stderr
     assert "warning" not in built.stderr
     done = run(tmp_path / "harness", finds_leaks)

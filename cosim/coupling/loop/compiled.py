@@ -14,11 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.coupling.loop.recorder import Z_SURFACE, Recorder
-from cosim.errors import BadInput
 from cosim.mechanics.stickslip import COUNTERS, Mechanics
 from cosim.scene import Scene
+from cosim.toolchain import libraries
 from cosim.toolchain.interrupts import caught_signals
-from cosim.toolchain.libraries import coupled_library
 
 Array = npt.NDArray[np.float64]
 
@@ -73,13 +72,25 @@ class State(ctypes.Structure):
     )
 
 
+_POINTER = c_void_p
+_FUNCTIONS = {
+    "recorder_begin": (ctypes.c_int, (_POINTER,)),
+    "recorder_follow": (c_int64, (_POINTER, c_int64, _POINTER, _POINTER, _POINTER, c_int64)),
+    "coupled_hand_on": (None, (_POINTER,)),
+    "coupled_lead": (None, (_POINTER,)),
+    "coupled_finish": (None, (_POINTER,)),
+    "coupled_size": (c_int64, (ctypes.c_int,)),
+}
+
+
 @cache
-def library() -> ctypes.CDLL | None:
-    """The compiled library; None on a machine without a C compiler that never built it."""
-    try:
-        return coupled_library()
-    except BadInput:
-        return None
+def library() -> ctypes.CDLL:
+    """The compiled library."""
+    functions = libraries.library("loop")
+    for name, (result, arguments) in _FUNCTIONS.items():
+        function = getattr(functions, name)
+        function.restype, function.argtypes = result, arguments
+    return functions
 
 
 class CompiledRecorder(Recorder):
@@ -88,7 +99,7 @@ class CompiledRecorder(Recorder):
     def __init__(
         self, scene: Scene, mechanics: Mechanics, progress: Callable[[float], None]
     ) -> None:
-        self._library = coupled_library()
+        self._library = library()
         self._told = -1.0
         self._fault: BaseException | None = None
         self._totals = (c_double * len(mechanics.total_names))()

@@ -12,7 +12,6 @@ import numpy as np
 from cosim.mechanics import part
 from cosim.studies.fit.cases import Case, Solver
 from cosim.studies.fit.search import search
-from cosim.toolchain.libraries import part_library
 from cosim.trials import published
 
 
@@ -76,7 +75,7 @@ def _call(case: Case, solver: Solver) -> Callable[[], int]:
     law = part.friction_law(published.MU_S, published.MU_K_FITTED, force, published.GRAVITY, 0.0)
     length = len(case.time) if solver == "exact" else len(case.grid)
     rows = np.empty((3, length))
-    library, surface = part_library(), (len(case.time), case.time.ctypes.data)
+    library, surface = part.part_library(), (len(case.time), case.time.ctypes.data)
     surface = (*surface, case.v_surface.ctypes.data, 1, law.ctypes.data, 0.0, case.v0)
     result = tuple(row.ctypes.data for row in rows)
     if solver == "exact":
