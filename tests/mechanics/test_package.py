@@ -177,3 +177,11 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None
 def test_data_folders_are_found() -> None:
     assert (fmu_sources() / "src" / "physics" / "variables.def").is_file()
     assert circuits().is_dir()
+
+
+def test_the_physics_know_nothing_of_fmi() -> None:
+    folder = fmu_sources() / "src" / "physics"
+    text = "".join(path.read_text() for path in folder.iterdir())
+    included = set(re.findall(r'#include "(.*)"', text))
+    assert len(included) > 5
+    assert included <= {path.name for path in folder.iterdir()}
