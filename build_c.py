@@ -25,8 +25,11 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent
 FMU = ROOT / "fmu"
 MODEL = "stickslip"
-LIBRARIES = {"loop": ROOT / "cosim/coupling/loop", "part": ROOT / "cosim/mechanics"}
-"""The package's libraries; each is made of all C files of a folder."""
+LIBRARIES = {
+    "loop": (ROOT / "cosim/coupling/loop", ROOT / "cosim/drive"),
+    "part": (ROOT / "cosim/mechanics",),
+}
+"""The package's libraries; each is made of all C files of its folders."""
 REPLAY = ROOT / "cosim/studies/bench/replay.c"
 DESCRIBE = FMU / "src/fmi/describe.c"
 
@@ -42,7 +45,7 @@ class BuildFailed(Exception):
 
 def sources() -> list[Path]:
     """All files that the products depend on."""
-    code = [path for folder in LIBRARIES.values() for path in folder.glob("*.[ch]")]
+    code = [path for folders in LIBRARIES.values() for path in _code(folders, "*.[ch]")]
     return sorted([*code, REPLAY, *_fmu_files(), DESCRIBE, ROOT / "LICENSE", Path(__file__)])
 
 
@@ -57,8 +60,8 @@ def make(folder: Path) -> None:
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".compile-") as name:
         work, new = Path(name), Path(name) / "new"
         new.mkdir()
-        for library, place in LIBRARIES.items():
-            link(_objects(sorted(place.glob("*.c")), work), new / (library + SUFFIX), "-shared")
+        for library, folders in LIBRARIES.items():
+            link(_objects(_code(folders, "*.c"), work), new / (library + SUFFIX), "-shared")
         if sys.platform != "win32":
             link([REPLAY], new / "replay", "-ldl")
         _make_fmu(new, work)
@@ -88,6 +91,10 @@ def compiler_version() -> str:
 def link(inputs: list[Path], target: Path, *flags: str) -> None:
     """Make a program, or with ``-shared`` a library, of objects or C files."""
     _run(*compiler(), *FLAGS, *map(str, inputs), "-o", str(target), *flags, "-lm")
+
+
+def _code(folders: tuple[Path, ...], pattern: str) -> list[Path]:
+    return [path for folder in folders for path in sorted(folder.glob(pattern))]
 
 
 def _objects(files: list[Path], work: Path, *flags: str) -> list[Path]:

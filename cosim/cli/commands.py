@@ -1,6 +1,5 @@
 """What each command does, apart from reading its options."""
 
-import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.files.atomic import whole
-from cosim.scene import Scene, list_scenes, load, to_toml
+from cosim.scene import Scene, list_scenes, load
 from cosim.scene.messages import plain
 from cosim.waveforms.report import table
 
@@ -59,21 +58,7 @@ def _run(scene: Scene, folder: Path) -> None:
         on_disk_in(folder),
     ):
         result = simulate(scene, progress=progress)
-    from cosim.simulation.simulate import UNITS
-    from cosim.waveforms import figure
-    from cosim.waveforms.storage import write_csv, write_netcdf
-
-    write_csv(folder / "waveforms.csv", result.waveforms, UNITS)
-    attributes = {"title": scene.description or scene.name, "scene": to_toml(scene)}
-    write_netcdf(folder / "waveforms.nc", result.waveforms, UNITS, attributes)
-    for name, text in (
-        ("scene.toml", to_toml(scene)),
-        ("summary.json", json.dumps(result.summary, indent=2, allow_nan=False) + "\n"),
-    ):
-        with whole(folder / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-    with whole(folder / "figure.png") as temporary:
-        figure.draw(result, temporary)
+    result.save(folder)
     print(f"{scene.name}: {scene.description}" if scene.description else scene.name)
     print(table(scene, result.summary))
     print(f"Written to {folder}: waveforms.csv, waveforms.nc, summary.json, scene.toml")

@@ -8,8 +8,8 @@
 from cosim.scene.describe import Key, keys
 from cosim.scene.loading import changed, list_scenes, load
 from cosim.scene.model import Scene, to_toml
+from cosim.scene.rungs import RUNGS, Rung
 from cosim.scene.tables import (
-    WITHOUT_NGSPICE,
     Circuit,
     Coil,
     Coupling,
@@ -20,7 +20,7 @@ from cosim.scene.tables import (
 )
 
 __all__ = [
-    "WITHOUT_NGSPICE",
+    "RUNGS",
     "Circuit",
     "Coil",
     "Coupling",
@@ -29,6 +29,7 @@ __all__ = [
     "Key",
     "Mechanics",
     "Run",
+    "Rung",
     "Scene",
     "changed",
     "keys",

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 from types import UnionType
-from typing import Literal, Union, get_args, get_origin
+from typing import Any, Literal, Union, get_args, get_origin
 
-from cosim.scene.tables import TABLES
+from cosim.scene.methods import CouplingMethod
+from cosim.scene.rungs import Rung
+from cosim.scene.tables import GIVEN_SURFACES, TABLES
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,8 @@ class Key:
     low: float | None
     high: float | None
     text: str
+    variable: str
+    """The FMU's variable that the key is; empty where it is none."""
 
     @property
     def full(self) -> str:
@@ -46,10 +50,9 @@ def _key(table: str, name: str) -> Key:
     kind = field.annotation
     if get_origin(kind) in (UnionType, Union):
         kind = next(arg for arg in get_args(kind) if arg is not type(None))
-    choices = get_args(kind) if get_origin(kind) is Literal else None
     limits = {k: getattr(m, k) for m in field.metadata for k in ("ge", "le") if hasattr(m, k)}
-    extra = field.json_schema_extra
-    assert isinstance(extra, dict)
+    extra: Any = field.json_schema_extra
+    choices = get_args(kind) if get_origin(kind) is Literal else extra.get("choices")
     return Key(
         table=table,
         name=name,
@@ -60,6 +63,7 @@ def _key(table: str, name: str) -> Key:
         low=limits.get("ge"),
         high=limits.get("le"),
         text=field.description or "",
+        variable=str(extra.get("variable", "")),
     )
 
 
@@ -69,3 +73,22 @@ _KEYS = tuple(_key(table, name) for table, model in TABLES.items() for name in m
 def keys() -> tuple[Key, ...]:
     """Every key of every table, in order."""
     return _KEYS
+
+
+def acts(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> bool:
+    """Whether a key has an effect with this rung, ``drive.waveform`` and coupling method."""
+    if key.name in ("model", "waveform"):
+        return True
+    if key.table == "coupling":
+        return rung.ngspice and (key.name == "method" or key.name in method.keys)
+    if key.full == "run.tolerance":
+        return rung.on_ladder
+    if key.table == "circuit":
+        return key.name in rung.keys - method.chooses
+    if key.table == "coil":
+        return rung.driven or key.name == "count"  # as many rams take part in the energies
+    if key.table == "drive":
+        if not rung.driven:
+            return key.name in GIVEN_SURFACES.get(waveform, ())
+        return key.name not in set().union(*GIVEN_SURFACES.values()) - {"frequency"}
+    return True

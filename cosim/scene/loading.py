@@ -15,9 +15,10 @@ from pydantic import ValidationError
 
 from cosim.errors import BadInput, NoEffect
 from cosim.scene import messages
-from cosim.scene.describe import keys
+from cosim.scene.describe import acts, keys
+from cosim.scene.methods import METHODS
 from cosim.scene.model import Scene
-from cosim.scene.tables import CHOSEN_BY_AUTO, KNOBS, NORMAL_FORCES, TABLES, acts
+from cosim.scene.tables import KNOBS, NORMAL_FORCES, TABLES
 
 PATHS = (("circuit", "netlist"), ("drive", "file"), ("friction", "normal_force_file"))
 """The keys that name files."""
@@ -249,21 +250,21 @@ def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int,
     Only where the user, with that circuit and waveform chosen, gave the key another value: a file
     may be run with another circuit on top, and a resolved scene holds every key.
     """
-    model, waveform, method = scene.circuit.model, scene.drive.waveform, scene.coupling.method
+    chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
     resolved = [_is_resolved(layer.tables) for layer in layers]
     for key in keys():
         rank, origin = origins.get(key.full, (-1, ""))
         choices = ["circuit.model"]
         choices += ["drive.waveform"] * (key.table == "drive")
-        steered = key.table == "circuit" and key.name in CHOSEN_BY_AUTO
-        choices += ["coupling.method"] * (steered or key.full.startswith("coupling."))
-        chosen = max(origins.get(choice, (-1, ""))[0] for choice in choices)
-        if rank < max(chosen, 0) or layers[rank].builtin or resolved[rank]:
+        steered = key.table == "circuit" and key.name in METHODS[scene.coupling.method].chooses
+        choices += ["coupling.method"] * (steered or key.table == "coupling")
+        latest = max(origins.get(choice, (-1, ""))[0] for choice in choices)
+        if rank < max(latest, 0) or layers[rank].builtin or resolved[rank]:
             continue
         given = [layer.tables.get(key.table, {}) for layer in layers[: rank + 1]]
         values = [key.default, *(table[key.name] for table in given if key.name in table)]
-        if values[-1] != values[-2] and not acts(key.table, key.name, model, waveform, method):
-            sentence = f"{origin}: {messages.idle(key, model, waveform, method)}."
+        if values[-1] != values[-2] and not acts(key, *chosen):
+            sentence = f"{origin}: {messages.idle(key, *chosen)}."
             warnings.warn(sentence, NoEffect, stacklevel=3)
 
 

@@ -6,17 +6,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cosim.scene.describe import Key, keys
+from cosim.scene.describe import Key, acts, keys
+from cosim.scene.methods import METHODS, CouplingMethod
 from cosim.scene.model import toml_value
-from cosim.scene.tables import (
-    CHOSEN_BY_AUTO,
-    CIRCUIT_KEYS,
-    COUPLING_KEYS,
-    GIVEN_SURFACES,
-    LED,
-    TABLES,
-    acts,
-)
+from cosim.scene.rungs import RUNGS, Rung
+from cosim.scene.tables import GIVEN_SURFACES, TABLES
 
 ALLOWED_TOP = {
     "name": "at most 64 letters, digits, blanks and ._+- that begin with a letter or digit",
@@ -72,35 +66,32 @@ def unknown_key(table: str, name: str) -> str:
     return f'there is no key "{plain(full)}"' + hint
 
 
-def idle(key: Key, model: str, waveform: str, method: str) -> str:
-    """A sentence on a key that does nothing with this circuit.model, drive.waveform and
-    coupling.method."""
+def idle(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> str:
+    """A sentence on a key without effect with this rung, ``drive.waveform`` and coupling method."""
 
     def listed(names: Iterable[str]) -> str:
         *rest, last = [f'"{name}"' for name in names]
         return f"{', '.join(rest)} or {last}" if rest else last
 
-    if method == "auto" and key.table == "circuit" and key.name in CHOSEN_BY_AUTO:
-        return f'{key.full} has no effect with coupling.method = "auto", which chooses it'
-    at = f'circuit.model = "{model}"'
-    if key.table == "drive" and model == "none":
+    lead = f"{key.full} has no effect with"
+    if key.table == "circuit" and key.name in method.chooses:
+        return f'{lead} coupling.method = "{method.name}", which chooses it'
+    if key.table == "coupling" and rung.ngspice:
+        others = [name for name, other in METHODS.items() if key.name in other.keys]
+        return f'{lead} coupling.method = "{method.name}"; it acts in {listed(others)}'
+    at = f'circuit.model = "{rung.name}"'
+    if key.table == "drive" and not rung.driven:
         at += f' and drive.waveform = "{waveform}"'
-    if key.table == "coupling" and model in LED:
-        others = [name for name, known in COUPLING_KEYS.items() if key.name in known]
-        return (
-            f'{key.full} has no effect with coupling.method = "{method}"; it acts in '
-            f"{listed(others)}"
-        )
-    models = [name for name in CIRCUIT_KEYS if name != "auto"]  # which becomes one of the others
-    where = [name for name in models if acts(key.table, key.name, name, "sawtooth", method)]
-    if where or key.table == "coupling":
-        where = where or list(LED)
-        return f"{key.full} has no effect with {at}; it acts in {listed(where)}"
+    able = [
+        name
+        for name, other in RUNGS.items()
+        if not other.automatic  # which becomes one of the others
+        and (other.ngspice if key.table == "coupling" else acts(key, other, "sawtooth", method))
+    ]
+    if able:
+        return f"{lead} {at}; it acts in {listed(able)}"
     waveforms = [name for name, known in GIVEN_SURFACES.items() if key.name in known]
-    return (
-        f'{key.full} has no effect with {at}; it acts in "none" with drive.waveform = '
-        f"{listed(waveforms)}"
-    )
+    return f'{lead} {at}; it acts in "none" with drive.waveform = {listed(waveforms)}'
 
 
 def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], default: str) -> str:

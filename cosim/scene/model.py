@@ -1,12 +1,14 @@
 """A whole scene, and its text."""
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cosim.scene import firmware
 from cosim.scene.describe import Key, keys
+from cosim.scene.rungs import RUNGS, Rung
 from cosim.scene.tables import (
     GIVEN_SURFACES,
     KNOBS,
@@ -53,24 +55,22 @@ class Scene(BaseModel):
             return data
         data = dict(data)
         drive, circuit = data.get("drive", {}), data.get("circuit", {})
-        if (
-            isinstance(drive, dict)
-            and isinstance(circuit, dict)
-            and circuit.get("model") == "full"
-            and drive.get("waveform", "sawtooth") == "sawtooth"
-            and not drive.get("reset_time")
-        ):
-            data["drive"] = {"quantised": True} | drive
         mechanics = data.get("mechanics", {})
-        rigid = isinstance(mechanics, dict) and mechanics.get("contact") == "rigid"
-        if isinstance(circuit, dict) and (rigid or circuit.get("model") == "file"):
-            data["circuit"] = {"max_step": _SHORT_STEP} | circuit
+        if isinstance(circuit, dict):
+            model = circuit.get("model")
+            rung = RUNGS.get(model) if isinstance(model, str) else None
+            sawtooth = isinstance(drive, dict) and drive.get("waveform", "sawtooth") == "sawtooth"
+            if rung and rung.firmware and sawtooth and not drive.get("reset_time"):
+                data["drive"] = {"quantised": True} | drive
+            rigid = isinstance(mechanics, dict) and mechanics.get("contact") == "rigid"
+            if rigid or (rung and rung.own_netlist):
+                data["circuit"] = {"max_step": _SHORT_STEP} | circuit
         return data
 
     @model_validator(mode="after")
     def _check_speed(self) -> "Scene":
         """With "limited" one explicit method solves coil and mechanics: none may be stiff."""
-        if self.circuit.model != "limited":
+        if not self.rung.source_in_fmu:
             return self
         coil = self.coil
         eddy = coil.eddy_resistance or 0.0
@@ -80,8 +80,8 @@ class Scene(BaseModel):
             if inductance is not None and inductance < FASTEST * resistance:
                 raise fault(
                     f"coil.{key} = {inductance:g} H must be at least {FASTEST * resistance:.3g} H "
-                    f'with circuit.model = "limited" and {resistance:g} Ohm around it, or the '
-                    "current changes too fast to be solved with the mechanics",
+                    f'with circuit.model = "{self.rung.name}" and {resistance:g} Ohm around it, or '
+                    "the current changes too fast to be solved with the mechanics",
                     f"coil.{key}",
                     "coil.resistance",
                     "coil.eddy_resistance",
@@ -96,8 +96,9 @@ class Scene(BaseModel):
         """Two surfaces that move by themselves are solved in the FMU only, without a plate."""
         if self.drive.phase_deg is None:
             return self
-        needed: list[tuple[str, tuple[object, ...], str]] = [
-            ("circuit.model", ("ideal", "limited"), '"ideal" or "limited"'),
+        able = sorted(name for name, rung in RUNGS.items() if rung.two_surfaces)
+        needed: list[tuple[str, Sequence[object], str]] = [
+            ("circuit.model", able, " or ".join(f'"{name}"' for name in able)),
             ("coil.count", (1,), "1: each surface has a source of its own"),
             ("mechanics.n_surfaces", (2,), "2"),
             ("mechanics.actuator", ("ram",), '"ram"'),
@@ -119,14 +120,14 @@ class Scene(BaseModel):
     @model_validator(mode="after")
     def _check_reach(self) -> "Scene":
         drive = self.drive
-        if drive.pwm_ripple and self.circuit.model != "full":
+        if drive.pwm_ripple and not self.rung.firmware:
             raise fault(
                 'drive.pwm_ripple = true needs circuit.model = "full", which has the filter of '
                 "the offset pin",
                 "drive.pwm_ripple",
                 "circuit.model",
             )
-        if drive.waveform in ("optimal", "quaid", "file") and self.circuit.model != "none":
+        if drive.waveform in ("optimal", "quaid", "file") and self.rung.driven:
             raise fault(
                 f'drive.waveform = "{drive.waveform}" gives the surface its velocity, which needs '
                 'circuit.model = "none"',
@@ -141,10 +142,10 @@ class Scene(BaseModel):
                 "drive.waveform",
                 "circuit.model",
             )
-        if self.circuit.model == "none":
+        if not self.rung.driven:
             return self
-        if self.circuit.model == "full":
-            why = 'with circuit.model = "full"'
+        if self.rung.firmware:
+            why = f'with circuit.model = "{self.rung.name}"'
         elif drive.quantised:
             why = "with drive.quantised = true"
         else:
@@ -176,9 +177,14 @@ class Scene(BaseModel):
         return self
 
     @property
+    def rung(self) -> Rung:
+        """The declaration of the scene's ``circuit.model``."""
+        return RUNGS[self.circuit.model]
+
+    @property
     def surface_is_given(self) -> bool:
         """Whether the drive prescribes the surface's velocity, and only the part moves freely."""
-        return self.circuit.model == "none" and self.drive.waveform in GIVEN_SURFACES
+        return not self.rung.driven and self.drive.waveform in GIVEN_SURFACES
 
     def as_dict(self) -> dict[str, Any]:
         """The scene as plain tables that make an equal scene: nothing absent or said twice."""

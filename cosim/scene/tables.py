@@ -1,26 +1,49 @@
 """The tables of a scene: every key with its unit, default, range and meaning.
 
-These models are the one place where a key is described; validation, error messages, the written
-``scene.toml`` and the documentation all read it from here, through :func:`cosim.scene.keys`. All
+Validation, error messages and the written ``scene.toml`` read them through
+:func:`cosim.scene.keys`. A key that is a variable of the FMU has them from ``variables.def``. All
 values are SI.
 """
 
+import re
+from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from cosim.scene import firmware
+from cosim.scene.methods import METHODS, CouplingMethod
+from cosim.scene.rungs import RUNGS, Rung
+from cosim.scene.variables import variables
 
 
-def _number(default: Any, unit: str, low: float, high: float, text: str) -> Any:
+def _number(default: Any, unit: str, low: float, high: float, text: str, variable: str = "") -> Any:
     """A number (float or int by its annotation) within ``low…high``."""
-    extra: dict[str, Any] = {"unit": unit}
+    extra: dict[str, Any] = {"unit": unit, "variable": variable}
     return Field(default, ge=low, le=high, description=text, json_schema_extra=extra)
+
+
+def _of_fmu(name: str, least: float | None = None) -> Any:
+    """A number that the FMU takes as its variable ``name``.
+
+    Where ``least`` is given, the key is absent or at least that; the FMU takes 0 for absent.
+    """
+    known = variables()[name]
+    start, low = (known.start, known.low) if least is None else (None, least)
+    return _number(start, known.unit, low, known.high, known.text, name)
 
 
 def _choice(default: Any, text: str) -> Any:
     return Field(default, description=text, json_schema_extra={"unit": ""})
+
+
+def _declared(default: str, lead: str, registry: Mapping[str, Rung | CouplingMethod]) -> Any:
+    """A name out of a registry."""
+    text = "; ".join(f"{name}: {one.text}" for name, one in registry.items())
+    extra: dict[str, Any] = {"unit": "", "choices": tuple(registry)}
+    pattern = f"^({'|'.join(map(re.escape, registry))})$"
+    return Field(default, pattern=pattern, description=f"{lead}; {text}", json_schema_extra=extra)
 
 
 def fault(sentence: str, *keys: str) -> PydanticCustomError:
@@ -85,14 +108,14 @@ class Drive(Table):
     )
     optimum: Literal["up", "down", "robust"] = _choice(
         "up",
-        "Optimal waveform: fastest upwards or downwards, or the upward one whose part need not "
-        "meet the surface at the period's very end",
+        "Optimal waveform: fastest upwards, fastest downwards, or upwards where part and surface "
+        "need not meet exactly at the period's end",
     )
     velocity_amplitude: float = _number(
         0.1, "m/s", 0.0, 1e3, "Amplitude of a given surface's velocity, sine"
     )
     file: str | None = _choice(
-        None, "Tracked trial or CSV with time and velocity that moves a given surface"
+        None, "Tracked trial, or CSV with time and velocity, that prescribes the surface's motion"
     )
     quantised: bool = _choice(
         False,
@@ -204,20 +227,11 @@ class Drive(Table):
 class Circuit(Table):
     """What turns V1 into current."""
 
-    model: Literal["full", "amplifier", "limited", "ideal", "auto", "none", "file"] = _choice(
-        "amplifier",
-        "Schematic with its difference amplifier, behavioural current source, the same reduced to "
-        "its limits and the coil, current = command, the cheapest of the last three within "
-        "run.tolerance, no drive at all, or the netlist named in circuit.netlist",
-    )
-    netlist: str | None = _choice(None, "A netlist of one's own, seen from the scene's file")
+    model: str = _declared("amplifier", "Circuit", RUNGS)
+    netlist: str | None = _choice(None, "Path of the user's netlist, relative to the scene file")
     supply: float = _number(18.0, "V", 0.1, 1e3, "Supply voltage, both signs")
-    sense_resistance: float = _number(
-        4.0, "Ohm", 1e-3, 1e6, "Sense resistor: current = V1 / sense_resistance"
-    )
-    current_limit: float = _number(
-        2.504, "A", 1e-3, 1e3, 'Current limit of the power amplifier; not in "amplifier"'
-    )
+    sense_resistance: float = _of_fmu("sense_resistance")
+    current_limit: float = _of_fmu("current_limit")
     gain_bandwidth: float = _number(
         1e6, "Hz", 1e2, 1e12, "Gain-bandwidth product of the power amplifier"
     )
@@ -230,14 +244,14 @@ class Circuit(Table):
         "V",
         0.0,
         1e3,
-        "Output's least distance to the positive supply; \"full\" has the data sheet's instead",
+        'Least voltage from the output to the positive supply; "full" takes the data sheet\'s',
     )
     swing_loss_low: float = _number(
         4.0,
         "V",
         0.0,
         1e3,
-        "Output's least distance to the negative supply; \"full\" has the data sheet's instead",
+        'Least voltage from the output to the negative supply; "full" takes the data sheet\'s',
     )
     output_resistance: float = _number(
         0.0, "Ohm", 0.0, 1e3, "Open-loop output resistance of the power amplifier"
@@ -246,7 +260,7 @@ class Circuit(Table):
         None, "Ohm", 1e-3, 1e6, "Resistance of a snubber from the output to ground"
     )
     snubber_capacitance: float | None = _number(
-        None, "F", 1e-12, 1.0, "Capacitance in series with it; both or neither are given"
+        None, "F", 1e-12, 1.0, "Capacitance in series with snubber_resistance; give both or neither"
     )
     reltol: float = _number(1e-5, "1", 1e-9, 1e-2, "Relative tolerance of ngspice")
     max_step: float = _number(
@@ -254,21 +268,21 @@ class Circuit(Table):
         "s",
         1e-9,
         1e-2,
-        "Largest time step of ngspice; 2e-05 s with rigid walls or a netlist, unless given",
+        "Largest time step of ngspice; 2e-05 s by default with rigid walls or a netlist",
     )
 
     @model_validator(mode="after")
     def _check(self) -> "Circuit":
-        swing = self.model in ("amplifier", "limited", "auto", "file")
+        rung = RUNGS[self.model]
         for key in ("swing_loss_high", "swing_loss_low"):
-            if swing and (loss := getattr(self, key)) >= self.supply:
+            if key in rung.keys and (loss := getattr(self, key)) >= self.supply:
                 raise fault(
                     f"circuit.{key} = {loss:g} V must be below circuit.supply = {self.supply:g} V",
                     f"circuit.{key}",
                     "circuit.supply",
                 )
         _both_or_neither("circuit", self, "snubber_resistance", "snubber_capacitance")
-        if (self.model == "file") != (self.netlist is not None):
+        if rung.own_netlist != (self.netlist is not None):
             raise fault(
                 'circuit.model = "file" and circuit.netlist must be given together',
                 "circuit.netlist",
@@ -280,18 +294,14 @@ class Circuit(Table):
 class Coil(Table):
     """The voice coil; all values are those of one coil."""
 
-    resistance: float = _number(7.1, "Ohm", 1e-3, 1e6, "Resistance of one coil")
-    inductance: float = _number(1.2e-3, "H", 1e-9, 1e3, "Inductance of one coil")
-    eddy_inductance: float | None = _number(
-        None, "H", 1e-9, 1e3, "Inductance of the eddy-current branch (LR2 model), in series"
-    )
-    eddy_resistance: float | None = _number(
-        None, "Ohm", 1e-3, 1e6, "Resistance across eddy_inductance; both or neither are given"
-    )
-    force_factor: float = _number(0.6, "N/A", -1e3, 1e3, "Force factor Bl at the magnetic centre")
-    b1: float = _number(0.0, "1/m", -1e6, 1e6, "Linear term of Bl(q) = Bl (1 + b1 q + b2 q^2)")
-    b2: float = _number(0.0, "1/m2", -1e9, 1e9, "Quadratic term of Bl(q)")
-    count: int = _number(1, "1", 1, 16, "Equal coils in parallel that share the current")
+    resistance: float = _of_fmu("coil_resistance")
+    inductance: float = _of_fmu("inductance")
+    eddy_inductance: float | None = _of_fmu("eddy_inductance", least=1e-9)
+    eddy_resistance: float | None = _of_fmu("eddy_resistance", least=1e-3)
+    force_factor: float = _of_fmu("force_factor")
+    b1: float = _of_fmu("b1")
+    b2: float = _of_fmu("b2")
+    count: int = _of_fmu("coil_count")
 
     @model_validator(mode="after")
     def _check(self) -> "Coil":
@@ -304,48 +314,42 @@ class Mechanics(Table):
 
     actuator: Literal["ram", "direct"] = _choice(
         "ram",
-        "What the coil pushes off from: a free ram, or a magnet that stands on the ground; there "
-        "suspension and walls hold the surface itself",
+        "Reaction body of the coil: a free ram, or a magnet fixed to the ground (direct drive), "
+        "where suspension and walls act between surface and ground",
     )
-    ram_mass: float = _number(0.004, "kg", 1e-9, 1e3, "Mass of the ram in the actuator")
-    surface_mass: float = _number(
-        0.0145, "kg", 1e-9, 1e3, "Mass of the surface: actuator body and platform"
-    )
-    part_mass: float = _number(
-        0.009, "kg", 1e-9, 1e3, "Mass of the whole part, shared by n_surfaces"
-    )
-    flexure_stiffness: float = _number(560.0, "N/m", 1e-6, 1e12, "Stiffness, surface to ground")
-    flexure_damping: float = _number(0.84, "N.s/m", 0.0, 1e9, "Damping, surface to ground")
-    suspension_k1: float = _number(40.0, "N/m", 0.0, 1e12, "Linear stiffness, ram to surface")
-    suspension_k2: float = _number(0.0, "N/m2", -1e15, 1e15, "Quadratic stiffness of the same")
-    suspension_k3: float = _number(1.5e7, "N/m3", 0.0, 1e18, "Cubic stiffness of the same")
-    suspension_damping: float = _number(0.02, "N.s/m", 0.0, 1e9, "Damping, ram to surface")
-    travel: float = _number(1.9e-3, "m", 1e-9, 1e3, "Free travel of the ram to either wall")
+    ram_mass: float = _of_fmu("ram_mass")
+    surface_mass: float = _of_fmu("surface_mass")
+    part_mass: float = _of_fmu("part_mass")
+    flexure_stiffness: float = _of_fmu("flexure_stiffness")
+    flexure_damping: float = _of_fmu("flexure_damping")
+    suspension_k1: float = _of_fmu("suspension_k1")
+    suspension_k2: float = _of_fmu("suspension_k2")
+    suspension_k3: float = _of_fmu("suspension_k3")
+    suspension_damping: float = _of_fmu("suspension_damping")
+    travel: float = _of_fmu("travel")
     contact: Literal["compliant", "rigid"] = _choice(
         "compliant", "Law of the walls: Hunt-Crossley or instantaneous impacts"
     )
-    restitution: float = _number(0.75, "1", 0.0, 1.0, "Newton restitution of the rigid walls")
-    contact_stiffness: float = _number(
-        1e8, "N/m1.5", 1.0, 1e15, "Stiffness K of the compliant walls"
-    )
-    contact_damping: float = _number(0.38, "s/m", 0.0, 1e6, "Damping lambda of the compliant walls")
-    n_surfaces: int = _number(1, "1", 1, 16, "Surfaces that share the part; a gripper has 2")
-    gravity: float = _number(9.81, "m/s2", 0.0, 1e4, "Acceleration of gravity, downwards")
+    restitution: float = _of_fmu("restitution")
+    contact_stiffness: float = _of_fmu("contact_stiffness")
+    contact_damping: float = _of_fmu("contact_damping")
+    n_surfaces: int = _of_fmu("n_surfaces")
+    gravity: float = _of_fmu("gravity")
 
 
 class Friction(Table):
     """Friction on the part."""
 
     law: Literal["coulomb"] = _choice("coulomb", "Law of friction, exact in sticking")
-    mu_s: float = _number(0.72, "1", 0.0, 1e3, "Static coefficient, surface on part")
-    mu_k: float = _number(0.59, "1", 0.0, 1e3, "Kinetic coefficient, at most mu_s")
-    normal_force: float = _number(0.5, "N", 0.0, 1e9, "Normal force of one surface on the part")
+    mu_s: float = _of_fmu("mu_s")
+    mu_k: float = _of_fmu("mu_k")
+    normal_force: float = _of_fmu("normal_force")
     normal_force_file: str | None = _choice(
         None,
         "CSV with time [s] and normal_force [N], linear in between, its first and last values kept "
         "before and after; instead of normal_force",
     )
-    mu_plate: float = _number(0.0, "1", 0.0, 1e3, "Coefficient of the springed plate on the part")
+    mu_plate: float = _of_fmu("mu_plate")
 
     @model_validator(mode="before")
     @classmethod
@@ -369,20 +373,17 @@ class Friction(Table):
 class Coupling(Table):
     """How circuit and mechanics are joined; ngspice leads."""
 
-    method: Literal[
-        "step-locked", "jacobi", "gauss-seidel", "mean-current", "companion", "auto"
-    ] = _choice(
-        "step-locked",
-        "Mechanics follow each accepted step of ngspice; or macro steps: both sides extrapolated, "
-        "the mechanics fed the current's line or mean, or the circuit carrying their inertia; or "
-        "the cheapest of these, and of ngspice's steps, that meets a tolerance",
-    )
-    macro_step: float = _number(1e-4, "s", 1e-7, 1e-2, "Macro step; ends early at command's jumps")
+    method: str = _declared("step-locked", "Coupling", METHODS)
+    macro_step: float = _number(1e-4, "s", 1e-7, 1e-2, "Macro step; ends at jumps of the command")
     order: int = _number(
         1, "1", 0, 2, "Order of extrapolation: held, with the true slope, parabola"
     )
     tolerance: float = _number(
-        1e-3, "1", 1e-6, 0.5, "With auto: error of the part's height that is allowed, of its range"
+        1e-3,
+        "1",
+        1e-6,
+        0.5,
+        "With auto: allowed error of the part's height, relative to its range",
     )
 
     @model_validator(mode="before")
@@ -398,19 +399,6 @@ class Coupling(Table):
         return data
 
 
-COUPLING_KEYS = {
-    "step-locked": {"method"},
-    "jacobi": {"method", "macro_step", "order"},
-    "gauss-seidel": {"method", "macro_step", "order"},
-    "mean-current": {"method", "macro_step", "order"},
-    "companion": {"method", "macro_step"},
-    "auto": {"method", "tolerance"},
-}
-"""The keys of ``[coupling]`` that act with each ``coupling.method``."""
-
-CHOSEN_BY_AUTO = ("reltol", "max_step")
-"""The keys of ``[circuit]`` that ``coupling.method = "auto"`` chooses."""
-
 GIVEN_SURFACES = {
     "optimal": {"frequency", "acceleration_max", "optimum"},
     "quaid": {"frequency", "acceleration_max", "optimum"},
@@ -418,47 +406,6 @@ GIVEN_SURFACES = {
     "file": {"file"},
 }
 """Waveforms of ``[drive]`` that, with circuit none, are the surface's velocity, and their keys."""
-
-_OF_NGSPICE = set(Circuit.model_fields) - {"model"}
-CIRCUIT_KEYS: dict[str, set[str]] = {
-    "full": _OF_NGSPICE - {"swing_loss_high", "swing_loss_low"},
-    "amplifier": _OF_NGSPICE - {"current_limit"},
-    "limited": {"supply", "sense_resistance", "current_limit", "swing_loss_high", "swing_loss_low"},
-    "ideal": {"sense_resistance"},
-    "auto": _OF_NGSPICE,
-    "none": set(),
-    "file": _OF_NGSPICE,
-}
-"""The keys of ``[circuit]`` that act with each ``circuit.model``."""
-
-WITHOUT_NGSPICE = ("limited", "ideal", "none")
-"""Each ``circuit.model`` that starts no ngspice."""
-
-
-LED = ("full", "amplifier", "file")
-"""Values of ``circuit.model`` with which ngspice leads and there is something to couple."""
-
-
-def acts(table: str, key: str, model: str, waveform: str, method: str = "step-locked") -> bool:
-    """Whether a key does anything with this ``circuit.model``, ``drive.waveform`` and
-    ``coupling.method``."""
-    if key in ("model", "waveform"):
-        return True
-    if table == "coupling":
-        return (model in LED or model == "auto") and key in COUPLING_KEYS[method]
-    if (table, key) == ("run", "tolerance"):
-        return model not in ("none", "file")  # which are no rungs to choose from
-    if table == "circuit":
-        steered = method == "auto" and key in CHOSEN_BY_AUTO
-        return key in CIRCUIT_KEYS[model] and not steered
-    if table == "coil":
-        return model != "none" or key == "count"  # as many rams take part in the energies
-    if table == "drive":
-        if model == "none":
-            return key in GIVEN_SURFACES.get(waveform, ())
-        return key not in set().union(*GIVEN_SURFACES.values()) - {"frequency"}
-    return True
-
 
 MAX_ROWS = 20_000_000
 
@@ -468,9 +415,9 @@ class Run(Table):
 
     duration: float = _number(2.0, "s", 1e-6, 1e5, "Simulated time")
     settle: float = _number(
-        1.0, "s", 0.0, 1e5, "Time left out of the averages; half of the duration unless given"
+        1.0, "s", 0.0, 1e5, "Start of the averages; half of the duration by default"
     )
-    output_step: float = _number(5e-5, "s", 1e-9, 1e3, "Time between the rows of the waveforms")
+    output_step: float = _number(5e-5, "s", 1e-9, 1e3, "Time between rows of the waveforms")
     tolerance: float = _number(
         0.01,
         "1",

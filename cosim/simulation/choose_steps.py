@@ -15,7 +15,7 @@ import numpy as np
 
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene
-from cosim.simulation.simulate import Result
+from cosim.waveforms.result import Result
 
 LEVELS = (
     (1e-3, 1e-4),
@@ -77,7 +77,7 @@ def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> R
         taken["coupling.macro_step"] = coupling.macro_step
     found = {"wall_time": seconds, "error_estimate": error, "coupling_taken": taken}
     summary = best.summary | found
-    return Result(best.scene, best.waveforms, summary)
+    return Result(best.scene, best.columns, summary)
 
 
 def _meeting(
@@ -110,7 +110,7 @@ def _meeting(
 
 def difference(result: Result, truth: Result) -> float:
     """Greatest over time of the part's height, in units of the range of ``truth``."""
-    path, true = result.waveforms["z_part"], truth.waveforms["z_part"]
+    path, true = result.columns["z_part"], truth.columns["z_part"]
     off, span = float(np.abs(path - true).max()), float(np.ptp(true))
     return off / span if span else (0.0 if off == 0.0 else np.inf)
 

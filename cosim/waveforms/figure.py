@@ -9,11 +9,10 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
+from cosim.files.picture import Picture
 from cosim.files.spill import release
-from cosim.simulation.simulate import Result
+from cosim.scene import Scene
 from cosim.trials.published import FRAME_RATE
 
 Array = npt.NDArray[np.float64]
@@ -35,48 +34,45 @@ _STRETCHES = 4000
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def draw(result: Result, path: Path) -> None:
-    """Draw the run into ``path`` (a PNG)."""
-    waves = result.waveforms
-    given = result.scene.surface_is_given
+def draw(scene: Scene, waves: dict[str, Array], numbers: dict[str, Any]) -> Picture:
+    """The figure of a run: its scene, its columns, and the numbers of its summary."""
+    given = scene.surface_is_given
     height = 5.8 if given else 8.2
-    figure = Figure(figsize=(13.0, height), dpi=110)
-    FigureCanvasAgg(figure)
+    figure = Picture(13.0, height)
     axes = figure.subplots(2 if given else 3, 2)
     # Room that was measured once: a layout engine would double the time of a short run.
     figure.subplots_adjust(
         left=0.06, right=0.985, bottom=0.5 / height, top=1 - 0.62 / height, wspace=0.29, hspace=0.4
     )
-    shown = _last_periods(result)
+    shown = _last_periods(scene, waves["time"])
     time = waves["time"][shown] * 1e3
     cut = {name: values[shown] for name, values in waves.items()}
 
-    _whole_run(axes[0, 0], result)
+    _whole_run(axes[0, 0], scene, waves)
     _positions(axes[0, 1], time, cut)
     if given:
         _velocities(axes[1, 0], time, cut)
-        _acceleration(axes[1, 1], result, shown)
+        _acceleration(axes[1, 1], scene, waves, shown)
     else:
-        _command(axes[1, 0], result, time, cut)
+        _command(axes[1, 0], scene, time, cut)
         _voltages(axes[2, 0], time, cut)
         _velocities(axes[1, 1], time, cut)
-        _acceleration(axes[2, 1], result, shown)
+        _acceleration(axes[2, 1], scene, waves, shown)
     for axis in (*axes[1:, 0], *axes[:, 1]):
         axis.set_xlim(time[0], time[-1])
         axis.set_xlabel("time [ms]")
     for axis in axes.flat:
         axis.grid(alpha=0.25)
-    figure.suptitle(_title(result), fontsize=12, y=1 - 0.08 / height, va="top")
-    figure.savefig(path, format="png")
+    figure.suptitle(_title(scene, numbers), fontsize=12, y=1 - 0.08 / height, va="top")
+    return figure
 
 
-def _last_periods(result: Result) -> slice:
+def _last_periods(scene: Scene, time: Array) -> slice:
     """The rows of the last few periods; of the last part of the run where nothing is driven."""
-    time = result.waveforms["time"]
-    scene, run = result.scene, result.scene.run
+    run = scene.run
     if scene.drive.file is not None:
         span = run.duration
-    elif scene.circuit.model == "none" and not scene.surface_is_given:
+    elif not (scene.rung.driven or scene.surface_is_given):
         span = run.duration / 10
     else:
         span = PERIODS_SHOWN / scene.drive.frequency
@@ -99,16 +95,15 @@ def _outline(time: Array, values: Array) -> tuple[Array, Array]:
     return np.repeat(begins, 2), np.stack(ends, axis=1).ravel()
 
 
-def _title(result: Result) -> str:
-    scene, numbers = result.scene, result.summary
+def _title(scene: Scene, numbers: dict[str, Any]) -> str:
     drive = scene.drive
-    words = f"{scene.name}: part moves at {numbers['v_average'] * 1e3:+.2f} mm/s"  # pyright: ignore
+    words = f"{scene.name}: part moves at {numbers['v_average'] * 1e3:+.2f} mm/s"
     if drive.file is not None:
         return f"{words}; the surface moves as in {Path(drive.file).name}"
     if scene.surface_is_given:
         limit = f", at most {drive.acceleration_max:.4g} m/s²" if drive.waveform != "sine" else ""
         return f"{words}; the surface is given: {drive.waveform}, {drive.frequency:.4g} Hz{limit}"
-    if scene.circuit.model == "none":
+    if not scene.rung.driven:
         return f"{words}; no drive"
     late = "" if drive.phase_deg is None else f", second coil {drive.phase_deg:.4g}° late"
     return (
@@ -117,15 +112,14 @@ def _title(result: Result) -> str:
     )
 
 
-def _whole_run(axis: Axes, result: Result) -> None:
-    waves = result.waveforms
+def _whole_run(axis: Axes, scene: Scene, waves: dict[str, Array]) -> None:
     time, height = _outline(waves["time"], waves["z_surface"])
     axis.plot(time, height * 1e3, color=SURFACE, lw=0.5, label="surface")
     time, height = _outline(waves["time"], waves["z_part"])
     axis.plot(time, height * 1e3, color=PART, lw=1.2, label="part")
-    if result.scene.run.settle > 0:
-        axis.axvspan(0, result.scene.run.settle, color="0.93", zorder=0, label="settling")
-    axis.set_xlim(0, result.scene.run.duration)
+    if scene.run.settle > 0:
+        axis.axvspan(0, scene.run.settle, color="0.93", zorder=0, label="settling")
+    axis.set_xlim(0, scene.run.duration)
     axis.set(xlabel="time [s]", ylabel="height [mm]")
     _at_least(axis, 0.01)
     curves, _ = axis.get_legend_handles_labels()
@@ -170,7 +164,7 @@ def _no_drive(axis: Axes, title: str, unit: str) -> None:
     _head(axis, title)
 
 
-def _command(axis: Axes, result: Result, time: Array, cut: dict[str, Array]) -> None:
+def _command(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) -> None:
     title = "Command and current"
     if "command" not in cut:
         _no_drive(axis, title, "current [A]")
@@ -183,7 +177,7 @@ def _command(axis: Axes, result: Result, time: Array, cut: dict[str, Array]) -> 
         axis.plot(time, cut["current_2"], color=SECOND, lw=1.1, ls="--", label="second (left)")
     right.set_ylabel("V1 [V]")
     # On these scales the two curves coincide where the source does what it is told.
-    scale = result.scene.circuit.sense_resistance * result.scene.coil.count
+    scale = scene.circuit.sense_resistance * scene.coil.count
     both = np.concatenate([cut["current"], cut["command"] / scale])
     edge = 0.05 * max(np.ptp(both), 1e-9)
     low, high = both.min() - edge, both.max() + edge
@@ -253,8 +247,7 @@ def _power_of_ten(value: float, _: float) -> str:
     return f"{'−' if value < 0.0 else ''}10{power}"
 
 
-def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
-    waves = result.waveforms
+def _acceleration(axis: Axes, scene: Scene, waves: dict[str, Array], shown: slice) -> None:
     time = waves["time"][shown]
     axis.plot(time * 1e3, waves["a_surface"][shown], color=SURFACE, lw=0.8, label="true")
     frames = np.arange(np.ceil(time[0] * FRAME_RATE), time[-1] * FRAME_RATE) / FRAME_RATE
@@ -275,5 +268,5 @@ def _acceleration(axis: Axes, result: Result, shown: slice) -> None:
         axis.yaxis.set_major_formatter(_power_of_ten)
     _at_least(axis, 2.0)
     axis.set(ylabel="acceleration [m/s²]")
-    rigid = result.scene.mechanics.contact == "rigid" and not result.scene.surface_is_given
+    rigid = scene.mechanics.contact == "rigid" and not scene.surface_is_given
     _head(axis, "Acceleration of the surface" + (", without its jumps" if rigid else ""))

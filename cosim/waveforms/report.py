@@ -20,7 +20,7 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
     if "current_max" in summary:
         rows += [
             ("coil current", _range(summary, "current", 1, "A", "+.3f")),
-            ("amplifier at a limit", "" if scene.circuit.model == "ideal" else _limits(summary)),
+            ("amplifier at a limit", _limits(summary) if scene.rung.has_limits else ""),
         ]
     rows += [
         ("impacts", f"{summary['impacts']}"),
@@ -56,9 +56,7 @@ def _residual(share: float) -> str:
 
 def _broken_periods(scene: Scene) -> str:
     """A word where the averages end within a period, which makes them untrue."""
-    if scene.drive.waveform == "file" or (
-        scene.circuit.model == "none" and not scene.surface_is_given
-    ):
+    if scene.drive.waveform == "file" or not (scene.rung.driven or scene.surface_is_given):
         return ""
     periods = (scene.run.duration - scene.run.settle) * scene.drive.frequency
     if abs(periods - round(periods)) < 1e-6 or periods > MANY:

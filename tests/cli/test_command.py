@@ -11,16 +11,14 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import cosim
 from cosim.cli.main import main
-from cosim.coupling.loop.compiled import CompiledRecorder
-from cosim.coupling.loop.step_locked import StepLocked
+from cosim.coupling.loop.lead import Lead
+from cosim.coupling.loop.recorder import Recorder
+from cosim.coupling.methods.mean_current import MeanCurrent
 from cosim.drive.command import Sawtooth
-from cosim.errors import SimulationFailed
-from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 
@@ -281,13 +279,13 @@ def test_interrupt_where_compiled_code_calls_back(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Between the call and its first line nothing in the callback itself can catch it."""
-    planned = CompiledRecorder._planned
+    planned = Recorder._planned
 
-    def struck(self: CompiledRecorder) -> None:
+    def struck(self: Recorder) -> None:
         signal.raise_signal(signal.SIGINT)
         planned(self)
 
-    monkeypatch.setattr(CompiledRecorder, "_planned", struck)
+    monkeypatch.setattr(Recorder, "_planned", struck)
     arguments = [
         "run",
         "ideal-current",
@@ -324,11 +322,11 @@ def test_interrupt_while_writing(
 ) -> None:
     """What was complete stays; of the rest there is nothing."""
 
-    def interrupted(result: object, path: Path) -> None:
+    def interrupted(figure: object, path: Path, **_: object) -> None:
         path.write_bytes(b"half")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("cosim.waveforms.figure.draw", interrupted)
+    monkeypatch.setattr("cosim.files.picture.Picture.savefig", interrupted)
     assert main(["run", "held", *QUICK, "--out", str(tmp_path / "out")]) == 130
     assert capsys.readouterr().err == "cosim: interrupted.\n"
     kept = {path.name for path in (tmp_path / "out").iterdir()}
@@ -345,7 +343,7 @@ class Trouble(Exception):
 
 
 def bits(scene: str = "paper") -> dict[str, bytes]:
-    return {k: v.tobytes() for k, v in simulate(load(scene, SHORT)).waveforms.items()}
+    return {k: v.tobytes() for k, v in simulate(load(scene, SHORT)).columns.items()}
 
 
 def after_calls(number: int, original: Callable, failure: BaseException) -> Callable:
@@ -360,22 +358,17 @@ def after_calls(number: int, original: Callable, failure: BaseException) -> Call
     return function
 
 
-@pytest.mark.parametrize("scene", ["paper", "ideal-current"])
-def test_mechanics_fail(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = bits(scene)
-    failure = SimulationFailed("The mechanics failed at t = 0.01 s: as the test wants it.")
-    with monkeypatch.context() as patch:
-        patch.setattr(Mechanics, "step_to", after_calls(500, Mechanics.step_to, failure))
-        with pytest.raises(SimulationFailed, match="as the test wants it"):
-            simulate(load(scene, SHORT), compiled=False)
-    assert bits(scene) == before
-
-
 @pytest.mark.parametrize(
-    ("owner", "name"),
-    [(StepLocked, "back_emf"), (StepLocked, "accepted"), (Sawtooth, "value")],
+    ("owner", "name", "calls"),
+    [
+        (Lead, "_attend", 0),
+        (Sawtooth, "piece", 0),
+        (Recorder, "_plan", 0),
+        (MeanCurrent, "current", 0),
+        (MeanCurrent, "current", 1),
+        (MeanCurrent, "emf", 300),
+    ],
 )
-@pytest.mark.parametrize("calls", [0, 1, 300])
 def test_callback_fails(
     owner: type, name: str, calls: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -383,16 +376,7 @@ def test_callback_fails(
     with monkeypatch.context() as patch:
         patch.setattr(owner, name, after_calls(calls, getattr(owner, name), Trouble("here")))
         with pytest.raises(Trouble, match="here"):
-            simulate(load("paper", SHORT), compiled=False)
-    assert bits() == before
-
-
-def test_callback_gives_nonsense(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = bits()
-    with monkeypatch.context() as patch:
-        patch.setattr(StepLocked, "back_emf", lambda self, time: np.nan if time > 0.01 else 0.0)
-        with pytest.raises(SimulationFailed, match=r"ngspice stopped at t = 0\.0(0999|1)"):
-            simulate(load("paper", SHORT), compiled=False)
+            simulate(load("paper", [*SHORT, "coupling.method=mean-current"]))
     assert bits() == before
 
 
@@ -403,7 +387,7 @@ from cosim.simulation.simulate import simulate
 
 
 def bits():
-    return simulate(load("paper", ["run.duration=0.02"])).waveforms["z_part"].tobytes()
+    return simulate(load("paper", ["run.duration=0.02"])).columns["z_part"].tobytes()
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
@@ -415,7 +399,8 @@ if __name__ == "__main__":
         began = time.perf_counter()
         try:
             timer.start()
-            simulate(load("paper", ["run.duration=10"]), compiled=number % 2 == 0)
+            method = ("step-locked", "jacobi")[number % 2]
+            simulate(load("paper", ["run.duration=10", f"coupling.method={method}"]))
         except KeyboardInterrupt:
             assert time.perf_counter() - began < 5
         else:

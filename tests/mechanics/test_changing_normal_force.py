@@ -32,7 +32,7 @@ def test_a_part_is_let_go_where_friction_no_longer_carries_it(tmp_path: Path):
         tmp_path, [(0.0, normal), (0.05, normal + rate * 0.05), (end, normal + rate * end)]
     )
     run = ["run.duration=0.3", "run.settle=0", "run.output_step=1e-4"]
-    waves = simulate(load("held", [force, *run])).waveforms
+    waves = simulate(load("held", [force, *run])).columns
     time = waves["time"]
     since = np.clip(time - release, 0.0, None)
     falling = np.minimum(since, end - release)
@@ -57,7 +57,7 @@ def test_a_jump_of_the_force_lets_go_and_catches_at_its_time(tmp_path: Path):
     # a surface that hardly gives, so that it is at rest when the part stops against it
     still = ["mechanics.flexure_stiffness=1e9", "mechanics.flexure_damping=1e4"]
     result = simulate(load("held", [force, *run, *still]))
-    waves = result.waveforms
+    waves = result.columns
     brake = MU_K * caught / PART - G
     fall, stop = 0.02, G * 0.02 / brake
     assert result.summary["stick_slip_events"] == 2
@@ -92,7 +92,7 @@ def test_against_the_reference(contact: str, tmp_path: Path):
     assert result.summary["stick_fraction"] == pytest.approx(expected.stick_fraction, abs=1e-6)
     at = np.round(np.array(times) / 1e-4).astype(int)
     for name, allowed in (("z_surface", 2e-9), ("z_part", 2e-9), ("v_part", 5e-7)):
-        found = result.waveforms[name][at]
+        found = result.columns[name][at]
         np.testing.assert_allclose(found, expected.samples[name], rtol=0, atol=allowed)
     assert result.summary["energy_residual"] < 1e-7  # pyright: ignore[reportOperatorIssue]
 

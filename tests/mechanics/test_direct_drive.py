@@ -98,14 +98,14 @@ def test_against_the_reference_with_an_endless_ram(contact: str):
     assert result.summary["stick_fraction"] == pytest.approx(expected.stick_fraction, abs=1e-6)
     rows = np.round(np.array(times) / 1e-4).astype(int)
     for name, scale in (("z_surface", 1e-3), ("v_surface", 1.0), ("z_part", 1e-3), ("v_part", 1.0)):
-        found = result.waveforms[name][rows]
+        found = result.columns[name][rows]
         np.testing.assert_allclose(found, expected.samples[name], rtol=0, atol=2e-7 * scale)
     for name in ("friction", "impact", "damping"):
         assert result.summary[f"energy_{name}"] == pytest.approx(
             expected.energies[name], rel=1e-6, abs=1e-9
         )
     assert result.summary["energy_residual"] < 1e-9  # pyright: ignore[reportOperatorIssue]
-    assert not {"z_ram", "v_ram"} & set(result.waveforms)
+    assert not {"z_ram", "v_ram"} & set(result.columns)
 
 
 @pytest.mark.parametrize("contact", [RIGID, COMPLIANT])

@@ -16,7 +16,8 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from cosim.scene import load
-from cosim.simulation.simulate import Result, simulate
+from cosim.simulation.simulate import simulate
+from cosim.waveforms.result import Result
 
 pytestmark = pytest.mark.physics
 
@@ -44,7 +45,7 @@ def test_step_into_a_clamped_output() -> None:
     """A square wave that asks for more than the output can give: two exponentials for ever."""
     result = locked("drive.waveform=square", "drive.frequency=500", "drive.amplitude=12",
                     "drive.offset=0.2")  # fmt: skip
-    time, current = result.waveforms["time"], result.waveforms["current"]
+    time, current = result.columns["time"], result.columns["current"]
     tau, expected, start = L / (R + R_SENSE), np.zeros(len(time)), 0.0
     for half in range(5):
         end = (HIGH if half % 2 == 0 else LOW) / (R + R_SENSE)
@@ -59,7 +60,7 @@ def test_step_into_a_clamped_output() -> None:
     inside = time % 1e-3 > 1e-6
     output = np.where(time % 2e-3 < 1e-3, HIGH, LOW)[inside]
     np.testing.assert_allclose(
-        result.waveforms["coil_voltage"][inside], output - R_SENSE * current[inside], atol=1e-9
+        result.columns["coil_voltage"][inside], output - R_SENSE * current[inside], atol=1e-9
     )
 
 
@@ -71,7 +72,7 @@ def test_the_current_meets_the_command_after_its_fall(count: int) -> None:
         f"coil.count={count}", f"drive.frequency={frequency}", f"drive.amplitude={amplitude}",
         "drive.offset=0.5", "run.duration=0.016", "circuit.current_limit=10",
     )  # fmt: skip
-    time, current = result.waveforms["time"], result.waveforms["current"]
+    time, current = result.columns["time"], result.columns["current"]
     loop, period = R + count * R_SENSE, 1.0 / frequency
     tau, end = L / loop, LOW / loop
 
@@ -109,7 +110,7 @@ def test_eddy_branch_behind_a_clamped_output() -> None:
     rates = np.zeros((3, 3))  # of coil current, eddy current, and 1
     rates[0] = [-(R + R_SENSE + eddy_r) / L, eddy_r / L, HIGH / L]
     rates[1] = [eddy_r / eddy_l, -eddy_r / eddy_l, 0.0]
-    time, current = result.waveforms["time"], result.waveforms["current"]
+    time, current = result.columns["time"], result.columns["current"]
     some = slice(None, None, 50)
     expected = np.array([expm(rates * t)[:, 2] for t in time[some]])
     np.testing.assert_allclose(current[some], expected[:, 0], **EXACT)
@@ -129,8 +130,8 @@ def test_current_limit_cuts_the_command(count: int) -> None:
         "drive.frequency=250", "drive.reset_time=0.002", "drive.amplitude=20", "drive.offset=0",
         "run.duration=0.012", "run.settle=0.004",
     )  # fmt: skip
-    time, current = result.waveforms["time"], result.waveforms["current"]
-    asked = result.waveforms["command"] / R_SENSE
+    time, current = result.columns["time"], result.columns["current"]
+    asked = result.columns["command"] / R_SENSE
     settled = time > 0.001
     expected = np.clip(asked, -limit, limit)[settled] / count
     np.testing.assert_allclose(current[settled], expected, **EXACT)
@@ -173,17 +174,17 @@ def test_without_limits_it_is_the_ideal_source(contact: str) -> None:
     common = [*SMOOTH, f"mechanics.contact={contact}", "coil.b1=50"]
     ideal = simulate(load("paper", ["circuit.model=ideal", *common]))
     limited = simulate(load("paper-limited", ["circuit.supply=900", ABLE, *common]))
-    phase = ideal.waveforms["time"] * 20.0 % 1.0
+    phase = ideal.columns["time"] * 20.0 % 1.0
     off_corners = np.minimum(phase % 0.6, 1.0 - phase) > 1e-9
     assert limited.summary["saturated_fraction"] == 0.0
     assert ideal.summary["impacts"] > 2  # type: ignore
-    for name, column in ideal.waveforms.items():
+    for name, column in ideal.columns.items():
         # At its corners the ideal voltage jumps, and a row may hold either side.
         at = off_corners if name == "coil_voltage" else slice(None)
         scale = max(float(np.abs(column).max()), 1e-12)
         allowed = 1e-9 if name not in ("a_surface", "friction_force") else 1e-7
         np.testing.assert_allclose(
-            limited.waveforms[name][at] / scale, column[at] / scale, 0, allowed, err_msg=name
+            limited.columns[name][at] / scale, column[at] / scale, 0, allowed, err_msg=name
         )
     for name in ("v_average", "energy_in", "energy_copper", "energy_stored", "current_max"):
         assert limited.summary[name] == pytest.approx(ideal.summary[name], rel=1e-8), name

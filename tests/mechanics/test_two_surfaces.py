@@ -53,7 +53,7 @@ def test_a_scene_in_phase_is_the_scene_of_one(model: str):
     run = [f"circuit.model={model}", "run.duration=0.5", "run.settle=0.25"]
     one = simulate(load("paper", run)).summary
     result = simulate(load("two-surfaces", [*run, "drive.phase_deg=0"]))
-    two, waves = result.summary, result.waveforms
+    two, waves = result.summary, result.columns
     assert two["v_average"] == pytest.approx(one["v_average"], rel=1e-7)
     assert two["stick_fraction"] == pytest.approx(one["stick_fraction"], rel=1e-8)
     assert two["stick_fraction_2"] == pytest.approx(two["stick_fraction"], rel=1e-8)
@@ -123,7 +123,7 @@ def test_against_the_reference(phase: float):
     lag = phase / 360.0 / frequency
     run = ["circuit.model=ideal", f"drive.phase_deg={phase}", "run.duration=0.1", "run.settle=0"]
     scene = load("two-surfaces", [*run, "run.output_step=1e-4"])
-    waves = simulate(scene).waveforms
+    waves = simulate(scene).columns
     jumps = [n / frequency for n in range(1, 3)] + [n / frequency + lag for n in range(2)]
 
     def sawtooth(late: float) -> two_surfaces.Current:

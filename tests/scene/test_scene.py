@@ -6,12 +6,15 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim.errors import BadInput, NoEffect
-from cosim.scene import Key, Scene, keys, list_scenes, load, to_toml
+from cosim.mechanics import package
+from cosim.scene import RUNGS, Circuit, Coupling, Key, Scene, keys, list_scenes, load, to_toml
+from cosim.scene.methods import METHODS
 
 # The table of the design, written down once more: an accidental change of a default shows here.
 DEFAULTS: dict[str, dict[str, Any]] = {
@@ -123,6 +126,48 @@ def test_every_key_is_described() -> None:
         else:
             free = key.kind is bool or key.full in FILES
             assert free or (key.choices and key.default in key.choices)
+
+
+@pytest.fixture(scope="module")
+def fmu_variables() -> dict[str, Any]:
+    """The variables of the built FMU by name, read by FMPy."""
+    description = fmpy.read_model_description(str(package.unpacked(3)))
+    return {variable.name: variable for variable in description.modelVariables}
+
+
+# The FMU takes 0 for an absent eddy branch; a scene leaves the keys out.
+ABSENT = {"coil.eddy_inductance": (None, 1e-9), "coil.eddy_resistance": (None, 1e-3)}
+
+
+def test_keys_of_the_mechanics_are_those_of_the_fmu(fmu_variables: dict[str, Any]) -> None:
+    shared = [key for key in keys() if key.variable]
+    assert len(shared) > 25
+    for key in shared:
+        variable = fmu_variables[key.variable]
+        assert variable.causality in ("parameter", "input"), key.full
+        assert (key.unit, key.text) == (variable.unit or "1", variable.description), key.full
+        start, low = ABSENT.get(key.full, (float(variable.start), float(variable.min)))
+        assert (key.default, key.low) == (start, low), key.full
+        assert key.high == float(variable.max), key.full
+
+
+def test_parameters_of_the_fmu_that_are_no_keys(fmu_variables: dict[str, Any]) -> None:
+    """Every other parameter of the FMU is one that the program sets or leaves alone."""
+    parameters = {name for name, v in fmu_variables.items() if v.causality == "parameter"}
+    assert parameters - {key.variable for key in keys()} == {
+        "output_high", "output_low",  # from supply and swing losses
+        "tolerance",
+        "contact", "ram_fixed", "independent", "prescribed", "source",
+    }  # fmt: skip
+
+
+def test_every_key_of_circuit_and_coupling_acts_somewhere() -> None:
+    of_rungs = set().union(*(rung.keys for rung in RUNGS.values()))
+    assert of_rungs == set(Circuit.model_fields) - {"model"}
+    chosen = set().union(*(method.chooses for method in METHODS.values()))
+    assert chosen <= of_rungs
+    of_methods = set().union(*(method.keys for method in METHODS.values()))
+    assert of_methods == set(Coupling.model_fields) - {"method"}
 
 
 def test_built_in_scenes() -> None:

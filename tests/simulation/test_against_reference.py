@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from cosim.scene import Scene, keys, load
-from cosim.simulation.simulate import Result, simulate
+from cosim.simulation.simulate import simulate
+from cosim.waveforms.result import Result
 
 pytestmark = pytest.mark.physics
 
@@ -45,9 +46,9 @@ def scene_of(case: dict) -> Scene:
 def check_early(case: dict, result: Result) -> None:
     times = np.array(GOLDEN["sample_times"])
     rows = np.round(times / result.scene.run.output_step).astype(int)
-    np.testing.assert_allclose(result.waveforms["time"][rows], times, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(result.columns["time"][rows], times, rtol=0, atol=1e-12)
     for name, allowed in EARLY[case["circuit"]].items():
-        found, expected = result.waveforms[name][rows], case["trajectory"][name]
+        found, expected = result.columns[name][rows], case["trajectory"][name]
         np.testing.assert_allclose(found, expected, rtol=0, atol=allowed, err_msg=name)
 
 

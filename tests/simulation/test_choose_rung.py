@@ -62,4 +62,4 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert written["circuit_model"] == "limited" and set(written["circuit_model_errors"]) == {
         "limited", "ideal",
     }  # fmt: skip
-    assert load(tmp_path / "scene.toml").circuit.model == "auto"
+    assert load(tmp_path / "scene.toml").circuit.model == "limited"

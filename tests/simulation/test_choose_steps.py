@@ -32,13 +32,13 @@ def scene(name: str, tolerance: float, *more: str) -> Scene:
 @pytest.mark.parametrize(("name", "tolerance"), [("paper", 1e-3), ("stick-slip", 1e-3)])
 def test_the_tolerance_is_met_and_the_error_told(name: str, tolerance: float) -> None:
     result = simulate(scene(name, tolerance))
-    true = reference(name).error(result.waveforms["z_part"][np.newaxis, 1:])
+    true = reference(name).error(result.columns["z_part"][np.newaxis, 1:])
     told = result.summary["error_estimate"]
     assert isinstance(told, float)
     assert true <= tolerance
     assert true / 3.0 < told < 3.0 * true
     again = simulate(result.scene)
-    assert np.array_equal(again.waveforms["z_part"], result.waveforms["z_part"])
+    assert np.array_equal(again.columns["z_part"], result.columns["z_part"])
 
 
 def test_a_smaller_tolerance_takes_more_steps() -> None:

@@ -11,7 +11,7 @@ from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.mechanics import part
 from cosim.scene import Scene, load
-from cosim.simulation import given_surface as prescribed
+from cosim.simulation.rungs import given_surface as prescribed
 from cosim.simulation.simulate import simulate
 from cosim.studies import paper as theory
 from tests.helpers.fmu_bench import Bench
@@ -134,7 +134,7 @@ def test_horizontal_scene_meets_the_closed_form() -> None:
 
 def test_sine_gives_the_surface_its_velocity() -> None:
     scene = load("optimal", ["drive.waveform=sine", "drive.velocity_amplitude=0.2"])
-    waves = simulate(scene).waveforms
+    waves = simulate(scene).columns
     expected = 0.2 * np.sin(2 * np.pi * 20.0 * waves["time"])
     np.testing.assert_allclose(waves["v_surface"], expected, rtol=0, atol=3e-7)
 
@@ -143,7 +143,7 @@ def test_own_waveforms_move_the_part_again(tmp_path: Path) -> None:
     from cosim.waveforms.storage import write_csv
 
     first = simulate(load("paper", ["circuit.model=ideal", "run.duration=0.2"]))
-    write_csv(tmp_path / "w.csv", first.waveforms, dict.fromkeys(first.waveforms, "s"))
+    write_csv(tmp_path / "w.csv", first.columns, dict.fromkeys(first.columns, "s"))
     text = (tmp_path / "w.csv").read_text().replace("v_surface [s]", "v_surface [m/s]")
     (tmp_path / "w.csv").write_text(text)
     again = simulate(
@@ -196,7 +196,7 @@ def test_command_writes_only_what_the_scene_has(name: str, tmp_path: Path) -> No
 
 def test_energies_against_a_fine_quadrature() -> None:
     result = simulate(load("quaid", ["run.duration=0.2", "run.output_step=1e-6"]))
-    w, summary = result.waveforms, result.summary
+    w, summary = result.columns, result.summary
     power_in = w["friction_force"] * w["v_surface"]
     lost = w["friction_force"] * (w["v_surface"] - w["v_part"])
     h = np.diff(w["time"])

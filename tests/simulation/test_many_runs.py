@@ -26,7 +26,7 @@ def resident() -> float:
 
 
 def run_all() -> list[np.ndarray]:
-    return [np.column_stack(list(simulate(scene).waveforms.values())) for scene in MIXED]
+    return [np.column_stack(list(simulate(scene).columns.values())) for scene in MIXED]
 
 
 @pytest.mark.parametrize("rounds", [10, pytest.param(125, marks=pytest.mark.slow)])

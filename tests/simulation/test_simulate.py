@@ -176,7 +176,7 @@ def test_summary_has_every_key(run: Run) -> None:
 def test_written_scene_repeats_the_run(
     name: str, runs: dict[str, Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cosim.waveforms.figure.draw", lambda result, path: None)
+    monkeypatch.setattr("cosim.files.picture.Picture.savefig", lambda *_, **__: None)
     again = cosim_run(tmp_path, str(runs[name].folder / "scene.toml"))
     for file in ("waveforms.csv", "waveforms.nc", "scene.toml"):
         assert (again.folder / file).read_bytes() == (runs[name].folder / file).read_bytes(), file
@@ -309,8 +309,8 @@ def test_undriven_part_hangs_still(runs: dict[str, Run]) -> None:
 def test_both_fmi_versions_agree(name: str) -> None:
     scene = load(name, ["run.duration=0.12"])
     second, third = (simulate(scene, fmi_version=version) for version in (2, 3))
-    for name, values in third.waveforms.items():
-        np.testing.assert_allclose(second.waveforms[name], values, rtol=1e-12, atol=1e-12)
+    for name, values in third.columns.items():
+        np.testing.assert_allclose(second.columns[name], values, rtol=1e-12, atol=1e-12)
     assert second.summary["v_average"] == pytest.approx(third.summary["v_average"], rel=1e-12)
 
 
@@ -326,10 +326,10 @@ def test_two_coils_on_two_surfaces_are_one_twice() -> None:
     # The circuits' steps differ, and what ngspice has lies between them: 2e-3 from finer runs.
     within = {"current": 3e-3, "coil_voltage": 3e-3}
     for name in ("current", "coil_voltage", "z_surface", "z_ram", "z_part", "friction_force"):
-        scale = np.abs(one.waveforms[name]).max()
+        scale = np.abs(one.columns[name]).max()
         np.testing.assert_allclose(
-            two.waveforms[name] / scale,
-            one.waveforms[name] / scale,
+            two.columns[name] / scale,
+            one.columns[name] / scale,
             rtol=0,
             atol=within.get(name, 1e-3),
         )
@@ -363,7 +363,7 @@ def test_energy_balances_with_other_coils_and_commands(
 
 def test_sine_command() -> None:
     scene = load("paper", ["run.duration=0.12", "drive.waveform=sine", "drive.amplitude=6"])
-    waves = simulate(scene).waveforms
+    waves = simulate(scene).columns
     time = waves["time"][1:]
     expected = -1.2 + 3.0 * np.sin(2 * np.pi * 20 * time)
     np.testing.assert_allclose(waves["command"][1:], expected, rtol=0, atol=1e-5)
@@ -373,7 +373,7 @@ def test_sine_command() -> None:
 
 def test_square_command() -> None:
     changes = ["run.duration=0.12", "drive.waveform=square", "drive.amplitude=4"]
-    waves = simulate(load("paper", changes)).waveforms
+    waves = simulate(load("paper", changes)).columns
     phase = waves["time"] * 20 % 1
     near = np.minimum(phase, np.minimum(np.abs(phase - 0.5), 1 - phase)) < 0.02
     expected = np.where(phase < 0.5, 0.8, -3.2)
@@ -399,8 +399,8 @@ def test_macro_steps_end_with_the_run(method: str) -> None:
     overrides = ["drive.frequency=33", "run.duration=0.3", "run.output_step=1e-3"]
     overrides += [f"coupling.method={method}", "coupling.macro_step=2e-4"]
     result = simulate(load("paper", [*overrides, "circuit.reltol=1e-3", "circuit.max_step=1e-4"]))
-    assert result.waveforms["time"][-1] == pytest.approx(0.3)
-    assert len(result.waveforms["time"]) == 301
+    assert result.columns["time"][-1] == pytest.approx(0.3)
+    assert len(result.columns["time"]) == 301
 
 
 def test_progress_goes_from_start_to_end() -> None:

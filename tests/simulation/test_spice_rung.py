@@ -113,7 +113,7 @@ def solve(scene: Scene, times: Array) -> Solution:
 def test_current_and_output(changes: list[str]) -> None:
     scene = load("paper", LOCKED + FINE + FLYBACKS + changes)
     result = simulate(scene)
-    waves = result.waveforms
+    waves = result.columns
     expected = solve(scene, waves["time"])
     coil, circuit = scene.coil, scene.circuit
     reach = scene.drive.amplitude / circuit.sense_resistance
@@ -132,7 +132,7 @@ def test_current_and_output(changes: list[str]) -> None:
 def test_the_paper_rig_saturates_and_rings() -> None:
     """What the comparison above is about: a clamped flyback, then the loop's own oscillation."""
     scene = load("paper", LOCKED + FINE + FLYBACKS)
-    waves = simulate(scene).waveforms
+    waves = simulate(scene).columns
     time, current = waves["time"], waves["current"]
     output = waves["coil_voltage"] + scene.circuit.sense_resistance * current
     fall = (time > 0.00401) & (time < 0.00408)
@@ -157,7 +157,7 @@ def test_coil_voltage_is_that_of_the_coil(model: str, bl: str) -> None:
     if model == "amplifier":
         changes.append("circuit.max_step=1e-6")
     scene = load("paper", [f"circuit.model={model}", bl, *changes])
-    waves = simulate(scene).waveforms
+    waves = simulate(scene).columns
     rows = waves["time"] >= 1e-3
     time, voltage, current, emf = (
         waves[name][rows] for name in ("time", "coil_voltage", "current", "back_emf")

@@ -20,7 +20,7 @@ RECORDED = Path(__file__).parents[2] / "results" / "bench.json"
 def test_reference_is_met_by_the_rungs() -> None:
     for circuit, allowed in (("amplifier", 3e-4), ("ideal", 1e-6)):
         found = simulate(truth.brief(f"circuit.model={circuit}"))
-        assert truth.error(truth.heights(found.waveforms), circuit) < allowed
+        assert truth.error(truth.heights(found.columns), circuit) < allowed
 
 
 def test_peers_solve_the_same_problem() -> None:
@@ -28,7 +28,7 @@ def test_peers_solve_the_same_problem() -> None:
     times = truth.times()
     netlist = truth.brief("circuit.reltol=1e-8", "circuit.max_step=1e-4")
     assert truth.error(ngspice_alone.run(netlist, times)[1]) < 3e-4
-    found = simulate(truth.brief()).waveforms
+    found = simulate(truth.brief()).columns
     rest = [found["z_surface"][0], found["z_ram"][0]]
     assert truth.error(lsoda.run(truth.brief(), times, rest, 1e-6)[1]) < 3e-5
     seconds, path = naive.run(truth.brief("circuit.max_step=1e-5"), times, 1)

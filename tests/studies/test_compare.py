@@ -26,7 +26,7 @@ def write_trial(path: Path, time: np.ndarray, surface: np.ndarray, part: np.ndar
 
 def test_a_run_compared_with_itself_through_the_camera(tmp_path: Path) -> None:
     scene = load("ideal-current", ["run.duration=0.8", "run.settle=0.3"])
-    waves = simulate(scene).waveforms
+    waves = simulate(scene).columns
     frames = through_camera(waves, 0.3125, 300)
     write_trial(tmp_path / "own.csv", frames.time, frames.z_surface, frames.z_part)
     metrics, simulated, measured = compare(waves, read(tmp_path / "own.csv"), 0.3, 0.05)
@@ -42,7 +42,7 @@ def test_a_run_compared_with_itself_through_the_camera(tmp_path: Path) -> None:
 
 def test_metrics_of_a_known_difference(tmp_path: Path) -> None:
     scene = load("ideal-current", ["run.duration=0.8", "run.settle=0.3"])
-    waves = simulate(scene).waveforms
+    waves = simulate(scene).columns
     frames = through_camera(waves, 0.3, 300)
     slower = frames.z_part - 2e-3 * frames.time  # drifts 2 mm/s less
     write_trial(tmp_path / "own.csv", frames.time, frames.z_surface, slower)

@@ -34,7 +34,7 @@ def test_back_emf_is_turned_alone() -> None:
         "paper-limited", [*QUICK, "drive.waveform=sine", "circuit.supply=100", "coil.count=2"]
     )
     less = changed(base, BY_NAME["back-EMF"].turned(base, 0.25), "test")
-    own, other = simulate(base).waveforms, simulate(less).waveforms
+    own, other = simulate(base).columns, simulate(less).columns
     np.testing.assert_allclose(other["z_ram"], own["z_ram"], rtol=0, atol=1e-12)
     np.testing.assert_allclose(other["current"], 4.0 * own["current"], rtol=1e-9, atol=1e-12)
     gone = own["coil_voltage"] - other["coil_voltage"]

@@ -16,8 +16,9 @@ from statistics import mean, stdev
 import numpy as np
 
 from cosim.scene import load
-from cosim.simulation.simulate import Result, simulate
+from cosim.simulation.simulate import simulate
 from cosim.studies.study import Row, write
+from cosim.waveforms.result import Result
 
 CHAOTIC = 1e4
 """Growth of a small difference from which on single paths are not compared."""
@@ -64,7 +65,7 @@ def solved(scene: Sequence[str], more: Sequence[str], change: float = 0.0) -> Re
 
 def growth(scene: Sequence[str], more: Sequence[str] = ()) -> float:
     """How many times a small relative change of the normal force is found again in the path."""
-    path, nudged = (solved(scene, more, c).waveforms["z_part"] for c in (0.0, NUDGE))
+    path, nudged = (solved(scene, more, c).columns["z_part"] for c in (0.0, NUDGE))
     return float(np.abs(nudged - path).max() / np.ptp(path)) / NUDGE
 
 

@@ -87,7 +87,7 @@ def _processor() -> str:
 
 def _made_up(number: int) -> Trial:
     scene = load("ideal-current", ["run.duration=0.8", "run.settle=0.4"])
-    frames = through_camera(simulate(scene).waveforms, 0.4 + 0.003 * number, FRAMES)
+    frames = through_camera(simulate(scene).columns, 0.4 + 0.003 * number, FRAMES)
     nothing = np.full(FRAMES, np.nan)
     surface = Track(frames.z_surface, frames.v_surface, nothing, nothing)
     part = Track(frames.z_part, frames.v_part, nothing, nothing)

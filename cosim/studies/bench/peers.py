@@ -22,8 +22,8 @@ def compare(rounds: int) -> dict[str, Any]:
     """Spread of each peer's time over ours, with the errors of both."""
     ours = brief()
     found = simulate(ours)
-    wanted = error(heights(found.waveforms))
-    rest = [found.waveforms[name][0] for name in ("z_surface", "z_ram")]
+    wanted = error(heights(found.columns))
+    rest = [found.columns[name][0] for name in ("z_surface", "z_ram")]
 
     def all_in_ngspice(reltol: float) -> Peer:
         scene = brief(f"circuit.reltol={reltol}", "circuit.max_step=1e-4")

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from cosim.scene import Scene, load
-from cosim.scene.tables import CIRCUIT_KEYS
-from cosim.simulation.given_surface import force_per_mass
+from cosim.simulation.rungs.given_surface import force_per_mass
 from cosim.simulation.simulate import simulate
 from cosim.studies import paper as theory
 from cosim.studies.bench.sampling import spread, take_turns
@@ -34,11 +33,12 @@ def real_time(rounds: int) -> dict[str, Any]:
         "full": (load("paper-full", BRIEF_FULL), _error_of_full),
         "amplifier": (load("paper"), lambda: _error("amplifier", "amplifier")),
         "ideal": (load("paper", ["circuit.model=ideal"]), lambda: _error("ideal", "ideal")),
+        "limited": (
+            load("paper", ["circuit.model=limited"]),
+            lambda: _error("limited", "amplifier"),
+        ),
         "part": (load("optimal", _LONG_PART), _error_of_part),
     }
-    if _has("limited"):
-        scene = load("paper", ["circuit.model=limited"])
-        cases["limited"] = (scene, lambda: _error("limited", "amplifier"))
     calls = {name: partial(simulate, scene) for name, (scene, _) in cases.items()}
     taken = take_turns(calls, rounds)
     return {
@@ -63,18 +63,14 @@ def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
     return {**spread([float(value) for value in found]), "periods": list(periods)}
 
 
-def _has(model: str) -> bool:
-    return model in CIRCUIT_KEYS
-
-
 def _error(circuit: str, reference: str) -> float:
     found = simulate(brief(f"circuit.model={circuit}"))
-    return error(heights(found.waveforms), reference)
+    return error(heights(found.columns), reference)
 
 
 def _error_of_full() -> float:
     path, finer = (
-        simulate(load("paper-full", [*BRIEF_FULL, *more])).waveforms["z_part"]
+        simulate(load("paper-full", [*BRIEF_FULL, *more])).columns["z_part"]
         for more in ((), _FINER)
     )
     return float(np.abs(path - finer).max() / np.ptp(finer))

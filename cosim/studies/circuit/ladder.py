@@ -67,7 +67,7 @@ def cheapest(rungs: list[Rung], tolerance: float) -> Rung:
 
 
 def _on(scene: Scene, model: str) -> Scene:
-    if scene.circuit.model in ("none", "file"):
+    if not scene.rung.on_ladder:
         raise BadInput(
             f'scene {scene.name}: circuit.model = "{scene.circuit.model}" is no rung of the '
             f"ladder; it must be one of {', '.join(RUNGS)} or auto."

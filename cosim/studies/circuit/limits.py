@@ -248,7 +248,7 @@ def study(
 
 def prepared(scene: Scene) -> Scene:
     """The scene on the rung "amplifier", its knobs resolved into volts and hertz."""
-    if scene.circuit.model in ("none", "file"):
+    if not scene.rung.on_ladder:
         raise BadInput(
             f'scene {scene.name}: circuit.model = "{scene.circuit.model}" has no limits to lift; '
             'it must be "full", "amplifier", "limited", "ideal" or "auto".'
@@ -271,7 +271,7 @@ def needed_acceleration(scene: Scene) -> float:
 def contact(base: Scene) -> Contact:
     """The wall's part in the peak: a Hunt-Crossley wall has one, a rigid wall has no number."""
     result = simulate(base)
-    waves, summary = result.waveforms, result.summary
+    waves, summary = result.columns, result.summary
     apart = np.abs(waves["z_ram"] - waves["z_surface"]) < base.mechanics.travel
     counted = apart & (waves["time"] >= base.run.settle)
     peak = summary["a_surface_min"]

@@ -17,7 +17,7 @@ from cosim.errors import BadInput
 from cosim.files.atomic import whole
 from cosim.scene import Scene, load
 from cosim.scene.messages import plain
-from cosim.simulation.given_surface import knots
+from cosim.simulation.rungs.given_surface import knots
 from cosim.simulation.simulate import simulate
 from cosim.trials.published import FRAME_RATE
 from cosim.trials.tracked import Trial, read
@@ -282,7 +282,7 @@ def _waveforms(
         if scene.drive.waveform == "file":
             longer = {"duration": float(knots(scene)[0][-1]), "settle": 0.0}
         scene = scene.model_copy(update={"run": scene.run.model_copy(update=longer)})
-        waveforms = simulate(scene).waveforms
+        waveforms = simulate(scene).columns
     elif overrides:
         raise BadInput(f"--set cannot change {plain(source)}, which is a finished run.")
     else:

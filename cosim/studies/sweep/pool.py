@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
-from cosim.scene import WITHOUT_NGSPICE, Scene
+from cosim.scene import Scene
 from cosim.studies.sweep.point import Number, Outcome, evaluate
 from cosim.toolchain.isolation import PATIENCE, how_it_ended
 
@@ -189,7 +189,7 @@ def _send(pipe: Connection, message: Any) -> None:
 
 
 def _library_spoilt(base: Scene) -> bool:
-    if base.circuit.model == "file" or base.circuit.model in WITHOUT_NGSPICE:
+    if base.rung.own_netlist or not base.rung.ngspice:
         return False
     from cosim.circuit.ngspice import spoilt
 

@@ -11,12 +11,12 @@ import xarray as xr
 
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene
-from cosim.simulation.simulate import versions
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.design import Design
 from cosim.studies.sweep.journal import Journal
 from cosim.studies.sweep.point import Outcome
 from cosim.studies.sweep.pool import Point, Pool, workers_asked
+from cosim.toolchain.versions import versions
 
 JOURNAL = "sweep.journal"
 RESULT = "sweep.nc"

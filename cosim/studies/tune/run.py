@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import BadInput, SimulationFailed
-from cosim.scene import WITHOUT_NGSPICE, Scene, changed
+from cosim.scene import Scene, changed
 from cosim.studies.sweep.design import FREQUENCIES, numeric_key
 from cosim.studies.sweep.point import Number, Outcome, periods_made_whole
 from cosim.studies.sweep.pool import Pool, workers_asked
@@ -159,7 +159,7 @@ def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, 
 
 def _simplified(scene: Scene) -> Scene | None:
     """The scene without ngspice; None where it is so already, or cannot be."""
-    if scene.circuit.model == "file" or scene.circuit.model in WITHOUT_NGSPICE:
+    if scene.rung.own_netlist or not scene.rung.ngspice:
         return None
     try:
         return changed(scene, {"circuit.model": "limited", "drive.pwm_ripple": False}, "tune")

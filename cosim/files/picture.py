@@ -1,0 +1,33 @@
+"""Figures that need neither pyplot nor a screen."""
+
+from io import BytesIO
+from pathlib import Path
+from typing import Literal
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from cosim.files.atomic import whole
+
+
+class Picture(Figure):
+    """A matplotlib figure of ``width`` × ``height`` inches, which a notebook shows by itself."""
+
+    def __init__(
+        self, width: float, height: float, layout: Literal["constrained"] | None = None
+    ) -> None:
+        super().__init__(figsize=(width, height), dpi=110, layout=layout)
+        FigureCanvasAgg(self)
+
+    def write(self, path: Path) -> None:
+        """Write the figure as a PNG, whole or not at all. Raises BadInput."""
+        with whole(path) as temporary:
+            self.savefig(temporary, format="png")
+
+    def png(self) -> bytes:
+        """The figure as a PNG."""
+        content = BytesIO()
+        self.savefig(content, format="png")
+        return content.getvalue()
+
+    _repr_png_ = png

@@ -1,0 +1,100 @@
+"""The rungs: each value of ``circuit.model``, declared once.
+
+What a rung computes is in ``cosim/simulation``; what scenes, messages and reports need to know of
+it is here.
+"""
+
+from dataclasses import dataclass
+
+_SOLVER = frozenset({"reltol", "max_step"})
+_SUPPLY = frozenset({"supply", "sense_resistance"})
+_SWING = frozenset({"swing_loss_high", "swing_loss_low"})
+_LIMIT = frozenset({"current_limit"})
+_DYNAMICS = frozenset(
+    {
+        "gain_bandwidth", "open_loop_gain", "slew_rate", "output_resistance", "snubber_resistance",
+        "snubber_capacitance",
+    }
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One value of ``circuit.model``."""
+
+    name: str
+    text: str
+    keys: frozenset[str]
+    """The keys of ``[circuit]`` that act, besides ``model``."""
+    ngspice: bool = False
+    """Whether ngspice solves the circuit and leads the coupling."""
+    driven: bool = True
+    """Whether a command drives a coil; else ``[drive]`` can only give the surface's velocity."""
+    source_in_fmu: bool = False
+    """Whether the FMU solves the current source together with the mechanics."""
+    firmware: bool = False
+    """Whether the circuit has the DAC and the offset pin of the device's firmware."""
+    automatic: bool = False
+    """Whether the run takes another rung, the cheapest that suffices."""
+
+    @property
+    def own_netlist(self) -> bool:
+        """Whether the user gives the netlist."""
+        return "netlist" in self.keys
+
+    @property
+    def has_limits(self) -> bool:
+        """Whether the output of the amplifier is limited by its supply."""
+        return "supply" in self.keys
+
+    @property
+    def on_ladder(self) -> bool:
+        """Whether it models the device's amplifier, and other rungs do the same."""
+        return self.driven and not self.own_netlist
+
+    @property
+    def two_surfaces(self) -> bool:
+        """Whether two surfaces can move independently, which needs the coils in the FMU alone."""
+        return self.driven and not self.ngspice
+
+
+RUNGS: dict[str, Rung] = {
+    rung.name: rung
+    for rung in (
+        Rung(
+            "full",
+            "schematic with its difference amplifier",
+            _SOLVER | _SUPPLY | _LIMIT | _DYNAMICS,
+            ngspice=True,
+            firmware=True,
+        ),
+        Rung(
+            "amplifier",
+            "behavioural current source",
+            _SOLVER | _SUPPLY | _SWING | _DYNAMICS,
+            ngspice=True,
+        ),
+        Rung(
+            "limited",
+            "current source reduced to its limits and the coil",
+            _SUPPLY | _SWING | _LIMIT,
+            source_in_fmu=True,
+        ),
+        Rung("ideal", "current = command", frozenset({"sense_resistance"})),
+        Rung(
+            "auto",
+            "cheapest of amplifier, limited and ideal within run.tolerance",
+            _SOLVER | _SUPPLY | _SWING | _LIMIT | _DYNAMICS,
+            ngspice=True,
+            automatic=True,
+        ),
+        Rung("none", "no coil", frozenset(), driven=False),
+        Rung(
+            "file",
+            "netlist named in circuit.netlist",
+            _SOLVER | _SUPPLY | _SWING | _LIMIT | _DYNAMICS | {"netlist"},
+            ngspice=True,
+        ),
+    )
+}
+"""Every rung by its name; the order is that in which messages list them."""

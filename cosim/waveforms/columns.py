@@ -1,0 +1,42 @@
+"""The columns of the waveforms: the one place where each is named and described."""
+
+from typing import NamedTuple
+
+
+class Column(NamedTuple):
+    """What a column holds: its SI unit, and its name in words."""
+
+    unit: str
+    long_name: str
+
+
+_FIRST = {
+    "time": Column("s", "time"),
+    "command": Column("V", "command voltage V1"),
+    "current": Column("A", "current of one coil"),
+    "coil_voltage": Column("V", "voltage of the coil"),
+    "back_emf": Column("V", "back-EMF of the coil"),
+    "z_surface": Column("m", "height of the surface"),
+    "v_surface": Column("m/s", "velocity of the surface"),
+    "a_surface": Column("m/s2", "acceleration of the surface"),
+    "z_ram": Column("m", "height of the ram"),
+    "v_ram": Column("m/s", "velocity of the ram"),
+    "z_part": Column("m", "height of the part"),
+    "v_part": Column("m/s", "velocity of the part"),
+    "friction_force": Column("N", "friction force of the surface on the part"),
+    "sticking": Column("1", "whether the part sticks to the surface"),
+    "normal_force": Column("N", "normal force of the surface on the part"),
+}
+
+_SECOND = (
+    "command", "current", "coil_voltage", "back_emf", "z_surface", "v_surface", "a_surface",
+    "z_ram", "v_ram", "friction_force", "sticking",
+)  # fmt: skip
+
+COLUMNS: dict[str, Column] = _FIRST | {
+    f"{name}_2": Column(_FIRST[name].unit, f"{_FIRST[name].long_name}, second surface")
+    for name in _SECOND
+}
+"""Every column by its name, in the order of the files. Absent participants have none."""
+
+UNITS = {name: column.unit for name, column in COLUMNS.items()}

@@ -1,0 +1,89 @@
+"""A finished run: its waveforms, its summary, its figure and its files."""
+
+import json
+import os
+from base64 import b64encode
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.files.atomic import write_text
+from cosim.scene import Scene, to_toml
+from cosim.waveforms.columns import COLUMNS, UNITS
+from cosim.waveforms.report import table
+from cosim.waveforms.storage import write_csv, write_netcdf
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from cosim.files.picture import Picture
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A finished run.
+
+    ``columns`` are the waveforms as arrays of equal length, SI, by the names of
+    :data:`cosim.waveforms.columns.COLUMNS`; those of a long run are mapped from a file that goes
+    with them. ``summary`` holds the numbers of the run, SI. ``scene`` is what was run, in which the
+    choices of ``"auto"`` are made.
+    """
+
+    scene: Scene
+    columns: dict[str, Array]
+    summary: dict[str, Any]
+
+    @cached_property
+    def waveforms(self) -> "xr.Dataset":
+        """The columns over the dimension ``time``, s; each with ``units`` and ``long_name``."""
+        import xarray as xr
+
+        variables = {
+            name: (
+                "time",
+                values,
+                {"units": COLUMNS[name].unit, "long_name": COLUMNS[name].long_name},
+            )
+            for name, values in self.columns.items()
+        }
+        return xr.Dataset(variables, attrs=self._attributes())
+
+    def plot(self) -> "Picture":
+        """The figure of the run, as ``figure.png`` shows it."""
+        from cosim.waveforms import figure
+
+        return figure.draw(self.scene, self.columns, self.summary)
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Write what ``cosim run`` writes: ``waveforms.csv``, ``waveforms.nc``, ``scene.toml``,
+        ``summary.json`` and ``figure.png``, each whole or not at all.
+
+        Raises BadInput where the folder cannot be written to.
+        """
+        out = Path(folder)
+        write_csv(out / "waveforms.csv", self.columns, UNITS)
+        write_netcdf(out / "waveforms.nc", self.columns, UNITS, self._attributes())
+        write_text(out / "scene.toml", to_toml(self.scene))
+        write_text(out / "summary.json", json.dumps(self.summary, indent=2, allow_nan=False) + "\n")
+        self.plot().write(out / "figure.png")
+
+    def _attributes(self) -> dict[str, str]:
+        return {"title": self.scene.description or self.scene.name, "scene": to_toml(self.scene)}
+
+    def __repr__(self) -> str:
+        return f"{self.scene.name}: {len(self.columns['time'])} rows of {', '.join(self.columns)}"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the figure, and the table that ``cosim run`` prints."""
+        image = b64encode(self.plot().png()).decode()
+        return (
+            f'<img src="data:image/png;base64,{image}">'
+            f"<pre>{escape(table(self.scene, self.summary))}</pre>"
+        )
