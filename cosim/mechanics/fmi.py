@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import fmpy
 from fmpy import fmi2, fmi3
 
+from cosim.errors import BadInput
 from cosim.mechanics.package import MODEL, token, unpacked
 
 
@@ -81,13 +82,14 @@ def _addresses(fmu: Any, *functions: str) -> dict[str, int]:
     return {"instance": fmu.component, **dict(zip(names, found, strict=True))}
 
 
-def _arguments(version: int) -> dict[str, Any]:
-    return {
-        "instanceName": "cosim",
-        "guid": token(),
-        "modelIdentifier": MODEL,
-        "unzipDirectory": str(unpacked(version)),
-    }
+def _loaded(kind: Any, version: int) -> Any:
+    folder = str(unpacked(version))
+    try:
+        return kind(
+            instanceName="cosim", guid=token(), modelIdentifier=MODEL, unzipDirectory=folder
+        )
+    except Exception as error:
+        raise BadInput(f"The FMU in {folder} cannot be loaded: {error}") from error
 
 
 class _Places:
@@ -107,7 +109,7 @@ class Fmi2(_Places):
     def __init__(self) -> None:
         self.messages: list[str] = []
         self._running = False
-        self._fmu = fmi2.FMU2Slave(**_arguments(2))
+        self._fmu = _loaded(fmi2.FMU2Slave, 2)
         self._logger = _LOGGER_2(lambda *a: self.messages.append(_text(a[4])))
         callbacks = fmi2.fmi2CallbackFunctions()
         callbacks.logger = self._logger
@@ -177,7 +179,7 @@ class Fmi3(_Places):
     def __init__(self) -> None:
         self.messages: list[str] = []
         self._running = False
-        self._fmu = fmi3.FMU3Slave(**_arguments(3))
+        self._fmu = _loaded(fmi3.FMU3Slave, 3)
         self._logger = fmi3.fmi3LogMessageCallback(lambda *a: self.messages.append(_text(a[3])))
         self._fmu.instantiate(logMessage=self._logger)
         self._fmu.enterInitializationMode()

@@ -138,24 +138,23 @@ def test_scenes_without_a_circuit_need_no_ngspice(tmp_path: Path) -> None:
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """A copy of the checkout without anything built; Python run in it imports the copy."""
+    """A copy of the checkout that a test may spoil; Python run in it imports the copy."""
     root = Path(cosim.__file__).parents[1]
     if not (root / "fmu" / "src").is_dir():
         pytest.skip("cosim does not run from a checkout")
     folder = tmp_path / "copy"
     for name in ("cosim", "fmu", "circuits"):
-        leave_out = shutil.ignore_patterns("build", "__pycache__")
+        leave_out = shutil.ignore_patterns("__pycache__")
         shutil.copytree(root / name, folder / name, ignore=leave_out)
-    shutil.copy(root / "LICENSE", folder)
     return folder
 
 
-def test_missing_compiler(copy: Path) -> None:
-    done = command("run", "held", *QUICK, "--out", "out", cwd=copy, CC="/nonexistent/cc")
-    assert "/nonexistent/cc cannot be run" in complaint(done)
+@pytest.mark.parametrize("gone", ["fmi3", "fmi3/binaries"])
+def test_incomplete_installation(copy: Path, gone: str) -> None:
+    shutil.rmtree(copy / "cosim" / "_compiled" / gone)
+    done = command("run", "held", *QUICK, "--out", "out", cwd=copy)
+    assert re.search("is missing from this installation|cannot be loaded", complaint(done))
     assert not (copy / "out").exists()
-    build = copy / "fmu" / "build"
-    assert not build.exists() or not list(build.iterdir())
 
 
 def test_broken_netlist(copy: Path) -> None:

@@ -3,16 +3,19 @@
 from argparse import ArgumentParser, Namespace
 
 from cosim.cli.command import Command, add_commands
+from cosim.cli.options import add_out, writable
 
 
 def _build_options(parser: ArgumentParser) -> None:
-    parser.add_argument("--force", action="store_true", help="build even if they are up to date")
+    add_out(parser, "results/fmu")
 
 
 def _build(arguments: Namespace) -> None:
     from cosim.mechanics import package
 
-    for path in package.build(force=arguments.force).values():
+    with writable(arguments.out):
+        paths = package.pack(arguments.out)
+    for path in paths.values():
         print(path)
 
 
@@ -23,7 +26,7 @@ def _check(arguments: Namespace) -> int:
 
 
 _ACTIONS = (
-    Command("build", "build stickslip-fmi2.fmu and stickslip-fmi3.fmu", _build, _build_options),
+    Command("build", "write stickslip-fmi2.fmu and stickslip-fmi3.fmu", _build, _build_options),
     Command("check", "validate the FMU files and run them", _check),
 )
 
@@ -32,4 +35,4 @@ def _options(parser: ArgumentParser) -> None:
     add_commands(parser, "build|check", _ACTIONS)
 
 
-COMMAND = Command("fmu", "build or check the FMU files of the mechanics", options=_options)
+COMMAND = Command("fmu", "write or check the FMU files of the mechanics", options=_options)

@@ -53,7 +53,7 @@ def table(numbers: dict[str, Any]) -> str:
         lines += [f"  {name.partition('.')[2]:<10}{_numbers(found)}" for name, found in entries]
     lines.append(f"{_TITLES['part']}:\n  {'':<10}{numbers['part']['ratio']:.4g}")
     count = numbers["instructions_per_period"]
-    told = f"{count:,}" if count else "not counted: valgrind and a C compiler are needed"
+    told = f"{count:,}" if count else "not counted: valgrind is needed"
     lines.append(f"{_TITLES['instructions_per_period']}:\n  {'':<10}{told}")
     return "\n".join(lines)
 

@@ -6,9 +6,9 @@ from statistics import median
 import numpy as np
 
 from cosim.mechanics import part
+from cosim.mechanics.part import part_library
 from cosim.studies.bench.sampling import ratios, take_turns
 from cosim.studies.fit.cases import Case, Solver
-from cosim.toolchain.libraries import part_library
 from cosim.trials import published
 
 SOLVERS: tuple[Solver, Solver] = ("exact", "published")

@@ -40,10 +40,6 @@ class Pool:
     """Runs points of one scene in ``workers`` processes; to be used in a ``with`` block."""
 
     def __init__(self, base: Scene, workers: int, whole_periods: bool = False) -> None:
-        from cosim.mechanics import package as fmu
-
-        # Once, before many processes would do it at the same time.
-        fmu.unpacked(3)
         self._base, self._whole_periods = base, whole_periods
         self._count = workers
         self._workers: list[_Worker] = []
