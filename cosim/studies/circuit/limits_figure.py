@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from cosim.studies.circuit.limits import Study, name_of
+from cosim.studies.plots import save
 
 COLORS = {
     "binds": "#d1495b", "acts a little": "#e9a03b", "does not matter": "#8d99ae",
@@ -32,7 +32,6 @@ def draw(studies: Sequence[Study], path: Path) -> None:
     """Draw the studies, the turned limits of the first one, into ``path`` (a PNG)."""
     turned = bool(studies[0].turned)
     figure = Figure(figsize=(13.0, 9.0 if turned else 4.6), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
     rows: Any = figure.subfigures(2 if turned else 1, 1, squeeze=False)[:, 0]
     order = studies[0].ranked()[::-1]
     columns = np.atleast_1d(rows[0].subplots(1, len(studies), sharey=True))
@@ -55,7 +54,7 @@ def draw(studies: Sequence[Study], path: Path) -> None:
         middle.set_ylabel("surface's peak downward acceleration [m/s²]")
         middle.set_title("The peak, impacts included", loc="left", fontsize=10)
         _peaks(right, studies)
-    figure.savefig(path, format="png")
+    save(figure, path)
 
 
 def _bars(axis: Any, study: Study, order: Sequence[str]) -> None:
