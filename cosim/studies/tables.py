@@ -3,7 +3,7 @@
 import csv
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from math import isfinite
 from pathlib import Path
@@ -73,6 +73,11 @@ def brief(number: float) -> str:
     if not isfinite(number):
         return "-"
     return f"{number:.0f}" if 10.0 <= abs(number) < 1e5 else f"{number:.2g}"
+
+
+def span(numbers: Collection[float]) -> str:
+    """Least and greatest, in words; one number where they are the same."""
+    return " to ".join(dict.fromkeys((brief(min(numbers)), brief(max(numbers)))))
 
 
 def _short(cell: Any) -> str:

@@ -28,7 +28,7 @@ from cosim.simulation.peers.lsoda import run as run_machine
 from cosim.studies.accuracy.cases import CASES
 from cosim.studies.accuracy.figures import CREEP, ERROR, draw_friction
 from cosim.studies.accuracy.runs import reference
-from cosim.studies.tables import Row, brief, write_csv, write_page
+from cosim.studies.tables import Row, span, write_csv, write_page
 
 FREQUENCY, ACCELERATION, SLIP = 40.0, 15.0, 0.02
 """Of the surface, Hz and m/s²; of the surface against the part at first, m/s."""
@@ -59,7 +59,7 @@ def run(out: Path) -> str:
     errors = [row[ERROR] / exact[ERROR] for row in smoothed if isfinite(row[ERROR])]
     message = (
         "Every smoothed friction law lets a held part creep; set-valued friction does not, and is "
-        f"{brief(min(errors))} to {brief(max(errors))} times as accurate in the machine"
+        f"{span(errors)} times as accurate in the machine"
     )
     notes = [
         f"{message}.",

@@ -12,7 +12,7 @@ from cosim.studies.accuracy import chaos, figures
 from cosim.studies.accuracy.cases import CASES
 from cosim.studies.accuracy.runs import Run, reference
 from cosim.studies.accuracy.solvers import ALL_IN_NGSPICE, DEFAULT, LSODA, SOLVERS, Solver
-from cosim.studies.tables import Row, brief, write_page
+from cosim.studies.tables import Row, brief, span, write_page
 
 EQUAL_TIME, EQUAL_ERROR = 0.5, 1e-3
 """CPU seconds, and error over range, at which methods are compared."""
@@ -85,7 +85,7 @@ class Study:
         rough = [self.lead(scene) for scene in self.scenes if not CASES[scene].smooth]
         smooth = [self.lead(scene) for scene in self.scenes if CASES[scene].smooth]
         said = (
-            f"In equal time the default is {brief(min(rough))} to {brief(max(rough))} times as "
+            f"In equal time the default is {span(rough)} times as "
             "accurate as the best macro-step method where the part slips or strikes"
         )
         for lead in smooth:

@@ -227,10 +227,10 @@ of order 2 in a step that goes with the cube root of the tolerance."""
 
 _EVENT_AWARE = "EMF's slope, linear current"
 
-_ITERATED: dict[str, Make] = {
-    "Aitken": lambda a, b: Iterated(a, b, "aitken", tolerance=1e-9),
-    "Anderson": lambda a, b: Iterated(a, b, "anderson", tolerance=1e-9),
-}
+
+def _fixed(name: str, make: Make, order: int, events: bool = False) -> Solver:
+    return Solver(name, "macro steps", "macro step [s]", _macro(make, events), _steps, order)
+
 
 _IN_NGSPICE = {
     "jacobi": "Jacobi k = 1",
@@ -246,30 +246,14 @@ _OF_PEERS = "knows compliant walls and the sawtooth only"
 
 SOLVERS = (
     *(
-        Solver(name, "macro steps", "macro step [s]", _macro(make), _steps, ORDERS[name])
+        _fixed(name, make, ORDERS[name])
         for name, make in METHODS.items()
         if name != "iterated, plain"
     ),
-    Solver(
-        "event-aware",
-        "macro steps",
-        "macro step [s]",
-        _macro(METHODS[_EVENT_AWARE], True),
-        _steps,
-        ORDERS[_EVENT_AWARE],
-    ),
-    Solver(
-        "predictor-corrector",
-        "macro steps",
-        "macro step [s]",
-        _macro(PredictorCorrector),
-        _steps,
-        2,
-    ),
-    *(
-        Solver(f"iterated, {name}", "macro steps", "macro step [s]", _macro(make), _steps, 2)
-        for name, make in _ITERATED.items()
-    ),
+    _fixed("event-aware", METHODS[_EVENT_AWARE], ORDERS[_EVENT_AWARE], events=True),
+    _fixed("predictor-corrector", PredictorCorrector, 2),
+    _fixed("iterated, Aitken", lambda a, b: Iterated(a, b, "aitken", tolerance=1e-9), 2),
+    _fixed("iterated, Anderson", lambda a, b: Iterated(a, b, "anderson", tolerance=1e-9), 2),
     Solver("error-controlled", "macro steps", "tolerance", _controlled, _control),
     Solver("error-controlled, audited", "macro steps", "tolerance", _audited, _control),
     Solver(
@@ -308,10 +292,7 @@ SOLVERS = (
     ),
     Solver(
         ALL_IN_NGSPICE,
-        "peers",
-        "circuit.reltol",
-        _all_in_ngspice,
-        _peers_reltols,
+        *("peers", "circuit.reltol", _all_in_ngspice, _peers_reltols),
         limits=_OF_PEERS,
     ),
     Solver(LSODA, "peers", "tolerance", _solve_ivp, _peers_rtols, limits=_OF_PEERS),

@@ -7,7 +7,7 @@ from cosim.coupling.rewind.methods import ORDERS
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, End, label_ends, panels, save
 from cosim.studies.stability.machines import DIRECT
 from cosim.studies.stability.stability import LONGEST, METHODS, Limit
-from cosim.studies.tables import Row, brief, write_page
+from cosim.studies.tables import Row, span, write_page
 
 _COLORS = {1: ORANGE, 2: BLUE, 3: GREEN}
 """By the order of a method."""
@@ -33,7 +33,7 @@ def write(out: Path, limits: Sequence[Limit], clamped: Sequence[Row]) -> str:
         "radius of the coupled linear map, and observed by running it (with the FMU as the "
         "mechanics where the coil is in the circuit). The greatest difference between the two is "
         f"{worst:.1%}. Both are in stability.csv, over a strength of the coupling Bl²/(m R) of "
-        f"{brief(min(x.strength for x in swept))} to {brief(max(x.strength for x in swept))} 1/s.",
+        f"{span([x.strength for x in swept])} 1/s.",
         "An amplifier's limits add what no linear map knows: where its clamped output makes an "
         "unstable coupling, the growing oscillation ends as soon as the output leaves the limit, "
         "and what remains is bounded but false (last table; steady, it would be 1.26 A). In the "
