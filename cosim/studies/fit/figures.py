@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 
 from cosim.files.picture import Picture
 from cosim.mechanics.part import PartMotion
-from cosim.studies.figures import blank, save
 from cosim.studies.fit.cases import Case
 from cosim.studies.fit.search import Fit
 
@@ -21,10 +20,10 @@ DASHED = (0, (4, 1.2))
 
 def draw_all(results: "TrialResults", folder: Path) -> None:
     """Write every figure into a folder; a profile only where something was fitted."""
-    save(trials(results), folder / "fit-trials.png")
-    save(forces(results), folder / "fit-forces.png")
+    trials(results).write(folder / "fit-trials.png")
+    forces(results).write(folder / "fit-forces.png")
     if results.fit:
-        save(profile(results, results.fit), folder / "fit-profile.png")
+        profile(results, results.fit).write(folder / "fit-profile.png")
 
 
 def _words(result: dict[str, Any]) -> str:
@@ -37,7 +36,7 @@ def trials(results: "TrialResults") -> Picture:
     """Measured and simulated height of the part, and the surface's, a panel for each trial."""
     columns = min(2, len(results.cases))
     rows = math.ceil(len(results.cases) / columns)
-    figure = blank(13.0, 1.0 + 2.35 * rows)
+    figure = Picture(13.0, 1.0 + 2.35 * rows, "constrained")
     axes = figure.subplots(rows, columns, squeeze=False)
     result = results.numbers
     for axis, case, motion, row in zip(
@@ -84,7 +83,7 @@ def _trial(axis: Axes, case: Case, motion: PartMotion, row: dict[str, Any]) -> N
 def profile(results: "TrialResults", fit: Fit) -> Picture:
     """The mean error over µ_k, each normal force fitted anew, and the error of each trial."""
     result = results.numbers
-    figure = blank(9.0, 5.2)
+    figure = Picture(9.0, 5.2, "constrained")
     axis = figure.subplots()
     line, error = fit.profile()
     each = fit.errors[fit.at_best_plate]
@@ -109,7 +108,7 @@ def forces(results: "TrialResults") -> Picture:
     """Fitted against measured normal forces, trial by trial, with the bounds of the fit."""
     result = results.numbers
     rows = result["trials"]
-    figure = blank(8.0, 4.6)
+    figure = Picture(8.0, 4.6, "constrained")
     axis = figure.subplots()
     bounds: dict[str, Any] = {"color": SURFACE, "lw": 7.0, "alpha": 0.5}
     measured: dict[str, Any] = {"marker": "D", "ls": "", "mfc": "none", "color": MEASURED}
