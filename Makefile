@@ -3,6 +3,7 @@
 #   make run         sets up and runs the paper's scene (SCENE=name for another)
 #   make test        sets up and runs the quick tests   (ARGS='-k name' for some of them)
 #   make test-all    the slow ones too
+#   make fuzz        the random tests with new examples, many more (ARGS=--hypothesis-seed=N to repeat)
 #   make setup       sets up: system packages, .venv from the hashed lock, the compiled C
 #   make charts      remakes the README's figures and tables in results/, some minutes;
 #                    `make test` writes results/datasheet.*
@@ -34,7 +35,7 @@ SOURCES := $(sort $(shell find fmu/src fmu/include cosim -path cosim/_compiled -
 	-type f \( -name '*.[ch]' -o -name '*.def' \) -print)) build_c.py setup.py pyproject.toml LICENSE
 COMPILED := cosim/_compiled/build.json
 
-.PHONY: help run test test-all setup charts bench check lock clean FORCE
+.PHONY: help run test test-all fuzz setup charts bench check lock clean FORCE
 
 help:
 	@sed -n 's/^#  \( .*\)/\1/p' Makefile
@@ -47,6 +48,9 @@ test: setup
 
 test-all: setup
 	@$(PY) -m pytest $(ARGS)
+
+fuzz: setup
+	@$(PY) -m pytest -m hypothesis --hypothesis-profile=fuzz -o timeout=0 $(ARGS)
 
 setup: $(COMPILED)
 	@:

@@ -1,5 +1,7 @@
 """The errors that a user can cause or meet; each is told in one sentence, never as a traceback."""
 
+import json
+
 
 class CosimError(Exception):
     """An error told to the user in one sentence; ``exit_code`` ends the command."""
@@ -21,3 +23,10 @@ class SimulationFailed(CosimError):
     """The simulation could not be finished."""
 
     exit_code = 3
+
+
+def plain(text: str, limit: int = 200) -> str:
+    """A name or path as a sentence holds it: on one line, printable, not too long."""
+    text = json.dumps(text, ensure_ascii=False)[1:-1]
+    text = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+    return text if len(text) <= limit else text[:limit] + "…"

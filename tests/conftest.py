@@ -1,11 +1,21 @@
 """Settings and fixtures of all tests."""
 
 import json
+import os
+from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
 
 import build_c
 from cosim.toolchain.libraries import FOLDER
+
+# How long an example takes says something of the machine, not of the code.
+ANY_MACHINE = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("test", derandomize=True, database=None, **ANY_MACHINE)
+settings.register_profile("fuzz", max_examples=2000, print_blob=True, **ANY_MACHINE)
+settings.load_profile("test")  # `make fuzz` asks for the other
 
 
 def pytest_sessionstart() -> None:
@@ -16,3 +26,24 @@ def pytest_sessionstart() -> None:
         made_of = None
     if made_of != build_c.digest():
         pytest.exit("The C sources have changed since they were compiled: run `make setup`.", 2)
+
+
+@pytest.hookimpl(trylast=True)  # after Hypothesis has chosen the profile
+def pytest_configure() -> None:
+    # Hypothesis also tries the constants of all modules loaded so far: what it tries would depend
+    # on the tests that ran before.
+    if settings.get_current_profile_name() == "test":
+        providers._get_local_constants = lambda: providers._local_constants
+
+
+@pytest.fixture(scope="session")
+def trials() -> Path:
+    """The folder of the ten published trials, which belong to their authors.
+
+    Clone clyako/vertical-vibratory-transport-of-grasped-parts-using-impacts, and let the
+    environment variable COSIM_TRIALS name its folder matlab/data.
+    """
+    folder = os.environ.get("COSIM_TRIALS")
+    if not folder:
+        pytest.skip("COSIM_TRIALS names no folder with the published trials")
+    return Path(folder)

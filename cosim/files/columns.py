@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from cosim.errors import BadInput
-from cosim.scene.messages import plain
+from cosim.errors import BadInput, plain
 
 Array = npt.NDArray[np.float64]
 

@@ -74,15 +74,19 @@ static void emit(Output *out, double z, double v, double stuck)
 
 /* Exact: from event to event in closed form. A difference of velocities below what rounding can
    have made of zero (`noise`, a bound that grows with each piece and begins anew when the part
-   sticks) is zero, so that an event on a knot is not missed by a bit. */
+   sticks) is zero, so that an event on a knot is not missed by a bit. Times are known to
+   `resolution`: knots no farther apart are a jump, and a velocity that the forces give or take
+   within it (`least`) is zero, or an interval of 1e-309 s would decide whether the part slips. */
 EXPORT long part_exact(long knots, const double *time, const double *v_surface, long periods,
                        const double *law, double z, double v, long outputs, const double *at,
                        double *z_out, double *v_out, double *stuck_out)
 {
     const double period = time[knots - 1] - time[0], eps = DBL_EPSILON;
     const double forces = law[STATIC] + law[PLATE] + fabs(law[GRAVITY]);
+    const double resolution = eps * fmax(fabs(time[0]), fabs(time[knots - 1]));
+    const double least = forces * resolution;
     Output out = {at ? outputs : periods * knots, 0, at, z_out, v_out, stuck_out};
-    double stuck = 0.0, noise = 0.0;
+    double stuck = 0.0, noise = least;
     int sticks = -1; /* unknown yet */
     long events = 0;
 
@@ -96,7 +100,7 @@ EXPORT long part_exact(long knots, const double *time, const double *v_surface, 
             const double start = time[i - 1], length = time[i] - start;
             const double begin = v_surface[i - 1], end = v_surface[i];
             double left = length, done = 0.0, speed = begin;
-            if (length > 0) {
+            if (length > resolution) {
                 const double slope = (end - begin) / length;
                 const double late = eps * (fabs(start) + fabs(time[i])); /* rounding of times */
                 const double slack = 4 * eps * (forces + fabs(slope))
@@ -143,9 +147,11 @@ EXPORT long part_exact(long knots, const double *time, const double *v_surface, 
                     z += 0.5 * tau * (before + v);
                     stuck += sticks ? tau : 0.0;
                     if (sticks || meet)
-                        noise = 0.0;
+                        noise = least;
                     noise += here + 2 * eps * (fabs(before) + fabs(v)) + late * fabs(mode.a);
                 }
+            } else {
+                noise += forces * length;
             }
             if (!at)
                 emit(&out, z, v, stuck);

@@ -11,6 +11,7 @@ comparison; `published` is `threshold` as in the simulation of Yako, Nowak, Yuan
 """
 
 import ctypes
+import sys
 from dataclasses import dataclass
 from functools import cache
 
@@ -26,6 +27,7 @@ Real = npt.ArrayLike
 PUBLISHED_STEP = 1e-4  # s
 PUBLISHED_V_MIN = 1e-5  # m/s
 MOST_STEPS = 100_000_000
+EPSILON, LARGEST = sys.float_info.epsilon, sys.float_info.max
 
 _POINTER, _LONG, _REAL = ctypes.c_void_p, ctypes.c_long, ctypes.c_double
 _SURFACE = (_LONG, _POINTER, _POINTER, _LONG, _POINTER, _REAL, _REAL)
@@ -96,7 +98,7 @@ def exact(
     ``periods`` times, each following on the last.
 
     A needed friction that exceeds µ_s F_n by no more than the rounding of the knots counts as
-    equal to it.
+    equal to it. Knots whose times differ by no more than the rounding of the latest one are a jump.
     """
     case = _Case(time, v_surface, mu_s, mu_k, force_per_mass, gravity, mu_plate, v0, periods)
     at = None if output is None else case.times(output)
@@ -246,6 +248,9 @@ class _Case:
             raise BadInput("The surface's times and velocities must be finite.")
         if (self.time[1:] < self.time[:-1]).any() or not self.time[-1] > self.time[0]:
             raise BadInput("The times of the surface's knots must not decrease.")
+        least = EPSILON * float(np.abs(self.time[[0, -1]]).max())
+        if float(self.v.max()) - float(self.v.min()) > LARGEST * least:
+            raise BadInput("The surface's accelerations must be finite.")
         if periods < 1:
             raise BadInput(f"The knots are to be run through {periods} times, not once or more.")
         self.law = friction_law(mu_s, mu_k, force_per_mass, gravity, mu_plate)

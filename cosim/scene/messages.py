@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from cosim.errors import plain
 from cosim.scene.describe import Key, acts, keys
 from cosim.scene.methods import METHODS, CouplingMethod
 from cosim.scene.model import toml_value
@@ -28,11 +29,6 @@ def shown(value: object, limit: int = 60) -> str:
     return text if len(text) <= limit else text[: limit - 1] + "…"
 
 
-def plain(text: str, limit: int = 200) -> str:
-    """A name or path on one line, without the quotes of :func:`shown`."""
-    return shown(text, limit + 2).removeprefix('"').removesuffix('"')
-
-
 def suggestion(word: str, known: Iterable[str], what: str = "") -> str:
     """``; did you mean …?`` if something known looks like ``word``, else the empty string."""
     near = difflib.get_close_matches(word, list(known), n=1)
@@ -40,12 +36,12 @@ def suggestion(word: str, known: Iterable[str], what: str = "") -> str:
 
 
 def ended(sentence: str) -> str:
-    """The sentence with its final mark."""
+    """The sentence with a full stop, unless it is a question."""
     return sentence if sentence.endswith("?") else sentence + "."
 
 
 def unknown_table(name: str) -> str:
-    """A sentence on a table that no scene has, or a key that stands outside its table."""
+    """A sentence on an unknown table, or on a key outside its table."""
     holders = [key.full for key in keys() if key.name == name]
     hint = f"; did you mean {holders[0]}?" if holders else suggestion(name, TABLES)
     return f'there is no table "{plain(name)}"' + (hint or f" (tables: {', '.join(TABLES)})")

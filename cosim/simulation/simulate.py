@@ -18,7 +18,7 @@ from cosim.simulation.rungs.electrics import commanded
 from cosim.simulation.rungs.given_surface import simulate_part
 from cosim.simulation.rungs.rung import Driven, rungs
 from cosim.simulation.summary import summarise
-from cosim.toolchain.isolation import isolated
+from cosim.toolchain.processes import isolated
 from cosim.toolchain.versions import versions
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.result import Result

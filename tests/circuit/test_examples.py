@@ -1,7 +1,6 @@
 """The example netlists of circuits/examples against hand calculation."""
 
 import re
-import shutil
 import subprocess
 
 import numpy as np
@@ -9,12 +8,10 @@ import pytest
 
 from cosim.circuit.netlist import parameters
 from cosim.scene import load
-from tests.helpers.spice import CIRCUITS, LIBRARY, netlist, run, run_all
+from tests.helpers import needs
+from tests.helpers.spice import CIRCUITS, netlist, run, run_all
 
-pytestmark = [
-    pytest.mark.physics,
-    pytest.mark.skipif(LIBRARY is None, reason="the ngspice shared library is not installed"),
-]
+pytestmark = [pytest.mark.physics, needs.ngspice_library]
 
 EXAMPLES = sorted(path.stem for path in (CIRCUITS / "examples").glob("*.cir"))
 NAMES = re.findall(r"^\| `(\w+)` \|", (CIRCUITS / "README.md").read_text(encoding="utf-8"), re.M)
@@ -55,7 +52,7 @@ def test_contract(name):
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-@pytest.mark.skipif(not shutil.which("ngspice"), reason="the ngspice program is not installed")
+@needs.ngspice_program
 def test_runs_in_plain_ngspice(tmp_path, name):
     raw = tmp_path / "out.raw"
     done = subprocess.run(

@@ -5,7 +5,7 @@ import string
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.circuit.lint.checks import check
@@ -13,7 +13,9 @@ from cosim.circuit.lint.deck import Line, read
 from cosim.circuit.lint.expressions import BEHAVIOURAL, PARAMETRIC
 from cosim.errors import BadInput
 from cosim.files.resources import circuits
-from tests.helpers.ngspice_alone import LIBRARY, run
+from tests.helpers import needs
+from tests.helpers.examples import examples
+from tests.helpers.ngspice_alone import run
 from tests.helpers.ordinary_netlists import ORDINARY
 
 GOOD = """good
@@ -68,7 +70,7 @@ def test_ordinary_netlists_pass(tmp_path, name):
     checked(tmp_path, ORDINARY[name])
 
 
-@pytest.mark.skipif(LIBRARY is None, reason="the ngspice shared library is not installed")
+@needs.ngspice_library
 @pytest.mark.parametrize("name", ORDINARY)
 def test_ordinary_netlists_are_correct(tmp_path, name):
     """ngspice runs each to its end, as it stands and as it is read."""
@@ -195,7 +197,7 @@ Vh h 0 dc=max(1,2)
 """
 
 
-@pytest.mark.skipif(LIBRARY is None, reason="the ngspice shared library is not installed")
+@needs.ngspice_library
 @pytest.mark.parametrize(
     ("sources", "given", "others"),
     [
@@ -342,7 +344,7 @@ def test_subcircuits_that_explode_are_refused(tmp_path):
 POOL = GOOD + string.printable + "µ\u2028\x85\x00\ufeff{}'()=.+*$;"
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@examples(400)
 @given(
     st.sampled_from([GOOD, *ORDINARY.values()]),
     st.lists(
@@ -363,7 +365,7 @@ def test_mutations_pass_or_are_told(tmp_path_factory, text, cuts):
     passes_or_is_told(folder, text.encode())
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@examples(200)
 @given(st.sampled_from([GOOD, *ORDINARY.values()]), st.randoms(use_true_random=False))
 def test_shuffled_words_pass_or_are_told(tmp_path_factory, text, random):
     lines = text.split("\n")
@@ -375,7 +377,7 @@ def test_shuffled_words_pass_or_are_told(tmp_path_factory, text, random):
     passes_or_is_told(tmp_path_factory.getbasetemp(), "\n".join(lines).encode())
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@examples(200)
 @given(st.binary(max_size=200))
 def test_any_bytes_pass_or_are_told(tmp_path_factory, data):
     passes_or_is_told(tmp_path_factory.getbasetemp(), b"t\n" + data + b"\n.end\n")

@@ -9,12 +9,14 @@ import random
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.circuit.lint.deck import MAX_BYTES, read
 from cosim.errors import BadInput
-from tests.helpers.ngspice_alone import LIBRARY, run
+from tests.helpers import needs
+from tests.helpers.examples import examples
+from tests.helpers.ngspice_alone import run
 
 pytestmark = pytest.mark.reliability
 
@@ -147,8 +149,6 @@ FORMS = EXECUTED | {
     "two dots": line("..control"),
 }
 
-needs_library = pytest.mark.skipif(LIBRARY is None, reason="no ngspice shared library")
-
 
 @pytest.fixture
 def folder(tmp_path):
@@ -170,7 +170,7 @@ def refused(path: Path) -> str:
     return str(caught.value)
 
 
-@needs_library
+@needs.ngspice_library
 @pytest.mark.parametrize("name", EXECUTED)
 def test_these_forms_are_really_dangerous(folder, name):
     """Version 39 was seen to obey each of them; a later one may do so less, never unseen."""
@@ -180,7 +180,7 @@ def test_these_forms_are_really_dangerous(folder, name):
         pytest.skip("this ngspice does not")
 
 
-@needs_library
+@needs.ngspice_library
 def test_several_forms_are_really_dangerous(folder):
     for name in ("control", "comment that commands", "include", "script by its title"):
         run(EXECUTED[name], folder)
@@ -227,7 +227,7 @@ def test_links_out_of_the_folder_are_refused(tmp_path):
     assert len(read(put(inner, "t\n.include near.inc\n.end\n"))) == 2
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
+@needs.posix
 def test_pipes_and_devices_are_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     refused(put(tmp_path, "t\n.include pipe\n.end\n"))
@@ -282,7 +282,7 @@ HARMLESS = {
 }
 
 
-@needs_library
+@needs.ngspice_library
 @pytest.mark.parametrize("name", HARMLESS)
 def test_what_passes_does_nothing(folder, name):
     before = {*os.listdir(folder), "my.cir"}
@@ -300,7 +300,7 @@ FORBIDDEN = [
 ]  # fmt: skip
 
 
-@settings(max_examples=500, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@examples(500)
 @given(
     st.sampled_from(FORBIDDEN),
     st.randoms(use_true_random=False),

@@ -5,7 +5,6 @@ What has a number in a data sheet, the schematic or a hand calculation is a row 
 """
 
 import re
-import shutil
 import subprocess
 
 import numpy as np
@@ -14,14 +13,12 @@ from scipy.integrate import solve_ivp
 
 from cosim.drive.command import Constant, Staircase, WithPwm
 from cosim.scene.firmware import staircase, volts
+from tests.helpers import needs
 from tests.helpers.datasheet import ROWS, check, missing, write
 from tests.helpers.pins import pin, pin_before, v_dac, v_dac_before
-from tests.helpers.spice import CIRCUITS, LIBRARY, crossing, netlist, opamp, run, run_all
+from tests.helpers.spice import CIRCUITS, crossing, netlist, opamp, run, run_all
 
-pytestmark = [
-    pytest.mark.physics,
-    pytest.mark.skipif(LIBRARY is None, reason="the ngspice shared library is not installed"),
-]
+pytestmark = [pytest.mark.physics, needs.ngspice_library]
 
 # --- macromodels -----------------------------------------------------------------
 
@@ -630,7 +627,7 @@ def test_contract_of_the_netlists(name):
 
 
 @pytest.mark.parametrize("name", ["amplifier", "full"])
-@pytest.mark.skipif(not shutil.which("ngspice"), reason="the ngspice program is not installed")
+@needs.ngspice_program
 def test_netlist_runs_as_it_is_in_plain_ngspice(tmp_path, name):
     raw = tmp_path / "out.raw"
     done = subprocess.run(

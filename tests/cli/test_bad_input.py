@@ -1,15 +1,17 @@
-"""Whatever a scene or an override holds: a scene, or one sentence that helps; never a traceback."""
+"""Any scene file or override loads, or is refused in one sentence; never a traceback."""
 
 import os
 import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.errors import BadInput
 from cosim.scene import Scene, keys, list_scenes, load
+from tests.helpers import needs
+from tests.helpers.examples import examples
 
 pytestmark = pytest.mark.reliability
 
@@ -209,7 +211,7 @@ def test_directory(tmp_path: Path) -> None:
     assert complaint(tmp_path) == f"{tmp_path}: this is a directory, not a scene file."
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+@needs.posix
 def test_pipe_does_not_hang(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.toml")
     assert "not a regular file" in complaint(tmp_path / "pipe.toml")
@@ -266,7 +268,7 @@ WORDS = ["base", "name", "paper", *{key.table for key in keys()}, *{key.name for
 TOML_LIKE = st.lists(st.sampled_from(MARKS + sorted(WORDS)), max_size=30).map("".join)
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(raw=st.one_of(st.binary(max_size=200), TOML_LIKE.map(str.encode)))
 def test_any_file(raw: bytes) -> None:
     with tempfile.TemporaryDirectory() as directory:
@@ -285,7 +287,7 @@ OPTION = st.one_of(
 )
 
 
-@settings(max_examples=500, deadline=None)
+@examples(500)
 @given(scene=st.sampled_from(list_scenes()), options=st.lists(OPTION, max_size=4))
 def test_any_override(scene: tuple[str, str], options: list[str]) -> None:
     loads_or_complains(scene[0], options)

@@ -3,7 +3,6 @@
 ngspice keeps state, and an error in a netlist disables the library for good.
 """
 
-import ctypes.util
 import json
 import os
 import re
@@ -14,14 +13,17 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.helpers.ngspice_alone import LIBRARY
+
 CIRCUITS = Path(__file__).resolve().parents[2] / "circuits"
-LIBRARY = os.environ.get("NGSPICE_LIBRARY_PATH") or ctypes.util.find_library("ngspice")
 
 # Loads each deck, runs it, stores its last plot and its step counts; EXTERNAL sources
 # named in `external` follow (t, value) points, joined by straight lines.
 CHILD = r"""
 import json, logging, re, sys
 import numpy as np
+
+from tests.helpers.ngspice_alone import LIBRARY
 logging.disable(logging.CRITICAL)
 from PySpice.Spice.NgSpice.Shared import NgSpiceShared
 job = json.load(sys.stdin)

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import root_scalar
 
+from tests.helpers.examples import examples
 from tests.helpers.fmu_bench import COMPLIANT, FREE_BODIES, RIGID, Bench, ends
 
 pytestmark = pytest.mark.physics
@@ -712,24 +713,10 @@ AT_THE_LIMIT = {
     "b2": -7e4, "mu_s": 0.59, "mu_k": 1.0, "mu_plate": 0.0, "normal_force": 0.0,
     "at_the_limit": True,
 }  # fmt: skip
-QUICK = settings(
-    max_examples=300,
-    derandomize=True,
-    database=None,
-    deadline=None,
-    suppress_health_check=[HealthCheck.too_slow],
-)
 
 
-@QUICK
+@examples(300)
 @example(rig=AT_THE_LIMIT, amperes=0.05, pieces=[(1e-3, 0.0, 0.3)])
 @given(rig=RIGS, amperes=AMPERES, pieces=PIECES)
 def test_energy_account(rig, amperes, pieces):
-    check_energy(rig, amperes, pieces)
-
-
-@pytest.mark.slow
-@settings(QUICK, max_examples=10_000)
-@given(rig=RIGS, amperes=AMPERES, pieces=PIECES)
-def test_energy_account_at_length(rig, amperes, pieces):
     check_energy(rig, amperes, pieces)

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cosim.errors import BadInput
 from cosim.mechanics.part import exact, moreau, published, threshold
 from tests.helpers import rational_part
+from tests.helpers.examples import examples
 
 pytestmark = pytest.mark.physics
 
@@ -216,7 +217,19 @@ def cases(draw: st.DrawFn) -> tuple[Any, ...]:
     return knots, law, draw(FEW)
 
 
-@settings(max_examples=1500, deadline=None)
+def floats(law: dict[str, Fraction]) -> dict[str, Any]:
+    """The arguments of `exact` for a law of `rational_part`."""
+    force = max(law["static"], law["plate"], Fraction(1))
+    return {
+        "mu_s": float(law["static"] / force),
+        "mu_k": float(law["kinetic"] / force),
+        "mu_plate": float(law["plate"] / force),
+        "force_per_mass": float(force),
+        "gravity": float(law["g"]),
+    }
+
+
+@examples(1500)
 @given(cases())
 @example(
     (  # all at rest, friction at its limit, and a surface that turns back on a knot
@@ -228,15 +241,10 @@ def cases(draw: st.DrawFn) -> tuple[Any, ...]:
 def test_exact_agrees_with_rational_numbers(case: tuple[Any, ...]):
     knots, law, v0 = case
     z, v, stuck = rational_part.motion(knots, law, v0)
-    force = max(law["static"], law["plate"], Fraction(1))
     motion = exact(
         [float(time) for time, _ in knots],
         [float(speed) for _, speed in knots],
-        mu_s=float(law["static"] / force),
-        mu_k=float(law["kinetic"] / force),
-        mu_plate=float(law["plate"] / force),
-        force_per_mass=float(force),
-        gravity=float(law["g"]),
+        **floats(law),
         v0=float(v0),
     )
     np.testing.assert_allclose(motion.v, [float(x) for x in v], rtol=0, atol=1e-12)
@@ -245,13 +253,51 @@ def test_exact_agrees_with_rational_numbers(case: tuple[Any, ...]):
     np.testing.assert_allclose(spent, [float(x) for x in stuck], rtol=0, atol=1e-11)
 
 
-@settings(max_examples=200, deadline=None)
+TINY = st.floats(0.0, 1e-14)
+"""Seconds, down to those that are no normal number; just above and below what time resolves."""
+
+
+@examples(500)
+@given(cases(), st.integers(0, 12), st.lists(TINY, max_size=6), TINY)
+def test_knots_that_almost_coincide_change_nothing(
+    case: tuple[Any, ...], place: int, splits: list[float], rise: float
+):
+    """The knots at one time, set to 0 where the smallest distances can be told, are spread out."""
+    knots, law, v0 = case
+    z, v, _ = rational_part.motion(knots, law, v0)
+    origin = knots[place % len(knots)][0]
+    knots = [(time - origin, speed) for time, speed in knots]
+    before = [knot for knot in knots if knot[0] < 0]
+    jump = [speed for time, speed in knots if time == 0]
+    after = [knot for knot in knots if knot[0] > 0]
+    risen = [(Fraction(rise) * i / len(jump), speed) for i, speed in enumerate(jump)]
+    distances = [Fraction(t) for t in sorted(splits)]
+    if before:
+        slope = (jump[0] - before[-1][1]) / -before[-1][0]
+        before += [(-t, jump[0] - slope * t) for t in reversed(distances)]
+    if after:
+        slope = (after[0][1] - jump[-1]) / after[0][0]
+        after[:0] = [(risen[-1][0] + t, jump[-1] + slope * t) for t in distances]
+    spread = [*before, *risen, *after]
+    motion = exact(
+        [float(time) for time, _ in spread],
+        [float(speed) for _, speed in spread],
+        output=[float(time) for time, _ in knots],
+        **floats(law),
+        v0=float(v0),
+    )
+    np.testing.assert_allclose(motion.v, [float(x) for x in v], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(motion.z, [float(x) for x in z], rtol=0, atol=1e-11)
+
+
+@examples(300)
 @given(
     st.lists(st.floats(-2, 2), min_size=3, max_size=30),
     st.floats(0, 60),
     st.floats(0, 0.3),
-    st.lists(st.floats(0, 1), min_size=1, max_size=20),
+    st.lists(st.floats(0, 1) | st.floats(0, 1e-300), min_size=1, max_size=20),
 )
+@example([2.683346770898818e-308, -0.4375, 0.0, 0.0], 51.0, 0.03125, [1.0, 2.683346770898818e-308])
 def test_more_knots_mirrors_and_outputs_change_nothing(
     speeds: list[float], force: float, mu_plate: float, places: list[float]
 ):
@@ -325,6 +371,8 @@ def test_published_is_the_threshold_scheme_with_the_authors_numbers():
         ({"time": [0.0, 2.0, 1.0]}, "must not decrease"),
         ({"time": [1.0, 1.0, 1.0]}, "must not decrease"),
         ({"v_surface": [0.0, math.nan, 1.0]}, "finite"),
+        ({"time": [0.0, 1e-320, 1e-300]}, "accelerations must be finite"),
+        ({"v_surface": [-1e308, 1e308, 0.0]}, "accelerations must be finite"),
         ({"mu_k": 0.8}, "µ_k"),
         ({"mu_k": -0.1}, "µ_k"),
         ({"force_per_mass": -1.0}, "negative"),

@@ -5,8 +5,11 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from build_c import FLAGS, FMU, compiler, fmu_sources
+from tests.helpers.examples import examples
 
 pytestmark = pytest.mark.reliability
 
@@ -21,10 +24,12 @@ def compile_with_sanitizers(sources: list[Path], program: Path) -> subprocess.Co
     return subprocess.run([*command, "-o", str(program), "-lm"], capture_output=True, text=True)
 
 
-def run(program: Path, leaks: bool) -> subprocess.CompletedProcess:
+def run(program: Path, leaks: bool, *arguments: str) -> subprocess.CompletedProcess:
     options = f"detect_leaks={int(leaks)}:detect_stack_use_after_return=1"
     environment = os.environ | {"ASAN_OPTIONS": options, "UBSAN_OPTIONS": "print_stacktrace=1"}
-    return subprocess.run([str(program)], capture_output=True, text=True, env=environment)
+    return subprocess.run(
+        [str(program), *arguments], capture_output=True, text=True, env=environment
+    )
 
 
 @pytest.fixture(scope="module")
@@ -38,9 +43,17 @@ def finds_leaks(tmp_path_factory: pytest.TempPathFactory) -> bool:
     return "LeakSanitizer: detected memory leaks" in run(folder / "leak", leaks=True).stderr
 
 
-def test_random_and_senseless_calls(finds_leaks: bool, tmp_path: Path) -> None:
-    built = compile_with_sanitizers([*fmu_sources(), HARNESS], tmp_path / "harness")
+@pytest.fixture(scope="module")
+def harness(finds_leaks: bool, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    program = tmp_path_factory.mktemp("harness") / "harness"
+    built = compile_with_sanitizers([*fmu_sources(), HARNESS], program)
     assert built.returncode == 0, built.stderr
     assert "warning" not in built.stderr
-    done = run(tmp_path / "harness", finds_leaks)
+    return program
+
+
+@examples(2)
+@given(seed=st.integers(1, 2**64 - 1))
+def test_random_and_senseless_calls(harness: Path, finds_leaks: bool, seed: int) -> None:
+    done = run(harness, finds_leaks, str(seed))
     assert done.returncode == 0, done.stderr[-4000:]

@@ -8,13 +8,15 @@ from typing import Any
 
 import fmpy
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.errors import BadInput, NoEffect
 from cosim.mechanics import package
-from cosim.scene import RUNGS, Circuit, Coupling, Key, Scene, keys, list_scenes, load, to_toml
+from cosim.scene import RUNGS, Key, Scene, keys, list_scenes, load, to_toml
 from cosim.scene.methods import METHODS
+from cosim.scene.tables import Circuit, Coupling
+from tests.helpers.examples import examples
 
 # The table of the design, written down once more: an accidental change of a default shows here.
 DEFAULTS: dict[str, dict[str, Any]] = {
@@ -320,7 +322,7 @@ TEXT = st.text(st.characters(exclude_categories=["Cc", "Cs"]), max_size=50)
 SOME_KEYS = st.lists(st.sampled_from(keys()), max_size=6, unique=True)
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(chosen=SOME_KEYS, description=TEXT, data=st.data())
 def test_any_scene_comes_back(chosen: list[Key], description: str, data: st.DataObject) -> None:
     tables: dict[str, Any] = {"name": "any", "description": description}

@@ -1,24 +1,22 @@
 """Runs with a given surface: against the theory, and against the FMU in its prescribed mode."""
 
 import json
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cosim.cli.main import main
+from cosim.drive.surface.formulas import Transport, average_velocity
+from cosim.drive.surface.waveforms import quaid_velocity
 from cosim.errors import BadInput
 from cosim.mechanics import part
 from cosim.scene import Scene, load
 from cosim.simulation.rungs import given_surface as prescribed
 from cosim.simulation.simulate import simulate
-from cosim.studies import paper as theory
 from tests.helpers.fmu_bench import Bench
 
 pytestmark = pytest.mark.physics
-
-TRIALS = os.environ.get("COSIM_TRIALS")
 
 
 def fmu_part(
@@ -74,10 +72,8 @@ def test_fmu_follows_the_closed_form(seed: int, mu_plate: float) -> None:
 
 
 @pytest.mark.parametrize("number", range(1, 11))
-def test_fmu_follows_every_trial(number: int) -> None:
-    if TRIALS is None:
-        pytest.skip("COSIM_TRIALS names no folder with the tracked trials")
-    times, velocities = prescribed.read_surface(Path(TRIALS) / f"Trial #{number}.csv")
+def test_fmu_follows_every_trial(number: int, trials: Path) -> None:
+    times, velocities = prescribed.read_surface(trials / f"Trial #{number}.csv")
     exact = part.exact(times, velocities, mu_s=0.72, mu_k=0.59, force_per_mass=7.0 * 9.81)
     found = fmu_part(times, velocities, mu_s=0.72, mu_k=0.59, normal_force=7.0 * 9.81 * 0.009)
     np.testing.assert_allclose(found, exact.z, rtol=0, atol=1e-9)
@@ -86,7 +82,7 @@ def test_fmu_follows_every_trial(number: int) -> None:
 def test_optimal_scene_meets_the_closed_form() -> None:
     scene = load("optimal")
     found = simulate(scene).summary["v_average"]
-    expected = theory.average_velocity(0.7, 0.6, 98.1, 5.0, 0.05)
+    expected = average_velocity(Transport(0.7, 0.6, 98.1, 5.0, 0.05))
     assert found == pytest.approx(expected, rel=1e-7)
     assert found == pytest.approx(0.3106508876 * 9.81 * 0.05, rel=1e-7)
 
@@ -102,16 +98,15 @@ def test_variants(optimum: str, sign: int) -> None:
     scene = load("optimal", [f"drive.optimum={optimum}"])
     found = average(scene)
     direction = "down" if optimum == "down" else "up"
-    expected = theory.average_velocity(
-        0.7, 0.6, 98.1, 5.0, 0.05, direction=direction, robust=optimum == "robust"
-    )
+    robust = optimum == "robust"
+    expected = average_velocity(Transport(0.7, 0.6, 98.1, 5.0, 0.05, direction, robust))
     assert sign * found > 0
     assert found == pytest.approx(expected, rel=1e-6)
 
 
 def test_quaid_scene_meets_the_closed_form() -> None:
     found = simulate(load("quaid")).summary["v_average"]
-    assert found == pytest.approx(theory.quaid_velocity(0.7, 0.6, 98.1, 5.0, 0.05), rel=1e-6)
+    assert found == pytest.approx(quaid_velocity(Transport(0.7, 0.6, 98.1, 5.0, 0.05)), rel=1e-6)
 
 
 def test_horizontal_scene_meets_the_closed_form() -> None:

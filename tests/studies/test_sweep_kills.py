@@ -11,10 +11,11 @@ from pathlib import Path
 import psutil
 import pytest
 
+from tests.helpers import needs
+
 pytestmark = pytest.mark.reliability
 
 KNOBS = ("drive.pot_max", "drive.pot_frequency", "drive.pot_offset")
-KILLS = 5
 
 
 def arguments(points: int, out: Path) -> list[str]:
@@ -34,33 +35,32 @@ def lines(out: Path) -> int:
         return 0
 
 
-@pytest.mark.skipif(os.name != "posix", reason="needs SIGKILL")
-@pytest.mark.parametrize("points", [4, pytest.param(10, marks=pytest.mark.slow)])
-def test_killed(points: int, tmp_path: Path) -> None:
+@needs.posix
+@pytest.mark.parametrize(("points", "kills"), [(4, 3), pytest.param(10, 6, marks=pytest.mark.slow)])
+def test_killed(points: int, kills: int, tmp_path: Path) -> None:
     calm, wild = tmp_path / "calm", tmp_path / "wild"
     subprocess.run(arguments(points, calm), check=True, capture_output=True, timeout=300)
     dice = random.Random(points)
     total = points**3
     resumed_at = []
-    for kill in range(KILLS):
+    for _ in range(kills):
         process = subprocess.Popen(
             arguments(points, wild), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
         )
-        try:
-            # Somewhere in this run's share of the points.
-            goal = int(total * (kill + dice.uniform(0.2, 0.8)) / KILLS)
-            while lines(wild) < goal and process.poll() is None:
-                time.sleep(0.002)
-            workers = psutil.Process(process.pid).children()
-            for worker in dice.sample(workers, min(len(workers), 1)):
-                worker.kill()  # the sweep itself goes on
-            time.sleep(dice.uniform(0.0, 0.05))
-            assert process.poll() is None, process.stderr and process.stderr.read()
-            process.send_signal(signal.SIGKILL)
-        finally:
-            process.wait(timeout=60)
+        goal = lines(wild) + 1 + int(dice.uniform(0.2, 0.8) * total / (kills + 1))
+        while lines(wild) < goal and process.poll() is None:
+            time.sleep(0.002)
+        if process.poll() == 0 and resumed_at:
+            break  # a loaded machine may look too late
+        workers = psutil.Process(process.pid).children()
+        # The sweep goes on without it, unless it has not begun: the busiest one has.
+        max(workers, key=lambda worker: worker.cpu_times().user).kill()
+        time.sleep(dice.uniform(0.0, 0.05))
+        process.kill()
+        _, said = process.communicate(timeout=300)
+        assert process.returncode == -signal.SIGKILL, said
         resumed_at.append(lines(wild))
-        _, alive = psutil.wait_procs(workers, timeout=20)
+        _, alive = psutil.wait_procs(workers, timeout=120)
         assert not alive, "workers outlive their parent"
     assert resumed_at == sorted(resumed_at) and 0 < resumed_at[0] <= resumed_at[-1] < total + 1
     subprocess.run(arguments(points, wild), check=True, capture_output=True, timeout=300)
@@ -68,7 +68,7 @@ def test_killed(points: int, tmp_path: Path) -> None:
     assert lines(wild) == total + 1, "a point was repeated or lost"
 
 
-@pytest.mark.skipif(os.name != "posix", reason="needs SIGINT")
+@needs.posix
 def test_interrupted(tmp_path: Path) -> None:
     """Ctrl-C reaches parent and workers; what was complete is kept."""
     process = subprocess.Popen(
@@ -80,20 +80,23 @@ def test_interrupted(tmp_path: Path) -> None:
         time.sleep(0.01)
     workers = psutil.Process(process.pid).children()
     os.killpg(process.pid, signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=300)
     assert process.returncode == 130 and said.splitlines()[-1] == "cosim: interrupted."
     assert lines(tmp_path) >= 20
-    _, alive = psutil.wait_procs(workers, timeout=20)
+    _, alive = psutil.wait_procs(workers, timeout=120)
     assert not alive
 
 
+@needs.posix
 def test_one_sweep_at_a_time(tmp_path: Path) -> None:
-    pytest.importorskip("fcntl")
     first = subprocess.Popen(arguments(10, tmp_path), stdout=subprocess.DEVNULL)
     try:
         while lines(tmp_path) < 5 and first.poll() is None:
             time.sleep(0.01)
-        second = subprocess.run(arguments(10, tmp_path), capture_output=True, text=True, timeout=60)
+        first.send_signal(signal.SIGSTOP)  # or it might be done before the second has started
+        second = subprocess.run(
+            arguments(10, tmp_path), capture_output=True, text=True, timeout=300
+        )
     finally:
         first.kill()
         first.wait()

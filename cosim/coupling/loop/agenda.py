@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from cosim.trials.published import FRAME_RATE
+from cosim.trials.camera import FRAME_RATE
 
 Array = npt.NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from cosim.files.columns import read_timetable
 from cosim.mechanics import part
 from cosim.scene import Scene
 from cosim.scene.messages import plain
-from cosim.trials.published import FRAME_RATE
+from cosim.trials.camera import FRAME_RATE, three_point_accelerations
 
 Array = npt.NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def knots(scene: Scene) -> tuple[Array, Array, int]:
 
 def _period(scene: Scene) -> tuple[Array, Array]:
     from cosim.drive.surface import waveforms as theory
-    from cosim.drive.surface.formulas import sticking_range
+    from cosim.drive.surface.formulas import Transport
 
     drive, friction = scene.drive, scene.friction
     period = 1.0 / drive.frequency
@@ -56,23 +56,17 @@ def _period(scene: Scene) -> tuple[Array, Array]:
         return times, drive.velocity_amplitude * np.sin(2 * np.pi * times / period)
     gravity = max(scene.mechanics.gravity, NO_GRAVITY)
     ratio = force_per_mass(scene) / gravity
-    pair = (friction.mu_s, friction.mu_k)
-    down = drive.optimum == "down"
+    direction = "down" if drive.optimum == "down" else "up"
     if drive.waveform == "quaid":
-        low, high = sticking_range(friction.mu_s, ratio, gravity)
-        stick = -low if down else high
-        return theory.quaid_waveform(
-            stick * (1 - 1e-9), drive.acceleration_max, period, "down" if down else "up"
-        )
-    return theory.optimal_waveform(
-        *pair,
-        drive.acceleration_max,
-        ratio,
-        period,
-        direction="down" if down else "up",
+        stick = theory.quaid_limit(friction.mu_s, ratio, direction, gravity) * (1 - 1e-9)
+        return theory.quaid_cycle(stick, drive.acceleration_max, period, direction).knots()
+    case = Transport(
+        *(friction.mu_s, friction.mu_k, drive.acceleration_max, ratio, period),
+        direction=direction,
         robust=drive.optimum == "robust",
         gravity=gravity,
     )
+    return theory.optimal_cycle(case, theory.ROUNDING_MARGIN).knots()
 
 
 def force_per_mass(scene: Scene) -> float:
@@ -155,7 +149,7 @@ def simulate_part(scene: Scene, progress: Callable[[float], None]) -> tuple[dict
     span = run.duration - run.settle
     v_average = float(motion.z[-1] - motion.z[after][0]) / span
     peaks = surface.extremes(run.settle, run.duration)
-    camera = np.diff(z[np.searchsorted(wanted, frames)], 2) * FRAME_RATE**2
+    camera = three_point_accelerations(z[np.searchsorted(wanted, frames)])
     shares = motion.sticking[after[:-1]]
     periodic = scene.drive.file is None
     summary = {

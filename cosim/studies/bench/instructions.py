@@ -1,7 +1,7 @@
-"""Instructions that the FMU executes, counted by callgrind: a number without any noise.
+"""Instructions that the FMU executes, counted by callgrind: a measure without noise.
 
-The mechanics of the scene `paper` follow its command as a current, on a fixed grid of about the
-steps that ngspice takes.
+The mechanics of the scene `paper` get its command as a current, in fixed steps about as long as
+ngspice's.
 """
 
 import json
