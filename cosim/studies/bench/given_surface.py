@@ -39,10 +39,10 @@ def _call(case: Case, solver: Solver) -> Callable[[], int]:
     given = (len(case.time), case.time.ctypes.data, case.v_surface.ctypes.data, 1)
     given = (*given, law.ctypes.data, 0.0, case.v0)
     if solver == "exact":
-        function, asked = part_library().part_exact, (len(case.time), None)
+        function, asked = part.part_library().part_exact, (len(case.time), None)
     else:
         steps = len(case.grid) - 1
-        function = part_library().part_threshold
+        function = part.part_library().part_threshold
         asked = (part.PUBLISHED_STEP, part.PUBLISHED_V_MIN, steps)
 
     def call(_: object = (law, rows)) -> int:  # the buffers live as long as the call
