@@ -11,7 +11,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 
 def fmu_sources() -> Path:
     """The folder of the FMU's C sources."""
-    return _folder("cosim._fmu", "fmu", "src/model.h")
+    return _folder("cosim._fmu", "fmu", "src/physics/model.h")
 
 
 def circuits() -> Path:

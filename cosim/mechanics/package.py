@@ -32,7 +32,7 @@ from cosim.toolchain.compiler import (
 
 MODEL = "stickslip"
 VERSIONS = (2, 3)
-HOST_TOOL = "describe.c"
+HOST_TOOL = "fmi/describe.c"
 LARGEST_FILE = 50_000_000  # bytes, when unpacking
 
 
@@ -135,25 +135,34 @@ def token() -> str:
     """A hash of all that the FMU files are made of: their GUID and instantiation token."""
     digest = hashlib.sha256(repr((COMPILE_FLAGS, LIBRARY_FLAGS)).encode())
     root = fmu_sources()
-    for file in [*_sources(), root / "src" / HOST_TOOL, *_headers(), Path(__file__)]:
+    for file in [*_sources(), root / "src" / HOST_TOOL, *_headers()]:
         data = file.read_bytes()
-        digest.update(f"{file.name} {len(data)}\n".encode() + data)
+        digest.update(f"{_place(file)} {len(data)}\n".encode() + data)
     return digest.hexdigest()[:32]
 
 
 def _sources() -> list[Path]:
     folder = fmu_sources() / "src"
-    return sorted(file for file in folder.glob("*.c") if file.name != HOST_TOOL)
+    return sorted(file for file in folder.glob("*/*.c") if file != folder / HOST_TOOL)
 
 
 def _headers() -> list[Path]:
     root = fmu_sources()
-    return sorted([*root.glob("src/*.h"), *root.glob("src/*.def"), *root.glob("include/*.h")])
+    return sorted([*root.glob("src/*/*.h"), *root.glob("src/*/*.def"), *root.glob("include/*.h")])
+
+
+def _place(file: Path) -> str:
+    """Where a file lies in sources/. The standard's headers lie beside what includes them."""
+    root = fmu_sources()
+    inside = (
+        file.relative_to(root / "src") if root / "src" in file.parents else Path("fmi", file.name)
+    )
+    return inside.as_posix()
 
 
 def _compile(sources: list[Path], target: Path, flags: tuple[str, ...] = ()) -> None:
     root = fmu_sources()
-    includes = [f"-I{root / 'include'}", f"-I{root / 'src'}", f"-DFMU_TOKEN={token()}"]
+    includes = [f"-I{root / 'include'}", f"-DFMU_TOKEN={token()}"]
     files = [str(file) for file in sources]
     command = [*compiler(), *COMPILE_FLAGS, *flags, *includes, *files, "-o", str(target), "-lm"]
     execute(command, "the FMU")
@@ -178,13 +187,13 @@ def _library_place(version: int) -> str:
 
 
 def _contents(version: int, library: bytes, work: Path) -> Iterator[tuple[str, bytes]]:
-    sources = [file.name for file in _sources()]
+    sources = [_place(file) for file in _sources()]
     yield "modelDescription.xml", _describe(work, str(version), *sources)
     yield _library_place(version), library
     yield "documentation/licenses/license.txt", licence().read_bytes()
     for file in [*_sources(), *_headers()]:
-        yield f"sources/{file.name}", file.read_bytes()
-    yield "sources/token.h", f"#define FMU_TOKEN {token()}\n".encode()
+        yield f"sources/{_place(file)}", file.read_bytes()
+    yield "sources/fmi/token.h", f"#define FMU_TOKEN {token()}\n".encode()
     if version == 3:
         yield "sources/buildDescription.xml", _describe(work, "build", *sources)
 

@@ -235,7 +235,7 @@ def _given(overrides: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _find_files(tables: dict[str, Any], folder: Path) -> None:
-    """Make the paths of files, seen from ``folder``, ones that mean the same everywhere."""
+    """Make the paths of files absolute; they are relative to ``folder``."""
     for table, key in PATHS:
         path = tables.get(table, {}).get(key)
         if isinstance(path, str):
@@ -243,7 +243,7 @@ def _find_files(tables: dict[str, Any], folder: Path) -> None:
 
 
 def _value(text: str) -> Any:
-    """A TOML value; what is none, as a bare word, is a string."""
+    """The TOML value of ``text``; a string where it is none, such as a bare word."""
     try:
         data = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
@@ -276,11 +276,10 @@ def _merge(layers: list[_Layer]) -> tuple[dict[str, Any], dict[str, tuple[int, s
 
 
 def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int, str]]) -> None:
-    """Warn of what the user changed to no effect, as the circuit or waveform does not use it.
+    """Warn of each key that the user changed although circuit, waveform or method ignore it.
 
-    Not an error: the same changes are laid over several circuits to compare them.
-    Only where the user, with that circuit and waveform chosen, gave the key another value: a file
-    may be run with another circuit on top, and a resolved scene holds every key.
+    A warning, not an error: comparisons give several circuits the same overrides. No warning where
+    a later layer chose the circuit, waveform or method, nor for a scene.toml, which has every key.
     """
     chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
     resolved = [_is_resolved(layer.tables) for layer in layers]

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from cosim.coupling.loop.recorder import Recorder
 from cosim.files.spill import blocks
 from cosim.scene import Scene
-from cosim.simulation.electrics import Electrics
+from cosim.simulation.rungs.electrics import Electrics
 from cosim.trials.camera import three_point_accelerations
 
 UNITS = {

@@ -25,7 +25,12 @@ PACKAGE = Path(__file__).resolve().parents[1]
 LOOP = PACKAGE / "coupling" / "loop"
 SOURCES = {
     "part": (PACKAGE / "mechanics" / "part.c",),
-    "coupled": (LOOP / "recorder.c", LOOP / "circuit.c", LOOP / "coupled.h"),
+    "loop": (
+        *(LOOP / f"{name}.c" for name in ("fmu", "recorder", "lead")),
+        PACKAGE / "drive" / "command.c",
+        LOOP / "loop.h",
+        PACKAGE / "drive" / "command.h",
+    ),
 }
 """The libraries, and the files that each is made of."""
 FLAGS = (*COMPILE_FLAGS, *LIBRARY_FLAGS)
@@ -45,18 +50,6 @@ _ARGUMENTS = {
     ),
 }
 
-_COUPLED = {
-    "recorder_begin": (ctypes.c_int, (_POINTER,)),
-    "recorder_follow": (
-        ctypes.c_int64,
-        (_POINTER, ctypes.c_int64, _POINTER, _POINTER, _POINTER, ctypes.c_int64),
-    ),
-    "coupled_hand_on": (None, (_POINTER,)),
-    "coupled_lead": (None, (_POINTER,)),
-    "coupled_finish": (None, (_POINTER,)),
-    "coupled_size": (ctypes.c_int64, (ctypes.c_int,)),
-}
-
 
 @cache
 def part_library() -> ctypes.CDLL:
@@ -70,13 +63,9 @@ def part_library() -> ctypes.CDLL:
 
 
 @cache
-def coupled_library() -> ctypes.CDLL:
-    """The compiled recorder and coupling (see :mod:`cosim.coupling.loop.compiled`)."""
-    library = _loaded("coupled")
-    for name, (result, arguments) in _COUPLED.items():
-        function = getattr(library, name)
-        function.restype, function.argtypes = result, arguments
-    return library
+def library(name: str) -> ctypes.CDLL:
+    """A compiled library."""
+    return _loaded(name)
 
 
 def library_path(name: str) -> Path:

@@ -7,8 +7,8 @@
 
 #include "fmi2Functions.h"
 #include "fmi3Functions.h"
-#include "references.h"
-#include "model.h"
+#include "fmi/references.h"
+#include "physics/model.h"
 
 #define CHECK(condition)                                                                           \
     do {                                                                                           \

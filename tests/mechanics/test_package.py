@@ -28,7 +28,7 @@ def table() -> list[dict[str, Any]]:
     """variables.def, read by other means than the C compiler."""
     rows = []
     for integer, kind, name, fields, text in ROW.findall(
-        (fmu_sources() / "src" / "variables.def").read_text()
+        (fmu_sources() / "src/physics/variables.def").read_text()
     ):
         values = [field.strip().strip('"') for field in fields.split(",") if field.strip()]
         unit = None if integer else values.pop(0)
@@ -134,8 +134,9 @@ def test_contents(built: dict[int, Path], version: int) -> None:
         sources = {name.removeprefix("sources/") for name in names if name.startswith("sources/")}
         text = archive.read("documentation/licenses/license.txt")
     assert text == licence().read_bytes()
-    assert {"fmi2.c", "fmi3.c", "model.c", "variables.def", "token.h", "fmi2Functions.h"} <= sources
-    assert "describe.c" not in sources
+    assert {"fmi/fmi2.c", "fmi/fmi3.c", "fmi/fmi2Functions.h", "fmi/token.h"} <= sources
+    assert {"physics/model.c", "physics/variables.def"} <= sources
+    assert "fmi/describe.c" not in sources
     assert ("buildDescription.xml" in sources) == (version == 3)
     assert len([name for name in names if name.startswith("binaries/")]) == 1
     if version == 3:
@@ -154,7 +155,7 @@ def test_the_sources_inside_build_by_themselves(
     sources = tmp_path / "sources"
     library = tmp_path / "own.so"
     command = compiler()
-    files = sorted(str(path) for path in sources.glob("*.c"))
+    files = sorted(str(path) for path in sources.rglob("*.c"))
     subprocess.run([*command, "-shared", "-fPIC", *files, "-lm", "-o", str(library)], check=True)
     instantiate = ctypes.CDLL(str(library)).fmi2Instantiate
     instantiate.restype = ctypes.c_void_p
@@ -191,7 +192,7 @@ def test_what_is_up_to_date_is_left_alone(tmp_path: Path) -> None:
 
 def test_changed_sources_are_another_fmu(own_sources: Path, tmp_path: Path) -> None:
     before = fmu.token()
-    definition = own_sources / "src" / "variables.def"
+    definition = own_sources / "src/physics/variables.def"
     text = definition.read_text()
     odd = r"\"A\" < B & C > 'D'"
     definition.write_text(text.replace("Mass of the ram", odd))
@@ -204,7 +205,7 @@ def test_changed_sources_are_another_fmu(own_sources: Path, tmp_path: Path) -> N
 
 
 def test_an_unknown_unit_stops_the_build(own_sources: Path, tmp_path: Path) -> None:
-    definition = own_sources / "src" / "variables.def"
+    definition = own_sources / "src/physics/variables.def"
     definition.write_text(definition.read_text().replace('"kg"', '"lb"'))
     with pytest.raises(BadInput):
         fmu.build(out_dir=tmp_path / "out")
@@ -265,5 +266,5 @@ def test_unsafe_archives_are_refused(tmp_path: Path, name: str) -> None:
 
 
 def test_data_folders_are_found() -> None:
-    assert (fmu_sources() / "src" / "variables.def").is_file()
+    assert (fmu_sources() / "src/physics/variables.def").is_file()
     assert circuits().is_dir()

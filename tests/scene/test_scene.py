@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from cosim.errors import BadInput, NoEffect
 from cosim.mechanics import package
-from cosim.scene import RUNGS, Circuit, Coupling, Key, Scene, keys, list_scenes, load, to_toml
+from cosim.scene import RUNGS, Key, Scene, keys, list_scenes, load, to_toml
 from cosim.scene.methods import METHODS
+from cosim.scene.tables import Circuit, Coupling
 
 # The table of the design, written down once more: an accidental change of a default shows here.
 DEFAULTS: dict[str, dict[str, Any]] = {

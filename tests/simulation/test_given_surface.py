@@ -13,7 +13,7 @@ from cosim.drive.surface.waveforms import quaid_velocity
 from cosim.errors import BadInput
 from cosim.mechanics import part
 from cosim.scene import Scene, load
-from cosim.simulation import given_surface as prescribed
+from cosim.simulation.rungs import given_surface as prescribed
 from cosim.simulation.simulate import simulate
 from tests.helpers.fmu_bench import Bench
 

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.circuit.netlist import prepare
-from cosim.coupling.loop.compiled import CompiledRecorder
-from cosim.coupling.loop.compiled_run import CompiledRun
+from cosim.coupling.loop.lead import Lead
+from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import command
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
@@ -49,24 +49,19 @@ Cz z 0 1 ic={z}
 Cp p 0 1 ic={z}"""
 
 
-class Monolithic(CompiledRun):
-    """The run of such a netlist."""
-
-    def __init__(self, scene: Scene, recorder: CompiledRecorder) -> None:
-        super().__init__(scene, command(scene), recorder, np.zeros((_MOST_STEPS, 2)))
-
-    def _netlist(self) -> tuple[str, tuple[str, ...]]:
-        deck, _ = prepare(self._scene)
-        saved = ("i(vemf)", "v(p)")
-        lines = deck.splitlines()
-        place = next(k for k, line in enumerate(lines) if line.startswith("vemf "))
-        lines[place] = _mechanics(self._scene)
-        place = next(k for k, line in enumerate(lines) if line.startswith(".save "))
-        lines[place] = f".save {' '.join(saved)}"
-        place = next(k for k, line in enumerate(lines) if line.startswith(".tran "))
-        lines[place] += " uic"
-        # The trapezoidal rule is the better one for a mechanism.
-        return "\n".join(lines).replace("method=gear", "method=trap"), saved
+def _netlist(scene: Scene) -> tuple[str, tuple[str, ...]]:
+    """The deck, and the vectors to log."""
+    deck, _ = prepare(scene)
+    saved = ("i(vemf)", "v(p)")
+    lines = deck.splitlines()
+    place = next(k for k, line in enumerate(lines) if line.startswith("vemf "))
+    lines[place] = _mechanics(scene)
+    place = next(k for k, line in enumerate(lines) if line.startswith(".save "))
+    lines[place] = f".save {' '.join(saved)}"
+    place = next(k for k, line in enumerate(lines) if line.startswith(".tran "))
+    lines[place] += " uic"
+    # The trapezoidal rule is the better one for a mechanism.
+    return "\n".join(lines).replace("method=gear", "method=trap"), saved
 
 
 def run(scene: Scene, times: Sequence[float]) -> tuple[float, npt.NDArray[np.float64]]:
@@ -74,7 +69,9 @@ def run(scene: Scene, times: Sequence[float]) -> tuple[float, npt.NDArray[np.flo
     began = process_time()
     mechanics = Mechanics(scene)
     try:
-        circuit = Monolithic(scene, CompiledRecorder(scene, mechanics, lambda _: None))
+        recorder = Recorder(scene, mechanics, lambda _: None)
+        still = np.zeros((_MOST_STEPS, 2))
+        circuit = Lead(scene, command(scene), recorder, deck=_netlist(scene), replay=still)
         circuit.run()
     finally:
         mechanics.close()

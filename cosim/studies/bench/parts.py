@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cosim.coupling.loop.compiled import CompiledRecorder
-from cosim.coupling.loop.compiled_run import CompiledRun
+from cosim.coupling.loop.lead import Lead
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import command
 from cosim.mechanics.stickslip import Mechanics
@@ -46,11 +45,11 @@ def coupled_over_parts(scene: Scene, rounds: int) -> dict[str, Any]:
     }
 
 
-def _coupled(scene: Scene, replay: npt.NDArray[np.float64] | None = None) -> CompiledRun:
+def _coupled(scene: Scene, replay: npt.NDArray[np.float64] | None = None) -> Lead:
     mechanics = Mechanics(scene)
     try:
-        recorder = CompiledRecorder(scene, mechanics, lambda _: None)
-        circuit = CompiledRun(scene, command(scene), recorder, replay)
+        recorder = Recorder(scene, mechanics, lambda _: None)
+        circuit = Lead(scene, command(scene), recorder, replay=replay)
         circuit.run()
         return circuit
     finally:
@@ -60,9 +59,9 @@ def _coupled(scene: Scene, replay: npt.NDArray[np.float64] | None = None) -> Com
 def _mechanics(scene: Scene, log: Log) -> None:
     mechanics = Mechanics(scene)
     try:
-        recorder = CompiledRecorder(scene, mechanics, lambda _: None)
+        recorder = Recorder(scene, mechanics, lambda _: None)
         current = log["i(vemf)"] / scene.coil.count
-        recorder.follow(log["time"][1:], current[:-1], current[1:])
+        recorder.follow(log["time"][1:], current[:-1, np.newaxis], current[1:, np.newaxis])
     finally:
         mechanics.close()
 

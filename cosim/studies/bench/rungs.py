@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.drive.surface.formulas import Transport, average_velocity
 from cosim.scene import Scene, load
-from cosim.simulation.given_surface import force_per_mass
+from cosim.simulation.rungs.given_surface import force_per_mass
 from cosim.simulation.simulate import simulate
 from cosim.studies.bench.sampling import spread, take_turns
 from cosim.studies.bench.truth import BRIEF_FULL, brief, error, heights

@@ -196,7 +196,7 @@ def runs_in_all(turn: bool) -> int:
 def study(
     scene: Scene,
     turn: bool,
-    progress: Callable[[], None] = lambda: None,
+    progress: Callable[[], object] = lambda: None,
 ) -> Study:
     """Lift each limit of a scene's circuit alone and in pairs and, on request, turn each.
 
@@ -297,7 +297,7 @@ def _joined(base: Scene, names: Iterable[str]) -> Settings:
 
 
 def _run(
-    base: Scene, runs: list[tuple[str, Settings]], workers: int, progress: Callable[[], None]
+    base: Scene, runs: list[tuple[str, Settings]], workers: int, progress: Callable[[], object]
 ) -> list[Motion]:
     """What each (rung, settings) comes to, in their order."""
     motions: dict[int, Motion] = {}

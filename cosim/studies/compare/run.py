@@ -13,7 +13,7 @@ from cosim.files.picture import Picture
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
 from cosim.scene.messages import plain
-from cosim.simulation.given_surface import knots
+from cosim.simulation.rungs.given_surface import knots
 from cosim.simulation.simulate import simulate
 from cosim.studies.compare.compare import CameraError, Metrics, camera_error, made_of, measure
 from cosim.trials.camera import FRAME_RATE, Frames, laid_over

@@ -14,12 +14,12 @@ from cosim.errors import BadInput
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
-from cosim.simulation.simulate import versions
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.studies.sweep.journal import Journal
 from cosim.studies.sweep.point import Number, Outcome
 from cosim.studies.sweep.pool import Point, Pool, workers_asked
+from cosim.toolchain.versions import versions
 
 JOURNAL = "sweep.journal"
 RESULT = "sweep.nc"

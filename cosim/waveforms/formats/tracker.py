@@ -14,7 +14,7 @@ from cosim.scene import load
 from cosim.scene.messages import plain
 from cosim.trials.camera import FRAME_RATE, accelerations, film, frame_count, laid_over, velocities
 from cosim.trials.tracked import FEWEST_ROWS
-from cosim.waveforms.formats.source import Exported, Run
+from cosim.waveforms.formats.source import Exported, Format, Run
 
 Array = npt.NDArray[np.float64]
 
@@ -53,3 +53,6 @@ def number(value: float) -> str:
     if np.isnan(value):
         return MISSING
     return f"{float(f'{value:.7g}'):.8f}".replace("-0.00000000", "0.00000000")
+
+
+FORMAT = Format("tracker", "tracker.csv", "a tracked trial", content)

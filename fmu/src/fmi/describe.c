@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "model.h"
+#include "../physics/model.h"
 #include "references.h"
 
 #define PLACE(name) (offsetof(Reals, name) / sizeof(double))

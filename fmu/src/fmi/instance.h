@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "model.h"
+#include "../physics/model.h"
 
 typedef enum {
     INSTANTIATED = 1,

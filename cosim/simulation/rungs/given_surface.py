@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cosim.coupling.loop.recorder import grid
+from cosim.coupling.loop.agenda import grid
 from cosim.errors import BadInput
 from cosim.files.columns import read_timetable
 from cosim.mechanics import part
