@@ -18,11 +18,13 @@ if TYPE_CHECKING:
     from cosim.studies.paper.theory import theory
     from cosim.studies.sweep import sweep
     from cosim.studies.tune import tune
+    from cosim.waveforms.result import Result
 
 __version__ = "0.1.0"
 
 __all__ = [
     "BadInput",
+    "Result",
     "SimulationFailed",
     "compare",
     "fit",
@@ -34,6 +36,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Result": "cosim.waveforms.result",
     "load": "cosim.scene",
     "run": "cosim.simulation.run",
     "sweep": "cosim.studies.sweep",

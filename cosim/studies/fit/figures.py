@@ -2,23 +2,20 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from matplotlib.axes import Axes
 
 from cosim.files.picture import Picture
 from cosim.mechanics.part import PartMotion
 from cosim.studies.fit.cases import Case
-from cosim.studies.fit.search import Fit
-
-if TYPE_CHECKING:
-    from cosim.studies.fit.fit import TrialResults
+from cosim.studies.fit.search import Fit, Solved
 
 SURFACE, MEASURED, SIMULATED = "#8fb8da", "0.15", "#d1495b"
 DASHED = (0, (4, 1.2))
 
 
-def draw_all(results: "TrialResults", folder: Path) -> None:
+def draw_all(results: Solved, folder: Path) -> None:
     """Write every figure into a folder; a profile only where something was fitted."""
     trials(results).write(folder / "fit-trials.png")
     forces(results).write(folder / "fit-forces.png")
@@ -32,7 +29,7 @@ def _words(result: dict[str, Any]) -> str:
     return f"{result['parameters']} parameters, {solver}: µ_k {result['mu_k']:.3g}{plate}"
 
 
-def trials(results: "TrialResults") -> Picture:
+def trials(results: Solved) -> Picture:
     """Measured and simulated height of the part, and the surface's, a panel for each trial."""
     columns = min(2, len(results.cases))
     rows = math.ceil(len(results.cases) / columns)
@@ -80,7 +77,7 @@ def _trial(axis: Axes, case: Case, motion: PartMotion, row: dict[str, Any]) -> N
     )
 
 
-def profile(results: "TrialResults", fit: Fit) -> Picture:
+def profile(results: Solved, fit: Fit) -> Picture:
     """The mean error over µ_k, each normal force fitted anew, and the error of each trial."""
     result = results.numbers
     figure = Picture(9.0, 5.2, "constrained")
@@ -104,7 +101,7 @@ def profile(results: "TrialResults", fit: Fit) -> Picture:
     return figure
 
 
-def forces(results: "TrialResults") -> Picture:
+def forces(results: Solved) -> Picture:
     """Fitted against measured normal forces, trial by trial, with the bounds of the fit."""
     result = results.numbers
     rows = result["trials"]
