@@ -4,7 +4,7 @@
 #   make test        sets up and runs the quick tests   (ARGS='-k name' for some of them)
 #   make test-all    the slow ones too
 #   make fuzz        the random tests with new examples, many more (ARGS=--hypothesis-seed=N to repeat)
-#   make setup       sets up: system packages, .venv from the hashed lock, the FMU
+#   make setup       sets up: system packages, .venv from the hashed lock, the compiled C
 #   make charts      remakes the README's figures and tables in results/, some minutes;
 #                    `make test` writes results/datasheet.*
 #   make bench       remakes results/bench.json, some minutes (ARGS='--trials DIR')
@@ -30,10 +30,10 @@ PIP := $(PY) -m pip --disable-pip-version-check --no-input -q
 # An environment that was moved, or whose Python is gone, counts as not made.
 VENV_READY := $(shell test -x $(PY) && test "$$(cat $(VENV)/.created 2>/dev/null)" = "$$(pwd)" && echo yes)
 
-# What the FMU is built from, and what builds it.
-FMU_SOURCES := $(shell find fmu -name build -prune -o -type f \
-	\( -name '*.[ch]' -o -name '*.xml' -o -name '*.def' -o -name '*.py' -o -name '*.toml' \) -print) \
-	cosim/mechanics/package.py cosim/toolchain/compiler.py
+# What is compiled, and what compiles it.
+SOURCES := $(sort $(shell find fmu/src fmu/include cosim -path cosim/_compiled -prune -o \
+	-type f \( -name '*.[ch]' -o -name '*.def' \) -print)) build_c.py setup.py pyproject.toml LICENSE
+COMPILED := cosim/_compiled/build.json
 
 .PHONY: help run test test-all fuzz setup charts bench check lock clean FORCE
 
@@ -52,25 +52,29 @@ test-all: setup
 fuzz: setup
 	@$(PY) -m pytest -m hypothesis --hypothesis-profile=fuzz -o timeout=0 $(ARGS)
 
-setup: $(VENV)/.fmu
+setup: $(COMPILED)
 	@:
 
 # The machine: Python, libngspice, a C compiler; and an empty .venv.
 $(VENV)/.created: .ci/setup-system.sh $(if $(VENV_READY),,FORCE)
 	@PYTHON='$(PYTHON)' sh .ci/setup-system.sh
 
-# The Python packages, at the versions and hashes of the lock; then this project, in place.
-$(VENV)/.installed: $(VENV)/.created requirements.lock pyproject.toml setup.py
+# The Python packages, at the versions and hashes of the lock.
+$(VENV)/.installed: $(VENV)/.created requirements.lock
 	@echo "Installing the Python packages of requirements.lock into $(VENV)"
-	@$(PIP) install --require-hashes -r requirements.lock && \
-		$(PIP) install --no-build-isolation --no-deps -e . || \
+	@$(PIP) install --require-hashes -r requirements.lock || \
 		{ echo "cosim set-up: pip could not install the Python packages (see above); try again." >&2; exit 1; }
 	@touch $@
 
-$(VENV)/.fmu: $(VENV)/.installed $(FMU_SOURCES)
-	@echo "Building the FMU"
-	@$(VENV)/bin/cosim fmu build
-	@touch $@
+# This project, in place; that compiles its C.
+$(COMPILED): $(VENV)/.installed $(VENV)/.sources $(SOURCES)
+	@echo "Installing cosim and compiling its C"
+	@$(PIP) install --no-build-isolation --no-deps -e . || \
+		{ echo "cosim set-up: cosim could not be installed (see above)." >&2; exit 1; }
+
+# Sums of the sources, so that one that is gone, or changed but not newer, is noticed too.
+$(VENV)/.sources: $(VENV)/.created FORCE
+	@cksum $(SOURCES) | cmp -s - $@ || cksum $(SOURCES) >$@
 
 charts: setup
 	@$(VENV)/bin/cosim run paper
@@ -89,7 +93,7 @@ bench: setup
 	@$(VENV)/bin/cosim bench $(ARGS)
 	@cp results/bench/bench.json results/bench.json
 
-check: $(VENV)/.installed
+check: setup
 	@$(VENV)/bin/ruff check
 	@$(VENV)/bin/ruff format --check
 	@$(VENV)/bin/pyright
@@ -102,5 +106,5 @@ lock:
 	@! grep -n '://' requirements.lock || { echo "requirements.lock must name no registry." >&2; exit 1; }
 
 clean:
-	@rm -rf $(VENV) build dist *.egg-info fmu/build .pytest_cache .hypothesis .ruff_cache
+	@rm -rf $(VENV) build dist *.egg-info cosim/_compiled .pytest_cache .hypothesis .ruff_cache
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,3 +1,55 @@
-"""Co-simulation bench: SPICE circuits, voice-coil actuators and stick-slip mechanics."""
+"""Co-simulation bench: SPICE circuits, voice-coil actuators and stick-slip mechanics.
+
+>>> import cosim
+>>> cosim.run("optimal", {"drive.frequency": 30}).summary["v_average"] > 0
+True
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from cosim.errors import BadInput, SimulationFailed
+
+if TYPE_CHECKING:
+    from cosim.scene import load
+    from cosim.simulation.run import run
+    from cosim.studies.compare.run import compare
+    from cosim.studies.fit.fit import fit
+    from cosim.studies.paper.theory import theory
+    from cosim.studies.sweep import sweep
+    from cosim.studies.tune import tune
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "BadInput",
+    "SimulationFailed",
+    "compare",
+    "fit",
+    "load",
+    "run",
+    "sweep",
+    "theory",
+    "tune",
+]
+
+_HOMES = {
+    "load": "cosim.scene",
+    "run": "cosim.simulation.run",
+    "sweep": "cosim.studies.sweep",
+    "tune": "cosim.studies.tune",
+    "compare": "cosim.studies.compare.run",
+    "fit": "cosim.studies.fit.fit",
+    "theory": "cosim.studies.paper.theory",
+}
+"""Loaded on first use: `import cosim` and light commands need none of them."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

@@ -1,11 +1,15 @@
 """Settings and fixtures of all tests."""
 
+import json
 import os
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
+
+import build_c
+from cosim.toolchain.libraries import FOLDER
 
 # How long an example takes says something of the machine, not of the code.
 ANY_MACHINE = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
@@ -20,6 +24,16 @@ def pytest_configure() -> None:
     # on the tests that ran before.
     if settings.get_current_profile_name() == "test":
         providers._get_local_constants = lambda: providers._local_constants
+
+
+def pytest_sessionstart() -> None:
+    """Refuse to test what was compiled from other sources."""
+    try:
+        made_of = json.loads((FOLDER / "build.json").read_text())["sources"]
+    except OSError:
+        made_of = None
+    if made_of != build_c.digest():
+        pytest.exit("The C sources have changed since they were compiled: run `make setup`.", 2)
 
 
 @pytest.fixture(scope="session")

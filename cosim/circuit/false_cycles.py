@@ -1,9 +1,9 @@
 """False limit cycles: an output that swings from rail to rail only because steps are too coarse.
 
 With a loose tolerance the time stepping of an amplifier with feedback can fall into an oscillation
-that the converged solution does not have. It looks like a result. What gives it away is a burst of
-fast swings over the output's whole range; whether a burst is real (an unstable loop, a switching
-stage) or false is decided by solving up to it again with finer steps.
+that the converged solution does not have, and that looks like a result. Its mark is a burst of fast
+swings over the output's whole range. A burst can also be real (an unstable loop, a switching
+stage), so the run is solved again up to its end with finer steps.
 """
 
 from collections.abc import Callable
@@ -19,8 +19,8 @@ from cosim.scene import Scene
 Array = npt.NDArray[np.float64]
 
 BURST = 12
-"""Swings in a row that make a burst. The ringing after a flyback, of a loop with 4° of phase
-margin, stays below half of that."""
+"""Swings in a row that make a burst. A loop with 4° of phase margin, ringing after a flyback, makes
+fewer than half as many."""
 FAST = 1e-3
 """s; swings further apart are no burst."""
 

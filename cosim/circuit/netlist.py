@@ -1,9 +1,9 @@
 """A netlist made ready for co-simulation, and what may be read from its nodes.
 
-Every netlist in ``circuits/`` also runs in plain ngspice. Here the values of its ``.param`` lines
-are replaced by the scene's, its agreed sources become external ones, and its analysis gives way to
-the host's. Its options stay, but for the tolerance, which is the scene's. A user's own netlist goes
-the same way; ``circuits/README.md`` says what is agreed.
+Every netlist in ``circuits/`` also runs in plain ngspice. Here the scene's values replace those of
+its ``.param`` lines, the sources Vemf and Vcommand (or Vdac and Voffset) become external, and the
+scene's analysis and ``reltol`` replace the netlist's; its other options stay. A user's own netlist
+is treated alike; ``circuits/README.md`` says what it must have.
 """
 
 from collections.abc import Sequence
@@ -25,30 +25,27 @@ Array = npt.NDArray[np.float64]
 REQUIRED = ("i(vemf)", "v(out)", "v(sense)")
 """What every netlist has: the coils' total current, and the two ends of the coil."""
 OPTIONAL = ("v1", "swing", "climit", "slewing")
-"""Nodes that are read where a netlist has them: the command at the power amplifier's input, and
-limits at work, each while its magnitude is at least 0.5."""
+"""Nodes that are read where a netlist has them: the command at the power amplifier's input, and one
+for each limit, which acts while the node's magnitude is at least 0.5 V."""
 
 MOTIONAL = "v(motional)"
-"""The share of the back-EMF that the circuit carries itself, with the method "companion"."""
+"""With the method "companion": the part of the back-EMF that the circuit itself integrates."""
 
 LEAK_TIME = 0.1
-"""s; time constant with which that share leaks away. It keeps the share small over a long run, so
-that ngspice's relative tolerance stays a tolerance on the back-EMF."""
+"""s; time constant with which that part decays. It stays small over a long run, so that ngspice's
+relative tolerance stays a tolerance on the back-EMF."""
+
+
+_CIRCUIT_PARAMETERS = (
+    *("supply", "sense_resistance", "current_limit", "gain_bandwidth", "open_loop_gain"),
+    *("slew_rate", "swing_loss_high", "swing_loss_low", "output_resistance"),
+)
 
 
 def parameters(scene: Scene) -> dict[str, float]:
     """The numbers that the scene gives to the netlists' ``.param`` lines, SI (gain in dB)."""
     circuit, coil = scene.circuit, scene.coil
-    return {
-        "supply": circuit.supply,
-        "sense_resistance": circuit.sense_resistance,
-        "current_limit": circuit.current_limit,
-        "gain_bandwidth": circuit.gain_bandwidth,
-        "open_loop_gain": circuit.open_loop_gain,
-        "slew_rate": circuit.slew_rate,
-        "swing_loss_high": circuit.swing_loss_high,
-        "swing_loss_low": circuit.swing_loss_low,
-        "output_resistance": circuit.output_resistance,
+    return {name: getattr(circuit, name) for name in _CIRCUIT_PARAMETERS} | {
         "snubber_resistance": circuit.snubber_resistance or 1.0,
         "snubber_capacitance": circuit.snubber_capacitance or 0.0,
         "coil_resistance": coil.resistance,
@@ -124,8 +121,9 @@ def _external_sources(elements: Sequence[Element]) -> dict[Line, str]:
 def _carry_inertia(external: dict[Line, str], title: Line, present: set[str]) -> None:
     """Put the mechanics' local inertia in series with the coil, for the method "companion".
 
-    A capacitor C = m/Bl² carries e = ∫ i dt / C. Since the mass that the coil feels follows stick,
-    slip and contact, it is 1 F charged by the current times 1/C, which an external source gives.
+    A mass m behind the coil acts as a capacitor C = m/Bl² with e = ∫ i dt/C. Stick, slip and
+    contact change m, so the netlist has 1 F, charged by the current times 1/C, and an external
+    source gives 1/C.
     """
     for node in ("motional", "motional_gain", "motional_emf"):
         if node in present:

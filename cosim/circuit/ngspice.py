@@ -11,24 +11,18 @@ import logging
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from ctypes import byref, c_void_p, cast
 from ctypes.util import find_library
+from dataclasses import dataclass
 from functools import cache
-from math import nan
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 from PySpice.Spice.NgSpice import Shared
 
-from cosim.coupling.loop.compiled import library
 from cosim.errors import BadInput, SimulationFailed
 from cosim.toolchain.interrupts import caught_signals
-from cosim.toolchain.libraries import coupled_library
-
-_ACCEPTED = 0
-"""Location of a GetSyncData call that follows an accepted step."""
 
 _ffi: Any = Shared.ffi
 
@@ -46,31 +40,43 @@ _NOISE = re.compile(
 """What it says of itself, and what only follows from an earlier word."""
 
 
+@dataclass(frozen=True)
+class Callbacks:
+    """Addresses of the compiled functions that ngspice calls: SendData, GetVSRCData, GetSyncData.
+
+    Python would take longer than ngspice itself.
+    """
+
+    data: int
+    source: int
+    step: int
+
+
 class Leader(Protocol):
-    """What ngspice asks for while it leads a run."""
+    """What the compiled callbacks act for, during a run."""
 
-    def source(self, name: str) -> Callable[[float], float]:
-        """The function of time (s) that gives the voltage (V) of an external source."""
+    places: Any
+    """ctypes array, to be filled: where the saved vectors are among those sent; then the time."""
+
+    def begin(self) -> None:
+        """The callbacks act for this run from now on."""
         ...
 
-    def attempted(self) -> None:
-        """A step was tried."""
+    def finish(self) -> None:
+        """No further step comes; the last one was not told of."""
         ...
 
-    def accepted(self, time: float, values: Sequence[float], next_step: float) -> float:
-        """A step to ``time`` (s) was accepted, with the values of the saved vectors.
-
-        Returns the next step, s: ``next_step`` or less.
-        """
+    def stop(self) -> None:
+        """Nothing is to be done any more: the sources become NaN, so that no step succeeds."""
         ...
 
 
 @cache
-def engine() -> "Engine":
-    """The process's one ngspice. Raises BadInput where the library is missing."""
+def engine(callbacks: Callbacks) -> "Engine":
+    """The process's one ngspice, which calls back. Raises BadInput where the library is missing."""
     name = library_name()
     try:
-        return Engine(name)
+        return Engine(name, callbacks)
     except OSError as error:
         raise BadInput(f"{name}: this ngspice library cannot be loaded ({error}).") from error
 
@@ -88,7 +94,7 @@ def library_name() -> str:
 
 def spoilt() -> bool:
     """Whether ngspice has given up in this process: then another process must run the circuit."""
-    return engine.cache_info().currsize > 0 and engine().poisoned
+    return Engine.poisoned
 
 
 def _find_library() -> str | None:
@@ -102,91 +108,56 @@ def _find_library() -> str | None:
 
 
 class Engine(Shared.NgSpiceShared):
-    """One ngspice library, with the callbacks of the run under way.
+    """One ngspice library. PySpice's own callbacks turn every value into Python objects; compiled
+    ones take their place."""
 
-    The static methods replace PySpice's own, which turn every value into Python objects.
-    """
+    poisoned = False
+    """ngspice has given up for good: nothing runs in this process's library any more."""
 
-    def __init__(self, library: str) -> None:
+    def __init__(self, library: str, callbacks: Callbacks) -> None:
         # A path is made absolute, since it is opened from another folder; a bare name is not.
         self.LIBRARY_PATH = os.path.abspath(library) if os.sep in library else library
-        self.poisoned = False
-        """ngspice has given up for good: nothing runs in this process's library any more."""
         self._leader: Leader | None = None
-        self._circuit: Any = None
-        self._circuit_places: Any = None
         self._failure: BaseException | None = None
-        self._sources: dict[bytes, Callable[[float], float]] = {}
         self._save: tuple[str, ...] = ()
-        self._places: list[int] = []
-        self._values: list[float] = []
-        self._time_place = -1
-        self._time = self._told = 0.0
+        self._data = callbacks.data
         with caught_signals(self.fail), _nowhere():
             super().__init__(ngspice_id=0, send_data=True)
             self._library: Any = self._ngspice_shared
-            # PySpice leaves GetSyncData out; a second call puts it in beside its own.
-            self._sync_c = _ffi.callback("GetSyncData", self._get_sync_data)
-            self._call_back(self._get_vsrc_data_c, self._sync_c)
+            # PySpice leaves GetSyncData out; a second call puts it in, and a faster GetVSRCData.
+            self._library.ngSpice_Init_Sync(
+                _ffi.cast("GetVSRCData *", callbacks.source),
+                self._get_isrc_data_c,
+                _ffi.cast("GetSyncData *", callbacks.step),
+                _ffi.NULL,
+                self._self_c,
+            )
         if self._failure is not None:
             raise self._failure
 
     @property
     def _send_data_c(self) -> Any:
-        """What PySpice gives to ngspice for SendData. It must be given when the library starts, so
-        the compiled one stands there for good, and hands on where it is not wanted.
-        """
-        compiled = library()
-        if compiled is None:
-            return self._plain_data
-        address = int(_ffi.cast("uintptr_t", self._plain_data))
-        compiled.coupled_hand_on(address)
-        return _compiled("SendData", "coupled_data")
+        """What PySpice gives to ngspice for SendData when the library starts, and never again."""
+        return _ffi.cast("SendData *", self._data)
 
     @_send_data_c.setter
     def _send_data_c(self, plain: Any) -> None:
-        self._plain_data = plain
+        """PySpice sets its own."""
 
-    def run_transient(self, deck: str, save: tuple[str, ...], leader: Leader) -> None:
+    def transient(self, deck: str, save: tuple[str, ...], leader: Leader) -> None:
         """Run the transient analysis of ``deck``; ``save`` are its saved vectors, in this order.
 
-        Raises what the leader raised, or SimulationFailed with ngspice's own words.
+        Raises what was given to ``fail``, or SimulationFailed for a vector that is not there.
         """
-        self._leader, self._sources = leader, {}
-        self._call_back(self._get_vsrc_data_c, self._sync_c)
+        self._failure, self._save, self._leader = None, save, leader
+        leader.begin()
         try:
-            self._run(deck, save)
-            if self._time > self._told:
-                leader.accepted(self._time, self._values, 0.0)
+            self._run(deck)
         finally:
+            leader.finish()
             self._leader = None
 
-    def run_compiled(self, deck: str, save: tuple[str, ...], circuit: Any, places: Any) -> None:
-        """The same, led by compiled code: ``circuit`` is its ``Circuit``, with its ``places``.
-
-        What it finds wrong stands in ``circuit.status``.
-        """
-        compiled = coupled_library()
-        self._circuit, self._circuit_places = circuit, places
-        self._call_back(
-            _compiled("GetVSRCData", "coupled_source"), _compiled("GetSyncData", "coupled_step")
-        )
-        compiled.coupled_lead(byref(circuit))
-        try:
-            self._run(deck, save)
-        finally:
-            compiled.coupled_finish(byref(circuit))
-            self._circuit = self._circuit_places = None
-
-    def _call_back(self, source: Any, sync: Any) -> None:
-        self._library.ngSpice_Init_Sync(
-            source, self._get_isrc_data_c, sync, _ffi.NULL, self._self_c
-        )
-
-    def _run(self, deck: str, save: tuple[str, ...]) -> None:
-        self._failure = None
-        self._save = save
-        self._time, self._told = 0.0, 0.0
+    def _run(self, deck: str) -> None:
         self.clear_output()
         try:
             with caught_signals(self.fail):
@@ -213,19 +184,17 @@ class Engine(Shared.NgSpiceShared):
         return "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
 
     def fail(self, failure: BaseException) -> None:
-        """Make ngspice give up (its sources become NaN, no step can succeed); what runs it raises
-        ``failure`` then. An exception cannot pass through C.
-        """
+        """Make ngspice give up; ``run`` raises ``failure`` then. An exception cannot pass C."""
         if self._failure is None:
             self._failure = failure
-        if self._circuit is not None:
-            self._circuit.stopped = 1
+        if self._leader is not None:
+            self._leader.stop()
 
     @staticmethod
     def _exit(
         exit_status: int, immediate_unloding: bool, quit_exit: bool, ngspice_id: int, user_data: Any
     ) -> int:
-        _ffi.from_handle(user_data).poisoned = True
+        Engine.poisoned = True
         return exit_status
 
     @staticmethod
@@ -234,64 +203,11 @@ class Engine(Shared.NgSpiceShared):
         try:
             names = [_ffi.string(data.vecs[i].vecname).decode() for i in range(data.veccount)]
             names = [name.lower() for name in names]
-            self._places = [names.index(_vector(name)) for name in self._save]
-            self._values = [0.0] * len(self._places)
-            self._time_place = names.index("time")
-            if self._circuit_places is not None:
-                self._circuit_places[:] = [*self._places, self._time_place]
+            if self._leader is not None:
+                wanted = [*(_vector(name) for name in self._save), "time"]
+                self._leader.places[:] = [names.index(name) for name in wanted]
         except ValueError as error:
             self.fail(SimulationFailed(f"The netlist has no such vector: {error}."))
-        return 0
-
-    @staticmethod
-    def _send_data(data: Any, number_of_vectors: int, ngspice_id: int, user_data: Any) -> int:
-        self = _ffi.from_handle(user_data)
-        vectors = data.vecsa
-        self._values = [vectors[place].creal for place in self._places]
-        self._time = vectors[self._time_place].creal
-        return 0
-
-    @staticmethod
-    def _get_vsrc_data(
-        voltage: Any, time: float, node: Any, ngspice_id: int, user_data: Any
-    ) -> int:
-        self = _ffi.from_handle(user_data)
-        try:
-            if self._failure is not None:
-                voltage[0] = nan
-                return 0
-            name = _ffi.string(node)
-            source = self._sources.get(name)
-            if source is None:
-                source = self._leader.source(name.decode().lower())
-                self._sources[name] = source
-            voltage[0] = source(time)
-        except BaseException as failure:
-            voltage[0] = nan
-            self.fail(failure)
-        return 0
-
-    @staticmethod
-    def _get_sync_data(
-        time: float,
-        delta: Any,
-        old_delta: float,
-        redo: int,
-        ngspice_id: int,
-        location: int,
-        user_data: Any,
-    ) -> int:
-        self = _ffi.from_handle(user_data)
-        try:
-            if self._failure is not None:
-                return 0
-            if location == _ACCEPTED:
-                self._told = time
-                delta[0] = self._leader.accepted(time, self._values, delta[0])
-            else:
-                self._leader.attempted()
-        except BaseException as failure:
-            self.fail(failure)
         return 0
 
 
@@ -310,12 +226,6 @@ def _nowhere() -> Iterator[None]:
                 del os.environ["HOME"]
             else:
                 os.environ["HOME"] = home
-
-
-def _compiled(kind: str, name: str) -> Any:
-    """A function of the compiled library as a callback of ngspice."""
-    address = cast(getattr(coupled_library(), name), c_void_p).value
-    return _ffi.cast(f"{kind} *", address)
 
 
 def _vector(name: str) -> str:

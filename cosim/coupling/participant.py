@@ -6,10 +6,7 @@ a behavioural circuit. ngspice is none of them: it leads, and cannot repeat what
 
 from typing import Any, Protocol
 
-from cosim.coupling.polynomials import Array
-
-Signal = tuple[Array, Array]
-"""Value and time derivative of a signal at a communication point."""
+from cosim.coupling.polynomials import Array, Signal
 
 
 class Participant(Protocol):

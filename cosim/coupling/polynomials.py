@@ -1,10 +1,10 @@
 """What one side of a coupling is told of the other: polynomials in time over a macro step.
 
-A polynomial is an array of coefficients about the start of the step: ``c[k]``, of the signal's own
-shape, belongs to (t - t_n)^k.
+A polynomial is a tuple of coefficients about the start of the step: ``c[k]``, a number or an array
+of the signal's own shape, belongs to (t - t_n)^k. Plain arithmetic serves both: the compiled loop
+asks for a polynomial at each of its macro points, where arrays would cost more than the step.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,14 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+Polynomial = tuple[Any, ...]
+"""Coefficients, the constant one first."""
 
-def value(coefficients: Array, s: float) -> Array:
+Signal = tuple[Any, Any]
+"""Value and time derivative of a signal at a communication point."""
+
+
+def value(coefficients: Any, s: float) -> Any:
     """The polynomial at ``s`` seconds after its origin."""
     total = coefficients[-1]
     for k in range(len(coefficients) - 2, -1, -1):
@@ -21,11 +27,11 @@ def value(coefficients: Array, s: float) -> Array:
     return total
 
 
-def slope(coefficients: Array, s: float) -> Array:
+def slope(coefficients: Any, s: float) -> Any:
     """Its time derivative there, per second."""
     if len(coefficients) == 1:
-        return np.zeros_like(coefficients[0])
-    return value(np.array([k * c for k, c in enumerate(coefficients)][1:]), s)
+        return 0.0 * coefficients[0]
+    return value([k * c for k, c in enumerate(coefficients)][1:], s)
 
 
 def shifted(coefficients: Array, s: float) -> Array:
@@ -37,7 +43,7 @@ def shifted(coefficients: Array, s: float) -> Array:
     return c
 
 
-def projected(coefficients: Array, h: float, degree: int) -> Array:
+def projected(coefficients: Any, h: float, degree: int) -> Polynomial:
     """The polynomial of at most ``degree`` 0 or 1 that is nearest in the mean square over [0, h].
 
     Its integral, and for degree 1 its first moment, are those of the original: what a force or a
@@ -49,80 +55,80 @@ def projected(coefficients: Array, h: float, degree: int) -> Array:
         return c
     mean = sum(c[k] * (h**k / (k + 1)) for k in range(len(c)))
     if degree == 0:
-        return np.array([mean])
+        return (mean,)
     moment = sum(c[k] * (h**k / (k + 2)) for k in range(len(c)))
     rise = (12.0 * moment - 6.0 * mean) / h
-    return np.array([mean - 0.5 * h * rise, rise])
-
-
-def interpolated(
-    offsets: Sequence[float], values: Sequence[Any], slope_at_last: Any | None = None
-) -> Array:
-    """The polynomial through ``values`` at times ``offsets`` (s, against the origin).
-
-    With ``slope_at_last`` it also has that slope at the last of them.
-    """
-    n = len(offsets) + (slope_at_last is not None)
-    right = [*values] if slope_at_last is None else [*values, slope_at_last]
-    if n == 1:
-        return np.array(right)
-    # In units of the widest distance, so that the equations are well scaled.
-    unit = max(abs(s) for s in offsets) or 1.0
-    rows = [[(s / unit) ** k for k in range(n)] for s in offsets]
-    if slope_at_last is not None:
-        last = offsets[-1] / unit
-        rows.append([k * last ** (k - 1) / unit if k else 0.0 for k in range(n)])
-    stacked = np.array(right)
-    found = np.linalg.solve(np.array(rows), stacked.reshape(n, -1)).reshape(stacked.shape)
-    return np.array([c / unit**k for k, c in enumerate(found)])
+    return (mean - 0.5 * h * rise, rise)
 
 
 class History:
-    """The last values and slopes of a signal at communication points, newest last."""
+    """The last values of a signal at communication points, newest last, and the newest slope."""
 
-    def __init__(self, order: int, slopes: bool) -> None:
-        """Polynomials up to ``order``; with ``slopes`` the newest slope counts as a known value.
+    __slots__ = ("_keep", "_slopes", "_times", "_values", "slope")
+
+    def __init__(self, degree: int, slopes: bool) -> None:
+        """Polynomials up to ``degree``; with ``slopes`` the newest slope counts as a known value.
 
         Without it older values are used instead, and the slope only fills in while there are not
         yet enough of them, so that a method begins with its own order.
         """
-        self.order = order
+        self._keep = max(degree, 1)
         self._slopes = slopes
         self._times: tuple[float, ...] = ()
-        self._values: tuple[Array, ...] = ()
-        self._slope: Array = np.zeros(0)
+        self._values: tuple[Any, ...] = ()
+        self.slope: Any = None
+        """The newest slope, per second; None where it is not known."""
 
-    def add(self, time: float, value: Array, slope: Array) -> None:
+    def add(self, time: float, value: Any, slope: Any) -> None:
         """A new communication point at ``time`` (s)."""
-        keep = max(self.order, 1)
+        keep = self._keep
         self._times = (*self._times[-keep:], time)
         self._values = (*self._values[-keep:], value)
-        self._slope = slope
+        self.slope = slope
 
     def restart(self) -> None:
         """Forget all but the newest point: what is older lies before an event."""
         self._times, self._values = self._times[-1:], self._values[-1:]
 
     @property
-    def value(self) -> Array:
+    def value(self) -> Any:
         """The newest value."""
         return self._values[-1]
 
-    @property
-    def slope(self) -> Array:
-        """The newest slope, per second."""
-        return self._slope
+    def polynomial(self, degree: int) -> Polynomial:
+        """The polynomial of ``degree`` 0, 1 or 2 through the newest points, about the newest; of a
+        lower degree while there are too few."""
+        values, times = self._values, self._times
+        newest = values[-1]
+        if degree == 0:
+            return (newest,)
+        slopes = self.slope is not None and (self._slopes or len(times) <= degree)
+        points = min(degree + 1 - slopes, len(times))
+        if points == 1:
+            return (newest, self.slope) if slopes else (newest,)
+        back = times[-2] - times[-1]
+        rise = (values[-2] - newest) / back
+        if points == 2:
+            return (newest, self.slope, (rise - self.slope) / back) if slopes else (newest, rise)
+        further = times[-3] - times[-1]
+        bend = ((values[-3] - newest) / further - rise) / (further - back)
+        return (newest, rise - bend * back, bend)
 
-    def polynomial(self, origin: float, order: int | None = None) -> Array:
-        """The polynomial of ``order`` through the newest points, about ``origin`` (s)."""
-        order = self.order if order is None else order
-        slopes = order > 0 and (self._slopes or len(self._times) <= order)
-        points = min(order + 1 - slopes, len(self._times))
-        offsets = [time - origin for time in self._times[-points:]]
-        return interpolated(offsets, self._values[-points:], self._slope if slopes else None)
+    def polynomial_to(self, h: float, end: Any, degree: int) -> Polynomial:
+        """The polynomial of ``degree`` 0, 1 or 2 through ``end``, ``h`` (s) after the newest point,
+        and the newest points, about the newest."""
+        if degree == 0:
+            return (end,)
+        newest = self._values[-1]
+        rise = (end - newest) / h
+        if degree == 1 or len(self._times) == 1:
+            return (newest, rise)
+        back = self._times[-2] - self._times[-1]
+        bend = (rise - (self._values[-2] - newest) / back) / (h - back)
+        return (newest, rise - bend * h, bend)
 
     def save(self) -> tuple[Any, ...]:
-        return (self._times, self._values, self._slope)
+        return (self._times, self._values, self.slope)
 
     def restore(self, saved: tuple[Any, ...]) -> None:
-        self._times, self._values, self._slope = saved
+        self._times, self._values, self.slope = saved

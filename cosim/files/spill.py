@@ -1,6 +1,6 @@
-"""Rows that come one after the other and may become many: in memory while few, then on disk.
+"""Rows of numbers that a run appends: few stay in memory, many go to disk.
 
-What is on disk lies in a file that has no name, so nothing is left of it however the process ends.
+The file has no name, so it vanishes however the process ends.
 """
 
 import mmap
@@ -20,10 +20,10 @@ from cosim.errors import BadInput
 Array = npt.NDArray[np.float64]
 
 IN_MEMORY = 8 << 20
-"""Bytes of a tape that stay in memory; those of a run of some seconds do."""
+"""Bytes of a tape that stay in memory: enough for a run of some seconds."""
 
 BLOCK = 1 << 16
-"""Rows that are looked at at a time where all of them need not be in memory at once."""
+"""Rows that are processed at a time where not all of them need to be in memory."""
 
 _mapped: "WeakSet[mmap.mmap]" = WeakSet()
 
@@ -43,7 +43,7 @@ def on_disk_in(folder: Path) -> Iterator[None]:
 class Tape:
     """Rows of ``columns`` numbers, written once and then read as an array.
 
-    Raises BadInput where the disk takes no more of them.
+    Raises BadInput where the disk is full.
     """
 
     def __init__(self, columns: int) -> None:
@@ -102,16 +102,14 @@ class Tape:
 
 
 def blocks(count: int) -> Iterator[slice]:
-    """Slices of BLOCK rows that together are ``count`` rows; what was read of tapes for one does
-    not stay in memory for the next.
-    """
+    """Slices of BLOCK rows, ``count`` in all; after each the tapes' pages leave the memory."""
     for start in range(0, count, BLOCK):
         yield slice(start, min(start + BLOCK, count))
         release()
 
 
 def release() -> None:
-    """Take what was read of tapes on disk out of this process's memory; it can be read again."""
+    """Drop the pages of tapes on disk from this process's memory; they can be read again."""
     if hasattr(mmap, "MADV_DONTNEED"):
         for mapped in list(_mapped):
             mapped.madvise(mmap.MADV_DONTNEED)

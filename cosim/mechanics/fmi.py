@@ -3,6 +3,7 @@
 Both go through fmpy's own functions, which check every return code.
 """
 
+from collections.abc import Iterable
 from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_uint, c_void_p, cast
 from functools import cache
 from typing import Any, Protocol
@@ -10,14 +11,21 @@ from typing import Any, Protocol
 import fmpy
 from fmpy import fmi2, fmi3
 
+from cosim.errors import BadInput
 from cosim.mechanics.package import MODEL, token, unpacked
 
 
 class Interface(Protocol):
     """One instance of the FMU. Places and values are ctypes arrays of equal length."""
 
+    version: int
+    """Of FMI."""
     messages: list[str]
     """What the FMU has said, the newest last."""
+
+    def places(self, names: Iterable[str]) -> Any:
+        """The value references of variables, as an array for the calls."""
+        ...
 
     def initialise(self) -> None:
         """End the initialisation, in which parameters could be set."""
@@ -68,34 +76,40 @@ def references(version: int) -> dict[str, int]:
     return {v.name: v.valueReference for v in description.modelVariables}
 
 
-def places(version: int, names: Any) -> Any:
-    """The value references of variables as an array for the calls."""
-    known = references(version)
-    return (c_uint * len(names))(*(known[name] for name in names))
-
-
 def _addresses(fmu: Any, *functions: str) -> dict[str, int]:
     names = ("set_reals", "do_step", "get_reals", "get_integers")
     found = [cast(getattr(fmu.dll, function), c_void_p).value or 0 for function in functions]
     return {"instance": fmu.component, **dict(zip(names, found, strict=True))}
 
 
-def _arguments(version: int) -> dict[str, Any]:
-    return {
-        "instanceName": "cosim",
-        "guid": token(),
-        "modelIdentifier": MODEL,
-        "unzipDirectory": str(unpacked(version)),
-    }
+def _loaded(kind: Any, version: int) -> Any:
+    folder = str(unpacked(version))
+    try:
+        return kind(
+            instanceName="cosim", guid=token(), modelIdentifier=MODEL, unzipDirectory=folder
+        )
+    except Exception as error:
+        raise BadInput(f"The FMU in {folder} cannot be loaded: {error}") from error
 
 
-class Fmi2:
+class _Places:
+    version: int
+
+    def places(self, names: Iterable[str]) -> Any:
+        known = references(self.version)
+        found = [known[name] for name in names]
+        return (c_uint * len(found))(*found)
+
+
+class Fmi2(_Places):
     """The FMU through FMI 2.0 for co-simulation."""
+
+    version = 2
 
     def __init__(self) -> None:
         self.messages: list[str] = []
         self._running = False
-        self._fmu = fmi2.FMU2Slave(**_arguments(2))
+        self._fmu = _loaded(fmi2.FMU2Slave, 2)
         self._logger = _LOGGER_2(lambda *a: self.messages.append(_text(a[4])))
         callbacks = fmi2.fmi2CallbackFunctions()
         callbacks.logger = self._logger
@@ -157,13 +171,15 @@ class Fmi2:
         self._fmu.freeInstance()
 
 
-class Fmi3:
+class Fmi3(_Places):
     """The FMU through FMI 3.0 for co-simulation."""
+
+    version = 3
 
     def __init__(self) -> None:
         self.messages: list[str] = []
         self._running = False
-        self._fmu = fmi3.FMU3Slave(**_arguments(3))
+        self._fmu = _loaded(fmi3.FMU3Slave, 3)
         self._logger = fmi3.fmi3LogMessageCallback(lambda *a: self.messages.append(_text(a[3])))
         self._fmu.instantiate(logMessage=self._logger)
         self._fmu.enterInitializationMode()
@@ -246,9 +262,9 @@ def borrow(version: int) -> Interface:
     return kept
 
 
-def give_back(version: int, instance: Interface) -> None:
+def give_back(instance: Interface) -> None:
     """Keep a borrowed instance for the next run."""
-    other = _idle.pop(version, None)
+    other = _idle.pop(instance.version, None)
     if other is not None:
         other.close()
-    _idle[version] = instance
+    _idle[instance.version] = instance

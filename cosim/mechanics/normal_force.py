@@ -19,7 +19,7 @@ class NormalForce:
 
     def __init__(self, times: list[float], forces: list[float]) -> None:
         self.corners = times
-        self._forces = forces
+        self.forces = forces
 
     def value(self, time: float) -> float:
         """The force at ``time`` (s), N; at a jump the one after it."""
@@ -31,7 +31,7 @@ class NormalForce:
 
     def _between(self, after: int, time: float) -> float:
         """The force on the straight that ends at the corner with the index ``after``."""
-        corners, forces = self.corners, self._forces
+        corners, forces = self.corners, self.forces
         if after == 0 or after == len(corners):
             return forces[max(0, after - 1)]
         start, end = corners[after - 1], corners[after]

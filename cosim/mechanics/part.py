@@ -10,14 +10,16 @@ against the part's own velocity, set-valued at rest. Units: s, m, m/s, m/s².
 comparison; `published` is `threshold` as in the simulation of Yako, Nowak, Yuan and Salisbury.
 """
 
+import ctypes
 import sys
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import BadInput
-from cosim.toolchain.libraries import part_library
+from cosim.toolchain.libraries import library
 
 Array = npt.NDArray[np.float64]
 Real = npt.ArrayLike
@@ -26,6 +28,31 @@ PUBLISHED_STEP = 1e-4  # s
 PUBLISHED_V_MIN = 1e-5  # m/s
 MOST_STEPS = 100_000_000
 EPSILON, LARGEST = sys.float_info.epsilon, sys.float_info.max
+
+_POINTER, _LONG, _REAL = ctypes.c_void_p, ctypes.c_long, ctypes.c_double
+_SURFACE = (_LONG, _POINTER, _POINTER, _LONG, _POINTER, _REAL, _REAL)
+_RESULT = (_POINTER, _POINTER, _POINTER)
+_ARGUMENTS = {
+    "part_exact": (*_SURFACE, _LONG, _POINTER, *_RESULT),
+    "part_threshold": (*_SURFACE, _REAL, _REAL, _LONG, *_RESULT),
+    "part_moreau": (*_SURFACE, _REAL, _LONG, *_RESULT),
+    "part_errors": (
+        *(_LONG, _POINTER, _POINTER, _REAL),
+        *(_LONG, _POINTER, _REAL, _REAL),
+        *(_LONG, _POINTER, _POINTER, _POINTER, _POINTER),
+    ),
+}
+
+
+@cache
+def part_library() -> ctypes.CDLL:
+    """The functions of ``part.c``."""
+    functions = library("part")
+    for name, arguments in _ARGUMENTS.items():
+        function = getattr(functions, name)
+        function.argtypes = arguments
+        function.restype = None if name == "part_errors" else _LONG
+    return functions
 
 
 @dataclass(frozen=True)

@@ -8,32 +8,6 @@
 from cosim.scene.describe import Key, keys
 from cosim.scene.loading import changed, list_scenes, load
 from cosim.scene.model import Scene, to_toml
-from cosim.scene.rungs import RUNGS, Rung
-from cosim.scene.tables import (
-    Circuit,
-    Coil,
-    Coupling,
-    Drive,
-    Friction,
-    Mechanics,
-    Run,
-)
+from cosim.scene.rungs import RUNGS
 
-__all__ = [
-    "RUNGS",
-    "Circuit",
-    "Coil",
-    "Coupling",
-    "Drive",
-    "Friction",
-    "Key",
-    "Mechanics",
-    "Run",
-    "Rung",
-    "Scene",
-    "changed",
-    "keys",
-    "list_scenes",
-    "load",
-    "to_toml",
-]
+__all__ = ["RUNGS", "Key", "Scene", "changed", "keys", "list_scenes", "load", "to_toml"]

@@ -45,16 +45,28 @@ def list_scenes() -> list[tuple[str, str]]:
     return sorted(found, key=lambda scene: (not scene[0].startswith("paper"), scene[0]))
 
 
-def load(source: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scene:
-    """The checked scene of a built-in name or TOML file, with ``table.key=value`` overrides.
+Overrides = Mapping[str, Any] | Iterable[str]
+"""Values for keys: ``{"table.key": value}``, SI, or ``"table.key=value"`` as the command has it."""
+
+
+def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None = None) -> Scene:
+    """The checked scene of a built-in name, a TOML file or another scene, with ``overrides`` on
+    top: ``{"table.key": value}``, SI, or strings ``"table.key=value"``.
 
     A file may name a built-in scene as its ``base``; each layer changes only the keys that it
     gives. A knob of the device replaces its value from the layers below, and the other way round.
     Raises :class:`BadInput` with one sentence on the first thing that is wrong.
     """
-    layers = _layers(os.fspath(source))
-    if changes := _overrides(overrides):
-        layers.append(_Layer("--set", changes))
+    if isinstance(source, Scene):
+        layers = [_Layer(f"scene {source.name}", source.as_dict())]
+    else:
+        layers = _layers(os.fspath(source))
+    if isinstance(overrides, str):
+        raise BadInput("overrides: must be a mapping or a list of strings, not one string.")
+    origin = "overrides" if isinstance(overrides, Mapping) else "--set"
+    changes = _given(overrides) if isinstance(overrides, Mapping) else _overrides(overrides or ())
+    if changes:
+        layers.append(_Layer(origin, changes))
     merged, origins = _merge(layers)
     try:
         scene = Scene.model_validate(merged)
@@ -188,9 +200,7 @@ def _overrides(overrides: Iterable[str]) -> dict[str, Any]:
         left, equals, right = text.partition("=")
         table, dot, key = left.strip().partition(".")
         if not (equals and dot and table and key):
-            bare = left.strip()
-            full = next((k.full for k in keys() if k.name == bare), None)
-            hint = f"; did you mean {full}?" if full else ""
+            hint = _full_name(left.strip())
             raise BadInput(
                 messages.ended(f"--set {messages.plain(text)}: must be table.key=value{hint}")
             )
@@ -202,8 +212,30 @@ def _overrides(overrides: Iterable[str]) -> dict[str, Any]:
     return tables
 
 
+def _full_name(bare: str) -> str:
+    full = next((key.full for key in keys() if key.name == bare), None)
+    return f"; did you mean {full}?" if full else ""
+
+
+def _given(overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables that a mapping from ``table.key`` to values gives."""
+    tables: dict[str, Any] = {}
+    for full, value in overrides.items():
+        table, dot, key = full.partition(".")
+        if not dot:
+            hint = _full_name(full)
+            raise BadInput(messages.ended(f"overrides: {full} must be table.key{hint}"))
+        _check_names({table: {key: None}}, "overrides")
+        if isinstance(value, os.PathLike):
+            value = os.fspath(value)
+        # numpy's numbers are no Python numbers
+        tables.setdefault(table, {})[key] = value.item() if hasattr(value, "item") else value
+    _find_files(tables, Path())
+    return tables
+
+
 def _find_files(tables: dict[str, Any], folder: Path) -> None:
-    """Make the paths of files, seen from ``folder``, ones that mean the same everywhere."""
+    """Make the paths of files absolute; they are relative to ``folder``."""
     for table, key in PATHS:
         path = tables.get(table, {}).get(key)
         if isinstance(path, str):
@@ -211,7 +243,7 @@ def _find_files(tables: dict[str, Any], folder: Path) -> None:
 
 
 def _value(text: str) -> Any:
-    """A TOML value; what is none, as a bare word, is a string."""
+    """The TOML value of ``text``; a string where it is none, such as a bare word."""
     try:
         data = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
@@ -244,11 +276,10 @@ def _merge(layers: list[_Layer]) -> tuple[dict[str, Any], dict[str, tuple[int, s
 
 
 def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int, str]]) -> None:
-    """Warn of what the user changed to no effect, as the circuit or waveform does not use it.
+    """Warn of each key that the user changed although circuit, waveform or method ignore it.
 
-    Not an error: the same changes are laid over several circuits to compare them.
-    Only where the user, with that circuit and waveform chosen, gave the key another value: a file
-    may be run with another circuit on top, and a resolved scene holds every key.
+    A warning, not an error: comparisons give several circuits the same overrides. No warning where
+    a later layer chose the circuit, waveform or method, nor for a scene.toml, which has every key.
     """
     chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
     resolved = [_is_resolved(layer.tables) for layer in layers]

@@ -36,12 +36,12 @@ def suggestion(word: str, known: Iterable[str], what: str = "") -> str:
 
 
 def ended(sentence: str) -> str:
-    """The sentence with its final mark."""
+    """The sentence with a full stop, unless it is a question."""
     return sentence if sentence.endswith("?") else sentence + "."
 
 
 def unknown_table(name: str) -> str:
-    """A sentence on a table that no scene has, or a key that stands outside its table."""
+    """A sentence on an unknown table, or on a key outside its table."""
     holders = [key.full for key in keys() if key.name == name]
     hint = f"; did you mean {holders[0]}?" if holders else suggestion(name, TABLES)
     return f'there is no table "{plain(name)}"' + (hint or f" (tables: {', '.join(TABLES)})")

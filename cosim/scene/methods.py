@@ -3,6 +3,7 @@
 What a method computes is in ``cosim/coupling``.
 """
 
+from collections.abc import Set
 from dataclasses import dataclass
 
 
@@ -12,44 +13,31 @@ class CouplingMethod:
 
     name: str
     text: str
-    keys: frozenset[str] = frozenset()
+    keys: Set[str] = frozenset()
     """The keys of ``[coupling]`` that act, besides ``method``."""
-    chooses: frozenset[str] = frozenset()
+    chooses: Set[str] = frozenset()
     """The keys of ``[circuit]`` that the method chooses itself."""
 
 
-_STEP, _ORDER = "macro_step", "order"
+_ALL = (
+    CouplingMethod("step-locked", "mechanics follow each accepted step of ngspice"),
+    CouplingMethod("jacobi", "macro steps, both sides extrapolated", {"macro_step", "order"}),
+    CouplingMethod(
+        "gauss-seidel", "macro steps, mechanics take the current as a line", {"macro_step", "order"}
+    ),
+    CouplingMethod(
+        "mean-current", "macro steps, mechanics take the mean current", {"macro_step", "order"}
+    ),
+    CouplingMethod(
+        "companion", "macro steps, circuit carries the inertia of the mechanics", {"macro_step"}
+    ),
+    CouplingMethod(
+        "auto",
+        "cheapest method and steps of ngspice within coupling.tolerance",
+        {"tolerance"},
+        chooses={"reltol", "max_step"},
+    ),
+)
 
-METHODS: dict[str, CouplingMethod] = {
-    method.name: method
-    for method in (
-        CouplingMethod("step-locked", "mechanics follow each accepted step of ngspice"),
-        CouplingMethod(
-            "jacobi",
-            "macro steps, both sides extrapolated",
-            frozenset({_STEP, _ORDER}),
-        ),
-        CouplingMethod(
-            "gauss-seidel",
-            "macro steps, mechanics take the circuit's current as a line",
-            frozenset({_STEP, _ORDER}),
-        ),
-        CouplingMethod(
-            "mean-current",
-            "macro steps, mechanics take the circuit's mean current",
-            frozenset({_STEP, _ORDER}),
-        ),
-        CouplingMethod(
-            "companion",
-            "macro steps, circuit carries the inertia of the mechanics",
-            frozenset({_STEP}),
-        ),
-        CouplingMethod(
-            "auto",
-            "cheapest method and steps of ngspice within coupling.tolerance",
-            frozenset({"tolerance"}),
-            chooses=frozenset({"reltol", "max_step"}),
-        ),
-    )
-}
+METHODS = {method.name: method for method in _ALL}
 """Every method by its name; the order is that in which messages list them."""

@@ -26,7 +26,7 @@ from cosim.scene.tables import (
 _SHORT_STEP = 2e-5  # s
 
 FASTEST = 1e-6
-"""Least time constant of a coil, s, that the mechanics' integration takes along."""
+"""Least time constant of a coil, s, that the integration in the FMU can follow."""
 
 
 class Scene(BaseModel):
@@ -47,9 +47,8 @@ class Scene(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _fill(cls, data: Any) -> Any:
-        """Make models of the tables, with the staircase where the firmware is in the circuit, and
-        with shorter steps where a jump of the back-EMF within one, or a circuit of any kind, asks
-        for them.
+        """Defaults that depend on other keys: the firmware's staircase where the circuit has the
+        firmware; shorter steps where the back-EMF jumps (rigid walls) or the netlist is unknown.
         """
         if not isinstance(data, dict):
             return data
@@ -69,7 +68,7 @@ class Scene(BaseModel):
 
     @model_validator(mode="after")
     def _check_speed(self) -> "Scene":
-        """With "limited" one explicit method solves coil and mechanics: none may be stiff."""
+        """One explicit method solves coil and mechanics in the FMU: the coil must not be stiff."""
         if not self.rung.source_in_fmu:
             return self
         coil = self.coil
@@ -93,7 +92,7 @@ class Scene(BaseModel):
 
     @model_validator(mode="after")
     def _check_phase(self) -> "Scene":
-        """Two surfaces that move by themselves are solved in the FMU only, without a plate."""
+        """Only the FMU solves two surfaces that move independently, and without a plate."""
         if self.drive.phase_deg is None:
             return self
         able = sorted(name for name, rung in RUNGS.items() if rung.two_surfaces)
@@ -187,7 +186,7 @@ class Scene(BaseModel):
         return not self.rung.driven and self.drive.waveform in GIVEN_SURFACES
 
     def as_dict(self) -> dict[str, Any]:
-        """The scene as plain tables that make an equal scene: nothing absent or said twice."""
+        """The scene as plain tables that load to an equal scene, without absent or doubled keys."""
         data: dict[str, Any] = {"name": self.name, "description": self.description}
         for table in TABLES:
             values = getattr(self, table).model_dump(exclude_none=True)

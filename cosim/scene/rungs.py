@@ -4,18 +4,16 @@ What a rung computes is in ``cosim/simulation``; what scenes, messages and repor
 it is here.
 """
 
+from collections.abc import Set
 from dataclasses import dataclass
 
-_SOLVER = frozenset({"reltol", "max_step"})
-_SUPPLY = frozenset({"supply", "sense_resistance"})
-_SWING = frozenset({"swing_loss_high", "swing_loss_low"})
-_LIMIT = frozenset({"current_limit"})
-_DYNAMICS = frozenset(
-    {
-        "gain_bandwidth", "open_loop_gain", "slew_rate", "output_resistance", "snubber_resistance",
-        "snubber_capacitance",
-    }
-)  # fmt: skip
+_SOLVER = {"reltol", "max_step"}
+_SUPPLY = {"supply", "sense_resistance"}
+_SWING = {"swing_loss_high", "swing_loss_low"}
+_LIMIT = {"current_limit"}
+_SNUBBER = {"snubber_resistance", "snubber_capacitance"}
+_DYNAMICS = {"gain_bandwidth", "open_loop_gain", "slew_rate", "output_resistance"} | _SNUBBER
+_OF_NGSPICE = _SOLVER | _SUPPLY | _SWING | _LIMIT | _DYNAMICS
 
 
 @dataclass(frozen=True)
@@ -24,7 +22,7 @@ class Rung:
 
     name: str
     text: str
-    keys: frozenset[str]
+    keys: Set[str]
     """The keys of ``[circuit]`` that act, besides ``model``."""
     ngspice: bool = False
     """Whether ngspice solves the circuit and leads the coupling."""
@@ -58,43 +56,37 @@ class Rung:
         return self.driven and not self.ngspice
 
 
-RUNGS: dict[str, Rung] = {
-    rung.name: rung
-    for rung in (
-        Rung(
-            "full",
-            "schematic with its difference amplifier",
-            _SOLVER | _SUPPLY | _LIMIT | _DYNAMICS,
-            ngspice=True,
-            firmware=True,
-        ),
-        Rung(
-            "amplifier",
-            "behavioural current source",
-            _SOLVER | _SUPPLY | _SWING | _DYNAMICS,
-            ngspice=True,
-        ),
-        Rung(
-            "limited",
-            "current source reduced to its limits and the coil",
-            _SUPPLY | _SWING | _LIMIT,
-            source_in_fmu=True,
-        ),
-        Rung("ideal", "current = command", frozenset({"sense_resistance"})),
-        Rung(
-            "auto",
-            "cheapest of amplifier, limited and ideal within run.tolerance",
-            _SOLVER | _SUPPLY | _SWING | _LIMIT | _DYNAMICS,
-            ngspice=True,
-            automatic=True,
-        ),
-        Rung("none", "no coil", frozenset(), driven=False),
-        Rung(
-            "file",
-            "netlist named in circuit.netlist",
-            _SOLVER | _SUPPLY | _SWING | _LIMIT | _DYNAMICS | {"netlist"},
-            ngspice=True,
-        ),
-    )
-}
+_ALL = (
+    Rung(
+        "full",
+        "schematic with its difference amplifier",
+        _SOLVER | _SUPPLY | _LIMIT | _DYNAMICS,
+        ngspice=True,
+        firmware=True,
+    ),
+    Rung(
+        "amplifier",
+        "behavioural current source",
+        _SOLVER | _SUPPLY | _SWING | _DYNAMICS,
+        ngspice=True,
+    ),
+    Rung(
+        "limited",
+        "current source reduced to its limits and the coil",
+        _SUPPLY | _SWING | _LIMIT,
+        source_in_fmu=True,
+    ),
+    Rung("ideal", "current = command", {"sense_resistance"}),
+    Rung(
+        "auto",
+        "cheapest of amplifier, limited and ideal within run.tolerance",
+        _OF_NGSPICE,
+        ngspice=True,
+        automatic=True,
+    ),
+    Rung("none", "no coil", frozenset(), driven=False),
+    Rung("file", "netlist named in circuit.netlist", _OF_NGSPICE | {"netlist"}, ngspice=True),
+)
+
+RUNGS = {rung.name: rung for rung in _ALL}
 """Every rung by its name; the order is that in which messages list them."""

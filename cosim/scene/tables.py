@@ -59,7 +59,7 @@ def _both_or_neither(table: str, values: BaseModel, *pair: str) -> None:
 
 
 def is_number(value: object) -> bool:
-    """Whether a value that is not validated yet can be calculated with: no huge int, no NaN."""
+    """Whether an unvalidated value is a number of ordinary size: no huge int, no NaN."""
     return isinstance(value, int | float) and not isinstance(value, bool) and -1e9 < value < 1e9
 
 
@@ -83,9 +83,7 @@ class Drive(Table):
     """
 
     waveform: Literal["sawtooth", "sine", "square", "optimal", "quaid", "file"] = _choice(
-        "sawtooth",
-        "Shape of the command; optimal, quaid, file and, with circuit none, sine are velocities "
-        "that the surface is given",
+        "sawtooth", "Shape of the command; of the surface's velocity for optimal, quaid and file"
     )
     frequency: float = _number(
         20.0, "Hz", 0.01, 1e5, "Frequency; the staircase rounds its period up to whole 50 us steps"
@@ -96,44 +94,29 @@ class Drive(Table):
         0.0, "s", 0.0, 100.0, "Length of the sawtooth's linear fall, at the end of the period"
     )
     phase_deg: float | None = _number(
-        None,
-        "deg",
-        0.0,
-        360.0,
-        "Lag of the second surface's command; where given, two surfaces move by themselves, each "
-        "with a source and coil of its own",
+        None, "deg", 0.0, 360.0, "Lag of the second of two surfaces, each with its own source"
     )
     acceleration_max: float = _number(
-        98.1, "m/s2", 1e-3, 1e6, "Greatest acceleration of a given surface, optimal and quaid"
+        98.1, "m/s2", 1e-3, 1e6, "Greatest acceleration of the surface, optimal and quaid"
     )
     optimum: Literal["up", "down", "robust"] = _choice(
-        "up",
-        "Optimal waveform: fastest upwards, fastest downwards, or upwards where part and surface "
-        "need not meet exactly at the period's end",
+        "up", "Optimal waveform: fastest up, fastest down, or up with no exact meeting at the end"
     )
     velocity_amplitude: float = _number(
-        0.1, "m/s", 0.0, 1e3, "Amplitude of a given surface's velocity, sine"
+        0.1, "m/s", 0.0, 1e3, "Amplitude of the surface's velocity, sine with no coil"
     )
     file: str | None = _choice(
         None, "Tracked trial, or CSV with time and velocity, that prescribes the surface's motion"
     )
     quantised: bool = _choice(
         False,
-        "Firmware's staircase of 10-bit codes every 50 us; true for a sharp sawtooth "
-        'with circuit.model = "full" unless given',
+        "Firmware's staircase of 10-bit codes every 50 us; default of a sharp sawtooth in full",
     )
     loop_time: float = _number(
-        0.0,
-        "s",
-        0.0,
-        1e-3,
-        "Time of one pass of the firmware's loop, which lengthens the staircase's steps; "
-        "0 makes each 50 us, the device needs about 22 us",
+        0.0, "s", 0.0, 1e-3, "Pass of the firmware's loop, about 22 us; 0 makes steps of 50 us"
     )
     pwm_ripple: bool = _choice(
-        False,
-        "Offset pin as the 488.28 Hz PWM that it is, not as its mean; "
-        'with circuit.model = "full" only',
+        False, "Offset pin as its 488.28 Hz PWM instead of the mean; in circuit full only"
     )
     pot_max: float | None = _number(
         None, "1", 0.0, 1.0, "Knob that sets the DAC's maximum, instead of amplitude"
@@ -232,26 +215,14 @@ class Circuit(Table):
     supply: float = _number(18.0, "V", 0.1, 1e3, "Supply voltage, both signs")
     sense_resistance: float = _of_fmu("sense_resistance")
     current_limit: float = _of_fmu("current_limit")
-    gain_bandwidth: float = _number(
-        1e6, "Hz", 1e2, 1e12, "Gain-bandwidth product of the power amplifier"
-    )
-    open_loop_gain: float = _number(
-        98.0, "dB", 20.0, 200.0, "Open-loop gain of the power amplifier"
-    )
+    gain_bandwidth: float = _number(1e6, "Hz", 1e2, 1e12, "Gain-bandwidth product of the amplifier")
+    open_loop_gain: float = _number(98.0, "dB", 20.0, 200.0, "Open-loop gain of the amplifier")
     slew_rate: float = _number(10e6, "V/s", 1e2, 1e12, "Slew rate of the power amplifier")
     swing_loss_high: float = _number(
-        4.0,
-        "V",
-        0.0,
-        1e3,
-        'Least voltage from the output to the positive supply; "full" takes the data sheet\'s',
+        4.0, "V", 0.0, 1e3, "Supply less highest output; full takes the data sheet's"
     )
     swing_loss_low: float = _number(
-        4.0,
-        "V",
-        0.0,
-        1e3,
-        'Least voltage from the output to the negative supply; "full" takes the data sheet\'s',
+        4.0, "V", 0.0, 1e3, "Lowest output less negative supply; full takes the data sheet's"
     )
     output_resistance: float = _number(
         0.0, "Ohm", 0.0, 1e3, "Open-loop output resistance of the power amplifier"
@@ -264,11 +235,7 @@ class Circuit(Table):
     )
     reltol: float = _number(1e-5, "1", 1e-9, 1e-2, "Relative tolerance of ngspice")
     max_step: float = _number(
-        5e-5,
-        "s",
-        1e-9,
-        1e-2,
-        "Largest time step of ngspice; 2e-05 s by default with rigid walls or a netlist",
+        5e-5, "s", 1e-9, 1e-2, "Largest step of ngspice; 2e-05 by default with rigid walls or file"
     )
 
     @model_validator(mode="after")
@@ -313,9 +280,7 @@ class Mechanics(Table):
     """Surface, ram and part."""
 
     actuator: Literal["ram", "direct"] = _choice(
-        "ram",
-        "Reaction body of the coil: a free ram, or a magnet fixed to the ground (direct drive), "
-        "where suspension and walls act between surface and ground",
+        "ram", "Reaction body of the coil: a free ram, or a magnet on the ground (direct drive)"
     )
     ram_mass: float = _of_fmu("ram_mass")
     surface_mass: float = _of_fmu("surface_mass")
@@ -328,7 +293,7 @@ class Mechanics(Table):
     suspension_damping: float = _of_fmu("suspension_damping")
     travel: float = _of_fmu("travel")
     contact: Literal["compliant", "rigid"] = _choice(
-        "compliant", "Law of the walls: Hunt-Crossley or instantaneous impacts"
+        "compliant", "Law of the walls: Hunt-Crossley, or instantaneous Newton impacts"
     )
     restitution: float = _of_fmu("restitution")
     contact_stiffness: float = _of_fmu("contact_stiffness")
@@ -345,9 +310,7 @@ class Friction(Table):
     mu_k: float = _of_fmu("mu_k")
     normal_force: float = _of_fmu("normal_force")
     normal_force_file: str | None = _choice(
-        None,
-        "CSV with time [s] and normal_force [N], linear in between, its first and last values kept "
-        "before and after; instead of normal_force",
+        None, "CSV with time [s] and normal_force [N], linear in between; replaces normal_force"
     )
     mu_plate: float = _of_fmu("mu_plate")
 
@@ -423,8 +386,7 @@ class Run(Table):
         "1",
         1e-6,
         1.0,
-        'Relative error of v_average that a simpler circuit may make: for circuit.model = "auto", '
-        "and for the ladder",
+        "Relative error of v_average that a simpler circuit may make: auto, ladder",
     )
 
     @model_validator(mode="before")

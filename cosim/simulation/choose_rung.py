@@ -7,11 +7,13 @@ runs. What the rungs differ in acts on the current: where a ten-thousandth more 
 v_average much, the motion being chaotic or near another one, no simpler rung can be relied on.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
+from cosim.drive.command import period
 from cosim.errors import BadInput
 from cosim.scene import Scene, changed
+from cosim.waveforms.result import Result
 
 TOP = "amplifier"
 
@@ -37,30 +39,34 @@ class Choice:
     errors: dict[str, float]
 
 
-def choose(scene: Scene) -> Choice:
+def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
     """The cheapest rung of a scene whose v_average is within ``run.tolerance`` of the amplifier's.
 
-    Raises what :func:`cosim.simulation.simulate.simulate` does.
+    ``run`` runs a scene. Raises what it raises.
     """
+
+    def v_average(scene: Scene) -> float:
+        return run(scene).summary["v_average"]
+
     tolerance = scene.run.tolerance
     try:
         limited = _few_rows(changed(scene, {"circuit.model": "limited"}, "auto"))
     except BadInput:  # too fast a coil
         return Choice(TOP, "the rung limited cannot solve this coil", {})
-    own = _v_average(limited)
+    own = v_average(limited)
     force = scene.coil.force_factor
     near = [
         changed(limited, {"coil.force_factor": force * (1.0 + change)}, "auto")
         for change in (-TREMBLE, TREMBLE)
     ]
-    moved = max(relative_error(_v_average(other), own) for other in near)
+    moved = max(relative_error(v_average(other), own) for other in near)
     if moved > tolerance:
         why = f"a ten-thousandth of the coil's force moves v_average by {moved:.2%}"
         return Choice(TOP, why, {"limited": moved, "ideal": moved})
     part = _part(limited)
-    expected = _v_average(changed(part, {"circuit.model": TOP}, "auto"))
-    errors = {"limited": max(moved, relative_error(_v_average(part), expected))}
-    ideal = _v_average(changed(limited, {"circuit.model": "ideal"}, "auto"))
+    expected = v_average(changed(part, {"circuit.model": TOP}, "auto"))
+    errors = {"limited": max(moved, relative_error(v_average(part), expected))}
+    ideal = v_average(changed(limited, {"circuit.model": "ideal"}, "auto"))
     errors["ideal"] = relative_error(ideal, own) + errors["limited"]
     for model in ("ideal", "limited"):
         if errors[model] <= tolerance:
@@ -80,18 +86,9 @@ def _few_rows(scene: Scene) -> Scene:
 
 def _part(scene: Scene) -> Scene:
     """The first whole periods of a run."""
-    from cosim.studies.sweep.point import drive_period
-
-    period = drive_period(scene)
-    count = max(FEWEST_PERIODS, round(0.5 * PART * scene.run.duration / period))
-    if 2 * count * period >= scene.run.duration:
+    length = period(scene)
+    count = max(FEWEST_PERIODS, round(0.5 * PART * scene.run.duration / length))
+    if 2 * count * length >= scene.run.duration:
         return scene
-    times = {"run.settle": count * period, "run.duration": 2 * count * period}
-    return changed(scene, times | {"run.output_step": count * period}, "auto")
-
-
-def _v_average(scene: Scene) -> float:
-    from cosim.simulation.simulate import simulate
-
-    summary: dict[str, Any] = simulate(scene).summary
-    return summary["v_average"]
+    times = {"run.settle": count * length, "run.duration": 2 * count * length}
+    return changed(scene, times | {"run.output_step": count * length}, "auto")

@@ -1,87 +1,65 @@
-"""Runs a scene: picks the participants that its rung has, couples them, and gathers the result."""
+"""Runs a scene: gives the mechanics to its rung and gathers the result."""
 
-import platform
 import time
 from collections.abc import Callable
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.coupling.loop import coupling
-from cosim.coupling.loop.compiled import CompiledRecorder, library
 from cosim.coupling.loop.recorder import Recorder
-from cosim.drive.command import Command, command, commands
+from cosim.drive.command import commands
 from cosim.files.spill import Tape, blocks
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, changed
-from cosim.simulation import electrics
+from cosim.simulation.choose_rung import choose
+from cosim.simulation.choose_steps import simulate_within_tolerance
+from cosim.simulation.rungs.electrics import commanded
+from cosim.simulation.rungs.given_surface import simulate_part
+from cosim.simulation.rungs.rung import Driven, rungs
 from cosim.simulation.summary import summarise
-from cosim.toolchain.isolation import isolated
+from cosim.toolchain.processes import isolated
+from cosim.toolchain.versions import versions
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.result import Result
 
-if TYPE_CHECKING:
-    from cosim.coupling.loop.run import CircuitRun
-
 Array = npt.NDArray[np.float64]
 
-_INTERVALS = 4096
-"""How many intervals of a command are prepared at a time."""
+Progress = Callable[[float], None]
 
 
-def simulate(
-    scene: Scene,
-    progress: Callable[[float], None] = lambda _: None,
-    fmi_version: int = 3,
-    compiled: bool = True,
-) -> Result:
+def simulate(scene: Scene, progress: Progress = lambda _: None, fmi_version: int = 3) -> Result:
     """Run a scene. ``progress`` is told the simulated time (s) now and then.
-
-    Not ``compiled``, every step goes through Python, as on a machine without a C compiler; the
-    numbers are the same.
 
     A netlist of the user's own runs in a process of its own, as does every circuit after ngspice
     has given up in this one. Raises BadInput for a netlist that cannot be used, SimulationFailed
     with where, when, and what to try.
     """
+    again = partial(simulate, progress=progress, fmi_version=fmi_version)
     if scene.rung.automatic:
-        return _by_itself(scene, progress, fmi_version, compiled)
+        return _cheapest(scene, again)
     if scene.surface_is_given:
-        from cosim.simulation.given_surface import simulate_part
-
         waveforms, summary = simulate_part(scene, progress)
         return Result(scene, waveforms, summary | {"versions": versions()})
     if scene.coupling.method == "auto" and scene.rung.ngspice:
-        from cosim.simulation.choose_steps import simulate_within_tolerance
-
-        return simulate_within_tolerance(
-            scene, lambda chosen: simulate(chosen, progress, fmi_version, compiled)
-        )
+        return simulate_within_tolerance(scene, again)
     if _needs_own_process(scene):
-        return isolated(_simulate, scene, progress, fmi_version=fmi_version, compiled=compiled)
-    return _simulate(scene, progress, fmi_version, compiled)
+        return isolated(_simulate, scene, progress, fmi_version=fmi_version)
+    return _simulate(scene, progress, fmi_version)
 
 
-def _by_itself(
-    scene: Scene, progress: Callable[[float], None], fmi_version: int, compiled: bool
-) -> Result:
+def _cheapest(scene: Scene, run: Callable[[Scene], Result]) -> Result:
     """The run of the cheapest rung that suffices; what it took to find it is part of its time."""
-    from cosim.simulation.choose_rung import choose
-
     began = time.perf_counter()
-    choice = choose(scene)
-    taken = changed(scene, {"circuit.model": choice.model}, "auto")
-    result = simulate(taken, progress, fmi_version, compiled)
+    choice = choose(scene, simulate)
+    result = run(changed(scene, {"circuit.model": choice.model}, "auto"))
     found = {
         "circuit_model": choice.model,
         "circuit_model_why": choice.why,
         "circuit_model_errors": choice.errors,
         "wall_time": time.perf_counter() - began,
     }
-    return Result(taken, result.columns, result.summary | found)
+    return Result(result.scene, result.columns, result.summary | found)
 
 
 def _needs_own_process(scene: Scene) -> bool:
@@ -93,158 +71,35 @@ def _needs_own_process(scene: Scene) -> bool:
     return spoilt()
 
 
-def _simulate(
-    scene: Scene, progress: Callable[[float], None], fmi_version: int, compiled: bool
-) -> Result:
+def _simulate(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     began = time.perf_counter()
-    drive, *second_drive = commands(scene)
     mechanics = Mechanics(scene, fmi_version)
     try:
-        recorder = _recorder(scene, mechanics, progress, compiled)
-        electric, circuit = None, None
-        second: dict[str, Array] = {}
-        if scene.circuit.model == "none":
-            recorder.advance(scene.run.duration, 0.0, 0.0)
-        elif scene.circuit.model == "ideal":
-            share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
-            logs = _prescribe(scene, [drive, *second_drive], recorder, share)
-            motion = mechanics.totals()["energy_in"]
-            electric = electrics.from_command(
-                scene, drive, logs[0], recorder.time, recorder.column("back_emf"), motion
-            )
-            for command_2 in second_drive:
-                other = electrics.from_command(
-                    scene, command_2, logs[1], recorder.time, recorder.column("back_emf_2"), 0.0
-                )
-                electric = electrics.both(electric, other)
-                second = {"current_2": other.current, "coil_voltage_2": other.coil_voltage}
-        elif scene.circuit.model == "limited":
-            _prescribe(scene, [drive, *second_drive], recorder, 1.0)
-            electric = electrics.from_source(scene, drive, recorder)
-            if second_drive:
-                second = {
-                    "current_2": recorder.column("coil_current_2"),
-                    "coil_voltage_2": recorder.column("coil_voltage_2"),
-                }
-        else:
-            from cosim.circuit.false_cycles import refuse_false
-            from cosim.circuit.netlist import limits_at_work
-
-            circuit = _circuit_run(scene, drive, recorder)
-            circuit.run()
-            log = circuit.log()
-            refuse_false(scene, log, lambda finer: _circuit_log(finer, fmi_version, compiled))
-            if scene.circuit.netlist is not None:
-                electrics.refuse_foreign_coil(scene, log)
-            electric = electrics.from_circuit(scene, drive, log, recorder.time, limits_at_work)
-        for command_2 in second_drive:
-            second["command_2"] = electrics.commanded(command_2, recorder.time)
+        recorder = Recorder(scene, mechanics, progress)
+        driven = rungs()[scene.circuit.model].drive(scene, recorder)
         totals = mechanics.totals()
-        steps = mechanics.steps
     finally:
         mechanics.close()
-    summary = summarise(scene, recorder, totals, electric)
-    summary |= {
-        "circuit_steps": circuit.steps if circuit else 0,
-        "circuit_rejected": circuit.attempts - circuit.steps if circuit else 0,
-        "fmu_steps": steps,
+    summary = summarise(scene, recorder, totals, driven.electric) | {
+        "circuit_steps": driven.circuit_steps,
+        "circuit_rejected": driven.circuit_rejected,
+        "fmu_steps": recorder.steps,
         "wall_time": time.perf_counter() - began,
-        "method": _method(scene),
-        "versions": versions() | ({"ngspice": circuit.ngspice} if circuit else {}),
+        "method": driven.method,
+        "versions": {**versions(), **driven.versions},
     }
-    return Result(scene, _waveforms(scene, recorder, electric, second), summary)
-
-
-def _method(scene: Scene) -> str:
-    if scene.rung.source_in_fmu:
-        return "monolithic"
-    return scene.coupling.method if scene.rung.ngspice else "uncoupled"
-
-
-def _recorder(
-    scene: Scene, mechanics: Mechanics, progress: Callable[[float], None], compiled: bool
-) -> Recorder:
-    # The compiled steps have one input, and are those of the default coupling.
-    if mechanics.has_second or mechanics.normal_force is not None:
-        compiled = False
-    if scene.rung.ngspice and scene.coupling.method != "step-locked":
-        compiled = False
-    made = CompiledRecorder if compiled and library() is not None else Recorder
-    return made(scene, mechanics, progress)
-
-
-def _circuit_run(scene: Scene, drive: Command, recorder: Recorder) -> "CircuitRun":
-    if isinstance(recorder, CompiledRecorder):
-        from cosim.coupling.loop.compiled_run import CompiledRun
-
-        return CompiledRun(scene, drive, recorder)
-    from cosim.coupling.loop.run import CircuitRun
-
-    return CircuitRun(scene, drive, coupling(scene, recorder, drive))
-
-
-def _circuit_log(scene: Scene, fmi_version: int, compiled: bool) -> dict[str, Array]:
-    """The circuit's waveforms of a run of which nothing else is wanted."""
-    mechanics = Mechanics(scene, fmi_version)
-    try:
-        recorder = _recorder(scene, mechanics, lambda _: None, compiled)
-        circuit = _circuit_run(scene, command(scene), recorder)
-        circuit.run()
-        return circuit.log()
-    finally:
-        mechanics.close()
-
-
-def _prescribe(
-    scene: Scene, drives: list[Command], recorder: Recorder, share: float
-) -> list[dict[str, Array]]:
-    """Give the mechanics ``share`` times each surface's command, from corner to corner.
-
-    With the rung ``ideal`` that is the coil's current, whatever voltage it takes (A/V); with
-    ``limited`` the command itself.
-    """
-    duration = scene.run.duration
-    times, logs = Tape(1), [Tape(2) for _ in drives]
-    times.append(0.0)
-    reached = 0.0
-    while reached < duration:
-        edges = [reached]
-        ends: list[list[tuple[float, float]]] = [[] for _ in drives]
-        while edges[-1] < duration and len(edges) <= _INTERVALS:
-            begin = edges[-1]
-            stop = min(
-                duration,
-                *(drive.next_corner(begin) for drive in drives),
-                *(begin + drive.longest_straight for drive in drives),
-            )
-            edges.append(stop)
-            for drive, values in zip(drives, ends, strict=True):
-                values.append((share * drive.value(begin), share * drive.value_before(stop)))
-        reached = edges[-1]
-        _follow(recorder, edges, ends)
-        times.append(edges[1:])
-        for log, values in zip(logs, ends, strict=True):
-            log.append(values)
-    return [{"time": times.column(), "start": log.column(0), "end": log.column(1)} for log in logs]
-
-
-def _follow(recorder: Recorder, edges: list[float], ends: list[list[tuple[float, float]]]) -> None:
-    if len(ends) == 1:
-        recorder.follow(np.array(edges[1:]), *np.array(ends[0]).T)
-        return
-    for k, stop in enumerate(edges[1:]):
-        value, value_end = ends[1][k]
-        recorder.mechanics.give_second(value, (value_end - value) / (stop - edges[k]))
-        recorder.advance(stop, *ends[0][k])
+    return Result(scene, _waveforms(scene, recorder, driven), summary)
 
 
 def _waveforms(
     scene: Scene,
     recorder: Recorder,
-    electric: electrics.Electrics | None,
-    second: dict[str, Array],
+    driven: Driven,
 ) -> dict[str, Array]:
-    known = {"time": recorder.time} | second
+    known = {"time": recorder.time, **driven.second}
+    electric = driven.electric
+    for command_2 in commands(scene)[1:]:
+        known["command_2"] = commanded(command_2, recorder.time)
     if electric is not None:
         known["command"] = electric.command
         known["current"] = electric.current
@@ -261,20 +116,3 @@ def _waveforms(
             forces.append([force.value(t) for t in known["time"][part].tolist()])
         known["normal_force"] = forces.column()
     return {name: known[name] for name in COLUMNS if name in known}
-
-
-def versions() -> dict[str, str]:
-    """What made the result."""
-    return dict(_versions())
-
-
-@cache
-def _versions() -> dict[str, str]:
-    # Looked up once: it takes longer than a short run of the part alone.
-    found = {"python": platform.python_version()}
-    for package in ("cosim", "fmpy", "PySpice", "numpy"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "unknown"
-    return found

@@ -8,8 +8,8 @@ import numpy.typing as npt
 from cosim.coupling.loop.recorder import Recorder
 from cosim.files.spill import blocks
 from cosim.scene import Scene
-from cosim.simulation.electrics import Electrics
-from cosim.trials.published import FRAME_RATE
+from cosim.simulation.rungs.electrics import Electrics
+from cosim.trials.camera import three_point_accelerations
 
 UNITS = {
     "v_average": "m/s",
@@ -74,7 +74,7 @@ def _seen(frames: npt.NDArray[np.float64]) -> tuple[float, float] | tuple[None, 
     """The largest and smallest acceleration (m/s²) that a camera reads from heights (m)."""
     most, least = -np.inf, np.inf
     for part in blocks(len(frames) - 2):
-        read = np.diff(frames[part.start : part.stop + 2], 2) * FRAME_RATE**2
+        read = three_point_accelerations(frames[part.start : part.stop + 2])
         most, least = max(most, float(read.max())), min(least, float(read.min()))
     return (most, least) if len(frames) > 2 else (None, None)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.files.atomic import whole
-from cosim.simulation.simulate import versions
+from cosim.toolchain.versions import versions
 
 Row = dict[str, Any]
 """Cells by their column; all rows of a table have the same ones."""

@@ -8,7 +8,6 @@ weights of the part, m g, for the trials 1…10.
 """
 
 GRAVITY = 9.81  # m/s²
-FRAME_RATE = 960.0  # of the camera, 1/s
 
 MU_S = 0.72  # measured, and kept in the fit
 MU_K_FITTED = 0.6234
@@ -23,9 +22,3 @@ FORCE_BOUNDS = (
     *((4.9, 7.3), (4.9, 7.3), (4.56, 6.84), (4.0, 8.0), (8.0, 24.0)),
 )
 OTHER_BOUNDS = (4.0, 24.0)  # for a trial that is not among the ten: the widest of theirs
-
-# What the authors report of their fit.
-MEAN_ERROR_MM = 0.161
-MEAN_ERROR_PERCENT = 11.87
-FORCE_CHANGE_MEDIAN_PERCENT = 26.99
-FORCE_CHANGE_MEAN_PERCENT = 33.78

@@ -8,14 +8,15 @@ Two forms are read, with commas, semicolons or tabs between the cells:
 - what Tracker (physlets.org/tracker) exports for several tracks: lines that begin with ``#``, a
   line with the tracks' names, and a line ``t x y v_{y} …`` with their columns; y is the height.
 
-Times are in s and lengths in mm, unless told otherwise. Empty cells, ``nan``, ``?`` and U+FFFD
-(what became of Tracker's mark for a missing value) stand for no value. A velocity that is missing,
-or its whole column, is made by central differences, as Tracker does.
+Times are in s and lengths in mm. Empty cells, ``nan``, ``?`` and U+FFFD (Tracker's mark for a
+missing value, in an encoding that was lost) stand for no value. A velocity that is missing, or its
+whole column, is made by central differences, as Tracker does.
 """
 
 import math
 import re
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -31,8 +32,11 @@ TRACKS = {
     "o": ("o", "part", "object"),
     "s": ("s", "spring", "springed plate", "spring plate"),
 }
+Rows = list[tuple[int, list[str]]]
+"""Rows of cells with their line numbers in the file."""
 QUANTITIES = {"y": "z", "z": "z", "vy": "vz", "vz": "vz", "ay": "az", "az": "az"}
 FEWEST_ROWS = 8
+MM = 1e-3  # m
 LARGEST_FILE = 50_000_000  # bytes
 
 
@@ -59,33 +63,31 @@ class Trial:
     plate: Track | None
 
 
-def read_folder(folder: Path, unit: float = 1e-3) -> list[Trial]:
+def read_folder(folder: Path) -> list[Trial]:
     """All trials of a folder, in the order of their numbers.
 
     Where files have “trial” in their names only these are read, else all ``.csv`` and ``.txt``.
     """
     try:
-        files = [
-            path for path in sorted(folder.iterdir()) if path.suffix.lower() in (".csv", ".txt")
-        ]
+        found = sorted(folder.iterdir())
     except OSError as error:
         raise BadInput(f"{folder}: cannot be read ({error.strerror}).") from error
+    files = [path for path in found if path.suffix.lower() in (".csv", ".txt")]
     files = [path for path in files if path.is_file() and not path.name.startswith(".")]
     files = [path for path in files if "trial" in path.name.lower()] or files
     if not files:
         raise BadInput(f"{folder}: there are no trials (.csv or .txt) in this folder.")
-    trials = [read(path, unit) for path in files]
-    return sorted(trials, key=lambda t: (t.number is None, t.number or 0, t.name))
+    return sorted(map(read, files), key=lambda t: (t.number is None, t.number or 0, t.name))
 
 
-def read(path: Path, unit: float = 1e-3) -> Trial:
-    """One trial, whose lengths are in ``unit`` metres."""
+def read(path: Path) -> Trial:
+    """One trial. Raises BadInput, with file, row and column, for what is wrong with it."""
     lines = [(n, line) for n, line in enumerate(_text(path).splitlines(), 1) if line.strip()]
     tracker = any(line.startswith("#") for _, line in lines)
     lines = [(n, line) for n, line in lines if not line.startswith("#")]
     if not lines:
         raise BadInput(f"{path}: this file holds no table.")
-    separator = _separator([line for _, line in lines[:2]])
+    separator = next((sign for sign in "\t;" if any(sign in line for _, line in lines[:2])), ",")
     table = [
         (n, [cell.strip().strip('"').strip() for cell in line.split(separator)])
         for n, line in lines
@@ -98,10 +100,12 @@ def read(path: Path, unit: float = 1e-3) -> Trial:
     columns = {name: _column(path, rows, name, i, separator) for name, i in names.items()}
     for name in ("t", "zp", "zo"):
         if name not in columns:
-            raise BadInput(
-                f"{path}: there is no column {name} (found: {', '.join(names) or 'none'})."
-            )
-        _complete(path, rows, name, columns[name])
+            found = ", ".join(names) or "none"
+            raise BadInput(f"{path}: there is no column {name} (found: {found}).")
+        missing = np.flatnonzero(np.isnan(columns[name]))
+        if len(missing):
+            row = rows[missing[0]][0]
+            raise BadInput(f"{path}: row {row}, column {name}: the value is missing.")
     if len(rows) < FEWEST_ROWS:
         raise BadInput(f"{path}: there are {len(rows)} rows, and {FEWEST_ROWS} are needed.")
     time = columns["t"]
@@ -113,9 +117,9 @@ def read(path: Path, unit: float = 1e-3) -> Trial:
         name=path.stem,
         number=int(number[-1]) if number else None,
         time=time,
-        platform=_track(columns, "p", unit),
-        part=_track(columns, "o", unit),
-        plate=_track(columns, "s", unit) if "zs" in columns else None,
+        platform=_track(columns, "p"),
+        part=_track(columns, "o"),
+        plate=_track(columns, "s") if "zs" in columns else None,
     )
 
 
@@ -131,16 +135,6 @@ def _text(path: Path) -> str:
     return data.decode("utf-8-sig", errors="replace")  # what is no UTF-8 becomes U+FFFD: missing
 
 
-def _separator(lines: list[str]) -> str:
-    for separator in ("\t", ";"):
-        if any(separator in line for line in lines):
-            return separator
-    return ","
-
-
-Rows = list[tuple[int, list[str]]]
-
-
 def _header(path: Path, table: Rows, tracker: bool) -> tuple[dict[str, int], Rows]:
     """The place of each known column, and the rows below the header."""
     head = table[0][1]
@@ -148,7 +142,7 @@ def _header(path: Path, table: Rows, tracker: bool) -> tuple[dict[str, int], Row
         names = [_plain(cell) for cell in head]
         below = table[1:]
     elif len(table) > 1 and table[1][1][0] == "t":
-        names = _tracker_names(path, table[0], table[1])
+        names = _tracker_names(path, *table[0], table[1][1])
         below = table[2:]
     else:
         what = "a header with the column t" if not tracker else "a header t x y … of Tracker's"
@@ -168,13 +162,10 @@ def _plain(name: str) -> str:
     return re.sub(r"\[.*\]|[_{}\s]", "", name)
 
 
-def _tracker_names(
-    path: Path, names: tuple[int, list[str]], head: tuple[int, list[str]]
-) -> list[str]:
+def _tracker_names(path: Path, line: int, tracks: list[str], head: list[str]) -> list[str]:
     """Names as in the first form, from the line with the tracks and the line with t x y t x y."""
-    cells = [*names[1], *[""] * (len(head[1]) - len(names[1]))]
     track, found = "", []
-    for cell, quantity in zip(cells, map(_plain, head[1]), strict=False):
+    for cell, quantity in zip_longest(tracks[: len(head)], map(_plain, head), fillvalue=""):
         track = cell or track
         if quantity == "t":
             found.append("t" if "t" not in found else "")
@@ -183,12 +174,12 @@ def _tracker_names(
         known = body and QUANTITIES.get(quantity)
         found.append(f"{known}{body}" if known else "")
     if not {"zp", "zo"} <= set(found):
-        tracks = ", ".join(cell for cell in names[1] if cell) or "none"
+        named = ", ".join(filter(None, tracks)) or "none"
         raise BadInput(
-            f"{path}: row {names[0]}: the tracks platform and part are needed with their heights y "
-            f"(found: {tracks})."
+            f"{path}: row {line}: the tracks platform and part are needed with their heights y "
+            f"(found: {named})."
         )
-    # Passed over, and unlike each other.
+    # The others are skipped, but must differ from each other.
     return [name or f"({i})" for i, name in enumerate(found)]
 
 
@@ -212,22 +203,12 @@ def _column(path: Path, rows: Rows, name: str, place: int, separator: str) -> Ar
     return values
 
 
-def _complete(path: Path, rows: Rows, name: str, values: Array) -> None:
-    missing = np.flatnonzero(np.isnan(values))
-    if len(missing):
-        raise BadInput(f"{path}: row {rows[missing[0]][0]}, column {name}: the value is missing.")
-
-
-def _track(columns: dict[str, Array], body: str, unit: float) -> Track:
+def _track(columns: dict[str, Array], body: str) -> Track:
     time = columns["t"]
     nothing = np.full(len(time), np.nan)
-    z = columns[f"z{body}"] * unit
-    v = columns.get(f"vz{body}", nothing) * unit
+    z, v, a, v_across = (
+        columns.get(f"{quantity}{body}", nothing) * MM for quantity in ("z", "vz", "az", "vx")
+    )
     central = nothing.copy()
     central[1:-1] = (z[2:] - z[:-2]) / (time[2:] - time[:-2])
-    return Track(
-        z,
-        np.where(np.isnan(v), central, v),
-        columns.get(f"az{body}", nothing) * unit,
-        columns.get(f"vx{body}", nothing) * unit,
-    )
+    return Track(z, np.where(np.isnan(v), central, v), a, v_across)

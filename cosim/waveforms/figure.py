@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from cosim.files.picture import Picture
 from cosim.files.spill import release
 from cosim.scene import Scene
-from cosim.trials.published import FRAME_RATE
+from cosim.trials.camera import FRAME_RATE, three_point_accelerations
 
 Array = npt.NDArray[np.float64]
 
@@ -253,7 +253,7 @@ def _acceleration(axis: Axes, scene: Scene, waves: dict[str, Array], shown: slic
     frames = np.arange(np.ceil(time[0] * FRAME_RATE), time[-1] * FRAME_RATE) / FRAME_RATE
     heights = np.interp(frames, time, waves["z_surface"][shown])
     if len(frames) > 2:
-        read = np.diff(heights, 2) * FRAME_RATE**2
+        read = three_point_accelerations(heights)
         axis.plot(
             frames[1:-1] * 1e3,
             read,

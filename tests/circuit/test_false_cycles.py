@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cosim.circuit.false_cycles import BURST, burst_ends, swings
-from cosim.coupling.loop import run
+from cosim.coupling.loop import lead
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene, load
 from cosim.simulation.simulate import simulate
@@ -56,14 +56,14 @@ def scene(case: tuple, reltol: float) -> Scene:
 
 @pytest.fixture
 def trapezoidal(monkeypatch: pytest.MonkeyPatch) -> None:
-    original = run.prepare
+    original = lead.prepare
 
     def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
         deck, saved = original(scene)
         assert "method=gear" in deck
         return deck.replace("method=gear", "method=trap"), saved
 
-    monkeypatch.setattr(run, "prepare", prepare)
+    monkeypatch.setattr(lead, "prepare", prepare)
 
 
 def reported(case: tuple, reltol: float) -> bool:

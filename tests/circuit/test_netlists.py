@@ -15,6 +15,7 @@ from cosim.drive.command import Constant, Staircase, WithPwm
 from cosim.scene.firmware import staircase, volts
 from tests.helpers import needs
 from tests.helpers.datasheet import ROWS, check, missing, write
+from tests.helpers.pins import pin, pin_before, v_dac, v_dac_before
 from tests.helpers.spice import CIRCUITS, crossing, netlist, opamp, run, run_all
 
 pytestmark = [pytest.mark.physics, needs.ngspice_library]
@@ -168,9 +169,9 @@ def test_pwm_ripple(tmp_path, code):
     """The edges of cosim.drive.command at the schematic's filter, against the closed form."""
     mean, stop = volts(code), 0.06
     drive = WithPwm(_offset_at(mean))
-    points, t = [(0.0, mean), (1e-9, drive.v_offset_at(0.0))], 0.0
+    points, t = [(0.0, mean), (1e-9, pin(drive, 0.0))], 0.0
     while (t := drive.next_jump(t)) < stop:
-        points += [(t - 1e-9, drive.v_offset_before(t)), (t, drive.v_offset_at(t))]
+        points += [(t - 1e-9, pin_before(drive, t)), (t, pin(drive, t))]
     flat = " ".join(f"{t!r} {v!r}" for t, v in points)
     r = run(
         tmp_path,
@@ -204,11 +205,11 @@ def _offset_at(mean):
 
 def test_dac_staircase(tmp_path):
     drive = Staircase(staircase(1023, 5.0), volts(512))
-    check("dac levels", len({drive.v_dac(k * 50e-6) for k in range(4000)}))
+    check("dac levels", len({v_dac(drive, k * 50e-6) for k in range(4000)}))
     drive, points, t = Staircase(staircase(1023, 20.0), volts(512)), [], 0.0
     while t < 1.05e-3:
         after = drive.next_jump(t)
-        points += [(t, drive.v_dac(t)), (after - 1e-9, drive.v_dac_before(after))]
+        points += [(t, v_dac(drive, t)), (after - 1e-9, v_dac_before(drive, after))]
         t = after
     flat = " ".join(f"{t!r} {v!r}" for t, v in points)
     rest = (r"^Voffset.*$", f"Voffset pwm 0 {volts(512)!r}")

@@ -1,4 +1,4 @@
-"""Whatever a scene or an override holds: a scene, or one sentence that helps; never a traceback."""
+"""Any scene file or override loads, or is refused in one sentence; never a traceback."""
 
 import os
 import tempfile

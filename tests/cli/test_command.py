@@ -1,4 +1,4 @@
-"""The command from outside: exit codes, one sentence for whatever goes wrong, nothing left over."""
+"""The command as a process: exit codes, one sentence for every failure, no files left behind."""
 
 import ctypes
 import os
@@ -11,17 +11,15 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import psutil
 import pytest
 
 import cosim
 from cosim.cli.main import main
-from cosim.coupling.loop.compiled import CompiledRecorder
-from cosim.coupling.loop.step_locked import StepLocked
+from cosim.coupling.loop.lead import Lead
+from cosim.coupling.loop.recorder import Recorder
+from cosim.coupling.methods.mean_current import MeanCurrent
 from cosim.drive.command import Sawtooth
-from cosim.errors import SimulationFailed
-from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from tests.helpers import needs
@@ -30,7 +28,7 @@ pytestmark = pytest.mark.reliability
 
 COMMAND = [sys.executable, "-m", "cosim"]
 QUICK = ["--set", "run.duration=0.02", "--set", "run.output_step=1e-3"]
-# One internal step after another: the mechanics give up within a second.
+# The steps of the integration become so short that the FMU gives up within a second.
 TOO_FAST = ["--set", "coil.force_factor=1000", "--set", "mechanics.ram_mass=1e-9"]
 
 
@@ -140,24 +138,23 @@ def test_scenes_without_a_circuit_need_no_ngspice(tmp_path: Path) -> None:
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """A copy of the checkout without anything built; Python run in it imports the copy."""
+    """A copy of the checkout that a test may spoil; Python run in it imports the copy."""
     root = Path(cosim.__file__).parents[1]
     if not (root / "fmu" / "src").is_dir():
         pytest.skip("cosim does not run from a checkout")
     folder = tmp_path / "copy"
     for name in ("cosim", "fmu", "circuits"):
-        leave_out = shutil.ignore_patterns("build", "__pycache__")
+        leave_out = shutil.ignore_patterns("__pycache__")
         shutil.copytree(root / name, folder / name, ignore=leave_out)
-    shutil.copy(root / "LICENSE", folder)
     return folder
 
 
-def test_missing_compiler(copy: Path) -> None:
-    done = command("run", "held", *QUICK, "--out", "out", cwd=copy, CC="/nonexistent/cc")
-    assert "/nonexistent/cc cannot be run" in complaint(done)
+@pytest.mark.parametrize("gone", ["fmi3", "fmi3/binaries"])
+def test_incomplete_installation(copy: Path, gone: str) -> None:
+    shutil.rmtree(copy / "cosim" / "_compiled" / gone)
+    done = command("run", "held", *QUICK, "--out", "out", cwd=copy)
+    assert re.search("is missing from this installation|cannot be loaded", complaint(done))
     assert not (copy / "out").exists()
-    build = copy / "fmu" / "build"
-    assert not build.exists() or not list(build.iterdir())
 
 
 def test_broken_netlist(copy: Path) -> None:
@@ -283,13 +280,13 @@ def test_interrupt_where_compiled_code_calls_back(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Between the call and its first line nothing in the callback itself can catch it."""
-    planned = CompiledRecorder._planned
+    planned = Recorder._planned
 
-    def struck(self: CompiledRecorder) -> None:
+    def struck(self: Recorder) -> None:
         signal.raise_signal(signal.SIGINT)
         planned(self)
 
-    monkeypatch.setattr(CompiledRecorder, "_planned", struck)
+    monkeypatch.setattr(Recorder, "_planned", struck)
     arguments = [
         "run",
         "ideal-current",
@@ -362,22 +359,17 @@ def after_calls(number: int, original: Callable, failure: BaseException) -> Call
     return function
 
 
-@pytest.mark.parametrize("scene", ["paper", "ideal-current"])
-def test_mechanics_fail(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = bits(scene)
-    failure = SimulationFailed("The mechanics failed at t = 0.01 s: as the test wants it.")
-    with monkeypatch.context() as patch:
-        patch.setattr(Mechanics, "step_to", after_calls(500, Mechanics.step_to, failure))
-        with pytest.raises(SimulationFailed, match="as the test wants it"):
-            simulate(load(scene, SHORT), compiled=False)
-    assert bits(scene) == before
-
-
 @pytest.mark.parametrize(
-    ("owner", "name"),
-    [(StepLocked, "back_emf"), (StepLocked, "accepted"), (Sawtooth, "value")],
+    ("owner", "name", "calls"),
+    [
+        (Lead, "_attend", 0),
+        (Sawtooth, "piece", 0),
+        (Recorder, "_plan", 0),
+        (MeanCurrent, "current", 0),
+        (MeanCurrent, "current", 1),
+        (MeanCurrent, "emf", 300),
+    ],
 )
-@pytest.mark.parametrize("calls", [0, 1, 300])
 def test_callback_fails(
     owner: type, name: str, calls: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -385,16 +377,7 @@ def test_callback_fails(
     with monkeypatch.context() as patch:
         patch.setattr(owner, name, after_calls(calls, getattr(owner, name), Trouble("here")))
         with pytest.raises(Trouble, match="here"):
-            simulate(load("paper", SHORT), compiled=False)
-    assert bits() == before
-
-
-def test_callback_gives_nonsense(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = bits()
-    with monkeypatch.context() as patch:
-        patch.setattr(StepLocked, "back_emf", lambda self, time: np.nan if time > 0.01 else 0.0)
-        with pytest.raises(SimulationFailed, match=r"ngspice stopped at t = 0\.0(0999|1)"):
-            simulate(load("paper", SHORT), compiled=False)
+            simulate(load("paper", [*SHORT, "coupling.method=mean-current"]))
     assert bits() == before
 
 
@@ -416,7 +399,8 @@ if __name__ == "__main__":
         timer = threading.Timer(0.1 + 0.00822 * number, os.kill, strike)
         try:
             timer.start()
-            simulate(load("paper", ["run.duration=10"]), compiled=number % 2 == 0)
+            method = ("step-locked", "jacobi")[number % 2]
+            simulate(load("paper", ["run.duration=10", f"coupling.method={method}"]))
         except KeyboardInterrupt:
             pass
         else:
@@ -452,7 +436,9 @@ finally:
 
 
 @pytest.mark.parametrize(
-    "arguments", [["scenes"], ["--help"], ["run", "--help"], ["run", "papre"]], ids=" ".join
+    "arguments",
+    [["scenes"], ["--help"], ["run", "--help"], ["chart", "limits", "--help"], ["run", "papre"]],
+    ids=" ".join,
 )
 def test_light_commands_load_nothing_heavy(arguments: list[str], tmp_path: Path) -> None:
     program = LIGHT.format(arguments=arguments)
@@ -473,6 +459,36 @@ def test_scenes(tmp_path: Path) -> None:
         "regime-03", "regime-04", "regime-05", "regime-06", "regime-07", "regime-08", "regime-09",
         "regime-10", "square", "trial", "two-surfaces", "umbanhowar",
     ]  # fmt: skip
+
+
+def folder_of(*parts: str) -> Path:
+    return Path(cosim.__file__).parent.joinpath(*parts)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "folders"),
+    [
+        (["--help"], [("cli", "simulation"), ("cli", "studies")]),
+        (["chart", "--help"], [("cli", "charts")]),
+    ],
+)
+def test_every_file_of_the_folders_is_a_command(
+    arguments: list[str], folders: list[tuple[str, ...]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(arguments)
+    listed = set(re.findall(r"(?m)^    (\w+) ", capsys.readouterr().out))
+    files = {path.stem for parts in folders for path in folder_of(*parts).glob("*.py")}
+    assert listed == files - {"__init__"}
+
+
+def test_export_tells_every_format(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["export", "--help"])
+    told = capsys.readouterr().out.split("--as")[-1].partition("repeatable")[0]
+    listed = re.findall(r"(\w+)\s+\(", told)
+    modules = {path.stem for path in folder_of("waveforms", "formats").glob("*.py")}
+    assert len(listed) == len(modules - {"__init__", "source"})
 
 
 @pytest.mark.parametrize("option", ["--help", "--version"])

@@ -14,17 +14,16 @@ import pytest
 
 pytest.importorskip("sksundae")
 
+from cosim.coupling.methods.gauss_seidel import GaussSeidel
+from cosim.coupling.methods.jacobi import Jacobi
 from cosim.coupling.participants.stickslip import FmuMechanics
 from cosim.coupling.rewind.error_control import ErrorControlled
 from cosim.coupling.rewind.event_aware import EventAware
-from cosim.coupling.rewind.gauss_seidel import GaussSeidel
 from cosim.coupling.rewind.iterated import Iterated
-from cosim.coupling.rewind.jacobi import Jacobi
 from cosim.coupling.rewind.joint import Joint
 from cosim.coupling.rewind.methods import METHODS as METHODS_OF_STUDIES
 from cosim.coupling.rewind.methods import ORDERS
 from cosim.coupling.rewind.predictor_corrector import PredictorCorrector
-from cosim.mechanics.stickslip import SAMPLE_OUTPUTS
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.accuracy.cases import CASES, participants, reference_parameters
@@ -70,8 +69,8 @@ def joined_error(make: Make, steps: int) -> float:
         for k in range(steps):
             joint.step(DURATION / steps)
             if (k + 1) % (steps // SAMPLES) == 0:
-                row: dict[str, float] = dict(zip(SAMPLE_OUTPUTS, mechanics.sample(), strict=False))
-                row["current"] = float(joint.of_first.value[0])
+                row: dict[str, float] = mechanics.sample()
+                row["current"] = float(joint.past.current.value[0])
                 for name in JUDGED:
                     found[name].append(row[name])
     finally:
@@ -85,8 +84,8 @@ METHODS: dict[str, tuple[Make, float]] = {
         for name, order in ORDERS.items()
         if name != "iterated, plain"  # has the solution of the accelerated one
     },
-    "Jacobi k = 1, slopes": (lambda a, b: Jacobi(a, b, 1, slopes=True), 2.0),
-    "held EMF, linear current": (lambda a, b: GaussSeidel(a, b, 0, feed=1), 1.0),
+    "Jacobi k = 1, slopes": (lambda a, b: Joint(a, b, Jacobi(1)), 2.0),
+    "held EMF, linear current": (lambda a, b: Joint(a, b, GaussSeidel(0, feed=1)), 1.0),
     "predictor-corrector": (PredictorCorrector, 2.0),
     "iterated, Anderson, mean": (lambda a, b: Iterated(a, b, "anderson", "mean"), 2.0),
 }
@@ -131,7 +130,7 @@ def test_error_control_keeps_to_its_tolerance_and_the_audit_rejects() -> None:
     def taken(tolerance: float, share: float | None = None) -> ErrorControlled:
         circuit, mechanics = participants(load("paper", SMOOTH.overrides))
         try:
-            joint = Jacobi(circuit, mechanics, 1)
+            joint = Joint(circuit, mechanics, Jacobi(1, slopes=False))
             control = ErrorControlled(joint, 1, 1e-5, tolerance, tolerance, energy_share=share)
             control.run(DURATION)
         finally:
@@ -150,7 +149,7 @@ def test_events_are_met_by_cutting_steps() -> None:
     """At the first event of the paper's scene, a slip at the command's fall, the step is cut."""
     circuit, mechanics = participants(load("paper"))
     try:
-        method = EventAware(Jacobi(circuit, mechanics, 1), within=1e-8)
+        method = EventAware(Joint(circuit, mechanics, Jacobi(1, slopes=False)), within=1e-8)
         before = method.time
         while not method.events:
             before = method.time

@@ -22,6 +22,7 @@ from cosim.drive.command import (
 )
 from cosim.scene import load
 from cosim.scene.firmware import passes, staircase
+from tests.helpers.pins import pin, pin_before, v_dac, v_dac_before
 
 GAIN = 15 / 4.7
 
@@ -43,7 +44,7 @@ def test_paper_sawtooth_jumps() -> None:
     assert drive.next_jump(0.0) == 0.05
     assert drive.value_before(0.05) == pytest.approx(2.8)
     assert drive.value_before(0.03) == drive.value(0.03)
-    assert drive.next_corner(0.01) == 0.05
+    assert drive.piece(0.01).until == 0.05
 
 
 def test_slow_reset() -> None:
@@ -51,7 +52,7 @@ def test_slow_reset() -> None:
     times = [0.0, 0.02, 0.04, 0.045, 0.05]
     assert drive.values(times) == pytest.approx([-5.2, -1.2, 2.8, -1.2, -5.2])
     assert drive.next_jump(0.0) == inf
-    assert [drive.next_corner(t) for t in (0.0, 0.04, 0.05)] == pytest.approx([0.04, 0.05, 0.09])
+    assert [drive.piece(t).until for t in (0.0, 0.04, 0.05)] == pytest.approx([0.04, 0.05, 0.09])
 
 
 def test_sine() -> None:
@@ -177,12 +178,12 @@ def test_loop_time_lowers_the_frequency() -> None:
     # by hand: 50 us are reached at the third pass; 999 steps of three passes, the maximum for two
     # passes and 0 for one
     assert drive.period == pytest.approx((999 * 3 + 2 + 1) * 22e-6)
-    assert drive.v_dac(0.0) == pytest.approx(778 / 1024 * 3.3)
+    assert v_dac(drive, 0.0) == pytest.approx(778 / 1024 * 3.3)
     assert drive.next_jump(0.0) == pytest.approx(44e-6)
     assert drive.next_jump(44e-6 + 1e-9) == pytest.approx(110e-6)
     reset = drive.period
-    assert drive.v_dac(reset - 11e-6) == 0.0
-    assert drive.v_dac(reset + 11e-6) == drive.v_dac(0.0)
+    assert v_dac(drive, reset - 11e-6) == 0.0
+    assert v_dac(drive, reset + 11e-6) == v_dac(drive, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -203,13 +204,13 @@ def test_real_period_is_rounded_up_to_whole_steps(frequency: float, steps: int) 
 def test_staircase_of_the_paper() -> None:
     drive = made(scene="paper-full")
     # by hand: 8 V / 3.1915 = 2.5067 V -> code 778; offset pin 2.8 V / 3.1915 -> code 272
-    assert drive.v_dac(0.0) == pytest.approx(778 / 1024 * 3.3)
+    assert v_dac(drive, 0.0) == pytest.approx(778 / 1024 * 3.3)
     assert drive.v_offset == pytest.approx(272 / 1024 * 3.3)
     assert drive.value(0.0) == pytest.approx(GAIN * (272 - 778) / 1024 * 3.3)
     # after k steps the counter has lost 0.778 k and is truncated
-    assert drive.v_dac(10.5 * 50e-6) == pytest.approx(770 / 1024 * 3.3)
+    assert v_dac(drive, 10.5 * 50e-6) == pytest.approx(770 / 1024 * 3.3)
     assert drive.next_jump(0.0) == 50e-6
-    assert drive.v_dac_before(50e-6) == drive.v_dac(0.0)
+    assert v_dac_before(drive, 50e-6) == v_dac(drive, 0.0)
     smooth = made()
     times = np.arange(0, 0.2, 1e-5)
     assert np.abs(drive.values(times) - smooth.values(times)).max() < 0.03
@@ -233,7 +234,7 @@ def test_silent_knob() -> None:
 
 def test_knobs_reach_the_pins() -> None:
     drive = made("drive.pot_max=0.7", "drive.pot_offset=0.4", scene="paper-full")
-    assert drive.v_dac(0.0) == pytest.approx(716 / 1024 * 3.3)
+    assert v_dac(drive, 0.0) == pytest.approx(716 / 1024 * 3.3)
     assert drive.v_offset == pytest.approx(409 / 1024 * 3.3)
 
 
@@ -247,13 +248,13 @@ def test_pwm_of_the_paper() -> None:
     # by hand: code 272 of 1024, a period of 2048 us; a pulse is 544 us wide, its middle at 0
     mean = 272 / 1024 * 3.3
     assert drive.v_offset == pytest.approx(mean)
-    assert drive.v_offset_at(-1.0) == drive.v_offset_before(0.0) == drive.v_offset
-    levels = [drive.v_offset_at(t * 1e-6) for t in (0, 271, 273, 1775, 1777, 2319, 2321)]
+    assert pin(drive, -1.0) == pin_before(drive, 0.0) == drive.v_offset
+    levels = [pin(drive, t * 1e-6) for t in (0, 271, 273, 1775, 1777, 2319, 2321)]
     assert levels == [3.3, 3.3, 0.0, 0.0, 3.3, 3.3, 0.0]
     edges, t = [], 0.0
     while t < 0.1:
         t = drive.next_jump(t)
-        if drive.v_offset_before(t) != drive.v_offset_at(t):
+        if pin_before(drive, t) != pin(drive, t):
             edges.append(t)
     expected = [272e-6, *((k * 2048 + s * 272) * 1e-6 for k in range(1, 49) for s in (-1, 1))]
     assert edges[: len(expected)] == pytest.approx(expected, abs=1e-12)
@@ -264,8 +265,9 @@ def test_pwm_changes_nothing_else() -> None:
     times = np.linspace(0, 0.2, 7001)
     assert list(drive.values(times)) == list(plain.values(times))
     for t in map(float, times[:300]):
-        for name in ("value_before", "v_dac", "v_dac_before"):
-            assert getattr(drive, name)(t) == getattr(plain, name)(t)
+        assert drive.value_before(t) == plain.value_before(t)
+        for of in (v_dac, v_dac_before):
+            assert of(drive, t) == of(plain, t)
 
 
 @pytest.mark.parametrize("pot", [0, 1])
@@ -273,7 +275,7 @@ def test_pwm_without_edges(pot: int) -> None:
     drive = made("drive.pwm_ripple=true", "drive.pot_max=0", f"drive.pot_offset={pot}",
                  scene="paper-full")  # fmt: skip
     assert drive.next_jump(0.0) == (inf if pot == 0 else 1023 / 1024 / 2 / PWM)
-    assert drive.v_offset_at(0.3) in (0.0, 3.3)
+    assert pin(drive, 0.3) in (0.0, 3.3)
 
 
 def test_pwm_edges_do_not_stand_beside_those_of_the_staircase() -> None:
@@ -284,8 +286,8 @@ def test_pwm_edges_do_not_stand_beside_those_of_the_staircase() -> None:
     while t < 3.0:
         before, t = t, drive.next_jump(t)
         gaps.append(t - before)
-        both += drive.v_offset_before(t) != drive.v_offset_at(t) and (
-            drive.v_dac_before(t) != drive.v_dac(t)
+        both += pin_before(drive, t) != pin(drive, t) and (
+            v_dac_before(drive, t) != v_dac(drive, t)
         )
     assert min(gaps) > 1e-9
     assert both > 50
@@ -294,25 +296,25 @@ def test_pwm_edges_do_not_stand_beside_those_of_the_staircase() -> None:
 @given(code=st.integers(1, 1023), inner=st.sampled_from(["sawtooth", "square", "staircase"]),
        t=st.floats(0, 1e4))  # fmt: skip
 def test_pwm_edges_are_exact(code: int, inner: str, t: float) -> None:
-    pin = code / 1024 * 3.3
+    mean = code / 1024 * 3.3
     command: Command = {
         "sawtooth": Sawtooth(20.0, 8.0, -1.2),
         "square": Square(31.7, 8.0, -1.2),
-        "staircase": Staircase(staircase(778, 20.0), pin),
+        "staircase": Staircase(staircase(778, 20.0), mean),
     }[inner]
-    command.v_offset = pin
+    command.v_offset = mean
     drive, fresh = WithPwm(command), WithPwm(command)
     for _ in range(5):
         jump = drive.next_jump(t)
         assert jump > t
-        old, new = drive.v_offset_before(jump), drive.v_offset_at(jump)
+        old, new = pin_before(drive, jump), pin(drive, jump)
         assert old != new or drive.value_before(jump) != drive.value(jump)
         left, right = nextafter(jump, -inf), nextafter(jump, inf)
-        assert drive.v_offset_at(left) == drive.v_offset_before(left) == old
-        assert drive.v_offset_at(right) == drive.v_offset_before(right) == new
+        assert pin(drive, left) == pin_before(drive, left) == old
+        assert pin(drive, right) == pin_before(drive, right) == new
         assert {old, new} <= {0.0, 3.3}
         assert drive.next_jump(left) == jump
-        assert fresh.v_offset_at(t) == drive.v_offset_at(t)  # whatever was asked before
+        assert pin(fresh, t) == pin(drive, t)  # whatever was asked before
         t = jump
 
 
@@ -373,7 +375,7 @@ def test_jumps_are_exact(drive: Command, t: float) -> None:
     for _ in range(5):
         jump = drive.next_jump(t)
         assert jump > t
-        assert t < drive.next_corner(t) <= jump
+        assert t < drive.piece(t).until <= jump
         if jump == inf:
             return
         left, right = nextafter(jump, -inf), nextafter(jump, inf)
@@ -391,7 +393,7 @@ def test_jumps_are_exact(drive: Command, t: float) -> None:
 
 @given(drive=COMMANDS, t=TIME, share=st.floats(0, 1))
 def test_smooth_between_corners(drive: Command, t: float, share: float) -> None:
-    end = drive.next_corner(t)
+    end = drive.piece(t).until
     end = min(end, t + 0.01)
     late = min(t + share * (end - t), nextafter(end, -inf))
     if isinstance(drive, Sawtooth):
@@ -409,7 +411,7 @@ def test_smooth_between_corners(drive: Command, t: float, share: float) -> None:
 @given(drive=COMMANDS, times=st.lists(st.floats(-0.02, 0.02), max_size=9), ripple=st.booleans())
 def test_values_are_those_of_each_time(drive: Command, times: list[float], ripple: bool) -> None:
     edge = drive.next_jump(0.0)
-    times += [t for t in (edge, nextafter(edge, -inf)) if t < 0.05]
+    times = sorted([*times, *(t for t in (edge, nextafter(edge, -inf)) if t < 0.05)])
     made = WithPwm(drive) if ripple else drive
     expected = [drive.value(t) for t in times]
     assert made.values(times) == pytest.approx(expected, rel=1e-15, abs=1e-15)
@@ -417,10 +419,10 @@ def test_values_are_those_of_each_time(drive: Command, times: list[float], rippl
 
 @given(drive=COMMANDS, t=TIME)
 def test_pins_make_the_command(drive: Command, t: float) -> None:
-    assert GAIN * (drive.v_offset - drive.v_dac(t)) == pytest.approx(drive.value(t), abs=1e-9)
-    before = GAIN * (drive.v_offset - drive.v_dac_before(t))
+    assert GAIN * (drive.v_offset - v_dac(drive, t)) == pytest.approx(drive.value(t), abs=1e-9)
+    before = GAIN * (drive.v_offset - v_dac_before(drive, t))
     assert before == pytest.approx(drive.value_before(t), abs=1e-9)
-    assert drive.v_dac(t) >= -1e-9
+    assert v_dac(drive, t) >= -1e-9
 
 
 @pytest.mark.parametrize("frequency", [20.0, 50.8, 1 / 3, 21.37])

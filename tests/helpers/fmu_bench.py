@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from ctypes import Array, c_double, c_int
 from typing import Any, Self
 
-from cosim.mechanics.fmi import INTERFACES, places, references
+from cosim.mechanics.fmi import INTERFACES, references
 
 COMPLIANT, RIGID = 1, 2
 FIRST_INTEGER = 1001  # value references from here on are integers (fmu/README.md)
@@ -47,10 +47,10 @@ class Bench:
         integers = {n: int(v) for n, v in values.items() if self._is_integer(n)}
         if reals:
             array: Any = (c_double * len(reals))(*reals.values())
-            self.fmi.set_reals(places(self._version, tuple(reals)), array)
+            self.fmi.set_reals(self.fmi.places(tuple(reals)), array)
         if integers:
             array = (c_int * len(integers))(*integers.values())
-            self.fmi.set_integers(places(self._version, tuple(integers)), array)
+            self.fmi.set_integers(self.fmi.places(tuple(integers)), array)
 
     def get(self, *names: str) -> list[float]:
         """Values of variables in the order of their names; integers as floats."""
@@ -61,7 +61,7 @@ class Bench:
                 continue
             array: Array[Any] = ((c_int if integer else c_double) * len(group))()
             read = self.fmi.get_integers if integer else self.fmi.get_reals
-            read(places(self._version, group), array)
+            read(self.fmi.places(group), array)
             values.update(zip(group, array, strict=True))
         return [float(values[n]) for n in names]
 

@@ -168,8 +168,8 @@ def trajectory(it: Rig, steps: int) -> list[dict[str, float]]:
 # ---- the files ----
 
 
-def test_the_files_are_valid(version: int) -> None:
-    assert validate_fmu(str(fmu.build()[version])) == []
+def test_the_files_are_valid(version: int, tmp_path: Path) -> None:
+    assert validate_fmu(str(fmu.pack(tmp_path)[version])) == []
 
 
 def test_check_finds_no_problem(capsys: pytest.CaptureFixture[str]) -> None:
@@ -185,10 +185,10 @@ def test_every_function_of_both_standards_is_exported(version: int) -> None:
     assert {name for name in names if not hasattr(library, name)} == set()
 
 
-def test_another_importer_loop_runs_it(version: int) -> None:
+def test_another_importer_loop_runs_it(version: int, tmp_path: Path) -> None:
     signal = np.array([(0.0, 0.0), (0.05, 0.1)], dtype=[("time", float), ("current", float)])
     result = fmpy.simulate_fmu(
-        str(fmu.build()[version]),
+        str(fmu.pack(tmp_path)[version]),
         start_values={"part_mass": 0.018, "n_surfaces": 2},
         input=signal,
         stop_time=0.05,

@@ -1,11 +1,8 @@
-"""The FMU files as files: their table of variables, their bytes, and what stops a build."""
+"""The FMU files as files: their table of variables, their contents, their bytes."""
 
 import ctypes
-import hashlib
-import os
 import re
 import shutil
-import stat
 import subprocess
 import zipfile
 from pathlib import Path
@@ -14,12 +11,11 @@ from xml.etree import ElementTree
 
 import fmpy
 import pytest
-from fmpy.validation import validate_fmu
 
+from build_c import compiler
 from cosim.errors import BadInput
-from cosim.files.resources import circuits, fmu_sources, licence
+from cosim.files.resources import REPOSITORY, circuits, fmu_sources
 from cosim.mechanics import package as fmu
-from cosim.toolchain.compiler import compiler
 
 ROW = re.compile(r'^(INT_)?(PARAMETER|INPUT|OUTPUT)\((\w+), (.*)"(.*)"\)$', re.MULTILINE)
 
@@ -51,17 +47,7 @@ def version(request: pytest.FixtureRequest) -> int:
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
-    return fmu.build(out_dir=tmp_path_factory.mktemp("built"))
-
-
-@pytest.fixture
-def own_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the sources that a test may spoil."""
-    copy = tmp_path / "sources"
-    shutil.copytree(fmu_sources(), copy, ignore=shutil.ignore_patterns("build"))
-    monkeypatch.setattr(fmu, "fmu_sources", lambda: copy)
-    monkeypatch.setattr(fmu, "token", fmu.token.__wrapped__)
-    return copy
+    return fmu.pack(tmp_path_factory.mktemp("built"))
 
 
 def test_the_description_is_the_table(built: dict[int, Path], version: int) -> None:
@@ -120,8 +106,8 @@ def test_abilities(built: dict[int, Path], version: int) -> None:
         assert ability.get(name) == "false"
 
 
-def test_the_same_sources_give_the_same_bytes(built: dict[int, Path], tmp_path: Path) -> None:
-    again = fmu.build(out_dir=tmp_path / "elsewhere")
+def test_packing_again_gives_the_same_bytes(built: dict[int, Path], tmp_path: Path) -> None:
+    again = fmu.pack(tmp_path / "elsewhere")
     for version, path in built.items():
         assert again[version].read_bytes() == path.read_bytes()
     leftovers = {path.name for path in (tmp_path / "elsewhere").iterdir()}
@@ -133,7 +119,7 @@ def test_contents(built: dict[int, Path], version: int) -> None:
         names = set(archive.namelist())
         sources = {name.removeprefix("sources/") for name in names if name.startswith("sources/")}
         text = archive.read("documentation/licenses/license.txt")
-    assert text == licence().read_bytes()
+    assert text == (REPOSITORY / "LICENSE").read_bytes()
     assert {"fmi/fmi2.c", "fmi/fmi3.c", "fmi/fmi2Functions.h", "fmi/token.h"} <= sources
     assert {"physics/model.c", "physics/variables.def"} <= sources
     assert "fmi/describe.c" not in sources
@@ -151,7 +137,7 @@ def test_contents(built: dict[int, Path], version: int) -> None:
 def test_the_sources_inside_build_by_themselves(
     built: dict[int, Path], version: int, tmp_path: Path
 ) -> None:
-    fmu.extract(built[version], tmp_path)
+    fmpy.extract(str(built[version]), str(tmp_path))
     sources = tmp_path / "sources"
     library = tmp_path / "own.so"
     command = compiler()
@@ -164,12 +150,11 @@ def test_the_sources_inside_build_by_themselves(
     assert not instantiate(b"own", 1, b"other", *arguments)
 
 
-def test_only_fmi_functions_are_exported(built: dict[int, Path], tmp_path: Path) -> None:
+def test_only_fmi_functions_are_exported() -> None:
     nm = shutil.which("nm")
     if not nm or fmpy.system != "linux":
         pytest.skip("needs nm on Linux")
-    fmu.extract(built[2], tmp_path)
-    library = next(tmp_path.glob("binaries/*/*"))
+    library = next(fmu.unpacked(2).glob("binaries/*/*"))
     listing = subprocess.run(
         [nm, "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True
     )
@@ -177,94 +162,26 @@ def test_only_fmi_functions_are_exported(built: dict[int, Path], tmp_path: Path)
     assert {name for name in names if not name.startswith(("fmi2", "fmi3"))} == set()
 
 
-def test_what_is_up_to_date_is_left_alone(tmp_path: Path) -> None:
-    paths = fmu.build(out_dir=tmp_path)
-    before = {path: path.stat().st_mtime_ns for path in paths.values()}
-    fmu.build(out_dir=tmp_path)
-    assert {path: path.stat().st_mtime_ns for path in paths.values()} == before
-    digest = hashlib.sha256(paths[2].read_bytes()).digest()
-    paths[2].write_bytes(paths[2].read_bytes()[:1000])
-    fmu.build(out_dir=tmp_path)
-    assert hashlib.sha256(paths[2].read_bytes()).digest() == digest
-    fmu.build(force=True, out_dir=tmp_path)
-    assert hashlib.sha256(paths[2].read_bytes()).digest() == digest
-
-
-def test_changed_sources_are_another_fmu(own_sources: Path, tmp_path: Path) -> None:
-    before = fmu.token()
-    definition = own_sources / "src/physics/variables.def"
-    text = definition.read_text()
-    odd = r"\"A\" < B & C > 'D'"
-    definition.write_text(text.replace("Mass of the ram", odd))
-    assert fmu.token() != before
-    for path in fmu.build(out_dir=tmp_path / "out").values():
-        assert validate_fmu(str(path)) == []
-        variables = fmpy.read_model_description(str(path)).modelVariables
-        description = {v.name: v.description for v in variables}["ram_mass"]
-        assert description == "\"A\" < B & C > 'D'"
-
-
-def test_an_unknown_unit_stops_the_build(own_sources: Path, tmp_path: Path) -> None:
-    definition = own_sources / "src/physics/variables.def"
-    definition.write_text(definition.read_text().replace('"kg"', '"lb"'))
-    with pytest.raises(BadInput):
-        fmu.build(out_dir=tmp_path / "out")
-    assert list((tmp_path / "out").iterdir()) == []
-
-
-def test_a_missing_compiler_is_one_sentence(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(BadInput, match="No C compiler") as caught:
-        fmu.build(out_dir=tmp_path / "out")
-    assert caught.value.exit_code == 2
-    monkeypatch.setenv("CC", str(tmp_path / "none"))
-    with pytest.raises(BadInput, match="cannot be run"):
-        fmu.build(out_dir=tmp_path / "out")
-
-
-def test_the_compiler_is_that_of_cc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    script = tmp_path / "my cc"
-    script.write_text('#!/bin/sh\necho "x.c:1: error: not today" >&2\nexit 1\n')
-    script.chmod(script.stat().st_mode | stat.S_IXUSR)
-    monkeypatch.setenv("CC", f"'{script}' -m64")
-    with pytest.raises(BadInput, match="not today"):
-        fmu.build(out_dir=tmp_path / "out")
+def test_the_binary_lies_where_importers_look(version: int) -> None:
+    assert fmpy.supported_platforms(str(fmu.unpacked(version)))[:1] == [fmpy.platform]
+    platform = fmpy.platform if version == 2 else fmpy.platform_tuple
+    assert [path.name for path in (fmu.unpacked(version) / "binaries").iterdir()] == [platform]
 
 
 def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(BadInput, match="Cannot write"):
-        fmu.build(out_dir=tmp_path / "file" / "out")
-
-
-def test_outside_a_checkout_the_cache_is_used(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if os.name != "posix" or fmpy.system != "linux":
-        pytest.skip("the place differs by system")
-    monkeypatch.setattr("cosim.toolchain.compiler.REPOSITORY", tmp_path)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    assert fmu.build_directory() == tmp_path / "cache" / "cosim" / "fmu"
-    folder = fmu.unpacked(3)
-    assert folder.parent == tmp_path / "cache" / "cosim" / "fmu"
-    assert folder == fmu.unpacked(3)
-    assert (folder / "modelDescription.xml").is_file()
-
-
-@pytest.mark.parametrize("name", ["../out", "/out", "a/../../out", "C:/out", "a\\b"])
-def test_unsafe_archives_are_refused(tmp_path: Path, name: str) -> None:
-    archive = tmp_path / "bad.fmu"
-    with zipfile.ZipFile(archive, "w") as out:
-        info = zipfile.ZipInfo("x")
-        info.filename = name
-        out.writestr(info, b"")
-    with pytest.raises(BadInput, match="unsafe"):
-        fmu.extract(archive, tmp_path / "folder")
+    with pytest.raises(BadInput, match="cannot be written"):
+        fmu.pack(tmp_path / "file" / "out")
 
 
 def test_data_folders_are_found() -> None:
-    assert (fmu_sources() / "src/physics/variables.def").is_file()
+    assert (fmu_sources() / "src" / "physics" / "variables.def").is_file()
     assert circuits().is_dir()
+
+
+def test_the_physics_know_nothing_of_fmi() -> None:
+    folder = fmu_sources() / "src" / "physics"
+    text = "".join(path.read_text() for path in folder.iterdir())
+    included = set(re.findall(r'#include "(.*)"', text))
+    assert len(included) > 5
+    assert included <= {path.name for path in folder.iterdir()}

@@ -8,9 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.files.resources import fmu_sources
-from cosim.mechanics import package as fmu
-from cosim.toolchain.compiler import COMPILE_FLAGS, compiler
+from build_c import FLAGS, FMU, compiler, fmu_sources
 from tests.helpers.examples import examples
 
 pytestmark = pytest.mark.reliability
@@ -21,9 +19,8 @@ LEAK = "#include <stdlib.h>\nint main(void) { char *volatile p = malloc(9); p = 
 
 
 def compile_with_sanitizers(sources: list[Path], program: Path) -> subprocess.CompletedProcess:
-    root = fmu_sources()
-    includes = [f"-I{root / 'include'}", f"-I{root / 'src'}", "-DFMU_TOKEN=harness"]
-    command = [*compiler(), *COMPILE_FLAGS, *SANITIZE, *includes, *map(str, sources)]
+    includes = [f"-I{FMU / 'include'}", f"-I{FMU / 'src'}", "-DFMU_TOKEN=harness"]
+    command = [*compiler(), *FLAGS, *SANITIZE, *includes, *map(str, sources)]
     return subprocess.run([*command, "-o", str(program), "-lm"], capture_output=True, text=True)
 
 
@@ -49,7 +46,7 @@ def finds_leaks(tmp_path_factory: pytest.TempPathFactory) -> bool:
 @pytest.fixture(scope="module")
 def harness(finds_leaks: bool, tmp_path_factory: pytest.TempPathFactory) -> Path:
     program = tmp_path_factory.mktemp("harness") / "harness"
-    built = compile_with_sanitizers([*fmu._sources(), HARNESS], program)
+    built = compile_with_sanitizers([*fmu_sources(), HARNESS], program)
     assert built.returncode == 0, built.stderr
     assert "warning" not in built.stderr
     return program

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from cosim.errors import BadInput, NoEffect
 from cosim.mechanics import package
-from cosim.scene import RUNGS, Circuit, Coupling, Key, Scene, keys, list_scenes, load, to_toml
+from cosim.scene import RUNGS, Key, Scene, keys, list_scenes, load, to_toml
 from cosim.scene.methods import METHODS
+from cosim.scene.tables import Circuit, Coupling
 from tests.helpers.examples import examples
 
 # The table of the design, written down once more: an accidental change of a default shows here.
@@ -130,10 +131,9 @@ def test_every_key_is_described() -> None:
 
 
 @pytest.fixture(scope="module")
-def fmu_variables(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def fmu_variables() -> dict[str, Any]:
     """The variables of the built FMU by name, read by FMPy."""
-    path = package.build(out_dir=tmp_path_factory.mktemp("fmu"))[3]
-    description = fmpy.read_model_description(str(path))
+    description = fmpy.read_model_description(str(package.unpacked(3)))
     return {variable.name: variable for variable in description.modelVariables}
 
 

@@ -7,19 +7,19 @@ before.
 
 import itertools
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cosim.circuit import ngspice
-from cosim.coupling.loop import run, step_locked
+from cosim.coupling.loop import lead
+from cosim.coupling.methods.jacobi import Jacobi
 from cosim.errors import BadInput, CosimError, SimulationFailed
 from cosim.files.resources import circuits
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.toolchain import isolation
+from cosim.toolchain import processes
 
 pytestmark = pytest.mark.reliability
 
@@ -101,13 +101,13 @@ def test_failing_circuit(name: str, tmp_path: Path, before: np.ndarray) -> None:
 @pytest.mark.parametrize("harm", ["os._exit(7)", "os.kill(os.getpid(), 11)"])
 def test_dying_process(harm: str) -> None:
     with pytest.raises(SimulationFailed, match=r"died.*(exit code 7|SIGSEGV)"):
-        isolation.isolated(_harmful, harm, lambda _: None)
+        processes.isolated(_harmful, harm, lambda _: None)
 
 
 def test_hanging_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(isolation, "PATIENCE", 2.0)
+    monkeypatch.setattr(processes, "PATIENCE", 2.0)
     with pytest.raises(SimulationFailed, match="hangs"):
-        isolation.isolated(_harmful, "time.sleep(60)", lambda _: None)
+        processes.isolated(_harmful, "time.sleep(60)", lambda _: None)
 
 
 def _harmful(harm: str, progress: object) -> None:
@@ -118,76 +118,65 @@ def _harmful(harm: str, progress: object) -> None:
 
 def test_spoilt_library_is_left_behind(before: np.ndarray) -> None:
     # In a process of its own, since nothing else can run in it afterwards.
-    after = isolation.isolated(_spoil_and_run, None, lambda _: None)
+    after = processes.isolated(_spoil_and_run, None, lambda _: None)
     assert np.array_equal(after, before)
 
 
 def _spoil_and_run(nothing: None, progress: object) -> np.ndarray:
     deck = "spoilt\nV1 a 0 1\nR1 a 0 {nothing}\n.tran 1u 1m\n.end"
-    ngspice.engine().run_transient(deck, ("v(a)",), _Nobody())
+    lead._engine().transient(deck, ("v(a)",), _Nobody())
     assert ngspice.spoilt()
     return good_run()
 
 
 class _Nobody:
-    def source(self, name: str) -> Callable[[float], float]:
-        raise AssertionError(name)
+    def __init__(self) -> None:
+        self.places = [0, 0]
 
-    def attempted(self) -> None: ...
+    def begin(self) -> None: ...
 
-    def accepted(self, time: float, values: object, next_step: float) -> float:
-        return next_step
+    def finish(self) -> None: ...
+
+    def stop(self) -> None: ...
 
 
 @pytest.mark.parametrize("failure", [ValueError("a fault"), KeyboardInterrupt()])
-@pytest.mark.parametrize(
-    "owner, name",
-    [(step_locked.StepLocked, "back_emf"), (run.CircuitRun, "accepted")],
-    ids=["in a source", "after a step"],
-)
-def test_exception_in_a_callback(
-    owner: type,
-    name: str,
-    failure: BaseException,
-    monkeypatch: pytest.MonkeyPatch,
-    before: np.ndarray,
+@pytest.mark.parametrize("name", ["emf", "current"])
+def test_exception_in_a_method(
+    name: str, failure: BaseException, monkeypatch: pytest.MonkeyPatch, before: np.ndarray
 ) -> None:
-    original = getattr(owner, name)
+    original = getattr(Jacobi, name)
     calls = itertools.count()
 
-    def fail(*arguments: object) -> float:
-        if next(calls) > 100:
+    def fail(*arguments: object) -> object:
+        if next(calls) > 20:
             raise failure
         return original(*arguments)
 
-    monkeypatch.setattr(owner, name, fail)
+    monkeypatch.setattr(Jacobi, name, fail)
     with pytest.raises(type(failure)):
-        simulate(load("paper", SHORT), compiled=False)
+        simulate(load("paper", [*SHORT, "coupling.method=jacobi"]))
     monkeypatch.undo()
     assert np.array_equal(good_run(), before)
 
 
 def test_not_a_number_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndarray) -> None:
-    original = run.CircuitRun.accepted
-    monkeypatch.setattr(
-        run.CircuitRun,
-        "accepted",
-        lambda self, t, values, step: original(self, t, [np.nan, *values[1:]], step),
-    )
-    with pytest.raises(SimulationFailed, match="range of numbers"):
-        simulate(load("paper", SHORT), compiled=False)
+    calls = itertools.count()
+    monkeypatch.setattr(Jacobi, "emf", lambda self, past: (np.nan if next(calls) > 20 else 0.0,))
+    with pytest.raises(SimulationFailed, match=r"range of numbers|stopped at t = 0\.00"):
+        simulate(load("paper", [*SHORT, "coupling.method=jacobi"]))
     monkeypatch.undo()
     assert np.array_equal(good_run(), before)
 
 
 def test_early_end_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndarray) -> None:
-    original = run.prepare
+    original = lead.prepare
 
     def shortened(scene: object) -> object:
         deck, saved = original(scene)  # pyright: ignore[reportArgumentType]
         return deck.replace(" 0.01 0 ", " 0.004 0 "), saved
 
-    monkeypatch.setattr(run, "prepare", shortened)
+    monkeypatch.setattr(lead, "prepare", shortened)
     with pytest.raises(SimulationFailed, match=r"stopped at t = 0\.004 s of 0\.01 s"):
         simulate(load("paper", SHORT))
     monkeypatch.undo()
@@ -215,7 +204,7 @@ def test_startup_file_in_the_working_folder_is_not_run(tmp_path: Path) -> None:
     here = Path.cwd()
     os.chdir(tmp_path)
     try:
-        isolation.isolated(_run_scene, ["paper", SHORT], lambda _: None)
+        processes.isolated(_run_scene, ["paper", SHORT], lambda _: None)
     finally:
         os.chdir(here)
     assert not marker.exists()

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from cosim.cli.main import main
+from cosim.drive.surface.formulas import Transport, average_velocity
+from cosim.drive.surface.waveforms import quaid_velocity
 from cosim.errors import BadInput
 from cosim.mechanics import part
 from cosim.scene import Scene, load
-from cosim.simulation import given_surface as prescribed
+from cosim.simulation.rungs import given_surface as prescribed
 from cosim.simulation.simulate import simulate
-from cosim.studies import paper as theory
 from tests.helpers.fmu_bench import Bench
 
 pytestmark = pytest.mark.physics
@@ -81,7 +82,7 @@ def test_fmu_follows_every_trial(number: int, trials: Path) -> None:
 def test_optimal_scene_meets_the_closed_form() -> None:
     scene = load("optimal")
     found = simulate(scene).summary["v_average"]
-    expected = theory.average_velocity(0.7, 0.6, 98.1, 5.0, 0.05)
+    expected = average_velocity(Transport(0.7, 0.6, 98.1, 5.0, 0.05))
     assert found == pytest.approx(expected, rel=1e-7)
     assert found == pytest.approx(0.3106508876 * 9.81 * 0.05, rel=1e-7)
 
@@ -97,16 +98,15 @@ def test_variants(optimum: str, sign: int) -> None:
     scene = load("optimal", [f"drive.optimum={optimum}"])
     found = average(scene)
     direction = "down" if optimum == "down" else "up"
-    expected = theory.average_velocity(
-        0.7, 0.6, 98.1, 5.0, 0.05, direction=direction, robust=optimum == "robust"
-    )
+    robust = optimum == "robust"
+    expected = average_velocity(Transport(0.7, 0.6, 98.1, 5.0, 0.05, direction, robust))
     assert sign * found > 0
     assert found == pytest.approx(expected, rel=1e-6)
 
 
 def test_quaid_scene_meets_the_closed_form() -> None:
     found = simulate(load("quaid")).summary["v_average"]
-    assert found == pytest.approx(theory.quaid_velocity(0.7, 0.6, 98.1, 5.0, 0.05), rel=1e-6)
+    assert found == pytest.approx(quaid_velocity(Transport(0.7, 0.6, 98.1, 5.0, 0.05)), rel=1e-6)
 
 
 def test_horizontal_scene_meets_the_closed_form() -> None:

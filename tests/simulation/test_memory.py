@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.coupling.loop import recorder, run
+from cosim.coupling.loop import agenda, lead
+from cosim.drive import straights
 from cosim.files import spill as tape
 from cosim.scene import load
 from cosim.simulation import simulate
@@ -50,20 +51,20 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("name", CASES)
 def test_blocks_and_disk_change_nothing(
-    name: str, compiled: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = load(*CASES[name])
-    whole = simulate.simulate(scene, compiled=compiled)
+    whole = simulate.simulate(scene)
     monkeypatch.setattr(tape, "IN_MEMORY", 0)
     monkeypatch.setattr(tape, "BLOCK", 97)
-    monkeypatch.setattr(recorder, "ENTRIES", 50)
-    monkeypatch.setattr(simulate, "_INTERVALS", 3)
-    monkeypatch.setattr(run, "_POINTS", 11)
+    monkeypatch.setattr(agenda, "ENTRIES", 50)
+    monkeypatch.setattr(straights, "_TOGETHER", 3)
+    monkeypatch.setattr(lead, "_POINTS", 11)
+    monkeypatch.setattr(lead, "_PIECES", 2)
     with tape.on_disk_in(tmp_path):
-        parts = simulate.simulate(scene, compiled=compiled)
+        parts = simulate.simulate(scene)
     assert not os.listdir(tmp_path)
     assert list(parts.columns) == list(whole.columns)
     for column, values in whole.columns.items():
@@ -120,9 +121,8 @@ def test_disk_that_takes_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(tape.tempfile, "TemporaryFile", lambda **_: Full())
     for name in ("paper", "ideal-current"):
-        for compiled in (True, False):
-            with (
-                tape.on_disk_in(tmp_path),
-                pytest.raises(BadInput, match=r"cannot hold the waveforms .*No space left"),
-            ):
-                simulate.simulate(load(name, ["run.duration=0.1"]), compiled=compiled)
+        with (
+            tape.on_disk_in(tmp_path),
+            pytest.raises(BadInput, match=r"cannot hold the waveforms .*No space left"),
+        ):
+            simulate.simulate(load(name, ["run.duration=0.1"]))

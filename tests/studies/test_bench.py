@@ -31,9 +31,9 @@ def test_peers_solve_the_same_problem() -> None:
     found = simulate(truth.brief()).columns
     rest = [found["z_surface"][0], found["z_ram"][0]]
     assert truth.error(lsoda.run(truth.brief(), times, rest, 1e-6)[1]) < 3e-5
-    seconds, path = naive.run(truth.brief("circuit.max_step=1e-5"), times, 1)
+    seconds, path = naive.run(truth.brief("circuit.max_step=1e-5"), times)
     assert truth.error(path) < 3e-4
-    assert len(seconds) == 1
+    assert seconds > 0.0
 
 
 @pytest.mark.parametrize("name", ["paper", "paper-full"])

@@ -9,8 +9,8 @@ import pytest
 from cosim.cli.main import main
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.compare.compare import compare, differences, explained, hermite, through_camera
-from cosim.trials.published import FRAME_RATE
+from cosim.studies.compare.compare import explained, measure
+from cosim.trials.camera import FRAME_RATE, film, hermite, velocities
 from cosim.trials.tracked import read
 
 
@@ -27,9 +27,9 @@ def write_trial(path: Path, time: np.ndarray, surface: np.ndarray, part: np.ndar
 def test_a_run_compared_with_itself_through_the_camera(tmp_path: Path) -> None:
     scene = load("ideal-current", ["run.duration=0.8", "run.settle=0.3"])
     waves = simulate(scene).columns
-    frames = through_camera(waves, 0.3125, 300)
+    frames = film(waves, 0.3125, 300)
     write_trial(tmp_path / "own.csv", frames.time, frames.z_surface, frames.z_part)
-    metrics, simulated, measured = compare(waves, read(tmp_path / "own.csv"), 0.3, 0.05)
+    metrics, simulated, measured = measure(waves, read(tmp_path / "own.csv"), 0.3, 0.05)
     # The phase is searched on a grid of an eighth of a millisecond; the true one is on it.
     assert metrics.start == pytest.approx(0.3125, abs=1.3e-4)
     assert metrics.velocity_r2 > 0.999
@@ -43,10 +43,10 @@ def test_a_run_compared_with_itself_through_the_camera(tmp_path: Path) -> None:
 def test_metrics_of_a_known_difference(tmp_path: Path) -> None:
     scene = load("ideal-current", ["run.duration=0.8", "run.settle=0.3"])
     waves = simulate(scene).columns
-    frames = through_camera(waves, 0.3, 300)
+    frames = film(waves, 0.3, 300)
     slower = frames.z_part - 2e-3 * frames.time  # drifts 2 mm/s less
     write_trial(tmp_path / "own.csv", frames.time, frames.z_surface, slower)
-    metrics, _, _ = compare(waves, read(tmp_path / "own.csv"), 0.3, 0.05)
+    metrics, _, _ = measure(waves, read(tmp_path / "own.csv"), 0.3, 0.05)
     assert metrics.drift_error == pytest.approx(2e-3, abs=1e-4)
     span = 299 / FRAME_RATE
     assert metrics.mean_error_mm == pytest.approx(2.0 * span / 2, rel=0.03)
@@ -100,7 +100,7 @@ def test_interpolation_is_exact_for_cubics() -> None:
 
 def test_differences_and_r2() -> None:
     time = np.arange(20) / FRAME_RATE
-    v = differences(3.0 * time**2)
+    v = velocities(3.0 * time**2)
     assert np.isnan(v[[0, -1]]).all()
     np.testing.assert_allclose(v[1:-1], 6.0 * time[1:-1], atol=1e-9)
     wanted = np.sin(time * 300)

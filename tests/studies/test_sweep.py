@@ -14,8 +14,9 @@ from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.sweep import Design, grid, sample, sweep
+from cosim.studies.sweep import sweep
 from cosim.studies.sweep.dataset import read
+from cosim.studies.sweep.design import Design, grid, sample
 from cosim.studies.sweep.point import Outcome, evaluate
 from cosim.studies.sweep.pool import Pool
 
@@ -30,23 +31,23 @@ def test_closed_form(tmp_path: Path) -> None:
     scene = load("optimal", ["friction.mu_s=0.7", "friction.mu_k=0.6"])
     g, mass = scene.mechanics.gravity, scene.mechanics.part_mass
     forces = [ratio * mass * g for ratio in table]
-    data = sweep(scene, grid({"friction.normal_force": forces}), tmp_path, workers=2)
+    data = sweep(scene, {"friction.normal_force": forces}, out=tmp_path, workers=2)
     found = data["v_average"].values * scene.drive.frequency / g
     # As the surface is given per force, the drive's optimum follows the force.
     assert found == pytest.approx(list(table.values()), rel=1e-6)
-    assert data["friction.normal_force"].attrs["units"] == "N"
+    assert data.normal_force.attrs["units"] == "N"
     assert data["v_average"].attrs["units"] == "m/s"
 
 
 def test_agrees_with_single_runs(tmp_path: Path) -> None:
-    design = grid({"drive.amplitude": [6.0, 8.0], "drive.offset": [-1.5, -1.0, -0.5]})
+    over = {"drive.amplitude": [6.0, 8.0], "drive.offset": [-1.5, -1.0, -0.5]}
     scene = load("ideal-current", SHORT)
-    data = sweep(scene, design, tmp_path, workers=2)
-    assert data.sizes == {"drive.amplitude": 2, "drive.offset": 3}
+    data = sweep(scene, over, out=tmp_path, workers=2)
+    assert data.sizes == {"amplitude": 2, "offset": 3}
     for amplitude in (6.0, 8.0):
         for offset in (-1.5, -1.0, -0.5):
             values = {"drive.amplitude": amplitude, "drive.offset": offset}
-            point = data.sel(values)
+            point = data.sel(amplitude=amplitude, offset=offset)
             alone = simulate(
                 load("ideal-current", [*SHORT, *(f"{k}={v}" for k, v in values.items())])
             ).summary
@@ -57,15 +58,15 @@ def test_agrees_with_single_runs(tmp_path: Path) -> None:
 
 def test_read_by_others(tmp_path: Path) -> None:
     """The netCDF library, which this project does not write with, reads the same."""
-    design = grid({"drive.frequency": [10.0, 20.0], "drive.amplitude": [3.0, 99.0]})
+    over = {"drive.frequency": [10.0, 20.0], "drive.amplitude": [3.0, 99.0]}
     scene = load("ideal-current", [*SHORT, "drive.quantised=true"])
-    data = sweep(scene, design, tmp_path, workers=1)
+    data = sweep(scene, over, out=tmp_path, workers=1)
     with netCDF4.Dataset(tmp_path / "sweep.nc") as file:
-        assert file["v_average"].dimensions == ("drive.frequency", "drive.amplitude")
-        assert file["v_average"].units == "m/s" and file["drive.frequency"].units == "Hz"
+        assert file["v_average"].dimensions == ("frequency", "amplitude")
+        assert file["v_average"].units == "m/s" and file["frequency"].units == "Hz"
         np.testing.assert_array_equal(file["v_average"][:].filled(np.nan), data["v_average"])
         assert file["failure"][:].tolist() == data["failure"].values.tolist()
-    assert np.isnan(data["v_average"].sel({"drive.amplitude": 99.0})).all()
+    assert np.isnan(data.v_average.sel(amplitude=99.0)).all()
     assert "drive.amplitude = 99" in str(data["failure"].values[0, 1])
     assert read(tmp_path / "sweep.nc").identical(data)
 
@@ -97,15 +98,15 @@ def test_failures_cost_only_themselves(tmp_path: Path) -> None:
     ):
         data = sweep(
             load("paper", source),
-            grid(over),
-            tmp_path / str(lost) / str(len(over)) / next(iter(over)),
+            over,
+            out=tmp_path / str(lost) / str(len(over)) / next(iter(over)),
             workers=1,
         )
         assert data["failure"].values.tolist()[0] == ""
         assert data["failure"].values.tolist()[lost] != ""
         assert np.isfinite(data["v_average"].values[0]) and np.isnan(data["v_average"].values[lost])
     scene = load("paper", ["circuit.model=file", f"circuit.netlist={netlist}", *SHORT])
-    data = sweep(scene, grid({"drive.offset": [-1.2]}), tmp_path / "circuit", workers=1)
+    data = sweep(scene, {"drive.offset": [-1.2]}, out=tmp_path / "circuit", workers=1)
     assert str(data["failure"].values[0]) != ""
 
 
@@ -123,7 +124,7 @@ def test_worker_that_keeps_dying() -> None:
             while 0 not in outcomes:
                 for worker in list(pool._workers):
                     if worker.began and worker.point is not None and worker.point[0] == 0:
-                        worker.process.kill()
+                        worker._process.kill()
                 time.sleep(0.05)
 
         killer = threading.Thread(target=kill)
@@ -139,14 +140,16 @@ def test_worker_that_keeps_dying() -> None:
 def test_dask(tmp_path: Path) -> None:
     from distributed import LocalCluster
 
-    design = sample({"drive.offset": [-2.0, 0.0], "drive.frequency": [15.0, 40.0]}, 12, 3, False)
+    over = {"drive.offset": [-2.0, 0.0], "drive.frequency": [15.0, 40.0]}
     scene = load("ideal-current", SHORT)
-    here = sweep(scene, design, tmp_path / "here", workers=2)
+    here = sweep(scene, over, samples=12, seed=3, out=tmp_path / "here", workers=2)
     running: Any = LocalCluster(
         n_workers=2, threads_per_worker=2, dashboard_address="", host="127.0.0.1"
     )
     with running as cluster:
-        there = sweep(scene, design, tmp_path / "there", dask=cluster.scheduler_address)
+        there = sweep(
+            scene, over, samples=12, seed=3, out=tmp_path / "there", dask=cluster.scheduler_address
+        )
     assert there.identical(here)
     assert (tmp_path / "there/sweep.nc").read_bytes() == (tmp_path / "here/sweep.nc").read_bytes()
 
@@ -154,19 +157,19 @@ def test_dask(tmp_path: Path) -> None:
 def test_no_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cosim.studies.sweep.cluster.PATIENCE", 0.5)
     with pytest.raises(BadInput, match="no cluster answers"):
-        sweep(load("held"), grid({"friction.mu_s": [0.7]}), tmp_path, dask="tcp://127.0.0.1:9")
+        sweep(load("held"), {"friction.mu_s": [0.7]}, out=tmp_path, dask="tcp://127.0.0.1:9")
 
 
 def test_folder_of_another_sweep(tmp_path: Path) -> None:
     scene = load("held", ["run.duration=0.01"])
-    sweep(scene, grid({"friction.mu_s": [0.7]}), tmp_path, workers=1)
+    sweep(scene, {"friction.mu_s": [0.7]}, out=tmp_path, workers=1)
     before = (tmp_path / "sweep.nc").read_bytes()
     with pytest.raises(BadInput, match="another sweep"):
-        sweep(scene, grid({"friction.mu_s": [0.8]}), tmp_path, workers=1)
+        sweep(scene, {"friction.mu_s": [0.8]}, out=tmp_path, workers=1)
     assert (tmp_path / "sweep.nc").read_bytes() == before
     (tmp_path / "sweep.journal").write_bytes(b'{"sweep": "torn')
     with pytest.raises(BadInput, match="another sweep"):
-        sweep(scene, grid({"friction.mu_s": [0.7]}), tmp_path, workers=1)
+        sweep(scene, {"friction.mu_s": [0.7]}, out=tmp_path, workers=1)
 
 
 def test_latin_hypercube() -> None:

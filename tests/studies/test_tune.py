@@ -20,7 +20,7 @@ def test_theory_s_optimum() -> None:
     scene = load("optimal", ["friction.mu_s=0.7", "friction.mu_k=0.6"])
     weight = scene.mechanics.part_mass * scene.mechanics.gravity
     over = {"friction.normal_force": (0.5 * weight, 13.0 * weight)}
-    found = tune(scene, "v_average", over=over, budget=80, workers=2)
+    found = tune(scene, maximise="v_average", over=over, budget=80, workers=2)
     assert found.best.value is not None
     reached = found.best.value * scene.drive.frequency / scene.mechanics.gravity
     assert 0.3356265876 * (1 - 2e-4) < reached < 0.3356265876 * (1 + 1e-9)
@@ -33,14 +33,14 @@ def test_same_for_any_number_of_workers() -> None:
     scene = load("ideal-current", ["run.duration=0.2", "run.settle=0.1"])
     over = {"drive.offset": (-2.0, 0.0), "mechanics.n_surfaces": (1.0, 3.0)}
     first, second = (
-        tune(scene, "v_average", False, over, budget=60, seed=4, workers=n) for n in (1, 2)
+        tune(scene, minimise="v_average", over=over, budget=60, seed=4, workers=n) for n in (1, 2)
     )
     assert first == second
     assert first.best.value is not None
     searched = [run.value for run in first.runs[:-8]]  # the last round turns two keys
     assert first.best.value <= min(value for value in searched if value is not None)
     assert all(isinstance(run.values["mechanics.n_surfaces"], int) for run in first.runs)
-    assert first != tune(scene, "v_average", False, over, budget=60, seed=5, workers=2)
+    assert first != tune(scene, minimise="v_average", over=over, budget=60, seed=5, workers=2)
 
 
 def test_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -68,7 +68,13 @@ def test_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_all_runs_fail() -> None:
     with pytest.raises(SimulationFailed, match=r"the first one: --over: friction\.mu_k = 0\.[89]"):
-        tune(load("held"), "v_average", over={"friction.mu_k": (0.8, 0.9)}, budget=30, workers=2)
+        tune(
+            load("held"),
+            maximise="v_average",
+            over={"friction.mu_k": (0.8, 0.9)},
+            budget=30,
+            workers=2,
+        )
 
 
 BAD = [
@@ -110,7 +116,11 @@ def test_scouts_without_ngspice() -> None:
     ahead: list[float | None] = []
     scene = load("paper", quick)
     found = tune(
-        scene, "v_average", budget=40, workers=2, scouting=lambda run, best: ahead.append(run.value)
+        scene,
+        maximise="v_average",
+        budget=40,
+        workers=2,
+        scouting=lambda run, best: ahead.append(run.value),
     )
     assert found.scouts == len(ahead) > 100 and len(found.runs) <= 40
     assert found.scene.circuit.model == "amplifier"
@@ -133,6 +143,6 @@ def test_beats_a_grid() -> None:
     whole = changed(there, periods_made_whole(there), "test")
     summary: Any = simulate(whole).summary
     assert summary["v_average"] == pytest.approx(GRID_BEST, rel=2e-3)
-    found = tune(scene, "v_average", budget=200, workers=2)
+    found = tune(scene, maximise="v_average", budget=200, workers=2)
     assert len(found.runs) <= 200
     assert found.best.value is not None and found.best.value > GRID_BEST

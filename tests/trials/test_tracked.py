@@ -122,11 +122,6 @@ def test_trackers_own_export_with_decimal_commas_and_other_names(tmp_path: Path)
     check(write(tmp_path / "trial.txt", content))
 
 
-def test_another_unit(tmp_path: Path):
-    path = write(tmp_path / "trial.csv", text(table()))
-    np.testing.assert_allclose(read(path, unit=1.0).part.z, 1e3 * read(path).part.z)
-
-
 def changed(row: int, column: str, value: str) -> str:
     cells = table()
     cells[row][cells[0].index(column)] = value

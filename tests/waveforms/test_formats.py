@@ -20,10 +20,10 @@ import xarray
 from scipy.io import loadmat
 
 from cosim.cli.main import main
-from cosim.studies.compare.compare import differences
+from cosim.trials.camera import accelerations, velocities
 from cosim.trials.tracked import read
-from cosim.waveforms.formats import FORMS
-from cosim.waveforms.formats.tracker import number, second_differences
+from cosim.waveforms.formats import formats
+from cosim.waveforms.formats.tracker import number
 from tests.helpers.ngspice_alone import LIBRARY
 
 Array = npt.NDArray[np.float64]
@@ -307,8 +307,8 @@ def test_the_published_trials_have_this_form(name: str, trials: Path) -> None:
     frames: dict[str, tuple[str, ...]] = dict(zip(TRIAL.split(","), columns, strict=True))
     # Tracker differences heights of more digits than it writes.
     for quantity, differenced, unsure in (
-        ("v", differences, 1e-3),
-        ("a", second_differences, 1.0),
+        ("v", velocities, 1e-3),
+        ("a", accelerations, 1.0),
     ):
         for body in ("zp", "zo", "xo", "zs"):
             mm = np.array(frames[body], float)
@@ -403,7 +403,7 @@ def test_all_forms_of_a_part_alone(
     before = {path.name for path in sine.iterdir()}
     lists = ["--as", "csv,mat, hdf5", "--as", "nc,wav,raw,tracker"]
     assert main(["export", str(sine), *lists, "--out", str(tmp_path)]) == 0
-    names = {name for _, name in FORMS.values()}
+    names = {format.file for format in formats().values()}
     assert {path.name for path in tmp_path.iterdir()} == names
     said = capsys.readouterr().out
     assert all(name in said for name in names)
@@ -414,8 +414,8 @@ def test_all_forms_of_a_part_alone(
 
 def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
     for out in ("once", "again"):
-        export(run, ",".join(FORMS), tmp_path / out)
-    for _, name in FORMS.values():
+        export(run, ",".join(formats()), tmp_path / out)
+    for name in (format.file for format in formats().values()):
         once, again = ((tmp_path / out / name).read_bytes() for out in ("once", "again"))
         assert once == again, name
 
@@ -423,7 +423,7 @@ def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "arguments, told",
     [
-        (["run", "--as", "xls"], r'"xls".*csv, nc, mat, hdf5, raw, wav, tracker'),
+        (["run", "--as", "xls"], r'"xls".*csv, hdf5, mat, nc, raw, tracker, wav'),
         (["run", "--as", "csv,,mat"], r'there is no form ""'),
         (["run", "--as", "mat,csv,mat"], "mat stands there 2 times"),
         (["run", "--as", "mat", "--as", "mat"], "mat stands there 2 times"),

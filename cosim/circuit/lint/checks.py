@@ -1,13 +1,13 @@
-"""Mistakes that ngspice takes silently, tells obscurely or does not survive, told in one sentence.
+"""Mistakes that ngspice accepts in silence, reports obscurely or crashes on, each in one sentence.
 
-Where it cannot be decided without evaluating the netlist, it passes.
+What cannot be decided without evaluating the netlist passes.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from cosim.circuit.lint.deck import Line, refuse, shown, word_set
-from cosim.circuit.lint.elements import MODEL_TYPES, Element, Scope, parse
+from cosim.circuit.lint.elements import MODEL_TYPES, Element, Scope, controls, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed
 from cosim.circuit.lint.topology import check_topology
 
@@ -51,7 +51,7 @@ def _check_required(top: Scope, required: Sequence[Sequence[str]]) -> None:
     for scope in top.in_use():
         for element in scope.elements:
             if "external" in element.words and (scope is not top or element.name not in agreed):
-                refuse(element.line, f"{shown(element.name)} cannot be external: nothing drives it")
+                element.refuse(" cannot be external: nothing drives it")
 
 
 def _check_duplicates(scope: Scope) -> None:
@@ -65,28 +65,29 @@ def _check_duplicates(scope: Scope) -> None:
 
 
 def _check_element(element: Element, scope: Scope, names: Names) -> None:
-    kind, line = element.kind, element.line
+    kind = element.kind
     if kind in MODEL_TYPES:
         _check_model(element, scope)
     if kind in "rcl":
         _check_passive(element, scope, names)
     elif kind in "vi":
         _check_source(element, scope, names)
-    elif kind == "b":
-        if not body(line).strip():
-            refuse(line, f"{shown(element.name)} has neither V=… nor I=…")
-    elif kind in "eg":
-        if not element.words:
-            refuse(line, f"{shown(element.name)} has no value")
+    elif kind == "b" and not body(element.line).strip():
+        element.refuse(" has neither V=… nor I=…")
+    elif kind in "eg" and not element.words:
+        element.refuse(" has no value")
     elif kind in "fhw":
         _check_current_controlled(element, scope)
     elif kind == "k":
-        _check_coupling(element, scope)
+        if len(element.words) < 3:
+            element.refuse(" must name two inductors and their coupling")
+        _check_named(element, scope, "inductor", element.words[:2])
     elif kind == "t" and not any(word.startswith(("z0=", "zo=")) for word in element.words):
-        refuse(line, f"{shown(element.name)} has no Z0=…")
+        element.refuse(" has no Z0=…")
     elif kind == "x":
         _check_call(element, scope)
-    _check_sensed(element, scope)
+    if kind in "beg":
+        _check_named(element, scope, "source", _plain(sensed(element.line.text, "i")))
 
 
 def _check_model(element: Element, scope: Scope) -> None:
@@ -94,106 +95,77 @@ def _check_model(element: Element, scope: Scope) -> None:
     if element.kind in "swo":
         place = 1 if element.kind == "w" else 0
         if len(element.words) <= place:
-            refuse(element.line, f"{shown(element.name)} has too few nodes or no model")
+            element.refuse(" has too few nodes or no model")
         name = element.words[place]
     if name is None:
         return
     types = scope.model_types(name)
     if types is None:
-        refuse(element.line, f"{shown(element.name)}: no model {shown(name)} is defined here")
+        element.refuse(f": no model {shown(name)} is defined here")
+    _check_type(element, name, types)
+
+
+def _check_type(element: Element, model: str, types: set[str]) -> None:
     if types and not types & MODEL_TYPES[element.kind]:
-        refuse(
-            element.line,
-            f"{shown(element.name)}: the model {shown(name)} is of type {shown(min(types))}",
-        )
+        element.refuse(f": the model {shown(model)} is of type {shown(min(types))}")
 
 
 def _check_passive(element: Element, scope: Scope, names: Names) -> None:
-    line, name = element.line, shown(element.name)
-    if all(word.partition("=")[0] in _NO_VALUES for word in element.words if "=" in word):
-        plain = [word for word in element.words if "=" not in word]
-        if not plain:
-            refuse(line, f"{name} has no value")
-        first = plain[0]
-        if _NUMBER.match(first) or first[0] in "{'" or first[0] in "+-":
-            return
-        types = scope.model_types(first)
-        if types is not None:
-            if types and not types & MODEL_TYPES[element.kind]:
-                refuse(line, f"{name}: the model {shown(first)} is of type {shown(min(types))}")
-        elif names.is_parameter(scope, first):
-            if element.kind == "r":
-                refuse(
-                    line,
-                    f"{name}: write {{{shown(first)}}}, as ngspice takes a bare word for a model",
-                )
-        else:
-            refuse(line, f"{name}: {shown(first)} is neither a number nor a model")
+    if any(word.partition("=")[0] not in _NO_VALUES for word in element.words if "=" in word):
+        return
+    first = next((word for word in element.words if "=" not in word), None)
+    if first is None:
+        element.refuse(" has no value")
+    if _NUMBER.match(first) or first[0] in "{'+-":
+        return
+    types = scope.model_types(first)
+    if types is not None:
+        _check_type(element, first, types)
+    elif not names.is_parameter(scope, first):
+        element.refuse(f": {shown(first)} is neither a number nor a model")
+    elif element.kind == "r":
+        element.refuse(f": write {{{shown(first)}}}, as ngspice takes a bare word for a model")
 
 
 def _check_source(element: Element, scope: Scope, names: Names) -> None:
     for word in element.words:
         plain = word.lstrip("+-")
-        if (
-            "=" in word
-            or _NUMBER.match(word)
-            or plain[:1] in ("{", "'", "")
-            or plain in _WAVEFORMS
-            or names.is_parameter(scope, plain)
-        ):
+        known = plain in _WAVEFORMS or names.is_parameter(scope, plain)
+        if known or "=" in word or _NUMBER.match(word) or plain[:1] in ("{", "'", ""):
             continue
-        refuse(
-            element.line,
-            f"{shown(element.name)}: {shown(word)} is neither a number, a parameter nor a waveform",
-        )
+        element.refuse(f": {shown(word)} is neither a number, a parameter nor a waveform")
 
 
 def _check_current_controlled(element: Element, scope: Scope) -> None:
     found = element.words
     if element.kind != "w" and (not found or "=" in found[0] or found[0][0] in "{'"):
         return
-    count, start = 1, 0
-    if found and found[0] == "poly":
-        if len(found) < 2 or not found[1].isdigit():
-            return
-        count, start = int(found[1]), 2
-    controls = found[start : start + count]
-    if len(found) <= start + count:
-        refuse(element.line, f"{shown(element.name)} has too few words")
-    for control in controls:
-        _check_source_exists(element, scope, control)
-
-
-def _check_source_exists(element: Element, scope: Scope, name: str) -> None:
-    if "." in name or ":" in name:
+    place = controls(found, 1)
+    if place is None:
         return
-    if name not in scope.names:
-        refuse(element.line, f"{shown(element.name)}: there is no source {shown(name)} here")
+    if len(found) <= place.stop:
+        element.refuse(" has too few words")
+    _check_named(element, scope, "source", _plain(found[place]))
 
 
-def _check_coupling(element: Element, scope: Scope) -> None:
-    if len(element.words) < 3:
-        refuse(element.line, f"{shown(element.name)} must name two inductors and their coupling")
-    for name in element.words[:2]:
+def _check_named(element: Element, scope: Scope, what: str, names: Iterable[str]) -> None:
+    for name in names:
         if name not in scope.names:
-            refuse(element.line, f"{shown(element.name)}: there is no inductor {shown(name)} here")
+            element.refuse(f": there is no {what} {shown(name)} here")
+
+
+def _plain(names: Iterable[str]) -> Iterator[str]:
+    """Those that are no paths into subcircuits, which are not followed."""
+    return (name for name in names if "." not in name and ":" not in name)
 
 
 def _check_call(element: Element, scope: Scope) -> None:
     name = element.model or ""
     subcircuits = scope.subcircuit(name)
     if subcircuits is None:
-        refuse(element.line, f"{shown(element.name)}: no subcircuit {shown(name)} is defined here")
+        element.refuse(f": no subcircuit {shown(name)} is defined here")
     counts = {len(subcircuit.pins) for subcircuit in subcircuits}
     if len(element.nodes) not in counts:
-        refuse(
-            element.line,
-            f"{shown(element.name)} has {len(element.nodes)} nodes, but the subcircuit "
-            f"{shown(name)} has {max(counts)}",
+        element.refuse(
+            f" has {len(element.nodes)} nodes, but the subcircuit {shown(name)} has {max(counts)}"
         )
-
-
-def _check_sensed(element: Element, scope: Scope) -> None:
-    if element.kind in "beg":
-        for name in sensed(element.line.text, "i"):
-            _check_source_exists(element, scope, name)

@@ -1,9 +1,9 @@
-"""The one door by which a netlist's text reaches ngspice.
+"""Reads a netlist for ngspice; no other code passes a file's text to it.
 
 A netlist can run commands, write files and read files while ngspice merely loads it: ``.control``,
-``*#`` comments, a ``*ng_script`` title, code models, several device models and options. Hence
-nothing is searched for what is bad. Files are read and put together here, and only the lines, words
-and characters known to be needed for a circuit pass; ngspice sees neither comments nor file names.
+``*#`` comments, a ``*ng_script`` title, code models, several device models and options. So this is
+a list of what is allowed: files are read and joined here, and only lines, words and characters that
+a circuit needs pass. ngspice sees neither comments nor file names.
 """
 
 import re
@@ -74,7 +74,7 @@ _UNSAFE = re.compile(r'["`\\]')
 _FILE_WORD = re.compile(r"\b(?:\w*_)?(?:file|filename|wavefile)\b", re.IGNORECASE)
 _COMMAND_COMMENT = re.compile(r"\*\s*(?:#\s*[\w!/.]|ng_script)", re.IGNORECASE)
 _TRAILING = re.compile(r";|//|(?:^|(?<=[\s,]))\$")
-_OPTION = re.compile(r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+))?\s*", re.IGNORECASE)
+_OPTION = re.compile(r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+))?[\s,]*", re.IGNORECASE)
 _MODEL = re.compile(r"\.model\s+([^\s=(){}']+)\s+([a-z]\w*)(?![\w:])", re.IGNORECASE)
 _LEVEL = re.compile(r"(?<![\w.])level\s*(=?)\s*([^\s,()]*)", re.IGNORECASE)
 _PATH = re.compile(r"""\s*(?:"([^"]*)"|'([^']*)'|([^\s"']+))\s*([^\s"']*)\s*""")
@@ -101,7 +101,7 @@ def read(path: Path) -> list[Line]:
 
 @dataclass
 class _Reader:
-    """State of one ``read``: the folder it may not leave and what it has used of its limits."""
+    """One ``read``: the folder that it must not leave, and how much it has read."""
 
     path: Path
     lines: list[Line] = field(default_factory=list)
@@ -327,12 +327,10 @@ def _options(line: Line, word: str, rest: str) -> str | None:
             refuse(line, f"{shown(rest[place:])} is no option")
         name = match[1].lower()
         if name in NUMERIC_OPTIONS:
-            kept.append(match[0].strip())
+            kept.append(match[0].strip(" ,"))
         elif name not in DROPPED_OPTIONS:
             refuse(line, f"the option {shown(name)} is not allowed in a netlist")
         place = match.end()
-        while rest[place : place + 1] in (",", " "):
-            place += 1
     return f"{word} {' '.join(kept)}" if kept else None
 
 

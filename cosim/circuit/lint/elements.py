@@ -1,11 +1,12 @@
-"""What a netlist's lines say: scopes, elements and the words of a line, as ngspice reads them.
+"""A netlist's scopes and elements, as ngspice reads them from its lines.
 
-Nothing is evaluated; whatever cannot be decided without its value stays undecided.
+Nothing is evaluated: what depends on a value stays undecided.
 """
 
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import NoReturn
 
 from cosim.circuit.lint.deck import Line, refuse, shown
 from cosim.circuit.lint.words import definitions, split_assignments, words
@@ -51,13 +52,9 @@ class Element:
     def kind(self) -> str:
         return self.name[0]
 
-    @property
-    def behavioural(self) -> bool:
-        """Whether an expression gives its value."""
-        first = self.words[0] if self.words else ""
-        return self.kind == "b" or first.startswith(
-            ("value", "vol=", "cur=", "table", "laplace", "freq", "{")
-        )
+    def refuse(self, reason: str) -> NoReturn:
+        """Raise the sentence in which ``reason`` follows the element's name."""
+        refuse(self.line, f"{shown(self.name)}{reason}")
 
 
 @dataclass
@@ -132,10 +129,7 @@ class _Parser:
         handlers: dict[str, Callable[[Line, list[str]], None]] = {
             ".subckt": self._subckt,
             ".ends": self._ends,
-            ".if": self._conditional,
-            ".elseif": self._conditional,
-            ".else": self._conditional,
-            ".endif": self._conditional,
+            **dict.fromkeys((".if", ".elseif", ".else", ".endif"), self._conditional),
             ".param": self._param,
             ".func": self._func,
             ".model": self._model,
@@ -220,36 +214,36 @@ class _Parser:
 def _check_brackets(line: Line) -> None:
     if line.text.count("'") % 2:
         refuse(line, "a quote is not closed, so the line may be cut short")
-    depth = {"{": 0, "(": 0}
-    for char in line.text:
-        if char in "{(":
-            depth[char] += 1
-        elif char in "})":
-            opening = "{" if char == "}" else "("
-            depth[opening] -= 1
-            if depth[opening] < 0:
-                refuse(line, f"{char} closes nothing")
-    for opening, open_ones in depth.items():
-        if open_ones:
+    for opening, shutting in ("{}", "()"):
+        depth = 0
+        for char in line.text:
+            depth += (char == opening) - (char == shutting)
+            if depth < 0:
+                refuse(line, f"{shutting} closes nothing")
+        if depth:
             refuse(line, f"{opening} is not closed, so the line may be cut short")
 
 
 def _place(element: Element, scope: Scope) -> None:
     """Tell nodes from what follows them."""
-    kind, line = element.kind, element.line
+    kind = element.kind
     if kind == "x":
-        element.nodes, element.model, element.words = _call(element)
+        positional, assigned = split_assignments(element.words)
+        if not positional:
+            element.refuse(" names no subcircuit")
+        *element.nodes, element.model = positional
+        element.words = assigned
     elif kind in MODEL_PLACES:
         least, most = MODEL_PLACES[kind]
         places = range(least, min(most + 1, len(element.words)))
         if not places:
-            refuse(line, f"{shown(element.name)} has too few nodes or no model")
+            element.refuse(" has too few nodes or no model")
         known = (i for i in places if scope.model_types(element.words[i]) is not None)
         place = next(known, None)
         if place is None:
-            # Numbers and letters before a "key=" are nodes as likely as models.
+            # Words before a "key=" are as likely nodes as models.
             name = element.words[least + 1 if kind == "m" and len(element.words) > 4 else least]
-            refuse(line, f"{shown(element.name)}: no model {shown(name)} is defined here")
+            element.refuse(f": no model {shown(name)} is defined here")
         _split(element, place)
         element.model = element.words.pop(0)
     else:
@@ -258,34 +252,36 @@ def _place(element: Element, scope: Scope) -> None:
     if kind == "s":
         element.controls, element.nodes = element.nodes[2:], element.nodes[:2]
     if kind in "eg":
-        _controls(element)
+        _place_controls(element)
 
 
 def _split(element: Element, count: int) -> None:
     element.nodes, element.words = element.words[:count], element.words[count:]
     if len(element.nodes) < count or any("=" in name or "{" in name for name in element.nodes):
-        refuse(element.line, f"{shown(element.name)} has too few nodes")
+        element.refuse(" has too few nodes")
 
 
-def _call(element: Element) -> tuple[list[str], str, list[str]]:
-    positional, assigned = split_assignments(element.words)
-    if not positional:
-        refuse(element.line, f"{shown(element.name)} names no subcircuit")
-    return positional[:-1], positional[-1], assigned
+def controls(words: list[str], each: int) -> slice | None:
+    """Where the words stand that name what controls a source, ``each`` for one controlling
+    quantity; None where the dimension of a POLY is not known.
+    """
+    if words[:1] != ["poly"]:
+        return slice(0, each)
+    if len(words) < 2 or not words[1].isdigit():
+        return None
+    return slice(2, 2 + each * int(words[1]))
 
 
-def _controls(element: Element) -> None:
-    """The controlling nodes of a linear or polynomial voltage-controlled source."""
+def _place_controls(element: Element) -> None:
+    """Tell the controlling nodes of a linear or polynomial voltage-controlled source."""
     first = element.words[0] if element.words else ""
-    count, start = 1, 0
-    if first == "poly":
-        if len(element.words) < 2 or not element.words[1].isdigit():
-            return
-        count, start = int(element.words[1]), 2
-    elif not first or not re.fullmatch(r"[^={}']+", first) or first in _SPECIAL:
+    if not re.fullmatch(r"[^={}']+", first) or first in _SPECIAL:
         return
-    end = start + 2 * count
-    if len(element.words) <= end or any("=" in word for word in element.words[start:end]):
-        refuse(element.line, f"{shown(element.name)} has too few nodes or no value")
-    element.controls = [node(name) for name in element.words[start:end]]
-    element.words = element.words[end:]
+    place = controls(element.words, 2)
+    if place is None:
+        return
+    found = element.words[place]
+    if len(element.words) <= place.stop or any("=" in word for word in found):
+        element.refuse(" has too few nodes or no value")
+    element.controls = [node(name) for name in found]
+    element.words = element.words[place.stop :]

@@ -13,26 +13,21 @@ from cosim.circuit.lint.elements import Element, Scope
 from cosim.circuit.lint.words import closing, definitions
 
 _RANDOM = {"agauss": 3, "gauss": 3, "aunif": 2, "unif": 2, "limit": 2}
-_COMMON = word_set(
+_ONE_ARGUMENT = word_set(
     """abs acos acosh asin asinh atan atanh ceil cos cosh exp floor ln log log10 nint sgn sin sinh
     sqrt tan tanh"""
 )
-PARAMETRIC = (
-    dict.fromkeys(_COMMON | word_set("arctan int sqr"), 1)
+_COMMON = (
+    dict.fromkeys(_ONE_ARGUMENT, 1)
     | dict.fromkeys(word_set("max min pow pwr"), 2)
-    | {"ternary_fcn": 3}
-    | _RANDOM
+    | {"ternary_fcn": 3, **_RANDOM}
 )
+PARAMETRIC = _COMMON | dict.fromkeys(word_set("arctan int sqr"), 1)
 """Functions of ngspice 39's parameters, which are numbers before a run, and how many arguments each
 takes: with too many or too few ngspice calculates something else in silence."""
-BEHAVIOURAL = (
-    dict.fromkeys(_COMMON | word_set("ddt eq0 ge0 gt0 le0 lt0 ne0 u u2 uramp"), 1)
-    | dict.fromkeys(word_set("max min pow pwr"), 2)
-    | {"ternary_fcn": 3}
-    | _RANDOM
-)
-"""Those of its behavioural sources, ``pwl`` (with any number of points) apart. The random ones are
-replaced by a number as the netlist is read."""
+BEHAVIOURAL = _COMMON | dict.fromkeys(word_set("ddt eq0 ge0 gt0 le0 lt0 ne0 u u2 uramp"), 1)
+"""Those of its behavioural sources, except ``pwl``, which takes any number of points. ngspice
+replaces the random ones by a number as it reads the netlist."""
 CONSTANTS = word_set("time temper hertz")
 BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
 
@@ -66,14 +61,6 @@ class _Function:
     formals: tuple[str, ...]
     body: str
     line: Line
-
-
-@dataclass(frozen=True)
-class _Place:
-    """An expression, and which of ngspice's two parsers evaluates it."""
-
-    text: str
-    behavioural: bool
 
 
 class Names:
@@ -135,14 +122,13 @@ def check_names(scope: Scope, names: Names) -> None:
     for line, element in scope.lines:
         if names.drops(line):
             continue
-        formal = _formal(line)
-        known = parameters | formal if formal else parameters
-        defines = any(True for _ in _functions(line))
-        for place in _expressions(line, element):
-            loose = place.behavioural or (element is not None and element.kind in "beg")
-            # Where a function's own definition will be evaluated is not known there.
-            behavioural = place.behavioural or (None if defines else False)
-            for name, arguments in used(place.text):
+        defined = list(_functions(line))
+        known = parameters.union(*(function.formals for function in defined))
+        for expression, in_source in _expressions(line, element):
+            loose = in_source or (element is not None and element.kind in "beg")
+            # A function's definition does not tell which parser will evaluate it.
+            behavioural = in_source or (None if defined else False)
+            for name, arguments in used(expression):
                 if arguments is None:
                     if name not in known and not (loose and name in BEHAVIOURAL_CONSTANTS):
                         refuse(line, f"the parameter {shown(name)} is not defined")
@@ -228,7 +214,7 @@ def _counted(count: int) -> str:
 
 
 def _is_plain(argument: str) -> bool:
-    return _PLAIN.fullmatch(argument) is not None and not _VARYING.search(argument)
+    return _PLAIN.fullmatch(argument) is not None and not _varies(argument)
 
 
 def check_circles(top: Scope) -> None:
@@ -296,15 +282,19 @@ def body(line: Line) -> str:
     return line.text[match.end() :] if match else ""
 
 
-def _expressions(line: Line, element: Element | None) -> Iterator[_Place]:
+def _expressions(line: Line, element: Element | None) -> Iterator[tuple[str, bool]]:
+    """The expressions of a line, and whether ngspice's parser of behavioural sources evaluates
+    each: outside B sources it does where the expression varies during a run.
+    """
     text = line.text
     word = text.split()[0].lower()
     if word == ".param":
         for _, expression in definitions(text):
-            yield _place(expression)
+            yield expression, _varies(expression)
         return
     if word.startswith((".if", ".elseif")):
-        yield _place(text[text.lower().index("if") + 2 :])
+        condition = text[text.lower().index("if") + 2 :]
+        yield condition, _varies(condition)
         return
     end = 0
     if element is not None and element.kind == "b":
@@ -312,14 +302,14 @@ def _expressions(line: Line, element: Element | None) -> Iterator[_Place]:
         start = len(text) - len(body(line))
         key = _NEXT_KEY.search(_masked(text), start)
         end = key.start() if key else len(text)
-        yield _Place(text[start:end], True)
+        yield text[start:end], True
     place = end
     while place < len(text):
         if text[place] in "{'":
             after = closing(text, place)
             inside = text[place + 1 : after - 1]
             source = element is not None and _SOURCE.search(text[:place]) is not None
-            yield _Place(inside, True) if source else _place(inside)
+            yield inside, source or _varies(inside)
             place = after
         else:
             place += 1
@@ -327,12 +317,11 @@ def _expressions(line: Line, element: Element | None) -> Iterator[_Place]:
         return
     if element is None or element.kind != "b":
         for _, name in _ASSIGNMENT.findall(re.sub(r"\s*=\s*", "=", _unbraced(text))):
-            yield _place(name)
+            yield name, _varies(name)
 
 
-def _place(expression: str) -> _Place:
-    """An expression outside a B source: what varies during a run makes it one."""
-    return _Place(expression, _VARYING.search(expression) is not None)
+def _varies(expression: str) -> bool:
+    return _VARYING.search(expression) is not None
 
 
 def _functions(line: Line) -> Iterator[_Function]:
@@ -359,8 +348,3 @@ def _masked(text: str) -> str:
 
 def _unbraced(text: str) -> str:
     return re.sub(r"\{[^{}]*\}|'[^']*'", "{}", text)
-
-
-def _formal(line: Line) -> set[str]:
-    """The formal parameters of functions that a line defines."""
-    return {name for function in _functions(line) for name in function.formals}

@@ -1,7 +1,7 @@
 """Circuits that have no operating point: floating nodes and loops of ideal voltages.
 
-The subcircuits are expanded. Where an element's effect is not known for sure, it is taken for one
-that makes the circuit solvable.
+Subcircuits are expanded. An element whose effect is uncertain counts as one that makes the circuit
+solvable.
 """
 
 import re
@@ -48,12 +48,10 @@ class _Groups:
 
     def find(self, name: str) -> str:
         parents = self.parents
-        root = name
-        while (parent := parents.setdefault(root, root)) != root:
-            root = parent
-        while name != root:
-            parents[name], name = root, parents[name]
-        return root
+        while (parent := parents.setdefault(name, name)) != name:
+            parents[name] = parents[parent]
+            name = parent
+        return name
 
     def join(self, one: str, other: str) -> bool:
         """Whether the two were apart."""
@@ -125,15 +123,9 @@ def _check_ends(parts: list[Part], terminals: Counter[str], held: set[str]) -> N
             if name != GROUND and name not in terminals and not re.search(r"[.:]", name):
                 refuse(line, f"nothing is connected to the node {shown(name)}")
         for name in part.nodes:
-            if (
-                part.top
-                and part.element.kind in _LEAF
-                and terminals[name] == 1
-                and name not in seen
-                and name not in held
-                and name != GROUND
-                and not name.startswith("nc")
-            ):
+            leaf = part.top and part.element.kind in _LEAF
+            excused = name in seen or name in held or name == GROUND or name.startswith("nc")
+            if leaf and terminals[name] == 1 and not excused:
                 refuse(line, f"the node {shown(name)} has no other connection")
 
 
@@ -185,8 +177,4 @@ def _check_loops(parts: list[Part]) -> None:
         if "portnum" in element.words or (element.kind != "l" and element.name in read):
             continue
         if not groups.join(*part.nodes):
-            refuse(
-                element.line,
-                f"{shown(element.name)} closes a loop of voltage sources and inductors without "
-                "resistance",
-            )
+            element.refuse(" closes a loop of voltage sources and inductors without resistance")

@@ -1,88 +1,59 @@
-/* The compiled twin of cosim/recorder.py and of the calls of cosim/mechanics.py: the same arithmetic
-   in the same order, so the same bits. */
+/* Rows of the waveforms, frames of the camera and the end of settling are communication points of
+   their own: what stands in a row is a state of the mechanics, never an interpolation. */
 
-#include "coupled.h"
+#include "loop.h"
 
-#include <stdbool.h>
-#include <stddef.h>
+#include <stdint.h>
 
 static const double SAME_TIME = 1e-12; /* s; communication points closer than this are one */
 
-typedef int Set2(void *, const uint32_t *, size_t, const double *);
-typedef int Get2(void *, const uint32_t *, size_t, double *);
-typedef int GetIntegers2(void *, const uint32_t *, size_t, int32_t *);
-typedef int DoStep2(void *, double, double, int);
-typedef int Set3(void *, const uint32_t *, size_t, const double *, size_t);
-typedef int Get3(void *, const uint32_t *, size_t, double *, size_t);
-typedef int GetIntegers3(void *, const uint32_t *, size_t, int32_t *, size_t);
-typedef int DoStep3(void *, double, double, bool, bool *, bool *, bool *, double *);
-
-static int good(Fmu *f, int status, AnyFunction called)
+/* The value at `t` on the straight that ends at the corner with the index `after`. */
+static double between(const Schedule *s, int64_t after, double t)
 {
-    f->status = status;
-    if (status <= 1)
-        return 1;
-    f->failed = called;
-    return 0;
+    if (after == 0 || after == s->n)
+        return s->values[after == 0 ? 0 : after - 1];
+    const double start = s->times[after - 1], end = s->times[after];
+    double share = (t - start) / (end - start);
+    share = share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;
+    return (1.0 - share) * s->values[after - 1] + share * s->values[after];
 }
 
-static int set_inputs(Fmu *f, const double *values)
+/* How many corners lie before `t`, or at it too. */
+static int64_t corners(const Schedule *s, double t, int with_it)
 {
-    const size_t n = (size_t)f->inputs;
-    const int status = f->version == 2
-                           ? ((Set2 *)f->set_reals)(f->instance, f->input_places, n, values)
-                           : ((Set3 *)f->set_reals)(f->instance, f->input_places, n, values, n);
-    return good(f, status, f->set_reals);
+    int64_t low = 0, high = s->n;
+    while (low < high) {
+        const int64_t middle = (low + high) / 2;
+        if (s->times[middle] < t || (with_it && s->times[middle] == t))
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
 }
 
-static int get_reals(Fmu *f, const uint32_t *places, int64_t count, double *values)
+/* Advance to `time`, with the inputs as they are set. */
+static int step(Recorder *r, double time)
 {
-    const size_t n = (size_t)count;
-    const int status = f->version == 2
-                           ? ((Get2 *)f->get_reals)(f->instance, places, n, values)
-                           : ((Get3 *)f->get_reals)(f->instance, places, n, values, n);
-    return good(f, status, f->get_reals);
-}
-
-static int get_integers(Fmu *f, const uint32_t *places, int64_t count, int32_t *values)
-{
-    const size_t n = (size_t)count;
-    const int status = f->version == 2
-                           ? ((GetIntegers2 *)f->get_integers)(f->instance, places, n, values)
-                           : ((GetIntegers3 *)f->get_integers)(f->instance, places, n, values, n);
-    return good(f, status, f->get_integers);
-}
-
-static int do_step(Fmu *f, double h)
-{
-    bool unused[3];
-    double reached;
-    const int status = f->version == 2
-                           ? ((DoStep2 *)f->do_step)(f->instance, f->time, h, 1)
-                           : ((DoStep3 *)f->do_step)(f->instance, f->time, h, true, &unused[0],
-                                                     &unused[1], &unused[2], &reached);
-    return good(f, status, f->do_step);
-}
-
-/* Advance to `time` with the input's value at the start and its slope. */
-static int step_to(Fmu *f, double time, double value, double slope)
-{
-    const double inputs[2] = {value, slope};
-    if (!set_inputs(f, inputs) || !do_step(f, time - f->time) ||
-        !get_reals(f, f->step_places, f->step_outputs_count, f->step_outputs))
+    Fmu *f = r->fmu;
+    int64_t inputs = r->ports;
+    if (r->schedule) {
+        /* No corner lies within the step: they are communication points. */
+        const Schedule *s = r->schedule;
+        const double value = between(s, corners(s, f->time + SAME_TIME, 1), f->time);
+        const double end = between(s, corners(s, time - SAME_TIME, 0), time);
+        r->inputs[2 * inputs] = value;
+        r->inputs[2 * inputs + 1] = (end - value) / (time - f->time);
+        inputs++;
+    }
+    if (!f->set(f, r->input_places, 2 * inputs, r->inputs) || !f->step(f, time - f->time) ||
+        !f->get(f, r->step_places, r->step_outputs, r->outputs))
         return 0;
     f->time = time;
     f->steps++;
-    return 1;
-}
-
-static int step(Recorder *r, double time, double value, double slope)
-{
-    if (!step_to(r->fmu, time, value, slope))
-        return 0;
     if (time > r->settle) {
-        const double *found = r->fmu->step_outputs + 2;
-        for (int64_t k = 0; k < r->fmu->step_outputs_count - 2; k += 2) {
+        const double *found = r->outputs + 2;
+        for (int64_t k = 0; k < r->step_outputs - 2; k += 2) {
             if (found[k] > r->extremes[k])
                 r->extremes[k] = found[k];
             if (found[k + 1] < r->extremes[k + 1])
@@ -92,22 +63,36 @@ static int step(Recorder *r, double time, double value, double slope)
     return 1;
 }
 
+/* The same within an interval, whose inputs go linearly from `start` to `end`. */
+static int step_within(Recorder *r, double time, double edge, const double *start,
+                       const double *end)
+{
+    const double reached = r->fmu->time - r->began;
+    for (int64_t k = 0; k < r->ports; k++) {
+        const double slope = (end[k] - start[k]) / (edge - r->began);
+        r->inputs[2 * k] = start[k] + slope * reached;
+        r->inputs[2 * k + 1] = slope;
+    }
+    return step(r, time);
+}
+
 /* Write down what the agenda has for this time. */
 static int visit(Recorder *r)
 {
     Fmu *f = r->fmu;
     const int32_t what = r->what[r->next++];
-    if (what & SETTLED && !(get_reals(f, f->total_places, f->totals, r->totals_at_settle) &&
-                            get_integers(f, f->counter_places, f->counters, r->counters_at_settle)))
+    if (what & SETTLED && !(f->get(f, r->total_places, r->totals, r->totals_at_settle) &&
+                            f->get_whole(f, r->counter_places, r->counters, r->counters_at_settle)))
         return 0;
     if (what & (ROW | FRAME)) {
         /* The row's place holds the sample of a frame too; the array has one row to spare. */
-        double *row = r->rows + r->n_rows * (f->samples + 1);
-        int32_t sticking;
-        if (!get_reals(f, f->sample_places, f->samples, row) ||
-            !get_integers(f, f->sticking_place, 1, &sticking))
+        double *row = r->rows + r->n_rows * (r->reals + r->wholes);
+        int32_t whole[2];
+        if (!f->get(f, r->real_places, r->reals, row) ||
+            !f->get_whole(f, r->whole_places, r->wholes, whole))
             return 0;
-        row[f->samples] = sticking;
+        for (int64_t k = 0; k < r->wholes; k++)
+            row[r->reals + k] = whole[k];
         if (what & FRAME)
             r->frames[r->n_frames++] = row[r->z_surface];
         if (what & ROW)
@@ -120,30 +105,27 @@ static int visit(Recorder *r)
     return 1;
 }
 
-/* What the agenda has for time 0. */
-EXPORT int recorder_begin(Recorder *r)
+int recorder_begin(Recorder *r)
 {
     return visit(r);
 }
 
-EXPORT int64_t recorder_follow(Recorder *r, int64_t n, const double *edges, const double *start,
-                               const double *end, int64_t most)
+int64_t recorder_follow(Recorder *r, int64_t n, const double *edges, const double *start,
+                        const double *end, int64_t most)
 {
     Fmu *f = r->fmu;
     const int64_t stop = f->steps + most;
-    for (int64_t k = 0; k < n; k++) {
+    for (int64_t k = 0; k < n; k++, start += r->ports, end += r->ports) {
         if (!r->inside)
             r->began = f->time;
         r->inside = 1;
-        const double slope = (end[k] - start[k]) / (edges[k] - r->began);
         while (r->times[r->next] < edges[k] - SAME_TIME) {
             if (f->steps >= stop)
                 return k;
-            if (!step(r, r->times[r->next], start[k] + slope * (f->time - r->began), slope) ||
-                !visit(r))
+            if (!step_within(r, r->times[r->next], edges[k], start, end) || !visit(r))
                 return -1;
         }
-        if (!step(r, edges[k], start[k] + slope * (f->time - r->began), slope))
+        if (!step_within(r, edges[k], edges[k], start, end))
             return -1;
         r->inside = 0;
         if (r->times[r->next] <= edges[k] + SAME_TIME && !visit(r))
@@ -152,4 +134,18 @@ EXPORT int64_t recorder_follow(Recorder *r, int64_t n, const double *edges, cons
             return k + 1;
     }
     return n;
+}
+
+int recorder_advance(Recorder *r, double time, double start, double end)
+{
+    return recorder_follow(r, 1, &time, &start, &end, INT64_MAX / 2) == 1;
+}
+
+int recorder_refresh(Recorder *r, double value)
+{
+    Fmu *f = r->fmu;
+    r->inputs[0] = value;
+    r->inputs[1] = 0.0;
+    return f->set(f, r->input_places, 2, r->inputs) &&
+           f->get(f, r->step_places, r->step_outputs, r->outputs);
 }

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from cosim.coupling.participant import Signal
-from cosim.coupling.polynomials import Array, slope, value
+from cosim.coupling.polynomials import Array, Signal, slope, value
 
 _REMEMBERED = 64  # propagators; a variable macro step uses each but a few times
 

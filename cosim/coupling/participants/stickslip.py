@@ -5,11 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from cosim.coupling.participant import Signal
-from cosim.coupling.polynomials import Array, projected, value
+from cosim.coupling.polynomials import Array, Signal, projected, value
 from cosim.coupling.polynomials import slope as slope_of
 from cosim.errors import SimulationFailed
-from cosim.mechanics.fmi import places
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
 
@@ -25,11 +23,15 @@ class FmuMechanics(Mechanics):
 
     def __init__(self, scene: Scene, fmi_version: int = 3) -> None:
         super().__init__(scene, fmi_version)
+        if self.normal_force is not None:
+            raise NotImplementedError("a normal force that changes in time")
         coil = scene.coil
         self._flux_terms = (coil.force_factor, coil.b1, coil.b2)
-        self._q_place = places(fmi_version, ("q",))
+        self.time = 0.0
+        """Time that the mechanics have reached, s."""
+        self._q_place = self.instance.places(["q"])
         self._q = (c_double * 1)()
-        self._event_places = places(fmi_version, _EVENTS)
+        self._event_places = self.instance.places(_EVENTS)
         self._event_counts = (c_int * len(_EVENTS))()
         self._touches = 0
         self._free: list[c_void_p] = []
@@ -40,30 +42,53 @@ class FmuMechanics(Mechanics):
         if gain:
             raise NotImplementedError("the companion belongs to the circuit's side")
         before, was = self._flux(), self._read_events()
-        line = projected(inputs, h, 1)
-        rise = float(line[1, 0]) if len(line) > 1 else 0.0
-        self.step_to(self.time + h, float(line[0, 0]), rise)
+        first, *rise = projected(tuple(inputs), h, 1)
+        self._step(h, float(first[0]), float(rise[0][0]) if rise else 0.0)
         if len(inputs) > 2:
             # The slope of the output answers to the current itself, not to the line in its stead.
-            self.refresh(float(value(inputs, h)[0]), float(slope_of(inputs, h)[0]))
+            self._refresh(float(value(inputs, h)[0]), float(slope_of(inputs, h)[0]))
         self.mean = np.array([(self._flux() - before) / h])
         self._touches += self._read_events() != was
 
     def outputs(self, inputs: Signal | None = None) -> Signal:
         if inputs is not None:
-            self.refresh(float(inputs[0][0]), float(inputs[1][0]))
+            self._refresh(float(inputs[0][0]), float(inputs[1][0]))
         return np.array([self.step_outputs[0]]), np.array([self.step_outputs[1]])
+
+    def _step(self, h: float, value: float, slope: float) -> None:
+        """Advance by ``h`` (s) with the current (A) at the start and its slope (A/s)."""
+        try:
+            self.inputs[:] = value, slope
+            self.instance.set_reals(self.places["inputs"], self.inputs)
+            self.instance.do_step(self.time, h)
+            self.instance.get_reals(self.places["step_outputs"], self.step_outputs)
+        except Exception as error:
+            raise self.failed(error, self.time) from error
+        self.time += h
+
+    def _refresh(self, value: float, slope: float) -> None:
+        """Calculate the outputs anew with this current, which the last step did not end with."""
+        try:
+            self.inputs[:] = value, slope
+            self.instance.set_reals(self.places["inputs"], self.inputs)
+            self.instance.get_reals(self.places["step_outputs"], self.step_outputs)
+        except Exception as error:
+            raise self.failed(error, self.time) from error
 
     def _flux(self) -> float:
         """∫ Bl(q) dq from the centre, V s."""
-        self._fmi.get_reals(self._q_place, self._q)
+        self.instance.get_reals(self._q_place, self._q)
         q, (bl, b1, b2) = self._q[0], self._flux_terms
         return bl * q * (1.0 + q * (b1 / 2.0 + q * b2 / 3.0))
 
     def _read_events(self) -> tuple[int, ...]:
         """Counters of impacts and stick-slip changes, and which wall is touched."""
-        self._fmi.get_integers(self._event_places, self._event_counts)
+        self.instance.get_integers(self._event_places, self._event_counts)
         return tuple(self._event_counts)
+
+    def gain(self) -> float:
+        """Bl²/m_eff now, V/(A s)."""
+        return self.inertial_gain(self.time)
 
     def events(self) -> int:
         """Number of steps so far in which a mode changed: stick, slip, a wall met or left."""
@@ -71,13 +96,13 @@ class FmuMechanics(Mechanics):
 
     def save(self) -> Any:
         handle = self._free.pop() if self._free else c_void_p()
-        self._fmi.get_state(handle)
+        self.instance.get_state(handle)
         rest = (self.time, tuple(self.step_outputs), self.mean, self._touches)
         return _Saved(handle, self._free, rest)
 
     def restore(self, saved: Any) -> None:
         try:
-            self._fmi.set_state(saved.handle)
+            self.instance.set_state(saved.handle)
         except Exception as error:
             raise SimulationFailed(f"The mechanics cannot go back: {error}") from error
         self.time, outputs, self.mean, self._touches = saved.rest
@@ -85,7 +110,7 @@ class FmuMechanics(Mechanics):
 
     def close(self) -> None:
         for handle in self._free:
-            self._fmi.free_state(handle)
+            self.instance.free_state(handle)
         self._free.clear()
         super().close()
 

@@ -117,15 +117,15 @@ class ErrorControlled:
 
     def _predicted(self, h: float, saved: object) -> tuple[float, float]:
         method = self.method
-        guess = [value(method.of_first.polynomial(method.time, self._order), h)]
-        guess += [value(method.of_second.polynomial(method.time, self._order), h)]
+        signals = (method.past.current, method.past.emf)
+        guess = [value(signal.polynomial(self._order), h) for signal in signals]
         method.step(h)
         found = self._outputs()
-        off = found - np.concatenate([g.ravel() for g in guess])
+        off = found - np.concatenate([np.ravel(g) for g in guess])
         return self._weighed(off / (self._order + 2.0), found), self._residual(h)
 
     def _outputs(self) -> Array:
-        return np.concatenate([self.method.of_first.value, self.method.of_second.value]).ravel()
+        return np.concatenate([self.method.past.current.value, self.method.past.emf.value]).ravel()
 
     def _weighed(self, error: Array, reference: Array) -> float:
         share = error / (self._absolute + self._relative * np.abs(reference))

@@ -11,6 +11,7 @@ can repeat a step, so ngspice cannot take part; costs some 20 repeated steps an 
 
 from typing import Any
 
+from cosim.coupling.method import Past
 from cosim.coupling.rewind.joint import Joint
 
 
@@ -29,12 +30,8 @@ class EventAware:
         return self.method.time
 
     @property
-    def of_first(self) -> Any:
-        return self.method.of_first
-
-    @property
-    def of_second(self) -> Any:
-        return self.method.of_second
+    def past(self) -> Past:
+        return self.method.past
 
     def step(self, h: float) -> None:
         """Go on by ``h`` seconds, in as many macro steps as there are events in it, and one."""

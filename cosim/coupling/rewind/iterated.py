@@ -14,12 +14,14 @@ two of Jacobi's; with the line as feed, the accelerated ones have no such limit.
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from cosim.coupling.methods.gauss_seidel import GaussSeidel
+from cosim.coupling.methods.mean_current import MeanCurrent
 from cosim.coupling.participant import Follower, Participant
-from cosim.coupling.polynomials import Array, History
+from cosim.coupling.polynomials import Array
 from cosim.coupling.rewind.joint import Joint
 from cosim.errors import SimulationFailed
 
@@ -40,34 +42,33 @@ class Iterated(Joint):
         max_iterations: int = 60,
     ) -> None:
         """``tolerance`` is relative to the largest back-EMF so far."""
-        self.order = 1
         self._acceleration = acceleration
-        self._feed = feed
         self._tolerance = tolerance
         self._max_iterations = max_iterations
         self._size = 0.0
         self.iterations = 0
         """Steps that were tried so far, of both sides."""
-        super().__init__(first, second, History(1, False), History(1, True))
+        super().__init__(first, second, MeanCurrent() if feed == "mean" else GaussSeidel())
 
     def step(self, h: float) -> None:
         start = (self.first.save(), self.second.save())
-        begin = self.of_second.value
-
-        def answer(end: Array) -> Array:
-            """The second side's output at the end, if the first one is given this end."""
-            self.first.restore(start[0])
-            self.second.restore(start[1])
-            self.for_first = np.array([begin, (end - begin) / h])
-            self.first.advance(h, self.for_first)
-            self.for_second = self.fed(h, self._feed)
-            self.second.advance(h, self.for_second)
-            self.iterations += 1
-            return self.second.outputs()[0]
-
-        self._solve(answer, begin + h * self.of_second.slope)
+        emf = self.past.emf
+        self._solve(lambda end: self.attempt(h, start, end), emf.value + h * emf.slope)
         self.time += h
         self.meet()
+
+    def attempt(self, h: float, start: tuple[Any, Any], end: Array) -> Array:
+        """The second side's output at the end, if the first one is given ``end`` there."""
+        self.first.restore(start[0])
+        self.second.restore(start[1])
+        begin = self.past.emf.value
+        self.for_first = np.array([begin, (end - begin) / h])
+        self.first.advance(h, self.for_first)
+        self.past.stepped(self.time + h, self.first.outputs()[0], self.first.mean)
+        self.for_second = np.array(self.method.current(self.past))
+        self.second.advance(h, self.for_second)
+        self.iterations += 1
+        return self.second.outputs()[0]
 
     def _solve(self, answer: Callable[[Array], Array], x: Array) -> None:
         guesses: list[Array] = []

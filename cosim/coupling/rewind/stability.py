@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from cosim.coupling.method import Past
 from cosim.coupling.polynomials import Array
 from cosim.errors import SimulationFailed
 
@@ -25,18 +26,17 @@ _UNBOUNDED, _NOISE = 1e7, 1e-4
 """Multiples of the first size: beyond the one nothing is bounded, below the other all is noise."""
 
 
-class Method(Protocol):
-    """What is asked of a method here: all of :mod:`cosim.coupling` have it."""
+class Steps(Protocol):
+    """What is asked of a master with its method here."""
 
-    of_first: Any
-    of_second: Any
+    past: Past
 
     def step(self, h: float) -> None: ...
     def save(self) -> Any: ...
     def restore(self, saved: Any) -> None: ...
 
 
-def linear_map(make: Callable[[], Method], h: float) -> Array:
+def linear_map(make: Callable[[], Steps], h: float) -> Array:
     """The matrix by which one macro step of ``h`` (s) takes what the method keeps to the next.
 
     ``make`` gives the method between two homogeneous linear participants. Raises SimulationFailed
@@ -53,7 +53,7 @@ def linear_map(make: Callable[[], Method], h: float) -> Array:
     return np.concatenate(_leaves(method.save()))
 
 
-def spectral_radius(make: Callable[[], Method], h: float) -> float:
+def spectral_radius(make: Callable[[], Steps], h: float) -> float:
     """Largest magnitude of an eigenvalue of the map; inf where a step cannot be done at all."""
     try:
         m = linear_map(make, h)
@@ -65,7 +65,7 @@ def spectral_radius(make: Callable[[], Method], h: float) -> float:
 
 
 def largest_stable_step(
-    make: Callable[[], Method],
+    make: Callable[[], Steps],
     low: float,
     high: float,
     tolerance: float = 1e-3,
@@ -81,7 +81,7 @@ def largest_stable_step(
 
 
 def observed_limit(
-    make: Callable[[], Method],
+    make: Callable[[], Steps],
     low: float,
     high: float,
     tolerance: float = 0.02,
@@ -92,7 +92,7 @@ def observed_limit(
     return _first_limit(lambda h: remains_bounded(make, h, steps), low, high, tolerance, leap)
 
 
-def remains_bounded(make: Callable[[], Method], h: float, steps: int = 600) -> bool:
+def remains_bounded(make: Callable[[], Steps], h: float, steps: int = 600) -> bool:
     """Whether what is exchanged has stopped growing after ``steps`` macro steps of ``h`` (s).
 
     It is compared in the last quarter of the steps with the second quarter.
@@ -114,8 +114,9 @@ def remains_bounded(make: Callable[[], Method], h: float, steps: int = 600) -> b
     return bool(sizes[3 * quarter :].max() <= 1.0001 * sizes[quarter : 2 * quarter].max() + floor)
 
 
-def _size(method: Method) -> float:
-    return float(max(np.abs(method.of_first.value).max(), np.abs(method.of_second.value).max()))
+def _size(method: Steps) -> float:
+    past = method.past
+    return float(max(np.abs(past.current.value).max(), np.abs(past.emf.value).max()))
 
 
 def _first_limit(

@@ -1,9 +1,13 @@
-"""The paper's conditions and closed forms; see :mod:`cosim.studies.paper` for the symbols.
+"""The closed forms of vertical vibratory transport, corrected where the paper is misprinted.
 
-Numbers in brackets, as in (3), are the paper's equations.
+The paper is Yako, Nowak, Yuan, Salisbury, *Vertical Vibratory Transport of Grasped Parts Using
+Impacts* (ICRA 2024, arXiv 2502.05693). A surface moves periodically along the vertical; a part of
+mass m_P is pressed against it by the normal force F_n. Up is positive, units are SI. Numbers in
+brackets, as in (3), are the paper's equations.
 """
 
 import math
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from cosim.errors import BadInput
@@ -20,6 +24,65 @@ class Friction(NamedTuple):
 
     static: float
     kinetic: float
+
+
+@dataclass(frozen=True)
+class Transport:
+    """One case of transport with the optimal waveform.
+
+    The ``robust`` waveform has its first phase at (µ_k f_n − 1) g instead of (µ_s f_n − 1) g. It is
+    slower, but loses nothing when part and surface meet a little too early.
+    """
+
+    mu_s: float
+    mu_k: float
+    a_max: float  # m/s², the surface's largest acceleration
+    f_n: float  # F_n/(m_P g), without unit
+    period: float  # T, s
+    direction: Direction = "up"
+    robust: bool = False
+    gravity: float = GRAVITY
+
+    @property
+    def sign(self) -> float:
+        """1 for up, −1 for down."""
+        return sign_of(self.direction)
+
+    def coefficients(self) -> Friction:
+        """Those of :func:`horizontal_equivalent`; BadInput where there is no such transport."""
+        mu_s, mu_k, a_max, f_n = self.mu_s, self.mu_k, self.a_max, self.f_n
+        _friction(mu_s, mu_k)
+        positive(a_max=a_max, f_n=f_n, period=self.period, gravity=self.gravity)
+        if f_n <= least_force_ratio(mu_s):
+            raise BadInput(
+                f"f_n = {f_n:g} is too small: a surface at rest holds the part only above "
+                f"F_n/(m_P g) = 1/mu_s = {1.0 / mu_s:.6g}."
+            )
+        least = least_peak_acceleration(mu_s, f_n, self.gravity)
+        if a_max <= least:
+            raise BadInput(
+                f"a_max = {a_max:g} m/s² is too small: at f_n = {f_n:g} only more than "
+                f"mu_s F_n/m_P + g = {least:.6g} m/s² shakes the part loose."
+            )
+        pair = horizontal_equivalent(mu_s, mu_k, f_n, self.direction, self.robust)
+        if min(pair) <= 0.0:
+            what = "robust transport" if self.direction == "up" else "transport downwards"
+            raise BadInput(
+                f"f_n = {f_n:g} is too small for {what}: a slipping part is slowed only above "
+                f"F_n/(m_P g) = 1/mu_k = {1.0 / mu_k:.6g}."
+            )
+        return pair
+
+
+def average_velocity(case: Transport) -> float:
+    """v_ave, the part's mean velocity, m/s, with the optimal waveform; negative downwards.
+
+    Up: (µ_s f − 1)² (A² − (µ_k f + 1)²) g T/(4 A (µ_s + µ_k)² f²) with f = F_n/(m_P g) and
+    A = a_max/g.
+    """
+    return case.sign * horizontal_velocity(
+        *case.coefficients(), case.a_max, case.period, case.gravity
+    )
 
 
 # The conditions (1) to (5)
@@ -102,7 +165,7 @@ def horizontal_velocity(
 ) -> float:
     """Mean velocity, m/s, in optimal horizontal transport with the coefficients given.
 
-    v = µ_s² (A² − µ_k²) g T/(4 A (µ_s + µ_k)²); nought where a_max = µ_k g. The first phase is at
+    v = µ_s² (A² − µ_k²) g T/(4 A (µ_s + µ_k)²); 0 where a_max = µ_k g. The first phase is at
     µ_s g; where a_max is less it is at a_max, so that A stands for µ_s.
     """
     positive(mu_s=mu_s, mu_k=mu_k, a_max=a_max, period=period, gravity=gravity)
@@ -116,69 +179,23 @@ def horizontal_velocity(
     return share * share * (1.0 - mu_k / peak) * (1.0 + mu_k / peak) * a_max * period / 4.0
 
 
-# The optimal waveform
-
-
-def optimal_times(
-    mu_s: float,
-    mu_k: float,
-    a_max: float,
-    f_n: float,
-    period: float,
-    *,
-    direction: Direction = "up",
-    robust: bool = False,
-    gravity: float = GRAVITY,
-) -> tuple[float, float]:
-    """The ends T1, T2, in s, of the optimal waveform's first and second phase.
-
-    T1 = T µ̃_k/(µ̃_s + µ̃_k), T2 = T1 + T (A + µ̃_k) µ̃_s/(2 A (µ̃_s + µ̃_k)), with the coefficients
-    of :func:`horizontal_equivalent`. On [0, T1] the surface accelerates at µ̃_s g and the part
-    sticks; on [T1, T2] at −a_max, on [T2, T] at +a_max, and the part slips.
-    """
-    pair = admissible(mu_s, mu_k, a_max, f_n, period, direction, robust, gravity)
-    peak, total = a_max / gravity, pair.static + pair.kinetic
-    first = pair.kinetic / total
-    second = (1.0 + pair.kinetic / peak) * pair.static / (2.0 * total)
-    return first * period, (first + second) * period
-
-
-def average_velocity(
-    mu_s: float,
-    mu_k: float,
-    a_max: float,
-    f_n: float,
-    period: float,
-    *,
-    direction: Direction = "up",
-    robust: bool = False,
-    gravity: float = GRAVITY,
-) -> float:
-    """v_ave, the part's mean velocity, m/s, with the optimal waveform; negative downwards.
-
-    Up: (µ_s f − 1)² (A² − (µ_k f + 1)²) g T/(4 A (µ_s + µ_k)² f²) with f = F_n/(m_P g). The
-    ``robust`` variant, first phase at (µ_k f − 1) g, gives less, but loses nothing when part and
-    surface meet a little too early.
-    """
-    pair = admissible(mu_s, mu_k, a_max, f_n, period, direction, robust, gravity)
-    return sign_of(direction) * horizontal_velocity(*pair, a_max, period, gravity)
-
-
 # The limits and the optimum of the normal force
 
 
-def largest_force_ratio_sticking(mu_s: float, a_max: float, gravity: float = GRAVITY) -> float:
-    """The ratio F_n/(m_P g) = (A − 1)/µ_s from which a part that sticks cannot be shaken loose."""
-    return _largest(mu_s, a_max, gravity)
+def largest_force_ratio(mu: float, a_max: float, gravity: float = GRAVITY) -> float:
+    """The ratio F_n/(m_P g) = (A − 1)/µ from which a part cannot be shaken loose.
 
-
-def largest_force_ratio_sliding(mu_k: float, a_max: float, gravity: float = GRAVITY) -> float:
-    """f_n,max = (A − 1)/µ_k, where −µ_k F_n/m_P − g = −a_max on [T1, T2], and v_ave is nought.
-
-    That holds for a part that slides already. One that sticks stops at the lesser ratio of
-    :func:`largest_force_ratio_sticking`, where v_ave is not nought yet.
+    With µ_s it holds for a part that sticks. With µ_k it holds for a part that slides already: then
+    −µ_k F_n/m_P − g = −a_max on [T1, T2] and v_ave is 0, which it is not yet at the former ratio.
     """
-    return _largest(mu_k, a_max, gravity)
+    positive(mu=mu, a_max=a_max, gravity=gravity)
+    least = least_peak_acceleration_at_any_force(gravity)
+    if a_max <= least:
+        raise BadInput(
+            f"a_max = {a_max:g} m/s² is too small: transport upwards needs more than "
+            f"2 g = {least:g} m/s²."
+        )
+    return (a_max / gravity - 1.0) / mu
 
 
 def cubic_force_ratio(mu_s: float, mu_k: float, a_max: float, gravity: float = GRAVITY) -> float:
@@ -187,7 +204,7 @@ def cubic_force_ratio(mu_s: float, mu_k: float, a_max: float, gravity: float = G
     It solves µ_s µ_k² f³ + µ_s µ_k f² + µ_k f + 1 = A², and grows as A^(2/3).
     """
     _friction(mu_s, mu_k)
-    peak = _largest(1.0, a_max, gravity) + 1.0
+    peak = largest_force_ratio(1.0, a_max, gravity) + 1.0
     ratio, low, high = mu_s / mu_k, 0.0, peak - 1.0
     # In x = µ_k f: (x + 1)(x² µ_s/µ_k + 1) = A² has one positive root, below A − 1 as µ_s ≥ µ_k.
     while (middle := 0.5 * (low + high)) not in (low, high):
@@ -203,55 +220,7 @@ def optimal_force_ratio(mu_s: float, mu_k: float, a_max: float, gravity: float =
     sticking part allows; then the optimum is the least upper bound of the ratios allowed.
     """
     cubic = cubic_force_ratio(mu_s, mu_k, a_max, gravity)
-    return min(cubic, largest_force_ratio_sticking(mu_s, a_max, gravity))
-
-
-# What is admissible
-
-
-def admissible(
-    mu_s: float,
-    mu_k: float,
-    a_max: float,
-    f_n: float,
-    period: float,
-    direction: Direction = "up",
-    robust: bool = False,
-    gravity: float = GRAVITY,
-) -> Friction:
-    """The equivalent horizontal coefficients; BadInput where there is no such transport."""
-    _friction(mu_s, mu_k)
-    positive(a_max=a_max, f_n=f_n, period=period, gravity=gravity)
-    if f_n <= least_force_ratio(mu_s):
-        raise BadInput(
-            f"f_n = {f_n:g} is too small: a surface at rest holds the part only above "
-            f"F_n/(m_P g) = 1/mu_s = {1.0 / mu_s:.6g}."
-        )
-    least = least_peak_acceleration(mu_s, f_n, gravity)
-    if a_max <= least:
-        raise BadInput(
-            f"a_max = {a_max:g} m/s² is too small: at f_n = {f_n:g} only more than "
-            f"mu_s F_n/m_P + g = {least:.6g} m/s² shakes the part loose."
-        )
-    pair = horizontal_equivalent(mu_s, mu_k, f_n, direction, robust)
-    if min(pair) <= 0.0:
-        what = "robust transport" if direction == "up" else "transport downwards"
-        raise BadInput(
-            f"f_n = {f_n:g} is too small for {what}: a slipping part is slowed only above "
-            f"F_n/(m_P g) = 1/mu_k = {1.0 / mu_k:.6g}."
-        )
-    return pair
-
-
-def _largest(mu: float, a_max: float, gravity: float) -> float:
-    positive(mu=mu, a_max=a_max, gravity=gravity)
-    least = least_peak_acceleration_at_any_force(gravity)
-    if a_max <= least:
-        raise BadInput(
-            f"a_max = {a_max:g} m/s² is too small: transport upwards needs more than "
-            f"2 g = {least:g} m/s²."
-        )
-    return (a_max / gravity - 1.0) / mu
+    return min(cubic, largest_force_ratio(mu_s, a_max, gravity))
 
 
 def _friction(mu_s: float, mu_k: float) -> None:

@@ -1,4 +1,4 @@
-"""The surface's motion: the optimal waveform, its variants, and Quaid's, as functions of time."""
+"""The surface's motion over one period: the optimal waveform, its variants, and Quaid's."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ import numpy.typing as npt
 from cosim.drive.surface.formulas import (
     GRAVITY,
     Direction,
-    admissible,
+    Transport,
     positive,
     sign_of,
     sticking_range,
@@ -17,8 +17,9 @@ from cosim.errors import BadInput
 
 Array = npt.NDArray[np.float64]
 
-# What the simulation's waveform stays away from the knife edge, by default: see optimal_cycle.
-MARGIN = 1e-9
+ROUNDING_MARGIN = 1e-9
+"""The ``margin`` of :func:`optimal_cycle` that rounding needs; solvers whose events are less exact
+need more."""
 
 
 @dataclass(frozen=True)
@@ -32,19 +33,12 @@ class Cycle:
     accelerations: tuple[float, float, float]  # m/s²
     start_velocity: float  # m/s
 
-    def acceleration(self, time: npt.ArrayLike) -> Array:
-        """The surface's acceleration, m/s², at times in s; at a jump the later one."""
-        return np.asarray(self.accelerations)[self._phase(time)[0]]
-
-    def velocity(self, time: npt.ArrayLike) -> Array:
-        """The surface's velocity, m/s, at times in s."""
-        phase, since = self._phase(time)
-        return self.knots()[1][phase] + np.asarray(self.accelerations)[phase] * since
-
     def position(self, time: npt.ArrayLike) -> Array:
         """The surface's height, m, at times in s."""
-        phase, since = self._phase(time)
         times, velocities = self.knots()
+        within = np.mod(np.asarray(time, dtype=float), times[3])
+        phase = np.clip(np.searchsorted(times, within, side="right") - 1, 0, 2)
+        since = within - times[phase]
         travelled = 0.5 * (velocities[1:] + velocities[:-1]) * np.diff(times)
         start = np.concatenate([[0.0], np.cumsum(travelled)])[phase]
         mean = velocities[phase] + 0.5 * np.asarray(self.accelerations)[phase] * since
@@ -64,80 +58,43 @@ class Cycle:
         change[-1] = 0.0  # but for rounding it is that already
         return times, self.start_velocity + np.concatenate([[0.0], change])
 
-    def _phase(self, time: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], Array]:
-        """The phase in which each time falls, and the time since that phase began."""
-        within = np.mod(np.asarray(time, dtype=float), self.times[3])
-        phase = np.clip(np.searchsorted(self.times, within, side="right") - 1, 0, 2)
-        return phase, within - np.asarray(self.times)[phase]
 
+def optimal_cycle(case: Transport, margin: float = 0.0) -> Cycle:
+    """The motion of a surface with at most a_max that transports the part fastest.
 
-def optimal_cycle(
-    mu_s: float,
-    mu_k: float,
-    a_max: float,
-    f_n: float,
-    period: float,
-    *,
-    direction: Direction = "up",
-    robust: bool = False,
-    margin: float = 0.0,
-    gravity: float = GRAVITY,
-) -> Cycle:
-    """The surface's motion, at most a_max, that transports the part fastest.
+    With the coefficients µ̃_s, µ̃_k of `horizontal_equivalent`: up, µ̃_s g on [0, T1], −a_max on
+    [T1, T2], +a_max on [T2, T]; down, with all signs changed. T1 = T µ̃_k/(µ̃_s + µ̃_k).
 
-    Upwards: (µ_s F_n/m_P − g) on [0, T1], −a_max on [T1, T2], +a_max on [T2, T]; downwards
-    −(µ_s F_n/m_P + g), +a_max, −a_max. Part and surface meet again just at T. That is a knife
-    edge: if they meet a little before T, the surface, still at a_max, overtakes the part, which
-    then slips for the whole next phase. ``margin``, a fraction, keeps away from it: T1 comes
-    ``margin`` T later, so that they meet ``margin`` T after the period's end, and the first phase
-    stays below the limit of friction as if µ_s were that much smaller.
-
-    The ``robust`` variant has a first phase at (µ_k F_n/m_P − g), in which a part that still
-    slips keeps up with the surface, so that meeting early costs nothing.
+    Part and surface meet again exactly at T. If they meet a little earlier, the surface, still at
+    a_max, overtakes the part, which then slips for the whole next phase. ``margin``, a fraction,
+    avoids that: T1 comes ``margin`` T later, so that they meet ``margin`` T after the period's end,
+    and the first phase stays below the limit of friction as if µ_s were that much smaller.
     """
-    pair = admissible(mu_s, mu_k, a_max, f_n, period, direction, robust, gravity)
+    pair = case.coefficients()
     if not 0.0 <= margin < 0.1:
         raise BadInput(f"margin = {margin:g} must be at least 0 and less than 0.1.")
-    static = pair.static - margin * (mu_k if robust else mu_s) * f_n
-    first = static * gravity
-    end_first = period * (pair.kinetic / (static + pair.kinetic) + margin)
-    end_second = 0.5 * (period + end_first * (1.0 + first / a_max))  # the velocity returns
-    if first <= 0.0 or end_second >= period:
+    static = pair.static - margin * (case.mu_k if case.robust else case.mu_s) * case.f_n
+    end_first = case.period * (pair.kinetic / (static + pair.kinetic) + margin)
+    cycle = closed_cycle(end_first, case.period, static * case.gravity, case.a_max, case.sign)
+    if static <= 0.0 or cycle.times[2] >= case.period:
         raise BadInput(f"margin = {margin:g} leaves no transport with these numbers.")
-    sign = sign_of(direction)
-    return closing_cycle(
-        (0.0, end_first, end_second, period), (sign * first, -sign * a_max, sign * a_max)
-    )
+    return cycle
 
 
-def optimal_waveform(
-    mu_s: float,
-    mu_k: float,
-    a_max: float,
-    f_n: float,
-    period: float,
-    *,
-    direction: Direction = "up",
-    robust: bool = False,
-    margin: float = MARGIN,
-    gravity: float = GRAVITY,
-) -> tuple[Array, Array]:
-    """:func:`optimal_cycle` for a simulation: knots (times, s; velocities, m/s) over one period.
+def closed_cycle(
+    end_first: float, period: float, first: float, a_max: float, sign: float = 1.0
+) -> Cycle:
+    """The cycle at ``first``, −a_max and +a_max, m/s², that returns to its velocity and height.
 
-    Between the knots the velocity is linear. The default margin is what rounding needs; solvers
-    with coarser events need more.
+    The first phase ends at ``end_first``, s; ``sign`` −1 turns the motion over.
     """
-    return optimal_cycle(
-        mu_s,
-        mu_k,
-        a_max,
-        f_n,
-        period,
-        direction=direction,
-        robust=robust,
-        margin=margin,
-        gravity=gravity,
-    ).knots()
+    end_second = 0.5 * (period + end_first * (1.0 + first / a_max))
+    times = (0.0, end_first, end_second, period)
+    accelerations = (sign * first, -sign * a_max, sign * a_max)
+    lengths = np.diff(times)
+    gained = np.asarray(accelerations) * lengths
+    travelled = float(np.sum(gained * (period - np.asarray(times[1:]) + 0.5 * lengths)))
+    return Cycle(times, accelerations, -travelled / period)
 
 
 def quaid_cycle(a_stick: float, a_max: float, period: float, direction: Direction = "up") -> Cycle:
@@ -152,48 +109,26 @@ def quaid_cycle(a_stick: float, a_max: float, period: float, direction: Directio
     return Cycle((0.0, end, period - end, period), (slow, fast, slow), 0.0)
 
 
-def quaid_waveform(
-    a_stick: float, a_max: float, period: float, direction: Direction = "up"
-) -> tuple[Array, Array]:
-    """:func:`quaid_cycle` as knots (times, s; velocities, m/s) over one period."""
-    return quaid_cycle(a_stick, a_max, period, direction).knots()
+def quaid_limit(mu_s: float, f_n: float, direction: Direction, gravity: float = GRAVITY) -> float:
+    """The largest ``a_stick``, m/s², with which the part still sticks."""
+    low, high = sticking_range(mu_s, f_n, gravity)
+    return high if direction == "up" else -low
 
 
-def quaid_velocity(
-    mu_s: float,
-    mu_k: float,
-    a_max: float,
-    f_n: float,
-    period: float,
-    *,
-    a_stick: float | None = None,
-    direction: Direction = "up",
-    gravity: float = GRAVITY,
-) -> float:
+def quaid_velocity(case: Transport, a_stick: float | None = None) -> float:
     """The part's mean velocity, m/s, with Quaid's waveform; negative downwards.
 
     (a_s T/2) (1/(1 + a_s/a_max) − 1/(1 + a_s/a_k)), where a_k = µ_k F_n/m_P ± g slows the slipping
     part. ``a_stick``, m/s², is by default the limit of friction, which it must not exceed.
     """
-    pair = admissible(mu_s, mu_k, a_max, f_n, period, direction, False, gravity)
-    low, high = sticking_range(mu_s, f_n, gravity)
-    limit = high if direction == "up" else -low
+    pair = case.coefficients()
+    limit = quaid_limit(case.mu_s, case.f_n, case.direction, case.gravity)
     stick = limit if a_stick is None else a_stick
     if not 0.0 < stick <= limit:
         raise BadInput(
             f"a_stick = {stick:g} m/s² must be above 0 and at most {limit:.6g} m/s², "
             "with which the part still sticks."
         )
-    slowed = pair.kinetic * gravity
-    share = a_max / (a_max + stick) - slowed / (slowed + stick)
-    return 0.5 * stick * period * share * sign_of(direction)
-
-
-def closing_cycle(
-    times: tuple[float, float, float, float], accelerations: tuple[float, float, float]
-) -> Cycle:
-    """The cycle whose start velocity brings the surface back to where it began."""
-    lengths = np.diff(times)
-    gained = np.asarray(accelerations) * lengths
-    travelled = float(np.sum(gained * (times[3] - np.asarray(times[1:]) + 0.5 * lengths)))
-    return Cycle(times, accelerations, -travelled / times[3])
+    slowed = pair.kinetic * case.gravity
+    share = case.a_max / (case.a_max + stick) - slowed / (slowed + stick)
+    return 0.5 * stick * case.period * share * case.sign

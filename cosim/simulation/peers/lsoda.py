@@ -18,10 +18,10 @@ from cosim.scene import Scene
 _SCALES = np.array([1.0, 10.0, *[1e-3, 0.1] * 3])
 
 _BEYOND = 1e-9
-"""m/s and V; an event lies this far behind its boundary, since the next piece begins on it."""
+"""m/s and V; events lie this far beyond their boundary, since each piece begins on a boundary."""
 
 _CLEAR = 1.0
-"""V/s; an output that would go beyond its limit more slowly than this leaves it."""
+"""V/s; an output at its limit stays there while its free slope outwards exceeds this."""
 
 CURRENT, VA, Q, DQ, Z, V, W, U = range(8)
 """Current, amplifier's pole, ram against surface, surface, surface against part; each its rate."""
@@ -31,7 +31,7 @@ class Machine:
     """Right-hand sides and events in one set of modes."""
 
     scales = _SCALES
-    """Size of what matters in each state; absolute tolerances over the relative one, SI."""
+    """Scale of each state, SI: its absolute tolerance over the relative one."""
 
     def __init__(self, scene: Scene, drive: Command) -> None:
         self._scene = scene
@@ -54,7 +54,7 @@ class Machine:
         return min(max(wish, -circuit.slew_rate), circuit.slew_rate)
 
     def forces(self, y: Any) -> tuple[float, float, float]:
-        """On the ram, the surface without friction, and from the surface to a sticking part, N."""
+        """Forces, N: on the ram, on the surface without friction, on the part while it sticks."""
         m, coil = self._scene.mechanics, self._scene.coil
         q, dq = y[Q], y[DQ]
         wall, over = 0.0, abs(q) - m.travel

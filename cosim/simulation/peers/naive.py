@@ -1,8 +1,8 @@
-"""A peer: PySpice's own callbacks and fmpy's own calls with lists, as their manuals show them.
+"""A peer: PySpice's callbacks and fmpy's calls with lists, as their manuals show them.
 
-PySpice hands every value over as a Python object after each accepted step; the mechanics follow
-with the step's mean current, and the circuit sees the back-EMF of the last step held. It needs a
-process of its own, since a process has one ngspice and ours has other callbacks.
+After each accepted step PySpice passes every value as a Python object; the mechanics step with the
+mean current, and the circuit keeps the back-EMF of the last step. It needs a process of its own,
+since a process has one ngspice and ours has other callbacks.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,17 +20,15 @@ from cosim.mechanics.fmi import references
 from cosim.mechanics.package import MODEL, token, unpacked
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
-from cosim.toolchain.isolation import isolated
+from cosim.toolchain.processes import isolated
 
 _FALL = 1e-9
 """s; time of the sawtooth's fall, which ngspice's own source wants above 0."""
 
 
-def run(
-    scene: Scene, times: Sequence[float], rounds: int
-) -> tuple[list[float], npt.NDArray[np.float64]]:
-    """CPU seconds of each round, and the part's height (m) at ``times`` (s)."""
-    return isolated(_rounds, scene, lambda _: None, times=times, rounds=rounds)
+def run(scene: Scene, times: Sequence[float]) -> tuple[float, npt.NDArray[np.float64]]:
+    """CPU seconds, and the part's height (m) at ``times`` (s)."""
+    return isolated(_run, scene, lambda _: None, times=times)
 
 
 class Shared(NgSpiceShared):
@@ -67,24 +65,19 @@ class Shared(NgSpiceShared):
         return 0
 
 
-def _rounds(
-    scene: Scene, progress: Callable[[float], None], times: Sequence[float], rounds: int
-) -> tuple[list[float], npt.NDArray[np.float64]]:
+def _run(
+    scene: Scene, _: Callable[[float], None], times: Sequence[float]
+) -> tuple[float, npt.NDArray[np.float64]]:
     shared, deck = Shared(), _deck(scene)
-    taken, found = [], np.empty(0)
-    for done in range(rounds):
-        began = process_time()
-        shared.begin(_instance(scene))
-        shared.load_circuit(deck)
-        shared.run()
-        shared.destroy()
-        shared.remove_circuit()
-        shared.fmu.freeInstance()
-        path = np.array(shared.path)
-        found = np.interp(times, path[:, 0], path[:, 1])
-        taken.append(process_time() - began)
-        progress(float(done + 1))
-    return taken, found
+    began = process_time()
+    shared.begin(_instance(scene))
+    shared.load_circuit(deck)
+    shared.run()
+    shared.destroy()
+    shared.remove_circuit()
+    shared.fmu.freeInstance()
+    path = np.interp(times, *np.array(shared.path).T)
+    return process_time() - began, path
 
 
 def _instance(scene: Scene) -> FMU3Slave:

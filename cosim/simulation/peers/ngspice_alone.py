@@ -6,14 +6,15 @@ the same compiled log takes what ngspice sends, so only the mechanics differ.
 """
 
 from collections.abc import Sequence
+from contextlib import closing
 from time import process_time
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.circuit.netlist import prepare
-from cosim.coupling.loop.compiled import CompiledRecorder
-from cosim.coupling.loop.compiled_run import CompiledRun
+from cosim.coupling.loop.lead import Lead
+from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import command
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
@@ -49,35 +50,25 @@ Cz z 0 1 ic={z}
 Cp p 0 1 ic={z}"""
 
 
-class Monolithic(CompiledRun):
-    """The run of such a netlist."""
-
-    def __init__(self, scene: Scene, recorder: CompiledRecorder) -> None:
-        super().__init__(scene, command(scene), recorder, np.zeros((_MOST_STEPS, 2)))
-
-    def _netlist(self) -> tuple[str, tuple[str, ...]]:
-        deck, _ = prepare(self._scene)
-        saved = ("i(vemf)", "v(p)")
-        lines = deck.splitlines()
-        place = next(k for k, line in enumerate(lines) if line.startswith("vemf "))
-        lines[place] = _mechanics(self._scene)
-        place = next(k for k, line in enumerate(lines) if line.startswith(".save "))
-        lines[place] = f".save {' '.join(saved)}"
-        place = next(k for k, line in enumerate(lines) if line.startswith(".tran "))
-        lines[place] += " uic"
-        # The trapezoidal rule is the better one for a mechanism.
-        return "\n".join(lines).replace("method=gear", "method=trap"), saved
+def _netlist(scene: Scene) -> tuple[str, tuple[str, ...]]:
+    """The deck, and the vectors to log."""
+    deck, _ = prepare(scene)
+    saved = ("i(vemf)", "v(p)")
+    own = {"vemf": _mechanics(scene), ".save": f".save {' '.join(saved)}"}
+    lines = [own.get(line.split()[0], line) for line in deck.splitlines()]
+    # The trapezoidal rule is the better one for a mechanism.
+    lines = [line.replace("method=gear", "method=trap") for line in lines]
+    return "\n".join(f"{x} uic" if x.startswith(".tran ") else x for x in lines), saved
 
 
 def run(scene: Scene, times: Sequence[float]) -> tuple[float, npt.NDArray[np.float64]]:
     """CPU seconds, and the part's height (m) at ``times`` (s)."""
     began = process_time()
-    mechanics = Mechanics(scene)
-    try:
-        circuit = Monolithic(scene, CompiledRecorder(scene, mechanics, lambda _: None))
+    with closing(Mechanics(scene)) as mechanics:
+        recorder = Recorder(scene, mechanics, lambda _: None)
+        still = np.zeros((_MOST_STEPS, 2))
+        circuit = Lead(scene, command(scene), recorder, deck=_netlist(scene), replay=still)
         circuit.run()
-    finally:
-        mechanics.close()
     log = circuit.log()
     path = np.interp(times, log["time"], 1e-3 * log["v(p)"])
     return process_time() - began, path

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from cosim.drive.command import Command
-from cosim.mechanics.stickslip import SAMPLE_OUTPUTS, Mechanics
+from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, load
 from cosim.simulation.peers.lsoda import Machine, U
 from cosim.simulation.peers.lsoda import run as run_machine
@@ -131,7 +131,7 @@ def in_the_machine() -> Iterator[Row]:
     scene = load("paper", [*case.overrides, f"run.duration={case.duration!r}"])
     mechanics = Mechanics(scene)
     try:
-        row = dict(zip(SAMPLE_OUTPUTS, mechanics.sample(), strict=False))
+        row = mechanics.sample()
     finally:
         mechanics.close()
     rest = (row["z_surface"], row["z_ram"])

@@ -8,16 +8,16 @@ from typing import Any, Literal
 
 import numpy as np
 
+from cosim.coupling.methods.jacobi import Jacobi
 from cosim.coupling.polynomials import Array
 from cosim.coupling.rewind.error_control import ErrorControlled
 from cosim.coupling.rewind.event_aware import EventAware
 from cosim.coupling.rewind.iterated import Iterated
-from cosim.coupling.rewind.jacobi import Jacobi
 from cosim.coupling.rewind.joint import Joint
 from cosim.coupling.rewind.methods import METHODS, ORDERS
 from cosim.coupling.rewind.predictor_corrector import PredictorCorrector
 from cosim.drive.command import command
-from cosim.mechanics.stickslip import SAMPLE_OUTPUTS, Mechanics
+from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, load
 from cosim.simulation.choose_steps import LEVELS
 from cosim.studies.accuracy.cases import Case, participants
@@ -91,7 +91,7 @@ def _controlled(
     circuit, mechanics = participants(scene)
     began, rows = process_time(), []
     try:
-        method = Jacobi(circuit, mechanics, 1)
+        method = Joint(circuit, mechanics, Jacobi(1, slopes=False))
         control = ErrorControlled(
             method, 1, 1e-5, tolerance, tolerance, shortest=1e-9, energy_share=energy_share
         )
@@ -108,8 +108,8 @@ def _controlled(
 
 
 def _sample(method: Joint, mechanics: Mechanics, case: Case) -> list[float]:
-    row: dict[str, float] = dict(zip(SAMPLE_OUTPUTS, mechanics.sample(), strict=False))
-    current = float(method.of_first.value[0])
+    row: dict[str, float] = mechanics.sample()
+    current = float(method.past.current.value[0])
     return [current if name == "current" else row[name] for name in case.judged]
 
 
@@ -167,7 +167,7 @@ def _solve_ivp(scene: Scene, case: Case, rtol: float) -> Outcome:
     chosen = _for_peer(case)
     mechanics = Mechanics(chosen)
     try:
-        row = dict(zip(SAMPLE_OUTPUTS, mechanics.sample(), strict=False))
+        row = mechanics.sample()
     finally:
         mechanics.close()
     seconds, path = run(chosen, case.times(), (row["z_surface"], row["z_ram"]), rtol)

@@ -1,45 +1,42 @@
 """Speed as ratios, each taken side by side in one run; an absolute time means nothing elsewhere."""
 
-import json
-import os
-import platform
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cosim.files.atomic import whole
+from cosim.files.atomic import write_json
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.bench.bars import held, table
+from cosim.studies.bench.given_surface import solvers
 from cosim.studies.bench.instructions import compiler_version, per_period
 from cosim.studies.bench.memory import growth
 from cosim.studies.bench.parts import coupled_over_parts
 from cosim.studies.bench.peers import compare
 from cosim.studies.bench.rungs import cost_exponent, real_time
 from cosim.studies.bench.truth import BRIEF, BRIEF_FULL
-from cosim.studies.compare.compare import through_camera
 from cosim.studies.fit.cases import Case
-from cosim.studies.fit.timing import solvers
+from cosim.studies.study import machine
 from cosim.studies.sweep.timing import throughput
+from cosim.trials.camera import film
 from cosim.trials.tracked import Track, Trial, read_folder
 
 _OFFSETS = [-2.0 + 0.05 * k for k in range(40)]
-"""V; of the points of a sweep that is timed."""
+"""V; ``drive.offset`` of the points of the sweep that is timed."""
 
 FRAMES = 312
-"""Frames of a made-up trial: as many as the published ones have."""
+"""Of a made-up trial: as many as the published ones have."""
 
 
 def run(out: Path, trials: Path | None, quick: bool) -> dict[str, Any]:
     """Measure, write ``bench.json`` into ``out`` and print each number with its bar.
 
-    The part's motion is timed on the trials of a folder or, without one, on the bench's own surface
-    as the camera sees it. A ``quick`` bench takes fewer rounds and shorter runs.
+    The part's solvers are timed on the trials of a folder or, without one, on trials that the
+    camera makes of a simulated run. A ``quick`` bench takes fewer rounds and shorter runs.
     """
     numbers = measure(trials, quick)
-    with whole(out / "bench.json") as temporary:
-        temporary.write_text(json.dumps(numbers, indent=2) + "\n", encoding="utf-8")
+    write_json(out / "bench.json", numbers)
     print(table(numbers))
     print(f"Written to {out}: bench.json")
     return numbers
@@ -47,7 +44,7 @@ def run(out: Path, trials: Path | None, quick: bool) -> dict[str, Any]:
 
 def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
     """All the numbers; ratios as median, ``low`` and ``high``, with their bars."""
-    rounds = 3 if quick else 11
+    rounds, host = 3 if quick else 11, machine()
     circuits = {"amplifier": load("paper", BRIEF), "full": load("paper-full", BRIEF_FULL)}
     found = read_folder(trials) if trials is not None else [_made_up(k) for k in range(10)]
     seconds = solvers([Case(trial) for trial in found], 11 if quick else 51)
@@ -68,26 +65,16 @@ def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
         "sweep_over_bare_loop": throughput(scene, offsets, 3 if quick else 7),
         "quick": quick,
         "machine": {
-            "processor": _processor(),
-            "cores": os.cpu_count(),
-            "python": platform.python_version(),
+            **{name: host[name] for name in ("processor", "cores", "python")},
             "compiler": compiler_version(),
         },
     }
     return held(numbers)
 
 
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
-        return next(line.split(":")[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor() or platform.machine()
-
-
 def _made_up(number: int) -> Trial:
     scene = load("ideal-current", ["run.duration=0.8", "run.settle=0.4"])
-    frames = through_camera(simulate(scene).columns, 0.4 + 0.003 * number, FRAMES)
+    frames = film(simulate(scene).columns, 0.4 + 0.003 * number, FRAMES)
     nothing = np.full(FRAMES, np.nan)
     surface = Track(frames.z_surface, frames.v_surface, nothing, nothing)
     part = Track(frames.z_part, frames.v_part, nothing, nothing)

@@ -1,9 +1,10 @@
-"""Instructions that the FMU executes, counted by callgrind: a number without any noise.
+"""Instructions that the FMU executes, counted by callgrind: a measure without noise.
 
-The mechanics of the scene `paper` follow its command as a current, on a fixed grid of about the
-steps that ngspice takes.
+The mechanics of the scene `paper` get its command as a current, in fixed steps about as long as
+ngspice's.
 """
 
+import json
 import re
 import shutil
 import subprocess
@@ -14,29 +15,22 @@ import fmpy
 import numpy as np
 
 from cosim.drive.command import command
-from cosim.errors import BadInput
 from cosim.mechanics.fmi import references
 from cosim.mechanics.package import MODEL, token, unpacked
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import load
-from cosim.toolchain.compiler import COMPILE_FLAGS, compiler, execute
+from cosim.toolchain.libraries import compiled
 
 PERIODS, STEPS_PER_PERIOD = 4, 1600
 
 
 def per_period() -> int | None:
-    """Instructions of the FMU per period of `paper`; None without valgrind or a compiler."""
+    """Instructions of the FMU per period of `paper`; None without valgrind."""
     valgrind = shutil.which("valgrind")
     if valgrind is None:
         return None
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        program, points = folder / "replay", folder / "points"
-        try:
-            source = str(Path(__file__).with_name("replay.c"))
-            execute([*compiler(), *COMPILE_FLAGS, source, "-o", str(program), "-ldl"], "the replay")
-        except BadInput:
-            return None
+    with tempfile.TemporaryDirectory() as folder:
+        points = Path(folder) / "points"
         _write(points)
         library = unpacked(3) / "binaries" / fmpy.platform_tuple
         library /= MODEL + fmpy.sharedLibraryExtension
@@ -44,7 +38,7 @@ def per_period() -> int | None:
             [
                 *(valgrind, "--tool=callgrind", "--callgrind-out-file=/dev/null"),
                 *("--collect-atstart=no", "--toggle-collect=replay"),
-                *(str(program), str(library), token(), str(points)),
+                *(str(compiled("replay")), str(library), token(), str(points)),
             ],
             capture_output=True,
             text=True,
@@ -57,8 +51,8 @@ def per_period() -> int | None:
 
 
 def compiler_version() -> str:
-    """The first line of what the C compiler says of itself."""
-    return execute([*compiler(), "--version"], "nothing").decode(errors="replace").split("\n")[0]
+    """What made the FMU: the first line that the C compiler says of itself."""
+    return json.loads(compiled("build.json").read_text())["compiler"]
 
 
 def _write(path: Path) -> None:

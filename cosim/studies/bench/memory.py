@@ -3,9 +3,10 @@
 import subprocess
 import sys
 from pathlib import Path
-from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
+
+from cosim.studies.bench.sampling import spread
 
 _RUN = """
 import sys
@@ -24,18 +25,9 @@ def growth(rounds: int, periods: tuple[int, int]) -> dict[str, Any] | None:
     """
     if not Path("/proc/self/status").exists():
         return None
-    found = []
-    sizes: list[float] = []
-    for _ in range(rounds):
-        sizes = [peak(f"run.duration={n / 20}") for n in periods]
-        found.append(sizes[1] / sizes[0])
-    return {
-        "median": median(found),
-        "low": min(found),
-        "high": max(found),
-        "periods": list(periods),
-        "mebibytes": sizes,
-    }
+    sizes = [[peak(f"run.duration={n / 20}") for n in periods] for _ in range(rounds)]
+    growths = spread([long / short for short, long in sizes])
+    return {**growths, "periods": list(periods), "mebibytes": sizes[-1]}
 
 
 def peak(*overrides: str) -> float:

@@ -1,4 +1,7 @@
-"""Against what users would write, on `paper`; each peer as coarse as its error allows."""
+"""The time of what users would write, over ours, on `paper`.
+
+Each peer runs at its coarsest setting whose error is no larger than ours.
+"""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -11,11 +14,11 @@ from cosim.simulation.simulate import simulate
 from cosim.studies.bench.sampling import cpu, ratios
 from cosim.studies.bench.truth import brief, error, heights, times
 
-Peer = Callable[[int], tuple[list[float], npt.NDArray[np.float64]]]
-"""Runs as often as it is told; gives the CPU seconds of each and the part's heights, m."""
+Peer = Callable[[], tuple[float, npt.NDArray[np.float64]]]
+"""Gives the CPU seconds of a run and the part's heights, m."""
 
 LSODA_ERROR = 5e-4
-"""The error at which LSODA is compared; below it, it costs only more."""
+"""The error at which LSODA is compared: a smaller one only costs more."""
 
 
 def compare(rounds: int) -> dict[str, Any]:
@@ -27,14 +30,14 @@ def compare(rounds: int) -> dict[str, Any]:
 
     def all_in_ngspice(reltol: float) -> Peer:
         scene = brief(f"circuit.reltol={reltol}", "circuit.max_step=1e-4")
-        return lambda n: _again(lambda: ngspice_alone.run(scene, times()), n)
+        return lambda: ngspice_alone.run(scene, times())
 
     def plain_calls(step: float) -> Peer:
         scene = brief(f"circuit.max_step={step}")
-        return lambda n: naive.run(scene, times(), n)
+        return lambda: naive.run(scene, times())
 
     def solve_ivp(rtol: float) -> Peer:
-        return lambda n: _again(lambda: lsoda.run(ours, times(), rest, rtol), n)
+        return lambda: lsoda.run(ours, times(), rest, rtol)
 
     peers = {
         "all_in_ngspice_over_ours": (wanted, map(all_in_ngspice, (1e-7, 1e-8, 3e-9))),
@@ -46,7 +49,7 @@ def compare(rounds: int) -> dict[str, Any]:
         peer, reached = _coarsest(settings, target)
         theirs, own = [], []
         for _ in range(rounds):
-            theirs += peer(1)[0]
+            theirs.append(peer()[0])
             own.append(cpu(lambda: simulate(ours)))
         numbers[name] = {**ratios(theirs, own), "error": wanted, "error_of_peer": reached}
     return numbers
@@ -56,14 +59,7 @@ def _coarsest(settings: Iterable[Peer], target: float) -> tuple[Peer, float]:
     """The first peer with an error of at most ``target``, or the last; and its error."""
     tried: list[tuple[Peer, float]] = []
     for peer in settings:
-        tried.append((peer, error(peer(1)[1])))
+        tried.append((peer, error(peer()[1])))
         if tried[-1][1] <= target:
             break
     return tried[-1]
-
-
-def _again(
-    run: Callable[[], tuple[float, npt.NDArray[np.float64]]], rounds: int
-) -> tuple[list[float], npt.NDArray[np.float64]]:
-    runs = [run() for _ in range(rounds)]
-    return [seconds for seconds, _ in runs], runs[-1][1]

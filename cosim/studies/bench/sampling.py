@@ -1,4 +1,4 @@
-"""Calls that take turns, so that the machine's mood cancels out of the ratios of their times."""
+"""Times of calls that take turns, so that changes of the machine's speed cancel in ratios."""
 
 from collections.abc import Callable, Mapping, Sequence
 from statistics import median

@@ -11,10 +11,10 @@ import numpy.typing as npt
 from cosim.scene import Scene, load
 
 BRIEF = ("run.duration=0.2", "run.settle=0.1")
-"""What makes `paper` as long as the reference is."""
+"""Settings that make `paper` as short as the reference."""
 
 BRIEF_FULL = ("run.duration=0.1", "run.settle=0.05")
-"""What makes `paper-full` short: it is thirty times as slow."""
+"""Settings that shorten `paper-full`, which is thirty times as slow."""
 
 _ROW = 1e-3
 """s; the reference's times are whole rows."""

@@ -38,7 +38,7 @@ def runs_in_all() -> int:
     return sum(REPEATS.get(model, MOST) for model in RUNGS)
 
 
-def ladder(scene: Scene, progress: Callable[[], None] = lambda: None) -> list[Rung]:
+def ladder(scene: Scene, progress: Callable[[], object] = lambda: None) -> list[Rung]:
     """Run a scene on each rung in turn, and again for the cost. Raises BadInput, SimulationFailed.
 
     Averages are over whole periods; few rows are written, so that the cost is the rung's own.

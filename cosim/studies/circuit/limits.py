@@ -1,14 +1,14 @@
-"""Which limit binds? Each limit of a circuit lifted alone, in pairs, and turned up and down.
+"""Which limit of a circuit binds: each is lifted alone and in pairs, and turned up and down.
 
-The paper's mechanism lives on how fast the surface drops away: the part slips only where the
-surface's acceleration downwards exceeds mu_s F_n / m_p + g. What keeps a circuit from giving the
-current that is commanded is found here by lifting one limit after another, which no bench can.
+The part slips only where the surface's downward acceleration exceeds mu_s F_n / m_p + g. What keeps
+the circuit from giving the commanded current is found by lifting one limit after another, which no
+real bench can do.
 """
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import combinations
-from math import nan
+from math import comb, nan
 
 import numpy as np
 
@@ -22,14 +22,14 @@ from cosim.studies.sweep.pool import Pool, workers_asked
 Settings = dict[str, float | int]
 
 FACTORS = (0.5, 0.7, 0.85, 1.2, 1.5, 2.0)
-"""What each limit is turned to, relative to the scene's."""
+"""What each limit is multiplied by when it is turned."""
 
 BINDS, ACTS = 0.03, 0.01
 """Least change of v_average, relative to the ideal current's or the scene's own, whichever is
 larger, of a limit that binds, and of one that can be told at all."""
 
 UNTOLD = ("another motion", "could not be lifted")
-"""Verdicts where nothing can be told."""
+"""Verdicts for a limit whose effect cannot be determined."""
 
 PAIRED = 4
 """Limits of largest effect that are lifted two at a time."""
@@ -102,7 +102,7 @@ LIMITS = (
 
 @dataclass(frozen=True)
 class Motion:
-    """What a run came to, SI; NaN where it failed or a rigid wall leaves no number."""
+    """Results of a run, SI; NaN where it failed or a rigid wall leaves no number."""
 
     v_average: float
     fall: float
@@ -121,7 +121,7 @@ class Contact:
 
 @dataclass
 class Study:
-    """One scene under the knife. Motions are keyed by the names of the limits."""
+    """The limits of one scene. Motions are keyed by the names of the limits."""
 
     scene: Scene
     own: Motion
@@ -180,24 +180,12 @@ class Study:
 
 def runs_in_all(turn: bool) -> int:
     """How many runs a study takes."""
+    alone = 3 + 2 * len(TREMBLES) + len(LIMITS) + sum(limit.reduced for limit in LIMITS)
     turned = sum(limit.factors for limit in LIMITS) * len(FACTORS)
-    reduced = sum(limit.reduced for limit in LIMITS)
-    return (
-        3
-        + 2 * len(TREMBLES)
-        + len(LIMITS)
-        + reduced
-        + turn * turned
-        + PAIRED * (PAIRED - 1) // 2
-        + 1
-    )
+    return alone + turn * turned + comb(PAIRED, 2) + 1
 
 
-def study(
-    scene: Scene,
-    turn: bool,
-    progress: Callable[[], None] = lambda: None,
-) -> Study:
+def study(scene: Scene, turn: bool, progress: Callable[[], object] = lambda: None) -> Study:
     """Lift each limit of a scene's circuit alone and in pairs and, on request, turn each.
 
     The circuit is the behavioural amplifier, where all of them but the current limit act; that one
@@ -205,8 +193,7 @@ def study(
     kind, SimulationFailed where the scene itself does not run.
     """
     base, workers = prepared(scene), workers_asked(None)
-    runs: list[tuple[str, Settings]] = [("amplifier", {})]
-    runs += [("ideal", {}), ("limited", {})]
+    runs: list[tuple[str, Settings]] = [("amplifier", {}), ("ideal", {}), ("limited", {})]
     runs += [
         ("amplifier", _times(key)(base, 1.0 + change))
         for key in ("friction.normal_force", "coil.force_factor")
@@ -297,7 +284,7 @@ def _joined(base: Scene, names: Iterable[str]) -> Settings:
 
 
 def _run(
-    base: Scene, runs: list[tuple[str, Settings]], workers: int, progress: Callable[[], None]
+    base: Scene, runs: list[tuple[str, Settings]], workers: int, progress: Callable[[], object]
 ) -> list[Motion]:
     """What each (rung, settings) comes to, in their order."""
     motions: dict[int, Motion] = {}

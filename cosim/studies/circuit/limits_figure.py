@@ -1,38 +1,29 @@
-"""The limits as a picture: what each costs, what turning it does, and the walls' part."""
+"""The figure of the limits: what each costs, what turning it does, and what the walls do."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from cosim.studies.circuit.limits import Study, name_of
+from cosim.studies.figures import blank, save
 
 COLORS = {
     "binds": "#d1495b", "acts a little": "#e9a03b", "does not matter": "#8d99ae",
     "another motion": "#cfe3f5", "could not be lifted": "#ffffff",
 }  # fmt: skip
 LINES = (
-    "#1f6fb2",
-    "#d1495b",
-    "#2a9d8f",
-    "#e9a03b",
-    "#6a4c93",
-    "#333333",
-    "#8d99ae",
-    "#b5651d",
-    "#e07be0",
+    *("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#6a4c93"),
+    *("#333333", "#8d99ae", "#b5651d", "#e07be0"),
 )
 
 
 def draw(studies: Sequence[Study], path: Path) -> None:
     """Draw the studies, the turned limits of the first one, into ``path`` (a PNG)."""
     turned = bool(studies[0].turned)
-    figure = Figure(figsize=(13.0, 9.0 if turned else 4.6), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = blank(13.0, 9.0 if turned else 4.6)
     rows: Any = figure.subfigures(2 if turned else 1, 1, squeeze=False)[:, 0]
     order = studies[0].ranked()[::-1]
     columns = np.atleast_1d(rows[0].subplots(1, len(studies), sharey=True))
@@ -46,16 +37,15 @@ def draw(studies: Sequence[Study], path: Path) -> None:
         left, middle, right = rows[1].subplots(1, 3, width_ratios=(1.0, 1.0, 0.75))
         left.axhline(first.ideal.v_average * 1e3, color="#555555", ls="--", lw=1)
         _curves(left, first, lambda motion: motion.v_average * 1e3, legend=True)
-        left.annotate(
-            "ideal current", (0.5, first.ideal.v_average * 1e3), fontsize=8.5, va="bottom"
-        )
+        place = (0.5, first.ideal.v_average * 1e3)
+        left.annotate("ideal current", place, fontsize=8.5, va="bottom")
         left.set_ylabel("v_average [mm/s]")
         left.set_title(f"Each limit turned: {name_of(first.scene)}", loc="left", fontsize=10)
         _curves(middle, first, lambda motion: motion.fall, legend=False)
         middle.set_ylabel("surface's peak downward acceleration [m/s²]")
         middle.set_title("The peak, impacts included", loc="left", fontsize=10)
         _peaks(right, studies)
-    figure.savefig(path, format="png")
+    save(figure, path)
 
 
 def _bars(axis: Any, study: Study, order: Sequence[str]) -> None:
@@ -79,11 +69,9 @@ def _curves(axis: Any, study: Study, quantity: Any, legend: bool) -> None:
     for (name, row), color in zip(study.turned.items(), LINES * 2, strict=False):
         factors = sorted(row)
         heights = [quantity(row[factor]) for factor in factors]
-        flat = study.verdict(name) == "does not matter"
-        axis.plot(
-            factors, heights, color=color, marker="o", ms=3.5, lw=0.9 if flat else 1.6,
-            ls=":" if flat else "-", label=name,
-        )  # fmt: skip
+        style = (0.9, ":") if study.verdict(name) == "does not matter" else (1.6, "-")
+        look: dict[str, Any] = {"color": color, "marker": "o", "ms": 3.5, "label": name}
+        axis.plot(factors, heights, lw=style[0], ls=style[1], **look)
     axis.set_xscale("log", base=2)
     ticks = sorted({factor for row in study.turned.values() for factor in row})
     axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
@@ -103,15 +91,9 @@ def _peaks(axis: Any, studies: Sequence[Study]) -> None:
     needed = [study.needed for study in studies]
     axis.bar(places - 0.2, at_all, 0.38, color="#8d99ae", label="in all, walls included")
     axis.bar(places + 0.2, between, 0.38, color="#1f6fb2", label="while no wall is touched")
-    for place, value in zip(places, at_all, strict=True):
-        if np.isnan(value):
-            axis.annotate(
-                "rigid:\nno number",
-                (place - 0.2, 1.2 * max(needed)),
-                ha="center",
-                va="bottom",
-                fontsize=8,
-            )
+    for place in places[np.isnan(at_all)]:
+        at = (place - 0.2, 1.2 * max(needed))
+        axis.annotate("rigid:\nno number", at, ha="center", va="bottom", fontsize=8)
     for place, value in zip(places, needed, strict=True):
         label = "needed: µ_s F_n/m_p + g" if place == 0 else None
         axis.plot([place - 0.42, place + 0.42], [value] * 2, color="#d1495b", lw=1.6, label=label)

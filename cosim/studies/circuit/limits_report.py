@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from math import nan
 from pathlib import Path
 
-from cosim.files.atomic import whole
 from cosim.studies.circuit import limits_figure
 from cosim.studies.circuit.limits import LIMITS, TREMBLES, UNTOLD, Study, name_of
 from cosim.studies.study import Row
@@ -26,8 +25,7 @@ def write(folder: Path, studies: Sequence[Study]) -> str:
             found[f"Each limit turned: {name}"] = turned(study)
         said.append(words(study))
     write_tables(folder, "limits", "Which limit binds?", found, said)
-    with whole(folder / "limits.png") as temporary:
-        limits_figure.draw(studies, temporary)
+    limits_figure.draw(studies, folder / "limits.png")
     printed: list[str] = []
     for study, sentence in zip(studies, said, strict=True):
         printed += [sentence, ""]
@@ -42,22 +40,19 @@ def write(folder: Path, studies: Sequence[Study]) -> str:
 def rows(study: Study) -> list[Row]:
     """The ranked table: which limit binds here."""
     gap = study.ideal.v_average - study.own.v_average
-    found = []
-    for name in study.ranked():
-        without = study.without[name]
-        found.append(
-            {
-                "limit": name,
-                "verdict": study.verdict(name),
-                "v_average without it [mm/s]": without.v_average * 1e3,
-                "change [mm/s]": study.gain(name) * 1e3,
-                "change on the rung limited [mm/s]": study.reduced_gain.get(name, nan) * 1e3,
-                "of the way to the ideal current [%]": 100.0 * study.gain(name) / gap,
-                "peak downward acceleration without it [m/s2]": without.fall,
-                "output at a limit without it [% of the time]": without.saturated * 100.0,
-            }
-        )
-    return found
+    return [
+        {
+            "limit": name,
+            "verdict": study.verdict(name),
+            "v_average without it [mm/s]": study.without[name].v_average * 1e3,
+            "change [mm/s]": study.gain(name) * 1e3,
+            "change on the rung limited [mm/s]": study.reduced_gain.get(name, nan) * 1e3,
+            "of the way to the ideal current [%]": 100.0 * study.gain(name) / gap,
+            "peak downward acceleration without it [m/s2]": study.without[name].fall,
+            "output at a limit without it [% of the time]": study.without[name].saturated * 100.0,
+        }
+        for name in study.ranked()
+    ]
 
 
 def pairs(study: Study) -> list[Row]:
@@ -96,15 +91,12 @@ def words(study: Study) -> str:
     own, ideal = study.own.v_average, study.ideal.v_average
     said = [
         f"{name_of(study.scene)}: the circuit moves the part at {own * 1e3:+.3g} mm/s, an ideal "
+        f"current source at {ideal * 1e3:+.3g} mm/s{_ratio(own, ideal)}."
     ]
-    said[0] += f"current source at {ideal * 1e3:+.3g} mm/s{_ratio(own, ideal)}."
-    by_verdict = {verdict: _named(study, verdict) for verdict in ("binds", "acts a little")}
-    if by_verdict["binds"]:
-        said.append(f"What binds: {_listed(by_verdict['binds'])}.")
-    else:
-        said.append("No limit binds.")
-    if by_verdict["acts a little"]:
-        said.append(f"Little: {_listed(by_verdict['acts a little'])}.")
+    binding, little = _named(study, "binds"), _named(study, "acts a little")
+    said.append(f"What binds: {_listed(binding)}." if binding else "No limit binds.")
+    if little:
+        said.append(f"Little: {_listed(little)}.")
     rest = [limit.name for limit in LIMITS if study.verdict(limit.name) == "does not matter"]
     if rest:
         said.append(f"The {_listed(rest)} {'do' if len(rest) > 1 else 'does'} not matter.")

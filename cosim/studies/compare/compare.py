@@ -6,22 +6,14 @@ is not known: it is chosen so that the surfaces' velocities agree best. A trial 
 made of the same run is recognised by its heights; then the camera's own error is told too.
 """
 
-import json
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import BadInput
-from cosim.files.atomic import whole
-from cosim.scene import Scene, load
-from cosim.scene.messages import plain
-from cosim.simulation.given_surface import knots
-from cosim.simulation.simulate import simulate
-from cosim.trials.published import FRAME_RATE
-from cosim.trials.tracked import Trial, read
-from cosim.waveforms.storage import read_csv, write_csv
+from cosim.trials.camera import FRAME_RATE, Frames, film, frame_count
+from cosim.trials.tracked import Trial
 
 Array = npt.NDArray[np.float64]
 
@@ -62,17 +54,6 @@ class Metrics:
 
 
 @dataclass(frozen=True)
-class Frames:
-    """What a camera sees: heights (m) and velocities (m/s, by central differences) at frames."""
-
-    time: Array
-    z_surface: Array
-    v_surface: Array
-    z_part: Array
-    v_part: Array
-
-
-@dataclass(frozen=True)
 class CameraError:
     """What the camera alone makes of a run: mean distances of the run's rows from the straight
     lines between the frames, as scripts that interpolate a trial draw them.
@@ -86,81 +67,7 @@ class CameraError:
     """Of the surface's velocity, m/s."""
 
 
-def through_camera(waveforms: dict[str, Array], start: float, frames: int) -> Frames:
-    """The run as a camera reads it from ``start`` (s) on."""
-    time = start + np.arange(frames) / FRAME_RATE
-    heights = {
-        body: hermite(time, waveforms["time"], waveforms[f"z_{body}"], waveforms[f"v_{body}"])
-        for body in ("surface", "part")
-    }
-    speeds = {body: differences(z) for body, z in heights.items()}
-    return Frames(
-        time - start, heights["surface"], speeds["surface"], heights["part"], speeds["part"]
-    )
-
-
-def visible_frames(waveforms: dict[str, Array], start: float) -> int:
-    """How many frames the camera takes from ``start`` (s) to the run's end."""
-    return max(0, int((waveforms["time"][-1] - start) * FRAME_RATE + 1e-6) + 1)
-
-
-def differences(z: Array) -> Array:
-    """Velocity, m/s, by the tracker's central differences; NaN in the first and last frame."""
-    v = np.full(len(z), np.nan)
-    v[1:-1] = (z[2:] - z[:-2]) * FRAME_RATE / 2.0
-    return v
-
-
-def hermite(at: Array, time: Array, z: Array, v: Array) -> Array:
-    """Cubic interpolation of heights with known velocities."""
-    k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
-    h = time[k + 1] - time[k]
-    s = (at - time[k]) / h
-    left = (1 + 2 * s) * (1 - s) ** 2 * z[k] + s * (1 - s) ** 2 * h * v[k]
-    right = s**2 * (3 - 2 * s) * z[k + 1] + s**2 * (s - 1) * h * v[k + 1]
-    return left + right
-
-
-def run(source: str, overrides: list[str], trial_path: Path, out: Path) -> Metrics:
-    """Compare a run's folder or a scene with a trial; write ``compare.json``, ``compare.csv``,
-    ``frames.csv`` and ``compare.png`` into ``out``, and print the table.
-    """
-    trial = read(trial_path)
-    waveforms, earliest, period = _waveforms(source, overrides, trial)
-    metrics, simulated, measured = compare(waveforms, trial, earliest, period)
-    camera = camera_error(waveforms, trial, earliest) if _own(waveforms, trial, earliest) else None
-    numbers = asdict(metrics) | (asdict(camera) if camera else {})
-    with whole(out / "compare.json") as temporary:
-        content = {"run": source, "trial": trial.name, **numbers}
-        temporary.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-    with whole(out / "compare.csv") as temporary:
-        rows = "".join(f"{name},{value!r}\n" for name, value in numbers.items())
-        temporary.write_text(f"metric,value\n{rows}", encoding="utf-8")
-    table, units = {"time": simulated.time}, {"time": "s"}
-    for side, frames in (("measured", measured), ("simulated", simulated)):
-        for name in ("z_surface", "v_surface", "z_part", "v_part"):
-            table[f"{name}_{side}"] = getattr(frames, name)
-            units[f"{name}_{side}"] = "m" if name.startswith("z") else "m/s"
-    write_csv(out / "frames.csv", table, units)
-    from cosim.studies.compare.figure import draw
-
-    with whole(out / "compare.png") as temporary:
-        draw(simulated, measured, metrics, f"{source} against {trial.name}", temporary)
-    width = max(map(len, numbers))
-    for name, value in numbers.items():
-        print(f"  {name:<{width}}  {'not tracked' if value is None else f'{value:.6g}'}")
-    if camera:
-        print(
-            "This trial is the run's own. Both sides went through the same camera: mean_error_mm "
-            "is what the digits of the file make, and camera_… is the error that the camera alone "
-            "makes, the run's rows against straight lines between the frames."
-        )
-    print(f"Written to {out}: compare.json, compare.csv, frames.csv")
-    print(f"Figure: {out / 'compare.png'}")
-    return metrics
-
-
-def compare(
+def measure(
     waveforms: dict[str, Array], trial: Trial, earliest: float, period: float
 ) -> tuple[Metrics, Frames, Frames]:
     """Metrics, and both sides at the trial's frames, the run shifted for the best agreement.
@@ -171,7 +78,7 @@ def compare(
     for body, z in (("platform", measured.z_surface), ("part", measured.z_part)):
         if np.ptp(z) == 0.0:
             raise BadInput(f"{trial.name}: the {body} does not move: there is nothing to compare.")
-    own = _own(waveforms, trial, earliest)
+    own = made_of(waveforms, trial, earliest)
     end = float(waveforms["time"][-1])
     if period == 0.0 and not own:  # the run begins with the first frame whose velocity is known
         first = int(np.argmax(np.isfinite(trial.platform.v)))
@@ -186,10 +93,10 @@ def compare(
         )
     latest = earliest if own else max(earliest, min(room, earliest + period))
     starts = np.linspace(earliest, latest, SHIFTS)
-    candidates = (through_camera(waveforms, float(start), n) for start in starts)
+    candidates = (film(waveforms, float(start), n) for start in starts)
     fits = [explained(frames.v_surface, measured.v_surface) for frames in candidates]
     start = float(starts[int(np.argmax(fits))])
-    simulated = through_camera(waveforms, start, n)
+    simulated = film(waveforms, start, n)
     moved = simulated.z_part - simulated.z_part[0], measured.z_part - measured.z_part[0]
     error = float(np.nanmean(np.abs(moved[0] - moved[1])))
     span = float(measured.time[-1] - measured.time[0])
@@ -230,12 +137,12 @@ def camera_error(waveforms: dict[str, Array], trial: Trial, start: float) -> Cam
     )
 
 
-def _own(waveforms: dict[str, Array], trial: Trial, start: float) -> bool:
+def made_of(waveforms: dict[str, Array], trial: Trial, start: float) -> bool:
     """Whether the trial's heights are this run's from ``start`` (s) on, to a trial's digits."""
     n = len(trial.time)
-    if n > visible_frames(waveforms, start):
+    if n > frame_count(waveforms, start):
         return False
-    seen, tracked = through_camera(waveforms, start, n), _of_trial(trial)
+    seen, tracked = film(waveforms, start, n), _of_trial(trial)
     # A trial has seven digits, and eight places of a second or millimetre.
     return np.allclose(seen.time, tracked.time, rtol=6e-7, atol=6e-9) and all(
         np.allclose(mine, theirs, rtol=6e-7, atol=6e-12)
@@ -268,31 +175,3 @@ def _horizontal(trial: Trial) -> float | None:
         return None
     squares = float(np.mean(across[known] ** 2)), float(np.mean(along[known] ** 2))
     return squares[0] / (squares[0] + squares[1])
-
-
-def _waveforms(
-    source: str, overrides: list[str], trial: Trial
-) -> tuple[dict[str, Array], float, float]:
-    """The run's waveforms, the time from which on it has settled, s, and its period, s."""
-    folder = Path(source)
-    if not folder.is_dir():
-        scene = load(source, overrides)
-        span = len(trial.time) / FRAME_RATE + 1.0 / scene.drive.frequency
-        longer = {"duration": max(scene.run.duration, scene.run.settle + span)}
-        if scene.drive.waveform == "file":
-            longer = {"duration": float(knots(scene)[0][-1]), "settle": 0.0}
-        scene = scene.model_copy(update={"run": scene.run.model_copy(update=longer)})
-        waveforms = simulate(scene).columns
-    elif overrides:
-        raise BadInput(f"--set cannot change {plain(source)}, which is a finished run.")
-    else:
-        scene = load(folder / "scene.toml")
-        waveforms = read_csv(folder / "waveforms.csv")
-    return waveforms, *laid_over(scene)
-
-
-def laid_over(scene: Scene) -> tuple[float, float]:
-    """The first time of a run that may be laid over a trial's first frame, s, and its period, s."""
-    if scene.drive.file is not None:
-        return 0.0, 0.0  # the trial's own surface: there is nothing to shift
-    return scene.run.settle, 1.0 / scene.drive.frequency

@@ -1,13 +1,12 @@
 """The figure of a comparison: surface and part, measured and simulated, frame by frame."""
 
-from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
-from cosim.studies.compare.compare import Frames, Metrics
+from cosim.files.picture import Picture
+from cosim.studies.compare.compare import Metrics
+from cosim.trials.camera import Frames
 from cosim.waveforms.figure import PART, SURFACE
 
 MEASURED: dict[str, Any] = {
@@ -19,10 +18,9 @@ MEASURED: dict[str, Any] = {
 }
 
 
-def draw(simulated: Frames, measured: Frames, metrics: Metrics, title: str, path: Path) -> None:
-    """Draw heights and velocities over time, of surface and part, into ``path`` (a PNG)."""
-    figure = Figure(figsize=(13.0, 7.2), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+def draw(simulated: Frames, measured: Frames, metrics: Metrics, title: str) -> Picture:
+    """Heights and velocities over time, of surface and part."""
+    figure = Picture(13.0, 7.2, "constrained")
     axes = figure.subplots(2, 2, sharex=True)
     for column, (body, color) in enumerate((("surface", SURFACE), ("part", PART))):
         for row, (kind, unit) in enumerate((("z", "mm"), ("v", "mm/s"))):
@@ -51,4 +49,4 @@ def draw(simulated: Frames, measured: Frames, metrics: Metrics, title: str, path
     )
     axes[0, 1].legend(loc="upper left", fontsize=8)
     figure.suptitle(title, fontsize=12)
-    figure.savefig(path, format="png")
+    return figure

@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.mechanics import part
-from cosim.toolchain.libraries import part_library
 from cosim.trials import published
 from cosim.trials.tracked import Trial
 
@@ -84,7 +83,7 @@ class Case:
         laws[:, :3] = np.multiply.outer(weights, (mu_s, mu_k, mu_plate))
         laws[:, 3] = published.GRAVITY
         found = np.empty(len(weights))
-        part_library().part_errors(
+        part.part_library().part_errors(
             *(len(self.time), self.time.ctypes.data, self.v_surface.ctypes.data, self.v0),
             *(len(laws), laws.ctypes.data, STEP if solver == "published" else 0.0),
             *(part.PUBLISHED_V_MIN, len(self.grid), self.grid.ctypes.data),

@@ -1,12 +1,6 @@
-"""Fits the part's motion to tracked trials, or evaluates the published parameters on them.
+"""Fits the part's motion to tracked trials, or evaluates the published parameters on them."""
 
-`run` writes `fit.json`, `fit.csv` and the figures `fit-trials.png`, `fit-profile.png` and
-`fit-forces.png`. The measure of the error is the authors' (`cosim.studies.fit.cases`), the search
-separable (`cosim.studies.fit.search`).
-"""
-
-import json
-from collections.abc import Callable, Sequence
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -15,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import BadInput
-from cosim.files.atomic import whole
+from cosim.files.atomic import write_json, write_text
+from cosim.files.picture import Picture
 from cosim.mechanics.part import PartMotion
 from cosim.studies.fit.cases import Case, Parameters, Solver
 from cosim.studies.fit.search import Fit, search
@@ -26,79 +21,75 @@ Array = npt.NDArray[np.float64]
 
 SENSITIVITY = 0.05  # relative change of a parameter
 RESAMPLES = 2000  # of the trials, for the interval of µ_k
-NEAR = 1.05  # a mean error within this of the best is told as about as good
+NEAR = 1.05  # over the best mean error: µ_k with less are reported as about as good
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """Parameters, motions and errors, trial by trial; ``fit`` is there if they were fitted."""
+@dataclass(frozen=True, eq=False, repr=False)
+class TrialResults:
+    """Trials with their parameters and simulated motions; ``fit`` if they were fitted."""
 
     cases: list[Case]
     parameters: list[Parameters]
     motions: list[PartMotion]
-    errors: Array  # m
     fit: Fit | None
-    result: dict[str, Any]  # what fit.json holds
+    numbers: dict[str, Any]
+    """What ``fit.json`` holds; millimetres, m_P g and shares in per cent as the names say."""
+
+    def plot(self) -> Picture:
+        """Measured and simulated height of the part, a panel for each trial."""
+        from cosim.studies.fit import figures
+
+        return figures.trials(self)
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Write ``fit.json``, ``fit.csv`` and the figures ``fit-*.png``."""
+        from cosim.studies.fit import figures
+
+        out = Path(folder)
+        write_json(out / "fit.json", self.numbers)
+        write_text(out / "fit.csv", _csv(self.numbers["trials"]))
+        figures.draw_all(self, out)
+
+    def __repr__(self) -> str:
+        return table(self.numbers)
 
 
-def run(
-    trials_dir: Path,
-    out_dir: Path,
+def fit(
+    trials: str | os.PathLike[str],
+    *,
     evaluate: Literal["published"] | None = None,
     solver: Solver = "exact",
     plate: bool = False,
-    progress: Callable[[], None] = lambda: None,
-) -> dict[str, Any]:
-    """Fit or evaluate the trials of a folder, write the files, and return what `fit.json` holds.
+) -> TrialResults:
+    """Fit friction and normal forces to the tracked trials (CSVs) of a folder.
 
     ``evaluate="published"`` takes the paper's µ_k and normal forces instead of fitting them;
     ``plate`` fits the friction of the springed plate too; ``solver`` is the exact solution or the
-    authors' scheme. ``progress`` is called now and then while fitting.
+    authors' scheme. The measure of the error is the authors' (:mod:`cosim.studies.fit.cases`), the
+    search separable (:mod:`cosim.studies.fit.search`). Raises BadInput.
     """
-    from cosim.studies.fit import figures as fit_figures
-
-    outcome = compute(Path(trials_dir), evaluate, solver, plate, progress)
-    out = Path(out_dir)
-    with whole(out / "fit.json") as temporary:
-        text = json.dumps(outcome.result, indent=2, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
-    with whole(out / "fit.csv") as temporary:
-        temporary.write_text(_csv(outcome.result["trials"]), encoding="utf-8")
-    fit_figures.draw_all(outcome, out)
-    return outcome.result
-
-
-def compute(
-    trials_dir: Path,
-    evaluate: Literal["published"] | None = None,
-    solver: Solver = "exact",
-    plate: bool = False,
-    progress: Callable[[], None] = lambda: None,
-) -> Outcome:
-    """`run` without the files."""
     if evaluate not in (None, "published"):
         raise BadInput(f"Only “published” parameters can be evaluated, not “{evaluate}”.")
     if solver not in ("exact", "published"):
         raise BadInput(f"The solver is exact or published, not “{solver}”.")
-    cases = [Case(trial) for trial in read_folder(trials_dir)]
-    fit = None
+    cases = [Case(trial) for trial in read_folder(Path(trials))]
+    found = None
     if evaluate:
         if plate:
             raise BadInput("The published parameters know no friction of the springed plate.")
-        parameters = _published(cases, trials_dir)
+        parameters = _published(cases, Path(trials))
     else:
-        fit = search(cases, solver, plate, progress=progress)
+        found = search(cases, solver, plate)
         parameters = [
-            Parameters(fit.mu_k, float(force), mu_plate=fit.mu_plate)
-            for force in fit.forces[fit.best]
+            Parameters(found.mu_k, float(force), mu_plate=found.mu_plate)
+            for force in found.forces[found.best]
         ]
     motions = [case.motion(p, solver) for case, p in zip(cases, parameters, strict=True)]
-    errors = np.array([_error(case, p, solver) for case, p in zip(cases, parameters, strict=True)])
-    result = _result(cases, parameters, motions, errors, solver, evaluate)
-    if fit:
-        result |= _certainty(fit, cases)
+    result = _result(cases, parameters, motions, solver, evaluate)
+    if found:
+        result |= _certainty(found)
     result["sensitivity"] = _sensitivity(cases, parameters, solver)
-    return Outcome(cases, parameters, motions, errors, fit, result)
+    return TrialResults(cases, parameters, motions, found, result)
 
 
 def table(result: dict[str, Any]) -> str:
@@ -134,26 +125,30 @@ def _published(cases: list[Case], folder: Path) -> list[Parameters]:
     return [Parameters(published.MU_K_FITTED, force) for force in published.FORCES_FITTED]
 
 
-def _error(case: Case, parameters: Parameters, solver: Solver) -> float:
-    p = parameters
-    return float(case.errors(np.array([p.force]), p.mu_k, p.mu_plate, p.mu_s, solver)[0])
+def _errors(cases: list[Case], parameters: list[Parameters], solver: Solver) -> Array:
+    """The mean error [m] in each trial."""
+    return np.array(
+        [
+            case.errors(np.array([p.force]), p.mu_k, p.mu_plate, p.mu_s, solver)[0]
+            for case, p in zip(cases, parameters, strict=True)
+        ]
+    )
 
 
 def _result(
     cases: list[Case],
     parameters: list[Parameters],
     motions: list[PartMotion],
-    errors: Array,
     solver: Solver,
     evaluate: str | None,
 ) -> dict[str, Any]:
+    errors = _errors(cases, parameters, solver)
     trials = [
         _trial(case, p, motion, float(error))
         for case, p, motion, error in zip(cases, parameters, motions, errors, strict=True)
     ]
     changes = [row["normal_force_change_percent"] for row in trials]
     changes = [change for change in changes if change is not None]
-    lines = [case.straight_line_error() * 1e3 for case in cases]
     return {
         "parameters": "published" if evaluate else "fitted",
         "solver": solver,
@@ -165,7 +160,9 @@ def _result(
         "mean_error_percent": float(np.mean([row["mean_error_percent"] for row in trials])),
         "normal_force_change_mean_percent": float(np.mean(changes)) if changes else None,
         "normal_force_change_median_percent": float(np.median(changes)) if changes else None,
-        "straight_line_mean_error_mm": float(np.mean(lines)),
+        "straight_line_mean_error_mm": float(
+            np.mean([row["straight_line_error_mm"] for row in trials])
+        ),
         "trials": trials,
     }
 
@@ -189,33 +186,13 @@ def _trial(case: Case, p: Parameters, motion: PartMotion, error: float) -> dict[
     }
 
 
-def leave_one_out(fit: Fit) -> tuple[Array, Array]:
-    """Each case's error [m] with the µ_k that is best for the others, and these µ_k.
-
-    The normal force belongs to the case and is fitted to it, given that µ_k (and µ_p).
-    """
-    errors = fit.errors
-    if errors.shape[1] < 2:
-        return errors[fit.best], fit.tried[[fit.best], 1]
-    rest = errors.sum(axis=1)[:, None] - errors
-    rows = rest.argmin(axis=0)
-    return errors[rows, np.arange(errors.shape[1])], fit.tried[rows, 1]
-
-
-def profile(fit: Fit) -> tuple[Array, Array]:
-    """µ_k, rising, and the smallest mean error [m] with each, at the best µ_p."""
-    rows = fit.tried[:, 0] == fit.tried[fit.best, 0]
-    return fit.tried[rows, 1], fit.errors[rows].mean(axis=1)
-
-
-def _certainty(fit: Fit, cases: Sequence[Case]) -> dict[str, Any]:
-    left_out, mu_k = leave_one_out(fit)
-    line, error = profile(fit)
+def _certainty(fit: Fit) -> dict[str, Any]:
+    left_out, mu_k = fit.leave_one_out()
+    line, error = fit.profile()
     near = line[error <= NEAR * error.min()]
     # The trials drawn anew, with repetition: what µ_k other trials of the kind would have given.
-    draws = np.random.default_rng(0).multinomial(
-        len(cases), np.full(len(cases), 1 / len(cases)), RESAMPLES
-    )
+    count = fit.errors.shape[1]
+    draws = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), RESAMPLES)
     found = fit.tried[(fit.errors @ draws.T).argmin(axis=0)]
     return {
         "leave_one_out_mean_error_mm": float(left_out.mean() * 1e3),
@@ -232,25 +209,15 @@ def _sensitivity(
 ) -> dict[str, dict[str, float]]:
     """The mean error [mm] with one parameter 5 % lower or higher and all others kept."""
 
-    def mean(mu_s: float = 1.0, mu_k: float = 1.0, force: float = 1.0) -> float:
-        changed = [
-            replace(
-                p,
-                mu_s=p.mu_s * mu_s,
-                mu_k=min(p.mu_k * mu_k, p.mu_s * mu_s),
-                force=p.force * force,
-            )
-            for p in parameters
-        ]
-        errors = [_error(case, p, solver) for case, p in zip(cases, changed, strict=True)]
-        return float(np.mean(errors) * 1e3)
+    def mean(name: str, factor: float) -> float:
+        changed = [replace(p, **{name: getattr(p, name) * factor}) for p in parameters]
+        changed = [replace(p, mu_k=min(p.mu_k, p.mu_s)) for p in changed]
+        return float(np.mean(_errors(cases, changed, solver)) * 1e3)
 
-    names = ("mu_s", "mu_k", "force")
+    names = {"mu_s": "mu_s", "mu_k": "mu_k", "normal_force": "force"}
     return {
-        "normal_force" if name == "force" else name: {
-            f"{sign * SENSITIVITY:+.0%}": mean(**{name: 1 + sign * SENSITIVITY}) for sign in (-1, 1)
-        }
-        for name in names
+        told: {f"{sign * SENSITIVITY:+.0%}": mean(name, 1 + sign * SENSITIVITY) for sign in (-1, 1)}
+        for told, name in names.items()
     }
 
 
@@ -260,5 +227,5 @@ def _csv(rows: list[dict[str, Any]]) -> str:
             return ""
         return f"{value:.10g}" if isinstance(value, float) else str(value)
 
-    lines = [",".join(rows[0]), *(",".join(map(cell, row.values())) for row in rows)]
-    return "\n".join(lines) + "\n"
+    lines = [rows[0], *(map(cell, row.values()) for row in rows)]
+    return "".join(",".join(line) + "\n" for line in lines)

@@ -1,12 +1,13 @@
 """The separable fit: µ_k (and µ_p) shared by all trials, a normal force for each.
 
 Given µ_k and µ_p the trials have nothing in common, so that a fit of eleven numbers is ten
-searches in one dimension for each µ_k on a line. The error has steps where a stick begins to be
-missed, so the searches look at grids that grow finer, and follow no slope.
+searches in one dimension for each µ_k on a line. The error jumps where a parameter makes the part
+miss a stick, so the searches use grids, finer and finer, and no slope.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -48,6 +49,28 @@ class Fit:
     def mu_k(self) -> float:
         return float(self.tried[self.best, 1])
 
+    @property
+    def at_best_plate(self) -> npt.NDArray[np.bool_]:
+        """The rows with the best µ_p."""
+        return self.tried[:, 0] == self.tried[self.best, 0]
+
+    def profile(self) -> tuple[Array, Array]:
+        """µ_k, rising, and the smallest mean error [m] with each, at the best µ_p."""
+        rows = self.at_best_plate
+        return self.tried[rows, 1], self.errors[rows].mean(axis=1)
+
+    def leave_one_out(self) -> tuple[Array, Array]:
+        """Each case's error [m] with the µ_k that is best for the others, and these µ_k.
+
+        The normal force belongs to the case and is fitted to it, given that µ_k (and µ_p).
+        """
+        cases = self.errors.shape[1]
+        if cases < 2:
+            return self.errors[self.best], self.tried[[self.best], 1]
+        others = self.errors.sum(axis=1)[:, None] - self.errors
+        rows = others.argmin(axis=0)
+        return self.errors[rows, np.arange(cases)], self.tried[rows, 1]
+
 
 def best_force(
     case: Case, mu_k: float, mu_plate: float, mu_s: float, solver: Solver
@@ -76,47 +99,32 @@ def best_force(
     return best, error
 
 
-def search(
-    cases: Sequence[Case],
-    solver: Solver = "exact",
-    plate: bool = False,
-    mu_s: float = published.MU_S,
-    progress: Callable[[], None] = lambda: None,
-) -> Fit:
+def search(cases: Sequence[Case], solver: Solver = "exact", plate: bool = False) -> Fit:
     """Fit µ_k in 0…µ_s, each normal force within its bounds and, with ``plate``, µ_p in 0…0.3."""
+    mu_s = published.MU_S
     done: dict[tuple[float, float], tuple[list[float], list[float]]] = {}
 
-    def look(mu_plate: float, mu_k: float) -> None:
-        key = (round(mu_plate, 9), round(mu_k, 9))
-        if key not in done:
-            pairs = [best_force(case, key[1], key[0], mu_s, solver) for case in cases]
-            done[key] = ([force for force, _ in pairs], [error for _, error in pairs])
-            progress()
+    def look(plates: Iterable[float], mu_ks: Iterable[float]) -> None:
+        for pair in product(plates, mu_ks):
+            key = (round(pair[0], 9), round(pair[1], 9))
+            if key not in done:
+                pairs = [best_force(case, key[1], key[0], mu_s, solver) for case in cases]
+                done[key] = ([force for force, _ in pairs], [error for _, error in pairs])
 
     def best() -> tuple[float, float]:
         return min(done, key=lambda key: sum(done[key][1]))
 
     plates = np.arange(0, LARGEST_MU_PLATE + 1e-9, MU_PLATE_STEPS[0]) if plate else [0.0]
-    for mu_plate in plates:
-        for mu_k in _line(0.0, mu_s, MU_K_STEPS[0] * (2 if plate else 1)):
-            look(mu_plate, mu_k)
+    look(plates, _line(0.0, mu_s, MU_K_STEPS[0] * (2 if plate else 1)))
     for before, step, wide, narrow in zip(
         MU_K_STEPS, MU_K_STEPS[1:], MU_PLATE_STEPS, MU_PLATE_STEPS[1:], strict=False
     ):
         mu_plate, mu_k = best()
-        near = _line(max(0.0, mu_k - before), min(mu_s, mu_k + before), step)
-        if plate:
-            low, high = max(0.0, mu_plate - wide), min(LARGEST_MU_PLATE, mu_plate + wide)
-            for other in _line(low, high, narrow):
-                for value in near:
-                    look(other, value)
-        else:
-            for value in near:
-                look(0.0, value)
+        low, high = max(0.0, mu_plate - wide), min(LARGEST_MU_PLATE, mu_plate + wide)
+        plates = _line(low, high, narrow) if plate else [0.0]
+        look(plates, _line(max(0.0, mu_k - before), min(mu_s, mu_k + before), step))
     if plate:  # the whole profile over µ_k, at the best µ_p
-        mu_plate, _ = best()
-        for mu_k in _line(0.0, mu_s, MU_K_STEPS[0]):
-            look(mu_plate, mu_k)
+        look([best()[0]], _line(0.0, mu_s, MU_K_STEPS[0]))
     tried = sorted(done)
     return Fit(
         np.array(tried),

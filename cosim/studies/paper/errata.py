@@ -1,15 +1,15 @@
 """The paper's misprints, each with a proof that is computed when it is asked for.
 
-The proofs do not use the closed forms of this package: they follow the part exactly from event to
-event (:mod:`cosim.studies.paper.exact`). In the paper's units: f = F_n/(m_P g), A = a_max/g, times
-in periods, velocities in g T; µ_s = 0.7 and µ_k = 0.6 as in its figures.
+The proofs use none of the closed forms: they follow the part exactly from event to event
+(:mod:`cosim.studies.paper.exact`). In the paper's units: f = F_n/(m_P g), A = a_max/g, times in
+periods, velocities in g T; µ_s = 0.7 and µ_k = 0.6 as in its figures.
 """
 
 import math
 import textwrap
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from cosim.studies.paper.exact import Contact, Phase, closed_cycle, simulate
 
@@ -45,27 +45,24 @@ def errata() -> list[Erratum]:
 
 
 def errata_text() -> str:
-    """The misprints for a reader."""
-    found = errata()
+    """The misprints as text to print."""
     head = (
         "Misprints in Yako, Nowak, Yuan, Salisbury, “Vertical Vibratory Transport of Grasped Parts "
         "Using Impacts”, with proofs computed now, by exact event-driven simulation. "
         "f = F_n/(m_P g), A = a_max/g; mu_s = 0.7, mu_k = 0.6."
     )
     blocks = [textwrap.fill(head, WIDTH)]
-    for number, item in enumerate(found, start=1):
-        rows = [f"{number}. {item.where}"]
+    for number, item in enumerate(errata(), start=1):
         verdict = "confirmed" if item.confirmed else "NOT CONFIRMED"
-        for name, words in (
-            ("printed", item.printed),
-            ("right", item.right),
-            ("proof", f"{item.proof} — {verdict}."),
-        ):
-            indent = " " * 12
-            rows.append(
-                textwrap.fill(f"   {name + ':':<9}{words}", WIDTH, subsequent_indent=indent)
-            )
-        blocks.append("\n".join(rows))
+        rows = (
+            f"{number}. {item.where}",
+            f"   printed: {item.printed}",
+            f"   right:   {item.right}",
+            f"   proof:   {item.proof} — {verdict}.",
+        )
+        blocks.append(
+            "\n".join(textwrap.fill(row, WIDTH, subsequent_indent=" " * 12) for row in rows)
+        )
     return "\n\n".join(blocks) + "\n"
 
 
@@ -73,8 +70,8 @@ def _first_phase() -> Erratum:
     f, peak = SCENE_F, SCENE_A
     right = _optimal(f, peak)
     printed: list[Phase] = [(right[0][0], MU_K * f - 1), *right[1:]]
-    gain = float(simulate(printed, _contact(f), 1).surface_gain[0])
-    moved, closed = _moved(right, f), float(simulate(right, _contact(f), 1).surface_gain[0])
+    gain = float(simulate(printed, _contact(f))[0].surface_gain)
+    moved, closed = _moved(right, f), float(simulate(right, _contact(f))[0].surface_gain)
     return Erratum(
         where="Acceleration of the optimal waveform's first phase, with T1 and T2 as printed",
         printed="(µ_k F_n/m_P − g) on [0, T1]",
@@ -159,7 +156,7 @@ def _force_guideline() -> Erratum:
 def _order_of_coefficients() -> Erratum:
     limit, peak = 2 / (MU_S - MU_K), Fraction(50)
     below, above = (
-        float(simulate(_optimal(f, peak), _contact(f)).stuck[-1]) for f in (limit - 5, limit + 5)
+        float(simulate(_optimal(f, peak), _contact(f))[-1].stuck) for f in (limit - 5, limit + 5)
     )
     return Erratum(
         where="µ̃_s < µ̃_k in the mapping to horizontal transport",
@@ -204,30 +201,17 @@ def _optimal(f: Fraction, peak: Fraction) -> list[Phase]:
 
 def _moved(phases: list[Phase], f: Fraction, contact: Contact | None = None) -> float:
     """The part's simulated mean velocity, g T, in the third period."""
-    return float(simulate(phases, contact or _contact(f)).travelled[-1])
+    return float(simulate(phases, contact or _contact(f))[-1].travelled)
 
 
 def _best_f(peak: Fraction) -> float:
-    """The ratio at which the simulated transport is fastest, by golden section."""
+    """The ratio at which the simulated transport is fastest."""
+    from scipy.optimize import minimize_scalar
 
-    def moved(f: float) -> float:
+    def loss(f: float) -> float:
         exact = Fraction(f).limit_denominator(10**8)
-        return _moved(_optimal(exact, peak), exact)
+        return -_moved(_optimal(exact, peak), exact)
 
-    return _maximiser(moved, float(1 / MU_S), float((peak - 1) / MU_S))
-
-
-def _maximiser(function: Callable[[float], float], low: float, high: float) -> float:
-    share = (math.sqrt(5.0) - 1.0) / 2.0
-    inner = [high - share * (high - low), low + share * (high - low)]
-    values = [function(f) for f in inner]
-    while high - low > 1e-7 * high:
-        if values[0] > values[1]:
-            high, inner[1], values[1] = inner[1], inner[0], values[0]
-            inner[0] = high - share * (high - low)
-            values[0] = function(inner[0])
-        else:
-            low, inner[0], values[0] = inner[0], inner[1], values[1]
-            inner[1] = low + share * (high - low)
-            values[1] = function(inner[1])
-    return 0.5 * (low + high)
+    bounds = (float(1 / MU_S), float((peak - 1) / MU_S))
+    found: Any = minimize_scalar(loss, bounds=bounds, options={"xatol": 1e-7})
+    return float(found.x)

@@ -1,12 +1,13 @@
 """A part on a vibrating surface, solved exactly: rational numbers, from event to event.
 
-Written for :mod:`cosim.studies.paper.errata` to judge printed formulas by, so it shares nothing
-with the closed forms. Accelerations are in g, times in periods, velocities in g T.
+:mod:`cosim.studies.paper.errata` judges printed formulas by it, so it shares nothing with the
+closed forms. Accelerations are in g, times in periods, velocities in g T.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 Phase = tuple[Fraction, Fraction]  # length, the surface's acceleration
 
@@ -26,29 +27,22 @@ class Contact:
         return cls(-mu_s * f_n - 1, mu_s * f_n - 1, mu_k * f_n - 1, -mu_k * f_n - 1)
 
 
-@dataclass
-class Run:
-    """What was reached, period by period."""
+class Period(NamedTuple):
+    """What one period came to."""
 
-    travelled: list[Fraction] = field(default_factory=list)  # by the part
-    stuck: list[Fraction] = field(default_factory=list)  # time
-    surface_gain: list[Fraction] = field(default_factory=list)  # of the surface's velocity
+    travelled: Fraction  # by the part
+    stuck: Fraction  # time in which the part stuck
+    surface_gain: Fraction  # of the surface's velocity
 
 
-def simulate(
-    phases: Sequence[Phase],
-    contact: Contact,
-    periods: int = 3,
-    lag: Fraction = Fraction(0),
-) -> Run:
+def simulate(phases: Sequence[Phase], contact: Contact, periods: int = 3) -> list[Period]:
     """Follow the part over ``periods`` repetitions of ``phases``.
 
-    The surface starts with the velocity that brings it back after one period, the part with
-    ``lag`` less (0: it sticks).
+    The surface starts with the velocity that brings it back after one period, the part sticking.
     """
     surface = start_velocity(phases)
-    slip = lag  # surface minus part
-    run = Run()
+    slip = Fraction(0)  # surface minus part
+    found = []
     for _ in range(periods):
         travelled = stuck = Fraction(0)
         before = surface
@@ -62,10 +56,8 @@ def simulate(
                 slip += (acceleration - part) * step
                 surface += acceleration * step
                 left -= step
-        run.travelled.append(travelled)
-        run.stuck.append(stuck)
-        run.surface_gain.append(surface - before)
-    return run
+        found.append(Period(travelled, stuck, surface - before))
+    return found
 
 
 def start_velocity(phases: Sequence[Phase]) -> Fraction:

@@ -1,57 +1,50 @@
 """The paper's figures 3 and 4, drawn from the corrected closed forms."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cosim.drive.surface import formulas
-from cosim.drive.surface.formulas import GRAVITY
+from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import Cycle, optimal_cycle
+from cosim.files.picture import Picture
 
 Array = npt.NDArray[np.float64]
 
-# The colours of surface and part in all of the bench's figures.
+# The colours of surface and part in all figures.
 SURFACE, PART, STICKING = "#1f6fb2", "#d1495b", "#f4e3c1"
 CURVES = ("#8d99ae", "#1f6fb2", "#2a9d8f", "#e9a03b")
+DASHED, BEYOND = (0, (5, 2)), (0, (4, 3))
 POINTS = 400
 
 
-def draw_cycle(
-    path: Path,
-    mu_s: float,
-    mu_k: float,
-    a_max: float,
-    f_n: float,
-    period: float,
-    gravity: float = GRAVITY,
-) -> None:
-    """Figure 3: one period of the optimal waveform, surface and part, into ``path`` (a PNG)."""
-    cycle = optimal_cycle(mu_s, mu_k, a_max, f_n, period, gravity=gravity)
-    mean = formulas.average_velocity(mu_s, mu_k, a_max, f_n, period, gravity=gravity)
-    slowed = formulas.slipping_acceleration(mu_k, f_n, -1.0, gravity)
-    figure = Figure(figsize=(8.4, 8.6), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+def draw_cycle(case: Transport) -> Picture:
+    """Figure 3: one period of the optimal waveform, surface and part."""
+    cycle, mean, gravity = optimal_cycle(case), formulas.average_velocity(case), case.gravity
+    slowed = formulas.slipping_acceleration(case.mu_k, case.f_n, -1.0, gravity)
+    figure = Picture(8.4, 8.6, "constrained")
     axes = figure.subplots(3, 1, sharex=True)
     _accelerations(axes[0], cycle, slowed, gravity)
     _motions(axes[1], axes[2], cycle, slowed)
+    sticking = (0.0, cycle.times[1] * 1e3)
     for axis in axes:
-        _phases(axis, cycle)
+        axis.axvspan(*sticking, color=STICKING, alpha=0.6, lw=0, zorder=0, label="sticking")
+        for time in cycle.times[1:3]:
+            axis.axvline(time * 1e3, color="0.35", lw=0.9, ls=":")
         axis.grid(alpha=0.25)
     _name_phases(axes[0], axes[1], cycle)
-    axes[2].set(xlabel="time [ms]", xlim=(0.0, period * 1e3))
+    axes[2].set(xlabel="time [ms]", xlim=(0.0, case.period * 1e3))
     figure.suptitle(
         f"Optimal waveform: the part moves at {mean * 1e3:+.2f} mm/s "
-        f"({mean / (gravity * period):.4f} gT)\n{_case(mu_s, mu_k)}, "
-        f"F$_n$ = {f_n:g} m$_P$g, a$_{{max}}$ = {a_max / gravity:g} g, T = {period * 1e3:.5g} ms",
+        f"({mean / (gravity * case.period):.4f} gT)\n{_friction(case)}, "
+        f"F$_n$ = {case.f_n:g} m$_P$g, a$_{{max}}$ = {case.a_max / gravity:g} g, "
+        f"T = {case.period * 1e3:.5g} ms",
         fontsize=12,
     )
-    figure.savefig(path, format="png")
+    return figure
 
 
 def _accelerations(axis: Axes, cycle: Cycle, slowed: float, gravity: float) -> None:
@@ -59,7 +52,7 @@ def _accelerations(axis: Axes, cycle: Cycle, slowed: float, gravity: float) -> N
     surface = np.repeat(cycle.accelerations, 2) / gravity
     part = np.repeat([cycle.accelerations[0], slowed, slowed], 2) / gravity
     axis.plot(edges, surface, color=SURFACE, lw=1.4, label="surface")
-    axis.plot(edges, part, color=PART, lw=1.8, ls=(0, (5, 2)), label="part")
+    axis.plot(edges, part, color=PART, lw=1.8, ls=DASHED, label="part")
     axis.set_ylabel("acceleration [g]")
 
 
@@ -67,27 +60,18 @@ def _motions(velocity: Axes, height: Axes, cycle: Cycle, slowed: float) -> None:
     """Velocities and heights; the end of the period is its own time, not the next one's start."""
     time = np.linspace(0.0, cycle.times[3], POINTS)
     knots = cycle.knots()
-    surface = np.interp(time, *knots)
     loose = np.maximum(time - cycle.times[1], 0.0)
     stuck = np.minimum(time, cycle.times[1])
     part = knots[1][0] + cycle.accelerations[0] * stuck + slowed * loose
     travelled = knots[1][0] * time + cycle.accelerations[0] * stuck * (0.5 * stuck + loose)
     travelled += 0.5 * slowed * loose**2
-    for axis, first, second in (
-        (velocity, surface, part),
-        (height, cycle.position(time), travelled),
+    for axis, surface, moved, name in (
+        (velocity, np.interp(time, *knots), part, "velocity [mm/s]"),
+        (height, cycle.position(time), travelled, "height [mm]"),
     ):
-        axis.plot(time * 1e3, first * 1e3, color=SURFACE, lw=1.4)
-        axis.plot(time * 1e3, second * 1e3, color=PART, lw=1.8, ls=(0, (5, 2)))
-    velocity.set_ylabel("velocity [mm/s]")
-    height.set_ylabel("height [mm]")
-
-
-def _phases(axis: Axes, cycle: Cycle) -> None:
-    sticking = (0.0, cycle.times[1] * 1e3)
-    axis.axvspan(*sticking, color=STICKING, alpha=0.6, lw=0, zorder=0, label="sticking")
-    for time in cycle.times[1:3]:
-        axis.axvline(time * 1e3, color="0.35", lw=0.9, ls=":")
+        axis.plot(time * 1e3, surface * 1e3, color=SURFACE, lw=1.4)
+        axis.plot(time * 1e3, moved * 1e3, color=PART, lw=1.8, ls=DASHED)
+        axis.set_ylabel(name)
 
 
 def _name_phases(above: Axes, between: Axes, cycle: Cycle) -> None:
@@ -97,31 +81,18 @@ def _name_phases(above: Axes, between: Axes, cycle: Cycle) -> None:
     above.set_title(title, loc="left", fontsize=10.5)
     above.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, fontsize=9, frameon=False)
     near = second - first < 0.05e3 * cycle.times[3]
+    axis = between.get_xaxis_transform()
     for name, time, side in (("1", first, "right"), ("2", second, "left")):
-        between.text(
-            time,
-            1.015,
-            f"T$_{name}$",
-            transform=between.get_xaxis_transform(),
-            ha=side if near else "center",
-            fontsize=10,
-        )
+        place = side if near else "center"
+        between.text(time, 1.015, f"T$_{name}$", transform=axis, ha=place, fontsize=10)
 
 
-def draw_velocities(
-    path: Path,
-    mu_s: float,
-    mu_k: float,
-    peaks: Sequence[float],
-    period: float,
-    gravity: float = GRAVITY,
-) -> None:
-    """Figure 4: v_ave over the normal force for several a_max, m/s², into ``path`` (a PNG)."""
-    figure = Figure(figsize=(9.0, 6.0), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+def draw_velocities(case: Transport, peaks: Sequence[float]) -> Picture:
+    """Figure 4: v_ave over the normal force for several a_max, m/s²."""
+    figure = Picture(9.0, 6.0, "constrained")
     axis = figure.subplots()
     for peak, color in zip(peaks, CURVES, strict=False):
-        _curve(axis, mu_s, mu_k, peak, period, gravity, color)
+        _curve(axis, case, peak, color)
     axis.grid(alpha=0.25)
     axis.axhline(0.0, color="0.5", lw=0.8, zorder=1)
     axis.set(
@@ -129,54 +100,39 @@ def draw_velocities(
         ylabel="mean velocity of the part v$_{ave}$ [mm/s]",
         xlim=(0.0, None),
     )
-    scale = gravity * period * 1e3
-    right = axis.twinx()
+    scale = case.gravity * case.period * 1e3
     low, high = axis.get_ylim()
-    right.set(ylim=(low / scale, high / scale), ylabel="v$_{ave}$/(gT) [1]")
+    axis.twinx().set(ylim=(low / scale, high / scale), ylabel="v$_{ave}$/(gT) [1]")
     figure.legend(
         handles=_legend(axis), loc="outside lower center", ncols=4, fontsize=9, frameon=False
     )
-    axis.set_title(
-        f"Fastest transport upwards: {_case(mu_s, mu_k)}, T = {period * 1e3:.5g} ms", fontsize=12
-    )
-    figure.savefig(path, format="png")
+    title = f"Fastest transport upwards: {_friction(case)}, T = {case.period * 1e3:.5g} ms"
+    axis.set_title(title, fontsize=12)
+    return figure
 
 
-def _curve(
-    axis: Axes,
-    mu_s: float,
-    mu_k: float,
-    peak: float,
-    period: float,
-    gravity: float,
-    color: str,
-) -> None:
-    sticking = formulas.largest_force_ratio_sticking(mu_s, peak, gravity)
-    sliding = formulas.largest_force_ratio_sliding(mu_k, peak, gravity)
+def _curve(axis: Axes, case: Transport, peak: float, color: str) -> None:
+    mu_s, mu_k, gravity = case.mu_s, case.mu_k, case.gravity
+    sticking = formulas.largest_force_ratio(mu_s, peak, gravity)
+    sliding = formulas.largest_force_ratio(mu_k, peak, gravity)
     best = formulas.optimal_force_ratio(mu_s, mu_k, peak, gravity)
 
-    def velocity(forces: npt.ArrayLike) -> Array:
-        pairs = (formulas.horizontal_equivalent(mu_s, mu_k, f) for f in np.atleast_1d(forces))
-        speeds = [_speed(pair, peak, period, gravity) for pair in pairs]
-        return np.array(speeds) * 1e3
+    def speed(f_n: float) -> float:
+        """v_ave, mm/s, with its value 0 at both its ends, where rounding may miss it."""
+        pair = formulas.horizontal_equivalent(mu_s, mu_k, f_n)
+        if pair.static <= 0.0 or pair.kinetic >= peak / gravity:
+            return 0.0
+        return formulas.horizontal_velocity(*pair, peak, case.period, gravity) * 1e3
 
     allowed = np.linspace(formulas.least_force_ratio(mu_s), sticking, POINTS)
     beyond = np.linspace(sticking, sliding, POINTS)
-    axis.plot(
-        allowed, velocity(allowed), color=color, lw=1.8, label=f"a$_{{max}}$ = {peak / gravity:g} g"
-    )
-    axis.plot(beyond, velocity(beyond), color=color, lw=1.1, ls=(0, (4, 3)))
-    axis.plot([sticking] * 2, [0.0, velocity(sticking)[0]], color=color, lw=0.8, ls=":")
-    axis.plot(best, velocity(best), "o", color=color, ms=6)
-    axis.plot(sticking, velocity(sticking), "s", color=color, ms=5.5)
+    label = f"a$_{{max}}$ = {peak / gravity:g} g"
+    axis.plot(allowed, [speed(f) for f in allowed], color=color, lw=1.8, label=label)
+    axis.plot(beyond, [speed(f) for f in beyond], color=color, lw=1.1, ls=BEYOND)
+    axis.plot([sticking] * 2, [0.0, speed(sticking)], color=color, lw=0.8, ls=":")
+    axis.plot(best, speed(best), "o", color=color, ms=6)
+    axis.plot(sticking, speed(sticking), "s", color=color, ms=5.5)
     axis.plot(sliding, 0.0, "v", color=color, ms=6.5, clip_on=False, zorder=3)
-
-
-def _speed(pair: formulas.Friction, peak: float, period: float, gravity: float) -> float:
-    """The formula of v_ave, m/s, with its value 0 at both its ends, where rounding may miss it."""
-    if pair.static <= 0.0 or pair.kinetic >= peak / gravity:
-        return 0.0
-    return formulas.horizontal_velocity(*pair, peak, period, gravity)
 
 
 def _legend(axis: Axes) -> list[Line2D]:
@@ -187,9 +143,9 @@ def _legend(axis: Axes) -> list[Line2D]:
         Line2D([], [], color=grey, marker="o", ls="", label="f$_{opt}$"),
         Line2D([], [], color=grey, marker="s", ls="", label="f$_{max}$ of a part that sticks"),
         Line2D([], [], color=grey, marker="v", ls="", label="f$_{n,max}$ of a part that slides"),
-        Line2D([], [], color=grey, lw=1.1, ls=(0, (4, 3)), label="the formula beyond f$_{max}$"),
+        Line2D([], [], color=grey, lw=1.1, ls=BEYOND, label="the formula beyond f$_{max}$"),
     ]
 
 
-def _case(mu_s: float, mu_k: float) -> str:
-    return f"µ$_s$ = {mu_s:g}, µ$_k$ = {mu_k:g}"
+def _friction(case: Transport) -> str:
+    return f"µ$_s$ = {case.mu_s:g}, µ$_k$ = {case.mu_k:g}"

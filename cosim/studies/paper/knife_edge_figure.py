@@ -1,12 +1,12 @@
-"""The knife edge as a picture."""
+"""The figure of the knife edge: v_ave over the timing error and over the normal force."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+
+from cosim.studies.figures import blank, save
 
 COLORS = ("#1f6fb2", "#2a9d8f", "#e9a03b", "#d1495b")
 STYLES = ("-", "--", "-", "-")
@@ -22,8 +22,7 @@ def draw(
     theory: Sequence[float],
 ) -> None:
     """v_ave, m/s, over the timing error (periods) and over f_n, one line a method, into a PNG."""
-    figure = Figure(figsize=(13.0, 4.8), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = blank(13.0, 4.8)
     left, right = figure.subplots(1, 2)
     left.axhline(best * 1e3, color="0.2", lw=3.0, alpha=0.3, label="closed form")
     right.plot(ratios, np.array(theory) * 1e3, color="0.2", lw=4.0, alpha=0.3, label="closed form")
@@ -35,16 +34,15 @@ def draw(
     left.set_xticks([-1e-2, -1e-4, -1e-6, -1e-8, 0, 1e-8, 1e-6, 1e-4, 1e-2])
     left.set(
         xlabel="first phase ends later than the optimum by [periods]",
-        ylabel="mean velocity of the part [mm/s]",
         title="A part that meets the surface early loses most of the transport",
     )
     right.set(
         xlabel="normal force over the part's weight, f_n",
-        ylabel="mean velocity of the part [mm/s]",
         title="A solver with a velocity threshold meets it early by itself",
     )
     for axis in (left, right):
+        axis.set_ylabel("mean velocity of the part [mm/s]")
         axis.grid(alpha=0.25)
         axis.axhline(0.0, color="0.5", lw=0.6)
         axis.legend(fontsize=8)
-    figure.savefig(path, format="png")
+    save(figure, path)

@@ -15,7 +15,6 @@ from cosim.coupling.participants.amplifier import Amplifier
 from cosim.coupling.participants.stickslip import FmuMechanics
 from cosim.coupling.polynomials import Array
 from cosim.coupling.rewind import methods
-from cosim.coupling.rewind.gauss_seidel import GaussSeidel
 from cosim.coupling.rewind.iterated import Iterated
 from cosim.coupling.rewind.joint import Joint
 from cosim.coupling.rewind.stability import largest_stable_step, observed_limit
@@ -180,11 +179,11 @@ def with_limits(steps: Sequence[float]) -> Iterator[Row]:
     for h in steps:
         mechanics = FmuMechanics(scene)
         try:
-            method = GaussSeidel(Amplifier(scene, command(scene)), mechanics, 1)
+            method = METHODS["Gauss-Seidel k = 1"](Amplifier(scene, command(scene)), mechanics)
             currents = np.empty(_WATCHED)
             for k in range(_WATCHED):
                 method.step(h)
-                currents[k] = method.of_first.value[0]
+                currents[k] = method.past.current.value[0]
         finally:
             mechanics.close()
         late = currents[_WATCHED // 2 :]

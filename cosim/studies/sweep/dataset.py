@@ -1,5 +1,6 @@
 """The result of a sweep as a labelled dataset, and as netCDF."""
 
+from collections import Counter
 from collections.abc import Iterable
 from io import BytesIO
 from pathlib import Path
@@ -8,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from cosim.files.atomic import whole
-from cosim.scene import Scene, to_toml
+from cosim.scene import Scene, firmware, keys, to_toml
 from cosim.simulation.summary import UNITS
 from cosim.studies.sweep.design import Design
 from cosim.studies.sweep.point import Outcome
@@ -25,9 +26,10 @@ def dataset(
 ) -> xr.Dataset:
     """The numbers of each point's summary over the keys of the sweep, with their units.
 
-    The dimensions of a grid are the keys, ``table.key``; a sample has the dimension ``point``,
-    along which the keys vary. NaN stands for a point that failed, is still to be run, or has no
-    such number. SI units.
+    The dimensions of a grid are the keys; a sample has the dimension ``point``, along which the
+    keys vary. A key is named without its table (:func:`_names`), and its coordinate has its unit,
+    its meaning and, as ``key``, its ``table.key``. Beside a knob stands what it stands for. NaN
+    stands for a point that failed, is still to be run, or has no such number. SI units.
     """
     names: dict[str, None] = {}
     found: list[tuple[int, Outcome]] = sorted(outcomes, key=lambda pair: pair[0])
@@ -40,14 +42,16 @@ def dataset(
         failures[index] = outcome.failure
         for name, value in outcome.numbers.items():
             numbers[places[name], index] = value
-    dims = (POINT,) if design.sample is not None else tuple(a.key.full for a in design.axes)
+    axes = _names(design, {*names, FAILURE, POINT})
+    dims = tuple(axes) if design.sample is None else (POINT,)
     coordinates = {}
-    for k, axis in enumerate(design.axes):
-        about = {"units": axis.key.unit, "long_name": axis.key.text}
+    for k, (name, axis) in enumerate(zip(axes, design.axes, strict=True)):
+        key = axis.key
+        about = {"units": key.unit, "long_name": key.text, "key": key.full}
         if design.sample is not None:
-            coordinates[axis.key.full] = (POINT, [row[k] for row in design.sample], about)
+            coordinates[name] = (POINT, [row[k] for row in design.sample], about)
         else:
-            coordinates[axis.key.full] = (axis.key.full, list(axis.values), about)
+            coordinates[name] = (name, list(axis.values), about)
     variables = {
         name: (dims, numbers[k].reshape(design.shape), {"units": UNITS.get(name, "1")})
         for name, k in places.items()
@@ -62,7 +66,48 @@ def dataset(
         "scene": to_toml(scene),
         "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
     }
-    return xr.Dataset(variables, coordinates, attributes)
+    data = xr.Dataset(variables, coordinates, attributes)
+    return data.assign_coords(_meant(scene, data))
+
+
+def _names(design: Design, taken: set[str]) -> list[str]:
+    """A name for each axis that can be typed: ``key``, or ``table_key`` where that is taken."""
+    keys = [axis.key for axis in design.axes]
+    bare = Counter(key.name for key in keys)
+    return [
+        f"{key.table}_{key.name}"
+        if bare[key.name] > 1 or key.name in taken or hasattr(xr.Dataset, key.name)
+        else key.name
+        for key in keys
+    ]
+
+
+def swept(data: xr.Dataset) -> list[str]:
+    """Names of the coordinates that a sweep went over, in order."""
+    return [str(name) for name in data.coords if "key" in data[name].attrs]
+
+
+def _meant(scene: Scene, data: xr.Dataset) -> dict[str, xr.DataArray]:
+    """What the knobs that are swept stand for: ``amplitude``, ``frequency``, ``offset``."""
+    axes = {data[name].attrs["key"].removeprefix("drive."): data[name] for name in swept(data)}
+    found: dict[str, xr.DataArray] = {}
+    if "pot_max" in axes:
+        found["amplitude"] = xr.apply_ufunc(
+            firmware.knob_amplitude, axes["pot_max"], vectorize=True
+        )
+    if "pot_frequency" in axes:
+        found["frequency"] = xr.apply_ufunc(
+            firmware.knob_frequency, axes["pot_frequency"], vectorize=True
+        )
+    if "pot_offset" in axes:
+        amplitude = found.get("amplitude", axes.get("amplitude", scene.drive.amplitude))
+        found["offset"] = xr.apply_ufunc(
+            firmware.knob_offset, axes["pot_offset"], amplitude, vectorize=True
+        )
+    about = {key.name: {"units": key.unit, "long_name": key.text} for key in keys()}
+    for name, values in found.items():
+        values.attrs = about[name]
+    return {name: values for name, values in found.items() if name not in axes}
 
 
 def write(path: Path, data: xr.Dataset) -> None:

@@ -2,20 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator
 
+from cosim.files.picture import Picture
 from cosim.scene import firmware
-from cosim.studies.sweep.dataset import FAILURE, POINT
+from cosim.studies.sweep.dataset import FAILURE, POINT, swept
 
 Array = npt.NDArray[np.float64]
 
@@ -43,13 +42,11 @@ OTHERS = (
 )
 
 
-def draw(data: xr.Dataset, title: str, path: Path) -> None:
-    """Draw the dataset of a sweep into ``path`` (a PNG)."""
-    figure = Figure(figsize=(13.0, 8.4), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+def draw(data: xr.Dataset, title: str) -> Picture:
+    """The figure of the dataset of a sweep."""
+    figure = Picture(13.0, 8.4, "constrained")
     if POINT in data.dims:
-        names = [str(name) for name in data.coords]
-        _clouds(figure, data, names)
+        _clouds(figure, data, swept(data))
     else:
         names = [str(name) for name in data.dims]
         varied = sorted((n for n in names if data.sizes[n] > 1), key=names.index) or names[:1]
@@ -62,7 +59,7 @@ def draw(data: xr.Dataset, title: str, path: Path) -> None:
     if len(data.squeeze().dims) > 1:
         words += f"; hatched: the part stays (below {STAYS * 1e3:g} mm/s)"
     figure.suptitle(f"{title}: {words}", fontsize=12)
-    figure.savefig(path, format="png")
+    return figure
 
 
 def _row(rows: Any, number: int, count: int) -> list[Axes]:
@@ -164,7 +161,7 @@ def _clouds(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
         )
         _mark_failures(axis, x, y, data)
         _x_axis(axis, data, names[0])
-        _turned_ticks(names[1], axis.get_ylim, axis.set_ylim, axis.set_yticks)
+        _turned_ticks(data[names[1]].attrs["key"], axis.get_ylim, axis.set_ylim, axis.set_yticks)
         axis.set_ylabel(_label(data, names[1]))
         axis.set_title(quantity.title, loc="left", fontsize=10.5)
         if not _tell_absent(axis, values):
@@ -194,7 +191,7 @@ def _map(
     rows, columns = np.nonzero(failed)
     axis.plot(xs[columns], ys[rows], "x", color="#d1495b", ms=6)
     _x_axis(axis, data, x)
-    _turned_ticks(y, axis.get_ylim, axis.set_ylim, axis.set_yticks)
+    _turned_ticks(data[y].attrs["key"], axis.get_ylim, axis.set_ylim, axis.set_yticks)
     axis.set_ylabel(_label(data, y))
     return shown
 
@@ -262,24 +259,22 @@ def _best(data: xr.Dataset) -> dict[str, int]:
 
 
 def _label(data: xr.Dataset, name: str) -> str:
-    unit = data[name].attrs.get("units", "1")
-    return name if unit == "1" else f"{name} [{unit}]"
+    key, unit = data[name].attrs["key"], data[name].attrs["units"]
+    return key if unit == "1" else f"{key} [{unit}]"
 
 
 def _setting(data: xr.Dataset, name: str) -> str:
     value = float(data[name])
-    unit = data[name].attrs.get("units", "1")
-    turned = _turned(name, value)
-    return (
-        f"{name} = {value:.4g}" + ("" if unit == "1" else f" {unit}") + turned.replace("\n", ", ")
-    )
+    key, unit = data[name].attrs["key"], data[name].attrs["units"]
+    turned = _turned(key, value).replace("\n", ", ")
+    return f"{key} = {value:.4g}" + ("" if unit == "1" else f" {unit}") + turned
 
 
-def _turned(name: str, value: float) -> str:
+def _turned(key: str, value: float) -> str:
     """What a knob at ``value`` stands for, below it."""
-    if name == "drive.pot_frequency":
+    if key == "drive.pot_frequency":
         return f"\n{firmware.knob_frequency(value):.3g} Hz"
-    if name == "drive.pot_max":
+    if key == "drive.pot_max":
         return f"\n{firmware.knob_amplitude(value):.3g} V"
     return ""
 
@@ -287,15 +282,15 @@ def _turned(name: str, value: float) -> str:
 def _x_axis(axis: Axes, data: xr.Dataset, name: str) -> None:
     axis.set_xlabel(_label(data, name))
     axis.xaxis.set_major_locator(MaxNLocator(6))
-    _turned_ticks(name, axis.get_xlim, axis.set_xlim, axis.set_xticks)
+    _turned_ticks(data[name].attrs["key"], axis.get_xlim, axis.set_xlim, axis.set_xticks)
 
 
-def _turned_ticks(name: str, limits: Any, set_limits: Any, set_ticks: Any) -> None:
+def _turned_ticks(key: str, limits: Any, set_limits: Any, set_ticks: Any) -> None:
     """Write below the numbers of a knob what they stand for."""
-    if not _turned(name, 0.5):
+    if not _turned(key, 0.5):
         return
     low, high = limits()
     shown = [tick for tick in np.linspace(0.0, 1.0, 6) if low <= tick <= high]
     if len(shown) > 1:
-        set_ticks(shown, [f"{tick:.1f}{_turned(name, tick)}" for tick in shown], fontsize=8.5)
+        set_ticks(shown, [f"{tick:.1f}{_turned(key, tick)}" for tick in shown], fontsize=8.5)
         set_limits(low, high)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import ceil, nan
 
+from cosim.drive.command import period
 from cosim.errors import CosimError
 from cosim.scene import Scene, changed
 
@@ -57,19 +58,10 @@ def periods_made_whole(scene: Scene) -> dict[str, Number]:
 
     The mean over a broken period is off by per cents, which differ from frequency to frequency.
     """
-    period = drive_period(scene)
-    settle = _at_least(scene.run.settle, period)
-    span = _at_least(scene.run.duration - scene.run.settle, period)
-    return {"run.settle": settle * period, "run.duration": (settle + span) * period}
-
-
-def drive_period(scene: Scene) -> float:
-    """Period of the command, s; that of the firmware's staircase differs from 1 / frequency."""
-    if scene.surface_is_given:
-        return 1.0 / scene.drive.frequency
-    from cosim.drive.command import command
-
-    return getattr(command(scene), "period", 1.0 / scene.drive.frequency)
+    length = period(scene)
+    settle = _at_least(scene.run.settle, length)
+    span = _at_least(scene.run.duration - scene.run.settle, length)
+    return {"run.settle": settle * length, "run.duration": (settle + span) * length}
 
 
 def _at_least(time: float, period: float) -> int:

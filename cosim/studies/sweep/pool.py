@@ -1,22 +1,19 @@
-"""Worker processes for the points of a sweep: one that crashes or hangs costs only its own point.
+"""The points of a sweep in worker processes: one that crashes or hangs costs only its own point.
 
-ngspice is one library a process, leaks a little with every run, and can be spoilt for good. Workers
-are therefore replaced after some points, after one that has spoilt the library, and after their
-death. A worker notices the end of its parent at its next report, and ends too.
+ngspice leaks a little with every run, and can be spoilt for good. Workers are therefore replaced
+after some points, after one that has spoilt the library, and after their death.
 """
 
-import multiprocessing
 import os
-import signal
 import time
-from collections.abc import Iterable, Iterator, Mapping
-from multiprocessing.connection import Connection, wait
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
+from multiprocessing.connection import wait
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import Scene
 from cosim.studies.sweep.point import Number, Outcome, evaluate
-from cosim.toolchain.isolation import PATIENCE, how_it_ended
+from cosim.toolchain.processes import PATIENCE, Worker
 
 POINTS_A_WORKER = 250
 """Points after which a worker is replaced: what ngspice leaks stays below some MB."""
@@ -24,46 +21,25 @@ POINTS_A_WORKER = 250
 TRIES = 3
 """A worker may die of something else than its point, such as a kill from outside."""
 
-_REPORT_EVERY = PATIENCE / 20.0  # s of wall time
-
 Point = tuple[int, Mapping[str, Number]]
 
 
-class _Worker:
+class _Worker(Worker):
     """A process and the point that it has at hand."""
 
-    def __init__(self, base: Scene, whole_periods: bool) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.pipe, there = context.Pipe()
-        self.process = context.Process(
-            target=_work, args=(there, base, whole_periods), name="cosim-worker"
-        )
-        self.process.start()
-        there.close()
-        self.point: Point | None = None
-        self.began = False
-        """It has reported, so what ends it later is not its start."""
-        self.heard = time.monotonic()
+    point: Point | None = None
+    given = 0
 
-    def give(self, point: Point) -> None:
-        self.pipe.send(point)
-        self.point = point
-        self.heard = time.monotonic()
-
-    def end(self) -> None:
-        self.process.kill()
-        self.process.join()
-        self.pipe.close()
+    def give(self, argument: Point) -> None:
+        self.point = argument
+        self.given += 1
+        super().give(argument[1])
 
 
 class Pool:
     """Runs points of one scene in ``workers`` processes; to be used in a ``with`` block."""
 
     def __init__(self, base: Scene, workers: int, whole_periods: bool = False) -> None:
-        from cosim.mechanics import package as fmu
-
-        # Once, before many processes would do it at the same time.
-        fmu.unpacked(3)
         self._base, self._whole_periods = base, whole_periods
         self._count = workers
         self._workers: list[_Worker] = []
@@ -99,27 +75,23 @@ class Pool:
                 number = worker.point[0]
                 if worker.pipe in ready:
                     try:
-                        answer = worker.pipe.recv()
-                    except (EOFError, OSError):
-                        self._drop(worker)
+                        kind, answer = worker.hear()
+                    except EOFError:
+                        how = self._drop(worker, PATIENCE)
                         if not worker.began:
-                            how = how_it_ended(worker.process.exitcode)
                             words = f"The worker processes cannot start ({how})."
                             raise SimulationFailed(words) from None
                         deaths[number] = deaths.get(number, 0) + 1
                         if deaths[number] < TRIES:
                             again.append(worker.point)
                         else:
-                            how = how_it_ended(worker.process.exitcode)
                             yield number, Outcome({}, f"The worker process died ({how}).")
                         continue
-                    worker.began = True
-                    worker.heard = time.monotonic()
-                    if answer is None:
+                    if kind == "progress":
                         continue
-                    outcome, spent = answer
+                    outcome, spoilt = answer if kind == "result" else (_fault(answer), False)
                     worker.point = None
-                    if spent:
+                    if spoilt or worker.given == POINTS_A_WORKER:
                         self._drop(worker)
                     yield number, outcome
                 elif time.monotonic() - worker.heard > PATIENCE:
@@ -129,22 +101,17 @@ class Pool:
 
     def _given(self, point: Point) -> _Worker:
         """A worker, idle so far or new, that has been given the point."""
-        for worker in list(self._workers):
-            if worker.point is None:
-                try:
-                    worker.give(point)
-                except OSError:  # it died while it waited
-                    self._drop(worker)
-                    continue
-                return worker
-        worker = _Worker(self._base, self._whole_periods)
-        self._workers.append(worker)
+        worker = next((worker for worker in self._workers if worker.point is None), None)
+        if worker is None:
+            worker = _Worker(partial(_evaluate, self._base, self._whole_periods))
+            self._workers.append(worker)
         worker.give(point)
         return worker
 
-    def _drop(self, worker: _Worker) -> None:
+    def _drop(self, worker: _Worker, patience: float = 0.0) -> str:
+        """Replace the worker; how it ended."""
         self._workers.remove(worker)
-        worker.end()
+        return worker.end(patience)
 
 
 def workers_asked(workers: int | None) -> int:
@@ -160,36 +127,19 @@ def workers_asked(workers: int | None) -> int:
     return workers
 
 
-def _work(pipe: Connection, base: Scene, whole_periods: bool) -> None:
-    # Ctrl-C reaches the whole group; the parent decides what becomes of this process.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _send(pipe, None)
-    told = time.monotonic()
-
-    def progress(_: float) -> None:
-        nonlocal told
-        now = time.monotonic()
-        if now - told >= _REPORT_EVERY:
-            told = now
-            _send(pipe, None)
-
-    for done in range(1, POINTS_A_WORKER + 1):
-        try:
-            _, values = pipe.recv()
-        except (EOFError, OSError):
-            return
-        outcome = evaluate(base, values, whole_periods, progress)
-        spent = done == POINTS_A_WORKER or _library_spoilt(base)
-        _send(pipe, (outcome, spent))
-        if spent:
-            return
+def _evaluate(
+    base: Scene,
+    whole_periods: bool,
+    values: Mapping[str, Number],
+    progress: Callable[[float], None],
+) -> tuple[Outcome, bool]:
+    """A point's outcome, and whether it has spoilt the process for others."""
+    return evaluate(base, values, whole_periods, progress), _library_spoilt(base)
 
 
-def _send(pipe: Connection, message: Any) -> None:
-    try:
-        pipe.send(message)
-    except OSError:  # the parent is gone, and with it all reason to go on
-        os._exit(1)
+def _fault(error: Exception) -> Outcome:
+    """Of a point that meets what no scene should: the others go on."""
+    return Outcome({}, " ".join(f"{type(error).__name__}: {error}".split()))
 
 
 def _library_spoilt(base: Scene) -> bool:

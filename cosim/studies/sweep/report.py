@@ -5,17 +5,16 @@ from collections import Counter
 import numpy as np
 import xarray as xr
 
-from cosim.scene import Scene, keys
-from cosim.studies.sweep.dataset import FAILURE, POINT
+from cosim.studies.sweep.dataset import FAILURE, swept
 
 MOST_REASONS = 5
 
 
-def table(scene: Scene, data: xr.Dataset) -> str:
+def table(name: str, data: xr.Dataset) -> str:
     """The greatest transport up and down, with the settings, and why points failed."""
     reasons = Counter(str(text) for text in data[FAILURE].values.ravel() if text)
     count = data[FAILURE].size
-    lines = [f"{scene.name}: {count} points, {sum(reasons.values())} failed"]
+    lines = [f"{name}: {count} points, {sum(reasons.values())} failed"]
     if "v_average" in data and np.isfinite(data["v_average"].values).any():
         v = data["v_average"].values
         for way, place in (("up", np.nanargmax(v)), ("down", np.nanargmin(v))):
@@ -32,14 +31,10 @@ def table(scene: Scene, data: xr.Dataset) -> str:
 
 def _at(data: xr.Dataset, place: np.intp) -> str:
     """The settings of a point by its number."""
-    units = {key.full: key.unit for key in keys()}
-    if POINT in data.dims:
-        values = {str(name): data[name].values[place] for name in data.coords}
-    else:
-        dims = [str(dim) for dim in data["v_average"].dims]
-        where = np.unravel_index(place, data["v_average"].shape)
-        values = {dim: data[dim].values[k] for dim, k in zip(dims, where, strict=True)}
+    v = data["v_average"]
+    point = v[dict(zip(v.dims, np.unravel_index(place, v.shape), strict=True))]
+    settings = [point[name] for name in swept(data)]
     return ", ".join(
-        f"{name} = {value:.6g}" + ("" if units[name] == "1" else f" {units[name]}")
-        for name, value in values.items()
+        f"{setting.key} = {setting:.6g}" + ("" if setting.units == "1" else f" {setting.units}")
+        for setting in settings
     )

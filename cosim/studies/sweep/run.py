@@ -4,19 +4,22 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import xarray as xr
 
+from cosim.errors import BadInput
 from cosim.mechanics import package as fmu
-from cosim.scene import Scene
-from cosim.simulation.simulate import versions
+from cosim.scene import Scene, load
+from cosim.scene.loading import Overrides
 from cosim.studies.sweep import dataset
-from cosim.studies.sweep.design import Design
+from cosim.studies.sweep.design import Design, grid, sample
 from cosim.studies.sweep.journal import Journal
-from cosim.studies.sweep.point import Outcome
+from cosim.studies.sweep.point import Number, Outcome
 from cosim.studies.sweep.pool import Point, Pool, workers_asked
+from cosim.toolchain.versions import versions
 
 JOURNAL = "sweep.journal"
 RESULT = "sweep.nc"
@@ -27,27 +30,68 @@ _RARELY = 20.0
 
 
 def sweep(
-    scene: Scene,
-    design: Design,
-    out: str | os.PathLike[str],
+    scene: Scene | str | os.PathLike[str],
+    over: Mapping[str, Sequence[Number]],
+    overrides: Overrides | None = None,
+    *,
+    samples: int | None = None,
+    random: bool = False,
+    seed: int = 0,
+    out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     dask: str | None = None,
     progress: Callable[[int, int, int], None] = lambda done, failed, total: None,
 ) -> xr.Dataset:
-    """Run ``scene`` at every point of ``design``; the result is ``sweep.nc`` in the folder ``out``.
+    """Run a scene at many settings of its keys; the numbers of all summaries as one dataset.
 
-    Points that an interrupted sweep has left in the folder's journal are not run again. A point
-    that fails is NaN, with the reason in ``failure``. Where the frequency is swept, each point's
-    settling and averages last whole periods, at least as long as the scene's own. ``workers`` local
-    processes (default: one for each processor), or the Dask cluster at the address ``dask``.
-    ``progress`` is told the points done, how many of them failed, and their number.
+    ``over`` gives the values of each ``table.key``, SI; every combination is run. With ``samples``
+    that many settings are spread over the ranges that the values span instead: a Latin hypercube,
+    or independent points if ``random``, the same for the same ``seed``.
 
-    Call it under ``if __name__ == "__main__":`` in a script: the workers are processes of their
-    own. Raises BadInput where the folder holds another sweep.
+    The dataset has a dimension for each key, named without its table (``ds.sel(amplitude=8)``), or
+    the dimension ``point`` for samples. A point that fails is NaN, with the reason in ``failure``.
+    Where the frequency is swept, each point's settling and averages last whole periods, at least as
+    long as the scene's own.
+
+    In the folder ``out`` it leaves ``sweep.nc`` and ``figure.png``, and takes up what an
+    interrupted sweep has left there. ``workers`` local processes (default: one for each processor),
+    or the Dask cluster at the address ``dask``. ``progress`` is told the points done, how many of
+    them failed, and their number.
+
+    Raises BadInput for keys and values that cannot be, or where ``out`` holds another sweep.
+
+    >>> data = sweep("held", {"friction.mu_s": [0.7, 0.8]}, {"run.duration": 0.01})
+    >>> data.v_average.dims, data.mu_s.key
+    (('mu_s',), 'friction.mu_s')
     """
     count = workers_asked(workers)
+    scene = load(scene, overrides)
+    if samples is None:
+        if random:
+            raise BadInput("--random needs --samples N.")
+        design = grid(over)
+    else:
+        design = sample(over, samples, seed, random)
+    if out is None:
+        with TemporaryDirectory() as folder:
+            return _sweep(scene, design, Path(folder), count, dask, progress)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
+    data = _sweep(scene, design, folder, count, dask, progress)
+    from cosim.studies.sweep import figure
+
+    figure.draw(data, scene.name).write(folder / "figure.png")
+    return data
+
+
+def _sweep(
+    scene: Scene,
+    design: Design,
+    folder: Path,
+    workers: int,
+    dask: str | None,
+    progress: Callable[[int, int, int], None],
+) -> xr.Dataset:
     made_by = {**versions(), "fmu": fmu.token()}
     with Journal(folder / JOURNAL, _identity(scene, design, made_by)) as journal:
 
@@ -60,7 +104,7 @@ def sweep(
         failed = sum(1 for _, outcome in journal.read() if outcome.failure)
         progress(done, failed, total)
         due = time.monotonic() + _REFRESH
-        for number, outcome in _run(scene, design, journal, count, dask):
+        for number, outcome in _run(scene, design, journal, workers, dask):
             journal.add(number, outcome)
             done, failed = done + 1, failed + bool(outcome.failure)
             progress(done, failed, total)

@@ -1,25 +1,22 @@
 """A search as a picture: its path, where it listened, and what a small turn costs."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from cosim.files.picture import Picture
 from cosim.simulation.summary import UNITS
 from cosim.studies.sweep.design import numeric_key
-from cosim.studies.tune.run import TURNS, Tuning
+from cosim.studies.tune.found import TURNS, Search
 
 COLORS = ("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#8d99ae", "#6a4c93")
 MOST_KEYS = 4
 
 
-def draw(tuning: Tuning, path: Path) -> None:
-    """Draw the search into ``path`` (a PNG)."""
-    figure = Figure(figsize=(13.0, 8.0), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+def draw(tuning: Search) -> Picture:
+    """The figure of a search."""
+    figure = Picture(13.0, 8.0, "constrained")
     rows: Any = figure.subfigures(2, 1)
     top, bottom = rows
     unit, scale = UNITS.get(tuning.quantity, "1"), 1.0
@@ -77,4 +74,4 @@ def draw(tuning: Tuning, path: Path) -> None:
         + (f", and {tuning.scouts} ahead without ngspice" if tuning.scouts else ""),
         fontsize=12,
     )
-    figure.savefig(path, format="png")
+    return figure

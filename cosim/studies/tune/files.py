@@ -2,24 +2,23 @@
 
 import csv
 import io
-import json
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 from typing import Any
 
 from cosim.errors import BadInput
-from cosim.files.atomic import whole
+from cosim.files.atomic import write_json, write_text
 from cosim.scene import to_toml
 from cosim.scene.messages import plain
 from cosim.scene.tables import KNOBS
 from cosim.simulation.summary import UNITS
 from cosim.studies.sweep.design import numeric_key
-from cosim.studies.tune.run import TURNS, Run, Tuning
+from cosim.studies.tune.found import TURNS, Run, Search
 
 
-def write(folder: Path, tuning: Tuning, seed: int) -> dict[str, Any]:
-    """Write ``tune.json``, ``tune.csv`` and ``best.toml``; gives what the first one holds."""
+def write(folder: Path, tuning: Search) -> None:
+    """Write ``tune.json``, ``tune.csv`` and ``best.toml``."""
     drive = tuning.scene.drive
     numbers = {
         "quantity": tuning.quantity,
@@ -34,7 +33,7 @@ def write(folder: Path, tuning: Tuning, seed: int) -> dict[str, Any]:
         "ranges": tuning.ranges,
         "runs": len(tuning.runs),
         "failed": sum(run.value is None for run in tuning.runs),
-        "seed": seed,
+        "seed": tuning.seed,
         "search": "Latin hypercube, then the cross-entropy method",
         "scouts": tuning.scouts,
         "turns": list(TURNS),
@@ -46,13 +45,8 @@ def write(folder: Path, tuning: Tuning, seed: int) -> dict[str, Any]:
     aim = f"{'largest' if tuning.largest else 'least'} {tuning.quantity}"
     found = {"name": f"{tuning.scene.name}-tuned"[:64], "description": f"Tuned for the {aim}"}
     scene = tuning.scene.model_copy(update=found)
-    for name, text in (
-        ("tune.json", json.dumps(_plain(numbers), indent=2) + "\n"),
-        ("best.toml", to_toml(scene)),
-    ):
-        with whole(folder / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-    return numbers
+    write_json(folder / "tune.json", _plain(numbers))
+    write_text(folder / "best.toml", to_toml(scene))
 
 
 def write_runs(path: Path, runs: Sequence[Run], quantity: str) -> None:
@@ -67,11 +61,10 @@ def write_runs(path: Path, runs: Sequence[Run], quantity: str) -> None:
     for run in runs:
         value = "" if run.value is None else repr(run.value)
         table.writerow([*map(repr, run.values.values()), value, run.outcome.failure])
-    with whole(path) as temporary:
-        temporary.write_text(content.getvalue(), encoding="utf-8")
+    write_text(path, content.getvalue())
 
 
-def robustness(tuning: Tuning) -> str:
+def robustness(tuning: Search) -> str:
     """What it costs to turn a key a little, in words."""
     best = tuning.best.value
     assert best is not None
@@ -104,25 +97,28 @@ def ranges_of(over: Sequence[str]) -> dict[str, tuple[float, float]]:
     return ranges
 
 
-def table(numbers: dict[str, Any]) -> str:
+def table(tuning: Search) -> str:
     """The best settings for a reader."""
-    quantity, value = numbers["quantity"], numbers["value"]
+    quantity, value = tuning.quantity, tuning.best.value
+    assert value is not None
     unit, scale = UNITS.get(quantity, ""), 1.0
     if unit == "m/s":
         unit, scale = "mm/s", 1e3
-    ahead = f" ({numbers['scouts']} ahead without ngspice)" if numbers["scouts"] else ""
+    ahead = f" ({tuning.scouts} ahead without ngspice)" if tuning.scouts else ""
+    failed = sum(run.value is None for run in tuning.runs)
     lines = [
         f"{quantity} = {value * scale:.5g} {unit}".rstrip()
-        + f" after {numbers['runs']} runs{ahead}, {numbers['failed']} failed, at"
+        + f" after {len(tuning.runs)} runs{ahead}, {failed} failed, at"
     ]
-    for name, setting in numbers["settings"].items():
+    for name, setting in tuning.best.values.items():
         about = numeric_key(name, "--over").unit
         key = KNOBS.get(name.removeprefix("drive."))
         meant = ""
         if key is not None:
-            meant = f" ({key} {numbers['drive'][key]:.4g} {numeric_key(f'drive.{key}', '').unit})"
+            unit = numeric_key(f"drive.{key}", "").unit
+            meant = f" ({key} {getattr(tuning.scene.drive, key):.4g} {unit})"
         lines.append(f"  {name} = {setting:.6g}{'' if about == '1' else f' {about}'}{meant}")
-    words = numbers["robustness"]
+    words = robustness(tuning)
     return "\n".join([*lines, f"  {words}"] if words else lines)
 
 

@@ -1,18 +1,23 @@
 """Tunes a scene: searches its settings, then turns each key a little about the best."""
 
+import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from math import inf, isfinite
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import BadInput, SimulationFailed
-from cosim.scene import Scene, changed
+from cosim.files.picture import Picture
+from cosim.scene import Scene, changed, load
+from cosim.scene.loading import Overrides
 from cosim.studies.sweep.design import FREQUENCIES, numeric_key
 from cosim.studies.sweep.point import Number, Outcome, periods_made_whole
 from cosim.studies.sweep.pool import Pool, workers_asked
+from cosim.studies.tune import files
+from cosim.studies.tune.found import TURNS, Run, Search
 from cosim.studies.tune.search import apart, search
 
 Array = npt.NDArray[np.float64]
@@ -21,9 +26,6 @@ KNOBS: dict[str, tuple[float, float]] = {
     f"drive.{knob}": (0.0, 1.0) for knob in ("pot_max", "pot_frequency", "pot_offset")
 }
 """What is tuned unless told otherwise: the three potentiometers, from end to end."""
-
-TURNS = (-0.05, -0.01, 0.01, 0.05)
-"""How far each key is turned about the best, as shares of its range."""
 
 SEARCHED = 0.93
 """Most that the search has of the runs; the rest turns one key after another about its best."""
@@ -38,59 +40,30 @@ HINTS, HINTS_APART = 25, 0.02
 """Best scouts that are run again with ngspice, and how far apart, as a share of the ranges."""
 
 
-@dataclass(frozen=True)
-class Run:
-    """One simulation of a search: its settings (SI), its summary, and the value asked for."""
+class Tuning(Search):
+    """A finished search: ``best`` and ``runs``, and ``scene``, which is the one at the best."""
 
-    values: dict[str, Number]
-    outcome: Outcome
-    value: float | None
+    def plot(self) -> Picture:
+        """The path of the search, where it listened, and what a small turn costs."""
+        from cosim.studies.tune import figure
 
+        return figure.draw(self)
 
-@dataclass(frozen=True)
-class Tuning:
-    """What a search has found.
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Write ``tune.json``, ``tune.csv``, ``best.toml`` and ``figure.png``."""
+        files.write(Path(folder), self)
+        self.plot().write(Path(folder) / "figure.png")
 
-    ``neighbours`` gives for each key the value at each of TURNS about the best run, None beyond the
-    end of its range or where the run failed; empty where turning led on to this best run and the
-    budget ended there.
-    """
-
-    quantity: str
-    largest: bool
-    ranges: dict[str, tuple[float, float]]
-    runs: list[Run]
-    best: Run
-    neighbours: dict[str, list[float | None]]
-    scene: Scene
-    """The scene at the best settings."""
-    scouts: int
-    """Runs on the rung "limited" that went ahead; 0 where the scene needs no ngspice itself."""
-
-    def lost(self, turn: float) -> float | None:
-        """Greatest loss when one key is turned by ``turn`` of its range either way.
-
-        As a share of the best value; inf where such a run failed; None where there is none.
-        """
-        assert self.best.value is not None
-        losses = []
-        for key, values in self.neighbours.items():
-            for place, value in zip(TURNS, values, strict=True):
-                if abs(place) != turn or not self._within(key, place):
-                    continue
-                change = inf if value is None else self.best.value - value
-                losses.append(change if self.largest or value is None else -change)
-        return max(losses) / (abs(self.best.value) or 1.0) if losses else None
-
-    def _within(self, key: str, turn: float) -> bool:
-        low, high = self.ranges[key]
-        return low <= self.best.values[key] + turn * (high - low) <= high
+    def __repr__(self) -> str:
+        return files.table(self)
 
 
 def tune(
-    scene: Scene,
-    quantity: str,
-    largest: bool = True,
+    scene: Scene | str | os.PathLike[str],
+    overrides: Overrides | None = None,
+    *,
+    maximise: str | None = None,
+    minimise: str | None = None,
     over: Mapping[str, tuple[float, float]] | None = None,
     budget: int = 200,
     seed: int = 0,
@@ -98,18 +71,25 @@ def tune(
     progress: Callable[[Run, Run | None], None] = lambda run, best: None,
     scouting: Callable[[Run, Run | None], None] = lambda run, best: None,
 ) -> Tuning:
-    """Search ``scene`` for the largest (or least) ``quantity`` of its summary, in ``budget`` runs.
+    """Search a scene for the largest, or the least, of a number of its summary in ``budget`` runs.
 
-    ``over`` gives the range of each ``table.key``, SI; by default the three knobs. Where the scene
-    needs ngspice, SCOUTS times as many runs on the rung "limited" look first where it is worth
-    while. After the search each key is turned a little about the best, which moves on while that
-    helps and the budget lasts. The same for the same ``seed``, whatever the number of ``workers``.
-    ``progress`` is told each run and the best so far, as they finish, ``scouting`` each one ahead.
-    Where the frequency is tuned, each run lasts whole periods.
+    ``maximise`` or ``minimise`` names the number; ``over`` gives the range of each ``table.key``,
+    SI; by default the three knobs. Where the scene needs ngspice, SCOUTS times as many runs on the
+    rung "limited" look first where it is worth while. After the search each key is turned a little
+    about the best, which moves on while that helps and the budget lasts. The same for the same
+    ``seed``, whatever the number of ``workers``. ``progress`` is told each run and the best so far,
+    as they finish, ``scouting`` each one ahead. Where the frequency is tuned, each run lasts whole
+    periods.
 
     Raises BadInput for keys, ranges and quantities that are none; SimulationFailed where every run
     failed.
     """
+    quantity, largest = maximise or minimise, minimise is None
+    if quantity is None or (maximise and minimise):
+        raise BadInput("tune: either maximise or minimise must name a number of the summary.")
+    scene = load(scene, overrides)
+    if seed < 0:
+        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
     if not over and scene.drive.waveform != "sawtooth":
         raise BadInput(
             f'scene {scene.name}: drive.waveform = "{scene.drive.waveform}" has no knobs; name '
@@ -145,7 +125,7 @@ def tune(
     tuned = changed(scene, best.values, "tune")
     if whole_periods:
         tuned = changed(tuned, periods_made_whole(tuned), "tune")
-    return Tuning(quantity, largest, ranges, runs, best, neighbours, tuned, scouts)
+    return Tuning(quantity, largest, ranges, runs, best, neighbours, tuned, scouts, seed)
 
 
 def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:

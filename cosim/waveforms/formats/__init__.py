@@ -1,55 +1,49 @@
-"""A finished run in the formats of other programs, one form a module.
+"""A finished run in the formats of other programs, one format a module.
 
-Every form is made from ``waveforms.nc``, which holds the run's numbers in full; ``waveforms.csv``
-has ten digits of them. All forms are made before the first file is written, so that a form that
-cannot be made leaves no others behind.
+A module declares its format as ``FORMAT`` and imports nothing heavy at its top. Every format is
+made from ``waveforms.nc``, which holds the run's numbers in full; ``waveforms.csv`` has ten digits
+of them. All are made before the first file is written: one that fails leaves no others behind.
 """
 
 from collections import Counter
-from importlib import import_module
+from functools import cache
 from pathlib import Path
 
 from cosim.errors import BadInput
 from cosim.files.atomic import whole
+from cosim.files.declared import declared
 from cosim.scene.messages import plain
-from cosim.waveforms.formats.source import Exported, Run, read
+from cosim.waveforms.formats.source import Exported, Format, Run, read
 
-__all__ = ["FORMS", "export", "parse", "read"]
+__all__ = ["export", "formats", "parse", "read"]
 
-FORMS = {
-    "csv": ("table", "waveforms.csv"),
-    "nc": ("netcdf", "waveforms.nc"),
-    "mat": ("matlab", "waveforms.mat"),
-    "hdf5": ("hdf5", "waveforms.h5"),
-    "raw": ("rawfile", "waveforms.raw"),
-    "wav": ("sound", "surface.wav"),
-    "tracker": ("tracker", "tracker.csv"),
-}
-"""The forms: the module of this package that makes each, and the file it becomes."""
+
+@cache
+def formats() -> dict[str, Format]:
+    """Every format by its name."""
+    return declared(__name__, "FORMAT")
 
 
 def parse(lists: list[str]) -> list[str]:
-    """The forms of comma-separated lists of them; raises BadInput for an unknown one."""
-    forms = [form.strip() for text in lists for form in text.split(",")]
-    for form, count in Counter(forms).items():
-        if form not in FORMS:
-            known = ", ".join(FORMS)
-            raise BadInput(f'--as: there is no form "{plain(form)}" (forms: {known}).')
+    """The formats of comma-separated lists of them; raises BadInput for an unknown one."""
+    names = [name.strip() for text in lists for name in text.split(",")]
+    for name, count in Counter(names).items():
+        if name not in formats():
+            known = ", ".join(formats())
+            raise BadInput(f'--as: there is no form "{plain(name)}" (forms: {known}).')
         if count > 1:
-            raise BadInput(f"--as: the form {form} stands there {count} times.")
-    return forms
+            raise BadInput(f"--as: the form {name} stands there {count} times.")
+    return names
 
 
-def export(run: Run, forms: list[str], out: Path) -> dict[str, str]:
-    """Write the run in each of the ``forms`` into the folder ``out``.
+def export(run: Run, names: list[str], out: Path) -> dict[str, str]:
+    """Write the run in each of the formats into the folder ``out``.
 
     Returns the name of each file with a line on what it holds. Raises BadInput for a run that does
-    not have what a form needs; then nothing is written.
+    not have what a format needs; then nothing is written.
     """
-    made: dict[str, Exported] = {}
-    for form in forms:
-        module, name = FORMS[form]
-        made[name] = import_module(f"{__name__}.{module}").content(run)
+    chosen = [formats()[name] for name in names]
+    made: dict[str, Exported] = {format.file: format.content(run) for format in chosen}
     for name, file in made.items():
         with whole(out / name) as temporary:
             temporary.write_bytes(file.content)

@@ -3,7 +3,7 @@
 from io import BytesIO
 
 from cosim.errors import BadInput
-from cosim.waveforms.formats.source import Exported, Run
+from cosim.waveforms.formats.source import Exported, Format, Run
 
 
 def content(run: Run) -> Exported:
@@ -28,3 +28,6 @@ def content(run: Run) -> Exported:
             if dataset is not time:
                 dataset.dims[0].attach_scale(time)
     return Exported(file.getvalue(), "HDF5 that netCDF4 and xarray open too")
+
+
+FORMAT = Format("hdf5", "waveforms.h5", "as netCDF-4 lays it out", content)

@@ -2,7 +2,7 @@
 
 from io import BytesIO
 
-from cosim.waveforms.formats.source import Exported, Run
+from cosim.waveforms.formats.source import Exported, Format, Run
 
 ABOUT = 116  # bytes of free text at the file's beginning
 
@@ -19,3 +19,6 @@ def content(run: Run) -> Exported:
     about = b"MATLAB 5.0 MAT-file, written by cosim"  # SciPy's would name the moment of writing
     made = about.ljust(ABOUT) + file.getvalue()[ABOUT:]
     return Exported(made, f"MATLAB 5, {len(run.waveforms)} column vectors and a struct units")
+
+
+FORMAT = Format("mat", "waveforms.mat", "MATLAB 5", content)

@@ -6,7 +6,7 @@ expect them; motion keeps its column's name and has no type, since the format kn
 
 import numpy as np
 
-from cosim.waveforms.formats.source import Exported, Run
+from cosim.waveforms.formats.source import Exported, Format, Run
 
 TYPES = {"s": ("time", "{}"), "V": ("voltage", "v({})"), "A": ("current", "i({})")}
 """The type and the form of the name that go with a unit."""
@@ -40,3 +40,6 @@ def content(run: Run) -> Exported:
 def _line(text: str) -> str:
     """One line that is short enough."""
     return " ".join(text.split()).encode()[:TITLE_BYTES].decode(errors="ignore") or "cosim"
+
+
+FORMAT = Format("raw", "waveforms.raw", "ngspice's binary", content)

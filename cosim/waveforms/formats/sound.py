@@ -1,4 +1,4 @@
-"""The surface's velocity as sound, to be heard as at the bench: WAV, mono, 16 bit, 48 kHz.
+"""The surface's velocity as sound: WAV, mono, 16 bit, 48 kHz.
 
 The rows are resampled with a linear-phase low-pass filter (Kaiser window, about 118 dB) whose edge
 is at half the lower of the two rates; what is within 6 % of that edge is on the filter's slope. The
@@ -15,20 +15,20 @@ import numpy.typing as npt
 
 from cosim.errors import BadInput
 from cosim.scene.messages import plain
-from cosim.waveforms.formats.source import Exported, Run
+from cosim.waveforms.formats.source import Exported, Format, Run
 
 RATE = 48000  # Hz
 LARGEST = 32767
 SILENCE = 1e-9
-"""m/s; a surface that is never faster is at rest, and its rounding errors are not to be heard."""
+"""m/s; a slower surface is at rest, and its rounding errors stay inaudible."""
 
 KAISER_BETA = 12.0
 HALF_LENGTH = 64
 """Samples, of the lower rate, that the filter reaches to either side."""
 
 LARGEST_TERM = 10_000
-"""Of the ratio of the rates, as far as it is no larger itself; what that makes of an odd
-``run.output_step`` changes the pitch by less than 1e-4, a fifth of a cent.
+"""Largest term of the fraction that stands for the ratio of the rates. Rounding the ratio of an odd
+``run.output_step`` to it changes the pitch by less than 1e-4, a fifth of a cent.
 """
 
 LONGEST = 600.0  # s
@@ -84,3 +84,6 @@ def _wave(samples: npt.NDArray[np.int16], about: dict[str, str]) -> bytes:
 def _chunk(name: str, data: bytes) -> bytes:
     """Name, length and data, filled to an even length."""
     return name.encode() + struct.pack("<I", len(data)) + data + b"\0" * (len(data) % 2)
+
+
+FORMAT = Format("wav", "surface.wav", "the surface's velocity as sound", content)

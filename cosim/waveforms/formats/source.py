@@ -1,5 +1,6 @@
-"""What every form is made from: a run as its folder holds it."""
+"""What a format is, and what every format is made from: a run as its folder holds it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -44,6 +45,19 @@ class Exported:
 
     content: bytes
     note: str
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format that a run can be exported in."""
+
+    name: str
+    """What ``--as`` takes."""
+    file: str
+    """Name of the file that it becomes."""
+    help: str
+    content: Callable[[Run], Exported]
+    """Makes the file; raises BadInput for a run that lacks what the format needs."""
 
 
 def read(folder: Path) -> Run:

@@ -12,10 +12,9 @@ import numpy.typing as npt
 from cosim.errors import BadInput
 from cosim.scene import load
 from cosim.scene.messages import plain
-from cosim.studies.compare.compare import differences, laid_over, through_camera, visible_frames
-from cosim.trials.published import FRAME_RATE
+from cosim.trials.camera import FRAME_RATE, accelerations, film, frame_count, laid_over, velocities
 from cosim.trials.tracked import FEWEST_ROWS
-from cosim.waveforms.formats.source import Exported, Run
+from cosim.waveforms.formats.source import Exported, Format, Run
 
 Array = npt.NDArray[np.float64]
 
@@ -29,7 +28,7 @@ MISSING = "\ufffd"
 def content(run: Run) -> Exported:
     """Platform p, part o and springed plate s, mm, frame by frame."""
     start, _ = laid_over(load(run.folder / "scene.toml"))
-    n = visible_frames(run.waveforms, start)
+    n = frame_count(run.waveforms, start)
     if not FEWEST_ROWS <= n <= MOST_FRAMES:
         shortest, longest = ((rows - 1) / FRAME_RATE for rows in (FEWEST_ROWS, MOST_FRAMES))
         raise BadInput(
@@ -37,11 +36,11 @@ def content(run: Run) -> Exported:
             f"the camera sees {n} of this run; run.duration must be {shortest:.4g} s to "
             f"{longest:.4g} s more than {start:g} s."
         )
-    frames = through_camera(run.waveforms, start, n)
+    frames = film(run.waveforms, start, n)
     columns = {"t": frames.time}
     rest = np.zeros(n)
     for body, z in (("p", frames.z_surface), ("o", frames.z_part), ("s", rest)):
-        for kind, of in (("", np.copy), ("v", differences), ("a", second_differences)):
+        for kind, of in (("", np.copy), ("v", velocities), ("a", accelerations)):
             columns[f"{kind}x{body}"] = of(rest)
             columns[f"{kind}z{body}"] = of(1e3 * z)
     rows = zip(*(map(number, values.tolist()) for values in columns.values()), strict=True)
@@ -49,15 +48,11 @@ def content(run: Run) -> Exported:
     return Exported(text.encode(), f"{n} frames at {FRAME_RATE:g} frames/s from {start:g} s on")
 
 
-def second_differences(z: Array) -> Array:
-    """Acceleration by the tracker's differences, over five frames; NaN in the two at either end."""
-    a = np.full(len(z), np.nan)
-    a[2:-2] = (2 * z[4:] - z[3:-1] - 2 * z[2:-2] - z[1:-3] + 2 * z[:-4]) * FRAME_RATE**2 / 7.0
-    return a
-
-
 def number(value: float) -> str:
     """Seven digits, and eight places after the point, as the published trials have them."""
     if np.isnan(value):
         return MISSING
     return f"{float(f'{value:.7g}'):.8f}".replace("-0.00000000", "0.00000000")
+
+
+FORMAT = Format("tracker", "tracker.csv", "a tracked trial", content)

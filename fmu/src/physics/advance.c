@@ -5,6 +5,7 @@
 #include "advance.h"
 #include "events.h"
 #include "integrator.h"
+#include "mechanics.h"
 
 static const double STEP_MIN = 1e-14;          /* s; below this a step is an instant */
 static const int MAX_EVENTS_PER_STEP = 1000000; /* Zeno sequences end by themselves, far below */

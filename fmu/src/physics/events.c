@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "coil.h"
+#include "mechanics.h"
 #include "source.h"
 
 /* A bounce that would last less than this, s, ends a Zeno sequence in resting contact. What it

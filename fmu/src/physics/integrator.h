@@ -3,7 +3,7 @@
 #ifndef STICKSLIP_INTEGRATOR_H
 #define STICKSLIP_INTEGRATOR_H
 
-#include "model.h"
+#include "state.h"
 
 /* Step from y0 (time tau, rates dy0) over h in the model's present mode, to y1 with rates dy1.
  * Returns the local error over the model's tolerance: accept up to 1. NaN or infinity where the

@@ -2,17 +2,8 @@
 
 #include <math.h>
 
+#include "coil.h"
 #include "source.h"
-
-double force_factor_at(const Model *m, double q)
-{
-    return m->r.force_factor * (1.0 + q * (m->r.b1 + q * m->r.b2));
-}
-
-static double force_factor_rate(const Model *m, double q, double u)
-{
-    return m->r.force_factor * (m->r.b1 + 2.0 * m->r.b2 * q) * u;
-}
 
 double part_mass_per_surface(const Model *m)
 {
@@ -24,11 +15,6 @@ double rest_height(const Model *m)
     const double ram = m->n.ram_fixed ? 0.0 : m->r.ram_mass;
     return -(ram + m->r.surface_mass + part_mass_per_surface(m)) * m->r.gravity /
            m->r.flexure_stiffness;
-}
-
-double back_emf_slope(const Model *m, const double y[N_STATES], double a_q)
-{
-    return force_factor_at(m, y[Q]) * a_q + force_factor_rate(m, y[Q], y[U]) * y[U];
 }
 
 /* Penetration of the touched wall. Clamped at 0: trial points of a step may lie beyond the event. */

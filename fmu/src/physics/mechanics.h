@@ -2,7 +2,7 @@
 #ifndef STICKSLIP_MECHANICS_H
 #define STICKSLIP_MECHANICS_H
 
-#include "model.h"
+#include "state.h"
 
 typedef struct {
     double a_surface, a_q, a_slip; /* d2 z_s/dt2, d2 q/dt2, dw/dt, m/s2 */
@@ -32,8 +32,6 @@ double energy_stored(const Model *m, const double y[N_ALL]);
 
 /* For one surface, of its own mode and states. */
 
-double back_emf_slope(const Model *m, const double y[N_STATES], double a_q);
-double force_factor_at(const Model *m, double q);
 double part_mass_per_surface(const Model *m);
 /* Height of the surface at rest, under the weight of all that it carries, m. */
 double rest_height(const Model *m);

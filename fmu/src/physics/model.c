@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "advance.h"
+#include "coil.h"
 #include "events.h"
 #include "mechanics.h"
 #include "source.h"

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "coil.h"
+
 /* A current that misses its target by less than this part of the current limit has met it. */
 static const double MET = 1e-12;
 
@@ -156,8 +158,8 @@ void source_apply(Model *m, int s, double tau, EventKind kind)
         mode->output = 0;
         break;
     case EVENT_OUTPUT_HIGH:
-        mode->output = 1; /* not to be settled again: it is as near to following as not */
-        return;
+        mode->output = 1;
+        return; /* not settled: on the boundary, rounding could undo the mode just taken */
     case EVENT_OUTPUT_LOW:
         mode->output = -1;
         return;

@@ -13,7 +13,7 @@
 #ifndef STICKSLIP_SOURCE_H
 #define STICKSLIP_SOURCE_H
 
-#include "events.h"
+#include "event.h"
 
 /* Current of one coil, A, and its rate, A/s; with a source or as given. */
 double coil_current(const Model *m, const double y[N_STATES], int s, double tau);

@@ -1,0 +1,184 @@
+"""Compiles the C of this project; runs when the package is installed or its wheel is built.
+
+`make(folder)` writes:
+
+    loop.so, part.so   libraries of the package, loaded by cosim.toolchain.libraries
+    fmi2/, fmi3/       the FMU of the mechanics for FMI 2.0 and 3.0, as its .fmu files hold it
+    replay             the program in which `cosim bench` counts the FMU's instructions
+    build.json         a hash of all that this was made of, the compiler and its flags
+
+The same sources, compiler and flags give the same bytes.
+"""
+
+import hashlib
+import json
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+FMU = ROOT / "fmu"
+MODEL = "stickslip"
+LIBRARIES = {
+    "loop": (ROOT / "cosim/coupling/loop", ROOT / "cosim/drive"),
+    "part": (ROOT / "cosim/mechanics",),
+}
+"""The package's libraries; each is made of all C files of its folders."""
+REPLAY = ROOT / "cosim/studies/bench/replay.c"
+DESCRIBE = FMU / "src/fmi/describe.c"
+
+# Without contraction every platform computes the same bits.
+FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-Wall", "-Wextra")
+LIBRARY_FLAGS = ("-fPIC", "-fvisibility=hidden")
+SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+class BuildFailed(Exception):
+    """Why nothing was made, in one sentence."""
+
+
+def sources() -> list[Path]:
+    """All files that the products depend on."""
+    code = [path for folders in LIBRARIES.values() for path in _code(folders, "*.[ch]")]
+    return sorted([*code, REPLAY, *_fmu_files(), DESCRIBE, ROOT / "LICENSE", Path(__file__)])
+
+
+def digest() -> str:
+    """A hash of the sources as they are now; `build.json` holds that of the last build."""
+    return _hash(sources())
+
+
+def make(folder: Path) -> None:
+    """Compile everything into `folder`, which is replaced as a whole or left as it is."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".compile-") as name:
+        work, new = Path(name), Path(name) / "new"
+        new.mkdir()
+        for library, folders in LIBRARIES.items():
+            link(_objects(_code(folders, "*.c"), work), new / (library + SUFFIX), "-shared")
+        if sys.platform != "win32":
+            link([REPLAY], new / "replay", "-ldl")
+        _make_fmu(new, work)
+        made = {"sources": digest(), "compiler": compiler_version(), "flags": FLAGS}
+        (new / "build.json").write_text(json.dumps(made, indent=1) + "\n")
+        if folder.exists():
+            folder.rename(work / "old")
+        new.rename(folder)
+
+
+def compiler() -> list[str]:
+    """The command in CC, or the machine's cc, gcc or clang."""
+    chosen = shlex.split(os.environ.get("CC", ""))
+    if chosen:
+        return chosen
+    for name in ("cc", "gcc", "clang"):
+        if shutil.which(name):
+            return [name]
+    raise BuildFailed("No C compiler was found; install gcc or clang, or name one in CC.")
+
+
+def compiler_version() -> str:
+    """The first line of what the compiler says of itself."""
+    return _run(*compiler(), "--version").decode(errors="replace").split("\n")[0]
+
+
+def link(inputs: list[Path], target: Path, *flags: str) -> None:
+    """Make a program, or with ``-shared`` a library, of objects or C files."""
+    _run(*compiler(), *FLAGS, *map(str, inputs), "-o", str(target), *flags, "-lm")
+
+
+def _code(folders: tuple[Path, ...], pattern: str) -> list[Path]:
+    return [path for folder in folders for path in sorted(folder.glob(pattern))]
+
+
+def _objects(files: list[Path], work: Path, *flags: str) -> list[Path]:
+    def compiled(file: Path) -> Path:
+        target = work / f"{file.parent.name}-{file.stem}.o"
+        _run(*compiler(), *FLAGS, *LIBRARY_FLAGS, *flags, "-c", str(file), "-o", str(target))
+        return target
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(compiled, files))
+
+
+def _run(*command: str) -> bytes:
+    try:
+        done = subprocess.run(command, capture_output=True, check=False)
+    except OSError as error:
+        raise BuildFailed(f"{command[0]} cannot be run: {error.strerror}.") from error
+    if done.returncode:
+        lines = done.stderr.decode(errors="replace").splitlines()
+        first = next((line for line in lines if "error" in line), lines[0] if lines else "")
+        raise BuildFailed(f"{command[0]} failed: {first}")
+    return done.stdout
+
+
+def _hash(files: list[Path]) -> str:
+    digest = hashlib.sha256(repr((FLAGS, LIBRARY_FLAGS)).encode())
+    for file in files:
+        data = file.read_bytes()
+        digest.update(f"{file.relative_to(ROOT).as_posix()} {len(data)}\n".encode() + data)
+    return digest.hexdigest()
+
+
+# ---- the FMU ----
+
+
+def fmu_sources() -> list[Path]:
+    """The C files of the FMU's library."""
+    return sorted(file for file in FMU.glob("src/*/*.c") if file != DESCRIBE)
+
+
+def _fmu_files() -> list[Path]:
+    included = ("src/*/*.h", "src/*/*.def", "include/*.h")
+    return [*fmu_sources(), *sorted(path for kind in included for path in FMU.glob(kind))]
+
+
+def _place(file: Path) -> str:
+    """Where a file lies in sources/. The standard's headers lie beside what includes them."""
+    folder = "fmi" if file.parent.name == "include" else file.parent.name
+    return f"{folder}/{file.name}"
+
+
+def _make_fmu(target: Path, work: Path) -> None:
+    token = _hash([*_fmu_files(), DESCRIBE])[:32]
+    flags = (f"-I{FMU / 'include'}", f"-DFMU_TOKEN={token}")
+    objects = _objects(fmu_sources(), work, *flags)
+    library = work / (MODEL + SUFFIX)
+    link(objects, library, "-shared")
+    describe = work / ("describe.exe" if sys.platform == "win32" else "describe")
+    link([*objects, *_objects([DESCRIBE], work, *flags)], describe)
+
+    def described(what: str) -> bytes:
+        names = map(_place, fmu_sources())
+        return _run(str(describe), what, *names).replace(b"\r\n", b"\n")
+
+    for version, binaries in zip(("2", "3"), _platforms(), strict=True):
+        contents = {
+            "modelDescription.xml": described(version),
+            f"binaries/{binaries}/{library.name}": library.read_bytes(),
+            "documentation/licenses/license.txt": (ROOT / "LICENSE").read_bytes(),
+            **{f"sources/{_place(file)}": file.read_bytes() for file in _fmu_files()},
+            "sources/fmi/token.h": f"#define FMU_TOKEN {token}\n".encode(),
+        }
+        if version == "3":
+            contents["sources/buildDescription.xml"] = described("build")
+        for name, data in contents.items():
+            path = target / f"fmi{version}" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+
+
+def _platforms() -> tuple[str, str]:
+    """The names of this platform in FMI 2.0 and FMI 3.0."""
+    system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
+    bits = "64" if sys.maxsize > 2**32 else "32"
+    arm = platform.machine().lower() in ("aarch64", "arm64")
+    processor = "aarch64" if arm else {"64": "x86_64", "32": "x86"}[bits]
+    return system.removesuffix("dows") + bits, f"{processor}-{system}"

@@ -1,0 +1,1 @@
+"""Commands that simulate scenes, and what goes with that."""

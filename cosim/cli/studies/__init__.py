@@ -1,0 +1,1 @@
+"""Commands that study: closed forms, trials, charts, speed."""

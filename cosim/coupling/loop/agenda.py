@@ -1,0 +1,67 @@
+"""When something is to be written down: rows, frames of the camera, the end of settling."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.trials.camera import FRAME_RATE
+
+Array = npt.NDArray[np.float64]
+
+ENTRIES = 1 << 14
+"""Rows and frames of the camera that are planned, and taken, at a time."""
+
+_SAME_TIME = 1e-12  # s; communication points closer than this are one
+_ROW, _FRAME, _SETTLED = 1, 2, 4
+_NEVER = 1 << 80  # multiples of _SAME_TIME
+
+
+def grid(step: float, end: float) -> Array:
+    """0, step, 2 step ... up to ``end``, which counts as reached within rounding."""
+    return step * np.arange(int(end / step * (1 + 1e-12)) + 1, dtype=np.float64)
+
+
+def agendas(
+    row_step: float, duration: float, settle: float, stops: list[float]
+) -> Iterator[tuple[Array, npt.NDArray[np.int32]]]:
+    """Times (s) at which something is to be written down, and what, part after part; not more than
+    ENTRIES rows and frames in one. The last time of all is endless.
+    """
+    frame_step = 1.0 / FRAME_RATE
+    extra, kinds = np.array([settle, *stops]), np.array([_SETTLED, *[0] * len(stops)], np.int32)
+    # Whole numbers of _SAME_TIME, so that no part ends between times that are one.
+    length = max(1, int(ENTRIES / 3 * min(row_step, frame_step) / _SAME_TIME))
+    last = int(np.rint(duration / _SAME_TIME)) + 1
+    for begin in range(0, last, length):
+        # To the last one belongs what rounding puts behind the end.
+        end = begin + length if begin + length < last else _NEVER
+        rows = _within(row_step, duration, begin, end)
+        frames = _within(frame_step, duration, begin, end)
+        frames = frames[frames >= settle]
+        here = (np.rint(extra / _SAME_TIME) >= begin) & (np.rint(extra / _SAME_TIME) < end)
+        times = np.concatenate([rows, frames, extra[here]])
+        what = np.concatenate(
+            [np.repeat(np.array([_ROW, _FRAME], np.int32), [len(rows), len(frames)]), kinds[here]]
+        )
+        # Of times that are one the first is taken.
+        _, first, place = np.unique(
+            np.rint(times / _SAME_TIME), return_index=True, return_inverse=True
+        )
+        joined = np.zeros(len(first), np.int32)
+        np.bitwise_or.at(joined, place, what)
+        if end == _NEVER:
+            yield np.append(times[first], np.inf), np.append(joined, np.int32(0))
+        elif len(first):
+            yield times[first], joined
+
+
+def _within(step: float, duration: float, begin: int, end: int) -> Array:
+    """What :func:`grid` has from ``begin`` until before ``end``, multiples of _SAME_TIME."""
+    count = int(duration / step * (1 + 1e-12)) + 1
+    # One more at either side, and then those that rounding puts there.
+    low = max(0, int(begin * _SAME_TIME / step) - 1)
+    high = min(count, int(end * _SAME_TIME / step) + 2)
+    times = step * np.arange(low, high, dtype=np.float64)
+    place = np.rint(times / _SAME_TIME)
+    return times[(place >= begin) & (place < end)]

@@ -1,0 +1,251 @@
+/* The callbacks of ngspice, which leads; for the order of its calls see cosim/circuit/ngspice.py.
+   Python makes up for what is rare: it refills the pieces of the command and takes the log away,
+   which is also when Ctrl-C acts and progress is told; and it is asked at the macro points of most
+   coupling methods. */
+
+#include "loop.h"
+
+#include <ctype.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <string.h>
+
+static const double ON_TIME = 1e-13;
+/* s; ngspice's own sums of steps reach a time of ours only within rounding */
+
+typedef struct {
+    char *name;
+    double creal, cimag;
+    bool is_scale, is_complex;
+} VectorValue; /* ngspice's vecvalues */
+
+typedef struct {
+    int count, index;
+    VectorValue **vectors;
+} VectorValues; /* ngspice's vecvaluesall */
+
+static const int64_t ATTEND_EVERY = 4096; /* attempted steps; some ten milliseconds */
+
+static Lead *run; /* the one under way, or NULL */
+
+static int going(const Lead *c)
+{
+    return c && c->status == GOOD && !c->stopped;
+}
+
+/* --- the command --- */
+
+static const Piece *piece_at(Lead *c, double t)
+{
+    while (t >= c->pieces[c->piece].until) {
+        if (c->piece + 1 < c->n_pieces) {
+            c->piece++;
+            continue;
+        }
+        const double last = c->pieces[c->piece].until;
+        c->refill();
+        if (!going(c) || c->pieces[c->n_pieces - 1].until <= last)
+            break;
+    }
+    while (c->piece > 0 && t < c->pieces[c->piece].begin)
+        c->piece--;
+    return &c->pieces[c->piece];
+}
+
+enum { EMF, GAIN, COMMAND, DAC, PIN, UNKNOWN };
+
+static int kind_of(const char *name)
+{
+    static const char *const NAMES[] = {"vemf", "vgain", "vcommand", "vdac", "voffset"};
+    for (int k = 0; k < UNKNOWN; k++) {
+        size_t i = 0;
+        while (NAMES[k][i] && tolower((unsigned char)name[i]) == NAMES[k][i])
+            i++;
+        if (NAMES[k][i] == name[i]) /* both at their end */
+            return k;
+    }
+    return UNKNOWN;
+}
+
+static double back_emf(const Lead *c, double t)
+{
+    const Segment *s = &c->segment;
+    t -= s->origin;
+    return s->c[2] == 0.0 ? s->c[0] + s->c[1] * t : s->c[0] + t * (s->c[1] + t * s->c[2]);
+}
+
+static double pin_of(const Lead *c, int source, const Piece *p, double command)
+{
+    if (source == PIN)
+        return p->pin;
+    if (source == COMMAND)
+        return command;
+    return p->kind == LEVEL ? p->dac : c->v_offset - command / c->gain;
+}
+
+/* A source that follows the command keeps its left limit until a step has ended on the jump. */
+static double held(Lead *c, int source, double t)
+{
+    if (t <= 0.0)
+        return source == COMMAND ? 0.0 : c->v_offset;
+    if (t >= c->jump - ON_TIME) {
+        const Piece *before = piece_at(c, nextafter(c->jump, 0.0));
+        return pin_of(c, source, before, before->end);
+    }
+    const Piece *p = piece_at(c, t);
+    return pin_of(c, source, p, command_value(p, t));
+}
+
+/* --- the log and the mechanics --- */
+
+static void write_down(Lead *c, double time, double carried)
+{
+    c->log[c->n_log * (2 + c->n_saved)] = time;
+    c->log[c->n_log * (2 + c->n_saved) + 1] = back_emf(c, time) + carried;
+    c->n_log++;
+    c->logged++;
+}
+
+static void set_line(Lead *c, const double *emf_and_slope)
+{
+    c->segment = (Segment){.origin = c->time,
+                           .c = {emf_and_slope[0], emf_and_slope[1], 0.0},
+                           .end = -INFINITY,
+                           .start = c->current};
+}
+
+/* As cosim/coupling/methods/step_locked.py says. */
+void macro_point_step_locked(Lead *c)
+{
+    if (recorder_advance(c->recorder, c->time, c->segment.start, c->current))
+        set_line(c, c->recorder->outputs);
+    else
+        c->status = FMU_FAILED;
+}
+
+void macro_point_replayed(Lead *c)
+{
+    set_line(c, c->replay);
+    c->replay += 2;
+}
+
+/* The values that were sent last stand where the next row of the log begins to be filled. */
+static double accepted(Lead *c, double time, double next_step)
+{
+    const double *values = c->log + c->n_log * (2 + c->n_saved) + 2;
+    double sum = 0.0;
+    for (int64_t k = 0; k < c->n_saved; k++)
+        sum += values[k];
+    if (!isfinite(sum)) {
+        c->told = time;
+        c->status = NOT_FINITE;
+        return next_step;
+    }
+    const double current = values[0] / c->count;
+    c->carried = c->motional < 0 ? 0.0 : values[c->motional];
+    write_down(c, time, c->carried);
+    if (time <= 0.0)
+        return c->after_jump;
+    c->segment.charge += 0.5 * (c->current + current) * (time - c->time);
+    c->time = time;
+    c->current = current;
+    c->at_jump = time >= c->jump - ON_TIME;
+    if (c->at_jump) {
+        c->jump = piece_at(c, c->jump)->jump;
+        next_step = c->after_jump < next_step ? c->after_jump : next_step;
+    }
+    if (time >= c->segment.end - ON_TIME) {
+        c->macro_point(c);
+        if (!going(c))
+            return next_step;
+    }
+    if (c->segment.end > time && c->segment.end - time < next_step)
+        next_step = c->segment.end - time;
+    return c->jump - time < next_step ? c->jump - time : next_step;
+}
+
+static void attend(Lead *c)
+{
+    c->quiet = 0;
+    c->attend();
+}
+
+/* --- what ngspice calls --- */
+
+EXPORT int lead_source(double *voltage, double time, const char *node, int ident, void *user)
+{
+    (void)ident, (void)user;
+    Lead *c = run;
+    if (!going(c)) {
+        *voltage = NAN;
+        return 0;
+    }
+    const int source = kind_of(node);
+    if (source == UNKNOWN) {
+        strncpy(c->source, node, sizeof c->source - 1);
+        c->status = UNKNOWN_SOURCE;
+    }
+    *voltage = source == EMF    ? back_emf(c, time)
+               : source == GAIN ? c->segment.gain / c->count
+                                : held(c, source, time);
+    if (!going(c))
+        *voltage = NAN;
+    return 0;
+}
+
+EXPORT int lead_data(VectorValues *data, int n, int ident, void *user)
+{
+    (void)n, (void)ident, (void)user;
+    Lead *c = run;
+    if (!c)
+        return 0;
+    double *values = c->log + c->n_log * (2 + c->n_saved) + 2;
+    for (int64_t k = 0; k < c->n_saved; k++)
+        values[k] = data->vectors[c->places[k]]->creal;
+    c->sent = data->vectors[c->places[c->n_saved]]->creal;
+    return 0;
+}
+
+EXPORT int lead_step(double time, double *delta, double old_delta, int redo, int ident,
+                     int location, void *user)
+{
+    (void)old_delta, (void)redo, (void)ident, (void)user;
+    Lead *c = run;
+    if (!going(c))
+        return 0;
+    if (location == 0) {
+        c->told = time;
+        *delta = accepted(c, time, *delta);
+    } else {
+        c->attempts++;
+        c->quiet++;
+    }
+    /* Only before a step's values are sent, or after they were used. */
+    if (c->n_log == c->log_rows || c->quiet >= ATTEND_EVERY)
+        attend(c);
+    return 0;
+}
+
+/* --- what Python calls --- */
+
+void lead_begin(Lead *c)
+{
+    c->jump = piece_at(c, 0.0)->jump;
+    run = c;
+}
+
+/* The last point, of which ngspice does not tell; then nothing is led any more. */
+void lead_finish(Lead *c)
+{
+    if (going(c) && c->sent > c->told)
+        accepted(c, c->sent, 0.0);
+    run = NULL;
+}
+
+int64_t loop_size(int which)
+{
+    const size_t sizes[] = {sizeof(Fmu), sizeof(Schedule), sizeof(Recorder), sizeof(Lead),
+                            sizeof(Piece)};
+    return (int64_t)sizes[which];
+}

@@ -1,0 +1,186 @@
+"""One run of a circuit that ngspice leads: its steps are those of ``lead.c``.
+
+Steps end on the jumps of the command and on macro points, and begin small after a jump. Python
+prepares the command and takes the log away in blocks.
+"""
+
+import ctypes
+from collections.abc import Callable
+from ctypes import c_int64
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.circuit import ngspice
+from cosim.circuit.netlist import MOTIONAL, prepare
+from cosim.coupling.loop.recorder import Recorder
+from cosim.coupling.loop.structures import (
+    CALLBACK,
+    FMU_FAILED,
+    NOT_FINITE,
+    UNKNOWN_SOURCE,
+    LeadState,
+    address,
+    loop,
+)
+from cosim.drive.pieces import Command, Piece
+from cosim.errors import SimulationFailed
+from cosim.files.spill import Tape
+from cosim.scene import Scene
+from cosim.scene.firmware import GAIN
+
+_AFTER_JUMP, _SHARE_AFTER_JUMP = 1e-7, 1e-2
+"""Longest step after a jump of the command, in s and in ``circuit.max_step``: what ngspice
+remembers of the slopes before it misleads its choice of the step. The start is one too: V1 leaves 0
+at once. This step is of first order and nothing judges it, so finer runs must shorten it too."""
+
+_POINTS = 4096
+"""Places for accepted points between two emptyings of the log."""
+
+_PIECES = 512
+"""How many pieces of the command are prepared at a time."""
+
+
+class Lead:
+    """ngspice leads; the mechanics follow each of its accepted steps, or as ``use`` says."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        command: Command,
+        recorder: Recorder,
+        deck: tuple[str, tuple[str, ...]] | None = None,
+        replay: npt.NDArray[np.float64] | None = None,
+    ) -> None:
+        """``deck`` and its saved vectors replace the scene's. With ``replay``, pairs of back-EMF
+        (V) and slope (V/s) after each step, there are no mechanics: the circuit takes the steps of
+        the run that these are from.
+        """
+        self._duration = scene.run.duration
+        self._command = command
+        self._recorder = recorder
+        self._replay = replay
+        self._deck, self._saved = deck or prepare(scene)
+        width = 2 + len(self._saved)
+        self._log = Tape(width)
+        self._block = np.empty((_POINTS, width))
+        self.places = (c_int64 * (len(self._saved) + 1))()
+        self._pieces: list[Piece] = []
+        self._row: Any = None
+        self._time = 0.0
+        motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else -1
+        self.state = LeadState(
+            recorder=ctypes.pointer(recorder.state),
+            macro_point=address(f"macro_point_{'step_locked' if replay is None else 'replayed'}"),
+            replay=None if replay is None else replay.ctypes.data,
+            gain=GAIN,
+            v_offset=command.v_offset,
+            count=scene.coil.count,
+            after_jump=min(_AFTER_JUMP, _SHARE_AFTER_JUMP * scene.circuit.max_step),
+            places=self.places,
+            n_saved=len(self._saved),
+            motional=motional,
+            log=self._block.ctypes.data,
+            log_rows=_POINTS,
+            refill=self.callback(self._refill),
+            attend=self.callback(self._attend),
+        )
+        emf, slope = recorder.mechanics.step_outputs[:2]
+        segment = self.state.segment
+        segment.c[0], segment.c[1], segment.end = emf, slope, -np.inf
+        self._refill()
+        self.state.jump = self._pieces[0].jump
+
+    def run(self) -> None:
+        """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
+        state = self.state
+        try:
+            _engine().transient(self._deck, self._saved, self)
+        finally:
+            self._attend()
+        if state.status == FMU_FAILED:
+            raise self._recorder.failure()
+        if state.status == NOT_FINITE:
+            raise SimulationFailed(
+                f"The circuit left the range of numbers at t = {state.told:.6g} s."
+            )
+        if state.status == UNKNOWN_SOURCE:
+            name = state.source.decode().lower()
+            raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
+        if self._time < self._duration * (1 - 1e-9):
+            raise SimulationFailed(
+                f"ngspice stopped at t = {self._time:.6g} s of {self._duration:g} s: "
+                f"{_engine().said()}. If the circuit is right, a smaller circuit.max_step or "
+                "another circuit.reltol may help."
+            )
+
+    @property
+    def steps(self) -> int:
+        """Steps that ngspice accepted."""
+        return max(0, len(self._log) - 1)
+
+    @property
+    def attempts(self) -> int:
+        """Steps that ngspice tried."""
+        return self.state.attempts
+
+    @property
+    def ngspice(self) -> str:
+        """Version of ngspice."""
+        return str(_engine().ngspice_version)
+
+    def log(self) -> dict[str, npt.NDArray[np.float64]]:
+        """Time (s), the back-EMF given (V) and the saved vectors (A, V) at the accepted points."""
+        return dict(zip(("time", "emf", *self._saved), self._log.array().T, strict=True))
+
+    def use(self, macro_point: Callable[[], None]) -> None:
+        """Ask ``macro_point`` at each macro point from now on."""
+        self._macro_point = self.callback(macro_point)  # the structure keeps no reference
+        self.state.macro_point = ctypes.cast(self._macro_point, ctypes.c_void_p).value
+
+    def callback(self, act: Callable[[], None]) -> Any:
+        """``act`` as C can call it; what it raises ends the run. Whoever passes it on keeps it."""
+
+        def called() -> None:
+            # An exception cannot pass through C.
+            try:
+                act()
+            except BaseException as failure:
+                _engine().fail(failure)
+
+        return CALLBACK(called)
+
+    # What ngspice's engine asks for (see cosim.circuit.ngspice.Leader).
+
+    def begin(self) -> None:
+        loop().lead_begin(ctypes.byref(self.state))
+
+    def finish(self) -> None:
+        loop().lead_finish(ctypes.byref(self.state))
+
+    def stop(self) -> None:
+        self.state.stopped = 1
+
+    def _attend(self) -> None:
+        """Take the log away."""
+        filled = self.state.n_log
+        if filled:
+            self._time = float(self._block[filled - 1, 0])
+        self._log.append(self._block[:filled])
+        self.state.n_log = 0
+        self._recorder.tell()
+
+    def _refill(self) -> None:
+        """Keep the pieces that are still needed, and prepare those that follow them."""
+        state = self.state
+        kept = [piece for piece in self._pieces if piece.until > state.time]
+        begin = self._pieces[-1].until if self._pieces else 0.0
+        self._pieces = kept + self._command.pieces(begin, self._duration, _PIECES)
+        self._row = (Piece * len(self._pieces))(*self._pieces)
+        state.pieces, state.n_pieces, state.piece = self._row, len(self._pieces), 0
+
+
+def _engine() -> ngspice.Engine:
+    names = ("lead_data", "lead_source", "lead_step")
+    return ngspice.engine(ngspice.Callbacks(*map(address, names)))

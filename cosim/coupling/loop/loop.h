@@ -1,0 +1,150 @@
+/* What the coupled loop's files share, and share with cosim/coupling/loop/structures.py, whose
+   structures have the same fields in the same order. SI throughout.
+
+   Order of calls in a run that ngspice leads:
+
+     lead_begin    the segment that begins at t = 0 is set
+     for each macro step
+         circuit steps, solved against the segment, whose last one ends on `segment.end`
+         macro_point: moves the mechanics over the macro step, then sets the next segment
+     lead_finish
+
+   Without a circuit the mechanics are led by recorder_follow() alone. */
+
+#ifndef LOOP_H
+#define LOOP_H
+
+#include "../../drive/command.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* --- fmu.c: one instance of an FMU, of FMI 2.0 or 3.0 --- */
+
+typedef void (*AnyFunction)(void);
+
+typedef struct Fmu {
+    void *instance;
+    AnyFunction set_reals, do_step, get_reals, get_integers; /* of its interface */
+    /* Those of its version of FMI, bound once; false: `status` and `failed` tell why not. */
+    int (*set)(struct Fmu *, const uint32_t *places, int64_t n, const double *values);
+    int (*step)(struct Fmu *, double h);
+    int (*get)(struct Fmu *, const uint32_t *places, int64_t n, double *values);
+    int (*get_whole)(struct Fmu *, const uint32_t *places, int64_t n, int32_t *values);
+    int32_t status;     /* of the last call; above 1, a warning, it failed */
+    AnyFunction failed; /* which of them failed */
+    double time;        /* reached */
+    int64_t steps;      /* so far */
+} Fmu;
+
+EXPORT void fmu_bind(Fmu *f, int version);
+
+/* --- recorder.c: moves the mechanics and writes down what they do --- */
+
+/* A quantity over time: linear between its corners, where it may jump, and constant outside. */
+typedef struct {
+    const double *times, *values;
+    int64_t n;
+} Schedule;
+
+enum { ROW = 1, FRAME = 2, SETTLED = 4 }; /* what is to be written down at a time */
+
+typedef struct Recorder {
+    Fmu *fmu;
+    /* Variables by their roles; `places` are value references. */
+    const uint32_t *input_places; /* of each input: its value, its slope */
+    int64_t ports;                /* inputs that are led from outside, linear over an interval */
+    const Schedule *schedule;     /* of one more input that follows the time alone; or NULL */
+    const uint32_t *step_places;  /* a back-EMF and its slope, then pairs of maximum and minimum */
+    int64_t step_outputs;
+    const uint32_t *real_places, *whole_places; /* of a row: the reals, then the whole numbers */
+    int64_t reals, wholes;
+    const uint32_t *total_places, *counter_places;
+    int64_t totals, counters;
+    double *inputs;  /* as set last */
+    double *outputs; /* as read after the last step */
+    double settle;
+    const double *times; /* at which something is to be written down; the last of all is endless */
+    const int32_t *what;
+    int64_t n_times, next;
+    double *rows, *frames;
+    int64_t n_rows, n_frames; /* since Python took them away */
+    int64_t z_surface;        /* its place in a row */
+    double *totals_at_settle;
+    int32_t *counters_at_settle;
+    double *extremes;    /* pairs, as the step's outputs have them */
+    double began;        /* of the interval under way */
+    int64_t inside;      /* whether one is */
+    void (*plan)(void);  /* Python takes rows and frames away, and gives the next times */
+    int64_t stopped;     /* by Python: it failed there */
+} Recorder;
+
+/* Write down what is asked for at time 0; false if it failed. */
+EXPORT int recorder_begin(Recorder *r);
+
+/* Advance through `n` intervals that end at `edges`; in each, every port's input goes linearly from
+   `start` to `end` (a row of `ports` values for each interval). Not further once `most` steps were
+   made, perhaps within an interval, and then to be called again with the rest. Gives how many
+   intervals were finished, or -1 if something failed. */
+EXPORT int64_t recorder_follow(Recorder *r, int64_t n, const double *edges, const double *start,
+                               const double *end, int64_t most);
+
+/* One interval of a recorder with one port; false if it failed. */
+EXPORT int recorder_advance(Recorder *r, double time, double start, double end);
+
+/* Calculate the outputs anew with this input, which the last step did not end with. */
+EXPORT int recorder_refresh(Recorder *r, double value);
+
+/* --- lead.c: the callbacks of ngspice, which leads --- */
+
+/* What the circuit knows of the mechanics between two macro points. */
+typedef struct {
+    double origin; /* s; the macro point that it begins at */
+    double c[3];   /* back-EMF of one coil about it: V, V/s, V/s² */
+    double gain;   /* V/(A s); with it the circuit carries a share of the back-EMF itself */
+    double end;    /* s; the next macro point; -inf: each accepted step ends on one */
+    double start;  /* A; current of one coil at `origin` */
+    double charge; /* A s; integral of that current since then */
+} Segment;
+
+typedef struct Lead {
+    Recorder *recorder;
+    void (*macro_point)(struct Lead *); /* see above; Python's takes no notice of the argument */
+    Segment segment;
+    const double *replay; /* back-EMF and slope after each step, for macro_point_replayed() */
+    const Piece *pieces;  /* of the command in the order of time; one of them holds */
+    int64_t n_pieces, piece;
+    double gain, v_offset;        /* of the difference amplifier; mean voltage of the pin, V */
+    double count;                 /* of coils */
+    double after_jump;            /* s; longest step after a jump of the command */
+    double time, current, carried; /* at the last accepted point: s; A of one coil; V carried */
+    double jump;                  /* s; the command's next one */
+    int64_t at_jump;              /* the macro point lies on one */
+    double told;                  /* s; time of the last accepted step that ngspice told of */
+    double sent;                  /* s; time of the last values that it sent */
+    const int64_t *places;        /* of the saved vectors among those sent; then that of the time */
+    int64_t n_saved;
+    int64_t motional;             /* which of them is the share that the circuit carries; or -1 */
+    double *log;                  /* a row: time, back-EMF, the saved values */
+    int64_t n_log, log_rows;      /* filled; places for */
+    int64_t logged, attempts;     /* points and attempted steps so far */
+    int64_t quiet;                /* attempts since Python was last called */
+    int64_t status;
+    int64_t stopped;              /* by Python: nothing is to be done any more */
+    char source[64];              /* name of the one that nothing feeds */
+    void (*refill)(void);         /* makes the first piece the one that holds at `time` */
+    void (*attend)(void);         /* empties the log */
+} Lead;
+
+enum { GOOD, FMU_FAILED, NOT_FINITE, UNKNOWN_SOURCE };
+
+/* macro_point of the method step-locked, and of a circuit alone whose back-EMF is a table. */
+EXPORT void macro_point_step_locked(Lead *c);
+EXPORT void macro_point_replayed(Lead *c);
+
+EXPORT void lead_begin(Lead *c);
+EXPORT void lead_finish(Lead *c);
+
+EXPORT int64_t loop_size(int which); /* bytes of Fmu, Schedule, Recorder, Lead, Piece */
+
+#endif

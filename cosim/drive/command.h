@@ -1,0 +1,35 @@
+/* A command between two of its corners, as cosim/drive/command.py describes it. SI. */
+
+#ifndef COMMAND_H
+#define COMMAND_H
+
+#include <stdint.h>
+
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+enum { LEVEL, RISE, FALL, SINE };
+
+typedef struct {
+    double begin, until; /* s; the piece holds in [begin, until) */
+    int64_t kind;
+    double offset, amplitude;  /* V */
+    double origin, rate, span; /* s, Hz, 1: see command_value() */
+    double end;                /* V; left limit of V1 at `until` */
+    double jump;               /* s; first discontinuity after `begin`; inf: none */
+    double dac;                /* V at the DAC; of a LEVEL only */
+    double pin;                /* V at the offset pin */
+} Piece;
+
+/* V1 (V) at `t` (s) in [begin, until). With the phase (t - origin) rate it is `offset` for a LEVEL,
+   offset + amplitude/2 sin(2π phase) for a SINE, and offset + amplitude (shape - 1/2) otherwise, with
+   the shape phase / span in a RISE and (1 - phase) / span in a FALL, kept within 0 and 1. */
+EXPORT double command_value(const Piece *p, double t);
+
+/* V1 at each of `n` times, which do not fall, from pieces that cover them. */
+EXPORT void command_values(const Piece *p, int64_t n, const double *times, double *values);
+
+#endif

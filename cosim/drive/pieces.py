@@ -1,0 +1,135 @@
+"""A command is known by its pieces: V1 between two of its corners, in closed form.
+
+The one formula of a piece's value is in ``command.c``, which ngspice's callbacks call too.
+"""
+
+from abc import ABC, abstractmethod
+from ctypes import POINTER, Structure, byref, c_double, c_int64, c_void_p
+from functools import cache
+from math import floor, inf, nextafter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.scene.firmware import GAIN
+from cosim.toolchain.libraries import library
+
+LEVEL, RISE, FALL, SINE = range(4)
+"""Kinds of pieces."""
+
+
+class Piece(Structure):
+    """The command in [``begin``, ``until``), s; ``command.h`` says what the fields are.
+
+    ``kind``, ``offset``, ``amplitude`` (V), ``origin`` (s), ``rate`` (Hz) and ``span`` make its
+    value; ``end`` is V1's left limit at ``until``, ``jump`` the time of the first discontinuity of
+    V1 or of a pin after ``begin`` (inf: none), ``dac`` the voltage of the DAC on a level, ``pin``
+    that of the offset pin.
+    """
+
+    _fields_ = (
+        ("begin", c_double),
+        ("until", c_double),
+        ("kind", c_int64),
+        *((name, c_double) for name in ("offset", "amplitude", "origin", "rate", "span")),
+        *((name, c_double) for name in ("end", "jump", "dac", "pin")),
+    )
+
+    begin: float
+    until: float
+    kind: int
+    offset: float
+    amplitude: float
+    origin: float
+    rate: float
+    span: float
+    end: float
+    jump: float
+    dac: float
+    pin: float
+
+    def value(self, t: float) -> float:
+        """V1 at ``t`` in the piece, V."""
+        return _formula().command_value(byref(self), t)
+
+    def before(self, t: float) -> float:
+        """Left limit of V1 at ``t``, V, after the begin of the piece."""
+        return self.end if t >= self.until else self.value(t)
+
+
+def level(until: float, value: float, pin: float, dac: float | None = None) -> Piece:
+    """A constant piece that ends with a jump, if it ends."""
+    dac = pin - value / GAIN if dac is None else dac
+    return Piece(until=until, offset=value, end=value, jump=until, dac=dac, pin=pin)
+
+
+@cache
+def _formula() -> Any:
+    found = library("loop")
+    found.command_value.restype = c_double
+    found.command_value.argtypes = (POINTER(Piece), c_double)
+    found.command_values.restype = None
+    found.command_values.argtypes = (POINTER(Piece), c_int64, c_void_p, c_void_p)
+    return found
+
+
+class Command(ABC):
+    """V1 in V over time in s; continued periodically to times before 0.
+
+    Every command is periodic and right-continuous. The n-th edge stands at the float
+    ``n / frequency`` (one rounding, whatever n is): nothing drifts, and a solver that lands on a
+    time from ``next_jump`` sees the jump exactly there.
+    """
+
+    v_offset: float
+    """Mean voltage of the offset pin, V."""
+
+    @abstractmethod
+    def piece(self, t: float) -> Piece:
+        """The piece that holds at ``t``, without its ``begin``."""
+
+    def value(self, t: float) -> float:
+        """V1 at ``t``, V; at a jump the value after it."""
+        return self.piece(t).value(t)
+
+    def next_jump(self, t: float) -> float:
+        """Time of the first discontinuity of V1 or of a pin strictly after ``t``, s, or inf."""
+        return self.piece(t).jump
+
+    def piece_before(self, t: float) -> Piece:
+        """The piece that holds just before ``t``."""
+        return self.piece(nextafter(t, -inf))
+
+    def value_before(self, t: float) -> float:
+        """Left limit of V1 at ``t``, V; differs from ``value`` at jumps only."""
+        return self.piece_before(t).before(t)
+
+    def pieces(self, begin: float, end: float, most: int | None = None) -> list[Piece]:
+        """The pieces from ``begin`` until ``end`` (s) is within the last, at most ``most`` of
+        them."""
+        found: list[Piece] = []
+        while begin <= end and (most is None or len(found) < most):
+            piece = self.piece(begin)
+            piece.begin = begin
+            found.append(piece)
+            begin = piece.until
+        return found
+
+    def values(self, times: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """V1 at each of ``times``, which do not fall, V."""
+        at = np.ascontiguousarray(times, np.float64)
+        values = np.empty_like(at)
+        if at.size:
+            pieces = self.pieces(float(at[0]), float(at[-1]))
+            row = (Piece * len(pieces))(*pieces)
+            _formula().command_values(row, at.size, at.ctypes.data, values.ctypes.data)
+        return values
+
+
+def edge_before(t: float, rate: float) -> int:
+    """The n of the last edge ``n / rate`` (as a float) at or before ``t``."""
+    n = floor(t * rate)
+    if (n + 1) / rate <= t:
+        return n + 1
+    return n - 1 if n / rate > t else n

@@ -1,0 +1,86 @@
+"""The command as the firmware makes it: a staircase of DAC codes, and the offset pin's PWM."""
+
+from bisect import bisect_right
+from math import floor, inf
+
+from cosim.drive.pieces import Command, Piece, edge_before, level
+from cosim.scene.firmware import GAIN, PWM_FREQUENCY, STEPS_PER_SECOND, V_REFERENCE, volts
+
+
+class Staircase(Command):
+    """The firmware's sawtooth: ``rate`` DAC codes a second, and a 10-bit code at the offset pin.
+
+    ``codes`` is one period of DAC codes, ``v_offset`` the offset pin in V; see
+    :mod:`cosim.scene.firmware` for where they come from.
+    """
+
+    def __init__(
+        self, codes: tuple[int, ...], v_offset: float, rate: float = STEPS_PER_SECOND
+    ) -> None:
+        self.codes = codes
+        self.v_offset = v_offset
+        self._rate = rate
+        self.period = len(codes) / rate
+        """What the period has become, s."""
+        self._edges = [k for k in range(len(codes)) if codes[k] != codes[k - 1]]
+
+    def piece(self, t: float) -> Piece:
+        count = len(self.codes)
+        period, step = divmod(edge_before(t, self._rate), count)
+        dac = volts(self.codes[step])
+        return level(self._until(period, step), GAIN * (self.v_offset - dac), self.v_offset, dac)
+
+    def _until(self, period: int, step: int) -> float:
+        if not self._edges:
+            return inf
+        place = bisect_right(self._edges, step)
+        if place == len(self._edges):
+            period, place = period + 1, 0
+        return (period * len(self.codes) + self._edges[place]) / self._rate
+
+
+class WithPwm(Command):
+    """Another command, with the offset pin as its PWM: 0 or 3.3 V, its duty the mean's share.
+
+    Times count from the middle of a pulse, which is where the filter behind the pin, settled at the
+    mean, has its mean; how the real PWM lies to the sawtooth is left to chance. Before 0 there is
+    the mean itself, so that all begins settled. Edges within a nanosecond of a jump of the command
+    are moved onto it.
+    """
+
+    _SAME = 1e-9  # s
+
+    def __init__(self, command: Command) -> None:
+        self._command = command
+        self.v_offset = command.v_offset
+        duty = command.v_offset / V_REFERENCE
+        self._half = 0.5 * duty
+        self._still = not 1e-5 < duty < 1 - 1e-5  # pulses or gaps not wider than _SAME
+
+    def piece(self, t: float) -> Piece:
+        piece = self._command.piece(t)
+        if self._still:
+            return piece
+        edge = 0.0
+        if t >= 0.0:
+            k = self._last_edge(t)
+            edge = self._edge(k + 1)
+            piece.pin = V_REFERENCE if k % 2 else 0.0
+        piece.jump = min(piece.jump, edge)
+        if edge < piece.until:
+            piece.until, piece.end = edge, piece.value(edge)
+        return piece
+
+    def _edge(self, k: int) -> float:
+        """Time of the PWM's edge k >= 0, s: even ones fall, odd ones rise."""
+        place = 1 - self._half if k % 2 else self._half
+        time = (k // 2 + place) / PWM_FREQUENCY
+        jump = self._command.next_jump(time - self._SAME)
+        return jump if jump <= time + self._SAME else time
+
+    def _last_edge(self, t: float) -> int:
+        """The last edge at or before ``t`` >= 0; -1 if there is none."""
+        k = 2 * floor(t * PWM_FREQUENCY) + 2
+        while k >= 0 and self._edge(k) > t:
+            k -= 1
+        return k

@@ -1,0 +1,30 @@
+"""A scene's run, as a user of the library asks for it."""
+
+import os
+from collections.abc import Callable
+
+from cosim.scene import Scene, load
+from cosim.scene.loading import Overrides
+from cosim.simulation.simulate import simulate
+from cosim.waveforms.result import Result
+
+
+def run(
+    scene: Scene | str | os.PathLike[str],
+    overrides: Overrides | None = None,
+    progress: Callable[[float], None] = lambda time: None,
+) -> Result:
+    """Run a scene: a built-in name, a TOML file, or what :func:`cosim.load` gave.
+
+    ``overrides`` are values for its keys, SI: ``{"drive.frequency": 30}``. ``progress`` is told the
+    simulated time, s, now and then. A netlist of the user's own (``circuit.netlist``) runs in a
+    process of its own.
+
+    Raises BadInput for what cannot be simulated, SimulationFailed with where, when, and what to
+    try.
+
+    >>> result = run("held", {"run.duration": 0.1})
+    >>> result.waveforms.z_part.units
+    'm'
+    """
+    return simulate(load(scene, overrides), progress)

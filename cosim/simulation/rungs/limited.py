@@ -1,0 +1,56 @@
+"""Rung ``limited``: the current source reduced to its limits, solved with the mechanics in the FMU.
+
+The source's command is an input of the FMU; there is no ngspice.
+"""
+
+from cosim.coupling.loop.recorder import Recorder
+from cosim.drive.command import commands
+from cosim.drive.pieces import Command
+from cosim.drive.straights import straights
+from cosim.scene import Scene
+from cosim.simulation.rungs.electrics import Electrics, commanded
+from cosim.simulation.rungs.rung import Driven, Rung
+
+
+class Limited(Rung):
+    """One monolithic solution of source, coil and mechanics."""
+
+    names = ("limited",)
+
+    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
+        drives = commands(scene)
+        for edges, start, end in straights(drives, scene.run.duration):
+            recorder.follow(edges[1:], start, end)
+        second = {}
+        if len(drives) > 1:
+            columns = {"current_2": "coil_current_2", "coil_voltage_2": "coil_voltage_2"}
+            second = {name: recorder.column(own) for name, own in columns.items()}
+        return Driven(_electrics(scene, drives[0], recorder), method="monolithic", second=second)
+
+
+def _electrics(scene: Scene, command: Command, recorder: Recorder) -> Electrics:
+    """From the mechanics' own current source, at the end of its run.
+
+    In a row at a corner or jump of the command stands the voltage before it.
+    """
+    count, run = scene.coil.count, scene.run
+    totals, before = recorder.mechanics.totals(), recorder.at_settle
+    share = {
+        limit: (totals[name] - before[name]) / (run.duration - run.settle)
+        for limit, name in (
+            ("swing_high", "output_high_time"),
+            ("swing_low", "output_low_time"),
+            ("current_limit", "current_limit_time"),
+        )
+    }
+    return Electrics(
+        command=commanded(command, recorder.time),
+        current=recorder.column("coil_current"),
+        coil_voltage=recorder.column("coil_voltage"),
+        energy_in=count * totals["energy_output"],
+        energy_copper=count * totals["energy_copper"],
+        energy_magnetic=count * totals["energy_magnetic"],
+        current_max=recorder.extremes[6],
+        current_min=recorder.extremes[7],
+        limited=share | {"output": sum(share.values())},
+    )

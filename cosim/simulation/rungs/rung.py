@@ -1,0 +1,57 @@
+"""What each rung with mechanics does with them; one rung a file.
+
+``cosim/scene/rungs.py`` declares the rungs and the keys that each uses.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.coupling.loop.recorder import Recorder
+from cosim.scene import Scene
+from cosim.simulation import rungs as folder
+from cosim.simulation.rungs.electrics import Electrics
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What a rung has done to the mechanics by the end of the run."""
+
+    electric: Electrics | None
+    """The account of the coil; None where there is none."""
+    method: str = "uncoupled"
+    """How circuit and mechanics were joined."""
+    circuit_steps: int = 0
+    circuit_rejected: int = 0
+    versions: Mapping[str, str] = field(default_factory=dict)
+    second: Mapping[str, npt.NDArray[np.float64]] = field(default_factory=dict)
+    """Columns of the second surface's coil."""
+
+
+class Rung(ABC):
+    """A way to drive the mechanics."""
+
+    names: ClassVar[tuple[str, ...]]
+    """Values of ``circuit.model``."""
+
+    @abstractmethod
+    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
+        """Move the recorder's mechanics from 0 to ``run.duration``.
+
+        Raises BadInput and SimulationFailed.
+        """
+
+
+@cache
+def rungs() -> dict[str, Rung]:
+    """Each rung with mechanics by its names; a file in this folder is a rung."""
+    for module in iter_modules(folder.__path__):
+        import_module(f"{folder.__name__}.{module.name}")
+    return {name: kind() for kind in Rung.__subclasses__() for name in kind.names}

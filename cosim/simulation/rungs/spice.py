@@ -1,0 +1,162 @@
+"""Rungs ``amplifier``, ``full`` and ``file``: ngspice solves the circuit and leads the coupling."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.coupling.loop.recorder import Recorder
+from cosim.drive.command import command
+from cosim.drive.pieces import Command
+from cosim.errors import BadInput
+from cosim.files.spill import Tape, blocks
+from cosim.mechanics.stickslip import Mechanics
+from cosim.scene import Scene
+from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
+from cosim.simulation.rungs.rung import Driven, Rung
+
+Array = npt.NDArray[np.float64]
+
+
+class Spice(Rung):
+    """The coupling method of the scene joins ngspice and the mechanics."""
+
+    names = ("amplifier", "full", "file")
+
+    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
+        # Only those who run a circuit load PySpice, which takes a while.
+        from cosim.circuit.false_cycles import refuse_false
+        from cosim.coupling.loop.macro_steps import coupled
+
+        lead = coupled(scene, recorder)
+        lead.run()
+        log = lead.log()
+        version = recorder.mechanics.instance.version
+        refuse_false(scene, log, lambda finer: _log_alone(finer, version))
+        if scene.circuit.netlist is not None:
+            _refuse_foreign_coil(scene, log)
+        return Driven(
+            _electrics(scene, command(scene), log, recorder.time),
+            method=scene.coupling.method,
+            circuit_steps=lead.steps,
+            circuit_rejected=lead.attempts - lead.steps,
+            versions={"ngspice": lead.ngspice},
+        )
+
+
+def _log_alone(scene: Scene, fmi_version: int) -> dict[str, Array]:
+    """The circuit's waveforms of a run of which nothing else is wanted."""
+    from cosim.coupling.loop.macro_steps import coupled
+
+    mechanics = Mechanics(scene, fmi_version)
+    try:
+        lead = coupled(scene, Recorder(scene, mechanics, lambda _: None))
+        lead.run()
+        return lead.log()
+    finally:
+        mechanics.close()
+
+
+def _electrics(
+    scene: Scene,
+    command: Command,
+    log: dict[str, Array],
+    rows: Array,
+) -> Electrics:
+    """From the vectors at the accepted points of the circuit.
+
+    Energies are sums of step times means over the step: for them the trapezoidal companion of an
+    inductance, which ngspice integrates with, balances exactly.
+    """
+    from cosim.circuit.netlist import limits_at_work
+
+    coil, circuit, settle = scene.coil, scene.circuit, scene.run.settle
+    copper = coil.resistance / coil.count
+    if circuit.netlist is None:
+        copper += circuit.sense_resistance
+    made = "v(v1)" in log and circuit.model != "amplifier"  # by the circuit, not given to it
+    after = sum(
+        float((np.diff(part["time"]) * (part["time"][1:] > settle)).sum()) for part in _points(log)
+    )
+    delivered, squares, eddy = 0.0, 0.0, Eddy(scene)
+    most, least = -np.inf, np.inf
+    limited: dict[str, float] = {}
+    waves, done = Tape(3 if made else 2), 0
+    end = log["time"][-1]
+    for part in _points(log):
+        time, coils, out, sense = (part[k] for k in ("time", "i(vemf)", "v(out)", "v(sense)"))
+        current = coils / coil.count
+        h = np.diff(time)
+        mean = 0.5 * (coils[1:] + coils[:-1])
+        # What lies beyond the coil's ends is the netlist's own affair.
+        lost = out if circuit.netlist is None else out - sense
+        delivered += total(h, mean * (0.5 * (lost[1:] + lost[:-1])))
+        squares += total(h, mean**2)
+        eddy.follow(h, current[:-1], current[1:])
+        spent = h * (time[1:] > settle)
+        spent /= after
+        limits = limits_at_work(part)
+        at_limit = [acts for name, acts in limits.items() if name != "slew"]
+        if at_limit:
+            limits["output"] = np.any(at_limit, axis=0)
+        for name, acts in limits.items():
+            # A step that only begins or ends at the limit counts half.
+            share = total(spent, 0.5 * acts[1:] + 0.5 * acts[:-1])
+            limited[name] = limited.get(name, 0.0) + share
+        settled = current[time >= settle]
+        most, least = settled.max(initial=most), settled.min(initial=least)
+        stop = len(rows) if time[-1] == end else int(np.searchsorted(rows, time[-1]))
+        known = [current, out - sense, *([part["v(v1)"]] if made else [])]
+        for here in blocks(stop - done):
+            at = rows[done:stop][here]
+            waves.append(np.stack([np.interp(at, time, values) for values in known], axis=1))
+        done = stop
+    return Electrics(
+        command=waves.column(2) if made else commanded(command, rows),
+        current=waves.column(0),
+        coil_voltage=waves.column(1),
+        energy_in=delivered,
+        energy_copper=copper * squares + coil.count * eddy.heat,
+        energy_magnetic=magnetic(scene, float(log["i(vemf)"][-1] / coil.count), eddy.current),
+        current_max=float(most),
+        current_min=float(least),
+        limited=limited,
+    )
+
+
+def _points(log: dict[str, Array]) -> Iterator[dict[str, Array]]:
+    """The log in parts, each with the first point of the next one as its last."""
+    for part in blocks(len(log["time"]) - 1):
+        reach = slice(part.start, part.stop + 1)
+        yield {name: np.ascontiguousarray(values[reach]) for name, values in log.items()}
+
+
+def _refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
+    """Refuse a netlist whose voltage between ``out`` and ``sense`` is not that of the scene's coil.
+
+    Over the run, v = R i + L di/dt + e must hold in its integral, with the scene's coil; one with
+    an eddy branch is not checked. Raises BadInput: a source the wrong way round, not in series with
+    the coil, or values of the netlist's own would make a result without meaning.
+    """
+    coil = scene.coil
+    if coil.eddy_inductance:
+        return
+    missing, worst, swept = 0.0, 0.0, 0.0
+    for part in _points(log):
+        current = part["i(vemf)"] / coil.count
+        h = np.diff(part["time"])
+        mean = 0.5 * (current[1:] + current[:-1])
+        voltage = part["v(out)"] - part["v(sense)"]
+        expected = coil.resistance * mean * h + coil.inductance * np.diff(current)
+        given = 0.5 * (voltage[1:] + voltage[:-1]) * h
+        emf = 0.5 * (part["emf"][1:] + part["emf"][:-1]) * h
+        # Running sums: single steps of a stiff circuit need not obey to the digit.
+        sums = missing + np.cumsum(given - expected - emf)
+        missing, worst = float(sums[-1]), max(worst, float(np.abs(sums).max()))
+        swept += float(np.abs(given).sum() + np.abs(emf).sum())
+    if worst > 0.01 * swept + 1e-12:
+        raise BadInput(
+            f"{scene.circuit.netlist}: v(out) - v(sense) is not the voltage of the scene's coil at "
+            "the current i(Vemf): Vemf must be in series with the coil, + towards out, and the "
+            "coil's values must come from .param lines (coil_resistance, coil_inductance, count)."
+        )

@@ -1,0 +1,51 @@
+"""The part on a given surface: the exact solution beside the authors' scheme."""
+
+from collections.abc import Callable, Sequence
+from statistics import median
+
+import numpy as np
+
+from cosim.mechanics import part
+from cosim.mechanics.part import part_library
+from cosim.studies.bench.sampling import ratios, take_turns
+from cosim.studies.fit.cases import Case, Solver
+from cosim.trials import published
+
+SOLVERS: tuple[Solver, Solver] = ("exact", "published")
+
+
+def solvers(cases: Sequence[Case], rounds: int) -> dict[str, float]:
+    """CPU seconds that each compiled solver takes for all cases, medians, and ``ratio``, exact over
+    published.
+
+    Both are called straight, with buffers made beforehand. The exact solution is asked for the
+    heights at the tracked times; the published scheme gives them at its steps.
+    """
+    calls = {solver: [_call(case, solver) for case in cases] for solver in SOLVERS}
+    taken = take_turns(
+        {name: lambda todo=todo: [call() for call in todo] for name, todo in calls.items()}, rounds
+    )
+    seconds = {solver: median(values) for solver, values in taken.items()}
+    return {**seconds, "ratio": ratios(taken["exact"], taken["published"])["median"]}
+
+
+def _call(case: Case, solver: Solver) -> Callable[[], int]:
+    number = case.trial.number or 0
+    fitted = dict(enumerate(published.FORCES_FITTED, 1)).get(number, np.mean(case.bounds))
+    force = float(fitted) * published.GRAVITY
+    law = part.friction_law(published.MU_S, published.MU_K_FITTED, force, published.GRAVITY, 0.0)
+    rows = np.empty((3, len(case.time) if solver == "exact" else len(case.grid)))
+    motion = tuple(row.ctypes.data for row in rows)
+    given = (len(case.time), case.time.ctypes.data, case.v_surface.ctypes.data, 1)
+    given = (*given, law.ctypes.data, 0.0, case.v0)
+    if solver == "exact":
+        function, asked = part_library().part_exact, (len(case.time), None)
+    else:
+        steps = len(case.grid) - 1
+        function = part_library().part_threshold
+        asked = (part.PUBLISHED_STEP, part.PUBLISHED_V_MIN, steps)
+
+    def call(_: object = (law, rows)) -> int:  # the buffers live as long as the call
+        return function(*given, *asked, *motion)
+
+    return call

@@ -1,0 +1,171 @@
+"""Work in processes of their own, which may hang, crash or be spoilt without harm.
+
+ngspice is one library a process; a netlist can make it loop for ever, end the process, or refuse
+all further work in it, none of which can be caught from within. multiprocessing, and pebble on top
+of it, run the caller's program again in each process, which standard input and a script without a
+main guard do not survive, and pebble limits a call's whole time; loky loses all calls with one
+process. Here a process knows its function by its module, and silence ends it.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from typing import Any
+
+from cosim.errors import SimulationFailed
+
+PATIENCE = 30.0
+"""s of wall time without any progress after which a simulation counts as hanging."""
+
+_REPORT_EVERY = 0.1  # s of wall time
+
+_PROGRAM = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+from multiprocessing import connection
+pipe = getattr(connection, sys.argv[1])(int(sys.argv[2]))
+sys.path[:] = pipe.recv()
+from cosim.toolchain.processes import serve
+serve(pipe)
+"""
+
+Progress = Callable[[float], None]
+
+
+class Worker:
+    """A process that calls ``function(argument, progress)`` with one argument after another.
+
+    ``function`` must be importable, and travels once, as do the values that a partial binds.
+    ``pipe`` is ready for :meth:`hear` when there is news. The process ends with its parent.
+    """
+
+    def __init__(self, function: Callable[[Any, Progress], Any]) -> None:
+        self.pipe, there = Pipe()
+        with there:
+            self._process = _start(there)
+        self.began = False
+        """It has said something, so what ends it later is not its start."""
+        self.reached = 0.0
+        """The latest progress of the call at hand, s of simulated time."""
+        self.heard = time.monotonic()
+        self._send(sys.path)
+        self._send(function)
+
+    def give(self, argument: Any) -> None:
+        """Have the function called; what comes of it is heard later."""
+        self.reached = 0.0
+        self.heard = time.monotonic()
+        self._send(argument)
+
+    def hear(self) -> tuple[str, Any]:
+        """The next message: ``("progress", t)``, ``("result", value)`` or ``("failure", error)``.
+
+        Raises EOFError where the process has died.
+        """
+        try:
+            kind, value = self.pipe.recv()
+        except OSError as error:
+            raise EOFError from error
+        self.began = True
+        self.heard = time.monotonic()
+        if kind == "progress":
+            self.reached = value
+        return kind, value
+
+    def end(self, patience: float = 0.0) -> str:
+        """The signal or exit code that ended the process: SIGKILL, after ``patience`` s."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(patience)
+        self._process.kill()
+        code = self._process.wait()
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self.pipe.close()
+        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+    def _send(self, message: Any) -> None:
+        with suppress(OSError):  # of a process that has died: hear() tells it
+            self.pipe.send(message)
+
+
+def isolated(simulate: Callable[..., Any], scene: Any, progress: Progress, **options: Any) -> Any:
+    """What ``simulate(scene, progress, **options)`` gives, from a fresh process.
+
+    Raises what it raises there, or SimulationFailed where the process hangs or dies.
+    """
+    worker = Worker(partial(simulate, **options))
+    try:
+        worker.give(scene)
+        while worker.pipe.poll(PATIENCE):
+            kind, value = worker.hear()
+            if kind == "result":
+                return value
+            if kind == "failure":
+                raise value
+            progress(worker.reached)
+    except EOFError:
+        how = worker.end(PATIENCE)
+        raise SimulationFailed(
+            f"The simulation's process died at t = {worker.reached:.6g} s ({how})."
+        ) from None
+    finally:
+        worker.end()
+    raise SimulationFailed(
+        f"The simulation hangs at t = {worker.reached:.6g} s: no step was finished in "
+        f"{PATIENCE:g} s. A netlist without a solution can do this to ngspice."
+    )
+
+
+def _start(pipe: Connection) -> "subprocess.Popen[Any]":
+    """A process that serves the other end of ``pipe``, and whose input ends with this process."""
+    handle = pipe.fileno()
+    options: dict[str, Any] = {"pass_fds": (handle,)}
+    if sys.platform == "win32":
+        os.set_handle_inheritable(handle, True)
+        about = subprocess.STARTUPINFO(lpAttributeList={"handle_list": [handle]})
+        options = {"startupinfo": about}
+    command = [sys.executable, "-c", _PROGRAM, type(pipe).__name__, str(handle)]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, **options)
+
+
+def serve(pipe: Connection) -> None:
+    """What the process does until its parent ends: it calls the function, and tells."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    function = pipe.recv()
+    pipe.send(("progress", 0.0))
+    while True:
+        try:
+            argument = pipe.recv()
+        except (EOFError, OSError):
+            return
+        try:
+            answer = ("result", function(argument, _reporter(pipe)))
+        except Exception as failure:
+            answer = ("failure", failure)
+        pipe.send(answer)
+
+
+def _reporter(pipe: Connection) -> Progress:
+    told = time.monotonic()
+
+    def progress(reached: float) -> None:
+        nonlocal told
+        now = time.monotonic()
+        if now - told >= _REPORT_EVERY:
+            told = now
+            pipe.send(("progress", reached))
+
+    return progress
+
+
+def _end_with_parent() -> None:
+    os.read(0, 1)  # whose other end closes however the parent ends
+    os._exit(1)

@@ -1,0 +1,100 @@
+"""Compiling the C: the same sources give the same bytes, and a failure leaves what was there."""
+
+import json
+import os
+import shutil
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.validation import validate_fmu
+
+import build_c
+from cosim.toolchain import libraries
+
+posix = pytest.mark.skipif(os.name != "posix", reason="a compiler that is a shell script")
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """A copy of what is compiled, which a test may spoil."""
+    folder = tmp_path / "sources é"
+    for path in build_c.sources():
+        target = folder / path.relative_to(build_c.ROOT)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, target)
+    return folder
+
+
+def make(copy: Path, **environment: str) -> subprocess.CompletedProcess:
+    """Compile the copy in place."""
+    return subprocess.run(
+        [
+            *(sys.executable, "-c"),
+            "import build_c; build_c.make(build_c.ROOT / 'cosim/_compiled')",
+        ],
+        capture_output=True,
+        text=True,
+        cwd=copy,
+        env=os.environ | environment,
+        check=False,
+    )
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def test_the_same_sources_give_the_same_bytes(copy: Path) -> None:
+    done = make(copy)
+    assert done.returncode == 0, done.stderr
+    assert contents(copy / "cosim/_compiled") == contents(libraries.FOLDER)
+    assert [path.name for path in (copy / "cosim").glob(".*")] == []
+
+
+def test_changed_sources_are_another_fmu(copy: Path) -> None:
+    definition = copy / "fmu/src/physics/variables.def"
+    text = definition.read_text()
+    definition.write_text(text.replace("Mass of the ram", r"\"A\" < B & C > 'D'"))
+    assert make(copy).returncode == 0
+    tokens = set()
+    for version in (2, 3):
+        folder = str(copy / f"cosim/_compiled/fmi{version}")
+        assert validate_fmu(folder) == []
+        description = fmpy.read_model_description(folder)
+        tokens.add(description.guid)
+        texts = {v.name: v.description for v in description.modelVariables}
+        assert texts["ram_mass"] == "\"A\" < B & C > 'D'"
+    assert len(tokens) == 1
+    assert tokens != {fmpy.read_model_description(str(libraries.compiled("fmi2"))).guid}
+    made = json.loads((copy / "cosim/_compiled/build.json").read_text())
+    assert made["sources"] != build_c.digest()
+
+
+def test_a_failure_leaves_the_last_build(copy: Path) -> None:
+    old = copy / "cosim/_compiled"
+    old.mkdir()
+    (old / "build.json").write_text("old")
+    definition = copy / "fmu/src/physics/variables.def"
+    definition.write_text(definition.read_text().replace('"kg"', '"lb"'))
+    done = make(copy)
+    assert done.returncode and "cannot read the unit lb" in done.stderr
+    assert contents(copy / "cosim/_compiled") == {"build.json": b"old"}
+    assert [path.name for path in (copy / "cosim").glob(".*")] == []
+
+
+def test_without_a_compiler(copy: Path, tmp_path: Path) -> None:
+    assert "No C compiler was found" in make(copy, CC="", PATH=str(tmp_path)).stderr
+    assert "cannot be run" in make(copy, CC=str(tmp_path / "none")).stderr
+
+
+@posix
+def test_the_compiler_is_that_of_cc(copy: Path, tmp_path: Path) -> None:
+    script = tmp_path / "my cc"
+    script.write_text('#!/bin/sh\necho "x.c:1: error: not today" >&2\nexit 1\n')
+    script.chmod(script.stat().st_mode | stat.S_IXUSR)
+    assert "not today" in make(copy, CC=f"'{script}' -m64").stderr

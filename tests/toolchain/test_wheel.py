@@ -1,0 +1,85 @@
+"""A wheel made from the source distribution runs without a C compiler, to the same bits."""
+
+import json
+import os
+import subprocess
+import sys
+import sysconfig
+import venv
+from pathlib import Path
+
+import pytest
+
+import build_c
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(os.name != "posix", reason="the environment is laid out otherwise"),
+]
+SCENES = (("optimal",), ("paper", "--set", "run.duration=0.2"), ("paper-limited",))
+FILES = ["fmu/src/fmi/fmi3.c", "circuits/full.cir", "tests/conftest.py", "Makefile", ".ci/run"]
+
+
+def run(*command: object, cwd: Path, **environment: str) -> str:
+    done = subprocess.run(
+        [str(word) for word in command],
+        cwd=cwd,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sdist")
+    make = "import sys; from setuptools import build_meta; build_meta.build_sdist(sys.argv[1])"
+    run(sys.executable, "-c", make, folder, cwd=build_c.ROOT)
+    return next(folder.glob("*.tar.gz"))
+
+
+@pytest.fixture(scope="module")
+def wheel(sdist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    quiet = ("--no-index", "--no-deps", "--no-build-isolation", "--no-cache-dir")
+    run(sys.executable, "-m", "pip", "wheel", *quiet, "-w", folder, sdist, cwd=folder)
+    return next(folder.glob("*.whl"))
+
+
+def test_the_source_distribution_is_complete(sdist: Path, tmp_path: Path) -> None:
+    run("tar", "xzf", sdist, cwd=tmp_path)
+    (unpacked,) = tmp_path.iterdir()
+    code = [path.relative_to(build_c.ROOT) for path in build_c.sources()]
+    assert [path for path in [*code, *map(Path, FILES)] if not (unpacked / path).is_file()] == []
+
+
+def test_the_wheel_is_for_this_platform_and_any_python(wheel: Path) -> None:
+    platform = sysconfig.get_platform().replace("-", "_").split("_")[0]
+    assert wheel.name.startswith("cosim-")
+    assert f"-py3-none-{platform}" in wheel.name
+
+
+def test_it_runs_without_a_compiler(wheel: Path, tmp_path: Path) -> None:
+    environment, here, there, empty = (tmp_path / n for n in ("venv", "here", "there", "empty"))
+    for folder in (here, there, empty):
+        folder.mkdir()
+    venv.create(environment, with_pip=False)
+    python = environment / "bin" / "python"
+    site = run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=here)
+    Path(site.strip(), "dependencies.pth").write_text(sysconfig.get_path("purelib"))
+    pip = (sys.executable, "-m", "pip", "--python", python, "install", "--no-index", "--no-deps")
+    run(*pip, wheel, cwd=here)
+    found = run(python, "-c", "import cosim; print(cosim.__file__)", cwd=there)
+    assert Path(found).is_relative_to(environment)
+    for scene, *options in SCENES:
+        arguments = ("run", scene, *options)
+        run(sys.executable, "-m", "cosim", *arguments, cwd=here)
+        run(environment / "bin" / "cosim", *arguments, cwd=there, PATH=str(empty), CC="")
+        results = [folder / "results" / scene for folder in (here, there)]
+        one, other = ((folder / "waveforms.csv").read_bytes() for folder in results)
+        assert one == other
+        one, other = (json.loads((folder / "summary.json").read_text()) for folder in results)
+        assert one | {"wall_time": 0} == other | {"wall_time": 0}
