@@ -22,8 +22,6 @@ CIRCUITS = Path(__file__).resolve().parents[2] / "circuits"
 CHILD = r"""
 import json, logging, re, sys
 import numpy as np
-
-from tests.helpers.ngspice_alone import LIBRARY
 logging.disable(logging.CRITICAL)
 from PySpice.Spice.NgSpice.Shared import NgSpiceShared
 job = json.load(sys.stdin)

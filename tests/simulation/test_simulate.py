@@ -180,9 +180,7 @@ def test_written_scene_repeats_the_run(
     again = cosim_run(tmp_path, str(runs[name].folder / "scene.toml"))
     for file in ("waveforms.csv", "waveforms.nc", "scene.toml"):
         assert (again.folder / file).read_bytes() == (runs[name].folder / file).read_bytes(), file
-    for summary in (again.summary, runs[name].summary):
-        summary.pop("wall_time", None)
-    assert again.summary == runs[name].summary
+    assert again.summary | {"wall_time": 0} == runs[name].summary | {"wall_time": 0}
 
 
 def test_written_scene_is_the_resolved_one(run: Run) -> None:
