@@ -6,7 +6,6 @@ from statistics import median
 import numpy as np
 
 from cosim.mechanics import part
-from cosim.mechanics.part import part_library
 from cosim.studies.bench.sampling import ratios, take_turns
 from cosim.studies.fit.cases import Case, Solver
 from cosim.trials import published
