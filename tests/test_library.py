@@ -177,7 +177,7 @@ def test_notebook() -> None:
     import nbformat
     from nbclient import NotebookClient
 
-    path = REPOSITORY / "examples" / "library.ipynb"
+    path = REPOSITORY / "tests" / "library.ipynb"
     notebook = nbformat.read(path, as_version=4)
     client = NotebookClient(
         notebook, timeout=300, resources={"metadata": {"path": str(path.parent)}}
@@ -199,3 +199,15 @@ def test_import_is_light() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert (done.stdout.split("\n")[:2], done.stderr) == (["", ""], "")
+
+
+def test_the_snippet_of_the_readme_runs_from_stdin(tmp_path: Path) -> None:
+    text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+    snippet = text.split("```python\n", 1)[1].split("```", 1)[0]
+    (tmp_path / "circuits").symlink_to(REPOSITORY / "circuits")
+    done = subprocess.run(
+        [sys.executable, "-"], input=snippet, cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "run.png").read_bytes().startswith(PNG)
+    assert (tmp_path / "results/mine/waveforms.nc").is_file()
