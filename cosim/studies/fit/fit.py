@@ -39,16 +39,20 @@ class TrialResults:
         """Measured and simulated height of the part, a panel for each trial."""
         from cosim.studies.fit import figures
 
-        return figures.trials(self)
+        return figures.trials(self.cases, self.motions, self.numbers)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``fit.json``, ``fit.csv`` and the figures ``fit-*.png``."""
+        from cosim.studies.figures import save
         from cosim.studies.fit import figures
 
         out = Path(folder)
         write_json(out / "fit.json", self.numbers)
         write_text(out / "fit.csv", _csv(self.numbers["trials"]))
-        figures.draw_all(self, out)
+        save(self.plot(), out / "fit-trials.png")
+        save(figures.forces(self.cases, self.numbers), out / "fit-forces.png")
+        if self.fit:
+            save(figures.profile(self.fit, self.numbers), out / "fit-profile.png")
 
     def __repr__(self) -> str:
         return table(self.numbers)
