@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cosim.errors import BadInput, SimulationFailed
+from cosim.version import __version__
 
 if TYPE_CHECKING:
     from cosim.scene import load
@@ -18,12 +19,13 @@ if TYPE_CHECKING:
     from cosim.studies.paper.theory import theory
     from cosim.studies.sweep import sweep
     from cosim.studies.tune import tune
-
-__version__ = "0.1.0"
+    from cosim.waveforms.result import Result
 
 __all__ = [
     "BadInput",
+    "Result",
     "SimulationFailed",
+    "__version__",
     "compare",
     "fit",
     "load",
@@ -34,6 +36,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Result": "cosim.waveforms.result",
     "load": "cosim.scene",
     "run": "cosim.simulation.run",
     "sweep": "cosim.studies.sweep",

@@ -93,15 +93,10 @@ def test_the_reader_of_imports_sees_them() -> None:
     assert len({start for start, _ in found}) > 100
 
 
-NOT_YET = pytest.mark.xfail(strict=True, reason="some arrows still point upwards")
-
-
-@NOT_YET
 def test_modules_have_no_circle() -> None:
     order(arrows())
 
 
-@NOT_YET
 def test_folders_have_no_circle_and_few_floors() -> None:
     """A folder's floor lies above those of all that it imports; a single file has none."""
     found = between_rooms(arrows())

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from cosim.errors import BadInput
 from cosim.files.atomic import whole
 from cosim.files.spill import blocks
+from cosim.waveforms.columns import COLUMNS
 
 Array = npt.NDArray[np.float64]
 
@@ -61,7 +62,9 @@ def read_csv(path: Path) -> dict[str, Array]:
 def write_netcdf(
     path: Path, waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
 ) -> None:
-    """NetCDF (classic format) with the dimension ``time``; each variable has its ``units``."""
+    """NetCDF (classic format) with the dimension ``time``; each variable has its ``units``, and a
+    column of a run its ``long_name``.
+    """
     with whole(path) as temporary, open(temporary, "wb") as file:
         _netcdf(file, waveforms, units, attributes)
 
@@ -96,7 +99,7 @@ def _netcdf(
     head += _attributes(attributes) + pack(">ii", _VARIABLES, len(waveforms))
     about = [
         # One dimension, the first; the type; the size; then the offset.
-        _name(name) + pack(">ii", 1, 0) + _attributes({"units": units[name]})
+        _name(name) + pack(">ii", 1, 0) + _attributes(_about(name, units[name]))
         + pack(">ii", _DOUBLES, 8 * count)
         for name in waveforms
     ]  # fmt: skip
@@ -109,6 +112,11 @@ def _netcdf(
         for values, offset in zip(waveforms.values(), starts, strict=True):
             file.seek(offset + 8 * part.start)
             file.write(values[part].astype(">f8").tobytes())
+
+
+def _about(name: str, unit: str) -> dict[str, str]:
+    long_name = {"long_name": COLUMNS[name].long_name} if name in COLUMNS else {}
+    return {"units": unit, **long_name}
 
 
 def _name(text: str) -> bytes:

@@ -8,8 +8,8 @@ import pytest
 from cosim.errors import NoEffect, SimulationFailed
 from cosim.scene import Scene, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.accuracy.accuracy import reference
 from cosim.studies.accuracy.cases import CASES
+from cosim.studies.accuracy.runs import reference
 
 pytestmark = pytest.mark.physics
 

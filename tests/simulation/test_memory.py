@@ -89,6 +89,7 @@ def test_files_are_those_of_other_writers(monkeypatch: pytest.MonkeyPatch) -> No
     time_ = np.arange(2345) * 5e-5
     waves = {"time": time_, "z": random.normal(size=2345) * 1e-9, "sticking": np.round(time_)}
     units = {"time": "s", "z": "m", "sticking": "1"}
+    long_names = {"time": "time", "sticking": "whether the part sticks to the surface"}
     about = {"title": "fünf", "scene": "a = 1\nb = 2\n"}
     content = BytesIO()
     with netcdf_file(content, "w", version=2) as file:
@@ -99,6 +100,8 @@ def test_files_are_those_of_other_writers(monkeypatch: pytest.MonkeyPatch) -> No
             variable = file.createVariable(name, "f8", ("time",))
             variable[:] = values
             variable.units = units[name]
+            if name in long_names:
+                variable.long_name = long_names[name]
         file.flush()
         assert netcdf_content(waves, units, about) == content.getvalue()
     table = BytesIO()

@@ -1,7 +1,6 @@
 """What the accuracy study makes of its runs, on runs with known errors."""
 
 import csv
-import json
 from math import isnan, nan
 from pathlib import Path
 
@@ -10,10 +9,11 @@ import pytest
 
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene
-from cosim.studies.accuracy.accuracy import Run, measure, order, reference
 from cosim.studies.accuracy.cases import CASES, Case
+from cosim.studies.accuracy.report import error_in, order, time_to
+from cosim.studies.accuracy.runs import FALSE_CYCLE, Run, measure, reference
 from cosim.studies.accuracy.solvers import Outcome, Solver
-from cosim.studies.study import write
+from cosim.studies.tables import write_csv, write_page
 
 PAPER = CASES["paper"]
 STEPS = [1e-3 / 2**k for k in range(6)]
@@ -70,14 +70,30 @@ def test_failures_are_marked() -> None:
     assert isinstance(found[0], Run) and isnan(found[0].error)
 
 
+def test_failures_are_left_out_of_what_is_fitted() -> None:
+    """Beside runs of order 2 whose time is 1e-3/h: false ones that would be better and worse."""
+    true = [Run("paper", "a", "macro step [s]", h, h**2, 1e-3 / h, 7, "") for h in STEPS]
+    false = [
+        Run("paper", "a", "macro step [s]", 1e-6, 1e-12, 1e-6, 7, FALSE_CYCLE),
+        Run("paper", "a", "macro step [s]", 1e-6, 3.0, 1e3, 7, "diverged"),
+        Run("paper", "a", "macro step [s]", 1e-6, nan, 1e3, 7, "failed"),
+    ]
+    runs = [*true, *false]
+    assert order(runs) == pytest.approx(2.0)
+    assert error_in(runs, 2.5) == pytest.approx((1e-3 / 2.5) ** 2)
+    assert time_to(runs, (1e-3 / 2.5) ** 2) == pytest.approx(2.5)
+    assert isnan(error_in(runs, 0.5)) and error_in(runs, 1e3) == pytest.approx(STEPS[-1] ** 2)
+    assert isnan(time_to(runs, 1e-11)) and time_to(runs, 1.0) == pytest.approx(1.0)
+    assert isnan(error_in(false, 1.0)) and isnan(time_to(false, 1.0))
+
+
 def test_tables(tmp_path: Path) -> None:
     rows = [{"method": "a", "error [1]": 1.0 / 3.0}, {"method": "b", "error [1]": nan}]
-    write(tmp_path, "study", "A study", {"Runs": rows}, ["A note."])
+    write_csv(tmp_path / "study.csv", rows)
+    write_page(tmp_path / "study.md", "A study", ["A note."], {"Runs": rows})
     with (tmp_path / "study.csv").open() as file:
         read = list(csv.DictReader(file))
     assert float(read[0]["error [1]"]) == 1.0 / 3.0
-    content = json.loads((tmp_path / "study.json").read_text())
-    assert content["tables"]["Runs"][1] == {"method": "b", "error [1]": None}
-    assert content["machine"]["cores"] >= 1
-    text = (tmp_path / "study.md").read_text()
+    text = (tmp_path / "study.md").read_text(encoding="utf-8")
     assert "| a | 0.3333 |" in text and "| b | - |" in text and "A note." in text
+    assert "cores" in text

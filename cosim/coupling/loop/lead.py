@@ -64,7 +64,8 @@ class Lead:
         self._deck, self._saved = deck or prepare(scene)
         width = 2 + len(self._saved)
         self._log = Tape(width)
-        self._block = np.empty((_POINTS, width))
+        # With `uic`, ngspice accepts t = 0 before it has sent any value.
+        self._block = np.zeros((_POINTS, width))
         self.places = (c_int64 * (len(self._saved) + 1))()
         self._pieces: list[Piece] = []
         self._row: Any = None

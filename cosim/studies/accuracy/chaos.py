@@ -8,16 +8,15 @@ ensemble's own spread leaves open.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import hypot, sqrt
 from pathlib import Path
-from statistics import mean, stdev
 
 import numpy as np
 
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.study import Row, write
+from cosim.studies.accuracy.ensemble import Ensemble
+from cosim.studies.accuracy.figures import draw_chaos
+from cosim.studies.tables import Row, write_csv, write_page
 from cosim.waveforms.result import Result
 
 CHAOTIC = 1e4
@@ -36,24 +35,6 @@ METHODS = {
     "mean current, 0.2 ms": ("coupling.method=mean-current", "coupling.macro_step=2e-4"),
 }
 """What is compared with the first of them."""
-
-
-@dataclass(frozen=True)
-class Ensemble:
-    """Values of each statistic, one a member."""
-
-    name: str
-    values: dict[str, list[float]]
-
-    def mean(self, statistic: str) -> tuple[float, float]:
-        """Mean and its standard error."""
-        found = self.values[statistic]
-        return mean(found), stdev(found) / sqrt(len(found))
-
-    def apart(self, other: "Ensemble", statistic: str) -> float:
-        """Distance of two means in units of the standard error of their difference."""
-        (a, ea), (b, eb) = self.mean(statistic), other.mean(statistic)
-        return abs(a - b) / (hypot(ea, eb) or 1.0)
 
 
 def solved(scene: Sequence[str], more: Sequence[str], change: float = 0.0) -> Result:
@@ -81,33 +62,42 @@ def ensemble(name: str, scene: Sequence[str], more: Sequence[str], members: int)
     return Ensemble(name, found)
 
 
-def run(out: Path) -> None:
-    """Write ``chaos`` as png, csv, md and json into ``out``."""
-    from cosim.studies.accuracy.chaos_figure import draw
-
+def run(out: Path) -> str:
+    """Write ``chaos`` as png, csv and md into ``out``; gives what it shows."""
     grown = growth(SCENE)
     ensembles = [ensemble(name, SCENE, more, MEMBERS) for name, more in METHODS.items()]
-    note = (
+    first, *others = ensembles
+    most = max(first.apart(one, statistic) for one in others for statistic in STATISTICS)
+    message = (
+        f"In a chaotic scene no two paths agree, but the methods' statistics do: {most:.1f} "
+        "standard errors apart at most"
+    )
+    notes = [
+        f"{message}.",
         f"The scene paper with {', '.join(SCENE)}. A change of the normal force by {NUDGE:g} of "
         f"itself moves the path by {grown:.1e} times as much: chaotic (from {CHAOTIC:g}), so "
         f"statistics are compared and not paths. Means over {MEMBERS} runs of {DURATION:g} s whose "
-        f"normal forces are apart by {APART:g}, with their standard errors; apart: distance from "
-        "the first method's mean, in standard errors of the difference."
-    )
-    write(out, "chaos", "A chaotic scene", {"Ensembles": list(rows(ensembles))}, [note])
-    draw(ensembles, grown, out)
+        f"normal forces are apart by {APART:g}, ± their standard errors; in parentheses the "
+        "distance from the first method's mean, in standard errors of the difference.",
+    ]
+    raw = [
+        {"method": one.name, "run": k} | {name: one.values[name][k] for name in STATISTICS}
+        for one in ensembles
+        for k in range(MEMBERS)
+    ]
+    write_csv(out / "chaos.csv", raw)
+    write_page(out / "chaos.md", "A chaotic scene", notes, {"Ensembles": rows(ensembles)})
+    draw_chaos(ensembles, message, out / "chaos.png")
+    return message
 
 
 def rows(ensembles: Sequence[Ensemble]) -> list[Row]:
-    """A row a method and statistic."""
+    """A row a method, a column a statistic."""
+
+    def cell(one: Ensemble, statistic: str) -> str:
+        middle, error = one.mean(statistic)
+        return f"{middle:.4g} ± {error:.2g} ({one.apart(ensembles[0], statistic):.1f})"
+
     return [
-        {
-            "method": one.name,
-            "statistic": statistic,
-            "mean": one.mean(statistic)[0],
-            "standard error": one.mean(statistic)[1],
-            "apart": one.apart(ensembles[0], statistic),
-        }
-        for statistic in STATISTICS
-        for one in ensembles
+        {"method": one.name} | {name: cell(one, name) for name in STATISTICS} for one in ensembles
     ]

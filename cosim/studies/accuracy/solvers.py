@@ -47,6 +47,13 @@ class Solver:
     values: Callable[[Case], Sequence[float]]
     order: int | None = None
     """Order in ``setting`` where all is smooth; None where it is not a step."""
+    limits: str = ""
+    """Why some scenes have no ``values``."""
+
+    @property
+    def takes_macro_steps(self) -> bool:
+        """Whether its setting is the length of a macro step."""
+        return "macro" in self.setting and self.order is not None
 
 
 Make = Callable[[Any, Any], Joint]
@@ -180,7 +187,6 @@ def _for_peer(case: Case, *overrides: str) -> Scene:
 
 
 def _peers_reltols(case: Case) -> Sequence[float]:
-    """The peers know compliant walls and the sawtooth only."""
     return [10.0**-k for k in range(4, 10)] if case.name in ("stick-slip", "paper") else []
 
 
@@ -219,32 +225,35 @@ _AUDITED = 0.5
 """Share of the power that the audit lets be lost, over the tolerance's power of 2/3: a residual is
 of order 2 in a step that goes with the cube root of the tolerance."""
 
-_EVENT_AWARE = METHODS["EMF's slope, linear current"]
+_EVENT_AWARE = "EMF's slope, linear current"
 
-_ITERATED: dict[str, Make] = {
-    "Aitken": lambda a, b: Iterated(a, b, "aitken", tolerance=1e-9),
-    "Anderson": lambda a, b: Iterated(a, b, "anderson", tolerance=1e-9),
+
+def _fixed(name: str, make: Make, order: int, events: bool = False) -> Solver:
+    return Solver(name, "macro steps", "macro step [s]", _macro(make, events), _steps, order)
+
+
+_IN_NGSPICE = {
+    "jacobi": "Jacobi k = 1",
+    "gauss-seidel": "Gauss-Seidel k = 1",
+    "mean-current": "EMF's slope, mean current",
+    "companion": "companion",
 }
+"""The methods under ngspice, and the same ones with participants that can go back."""
+
+DEFAULT = "step-locked (default), both"
+ALL_IN_NGSPICE, LSODA = "all in ngspice", "SciPy's LSODA with events"
+_OF_PEERS = "knows compliant walls and the sawtooth only"
 
 SOLVERS = (
     *(
-        Solver(name, "macro steps", "macro step [s]", _macro(make), _steps, ORDERS[name])
+        _fixed(name, make, ORDERS[name])
         for name, make in METHODS.items()
         if name != "iterated, plain"
     ),
-    Solver("event-aware", "macro steps", "macro step [s]", _macro(_EVENT_AWARE, True), _steps),
-    Solver(
-        "predictor-corrector",
-        "macro steps",
-        "macro step [s]",
-        _macro(PredictorCorrector),
-        _steps,
-        2,
-    ),
-    *(
-        Solver(f"iterated, {name}", "macro steps", "macro step [s]", _macro(make), _steps, 2)
-        for name, make in _ITERATED.items()
-    ),
+    _fixed("event-aware", METHODS[_EVENT_AWARE], ORDERS[_EVENT_AWARE], events=True),
+    _fixed("predictor-corrector", PredictorCorrector, 2),
+    _fixed("iterated, Aitken", lambda a, b: Iterated(a, b, "aitken", tolerance=1e-9), 2),
+    _fixed("iterated, Anderson", lambda a, b: Iterated(a, b, "anderson", tolerance=1e-9), 2),
     Solver("error-controlled", "macro steps", "tolerance", _controlled, _control),
     Solver("error-controlled, audited", "macro steps", "tolerance", _audited, _control),
     Solver(
@@ -264,7 +273,7 @@ SOLVERS = (
         _reltols,
     ),
     Solver(
-        "step-locked (default), both",
+        DEFAULT,
         "ngspice leads",
         "level of coupling.method = auto",
         _level,
@@ -277,10 +286,15 @@ SOLVERS = (
             "coupling.macro_step [s]",
             _led("coupling.macro_step={}", f"coupling.method={method}", *_FINE),
             _macro_steps,
+            ORDERS[twin],
         )
-        for method in ("jacobi", "gauss-seidel", "mean-current", "companion")
+        for method, twin in _IN_NGSPICE.items()
     ),
-    Solver("all in ngspice", "peers", "circuit.reltol", _all_in_ngspice, _peers_reltols),
-    Solver("SciPy's LSODA with events", "peers", "tolerance", _solve_ivp, _peers_rtols),
+    Solver(
+        ALL_IN_NGSPICE,
+        *("peers", "circuit.reltol", _all_in_ngspice, _peers_reltols),
+        limits=_OF_PEERS,
+    ),
+    Solver(LSODA, "peers", "tolerance", _solve_ivp, _peers_rtols, limits=_OF_PEERS),
 )
 """Every line of the diagrams."""

@@ -17,8 +17,8 @@ from cosim.studies.bench.peers import compare
 from cosim.studies.bench.rungs import cost_exponent, real_time
 from cosim.studies.bench.truth import BRIEF, BRIEF_FULL
 from cosim.studies.fit.cases import Case
-from cosim.studies.study import machine
 from cosim.studies.sweep.timing import throughput
+from cosim.studies.tables import machine
 from cosim.trials.camera import film
 from cosim.trials.tracked import Track, Trial, read_folder
 

@@ -6,7 +6,6 @@ from statistics import median
 import numpy as np
 
 from cosim.mechanics import part
-from cosim.mechanics.part import part_library
 from cosim.studies.bench.sampling import ratios, take_turns
 from cosim.studies.fit.cases import Case, Solver
 from cosim.trials import published
@@ -39,10 +38,10 @@ def _call(case: Case, solver: Solver) -> Callable[[], int]:
     given = (len(case.time), case.time.ctypes.data, case.v_surface.ctypes.data, 1)
     given = (*given, law.ctypes.data, 0.0, case.v0)
     if solver == "exact":
-        function, asked = part_library().part_exact, (len(case.time), None)
+        function, asked = part.part_library().part_exact, (len(case.time), None)
     else:
         steps = len(case.grid) - 1
-        function = part_library().part_threshold
+        function = part.part_library().part_threshold
         asked = (part.PUBLISHED_STEP, part.PUBLISHED_V_MIN, steps)
 
     def call(_: object = (law, rows)) -> int:  # the buffers live as long as the call

@@ -3,34 +3,23 @@
 from collections.abc import Sequence
 from math import nan
 from pathlib import Path
-from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-
-from cosim.files.atomic import whole
 from cosim.scene import Scene
 from cosim.studies.circuit.ladder import Rung, cheapest
-from cosim.studies.study import Row
-from cosim.studies.study import write as write_tables
+from cosim.studies.plots import GREEN, panels
+from cosim.studies.tables import Row, brief, write_csv, write_page
 
 Found = Sequence[tuple[Scene, list[Rung]]]
 
-COLORS = ("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#6a4c93", "#333333")
-
-LEAST_SHOWN = 1e-6
-"""Least error in the figure."""
-
 
 def write(folder: Path, found: Found) -> str:
-    """Write ladder.csv, .md, .json and .png into ``folder``; gives what is printed."""
+    """Write ladder.csv, .md and .png into ``folder``; gives what is printed."""
     said = [words(scene, rungs) for scene, rungs in found]
-    content: dict[str, Sequence[Row]] = {
-        "Cost and error of each rung": [row for pair in found for row in rows(*pair)]
-    }
-    write_tables(folder, "ladder", "Model no more than a scene needs", content, said)
-    with whole(folder / "ladder.png") as temporary:
-        draw(found, temporary)
+    table = [row for pair in found for row in rows(*pair)]
+    write_csv(folder / "ladder.csv", table)
+    notes = [f"{message(found)}.", *said]
+    write_page(folder / "ladder.md", "The ladder of circuits", notes, {"Each rung": table})
+    draw(found, folder / "ladder.png")
     printed: list[str] = []
     for (_, rungs), sentence in zip(found, said, strict=True):
         printed += [sentence, ""]
@@ -40,8 +29,7 @@ def write(folder: Path, found: Found) -> str:
             for rung in rungs
         ]
         printed.append("")
-    printed.append(f"Written to {folder}: ladder.csv, ladder.md, ladder.json")
-    return "\n".join([*printed, f"Figure: {folder / 'ladder.png'}"])
+    return "\n".join([*printed, f"Written to {folder}: ladder.csv, ladder.md, ladder.png"])
 
 
 def rows(scene: Scene, rungs: list[Rung]) -> list[Row]:
@@ -90,32 +78,47 @@ def words(scene: Scene, rungs: list[Rung]) -> str:
 
 
 def draw(found: Found, path: Path) -> None:
-    """Draw error over cost, a line for each scene, into ``path`` (a PNG)."""
-    figure = Figure(figsize=(11.0, 5.2), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes: Any = figure.subplots(1, 2, sharey=True)
-    for axis, against in zip(axes, ("amplifier", "full"), strict=True):
-        for (scene, rungs), color in zip(found, COLORS * 9, strict=False):
-            top = [rung.model for rung in rungs].index(against)
-            shown = rungs[:top]
-            errors = [
-                max(rung.off_amplifier if against == "amplifier" else rung.off_top, LEAST_SHOWN)
-                for rung in shown
-            ]
-            costs = [rung.cost[0] for rung in shown]
-            axis.plot(costs, errors, color=color, marker="o", ms=5, label=scene.name)
-            for rung, cost, error in zip(shown, costs, errors, strict=True):
-                axis.plot(rung.cost[1:], [error, error], color=color, lw=0.8)
-                axis.annotate(
-                    rung.model, (cost, error), (5, 5), textcoords="offset points", fontsize=8.5
-                )
-            axis.axvline(rungs[top].cost[0], color=color, lw=0.9, ls=":")
-        axis.axhline(found[0][0].run.tolerance, color="#555555", lw=0.9, ls="--")
-        axis.set(xscale="log", yscale="log", xlabel="computing per simulated second [s]")
-        title = f"Against the rung “{against}” (dotted: its own cost)"
-        axis.set_title(title, loc="left", fontsize=10.5)
-        axis.grid(alpha=0.25, which="both")
-        axis.margins(x=0.12)
-    axes[0].set_ylabel("relative error of v_average (dashed: tolerance)")
-    axes[0].legend(fontsize=8.5)
-    figure.savefig(path, format="png")
+    """Draw error over cost, a panel a scene, and mark the cheapest rung within the tolerance."""
+    wide = min(len(found), 3)
+    errors = [rung.off_top for _, rungs in found for rung in rungs]
+    top = 200.0 * max(*errors, *(scene.run.tolerance for scene, _ in found))
+    size = (max(3.8 * wide, 6.0), 3.4 * -(-len(found) // wide) + 0.6)
+    note = "Green: the cheapest rung within run.tolerance, which is shaded."
+    figure, axes = panels(
+        message(found), note, size, -(-len(found) // wide), wide, sharex=True, sharey=True
+    )
+    for axis, (scene, rungs) in zip(axes, found, strict=False):
+        tolerance, taken = scene.run.tolerance, cheapest(rungs, scene.run.tolerance)
+        axis.axhspan(0.0, 100.0 * tolerance, color=GREEN, alpha=0.12, lw=0)
+        for rung in rungs:
+            cost, error = rung.cost[0], 100.0 * rung.off_top
+            color = GREEN if rung is taken else "0.45"
+            axis.plot(cost, error, "o", color=color, ms=9 if rung is taken else 6)
+            axis.annotate(
+                rung.model,
+                (cost, error),
+                (-8, 0) if rung is rungs[0] else (7, 6),
+                textcoords="offset points",
+                color=color,
+                ha="right" if rung is rungs[0] else "left",
+                fontweight="bold" if rung is taken else "normal",
+            )
+        axis.set_title(scene.name, loc="left")
+        axis.set_xscale("log")
+        axis.set_yscale("symlog", linthresh=0.1)
+        axis.set(xlabel="computing per simulated second [s]", ylim=(-0.03, top))
+        axis.margins(x=0.35)
+    axes[0].set_ylabel("error of v_average against “full” [%]")
+    figure.write(path)
+
+
+def message(found: Found) -> str:
+    """The title of the figure."""
+    by_model: dict[str, list[str]] = {}
+    for scene, rungs in found:
+        taken = cheapest(rungs, scene.run.tolerance)
+        less = f" ({brief(rungs[-1].cost[0] / taken.cost[0])} times cheaper)"
+        said = scene.name + (less if taken is not rungs[-1] else "")
+        by_model.setdefault(taken.model, []).append(said)
+    needed = [f"{' and '.join(scenes)} on {model}" for model, scenes in by_model.items()]
+    return f"The cheapest rung that keeps the tolerance: {', '.join(needed)}"

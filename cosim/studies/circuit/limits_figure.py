@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from matplotlib.patches import Patch
 
+from cosim.files.picture import Picture
 from cosim.studies.circuit.limits import Study, name_of
-from cosim.studies.figures import blank, save
 
 COLORS = {
     "binds": "#d1495b", "acts a little": "#e9a03b", "does not matter": "#8d99ae",
@@ -23,7 +23,7 @@ LINES = (
 def draw(studies: Sequence[Study], path: Path) -> None:
     """Draw the studies, the turned limits of the first one, into ``path`` (a PNG)."""
     turned = bool(studies[0].turned)
-    figure = blank(13.0, 9.0 if turned else 4.6)
+    figure = Picture(13.0, 9.0 if turned else 4.6, "constrained")
     rows: Any = figure.subfigures(2 if turned else 1, 1, squeeze=False)[:, 0]
     order = studies[0].ranked()[::-1]
     columns = np.atleast_1d(rows[0].subplots(1, len(studies), sharey=True))
@@ -45,7 +45,7 @@ def draw(studies: Sequence[Study], path: Path) -> None:
         middle.set_ylabel("surface's peak downward acceleration [m/s²]")
         middle.set_title("The peak, impacts included", loc="left", fontsize=10)
         _peaks(right, studies)
-    save(figure, path)
+    figure.write(path)
 
 
 def _bars(axis: Any, study: Study, order: Sequence[str]) -> None:

@@ -6,15 +6,14 @@ from pathlib import Path
 
 from cosim.studies.circuit import limits_figure
 from cosim.studies.circuit.limits import LIMITS, TREMBLES, UNTOLD, Study, name_of
-from cosim.studies.study import Row
-from cosim.studies.study import write as write_tables
+from cosim.studies.tables import Row, write_csv, write_page
 
 MATTERED = 1.05
 """Least factor by which the ideal current must be off for the circuit to be said to matter."""
 
 
 def write(folder: Path, studies: Sequence[Study]) -> str:
-    """Write limits.csv, .md, .json and .png into ``folder``; gives what is printed."""
+    """Write limits.csv, .md and .png into ``folder``; gives what is printed."""
     said: list[str] = []
     found: dict[str, Sequence[Row]] = {}
     for study in studies:
@@ -24,7 +23,8 @@ def write(folder: Path, studies: Sequence[Study]) -> str:
         if study.turned:
             found[f"Each limit turned: {name}"] = turned(study)
         said.append(words(study))
-    write_tables(folder, "limits", "Which limit binds?", found, said)
+    write_csv(folder / "limits.csv", rows(studies[0]))
+    write_page(folder / "limits.md", "Which limit binds?", said, found)
     limits_figure.draw(studies, folder / "limits.png")
     printed: list[str] = []
     for study, sentence in zip(studies, said, strict=True):
@@ -33,8 +33,7 @@ def write(folder: Path, studies: Sequence[Study]) -> str:
             name, verdict, v_average, change, *_ = row.values()
             printed.append(f"  {name:<20}{verdict:<18}{v_average:+8.3f} mm/s ({change:+.3f})")
         printed.append("")
-    printed.append(f"Written to {folder}: limits.csv, limits.md, limits.json")
-    return "\n".join([*printed, f"Figure: {folder / 'limits.png'}"])
+    return "\n".join([*printed, f"Written to {folder}: limits.csv, limits.md, limits.png"])
 
 
 def rows(study: Study) -> list[Row]:

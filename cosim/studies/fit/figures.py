@@ -1,19 +1,26 @@
 """The figures of a fit: each trial, the profile over µ_k, fitted against measured normal forces."""
 
 import math
-from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
 
 from cosim.files.picture import Picture
 from cosim.mechanics.part import PartMotion
-from cosim.studies.figures import blank
 from cosim.studies.fit.cases import Case
-from cosim.studies.fit.search import Fit
+from cosim.studies.fit.search import Fit, Solved
 
 SURFACE, MEASURED, SIMULATED = "#8fb8da", "0.15", "#d1495b"
 DASHED = (0, (4, 1.2))
+
+
+def draw_all(results: Solved, folder: Path) -> None:
+    """Write every figure into a folder; a profile only where something was fitted."""
+    trials(results).write(folder / "fit-trials.png")
+    forces(results).write(folder / "fit-forces.png")
+    if results.fit:
+        profile(results, results.fit).write(folder / "fit-profile.png")
 
 
 def _words(result: dict[str, Any]) -> str:
@@ -22,15 +29,18 @@ def _words(result: dict[str, Any]) -> str:
     return f"{result['parameters']} parameters, {solver}: µ_k {result['mu_k']:.3g}{plate}"
 
 
-def trials(cases: Sequence[Case], motions: Sequence[PartMotion], result: dict[str, Any]) -> Picture:
+def trials(results: Solved) -> Picture:
     """Measured and simulated height of the part, and the surface's, a panel for each trial."""
-    columns = min(2, len(cases))
-    rows = math.ceil(len(cases) / columns)
-    figure = blank(13.0, 1.0 + 2.35 * rows)
+    columns = min(2, len(results.cases))
+    rows = math.ceil(len(results.cases) / columns)
+    figure = Picture(13.0, 1.0 + 2.35 * rows, "constrained")
     axes = figure.subplots(rows, columns, squeeze=False)
-    for axis, case, motion, row in zip(axes.flat, cases, motions, result["trials"], strict=False):
+    result = results.numbers
+    for axis, case, motion, row in zip(
+        axes.flat, results.cases, results.motions, result["trials"], strict=False
+    ):
         _trial(axis, case, motion, row)
-    for axis in list(axes.flat)[len(cases) :]:
+    for axis in list(axes.flat)[len(results.cases) :]:
         axis.set_visible(False)
     for axis in axes[-1]:
         axis.set_xlabel("time [ms]")
@@ -67,9 +77,10 @@ def _trial(axis: Axes, case: Case, motion: PartMotion, row: dict[str, Any]) -> N
     )
 
 
-def profile(fit: Fit, result: dict[str, Any]) -> Picture:
+def profile(results: Solved, fit: Fit) -> Picture:
     """The mean error over µ_k, each normal force fitted anew, and the error of each trial."""
-    figure = blank(9.0, 5.2)
+    result = results.numbers
+    figure = Picture(9.0, 5.2, "constrained")
     axis = figure.subplots()
     line, error = fit.profile()
     each = fit.errors[fit.at_best_plate]
@@ -90,14 +101,15 @@ def profile(fit: Fit, result: dict[str, Any]) -> Picture:
     return figure
 
 
-def forces(cases: Sequence[Case], result: dict[str, Any]) -> Picture:
+def forces(results: Solved) -> Picture:
     """Fitted against measured normal forces, trial by trial, with the bounds of the fit."""
+    result = results.numbers
     rows = result["trials"]
-    figure = blank(8.0, 4.6)
+    figure = Picture(8.0, 4.6, "constrained")
     axis = figure.subplots()
     bounds: dict[str, Any] = {"color": SURFACE, "lw": 7.0, "alpha": 0.5}
     measured: dict[str, Any] = {"marker": "D", "ls": "", "mfc": "none", "color": MEASURED}
-    for x, (case, row) in enumerate(zip(cases, rows, strict=True)):
+    for x, (case, row) in enumerate(zip(results.cases, rows, strict=True)):
         axis.plot([x, x], case.bounds, solid_capstyle="butt", **bounds)
         if row["normal_force_measured_weights"] is not None:
             axis.plot(x, row["normal_force_measured_weights"], **measured)

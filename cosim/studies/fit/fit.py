@@ -1,7 +1,7 @@
 """Fits the part's motion to tracked trials, or evaluates the published parameters on them."""
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,7 +13,7 @@ from cosim.files.atomic import write_json, write_text
 from cosim.files.picture import Picture
 from cosim.mechanics.part import PartMotion
 from cosim.studies.fit.cases import Case, Parameters, Solver
-from cosim.studies.fit.search import Fit, search
+from cosim.studies.fit.search import Fit, Solved, search
 from cosim.trials import published
 from cosim.trials.tracked import read_folder
 
@@ -24,35 +24,23 @@ RESAMPLES = 2000  # of the trials, for the interval of µ_k
 NEAR = 1.05  # over the best mean error: µ_k with less are reported as about as good
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class TrialResults:
-    """Trials with their parameters and simulated motions; ``fit`` if they were fitted."""
-
-    cases: list[Case]
-    parameters: list[Parameters]
-    motions: list[PartMotion]
-    fit: Fit | None
-    numbers: dict[str, Any]
-    """What ``fit.json`` holds; millimetres, m_P g and shares in per cent as the names say."""
+class TrialResults(Solved):
+    """Trials with their parameters and simulated motions: ``numbers``, figures and files."""
 
     def plot(self) -> Picture:
         """Measured and simulated height of the part, a panel for each trial."""
         from cosim.studies.fit import figures
 
-        return figures.trials(self.cases, self.motions, self.numbers)
+        return figures.trials(self)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``fit.json``, ``fit.csv`` and the figures ``fit-*.png``."""
-        from cosim.studies.figures import save
         from cosim.studies.fit import figures
 
         out = Path(folder)
         write_json(out / "fit.json", self.numbers)
         write_text(out / "fit.csv", _csv(self.numbers["trials"]))
-        save(self.plot(), out / "fit-trials.png")
-        save(figures.forces(self.cases, self.numbers), out / "fit-forces.png")
-        if self.fit:
-            save(figures.profile(self.fit, self.numbers), out / "fit-profile.png")
+        figures.draw_all(self, out)
 
     def __repr__(self) -> str:
         return table(self.numbers)

@@ -8,11 +8,13 @@ miss a stick, so the searches use grids, finer and finer, and no slope.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.studies.fit.cases import Case, Solver
+from cosim.mechanics.part import PartMotion
+from cosim.studies.fit.cases import Case, Parameters, Solver
 from cosim.trials import published
 
 Array = npt.NDArray[np.float64]
@@ -131,6 +133,18 @@ def search(cases: Sequence[Case], solver: Solver = "exact", plate: bool = False)
         np.array([done[key][1] for key in tried]),
         np.array([done[key][0] for key in tried]),
     )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solved:
+    """Trials with their parameters and simulated motions; ``fit`` if they were fitted."""
+
+    cases: list[Case]
+    parameters: list[Parameters]
+    motions: list[PartMotion]
+    fit: Fit | None
+    numbers: dict[str, Any]
+    """What ``fit.json`` holds; millimetres, m_P g and shares in per cent as the names say."""
 
 
 def _line(low: float, high: float, step: float) -> Array:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from cosim.studies.figures import blank, save
+from cosim.files.picture import Picture
 
 COLORS = ("#1f6fb2", "#2a9d8f", "#e9a03b", "#d1495b")
 STYLES = ("-", "--", "-", "-")
@@ -22,7 +22,7 @@ def draw(
     theory: Sequence[float],
 ) -> None:
     """v_ave, m/s, over the timing error (periods) and over f_n, one line a method, into a PNG."""
-    figure = blank(13.0, 4.8)
+    figure = Picture(13.0, 4.8, "constrained")
     left, right = figure.subplots(1, 2)
     left.axhline(best * 1e3, color="0.2", lw=3.0, alpha=0.3, label="closed form")
     right.plot(ratios, np.array(theory) * 1e3, color="0.2", lw=4.0, alpha=0.3, label="closed form")
@@ -45,4 +45,4 @@ def draw(
         axis.grid(alpha=0.25)
         axis.axhline(0.0, color="0.5", lw=0.6)
         axis.legend(fontsize=8)
-    save(figure, path)
+    figure.write(path)

@@ -1,6 +1,6 @@
 """Machines of the stability study: voice coils on two bodies, as linear participants and as FMU."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Literal
 
@@ -41,6 +41,11 @@ class Machine:
         """Resistance around which the back-EMF drives a current, Ω."""
         return self.resistance + self.sense_resistance
 
+    @property
+    def strength(self) -> float:
+        """How strongly coil and mechanics are coupled while the part sticks, Bl²/(m R) in 1/s."""
+        return self.force_factor**2 / (self.mass(False) * self.loop)
+
 
 PAPER = Machine("paper", 0.6, 7.1, 1.2e-3)
 STRONG = Machine("Bl 3 N/A", 3.0, 7.1, 1.2e-3)
@@ -57,6 +62,7 @@ DIRECT = Machine(
 )
 """A loudspeaker driver like Dayton's ND91-4 on a voltage, its frame held: Bl 4.38 N/A, 4.3 Ω,
 0.83 mH, 4.33 g, 1.07 mm/N, 0.474 kg/s."""
+SLOW = replace(DIRECT, name="direct drive, 10 L", inductance=10.0 * DIRECT.inductance)
 
 GAIN_BANDWIDTH, OPEN_LOOP_GAIN = 1e6, 10.0 ** (98.0 / 20.0)
 

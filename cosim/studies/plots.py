@@ -1,0 +1,80 @@
+"""What the figures of the studies share: size, colours, labels at the ends of lines, saving."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from textwrap import fill
+from typing import Any
+
+from matplotlib.axes import Axes
+
+from cosim.files.picture import Picture
+
+VERMILION, BLUE, GREEN, ORANGE, SKY, PURPLE = (
+    "#d55e00",
+    "#0072b2",
+    "#009e73",
+    "#e69f00",
+    "#56b4e9",
+    "#aa4499",
+)
+"""Okabe and Ito's colours, which the colour-blind tell apart; a darker purple."""
+FAINT: dict[str, Any] = {"color": "0.74", "lw": 0.8, "zorder": 1}
+"""Style of a line that is there to be counted, not to be read."""
+
+
+def panels(
+    title: str,
+    note: str,
+    size: tuple[float, float],
+    rows: int = 1,
+    columns: int = 1,
+    **options: Any,
+) -> tuple[Picture, list[Axes]]:
+    """A figure of ``size`` (inches) and its axes row by row.
+
+    ``title`` is its message; ``note``, below, tells how to read it.
+    """
+    figure = Picture(*size, "constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, **options)
+    lines = fill(title, round(10.0 * size[0]))
+    figure.suptitle(lines, x=0.01, ha="left", fontsize=12, fontweight="bold")
+    figure.supxlabel(note, x=0.01, ha="left", fontsize=9, color="0.35")
+    for axis in axes.flat:
+        axis.grid(alpha=0.25)
+        axis.set_axisbelow(True)
+    return figure, list(axes.flat)
+
+
+@dataclass(frozen=True)
+class End:
+    """A label for the line that ends at ``x``, ``y``."""
+
+    x: float
+    y: float
+    text: str
+    color: str
+
+
+def label_ends(axis: Axes, ends: Sequence[End], gap: float = 0.07) -> None:
+    """Name lines, all drawn by now, right of the axes; ``gap``, a share of these, keeps apart."""
+    axis.autoscale_view()
+    to_share = axis.transData + axis.transAxes.inverted()
+    upward = sorted(ends, key=lambda end: end.y)
+    placed: list[float] = []
+    for end in upward:
+        height = float(to_share.transform((end.x, end.y))[1])
+        placed.append(max(height, placed[-1] + gap if placed else 0.0))
+    for k in range(len(placed)):
+        placed[k] = min(placed[k], 1.0 - gap * (len(placed) - 1 - k))
+    for end, height in zip(upward, placed, strict=True):
+        axis.annotate(
+            end.text,
+            (end.x, end.y),
+            (1.02, height),
+            textcoords="axes fraction",
+            color=end.color,
+            fontsize=9,
+            va="center",
+            arrowprops={"arrowstyle": "-", "color": end.color, "lw": 0.6, "relpos": (0.0, 0.5)},
+            annotation_clip=False,
+        )

@@ -1,0 +1,201 @@
+"""The library as its users have it: in a script, from standard input and in a notebook."""
+
+import json
+import os
+import subprocess
+import sys
+from base64 import b64decode
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+
+import cosim
+from cosim.cli.main import main
+from cosim.waveforms.storage import read_csv
+
+REPOSITORY = Path(__file__).parents[1]
+OWN = {
+    "circuit.model": "file",
+    "circuit.netlist": str(REPOSITORY / "circuits" / "examples" / "h_bridge.cir"),
+    "run.duration": 0.06,
+}
+SHORT = {"run.duration": 0.1, "run.settle": 0.05}
+PNG = b"\x89PNG\r\n\x1a\n"
+
+PROGRAM = """
+import cosim
+own = cosim.run("paper", {own!r})
+print(own.summary["v_average"])
+over = {{"drive.amplitude": [6, 8, 9], "drive.frequency": [10, 20, 30]}}
+data = cosim.sweep("ideal-current", over, {short!r}, workers=2)
+print(float(data.v_average.sel(amplitude=8, frequency=20)), int((data.failure != "").sum()))
+own.plot().savefig("own.png")
+"""
+
+
+@pytest.fixture(scope="module")
+def result() -> cosim.Result:
+    return cosim.run("ideal-current", {**SHORT, "drive.amplitude": 6.0})
+
+
+def test_run_is_what_the_command_writes(result: cosim.Result, tmp_path: Path) -> None:
+    """Overrides as a mapping, and the files of `save`, against `cosim run --set`."""
+    sets = [f"--set={key}={value}" for key, value in (SHORT | {"drive.amplitude": 6.0}).items()]
+    assert main(["run", "ideal-current", *sets, "--out", str(tmp_path / "command")]) == 0
+    result.save(tmp_path / "library")
+    files = {path.name for path in (tmp_path / "command").iterdir()}
+    assert files == {path.name for path in (tmp_path / "library").iterdir()}
+    for name in files - {"summary.json"}:
+        mine, theirs = ((tmp_path / who / name).read_bytes() for who in ("library", "command"))
+        assert mine == theirs, name
+    summary = json.loads((tmp_path / "command" / "summary.json").read_text(encoding="utf-8"))
+    assert summary | {"wall_time": 0.0} == result.summary | {"wall_time": 0.0}
+
+
+def test_waveforms_have_units_and_names(result: cosim.Result, tmp_path: Path) -> None:
+    """As another program reads them from the file, whose numbers are those of the table."""
+    waves = result.waveforms
+    result.save(tmp_path)
+    assert xr.load_dataset(tmp_path / "waveforms.nc").identical(waves)
+    with netCDF4.Dataset(tmp_path / "waveforms.nc") as file:
+        assert file["v_part"].units == "m/s" and file["v_part"].long_name == "velocity of the part"
+    table = read_csv(tmp_path / "waveforms.csv")
+    assert list(table) == ["time", *map(str, waves.data_vars)]
+    for name, values in table.items():
+        np.testing.assert_allclose(waves[name].values, values, rtol=1e-9, atol=1e-12)
+        assert waves[name].dims == ("time",) and waves[name].attrs["long_name"]
+
+
+def test_plot_and_html(result: cosim.Result) -> None:
+    figure = result.plot()
+    assert isinstance(figure, Figure) and len(figure.axes) >= 6
+    html = result._repr_html_()
+    image = html.partition("base64,")[2].partition('"')[0]
+    assert b64decode(image, validate=True).startswith(PNG)
+    assert f"{result.summary['v_average'] * 1e3:+.3f} mm/s" in html
+
+
+def test_scenes_from_scenes() -> None:
+    scene = cosim.load("paper", {"drive.frequency": np.float64(30)})
+    assert scene.drive.frequency == 30.0 and cosim.load(scene) == scene
+    assert cosim.load(scene, ["drive.frequency=31"]).drive.frequency == 31.0
+    assert cosim.load(scene, {"drive.pot_frequency": 0.5}).drive.frequency == pytest.approx(50.5)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (
+            {"frequency": 30},
+            "frequency must be table.key; did you mean drive.frequency?",
+        ),
+        ({"drive.frequncy": 30}, "did you mean drive.frequency?"),
+        ({"drive.frequency": -1}, "overrides: drive.frequency = -1 must be a number from 0.01"),
+        ({"drive.frequency": None}, "overrides: drive.frequency = None must be a number"),
+        ("drive.frequency=30", "not one string"),
+    ],
+)
+def test_bad_overrides(overrides: dict[str, object], words: str) -> None:
+    with pytest.raises(cosim.BadInput) as caught:
+        cosim.run("paper", overrides)
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_names_of_a_sweep() -> None:
+    """A key by itself where that can be typed, else with its table."""
+    over = {"coil.count": [1, 2], "drive.amplitude": [6.0, 8.0], "circuit.reltol": [1e-5]}
+    data = cosim.sweep("ideal-current", over, SHORT, workers=1)
+    assert data.sizes == {"coil_count": 2, "amplitude": 2, "reltol": 1}
+    assert data.amplitude.attrs["key"] == "drive.amplitude" and data.amplitude.units == "V"
+    assert callable(data.count)
+
+
+def test_knobs_have_volts_and_hertz_beside_them() -> None:
+    """What they stand for is what a scene with these knobs says."""
+    over = {
+        "drive.pot_max": [0.3, 0.5],
+        "drive.pot_frequency": [0.6, 0.8, 0.9],
+        "drive.pot_offset": [0.2],
+    }
+    data = cosim.sweep("ideal-current", over, SHORT, workers=2)
+    assert (data.amplitude.units, data.frequency.units, data.offset.units) == ("V", "Hz", "V")
+    for place in ({"pot_max": 1, "pot_frequency": 2}, {"pot_max": 0, "pot_frequency": 0}):
+        point = data.isel(place, drop=False).squeeze()
+        knobs = {f"drive.{knob}": float(point[knob]) for knob in ("pot_max", "pot_frequency")}
+        drive = cosim.load("ideal-current", knobs | {"drive.pot_offset": 0.2}).drive
+        found = [float(point[name]) for name in ("amplitude", "frequency", "offset")]
+        assert found == [drive.amplitude, drive.frequency, drive.offset]
+
+
+def test_tune_theory_and_compare(tmp_path: Path, result: cosim.Result) -> None:
+    over = {"drive.offset": (-2.0, 0.0)}
+    tuning = cosim.tune("ideal-current", SHORT, maximise="v_average", over=over, budget=24)
+    assert tuning.best.value == max(run.value for run in tuning.runs if run.value is not None)
+    again = cosim.run(tuning.scene).summary["v_average"]
+    assert again == pytest.approx(tuning.best.value, rel=1e-6)
+    tuning.save(tmp_path / "tune")
+    with pytest.raises(cosim.BadInput, match="either maximise or minimise"):
+        cosim.tune("ideal-current", over=over)
+    assert cosim.theory().numbers["up"]["v_average_over_gT"] == pytest.approx(0.31065088757)
+    with pytest.raises(cosim.BadInput, match="too small"):
+        cosim.theory(f_n=1.0)
+    long = cosim.run("ideal-current", {"run.duration": 0.6, "run.settle": 0.3})
+    long.save(tmp_path)
+    assert main(["export", str(tmp_path), "--as", "tracker"]) == 0
+    compared = [cosim.compare(run, tmp_path / "tracker.csv") for run in (long, tmp_path)]
+    for found in compared:
+        assert found.metrics.velocity_r2 == pytest.approx(1.0, abs=1e-6)
+        assert isinstance(found.plot(), Figure)
+
+
+@pytest.mark.parametrize("way", ["stdin", "script"])
+def test_without_a_main_guard(way: str, tmp_path: Path) -> None:
+    """A netlist of one's own and a sweep, which both run in processes of their own."""
+    program = PROGRAM.format(own=OWN, short=SHORT)
+    (tmp_path / "script.py").write_text(program, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-" if way == "stdin" else "script.py"],
+        input=program if way == "stdin" else None,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    own, (point, failed) = done.stdout.splitlines()[0], done.stdout.splitlines()[1].split()
+    assert float(own) == cosim.run("paper", OWN).summary["v_average"]
+    alone = cosim.run("ideal-current", SHORT | {"drive.amplitude": 8, "drive.frequency": 20})
+    assert float(point) == pytest.approx(alone.summary["v_average"], rel=1e-6)
+    assert failed == "0" and (tmp_path / "own.png").read_bytes().startswith(PNG)
+
+
+def test_notebook() -> None:
+    import nbformat
+    from nbclient import NotebookClient
+
+    path = REPOSITORY / "examples" / "library.ipynb"
+    notebook = nbformat.read(path, as_version=4)
+    client = NotebookClient(
+        notebook, timeout=300, resources={"metadata": {"path": str(path.parent)}}
+    )
+    client.execute()
+    shown = [
+        {kind for output in cell.outputs for kind in output.get("data", {})}
+        for cell in notebook.cells
+        if cell.cell_type == "code"
+    ]
+    assert "text/html" in shown[0] and "image/png" in shown[-1]
+
+
+def test_import_is_light() -> None:
+    program = (
+        "import sys, cosim; cosim.BadInput; "
+        "print(*{'numpy', 'xarray', 'matplotlib', 'pydantic', 'scipy'} & sys.modules.keys()); "
+        "cosim.load('paper'); print(*{'xarray', 'matplotlib', 'scipy'} & sys.modules.keys())"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.stdout.split("\n")[:2], done.stderr) == (["", ""], "")
