@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cosim.errors import BadInput, SimulationFailed
+from cosim.version import __version__
 
 if TYPE_CHECKING:
     from cosim.scene import load
@@ -20,12 +21,11 @@ if TYPE_CHECKING:
     from cosim.studies.tune import tune
     from cosim.waveforms.result import Result
 
-__version__ = "0.1.0"
-
 __all__ = [
     "BadInput",
     "Result",
     "SimulationFailed",
+    "__version__",
     "compare",
     "fit",
     "load",

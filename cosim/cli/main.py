@@ -10,10 +10,10 @@ import warnings
 from io import TextIOWrapper
 from typing import NoReturn, TextIO
 
-from cosim import __version__
 from cosim.cli.command import add_commands
 from cosim.errors import BadInput, CosimError, NoEffect
 from cosim.files.declared import declared
+from cosim.version import __version__
 
 INTERRUPTED = 130
 

@@ -12,10 +12,10 @@ def _options(parser: ArgumentParser) -> None:
 
 
 def _run(arguments: Namespace) -> None:
-    from cosim.studies.stability import stability
+    from cosim.studies.stability import report
 
     with writable(arguments.out):
-        stability.run(arguments.out, arguments.quick)
+        report.run(arguments.out, arguments.quick)
 
 
 COMMAND = Command("stability", "largest stable macro step of every coupling method", _run, _options)

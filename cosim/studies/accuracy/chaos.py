@@ -8,15 +8,13 @@ ensemble's own spread leaves open.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import hypot, sqrt
 from pathlib import Path
-from statistics import mean, stdev
 
 import numpy as np
 
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
+from cosim.studies.accuracy.ensemble import Ensemble
 from cosim.studies.accuracy.figures import draw_chaos
 from cosim.studies.tables import Row, write_csv, write_page
 from cosim.waveforms.result import Result
@@ -37,24 +35,6 @@ METHODS = {
     "mean current, 0.2 ms": ("coupling.method=mean-current", "coupling.macro_step=2e-4"),
 }
 """What is compared with the first of them."""
-
-
-@dataclass(frozen=True)
-class Ensemble:
-    """Values of each statistic, one a member."""
-
-    name: str
-    values: dict[str, list[float]]
-
-    def mean(self, statistic: str) -> tuple[float, float]:
-        """Mean and its standard error."""
-        found = self.values[statistic]
-        return mean(found), stdev(found) / sqrt(len(found))
-
-    def apart(self, other: "Ensemble", statistic: str) -> float:
-        """Distance of two means in units of the standard error of their difference."""
-        (a, ea), (b, eb) = self.mean(statistic), other.mean(statistic)
-        return abs(a - b) / (hypot(ea, eb) or 1.0)
 
 
 def solved(scene: Sequence[str], more: Sequence[str], change: float = 0.0) -> Result:

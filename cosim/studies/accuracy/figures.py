@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 
 from cosim.studies.accuracy.cases import CASES
+from cosim.studies.accuracy.ensemble import Ensemble
 from cosim.studies.accuracy.runs import Run
 from cosim.studies.plots import (
     BLUE,
@@ -21,9 +21,6 @@ from cosim.studies.plots import (
     panels,
 )
 from cosim.studies.tables import Row
-
-if TYPE_CHECKING:
-    from cosim.studies.accuracy.chaos import Ensemble
 
 CREEP, ERROR = "creep of a held part [µm/s]", "error in the machine / range"
 """Columns of the study of friction laws, and the labels of its axes."""
@@ -79,7 +76,7 @@ _STATISTICS = {
 """Labels, and factors to their units."""
 
 
-def draw_chaos(ensembles: Sequence["Ensemble"], title: str, path: Path) -> None:
+def draw_chaos(ensembles: Sequence[Ensemble], title: str, path: Path) -> None:
     """Draw each statistic of each method: a tick a run, the mean and two standard errors."""
     note = "One tick a run; dot and bar: their mean with two standard errors."
     figure, axes = panels(title, note, (11.0, 3.4), 1, len(_STATISTICS), sharey=True)

@@ -1,16 +1,34 @@
-"""What the limits of the stability study say: the page and the figure."""
+"""The stability study: its run, and what the limits say on a page and in a figure."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from cosim.coupling.rewind.methods import ORDERS
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, End, label_ends, panels
 from cosim.studies.stability.machines import DIRECT
-from cosim.studies.stability.stability import LONGEST, METHODS, Limit
-from cosim.studies.tables import Row, span, write_page
+from cosim.studies.stability.stability import (
+    LONGEST,
+    METHODS,
+    REGIMES,
+    Limit,
+    limits,
+    over_strength,
+    with_limits,
+)
+from cosim.studies.tables import Row, span, write_csv, write_page
 
 _COLORS = {1: ORANGE, 2: BLUE, 3: GREEN}
 """By the order of a method."""
+
+
+def run(out: Path, quick: bool) -> None:
+    """Write ``stability`` as png, csv and md into ``out``, and print what it shows."""
+    regimes = [*(REGIMES[:1] if quick else REGIMES), *over_strength(3 if quick else 9)]
+    found = list(limits(regimes))
+    write_csv(out / "stability.csv", [asdict(limit) for limit in found])
+    print(write(out, found, list(with_limits((4e-3, 5e-3, 6e-3)))))
+    print(f"Written to {out}: stability.{{csv,md,png}}")
 
 
 def write(out: Path, limits: Sequence[Limit], clamped: Sequence[Row]) -> str:

@@ -6,8 +6,7 @@ the FMU as the mechanics or, at the other cut, with the same linear participants
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,7 +30,7 @@ from cosim.studies.stability.machines import (
     linear_sides,
     scene_of,
 )
-from cosim.studies.tables import Row, write_csv
+from cosim.studies.tables import Row
 
 LONGEST = 0.1
 """s; a method that is stable up to here counts as one without a limit."""
@@ -175,14 +174,3 @@ def with_limits(steps: Sequence[float]) -> Iterator[Row]:
             "least current [A]": float(late.min()),
             "greatest current [A]": float(late.max()),
         }
-
-
-def run(out: Path, quick: bool) -> None:
-    """Write ``stability`` as png, csv and md into ``out``, and print what it shows."""
-    from cosim.studies.stability import report
-
-    regimes = [*(REGIMES[:1] if quick else REGIMES), *over_strength(3 if quick else 9)]
-    found = list(limits(regimes))
-    write_csv(out / "stability.csv", [asdict(limit) for limit in found])
-    print(report.write(out, found, list(with_limits((4e-3, 5e-3, 6e-3)))))
-    print(f"Written to {out}: stability.{{csv,md,png}}")
