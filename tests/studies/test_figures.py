@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from cosim.studies.accuracy import figures
+from cosim.files.picture import Picture
 from cosim.studies.accuracy import report as accuracy
 from cosim.studies.accuracy.runs import FALSE_CYCLE, Run
 from cosim.studies.accuracy.solvers import SOLVERS
@@ -35,8 +35,7 @@ def read(kind: type[Any], name: str) -> list[Any]:
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """Figures in the place of files."""
     found: list[Figure] = []
-    for module in (figures, stability):
-        monkeypatch.setattr(module, "save", lambda figure, path: found.append(figure))
+    monkeypatch.setattr(Picture, "write", lambda figure, path: found.append(figure))
     return found
 
 
