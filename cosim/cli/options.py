@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 
 if TYPE_CHECKING:
     from tqdm import tqdm
@@ -81,8 +81,6 @@ def writable(folder: Path) -> Iterator[None]:
 
     Folders that were made for a run that then fails go again, unless something is in them.
     """
-    from cosim.scene.messages import plain
-
     made: list[Path] = []
     try:
         try:

@@ -81,12 +81,10 @@ class Scene(BaseModel):
                     f"coil.{key} = {inductance:g} H must be at least {FASTEST * resistance:.3g} H "
                     f'with circuit.model = "{self.rung.name}" and {resistance:g} Ohm around it, or '
                     "the current changes too fast to be solved with the mechanics",
-                    f"coil.{key}",
                     "coil.resistance",
                     "coil.eddy_resistance",
                     "coil.count",
                     "circuit.sense_resistance",
-                    "circuit.model",
                 )
         return self
 
@@ -111,8 +109,6 @@ class Scene(BaseModel):
                 raise fault(
                     f"drive.phase_deg lets two surfaces move by themselves; with it {full} = "
                     f"{shown} must be {words}",
-                    full,
-                    "drive.phase_deg",
                 )
         return self
 
@@ -123,23 +119,16 @@ class Scene(BaseModel):
             raise fault(
                 'drive.pwm_ripple = true needs circuit.model = "full", which has the filter of '
                 "the offset pin",
-                "drive.pwm_ripple",
-                "circuit.model",
             )
         if drive.waveform in ("optimal", "quaid", "file") and self.rung.driven:
             raise fault(
                 f'drive.waveform = "{drive.waveform}" gives the surface its velocity, which needs '
                 'circuit.model = "none"',
-                "drive.waveform",
-                "circuit.model",
             )
         if self.friction.normal_force_file and self.surface_is_given:
             raise fault(
                 f'drive.waveform = "{drive.waveform}" with circuit.model = "none" moves the part '
                 "at a constant friction.normal_force, not at that of friction.normal_force_file",
-                "friction.normal_force_file",
-                "drive.waveform",
-                "circuit.model",
             )
         if not self.rung.driven:
             return self
@@ -154,7 +143,6 @@ class Scene(BaseModel):
             raise fault(
                 f"drive.amplitude = {drive.amplitude:g} V must be a number from 0 to "
                 f"{reach:.4g} V {why}, whose DAC ends at {firmware.V_REFERENCE} V",
-                "drive.amplitude",
                 "drive.pot_max",
                 "circuit.model",
                 "drive.quantised",
@@ -167,8 +155,6 @@ class Scene(BaseModel):
                 f"drive.offset = {drive.offset:g} V must be a number from {-half:.4g} to "
                 f"{reach - half:.4g} V {why} and drive.amplitude = {drive.amplitude:g} V, "
                 f"for its offset pin gives 0 to {firmware.V_REFERENCE} V",
-                "drive.offset",
-                "drive.amplitude",
                 "drive.pot_max",
                 "circuit.model",
                 "drive.quantised",

@@ -46,8 +46,12 @@ def _declared(default: str, lead: str, registry: Mapping[str, Rung | CouplingMet
     return Field(default, pattern=pattern, description=f"{lead}; {text}", json_schema_extra=extra)
 
 
-def fault(sentence: str, *keys: str) -> PydanticCustomError:
-    """A failed check between ``keys`` ("table.key"), told in a ``sentence`` without its dot."""
+def fault(sentence: str, *unnamed: str) -> PydanticCustomError:
+    """A failed check between the keys ("table.key") that ``sentence``, without its dot, names.
+
+    It is told of the layer that gave the last of these, or of the ``unnamed`` that play a part too.
+    """
+    keys = [*re.findall(r"\b[a-z]+\.[a-z]\w*", sentence), *unnamed]
     return PydanticCustomError("check", "{sentence}", {"sentence": sentence, "keys": keys})
 
 
@@ -55,7 +59,7 @@ def _both_or_neither(table: str, values: BaseModel, *pair: str) -> None:
     missing = [key for key in pair if getattr(values, key) is None]
     if len(missing) == 1:
         (there,) = set(pair) - set(missing)
-        raise fault(f"{table}.{there} needs {table}.{missing[0]} beside it", f"{table}.{there}")
+        raise fault(f"{table}.{there} needs {table}.{missing[0]} beside it")
 
 
 def is_number(value: object) -> bool:
@@ -138,8 +142,6 @@ class Drive(Table):
             if data.get(knob) is not None and key in data:
                 raise fault(
                     f"drive.{knob} and drive.{key} say the same thing twice; give one of them",
-                    f"drive.{knob}",
-                    f"drive.{key}",
                 )
 
         def turned(knob: str) -> float | None:
@@ -162,8 +164,6 @@ class Drive(Table):
         if self.file is not None and self.waveform != "file":
             raise fault(
                 f'drive.file is for drive.waveform = "file", not for "{self.waveform}"',
-                "drive.file",
-                "drive.waveform",
             )
         if self.waveform != "sawtooth":
             for key in ("quantised", "reset_time", "loop_time", *KNOBS):
@@ -171,8 +171,6 @@ class Drive(Table):
                     raise fault(
                         f'drive.{key} is for drive.waveform = "sawtooth" only, '
                         f'not for "{self.waveform}"',
-                        f"drive.{key}",
-                        "drive.waveform",
                     )
         period = 1 / self.frequency
         # shorter than this the fall could not be told from a jump after hours of simulated time
@@ -180,29 +178,21 @@ class Drive(Table):
             raise fault(
                 f"drive.reset_time = {self.reset_time:g} s must be 0, or at least 1e-09 s and "
                 f"below the period of {period:g} s at drive.frequency = {self.frequency:g} Hz",
-                "drive.reset_time",
-                "drive.frequency",
             )
         if self.quantised and self.reset_time:
             raise fault(
                 f"drive.reset_time = {self.reset_time:g} s must be 0 with drive.quantised = true, "
                 "whose reset is sharp",
-                "drive.reset_time",
-                "drive.quantised",
             )
         if self.loop_time and not (self.quantised and self.loop_time >= 5e-6):
             raise fault(
                 f"drive.loop_time = {self.loop_time:g} s must be 0, or at least 5e-06 s with "
                 "drive.quantised = true",
-                "drive.loop_time",
-                "drive.quantised",
             )
         if self.quantised and not 0.1 <= self.frequency <= 1e4:
             raise fault(
                 f"drive.frequency = {self.frequency:g} Hz must be a number from 0.1 to 10000 Hz "
                 "with drive.quantised = true",
-                "drive.frequency",
-                "drive.quantised",
             )
         return self
 
@@ -245,15 +235,11 @@ class Circuit(Table):
             if key in rung.keys and (loss := getattr(self, key)) >= self.supply:
                 raise fault(
                     f"circuit.{key} = {loss:g} V must be below circuit.supply = {self.supply:g} V",
-                    f"circuit.{key}",
-                    "circuit.supply",
                 )
         _both_or_neither("circuit", self, "snubber_resistance", "snubber_capacitance")
         if rung.own_netlist != (self.netlist is not None):
             raise fault(
                 'circuit.model = "file" and circuit.netlist must be given together',
-                "circuit.netlist",
-                "circuit.model",
             )
         return self
 
@@ -319,7 +305,7 @@ class Friction(Table):
     def _one_force(cls, data: Any) -> Any:
         if isinstance(data, dict) and None not in map(data.get, NORMAL_FORCES):
             one, other = (f"friction.{key}" for key in NORMAL_FORCES)
-            raise fault(f"{one} and {other} say the same thing twice; give one of them", one, other)
+            raise fault(f"{one} and {other} say the same thing twice; give one of them")
         return data
 
     @model_validator(mode="after")
@@ -327,8 +313,6 @@ class Friction(Table):
         if self.mu_k > self.mu_s:
             raise fault(
                 f"friction.mu_k = {self.mu_k:g} must be at most friction.mu_s = {self.mu_s:g}",
-                "friction.mu_k",
-                "friction.mu_s",
             )
         return self
 
@@ -357,7 +341,6 @@ class Coupling(Table):
             raise fault(
                 f'coupling.method = "{method}" repeats steps, which ngspice cannot; it is for '
                 "cosim.coupling's other participants",
-                "coupling.method",
             )
         return data
 
@@ -402,16 +385,12 @@ class Run(Table):
             if (value := getattr(self, key)) >= self.duration:
                 raise fault(
                     f"run.{key} = {value:g} s must be below run.duration = {self.duration:g} s",
-                    f"run.{key}",
-                    "run.duration",
                 )
         if self.duration / self.output_step > MAX_ROWS:
             raise fault(
                 f"run.output_step = {self.output_step:g} s makes more than {MAX_ROWS} rows in "
                 f"run.duration = {self.duration:g} s; it must be at least "
                 f"{self.duration / MAX_ROWS:g} s",
-                "run.output_step",
-                "run.duration",
             )
         return self
 

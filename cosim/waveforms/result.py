@@ -1,6 +1,5 @@
 """A finished run: its waveforms, its summary, its figure and its files."""
 
-import json
 import os
 from base64 import b64encode
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from cosim.files.atomic import write_text
+from cosim.files.atomic import write_json, write_text
 from cosim.scene import Scene, to_toml
 from cosim.waveforms.columns import COLUMNS, UNITS
 from cosim.waveforms.report import table
@@ -46,11 +45,7 @@ class Result:
         import xarray as xr
 
         variables = {
-            name: (
-                "time",
-                values,
-                {"units": COLUMNS[name].unit, "long_name": COLUMNS[name].long_name},
-            )
+            name: ("time", values, {"units": UNITS[name], "long_name": COLUMNS[name].long_name})
             for name, values in self.columns.items()
         }
         return xr.Dataset(variables, attrs=self._attributes())
@@ -71,7 +66,7 @@ class Result:
         write_csv(out / "waveforms.csv", self.columns, UNITS)
         write_netcdf(out / "waveforms.nc", self.columns, UNITS, self._attributes())
         write_text(out / "scene.toml", to_toml(self.scene))
-        write_text(out / "summary.json", json.dumps(self.summary, indent=2, allow_nan=False) + "\n")
+        write_json(out / "summary.json", self.summary)
         self.plot().write(out / "figure.png")
 
     def _attributes(self) -> dict[str, str]:

@@ -7,13 +7,13 @@ of them. All are made before the first file is written: one that fails leaves no
 
 from collections import Counter
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.files.atomic import whole
 from cosim.files.declared import declared
-from cosim.scene.messages import plain
-from cosim.waveforms.formats.source import Exported, Format, Run, read
+from cosim.waveforms.formats.source import Format, Run, read
 
 __all__ = ["export", "formats", "parse", "read"]
 
@@ -42,9 +42,9 @@ def export(run: Run, names: list[str], out: Path) -> dict[str, str]:
     Returns the name of each file with a line on what it holds. Raises BadInput for a run that does
     not have what a format needs; then nothing is written.
     """
-    chosen = [formats()[name] for name in names]
-    made: dict[str, Exported] = {format.file: format.content(run) for format in chosen}
+    made = {formats()[name].file: BytesIO() for name in names}
+    notes = [formats()[name].write(run, made[formats()[name].file]) for name in names]
     for name, file in made.items():
         with whole(out / name) as temporary:
-            temporary.write_bytes(file.content)
-    return {name: file.note for name, file in made.items()}
+            temporary.write_bytes(file.getvalue())
+    return dict(zip(made, notes, strict=True))

@@ -8,14 +8,14 @@ chunk.
 
 import struct
 from fractions import Fraction
+from io import BytesIO
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.errors import BadInput
-from cosim.scene.messages import plain
-from cosim.waveforms.formats.source import Exported, Format, Run
+from cosim.errors import BadInput, plain
+from cosim.waveforms.formats.source import Format, Run
 
 RATE = 48000  # Hz
 LARGEST = 32767
@@ -35,7 +35,7 @@ LONGEST = 600.0  # s
 RAREST = 1e-2  # s, of the rows
 
 
-def content(run: Run) -> Exported:
+def write(run: Run, file: BytesIO) -> str:
     """The whole run from its beginning; half a unit of the last place is the error."""
     for key, value, most in (
         ("output_step", run.step, RAREST),
@@ -51,10 +51,9 @@ def content(run: Run) -> Exported:
     factor = (loudest if loudest > SILENCE else LARGEST * SILENCE) / LARGEST
     samples = np.rint(sound / factor).astype("<i2")
     said = f"surface velocity in m/s = sample * {factor!r}"
-    return Exported(
-        _wave(samples, {"INAM": run.title, "ICMT": said, "ISFT": "cosim"}),
-        f"{len(samples) / RATE:.3g} s at {RATE} Hz; {said}",
-    )
+    about = {"INAM": run.attributes["title"], "ICMT": said, "ISFT": "cosim"}
+    file.write(_wave(samples, about))
+    return f"{len(samples) / RATE:.3g} s at {RATE} Hz; {said}"
 
 
 def resampled(values: npt.NDArray[np.float64], step: float) -> npt.NDArray[np.float64]:
@@ -86,4 +85,4 @@ def _chunk(name: str, data: bytes) -> bytes:
     return name.encode() + struct.pack("<I", len(data)) + data + b"\0" * (len(data) % 2)
 
 
-FORMAT = Format("wav", "surface.wav", "the surface's velocity as sound", content)
+FORMAT = Format("wav", "surface.wav", "the surface's velocity as sound", write)
