@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cosim.errors import plain
+from cosim.errors import BadInput, plain
 from cosim.scene.describe import Key, acts, keys
 from cosim.scene.methods import METHODS, CouplingMethod
 from cosim.scene.model import toml_value
@@ -38,6 +38,11 @@ def suggestion(word: str, known: Iterable[str], what: str = "") -> str:
 def ended(sentence: str) -> str:
     """The sentence with a full stop, unless it is a question."""
     return sentence if sentence.endswith("?") else sentence + "."
+
+
+def bad(sentence: str) -> BadInput:
+    """The error that tells :func:`ended`'s sentence."""
+    return BadInput(ended(sentence))
 
 
 def unknown_table(name: str) -> str:
@@ -101,11 +106,8 @@ def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], defa
         origin = max(layers)[1] if layers else default
         return f"{origin}: {ended(first['ctx']['sentence'])}"
     full = ".".join(str(part) for part in first["loc"])
-    allowed = next((key.allowed for key in keys() if key.full == full), None)
+    key = next((key for key in keys() if key.full == full), None)
+    allowed = key.allowed if key else ALLOWED_TOP.get(full, "a table")
+    hint = suggestion(str(first["input"]), key.choices or ()) if key else ""
     origin = origins.get(full, (0, default))[1]
-    value = shown(first["input"])
-    if allowed is None:
-        return f"{origin}: {full} = {value} must be {ALLOWED_TOP.get(full, 'a table')}."
-    choices = next(key.choices for key in keys() if key.full == full) or ()
-    hint = suggestion(str(first["input"]), choices)
-    return ended(f"{origin}: {full} = {value} must be {allowed}{hint}")
+    return ended(f"{origin}: {full} = {shown(first['input'])} must be {allowed}{hint}")

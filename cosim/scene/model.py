@@ -81,9 +81,7 @@ class Scene(BaseModel):
                     f"coil.{key} = {inductance:g} H must be at least {FASTEST * resistance:.3g} H "
                     f'with circuit.model = "{self.rung.name}" and {resistance:g} Ohm around it, or '
                     "the current changes too fast to be solved with the mechanics",
-                    "coil.resistance",
-                    "coil.eddy_resistance",
-                    "coil.count",
+                    *("coil.resistance", "coil.eddy_resistance", "coil.count"),
                     "circuit.sense_resistance",
                 )
         return self
@@ -138,14 +136,13 @@ class Scene(BaseModel):
             why = "with drive.quantised = true"
         else:
             return self
+        others = ("drive.pot_max", "circuit.model", "drive.quantised")
         reach = firmware.GAIN * firmware.V_REFERENCE
         if drive.amplitude > reach:
             raise fault(
                 f"drive.amplitude = {drive.amplitude:g} V must be a number from 0 to "
                 f"{reach:.4g} V {why}, whose DAC ends at {firmware.V_REFERENCE} V",
-                "drive.pot_max",
-                "circuit.model",
-                "drive.quantised",
+                *others,
             )
         pin = firmware.offset_pin(drive.offset, drive.amplitude)
         # a knob at its end may come out a rounding error outside
@@ -155,9 +152,7 @@ class Scene(BaseModel):
                 f"drive.offset = {drive.offset:g} V must be a number from {-half:.4g} to "
                 f"{reach - half:.4g} V {why} and drive.amplitude = {drive.amplitude:g} V, "
                 f"for its offset pin gives 0 to {firmware.V_REFERENCE} V",
-                "drive.pot_max",
-                "circuit.model",
-                "drive.quantised",
+                *others,
             )
         return self
 
