@@ -20,11 +20,9 @@ from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import BadInput
-
-Array = npt.NDArray[np.float64]
 
 MISSING = {"", "nan", "?"}  # once U+FFFD is gone
 TRACKS = {

@@ -6,16 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
+from cosim.arrays import Array
 from cosim.files.picture import Picture
 from cosim.files.spill import release
 from cosim.scene import Scene
 from cosim.trials.camera import FRAME_RATE, three_point_accelerations
-
-Array = npt.NDArray[np.float64]
 
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
 GRIP, SECOND = "#7a5195", "#6fb7e9"

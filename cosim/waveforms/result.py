@@ -8,9 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import numpy.typing as npt
-
+from cosim.arrays import Array
 from cosim.files.atomic import write_json, write_text
 from cosim.scene import Scene, to_toml
 from cosim.waveforms.columns import COLUMNS, UNITS
@@ -21,8 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from cosim.files.picture import Picture
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

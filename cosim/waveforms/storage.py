@@ -5,14 +5,12 @@ from struct import pack
 from typing import IO
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.files.atomic import whole
 from cosim.files.spill import blocks
 from cosim.waveforms.columns import COLUMNS
-
-Array = npt.NDArray[np.float64]
 
 _CSV_ROWS = 1024
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.waveforms.formats.source import Format, Run
 
@@ -56,7 +57,7 @@ def write(run: Run, file: BytesIO) -> str:
     return f"{len(samples) / RATE:.3g} s at {RATE} Hz; {said}"
 
 
-def resampled(values: npt.NDArray[np.float64], step: float) -> npt.NDArray[np.float64]:
+def resampled(values: Array, step: float) -> Array:
     """``values``, ``step`` seconds apart, at the rate of the sound, from the first to the last."""
     from scipy.signal import firwin, resample_poly
 

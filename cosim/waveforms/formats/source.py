@@ -6,13 +6,9 @@ from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
+from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.waveforms.storage import read_netcdf
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,12 @@ written as resting: platform and part across, and the springed plate. No noise i
 from io import BytesIO
 
 import numpy as np
-import numpy.typing as npt
 
 from cosim.errors import BadInput, plain
 from cosim.scene import Scene, load
 from cosim.trials.camera import FRAME_RATE, accelerations, film, frame_count, velocities
 from cosim.trials.tracked import FEWEST_ROWS
 from cosim.waveforms.formats.source import Format, Run
-
-Array = npt.NDArray[np.float64]
 
 MOST_FRAMES = 200_000
 """A trial of more is larger than a file that `cosim compare` reads."""
