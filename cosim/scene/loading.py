@@ -257,11 +257,14 @@ def _merge(layers: list[_Layer]) -> tuple[dict[str, Any], dict[str, tuple[int, s
 def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int, str]]) -> None:
     """Warn of each key that the user changed although circuit, waveform or method ignore it.
 
-    A warning, not an error: comparisons give several circuits the same overrides. No warning where
-    a later layer chose the circuit, waveform or method, nor for a scene.toml, which has every key.
+    Not where a later layer chose these, nor for a scene.toml, which has every key.
     """
     chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
-    resolved = [_is_resolved(layer.tables) for layer in layers]
+    every = [k for k in keys() if k.default is not None and k.name not in KNOBS.values()]
+    silent = [
+        layer.builtin or all(key.name in layer.tables.get(key.table, {}) for key in every)
+        for layer in layers
+    ]
     for key in keys():
         rank, origin = origins.get(key.full, (-1, ""))
         choices = ["circuit.model"]
@@ -269,19 +272,10 @@ def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int,
         steered = key.table == "circuit" and key.name in METHODS[scene.coupling.method].chooses
         choices += ["coupling.method"] * (steered or key.table == "coupling")
         latest = max(origins.get(choice, (-1, ""))[0] for choice in choices)
-        if rank < max(latest, 0) or layers[rank].builtin or resolved[rank]:
+        if rank < max(latest, 0) or silent[rank]:
             continue
         given = [layer.tables.get(key.table, {}) for layer in layers[: rank + 1]]
         values = [key.default, *(table[key.name] for table in given if key.name in table)]
         if values[-1] != values[-2] and not acts(key, *chosen):
             sentence = f"{origin}: {messages.idle(key, *chosen)}."
             warnings.warn(sentence, NoEffect, stacklevel=3)
-
-
-def _is_resolved(tables: dict[str, Any]) -> bool:
-    """Whether a layer gives every key, as the scene.toml of a run does."""
-    return all(
-        key.name in tables.get(key.table, {})
-        for key in keys()
-        if key.default is not None and key.name not in KNOBS.values()
-    )

@@ -1,8 +1,6 @@
-"""The tables of a scene: every key with its unit, default, range and meaning.
+"""The tables of a scene: every key with its SI unit, default, range and meaning.
 
-Validation, error messages and the written ``scene.toml`` read them through
-:func:`cosim.scene.keys`. A key that is a variable of the FMU has them from ``variables.def``. All
-values are SI.
+A key that is a variable of the FMU has them from ``variables.def``.
 """
 
 import re
@@ -53,6 +51,10 @@ def fault(sentence: str, *unnamed: str) -> PydanticCustomError:
     """
     keys = [*re.findall(r"\b[a-z]+\.[a-z]\w*", sentence), *unnamed]
     return PydanticCustomError("check", "{sentence}", {"sentence": sentence, "keys": keys})
+
+
+def _doubled(one: str, other: str) -> PydanticCustomError:
+    return fault(f"{one} and {other} say the same thing twice; give one of them")
 
 
 def _both_or_neither(table: str, values: BaseModel, *pair: str) -> None:
@@ -140,31 +142,24 @@ class Drive(Table):
         data = dict(data)
         for knob, key in KNOBS.items():
             if data.get(knob) is not None and key in data:
-                raise fault(
-                    f"drive.{knob} and drive.{key} say the same thing twice; give one of them",
-                )
+                raise _doubled(f"drive.{knob}", f"drive.{key}")
 
-        def turned(knob: str) -> float | None:
-            # anything else fails in the validation of the knob itself
-            value = data.get(knob)
-            return float(value) if is_number(value) and 0 <= value <= 1 else None
-
-        if (pot := turned("pot_max")) is not None:
-            data["amplitude"] = firmware.knob_amplitude(pot)
-        if (pot := turned("pot_frequency")) is not None:
-            data["frequency"] = firmware.knob_frequency(pot)
+        # anything else fails in the validation of the knob itself
+        pots = {k: data.get(k) for k in KNOBS if is_number(data.get(k)) and 0 <= data[k] <= 1}
+        if "pot_max" in pots:
+            data["amplitude"] = firmware.knob_amplitude(pots["pot_max"])
+        if "pot_frequency" in pots:
+            data["frequency"] = firmware.knob_frequency(pots["pot_frequency"])
         amplitude = data.get("amplitude", cls.model_fields["amplitude"].default)
-        if (pot := turned("pot_offset")) is not None and is_number(amplitude):
-            data["offset"] = firmware.knob_offset(pot, amplitude)
+        if "pot_offset" in pots and is_number(amplitude):
+            data["offset"] = firmware.knob_offset(pots["pot_offset"], amplitude)
         return data
 
     @model_validator(mode="after")
     def _check(self) -> "Drive":
         # The other way round is told when it is run, so that a scene can leave the file open.
         if self.file is not None and self.waveform != "file":
-            raise fault(
-                f'drive.file is for drive.waveform = "file", not for "{self.waveform}"',
-            )
+            raise fault(f'drive.file is for drive.waveform = "file", not for "{self.waveform}"')
         if self.waveform != "sawtooth":
             for key in ("quantised", "reset_time", "loop_time", *KNOBS):
                 if getattr(self, key):
@@ -234,13 +229,11 @@ class Circuit(Table):
         for key in ("swing_loss_high", "swing_loss_low"):
             if key in rung.keys and (loss := getattr(self, key)) >= self.supply:
                 raise fault(
-                    f"circuit.{key} = {loss:g} V must be below circuit.supply = {self.supply:g} V",
+                    f"circuit.{key} = {loss:g} V must be below circuit.supply = {self.supply:g} V"
                 )
         _both_or_neither("circuit", self, "snubber_resistance", "snubber_capacitance")
         if rung.own_netlist != (self.netlist is not None):
-            raise fault(
-                'circuit.model = "file" and circuit.netlist must be given together',
-            )
+            raise fault('circuit.model = "file" and circuit.netlist must be given together')
         return self
 
 
@@ -304,15 +297,14 @@ class Friction(Table):
     @classmethod
     def _one_force(cls, data: Any) -> Any:
         if isinstance(data, dict) and None not in map(data.get, NORMAL_FORCES):
-            one, other = (f"friction.{key}" for key in NORMAL_FORCES)
-            raise fault(f"{one} and {other} say the same thing twice; give one of them")
+            raise _doubled(*(f"friction.{key}" for key in NORMAL_FORCES))
         return data
 
     @model_validator(mode="after")
     def _check(self) -> "Friction":
         if self.mu_k > self.mu_s:
             raise fault(
-                f"friction.mu_k = {self.mu_k:g} must be at most friction.mu_s = {self.mu_s:g}",
+                f"friction.mu_k = {self.mu_k:g} must be at most friction.mu_s = {self.mu_s:g}"
             )
         return self
 
@@ -384,7 +376,7 @@ class Run(Table):
         for key in ("settle", "output_step"):
             if (value := getattr(self, key)) >= self.duration:
                 raise fault(
-                    f"run.{key} = {value:g} s must be below run.duration = {self.duration:g} s",
+                    f"run.{key} = {value:g} s must be below run.duration = {self.duration:g} s"
                 )
         if self.duration / self.output_step > MAX_ROWS:
             raise fault(

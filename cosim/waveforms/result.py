@@ -26,9 +26,8 @@ class Result:
     """A finished run.
 
     ``columns`` are the waveforms as arrays of equal length, SI, by the names of
-    :data:`cosim.waveforms.columns.COLUMNS`; those of a long run are mapped from a file that goes
-    with them. ``summary`` holds the numbers of the run, SI. ``scene`` is what was run, in which the
-    choices of ``"auto"`` are made.
+    :data:`cosim.waveforms.columns.COLUMNS`; ``summary`` holds the numbers of the run, SI; ``scene``
+    is what was run, with the choices of ``"auto"`` made.
     """
 
     scene: Scene

@@ -94,8 +94,7 @@ def netcdf(
 
 
 def _about(name: str, unit: str) -> dict[str, str]:
-    long_name = {"long_name": COLUMNS[name].long_name} if name in COLUMNS else {}
-    return {"units": unit, **long_name}
+    return {"units": unit} | ({"long_name": COLUMNS[name].long_name} if name in COLUMNS else {})
 
 
 def _name(text: str) -> bytes:

@@ -1,8 +1,7 @@
 """A finished run in the formats of other programs, one format a module.
 
 A module declares its format as ``FORMAT`` and imports nothing heavy at its top. Every format is
-made from ``waveforms.nc``, which holds the run's numbers in full; ``waveforms.csv`` has ten digits
-of them. All are made before the first file is written: one that fails leaves no others behind.
+made from ``waveforms.nc``, whose numbers have all their digits.
 """
 
 from collections import Counter
@@ -39,8 +38,8 @@ def parse(lists: list[str]) -> list[str]:
 def export(run: Run, names: list[str], out: Path) -> dict[str, str]:
     """Write the run in each of the formats into the folder ``out``.
 
-    Returns the name of each file with a line on what it holds. Raises BadInput for a run that does
-    not have what a format needs; then nothing is written.
+    Returns the name of each file with a line on what it holds. Raises BadInput, and then writes
+    nothing, for a run that lacks what a format needs.
     """
     made = {formats()[name].file: BytesIO() for name in names}
     notes = [formats()[name].write(run, made[formats()[name].file]) for name in names]

@@ -14,9 +14,7 @@ TYPES = {"s": ("time", "{}"), "V": ("voltage", "v({})"), "A": ("current", "i({})
 """The type and the form of the name that go with a unit."""
 
 TITLE_BYTES = 400
-"""ngspice reads lines of 511 bytes, and takes the rest of a longer one for a line of its own, which
-can be a command.
-"""
+"""ngspice takes what is beyond 511 bytes for a line of its own, which can be a command."""
 
 
 def write(run: Run, file: BytesIO) -> str:

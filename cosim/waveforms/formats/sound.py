@@ -1,9 +1,8 @@
 """The surface's velocity as sound: WAV, mono, 16 bit, 48 kHz.
 
-The rows are resampled with a linear-phase low-pass filter (Kaiser window, about 118 dB) whose edge
-is at half the lower of the two rates; what is within 6 % of that edge is on the filter's slope. The
-loudest sample is 32767, and the factor to m/s stands in the file, as the comment of its LIST/INFO
-chunk.
+A linear-phase low-pass filter (Kaiser window, about 118 dB) resamples the rows; its edge is at half
+the lower of the two rates, its slope within 6 % of that. The loudest sample is 32767, and the
+factor to m/s is the comment in the file's LIST/INFO chunk.
 """
 
 import struct
@@ -28,9 +27,7 @@ HALF_LENGTH = 64
 """Samples, of the lower rate, that the filter reaches to either side."""
 
 LARGEST_TERM = 10_000
-"""Largest term of the fraction that stands for the ratio of the rates. Rounding the ratio of an odd
-``run.output_step`` to it changes the pitch by less than 1e-4, a fifth of a cent.
-"""
+"""Of the fraction for the ratio of the rates: rounding changes the pitch by less than 1e-4."""
 
 LONGEST = 600.0  # s
 RAREST = 1e-2  # s, of the rows

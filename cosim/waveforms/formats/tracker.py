@@ -1,9 +1,7 @@
 """A tracked trial made of a run: the header, units, sampling and digits of the published trials.
 
-The camera is that of `cosim compare`: heights at 960 frames/s from ``run.settle`` on (from the
-run's beginning where a trial moves the surface), velocities and accelerations by the tracker's
-differences. The published scripts read it in place of a trial. What the model holds at rest is
-written as resting: platform and part across, and the springed plate. No noise is added.
+The camera is that of `cosim compare`, without noise. What the model holds at rest is written as
+resting: platform and part across, and the springed plate.
 """
 
 from io import BytesIO
