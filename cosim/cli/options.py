@@ -64,6 +64,12 @@ def add_quick(parser: ArgumentParser, text: str) -> None:
     parser.add_argument("--quick", action="store_true", help=text)
 
 
+def add_study(parser: ArgumentParser) -> None:
+    """``--quick`` and ``--out`` of a chart that is one long study."""
+    add_quick(parser, "a part of it, in a fraction of the time")
+    add_out(parser, "results")
+
+
 def add_out(parser: ArgumentParser, default: str, known: bool = True) -> None:
     """``--out``; None by default where the default is not ``known`` before the scene is."""
     parser.add_argument(

@@ -177,15 +177,11 @@ def _parsed(overrides: Iterable[str]) -> Iterator[tuple[str, Any]]:
         full = left.strip()
         table, _, key = full.partition(".")
         if not (equals and table and key):
-            raise messages.bad(f"--set {plain(text)}: must be table.key=value{_full_name(full)}")
+            hint = messages.full_name(full)
+            raise messages.bad(f"--set {plain(text)}: must be table.key=value{hint}")
         if not right.strip():
             raise BadInput(f"--set {plain(text)}: has no value.")
         yield full, _value(right.strip())
-
-
-def _full_name(bare: str) -> str:
-    full = next((key.full for key in keys() if key.name == bare), None)
-    return f"; did you mean {full}?" if full else ""
 
 
 def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
@@ -194,7 +190,7 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
     for full, value in values:
         table, dot, key = full.partition(".")
         if not dot:
-            raise messages.bad(f"{origin}: {full} must be table.key{_full_name(full)}")
+            raise messages.bad(f"{origin}: {full} must be table.key{messages.full_name(full)}")
         _check_names({table: {key: None}}, origin)
         if isinstance(value, os.PathLike):
             value = os.fspath(value)

@@ -35,6 +35,12 @@ def suggestion(word: str, known: Iterable[str], what: str = "") -> str:
     return f"; did you mean {what}{near[0]}?" if near else ""
 
 
+def full_name(bare: str) -> str:
+    """``; did you mean table.key?`` if a key is called ``bare``, else the empty string."""
+    full = next((key.full for key in keys() if key.name == bare), None)
+    return f"; did you mean {full}?" if full else ""
+
+
 def ended(sentence: str) -> str:
     """The sentence with a full stop, unless it is a question."""
     return sentence if sentence.endswith("?") else sentence + "."
@@ -47,24 +53,21 @@ def bad(sentence: str) -> BadInput:
 
 def unknown_table(name: str) -> str:
     """A sentence on an unknown table, or on a key outside its table."""
-    holders = [key.full for key in keys() if key.name == name]
-    hint = f"; did you mean {holders[0]}?" if holders else suggestion(name, TABLES)
-    return f'there is no table "{plain(name)}"' + (hint or f" (tables: {', '.join(TABLES)})")
+    hint = full_name(name) or suggestion(name, TABLES) or f" (tables: {', '.join(TABLES)})"
+    return f'there is no table "{plain(name)}"{hint}'
 
 
 def unknown_key(table: str, name: str) -> str:
     """A sentence on a key that its table does not have."""
     here = [key.name for key in keys() if key.table == table]
-    elsewhere = [key.full for key in keys() if key.name == name]
     full = f"{table}.{name}"
     hint = (
-        f"; did you mean {elsewhere[0]}?"
-        if elsewhere
-        else suggestion(name, here, f"{table}.")
+        full_name(name)
+        or suggestion(name, here, f"{table}.")
         or suggestion(full, [key.full for key in keys()])
         or f" (keys of {table}: {', '.join(here)})"
     )
-    return f'there is no key "{plain(full)}"' + hint
+    return f'there is no key "{plain(full)}"{hint}'
 
 
 def idle(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> str:

@@ -106,7 +106,7 @@ class Scene(BaseModel):
                 shown = f'"{value}"' if isinstance(value, str) else f"{value:g}"
                 raise fault(
                     f"drive.phase_deg lets two surfaces move by themselves; with it {full} = "
-                    f"{shown} must be {words}",
+                    f"{shown} must be {words}"
                 )
         return self
 
@@ -116,17 +116,17 @@ class Scene(BaseModel):
         if drive.pwm_ripple and not self.rung.firmware:
             raise fault(
                 'drive.pwm_ripple = true needs circuit.model = "full", which has the filter of '
-                "the offset pin",
+                "the offset pin"
             )
         if drive.waveform in ("optimal", "quaid", "file") and self.rung.driven:
             raise fault(
                 f'drive.waveform = "{drive.waveform}" gives the surface its velocity, which needs '
-                'circuit.model = "none"',
+                'circuit.model = "none"'
             )
         if self.friction.normal_force_file and self.surface_is_given:
             raise fault(
                 f'drive.waveform = "{drive.waveform}" with circuit.model = "none" moves the part '
-                "at a constant friction.normal_force, not at that of friction.normal_force_file",
+                "at a constant friction.normal_force, not at that of friction.normal_force_file"
             )
         if not self.rung.driven:
             return self

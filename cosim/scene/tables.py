@@ -165,29 +165,29 @@ class Drive(Table):
                 if getattr(self, key):
                     raise fault(
                         f'drive.{key} is for drive.waveform = "sawtooth" only, '
-                        f'not for "{self.waveform}"',
+                        f'not for "{self.waveform}"'
                     )
         period = 1 / self.frequency
         # shorter than this the fall could not be told from a jump after hours of simulated time
         if self.reset_time and not 1e-9 <= self.reset_time < period:
             raise fault(
                 f"drive.reset_time = {self.reset_time:g} s must be 0, or at least 1e-09 s and "
-                f"below the period of {period:g} s at drive.frequency = {self.frequency:g} Hz",
+                f"below the period of {period:g} s at drive.frequency = {self.frequency:g} Hz"
             )
         if self.quantised and self.reset_time:
             raise fault(
                 f"drive.reset_time = {self.reset_time:g} s must be 0 with drive.quantised = true, "
-                "whose reset is sharp",
+                "whose reset is sharp"
             )
         if self.loop_time and not (self.quantised and self.loop_time >= 5e-6):
             raise fault(
                 f"drive.loop_time = {self.loop_time:g} s must be 0, or at least 5e-06 s with "
-                "drive.quantised = true",
+                "drive.quantised = true"
             )
         if self.quantised and not 0.1 <= self.frequency <= 1e4:
             raise fault(
                 f"drive.frequency = {self.frequency:g} Hz must be a number from 0.1 to 10000 Hz "
-                "with drive.quantised = true",
+                "with drive.quantised = true"
             )
         return self
 
@@ -318,11 +318,7 @@ class Coupling(Table):
         1, "1", 0, 2, "Order of extrapolation: held, with the true slope, parabola"
     )
     tolerance: float = _number(
-        1e-3,
-        "1",
-        1e-6,
-        0.5,
-        "With auto: allowed error of the part's height, relative to its range",
+        1e-3, "1", 1e-6, 0.5, "With auto: allowed error of the part's height, relative to its range"
     )
 
     @model_validator(mode="before")
@@ -332,7 +328,7 @@ class Coupling(Table):
         if method in ("iterated", "error-controlled", "event-aware"):
             raise fault(
                 f'coupling.method = "{method}" repeats steps, which ngspice cannot; it is for '
-                "cosim.coupling's other participants",
+                "cosim.coupling's other participants"
             )
         return data
 
@@ -382,7 +378,7 @@ class Run(Table):
             raise fault(
                 f"run.output_step = {self.output_step:g} s makes more than {MAX_ROWS} rows in "
                 f"run.duration = {self.duration:g} s; it must be at least "
-                f"{self.duration / MAX_ROWS:g} s",
+                f"{self.duration / MAX_ROWS:g} s"
             )
         return self
 
