@@ -5,10 +5,6 @@ from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 
 
-def _none(parser: ArgumentParser) -> None:
-    """No options."""
-
-
 @dataclass(frozen=True)
 class Command:
     """A command, or a group whose ``options`` are further commands."""
@@ -17,7 +13,7 @@ class Command:
     help: str
     run: Callable[[Namespace], int | None] | None = None
     """Does it; returns the exit code, None for 0. Raises CosimError. None for a group."""
-    options: Callable[[ArgumentParser], None] = _none
+    options: Callable[[ArgumentParser], None] | None = None
 
 
 def add_commands(
@@ -34,5 +30,5 @@ def add_commands(
     for command in commands:
         one = own.add_parser(command.name, help=command.help, allow_abbrev=False)
         one.set_defaults(call=command.run)
-        if asked is None or command.name in asked:
+        if command.options and (asked is None or command.name in asked):
             command.options(one)

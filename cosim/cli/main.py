@@ -8,7 +8,7 @@ import os
 import sys
 import warnings
 from io import TextIOWrapper
-from typing import NoReturn, TextIO
+from typing import NoReturn
 
 from cosim.cli.command import add_commands
 from cosim.errors import BadInput, CosimError, NoEffect
@@ -40,11 +40,6 @@ def _parser(arguments: list[str]) -> argparse.ArgumentParser:
     return parser
 
 
-def _dispatch(argv: list[str]) -> int:
-    arguments = _parser(argv).parse_args(argv)
-    return arguments.call(arguments) or 0
-
-
 def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     if isinstance(sys.stdout, TextIOWrapper):
@@ -53,7 +48,9 @@ def main(argv: list[str] | None = None) -> int:
         with warnings.catch_warnings():
             warnings.simplefilter("always", NoEffect)
             warnings.showwarning = _note
-            code = _dispatch(sys.argv[1:] if argv is None else argv)
+            argv = sys.argv[1:] if argv is None else argv
+            arguments = _parser(argv).parse_args(argv)
+            code = arguments.call(arguments) or 0
         sys.stdout.flush()
         return code
     except CosimError as error:
@@ -73,14 +70,7 @@ def main(argv: list[str] | None = None) -> int:
         return _told("interrupted.", INTERRUPTED)
 
 
-def _note(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
+def _note(message: Warning | str, *_: object, **__: object) -> None:
     """Print a warning on one line, without its place in the program."""
     print("cosim: note:", " ".join(str(message).split()), file=sys.stderr)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 
 if TYPE_CHECKING:
     from tqdm import tqdm
@@ -64,6 +64,12 @@ def add_quick(parser: ArgumentParser, text: str) -> None:
     parser.add_argument("--quick", action="store_true", help=text)
 
 
+def add_study(parser: ArgumentParser) -> None:
+    """``--quick`` and ``--out`` of a chart that is one long study."""
+    add_quick(parser, "a part of it, in a fraction of the time")
+    add_out(parser, "results")
+
+
 def add_out(parser: ArgumentParser, default: str, known: bool = True) -> None:
     """``--out``; None by default where the default is not ``known`` before the scene is."""
     parser.add_argument(
@@ -81,8 +87,6 @@ def writable(folder: Path) -> Iterator[None]:
 
     Folders that were made for a run that then fails go again, unless something is in them.
     """
-    from cosim.scene.messages import plain
-
     made: list[Path] = []
     try:
         try:

@@ -5,11 +5,9 @@ import math
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import BadInput, plain
-
-Array = npt.NDArray[np.float64]
 
 
 def read_timetable(path: Path, time: tuple[str, ...], value: tuple[str, ...]) -> Array | None:

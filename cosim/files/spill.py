@@ -15,9 +15,8 @@ from weakref import WeakSet
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import BadInput
-
-Array = npt.NDArray[np.float64]
 
 IN_MEMORY = 8 << 20
 """Bytes of a tape that stay in memory: enough for a run of some seconds."""

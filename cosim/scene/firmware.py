@@ -4,22 +4,18 @@ Sources: the driver's schematic (rev 1.0), its firmware, and the Teensy core lib
 a 10-bit code into the upper bits of the 12-bit DAC and compares a 10-bit PWM value with 1024; so a
 code c stands for 3.3 V · c/1024 at either pin.
 
-The firmware keeps its counter in floating point: it starts at the maximum code, falls every 50 µs
-by ``maximum · f · 50 µs``, is truncated when written, and starts again in the step in which it has
-reached zero or less. So the period is 1/f rounded **up** to whole steps. Assumed here: steps of
-exactly 50 µs and exact arithmetic (the real counter is of single precision: now and then a code or
-one step differs). The code 0 that the firmware writes for one pass of its loop before the maximum
-is left out.
+The firmware's counter starts at the maximum code, falls every 50 µs by ``maximum · f · 50 µs``, is
+truncated when written, and starts again in the step in which it has reached zero or less. So the
+period is 1/f rounded **up** to whole steps. Assumed here: steps of exactly 50 µs and exact
+arithmetic (in the firmware's single precision a code or a step differs now and then). The code 0
+that the firmware writes for one pass of its loop before the maximum is left out.
 
-The real steps are longer. The firmware looks at its clock once a pass of ``loop()``, so a step is
-the first multiple of the loop's time that is not below 50 µs, and the reset takes further passes:
-one at code 0 and at least two at the maximum (:func:`passes`). A pass reads three potentiometers.
-Each reading is four conversions of 20 + 2 cycles and 3 more at 15 MHz, 6.2 µs by the core library's
-settings; at 12 bits, where the same sum gives 7.2 µs, 8 µs were measured with the call
-(forum.pjrc.com, thread 57683). With 1 to 2 µs assumed for the rest of the loop a pass takes about
-22 µs, a step three of them, 66 µs, and the real frequency is three quarters of the commanded one.
-Nobody has published a measurement, and from 25 µs on it would be two passes; hence a parameter,
-and the plain 50 µs without it.
+The real steps are longer: the firmware looks at its clock once a pass of ``loop()``
+(:func:`passes`). A pass reads three potentiometers, each by four conversions of 20 + 2 cycles and 3
+more at 15 MHz, 6.2 µs by the core library's settings; at 12 bits, where the same sum gives 7.2 µs,
+8 µs were measured (forum.pjrc.com, thread 57683). With 1 to 2 µs assumed for the rest a pass takes
+about 22 µs, a step three of them, and the real frequency is three quarters of the commanded one.
+Nobody has published a measurement; hence a parameter, and the plain 50 µs without it.
 """
 
 from fractions import Fraction
@@ -63,9 +59,8 @@ def knob_frequency(pot_frequency: float) -> float:
 
 
 def knob_offset(pot_offset: float, amplitude: float) -> float:
-    """Mean of V1, V, of the third knob at a peak-to-peak ``amplitude`` in V.
-
-    The knob sets the voltage of the offset pin, which is where the ramp ends (V_DAC = 0).
+    """Mean of V1, V, of the third knob, which sets the offset pin, where the ramp ends (V_DAC = 0);
+    ``amplitude`` is peak-to-peak, V.
     """
     return GAIN * volts(reading(pot_offset)) - amplitude / 2
 
@@ -86,9 +81,9 @@ def staircase(maximum: int, frequency: float) -> tuple[int, ...]:
 def passes(codes: tuple[int, ...], loop_time: float) -> tuple[int, ...]:
     """The DAC codes of one period, one each pass of a loop of ``loop_time`` in s.
 
-    ``codes`` are those of :func:`staircase`. The maximum is written one pass after the code 0, the
-    counter set to it in the next, and the first decrement made from the one after that on, once a
-    step has passed since the code 0.
+    ``codes`` are those of :func:`staircase`. A step is the fewest passes that take 50 µs. The
+    maximum is written one pass after the code 0, the counter set to it in the next, and the first
+    decrement made from the one after that on, once a step has passed since the code 0.
     """
     each = ceil(round(1 / (STEPS_PER_SECOND * loop_time), 9))
     falling = (code for code in codes[1:] for _ in range(each))

@@ -4,16 +4,15 @@ import os
 import re
 import tomllib
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import Any
 
 from pydantic import ValidationError
 
-from cosim.errors import BadInput, NoEffect
+from cosim.errors import BadInput, NoEffect, plain
 from cosim.scene import messages
 from cosim.scene.describe import acts, keys
 from cosim.scene.methods import METHODS
@@ -22,6 +21,8 @@ from cosim.scene.tables import KNOBS, NORMAL_FORCES, TABLES
 
 PATHS = (("circuit", "netlist"), ("drive", "file"), ("friction", "normal_force_file"))
 """The keys that name files."""
+
+_LIBRARY = Path(__file__).with_name("library")
 
 MAX_BYTES = 1 << 20
 """Largest scene file; far above any honest one."""
@@ -37,11 +38,10 @@ class _Layer:
 
 def list_scenes() -> list[tuple[str, str]]:
     """Name and description of every built-in scene, the paper's first."""
-    found = []
-    for entry in (resources.files("cosim.scene") / "library").iterdir():
-        if entry.name.endswith(".toml"):
-            data = tomllib.loads(entry.read_text(encoding="utf-8"))
-            found.append((entry.name.removesuffix(".toml"), str(data.get("description", ""))))
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in _LIBRARY.glob("*.toml")}
+    found = [
+        (name, str(tomllib.loads(text).get("description", ""))) for name, text in texts.items()
+    ]
     return sorted(found, key=lambda scene: (not scene[0].startswith("paper"), scene[0]))
 
 
@@ -63,16 +63,14 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
         layers = _layers(os.fspath(source))
     if isinstance(overrides, str):
         raise BadInput("overrides: must be a mapping or a list of strings, not one string.")
-    origin = "overrides" if isinstance(overrides, Mapping) else "--set"
-    changes = _given(overrides) if isinstance(overrides, Mapping) else _overrides(overrides or ())
-    if changes:
-        layers.append(_Layer(origin, changes))
-    merged, origins = _merge(layers)
-    try:
-        scene = Scene.model_validate(merged)
-    except ValidationError as error:
-        base = layers[-2] if changes else layers[-1]
-        raise BadInput(messages.explain(error, origins, base.origin)) from None
+    base = layers[-1].origin
+    if isinstance(overrides, Mapping):
+        changes = _Layer("overrides", _tables(overrides.items(), "overrides"))
+    else:
+        changes = _Layer("--set", _tables(_parsed(overrides or ()), "--set"))
+    if changes.tables:
+        layers.append(changes)
+    scene, origins = _checked(layers, base)
     _tell_idle(scene, layers, origins)
     return scene
 
@@ -82,47 +80,30 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
 
     ``origin`` names in messages where the values come from. Raises :class:`BadInput`.
     """
-    tables: dict[str, Any] = {}
-    for full, value in values.items():
-        table, _, key = full.partition(".")
-        tables.setdefault(table, {})[key] = value
-    _check_names(tables, origin)
-    merged, origins = _merge(
-        [_Layer(f"scene {scene.name}", scene.as_dict()), _Layer(origin, tables)]
-    )
-    try:
-        return Scene.model_validate(merged)
-    except ValidationError as error:
-        raise BadInput(messages.explain(error, origins, origin)) from None
+    layer = _Layer(origin, _tables(values.items(), origin))
+    return _checked([_Layer(f"scene {scene.name}", scene.as_dict()), layer], origin)[0]
 
 
 def _layers(source: str) -> list[_Layer]:
     """The file of ``source`` on top of the built-in scenes that it starts from."""
     builtin = [name for name, _ in list_scenes()]
     if source in builtin:
-        origin = f"scene {source}"
-        entry = resources.files("cosim.scene") / "library" / f"{source}.toml"
-        data = tomllib.loads(entry.read_text(encoding="utf-8"))
-        data.setdefault("name", source)
-        folder = Path(str(entry)).parent
+        origin, path = f"scene {source}", _LIBRARY / f"{source}.toml"
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
     else:
-        origin, folder = messages.plain(source), Path(source).parent
+        origin, path = plain(source), Path(source)
         data = _read(source, origin, builtin)
-        stem = re.sub(r"[^\w.+-]+", "-", Path(source).stem).strip("-.+")[:64]
-        data.setdefault("name", stem or "scene")
+    name = re.sub(r"[^\w.+-]+", "-", path.stem).strip("-.+")[:64]
+    data.setdefault("name", name or "scene")
     _check_names(data, origin)
-    _find_files(data, folder)
+    _find_files(data, path.parent)
     base = data.pop("base", None)
     if base is None:
         return [_Layer(origin, data, source in builtin)]
     if base not in builtin:
-        hint = messages.suggestion(str(base), builtin)
-        raise BadInput(
-            messages.ended(
-                f"{origin}: base = {messages.shown(base)} must be a built-in scene"
-                + (hint or f" ({', '.join(builtin)})")
-            )
-        )
+        hint = messages.suggestion(str(base), builtin) or f" ({', '.join(builtin)})"
+        what = f"base = {messages.shown(base)} must be a built-in scene{hint}"
+        raise messages.bad(f"{origin}: {what}")
     below = _layers(base)
     below[-1].tables.pop("description", None)
     return [*below, _Layer(origin, data, source in builtin)]
@@ -141,13 +122,9 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
     except FileNotFoundError:
         hint = messages.suggestion(Path(source).stem, builtin, "the built-in scene ")
         if source.endswith(".toml") or os.sep in source:
-            raise BadInput(messages.ended(f"{origin}: there is no such file{hint}")) from None
-        raise BadInput(
-            messages.ended(
-                f'there is no built-in scene and no file "{origin}"'
-                + (hint or f" (built-in: {', '.join(builtin)})")
-            )
-        ) from None
+            raise messages.bad(f"{origin}: there is no such file{hint}") from None
+        hint = hint or f" (built-in: {', '.join(builtin)})"
+        raise messages.bad(f'there is no built-in scene and no file "{origin}"{hint}') from None
     except OSError as error:
         raise BadInput(f"{origin}: cannot be read ({error.strerror}).") from None
     except ValueError:  # a NUL or a lone surrogate in the path
@@ -170,12 +147,12 @@ def _syntax(error: Exception, text: str, origin: str) -> str:
     message = "too deeply nested" if isinstance(error, RecursionError) else str(error)
     place = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", message)
     if place is None:
-        return f"{origin}: this is not TOML: {messages.plain(message)}."
+        return f"{origin}: this is not TOML: {plain(message)}."
     line, column = place[1], place[2]
     if line is None:
         lines = text.splitlines() or [""]
         line, column = len(lines), len(lines[-1]) + 1
-    message = messages.plain(message[: place.start()])
+    message = plain(message[: place.start()])
     return f"{origin}, line {line}, column {column}: this is not TOML: {message}."
 
 
@@ -184,48 +161,37 @@ def _check_names(data: dict[str, Any], origin: str) -> None:
         if name in ("name", "description", "base"):
             continue
         if name not in TABLES:
-            raise BadInput(messages.ended(f"{origin}: {messages.unknown_table(name)}"))
+            raise messages.bad(f"{origin}: {messages.unknown_table(name)}")
         if not isinstance(content, dict):
             raise BadInput(f"{origin}: {name} = {messages.shown(content)} must be a table.")
         known = TABLES[name].model_fields
         for key in content:
             if key not in known:
-                raise BadInput(messages.ended(f"{origin}: {messages.unknown_key(name, key)}"))
+                raise messages.bad(f"{origin}: {messages.unknown_key(name, key)}")
 
 
-def _overrides(overrides: Iterable[str]) -> dict[str, Any]:
-    """The tables that ``table.key=value`` options give."""
-    tables: dict[str, Any] = {}
+def _parsed(overrides: Iterable[str]) -> Iterator[tuple[str, Any]]:
+    """The keys and values of ``table.key=value`` options."""
     for text in overrides:
         left, equals, right = text.partition("=")
-        table, dot, key = left.strip().partition(".")
-        if not (equals and dot and table and key):
-            hint = _full_name(left.strip())
-            raise BadInput(
-                messages.ended(f"--set {messages.plain(text)}: must be table.key=value{hint}")
-            )
+        full = left.strip()
+        table, _, key = full.partition(".")
+        if not (equals and table and key):
+            hint = messages.full_name(full)
+            raise messages.bad(f"--set {plain(text)}: must be table.key=value{hint}")
         if not right.strip():
-            raise BadInput(f"--set {messages.plain(text)}: has no value.")
-        _check_names({table: {key: None}}, "--set")
-        tables.setdefault(table, {})[key] = _value(right.strip())
-    _find_files(tables, Path())
-    return tables
+            raise BadInput(f"--set {plain(text)}: has no value.")
+        yield full, _value(right.strip())
 
 
-def _full_name(bare: str) -> str:
-    full = next((key.full for key in keys() if key.name == bare), None)
-    return f"; did you mean {full}?" if full else ""
-
-
-def _given(overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """The tables that a mapping from ``table.key`` to values gives."""
+def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
+    """The tables that pairs of ``table.key`` and a value give."""
     tables: dict[str, Any] = {}
-    for full, value in overrides.items():
+    for full, value in values:
         table, dot, key = full.partition(".")
         if not dot:
-            hint = _full_name(full)
-            raise BadInput(messages.ended(f"overrides: {full} must be table.key{hint}"))
-        _check_names({table: {key: None}}, "overrides")
+            raise messages.bad(f"{origin}: {full} must be table.key{messages.full_name(full)}")
+        _check_names({table: {key: None}}, origin)
         if isinstance(value, os.PathLike):
             value = os.fspath(value)
         # numpy's numbers are no Python numbers
@@ -249,6 +215,15 @@ def _value(text: str) -> Any:
     except (ValueError, RecursionError):
         return text
     return data["value"] if data.keys() == {"value"} else text
+
+
+def _checked(layers: list[_Layer], default: str) -> tuple[Scene, dict[str, tuple[int, str]]]:
+    """The scene of the layers and :func:`_merge`'s origins; ``default`` is that of other faults."""
+    merged, origins = _merge(layers)
+    try:
+        return Scene.model_validate(merged), origins
+    except ValidationError as error:
+        raise BadInput(messages.explain(error, origins, default)) from None
 
 
 def _merge(layers: list[_Layer]) -> tuple[dict[str, Any], dict[str, tuple[int, str]]]:
@@ -278,11 +253,14 @@ def _merge(layers: list[_Layer]) -> tuple[dict[str, Any], dict[str, tuple[int, s
 def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int, str]]) -> None:
     """Warn of each key that the user changed although circuit, waveform or method ignore it.
 
-    A warning, not an error: comparisons give several circuits the same overrides. No warning where
-    a later layer chose the circuit, waveform or method, nor for a scene.toml, which has every key.
+    Not where a later layer chose these, nor for a scene.toml, which has every key.
     """
     chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
-    resolved = [_is_resolved(layer.tables) for layer in layers]
+    every = [k for k in keys() if k.default is not None and k.name not in KNOBS.values()]
+    silent = [
+        layer.builtin or all(key.name in layer.tables.get(key.table, {}) for key in every)
+        for layer in layers
+    ]
     for key in keys():
         rank, origin = origins.get(key.full, (-1, ""))
         choices = ["circuit.model"]
@@ -290,19 +268,10 @@ def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int,
         steered = key.table == "circuit" and key.name in METHODS[scene.coupling.method].chooses
         choices += ["coupling.method"] * (steered or key.table == "coupling")
         latest = max(origins.get(choice, (-1, ""))[0] for choice in choices)
-        if rank < max(latest, 0) or layers[rank].builtin or resolved[rank]:
+        if rank < max(latest, 0) or silent[rank]:
             continue
         given = [layer.tables.get(key.table, {}) for layer in layers[: rank + 1]]
         values = [key.default, *(table[key.name] for table in given if key.name in table)]
         if values[-1] != values[-2] and not acts(key, *chosen):
             sentence = f"{origin}: {messages.idle(key, *chosen)}."
             warnings.warn(sentence, NoEffect, stacklevel=3)
-
-
-def _is_resolved(tables: dict[str, Any]) -> bool:
-    """Whether a layer gives every key, as the scene.toml of a run does."""
-    return all(
-        key.name in tables.get(key.table, {})
-        for key in keys()
-        if key.default is not None and key.name not in KNOBS.values()
-    )

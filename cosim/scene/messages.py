@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cosim.errors import plain
+from cosim.errors import BadInput, plain
 from cosim.scene.describe import Key, acts, keys
 from cosim.scene.methods import METHODS, CouplingMethod
 from cosim.scene.model import toml_value
@@ -35,31 +35,39 @@ def suggestion(word: str, known: Iterable[str], what: str = "") -> str:
     return f"; did you mean {what}{near[0]}?" if near else ""
 
 
+def full_name(bare: str) -> str:
+    """``; did you mean table.key?`` if a key is called ``bare``, else the empty string."""
+    full = next((key.full for key in keys() if key.name == bare), None)
+    return f"; did you mean {full}?" if full else ""
+
+
 def ended(sentence: str) -> str:
     """The sentence with a full stop, unless it is a question."""
     return sentence if sentence.endswith("?") else sentence + "."
 
 
+def bad(sentence: str) -> BadInput:
+    """The error that tells :func:`ended`'s sentence."""
+    return BadInput(ended(sentence))
+
+
 def unknown_table(name: str) -> str:
     """A sentence on an unknown table, or on a key outside its table."""
-    holders = [key.full for key in keys() if key.name == name]
-    hint = f"; did you mean {holders[0]}?" if holders else suggestion(name, TABLES)
-    return f'there is no table "{plain(name)}"' + (hint or f" (tables: {', '.join(TABLES)})")
+    hint = full_name(name) or suggestion(name, TABLES) or f" (tables: {', '.join(TABLES)})"
+    return f'there is no table "{plain(name)}"{hint}'
 
 
 def unknown_key(table: str, name: str) -> str:
     """A sentence on a key that its table does not have."""
     here = [key.name for key in keys() if key.table == table]
-    elsewhere = [key.full for key in keys() if key.name == name]
     full = f"{table}.{name}"
     hint = (
-        f"; did you mean {elsewhere[0]}?"
-        if elsewhere
-        else suggestion(name, here, f"{table}.")
+        full_name(name)
+        or suggestion(name, here, f"{table}.")
         or suggestion(full, [key.full for key in keys()])
         or f" (keys of {table}: {', '.join(here)})"
     )
-    return f'there is no key "{plain(full)}"' + hint
+    return f'there is no key "{plain(full)}"{hint}'
 
 
 def idle(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> str:
@@ -101,11 +109,8 @@ def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], defa
         origin = max(layers)[1] if layers else default
         return f"{origin}: {ended(first['ctx']['sentence'])}"
     full = ".".join(str(part) for part in first["loc"])
-    allowed = next((key.allowed for key in keys() if key.full == full), None)
+    key = next((key for key in keys() if key.full == full), None)
+    allowed = key.allowed if key else ALLOWED_TOP.get(full, "a table")
+    hint = suggestion(str(first["input"]), key.choices or ()) if key else ""
     origin = origins.get(full, (0, default))[1]
-    value = shown(first["input"])
-    if allowed is None:
-        return f"{origin}: {full} = {value} must be {ALLOWED_TOP.get(full, 'a table')}."
-    choices = next(key.choices for key in keys() if key.full == full) or ()
-    hint = suggestion(str(first["input"]), choices)
-    return ended(f"{origin}: {full} = {value} must be {allowed}{hint}")
+    return ended(f"{origin}: {full} = {shown(first['input'])} must be {allowed}{hint}")

@@ -81,12 +81,8 @@ class Scene(BaseModel):
                     f"coil.{key} = {inductance:g} H must be at least {FASTEST * resistance:.3g} H "
                     f'with circuit.model = "{self.rung.name}" and {resistance:g} Ohm around it, or '
                     "the current changes too fast to be solved with the mechanics",
-                    f"coil.{key}",
-                    "coil.resistance",
-                    "coil.eddy_resistance",
-                    "coil.count",
+                    *("coil.resistance", "coil.eddy_resistance", "coil.count"),
                     "circuit.sense_resistance",
-                    "circuit.model",
                 )
         return self
 
@@ -110,9 +106,7 @@ class Scene(BaseModel):
                 shown = f'"{value}"' if isinstance(value, str) else f"{value:g}"
                 raise fault(
                     f"drive.phase_deg lets two surfaces move by themselves; with it {full} = "
-                    f"{shown} must be {words}",
-                    full,
-                    "drive.phase_deg",
+                    f"{shown} must be {words}"
                 )
         return self
 
@@ -122,24 +116,17 @@ class Scene(BaseModel):
         if drive.pwm_ripple and not self.rung.firmware:
             raise fault(
                 'drive.pwm_ripple = true needs circuit.model = "full", which has the filter of '
-                "the offset pin",
-                "drive.pwm_ripple",
-                "circuit.model",
+                "the offset pin"
             )
         if drive.waveform in ("optimal", "quaid", "file") and self.rung.driven:
             raise fault(
                 f'drive.waveform = "{drive.waveform}" gives the surface its velocity, which needs '
-                'circuit.model = "none"',
-                "drive.waveform",
-                "circuit.model",
+                'circuit.model = "none"'
             )
         if self.friction.normal_force_file and self.surface_is_given:
             raise fault(
                 f'drive.waveform = "{drive.waveform}" with circuit.model = "none" moves the part '
-                "at a constant friction.normal_force, not at that of friction.normal_force_file",
-                "friction.normal_force_file",
-                "drive.waveform",
-                "circuit.model",
+                "at a constant friction.normal_force, not at that of friction.normal_force_file"
             )
         if not self.rung.driven:
             return self
@@ -149,15 +136,13 @@ class Scene(BaseModel):
             why = "with drive.quantised = true"
         else:
             return self
+        others = ("drive.pot_max", "circuit.model", "drive.quantised")
         reach = firmware.GAIN * firmware.V_REFERENCE
         if drive.amplitude > reach:
             raise fault(
                 f"drive.amplitude = {drive.amplitude:g} V must be a number from 0 to "
                 f"{reach:.4g} V {why}, whose DAC ends at {firmware.V_REFERENCE} V",
-                "drive.amplitude",
-                "drive.pot_max",
-                "circuit.model",
-                "drive.quantised",
+                *others,
             )
         pin = firmware.offset_pin(drive.offset, drive.amplitude)
         # a knob at its end may come out a rounding error outside
@@ -167,11 +152,7 @@ class Scene(BaseModel):
                 f"drive.offset = {drive.offset:g} V must be a number from {-half:.4g} to "
                 f"{reach - half:.4g} V {why} and drive.amplitude = {drive.amplitude:g} V, "
                 f"for its offset pin gives 0 to {firmware.V_REFERENCE} V",
-                "drive.offset",
-                "drive.amplitude",
-                "drive.pot_max",
-                "circuit.model",
-                "drive.quantised",
+                *others,
             )
         return self
 

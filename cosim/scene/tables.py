@@ -1,8 +1,6 @@
-"""The tables of a scene: every key with its unit, default, range and meaning.
+"""The tables of a scene: every key with its SI unit, default, range and meaning.
 
-Validation, error messages and the written ``scene.toml`` read them through
-:func:`cosim.scene.keys`. A key that is a variable of the FMU has them from ``variables.def``. All
-values are SI.
+A key that is a variable of the FMU has them from ``variables.def``.
 """
 
 import re
@@ -46,16 +44,24 @@ def _declared(default: str, lead: str, registry: Mapping[str, Rung | CouplingMet
     return Field(default, pattern=pattern, description=f"{lead}; {text}", json_schema_extra=extra)
 
 
-def fault(sentence: str, *keys: str) -> PydanticCustomError:
-    """A failed check between ``keys`` ("table.key"), told in a ``sentence`` without its dot."""
+def fault(sentence: str, *unnamed: str) -> PydanticCustomError:
+    """A failed check between the keys ("table.key") that ``sentence``, without its dot, names.
+
+    It is told of the layer that gave the last of these, or of the ``unnamed`` that play a part too.
+    """
+    keys = [*re.findall(r"\b[a-z]+\.[a-z]\w*", sentence), *unnamed]
     return PydanticCustomError("check", "{sentence}", {"sentence": sentence, "keys": keys})
+
+
+def _doubled(one: str, other: str) -> PydanticCustomError:
+    return fault(f"{one} and {other} say the same thing twice; give one of them")
 
 
 def _both_or_neither(table: str, values: BaseModel, *pair: str) -> None:
     missing = [key for key in pair if getattr(values, key) is None]
     if len(missing) == 1:
         (there,) = set(pair) - set(missing)
-        raise fault(f"{table}.{there} needs {table}.{missing[0]} beside it", f"{table}.{there}")
+        raise fault(f"{table}.{there} needs {table}.{missing[0]} beside it")
 
 
 def is_number(value: object) -> bool:
@@ -136,73 +142,52 @@ class Drive(Table):
         data = dict(data)
         for knob, key in KNOBS.items():
             if data.get(knob) is not None and key in data:
-                raise fault(
-                    f"drive.{knob} and drive.{key} say the same thing twice; give one of them",
-                    f"drive.{knob}",
-                    f"drive.{key}",
-                )
+                raise _doubled(f"drive.{knob}", f"drive.{key}")
 
-        def turned(knob: str) -> float | None:
-            # anything else fails in the validation of the knob itself
-            value = data.get(knob)
-            return float(value) if is_number(value) and 0 <= value <= 1 else None
-
-        if (pot := turned("pot_max")) is not None:
-            data["amplitude"] = firmware.knob_amplitude(pot)
-        if (pot := turned("pot_frequency")) is not None:
-            data["frequency"] = firmware.knob_frequency(pot)
+        # anything else fails in the validation of the knob itself
+        pots = {k: data.get(k) for k in KNOBS if is_number(data.get(k)) and 0 <= data[k] <= 1}
+        if "pot_max" in pots:
+            data["amplitude"] = firmware.knob_amplitude(pots["pot_max"])
+        if "pot_frequency" in pots:
+            data["frequency"] = firmware.knob_frequency(pots["pot_frequency"])
         amplitude = data.get("amplitude", cls.model_fields["amplitude"].default)
-        if (pot := turned("pot_offset")) is not None and is_number(amplitude):
-            data["offset"] = firmware.knob_offset(pot, amplitude)
+        if "pot_offset" in pots and is_number(amplitude):
+            data["offset"] = firmware.knob_offset(pots["pot_offset"], amplitude)
         return data
 
     @model_validator(mode="after")
     def _check(self) -> "Drive":
         # The other way round is told when it is run, so that a scene can leave the file open.
         if self.file is not None and self.waveform != "file":
-            raise fault(
-                f'drive.file is for drive.waveform = "file", not for "{self.waveform}"',
-                "drive.file",
-                "drive.waveform",
-            )
+            raise fault(f'drive.file is for drive.waveform = "file", not for "{self.waveform}"')
         if self.waveform != "sawtooth":
             for key in ("quantised", "reset_time", "loop_time", *KNOBS):
                 if getattr(self, key):
                     raise fault(
                         f'drive.{key} is for drive.waveform = "sawtooth" only, '
-                        f'not for "{self.waveform}"',
-                        f"drive.{key}",
-                        "drive.waveform",
+                        f'not for "{self.waveform}"'
                     )
         period = 1 / self.frequency
         # shorter than this the fall could not be told from a jump after hours of simulated time
         if self.reset_time and not 1e-9 <= self.reset_time < period:
             raise fault(
                 f"drive.reset_time = {self.reset_time:g} s must be 0, or at least 1e-09 s and "
-                f"below the period of {period:g} s at drive.frequency = {self.frequency:g} Hz",
-                "drive.reset_time",
-                "drive.frequency",
+                f"below the period of {period:g} s at drive.frequency = {self.frequency:g} Hz"
             )
         if self.quantised and self.reset_time:
             raise fault(
                 f"drive.reset_time = {self.reset_time:g} s must be 0 with drive.quantised = true, "
-                "whose reset is sharp",
-                "drive.reset_time",
-                "drive.quantised",
+                "whose reset is sharp"
             )
         if self.loop_time and not (self.quantised and self.loop_time >= 5e-6):
             raise fault(
                 f"drive.loop_time = {self.loop_time:g} s must be 0, or at least 5e-06 s with "
-                "drive.quantised = true",
-                "drive.loop_time",
-                "drive.quantised",
+                "drive.quantised = true"
             )
         if self.quantised and not 0.1 <= self.frequency <= 1e4:
             raise fault(
                 f"drive.frequency = {self.frequency:g} Hz must be a number from 0.1 to 10000 Hz "
-                "with drive.quantised = true",
-                "drive.frequency",
-                "drive.quantised",
+                "with drive.quantised = true"
             )
         return self
 
@@ -244,17 +229,11 @@ class Circuit(Table):
         for key in ("swing_loss_high", "swing_loss_low"):
             if key in rung.keys and (loss := getattr(self, key)) >= self.supply:
                 raise fault(
-                    f"circuit.{key} = {loss:g} V must be below circuit.supply = {self.supply:g} V",
-                    f"circuit.{key}",
-                    "circuit.supply",
+                    f"circuit.{key} = {loss:g} V must be below circuit.supply = {self.supply:g} V"
                 )
         _both_or_neither("circuit", self, "snubber_resistance", "snubber_capacitance")
         if rung.own_netlist != (self.netlist is not None):
-            raise fault(
-                'circuit.model = "file" and circuit.netlist must be given together',
-                "circuit.netlist",
-                "circuit.model",
-            )
+            raise fault('circuit.model = "file" and circuit.netlist must be given together')
         return self
 
 
@@ -318,17 +297,14 @@ class Friction(Table):
     @classmethod
     def _one_force(cls, data: Any) -> Any:
         if isinstance(data, dict) and None not in map(data.get, NORMAL_FORCES):
-            one, other = (f"friction.{key}" for key in NORMAL_FORCES)
-            raise fault(f"{one} and {other} say the same thing twice; give one of them", one, other)
+            raise _doubled(*(f"friction.{key}" for key in NORMAL_FORCES))
         return data
 
     @model_validator(mode="after")
     def _check(self) -> "Friction":
         if self.mu_k > self.mu_s:
             raise fault(
-                f"friction.mu_k = {self.mu_k:g} must be at most friction.mu_s = {self.mu_s:g}",
-                "friction.mu_k",
-                "friction.mu_s",
+                f"friction.mu_k = {self.mu_k:g} must be at most friction.mu_s = {self.mu_s:g}"
             )
         return self
 
@@ -342,11 +318,7 @@ class Coupling(Table):
         1, "1", 0, 2, "Order of extrapolation: held, with the true slope, parabola"
     )
     tolerance: float = _number(
-        1e-3,
-        "1",
-        1e-6,
-        0.5,
-        "With auto: allowed error of the part's height, relative to its range",
+        1e-3, "1", 1e-6, 0.5, "With auto: allowed error of the part's height, relative to its range"
     )
 
     @model_validator(mode="before")
@@ -356,8 +328,7 @@ class Coupling(Table):
         if method in ("iterated", "error-controlled", "event-aware"):
             raise fault(
                 f'coupling.method = "{method}" repeats steps, which ngspice cannot; it is for '
-                "cosim.coupling's other participants",
-                "coupling.method",
+                "cosim.coupling's other participants"
             )
         return data
 
@@ -401,17 +372,13 @@ class Run(Table):
         for key in ("settle", "output_step"):
             if (value := getattr(self, key)) >= self.duration:
                 raise fault(
-                    f"run.{key} = {value:g} s must be below run.duration = {self.duration:g} s",
-                    f"run.{key}",
-                    "run.duration",
+                    f"run.{key} = {value:g} s must be below run.duration = {self.duration:g} s"
                 )
         if self.duration / self.output_step > MAX_ROWS:
             raise fault(
                 f"run.output_step = {self.output_step:g} s makes more than {MAX_ROWS} rows in "
                 f"run.duration = {self.duration:g} s; it must be at least "
-                f"{self.duration / MAX_ROWS:g} s",
-                "run.output_step",
-                "run.duration",
+                f"{self.duration / MAX_ROWS:g} s"
             )
         return self
 

@@ -1,7 +1,6 @@
 """Unit, start value, range and meaning of the FMU's parameters and inputs, from ``variables.def``.
 
-That file is the one place where they are described; the FMU's ``modelDescription.xml`` is made of
-it too. A key of a scene that is such a variable refers to it by name.
+The FMU's ``modelDescription.xml`` is made of it too.
 """
 
 import re

@@ -1,10 +1,9 @@
 """Work in processes of their own, which may hang, crash or be spoilt without harm.
 
-ngspice is one library a process; a netlist can make it loop for ever, end the process, or refuse
-all further work in it, none of which can be caught from within. multiprocessing, and pebble on top
-of it, run the caller's program again in each process, which standard input and a script without a
-main guard do not survive, and pebble limits a call's whole time; loky loses all calls with one
-process. Here a process knows its function by its module, and silence ends it.
+A netlist can make ngspice, one library a process, loop for ever, end the process, or refuse all
+further work. multiprocessing and pebble run the caller's program again, which standard input and a
+script without a main guard do not survive; pebble limits a call's whole time; loky loses all calls
+with one process. Here a process knows its function by its module, and silence ends it.
 """
 
 import os

@@ -6,17 +6,14 @@ from importlib.metadata import PackageNotFoundError, version
 
 
 def versions() -> dict[str, str]:
-    """What made the result."""
-    return dict(_versions())
+    """The version of each by its name."""
+    packages = ("cosim", "fmpy", "PySpice", "numpy")
+    return {"python": platform.python_version()} | {name: _version(name) for name in packages}
 
 
-@cache
-def _versions() -> dict[str, str]:
-    # Looked up once: it takes longer than a short run of the part alone.
-    found = {"python": platform.python_version()}
-    for package in ("cosim", "fmpy", "PySpice", "numpy"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "unknown"
-    return found
+@cache  # a look-up of all takes longer than a short run of the part alone
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"

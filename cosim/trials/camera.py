@@ -8,11 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from cosim.scene import Scene
-
-Array = npt.NDArray[np.float64]
+from cosim.arrays import Array
 
 FRAME_RATE = 960.0  # 1/s
 
@@ -70,10 +67,3 @@ def hermite(at: Array, time: Array, z: Array, v: Array) -> Array:
     left = (1 + 2 * s) * (1 - s) ** 2 * z[k] + s * (1 - s) ** 2 * h * v[k]
     right = s**2 * (3 - 2 * s) * z[k + 1] + s**2 * (s - 1) * h * v[k + 1]
     return left + right
-
-
-def laid_over(scene: Scene) -> tuple[float, float]:
-    """The first time of a run that may be laid over a trial's first frame, s, and its period, s."""
-    if scene.drive.file is not None:
-        return 0.0, 0.0  # the trial's own surface: there is nothing to shift
-    return scene.run.settle, 1.0 / scene.drive.frequency

@@ -3,8 +3,7 @@
 Two forms are read, with commas, semicolons or tabs between the cells:
 
 - a table with the columns ``t, zp, vzp, azp, zo, vzo, azo, zs, vzs, azs`` (p the platform, that is
-  the surface; o the part; s the springed plate), as the published trials have them; other columns,
-  such as the horizontal ``xp``, are passed over;
+  the surface; o the part; s the springed plate) among others, as the published trials have them;
 - what Tracker (physlets.org/tracker) exports for several tracks: lines that begin with ``#``, a
   line with the tracks' names, and a line ``t x y v_{y} …`` with their columns; y is the height.
 
@@ -20,11 +19,9 @@ from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import BadInput
-
-Array = npt.NDArray[np.float64]
 
 MISSING = {"", "nan", "?"}  # once U+FFFD is gone
 TRACKS = {
@@ -112,15 +109,10 @@ def read(path: Path) -> Trial:
     late = np.flatnonzero(np.diff(time) <= 0)
     if len(late):
         raise BadInput(f"{path}: row {rows[late[0] + 1][0]}, column t: the time does not increase.")
-    number = re.findall(r"\d+", path.stem)
-    return Trial(
-        name=path.stem,
-        number=int(number[-1]) if number else None,
-        time=time,
-        platform=_track(columns, "p"),
-        part=_track(columns, "o"),
-        plate=_track(columns, "s") if "zs" in columns else None,
-    )
+    numbers = re.findall(r"\d+", path.stem)
+    platform, part = (_track(columns, body) for body in "po")
+    plate = _track(columns, "s") if "zs" in columns else None
+    return Trial(path.stem, int(numbers[-1]) if numbers else None, time, platform, part, plate)
 
 
 def _text(path: Path) -> str:

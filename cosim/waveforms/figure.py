@@ -6,24 +6,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
+from cosim.arrays import Array
 from cosim.files.picture import Picture
 from cosim.files.spill import release
 from cosim.scene import Scene
 from cosim.trials.camera import FRAME_RATE, three_point_accelerations
 
-Array = npt.NDArray[np.float64]
-
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
-GRIP = "#7a5195"
-SECOND = "#6fb7e9"
-"""The second surface, where two move by themselves; its curves are dashed."""
-SECOND_SURFACE: dict[str, Any] = {
-    "color": SECOND, "lw": 1.1, "ls": "--", "label": "second"
-}  # fmt: skip
+GRIP, SECOND = "#7a5195", "#6fb7e9"
+BODIES: dict[str, dict[str, Any]] = {
+    "surface": {"color": SURFACE, "lw": 1.2, "label": "surface"},
+    "surface_2": {"color": SECOND, "lw": 1.1, "ls": "--", "label": "second"},
+    "part": {"color": PART, "lw": 1.6, "label": "part"},
+}
 PERIODS_SHOWN = 3
 
 LINEAR = 100.0
@@ -48,19 +46,14 @@ def draw(scene: Scene, waves: dict[str, Array], numbers: dict[str, Any]) -> Pict
     time = waves["time"][shown] * 1e3
     cut = {name: values[shown] for name, values in waves.items()}
 
-    _whole_run(axes[0, 0], scene, waves)
-    _positions(axes[0, 1], time, cut)
-    if given:
-        _velocities(axes[1, 0], time, cut)
-        _acceleration(axes[1, 1], scene, waves, shown)
-    else:
-        _command(axes[1, 0], scene, time, cut)
-        _voltages(axes[2, 0], time, cut)
-        _velocities(axes[1, 1], time, cut)
-        _acceleration(axes[2, 1], scene, waves, shown)
-    for axis in (*axes[1:, 0], *axes[:, 1]):
-        axis.set_xlim(time[0], time[-1])
-        axis.set_xlabel("time [ms]")
+    panels = [_positions, _velocities, _acceleration]
+    if not given:
+        panels = [_positions, _command, _velocities, _voltages, _acceleration]
+    whole, *others = axes.flat
+    _whole_run(whole, scene, waves)
+    for axis, panel in zip(others, panels, strict=True):
+        panel(axis, scene, time, cut)
+        axis.set(xlim=(time[0], time[-1]), xlabel="time [ms]")
     for axis in axes.flat:
         axis.grid(alpha=0.25)
     figure.suptitle(_title(scene, numbers), fontsize=12, y=1 - 0.08 / height, va="top")
@@ -167,8 +160,7 @@ def _no_drive(axis: Axes, title: str, unit: str) -> None:
 def _command(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) -> None:
     title = "Command and current"
     if "command" not in cut:
-        _no_drive(axis, title, "current [A]")
-        return
+        return _no_drive(axis, title, "current [A]")
     axis.plot(time, cut["current"], color=DRIVE, lw=1.3, label="one coil (left)")
     axis.set(ylabel="current [A]")
     right = axis.twinx()
@@ -186,38 +178,33 @@ def _command(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) -> No
     _head(axis, title, [*axis.get_lines(), *right.get_lines()])
 
 
-def _voltages(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
+def _voltages(axis: Axes, _: Scene, time: Array, cut: dict[str, Array]) -> None:
     title = "Coil voltage and back-EMF"
     if "coil_voltage" not in cut:
-        _no_drive(axis, title, "voltage [V]")
-        return
+        return _no_drive(axis, title, "voltage [V]")
     axis.plot(time, cut["coil_voltage"], color="0.35", lw=0.9, label="coil voltage")
     axis.plot(time, cut["back_emf"], color=EMF, lw=1.2, label="back-EMF")
     axis.set(ylabel="voltage [V]")
     _head(axis, title)
 
 
-def _positions(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
-    for name, color, width in (("surface", SURFACE, 1.2), ("part", PART, 1.6)):
-        height = cut[f"z_{name}"]
-        axis.plot(time, (height - height[0]) * 1e3, color=color, lw=width, label=name)
-    if "z_surface_2" in cut:
-        height = cut["z_surface_2"]
-        axis.plot(time, (height - height[0]) * 1e3, **SECOND_SURFACE)
+def _positions(axis: Axes, _: Scene, time: Array, cut: dict[str, Array]) -> None:
+    for body in ("surface", "part", "surface_2"):
+        if (height := cut.get(f"z_{body}")) is not None:
+            axis.plot(time, (height - height[0]) * 1e3, **BODIES[body])
     axis.set(ylabel="height [mm]")
     _shade_sticking(axis, time, cut["sticking"])
     _at_least(axis, 0.01)
     _head(axis, "Heights, each from its first")
 
 
-def _velocities(axis: Axes, time: Array, cut: dict[str, Array]) -> None:
+def _velocities(axis: Axes, _: Scene, time: Array, cut: dict[str, Array]) -> None:
     if "v_ram" in cut:
         relative = (cut["v_ram"] - cut["v_surface"]) * 1e3
         axis.plot(time, relative, color=RAM, lw=0.8, label="ram, relative")
-    axis.plot(time, cut["v_surface"] * 1e3, color=SURFACE, lw=1.2, label="surface")
-    if "v_surface_2" in cut:
-        axis.plot(time, cut["v_surface_2"] * 1e3, **SECOND_SURFACE)
-    axis.plot(time, cut["v_part"] * 1e3, color=PART, lw=1.6, label="part")
+    for body, style in BODIES.items():
+        if (velocity := cut.get(f"v_{body}")) is not None:
+            axis.plot(time, velocity * 1e3, **style)
     axis.set(ylabel="velocity [mm/s]")
     _at_least(axis, 1.0)
     _shade_sticking(axis, time, cut["sticking"])
@@ -247,22 +234,14 @@ def _power_of_ten(value: float, _: float) -> str:
     return f"{'−' if value < 0.0 else ''}10{power}"
 
 
-def _acceleration(axis: Axes, scene: Scene, waves: dict[str, Array], shown: slice) -> None:
-    time = waves["time"][shown]
-    axis.plot(time * 1e3, waves["a_surface"][shown], color=SURFACE, lw=0.8, label="true")
-    frames = np.arange(np.ceil(time[0] * FRAME_RATE), time[-1] * FRAME_RATE) / FRAME_RATE
-    heights = np.interp(frames, time, waves["z_surface"][shown])
+def _acceleration(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) -> None:
+    axis.plot(time, cut["a_surface"], color=SURFACE, lw=0.8, label="true")
+    first, last = cut["time"][[0, -1]] * FRAME_RATE
+    frames = np.arange(np.ceil(first), last) / FRAME_RATE
     if len(frames) > 2:
-        read = three_point_accelerations(heights)
-        axis.plot(
-            frames[1:-1] * 1e3,
-            read,
-            color="0.2",
-            lw=0.9,
-            marker=".",
-            ms=4,
-            label=f"read from {FRAME_RATE:.0f} frames/s",
-        )
+        read = three_point_accelerations(np.interp(frames, cut["time"], cut["z_surface"]))
+        label = f"read from {FRAME_RATE:.0f} frames/s"
+        axis.plot(frames[1:-1] * 1e3, read, color="0.2", lw=0.9, marker=".", ms=4, label=label)
     if np.abs(axis.dataLim.intervaly).max() > LINEAR:
         axis.set_yscale("symlog", linthresh=LINEAR)
         axis.yaxis.set_major_formatter(_power_of_ten)

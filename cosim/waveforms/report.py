@@ -7,6 +7,9 @@ from cosim.scene import Scene
 
 def table(scene: Scene, summary: dict[str, Any]) -> str:
     """The summary in a few lines, in the units of the bench."""
+    lost = summary["energy_residual"]
+    warning = ": too much, take finer steps" if lost > SUSPICIOUS else ""
+    taken = "{circuit_model}: {circuit_model_why}" if "circuit_model" in summary else ""
     rows = [
         ("part's mean velocity", _scaled(summary["v_average"], 1e3, "mm/s", "+.3f")),
         ("", _broken_periods(scene)),
@@ -25,8 +28,8 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
     rows += [
         ("impacts", f"{summary['impacts']}"),
         ("stick-slip events", f"{summary['stick_slip_events']}"),
-        ("circuit taken", _taken(summary)),
-        ("energy unaccounted for", _residual(summary["energy_residual"])),
+        ("circuit taken", taken.format_map(summary)),
+        ("energy unaccounted for", f"{lost:.1e} of the total{warning}"),
         ("error of the path", _error(summary)),
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
     ]
@@ -39,19 +42,7 @@ def _error(summary: dict[str, Any]) -> str:
         return ""
     taken = summary["coupling_taken"]
     words = (v if isinstance(v, str) else f"{key} {v:g}" for key, v in taken.items())
-    chosen = ", ".join(words)
-    return f"{summary['error_estimate']:.1e} of its range, with {chosen}"
-
-
-def _taken(summary: dict[str, Any]) -> str:
-    if "circuit_model" not in summary:
-        return ""
-    return f"{summary['circuit_model']}: {summary['circuit_model_why']}"
-
-
-def _residual(share: float) -> str:
-    text = f"{share:.1e} of the total"
-    return f"{text}: too much, take finer steps" if share > SUSPICIOUS else text
+    return f"{summary['error_estimate']:.1e} of its range, with {', '.join(words)}"
 
 
 def _broken_periods(scene: Scene) -> str:

@@ -1,6 +1,5 @@
 """A finished run: its waveforms, its summary, its figure and its files."""
 
-import json
 import os
 from base64 import b64encode
 from dataclasses import dataclass
@@ -9,10 +8,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import numpy.typing as npt
-
-from cosim.files.atomic import write_text
+from cosim.arrays import Array
+from cosim.files.atomic import write_json, write_text
 from cosim.scene import Scene, to_toml
 from cosim.waveforms.columns import COLUMNS, UNITS
 from cosim.waveforms.report import table
@@ -23,17 +20,14 @@ if TYPE_CHECKING:
 
     from cosim.files.picture import Picture
 
-Array = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Result:
     """A finished run.
 
     ``columns`` are the waveforms as arrays of equal length, SI, by the names of
-    :data:`cosim.waveforms.columns.COLUMNS`; those of a long run are mapped from a file that goes
-    with them. ``summary`` holds the numbers of the run, SI. ``scene`` is what was run, in which the
-    choices of ``"auto"`` are made.
+    :data:`cosim.waveforms.columns.COLUMNS`; ``summary`` holds the numbers of the run, SI; ``scene``
+    is what was run, with the choices of ``"auto"`` made.
     """
 
     scene: Scene
@@ -46,11 +40,7 @@ class Result:
         import xarray as xr
 
         variables = {
-            name: (
-                "time",
-                values,
-                {"units": COLUMNS[name].unit, "long_name": COLUMNS[name].long_name},
-            )
+            name: ("time", values, {"units": UNITS[name], "long_name": COLUMNS[name].long_name})
             for name, values in self.columns.items()
         }
         return xr.Dataset(variables, attrs=self._attributes())
@@ -71,7 +61,7 @@ class Result:
         write_csv(out / "waveforms.csv", self.columns, UNITS)
         write_netcdf(out / "waveforms.nc", self.columns, UNITS, self._attributes())
         write_text(out / "scene.toml", to_toml(self.scene))
-        write_text(out / "summary.json", json.dumps(self.summary, indent=2, allow_nan=False) + "\n")
+        write_json(out / "summary.json", self.summary)
         self.plot().write(out / "figure.png")
 
     def _attributes(self) -> dict[str, str]:

@@ -1,19 +1,16 @@
 """Waveforms as files: CSV and netCDF, each written whole or not at all."""
 
-from io import BytesIO
 from pathlib import Path
 from struct import pack
 from typing import IO
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.files.atomic import whole
 from cosim.files.spill import blocks
 from cosim.waveforms.columns import COLUMNS
-
-Array = npt.NDArray[np.float64]
 
 _CSV_ROWS = 1024
 
@@ -21,17 +18,11 @@ _CSV_ROWS = 1024
 def write_csv(path: Path, waveforms: dict[str, Array], units: dict[str, str]) -> None:
     """Comma-separated values: a header row ``name [unit]``, then a row for each time."""
     with whole(path) as temporary, open(temporary, "wb") as file:
-        _csv(file, waveforms, units)
+        csv(file, waveforms, units)
 
 
-def csv_content(waveforms: dict[str, Array], units: dict[str, str]) -> bytes:
-    """What :func:`write_csv` writes."""
-    content = BytesIO()
-    _csv(content, waveforms, units)
-    return content.getvalue()
-
-
-def _csv(file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str]) -> None:
+def csv(file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str]) -> None:
+    """What :func:`write_csv` writes, into an open file."""
     header = ",".join(f"{name} [{units[name]}]" for name in waveforms)
     file.write(f"{header}\n".encode())
     columns = list(waveforms.values())
@@ -66,32 +57,20 @@ def write_netcdf(
     column of a run its ``long_name``.
     """
     with whole(path) as temporary, open(temporary, "wb") as file:
-        _netcdf(file, waveforms, units, attributes)
-
-
-def netcdf_content(
-    waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
-) -> bytes:
-    """What :func:`write_netcdf` writes."""
-    content = BytesIO()
-    _netcdf(content, waveforms, units, attributes)
-    return content.getvalue()
+        netcdf(file, waveforms, units, attributes)
 
 
 _DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12
 _CHARACTERS, _DOUBLES = 2, 6
 
 
-def _netcdf(
-    file: IO[bytes],
-    waveforms: dict[str, Array],
-    units: dict[str, str],
-    attributes: dict[str, str],
+def netcdf(
+    file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
 ) -> None:
-    """The classic format with 64-bit offsets, a block of all columns at a time.
+    """What :func:`write_netcdf` writes, into an open file, a block of all columns at a time.
 
-    After NetCDF Classic Format Specification, Unidata; scipy's writer has the same bytes, but
-    needs all columns in memory.
+    After NetCDF Classic Format Specification, Unidata, with 64-bit offsets; scipy's writer has the
+    same bytes, but needs all columns in memory.
     """
     count = len(waveforms["time"])
     head = b"CDF\x02" + pack(">i", 0)
@@ -115,8 +94,7 @@ def _netcdf(
 
 
 def _about(name: str, unit: str) -> dict[str, str]:
-    long_name = {"long_name": COLUMNS[name].long_name} if name in COLUMNS else {}
-    return {"units": unit, **long_name}
+    return {"units": unit} | ({"long_name": COLUMNS[name].long_name} if name in COLUMNS else {})
 
 
 def _name(text: str) -> bytes:

@@ -308,7 +308,7 @@ def test_interrupt_within_an_executed_string_is_130_too(tmp_path: Path) -> None:
     """As where Ctrl-C strikes while a library is imported that makes code of text."""
     program = (
         "import sys\nfrom cosim.cli import main as cli\n"
-        "cli._dispatch = lambda arguments: exec('raise KeyboardInterrupt')\n"
+        "cli._parser = lambda arguments: exec('raise KeyboardInterrupt')\n"
         "sys.exit(cli.main(['scenes']))\n"
     )
     (tmp_path / "struck.py").write_text(program)

@@ -15,7 +15,7 @@ from cosim.files import spill as tape
 from cosim.scene import load
 from cosim.simulation import simulate
 from cosim.studies.bench.memory import peak
-from cosim.waveforms.storage import csv_content, netcdf_content
+from cosim.waveforms import storage
 
 pytestmark = pytest.mark.reliability
 
@@ -103,13 +103,15 @@ def test_files_are_those_of_other_writers(monkeypatch: pytest.MonkeyPatch) -> No
             if name in long_names:
                 variable.long_name = long_names[name]
         file.flush()
-        assert netcdf_content(waves, units, about) == content.getvalue()
+        storage.netcdf(found := BytesIO(), waves, units, about)
+        assert found.getvalue() == content.getvalue()
     table = BytesIO()
     header = "time [s],z [m],sticking [1]"
     np.savetxt(
         table, np.column_stack(list(waves.values())), "%.10g", ",", header=header, comments=""
     )
-    assert csv_content(waves, units) == table.getvalue()
+    storage.csv(found := BytesIO(), waves, units)
+    assert found.getvalue() == table.getvalue()
 
 
 def test_disk_that_takes_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,14 +1,9 @@
 """``cosim chart accuracy``."""
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 
 from cosim.cli.command import Command
-from cosim.cli.options import add_out, add_quick, writable
-
-
-def _options(parser: ArgumentParser) -> None:
-    add_quick(parser, "a part of it, in a fraction of the time")
-    add_out(parser, "results")
+from cosim.cli.options import add_study, writable
 
 
 def _run(arguments: Namespace) -> None:
@@ -18,4 +13,4 @@ def _run(arguments: Namespace) -> None:
         accuracy.run(arguments.out, arguments.quick)
 
 
-COMMAND = Command("accuracy", "error of every coupling method over its run time", _run, _options)
+COMMAND = Command("accuracy", "error of every coupling method over its run time", _run, add_study)

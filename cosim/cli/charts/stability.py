@@ -1,14 +1,9 @@
 """``cosim chart stability``."""
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 
 from cosim.cli.command import Command
-from cosim.cli.options import add_out, add_quick, writable
-
-
-def _options(parser: ArgumentParser) -> None:
-    add_quick(parser, "a part of it, in a fraction of the time")
-    add_out(parser, "results")
+from cosim.cli.options import add_study, writable
 
 
 def _run(arguments: Namespace) -> None:
@@ -18,4 +13,6 @@ def _run(arguments: Namespace) -> None:
         report.run(arguments.out, arguments.quick)
 
 
-COMMAND = Command("stability", "largest stable macro step of every coupling method", _run, _options)
+COMMAND = Command(
+    "stability", "largest stable macro step of every coupling method", _run, add_study
+)

@@ -16,8 +16,9 @@ from cosim.scene.messages import plain
 from cosim.simulation.rungs.given_surface import knots
 from cosim.simulation.simulate import simulate
 from cosim.studies.compare.compare import CameraError, Metrics, camera_error, made_of, measure
-from cosim.trials.camera import FRAME_RATE, Frames, laid_over
+from cosim.trials.camera import FRAME_RATE, Frames
 from cosim.trials.tracked import Trial, read
+from cosim.waveforms.formats.tracker import laid_over
 from cosim.waveforms.result import Result
 from cosim.waveforms.storage import read_csv, write_csv
 

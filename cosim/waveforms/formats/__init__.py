@@ -1,19 +1,18 @@
 """A finished run in the formats of other programs, one format a module.
 
 A module declares its format as ``FORMAT`` and imports nothing heavy at its top. Every format is
-made from ``waveforms.nc``, which holds the run's numbers in full; ``waveforms.csv`` has ten digits
-of them. All are made before the first file is written: one that fails leaves no others behind.
+made from ``waveforms.nc``, whose numbers have all their digits.
 """
 
 from collections import Counter
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.files.atomic import whole
 from cosim.files.declared import declared
-from cosim.scene.messages import plain
-from cosim.waveforms.formats.source import Exported, Format, Run, read
+from cosim.waveforms.formats.source import Format, Run, read
 
 __all__ = ["export", "formats", "parse", "read"]
 
@@ -39,12 +38,12 @@ def parse(lists: list[str]) -> list[str]:
 def export(run: Run, names: list[str], out: Path) -> dict[str, str]:
     """Write the run in each of the formats into the folder ``out``.
 
-    Returns the name of each file with a line on what it holds. Raises BadInput for a run that does
-    not have what a format needs; then nothing is written.
+    Returns the name of each file with a line on what it holds. Raises BadInput, and then writes
+    nothing, for a run that lacks what a format needs.
     """
-    chosen = [formats()[name] for name in names]
-    made: dict[str, Exported] = {format.file: format.content(run) for format in chosen}
+    made = {formats()[name].file: BytesIO() for name in names}
+    notes = [formats()[name].write(run, made[formats()[name].file]) for name in names]
     for name, file in made.items():
         with whole(out / name) as temporary:
-            temporary.write_bytes(file.content)
-    return {name: file.note for name, file in made.items()}
+            temporary.write_bytes(file.getvalue())
+    return dict(zip(made, notes, strict=True))

@@ -3,10 +3,10 @@
 from io import BytesIO
 
 from cosim.errors import BadInput
-from cosim.waveforms.formats.source import Exported, Format, Run
+from cosim.waveforms.formats.source import Format, Run
 
 
-def content(run: Run) -> Exported:
+def write(run: Run, file: BytesIO) -> str:
     """A dataset for each column with its ``units``, over the dimension scale ``time``; the root has
     ``title`` and ``scene``.
     """
@@ -16,7 +16,6 @@ def content(run: Run) -> Exported:
         raise BadInput(
             "--as hdf5 needs the package h5py, which the extra hdf5 of this project installs."
         ) from None
-    file = BytesIO()
     # netCDF-4 knows its variables by the order in which they were made.
     with h5py.File(file, "w", track_order=True) as root:
         root.attrs.update(run.attributes)
@@ -27,7 +26,7 @@ def content(run: Run) -> Exported:
             dataset.attrs["units"] = run.units[name]
             if dataset is not time:
                 dataset.dims[0].attach_scale(time)
-    return Exported(file.getvalue(), "HDF5 that netCDF4 and xarray open too")
+    return "HDF5 that netCDF4 and xarray open too"
 
 
-FORMAT = Format("hdf5", "waveforms.h5", "as netCDF-4 lays it out", content)
+FORMAT = Format("hdf5", "waveforms.h5", "as netCDF-4 lays it out", write)

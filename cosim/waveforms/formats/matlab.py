@@ -2,23 +2,23 @@
 
 from io import BytesIO
 
-from cosim.waveforms.formats.source import Exported, Format, Run
+from cosim.waveforms.formats.source import Format, Run
 
 ABOUT = 116  # bytes of free text at the file's beginning
 
 
-def content(run: Run) -> Exported:
+def write(run: Run, file: BytesIO) -> str:
     """A column vector for each column, under its own name and in SI; a struct ``units`` with the
     unit of each; ``title`` and ``scene`` (the text of scene.toml).
     """
     from scipy.io import savemat
 
     variables: dict[str, object] = dict(run.waveforms)
-    file = BytesIO()
     savemat(file, variables | {"units": run.units} | run.attributes, format="5", oned_as="column")
     about = b"MATLAB 5.0 MAT-file, written by cosim"  # SciPy's would name the moment of writing
-    made = about.ljust(ABOUT) + file.getvalue()[ABOUT:]
-    return Exported(made, f"MATLAB 5, {len(run.waveforms)} column vectors and a struct units")
+    file.seek(0)
+    file.write(about.ljust(ABOUT))
+    return f"MATLAB 5, {len(run.waveforms)} column vectors and a struct units"
 
 
-FORMAT = Format("mat", "waveforms.mat", "MATLAB 5", content)
+FORMAT = Format("mat", "waveforms.mat", "MATLAB 5", write)

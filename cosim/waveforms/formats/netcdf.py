@@ -1,13 +1,15 @@
 """The run's own netCDF (classic format), for another folder."""
 
-from cosim.waveforms.formats.source import Exported, Format, Run
-from cosim.waveforms.storage import netcdf_content
+from io import BytesIO
+
+from cosim.waveforms.formats.source import Format, Run
+from cosim.waveforms.storage import netcdf
 
 
-def content(run: Run) -> Exported:
+def write(run: Run, file: BytesIO) -> str:
     """The same bytes as the run's ``waveforms.nc``."""
-    made = netcdf_content(run.waveforms, run.units, run.attributes)
-    return Exported(made, "netCDF 3, with the scene")
+    netcdf(file, run.waveforms, run.units, run.attributes)
+    return "netCDF 3, with the scene"
 
 
-FORMAT = Format("nc", "waveforms.nc", "netCDF 3", content)
+FORMAT = Format("nc", "waveforms.nc", "netCDF 3", write)

@@ -4,24 +4,24 @@ Voltages are named ``v(column)`` and currents ``i(column)``, as the viewers of n
 expect them; motion keeps its column's name and has no type, since the format knows none for it.
 """
 
+from io import BytesIO
+
 import numpy as np
 
-from cosim.waveforms.formats.source import Exported, Format, Run
+from cosim.waveforms.formats.source import Format, Run
 
 TYPES = {"s": ("time", "{}"), "V": ("voltage", "v({})"), "A": ("current", "i({})")}
 """The type and the form of the name that go with a unit."""
 
 TITLE_BYTES = 400
-"""ngspice reads lines of 511 bytes, and takes the rest of a longer one for a line of its own, which
-can be a command.
-"""
+"""ngspice takes what is beyond 511 bytes for a line of its own, which can be a command."""
 
 
-def content(run: Run) -> Exported:
+def write(run: Run, file: BytesIO) -> str:
     """One plot, a transient analysis over the run's rows; the date is that of the run."""
     names = list(run.waveforms)
     lines = [
-        f"Title: {_line(run.title)}",
+        f"Title: {_line(run.attributes['title'])}",
         f"Date: {run.written:%a %b %d %H:%M:%S %Y}",
         "Plotname: Transient Analysis",
         "Flags: real",
@@ -34,7 +34,8 @@ def content(run: Run) -> Exported:
         lines.append(f"\t{number}\t{form.format(name)}\t{kind}")
     header = "\n".join([*lines, "Binary:\n"]).encode()
     rows = np.column_stack(list(run.waveforms.values())).astype("<f8")
-    return Exported(header + rows.tobytes(), "ngspice's binary raw file: v(…), i(…), motion")
+    file.write(header + rows.tobytes())
+    return "ngspice's binary raw file: v(…), i(…), motion"
 
 
 def _line(text: str) -> str:
@@ -42,4 +43,4 @@ def _line(text: str) -> str:
     return " ".join(text.split()).encode()[:TITLE_BYTES].decode(errors="ignore") or "cosim"
 
 
-FORMAT = Format("raw", "waveforms.raw", "ngspice's binary", content)
+FORMAT = Format("raw", "waveforms.raw", "ngspice's binary", write)

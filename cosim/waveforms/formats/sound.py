@@ -1,21 +1,21 @@
 """The surface's velocity as sound: WAV, mono, 16 bit, 48 kHz.
 
-The rows are resampled with a linear-phase low-pass filter (Kaiser window, about 118 dB) whose edge
-is at half the lower of the two rates; what is within 6 % of that edge is on the filter's slope. The
-loudest sample is 32767, and the factor to m/s stands in the file, as the comment of its LIST/INFO
-chunk.
+A linear-phase low-pass filter (Kaiser window, about 118 dB) resamples the rows; its edge is at half
+the lower of the two rates, its slope within 6 % of that. The loudest sample is 32767, and the
+factor to m/s is the comment in the file's LIST/INFO chunk.
 """
 
 import struct
 from fractions import Fraction
+from io import BytesIO
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.errors import BadInput
-from cosim.scene.messages import plain
-from cosim.waveforms.formats.source import Exported, Format, Run
+from cosim.arrays import Array
+from cosim.errors import BadInput, plain
+from cosim.waveforms.formats.source import Format, Run
 
 RATE = 48000  # Hz
 LARGEST = 32767
@@ -27,15 +27,13 @@ HALF_LENGTH = 64
 """Samples, of the lower rate, that the filter reaches to either side."""
 
 LARGEST_TERM = 10_000
-"""Largest term of the fraction that stands for the ratio of the rates. Rounding the ratio of an odd
-``run.output_step`` to it changes the pitch by less than 1e-4, a fifth of a cent.
-"""
+"""Of the fraction for the ratio of the rates: rounding changes the pitch by less than 1e-4."""
 
 LONGEST = 600.0  # s
 RAREST = 1e-2  # s, of the rows
 
 
-def content(run: Run) -> Exported:
+def write(run: Run, file: BytesIO) -> str:
     """The whole run from its beginning; half a unit of the last place is the error."""
     for key, value, most in (
         ("output_step", run.step, RAREST),
@@ -51,13 +49,12 @@ def content(run: Run) -> Exported:
     factor = (loudest if loudest > SILENCE else LARGEST * SILENCE) / LARGEST
     samples = np.rint(sound / factor).astype("<i2")
     said = f"surface velocity in m/s = sample * {factor!r}"
-    return Exported(
-        _wave(samples, {"INAM": run.title, "ICMT": said, "ISFT": "cosim"}),
-        f"{len(samples) / RATE:.3g} s at {RATE} Hz; {said}",
-    )
+    about = {"INAM": run.attributes["title"], "ICMT": said, "ISFT": "cosim"}
+    file.write(_wave(samples, about))
+    return f"{len(samples) / RATE:.3g} s at {RATE} Hz; {said}"
 
 
-def resampled(values: npt.NDArray[np.float64], step: float) -> npt.NDArray[np.float64]:
+def resampled(values: Array, step: float) -> Array:
     """``values``, ``step`` seconds apart, at the rate of the sound, from the first to the last."""
     from scipy.signal import firwin, resample_poly
 
@@ -86,4 +83,4 @@ def _chunk(name: str, data: bytes) -> bytes:
     return name.encode() + struct.pack("<I", len(data)) + data + b"\0" * (len(data) % 2)
 
 
-FORMAT = Format("wav", "surface.wav", "the surface's velocity as sound", content)
+FORMAT = Format("wav", "surface.wav", "the surface's velocity as sound", write)

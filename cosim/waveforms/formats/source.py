@@ -3,16 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from io import BytesIO
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
-from cosim.errors import BadInput
-from cosim.scene.messages import plain
+from cosim.arrays import Array
+from cosim.errors import BadInput, plain
 from cosim.waveforms.storage import read_netcdf
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -22,29 +18,15 @@ class Run:
     folder: Path
     waveforms: dict[str, Array]
     units: dict[str, str]
-    title: str
-    scene: str
-    """The text of its scene.toml."""
+    attributes: dict[str, str]
+    """Its ``title``, and as ``scene`` the text of its scene.toml."""
     written: datetime
-
-    @property
-    def attributes(self) -> dict[str, str]:
-        """What goes with the columns, as text."""
-        return {"title": self.title, "scene": self.scene}
 
     @property
     def step(self) -> float:
         """Time between the rows, s."""
         time = self.waveforms["time"]
         return float(time[-1] - time[0]) / (len(time) - 1)
-
-
-@dataclass(frozen=True)
-class Exported:
-    """The bytes of a file, and a line on what it holds."""
-
-    content: bytes
-    note: str
 
 
 @dataclass(frozen=True)
@@ -56,8 +38,9 @@ class Format:
     file: str
     """Name of the file that it becomes."""
     help: str
-    content: Callable[[Run], Exported]
-    """Makes the file; raises BadInput for a run that lacks what the format needs."""
+    write: Callable[[Run, BytesIO], str]
+    """Makes the file, and returns a line on what it holds; raises BadInput for a run that lacks
+    what the format needs."""
 
 
 def read(folder: Path) -> Run:
@@ -69,11 +52,6 @@ def read(folder: Path) -> Run:
     if not path.exists():
         raise BadInput(f"{name}: there is no run in this folder (waveforms.nc is missing).")
     waveforms, units, attributes = read_netcdf(path)
-    return Run(
-        folder,
-        waveforms,
-        units,
-        attributes.get("title", ""),
-        attributes.get("scene", ""),
-        datetime.fromtimestamp(path.stat().st_mtime, UTC),
-    )
+    about = {name: attributes.get(name, "") for name in ("title", "scene")}
+    written = datetime.fromtimestamp(path.stat().st_mtime, UTC)
+    return Run(folder, waveforms, units, about, written)

@@ -1,12 +1,15 @@
 """The run's own CSV, for another folder: a header ``name [unit]``, ten digits a number."""
 
-from cosim.waveforms.formats.source import Exported, Format, Run
-from cosim.waveforms.storage import csv_content
+from io import BytesIO
+
+from cosim.waveforms.formats.source import Format, Run
+from cosim.waveforms.storage import csv
 
 
-def content(run: Run) -> Exported:
+def write(run: Run, file: BytesIO) -> str:
     """The same bytes as the run's ``waveforms.csv``."""
-    return Exported(csv_content(run.waveforms, run.units), "comma-separated, ten digits")
+    csv(file, run.waveforms, run.units)
+    return "comma-separated, ten digits"
 
 
-FORMAT = Format("csv", "waveforms.csv", "comma-separated", content)
+FORMAT = Format("csv", "waveforms.csv", "comma-separated", write)

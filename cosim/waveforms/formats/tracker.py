@@ -1,22 +1,18 @@
 """A tracked trial made of a run: the header, units, sampling and digits of the published trials.
 
-The camera is that of `cosim compare`: heights at 960 frames/s from ``run.settle`` on (from the
-run's beginning where a trial moves the surface), velocities and accelerations by the tracker's
-differences. The published scripts read it in place of a trial. What the model holds at rest is
-written as resting: platform and part across, and the springed plate. No noise is added.
+The camera is that of `cosim compare`, without noise. What the model holds at rest is written as
+resting: platform and part across, and the springed plate.
 """
 
+from io import BytesIO
+
 import numpy as np
-import numpy.typing as npt
 
-from cosim.errors import BadInput
-from cosim.scene import load
-from cosim.scene.messages import plain
-from cosim.trials.camera import FRAME_RATE, accelerations, film, frame_count, laid_over, velocities
+from cosim.errors import BadInput, plain
+from cosim.scene import Scene, load
+from cosim.trials.camera import FRAME_RATE, accelerations, film, frame_count, velocities
 from cosim.trials.tracked import FEWEST_ROWS
-from cosim.waveforms.formats.source import Exported, Format, Run
-
-Array = npt.NDArray[np.float64]
+from cosim.waveforms.formats.source import Format, Run
 
 MOST_FRAMES = 200_000
 """A trial of more is larger than a file that `cosim compare` reads."""
@@ -25,7 +21,7 @@ MISSING = "\ufffd"
 """What stands in the published trials for a value that Tracker could not make."""
 
 
-def content(run: Run) -> Exported:
+def write(run: Run, file: BytesIO) -> str:
     """Platform p, part o and springed plate s, mm, frame by frame."""
     start, _ = laid_over(load(run.folder / "scene.toml"))
     n = frame_count(run.waveforms, start)
@@ -45,7 +41,15 @@ def content(run: Run) -> Exported:
             columns[f"{kind}z{body}"] = of(1e3 * z)
     rows = zip(*(map(number, values.tolist()) for values in columns.values()), strict=True)
     text = "\r\n".join([",".join(columns), *map(",".join, rows)])
-    return Exported(text.encode(), f"{n} frames at {FRAME_RATE:g} frames/s from {start:g} s on")
+    file.write(text.encode())
+    return f"{n} frames at {FRAME_RATE:g} frames/s from {start:g} s on"
+
+
+def laid_over(scene: Scene) -> tuple[float, float]:
+    """The first time of a run that may be laid over a trial's first frame, s, and its period, s."""
+    if scene.drive.file is not None:
+        return 0.0, 0.0  # the trial's own surface: there is nothing to shift
+    return scene.run.settle, 1.0 / scene.drive.frequency
 
 
 def number(value: float) -> str:
@@ -55,4 +59,4 @@ def number(value: float) -> str:
     return f"{float(f'{value:.7g}'):.8f}".replace("-0.00000000", "0.00000000")
 
 
-FORMAT = Format("tracker", "tracker.csv", "a tracked trial", content)
+FORMAT = Format("tracker", "tracker.csv", "a tracked trial", write)
