@@ -75,6 +75,7 @@ def write(out_dir: Path, case: Transport) -> None:
 
     figure = Picture(13.0, 4.8, "constrained")
     left, right = figure.subplots(1, 2)
+    left.set_xscale("symlog", linthresh=1e-9, linscale=0.4)
     left.axhline(average_velocity(case) * 1e3, lw=3.0, **CLOSED_FORM)
     right.plot(ratios, np.array(theory) * 1e3, lw=4.0, **CLOSED_FORM)
     rows = []
@@ -98,7 +99,6 @@ def write(out_dir: Path, case: Transport) -> None:
         axis.axhline(0.0, color="0.5", lw=0.6)
         axis.legend(fontsize=8)
     add("f_n [m_P g]", ratios, "theory", theory)
-    left.set_xscale("symlog", linthresh=1e-9, linscale=0.4)
     left.set_xticks([-1e-2, -1e-4, -1e-6, -1e-8, 0, 1e-8, 1e-6, 1e-4, 1e-2])
     left.set(
         xlabel="first phase ends later than the optimum by [periods]",
