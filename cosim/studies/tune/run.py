@@ -130,7 +130,7 @@ def tune(
 
 def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
     for name, (low, high) in over.items():
-        key = numeric_key(name, "--over")
+        key = numeric_key(name)
         assert key.low is not None and key.high is not None
         if not (isfinite(low) and isfinite(high) and key.low <= low < high <= key.high):
             raise BadInput(f"--over {name}={low:g}:{high:g}: must be a range, of {key.allowed}.")
@@ -194,7 +194,7 @@ class _Trial:
         settings: dict[str, Number] = {}
         for (name, (low, high)), share in zip(self.ranges.items(), place, strict=True):
             value = min(max(low + share * (high - low), low), high)
-            settings[name] = round(value) if numeric_key(name, "--over").kind is int else value
+            settings[name] = round(value) if numeric_key(name).kind is int else value
         return settings
 
     def _value(self, outcome: Outcome) -> float | None:
@@ -217,13 +217,9 @@ def _turned(trial: _Trial, best: Run) -> dict[str, list[float | None]]:
     place = next(place for place, run in trial.known.items() if run is best)
     found: dict[str, list[float | None]] = {}
     for k, key in enumerate(trial.ranges):
-        row: list[tuple[float, ...] | None] = []
-        for turn in TURNS:
-            share = place[k] + turn
-            inside = 0.0 <= share <= 1.0
-            row.append((*place[:k], round(share, 9), *place[k + 1 :]) if inside else None)
-        inside = [point for point in row if point is not None]
+        row = [(*place[:k], round(place[k] + turn, 9), *place[k + 1 :]) for turn in TURNS]
+        inside = [point for point in row if 0.0 <= point[k] <= 1.0]
         if inside:
             trial.costs(np.array(inside))
-        found[key] = [None if point is None else trial.known[point].value for point in row]
+        found[key] = [trial.known[point].value if point in inside else None for point in row]
     return found
