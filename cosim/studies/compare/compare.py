@@ -174,4 +174,4 @@ def _horizontal(trial: Trial) -> float | None:
     if not known.any():
         return None
     squares = float(np.mean(across[known] ** 2)), float(np.mean(along[known] ** 2))
-    return squares[0] / (squares[0] + squares[1])
+    return squares[0] / sum(squares)

@@ -56,12 +56,12 @@ class Comparison:
         write_json(out / "compare.json", {"run": self.run, "trial": self.trial, **numbers})
         rows = "".join(f"{name},{value!r}\n" for name, value in numbers.items())
         write_text(out / "compare.csv", f"metric,value\n{rows}")
-        table, units = {"time": self.simulated.time}, {"time": "s"}
+        table = {"time": self.simulated.time}
         for side in ("measured", "simulated"):
             for name in ("z_surface", "v_surface", "z_part", "v_part"):
                 table[f"{name}_{side}"] = getattr(getattr(self, side), name)
-                units[f"{name}_{side}"] = "m" if name.startswith("z") else "m/s"
-        write_csv(out / "frames.csv", table, units)
+        units = {"t": "s", "z": "m", "v": "m/s"}
+        write_csv(out / "frames.csv", table, {name: units[name[0]] for name in table})
         self.plot().write(out / "compare.png")
 
     def __repr__(self) -> str:
