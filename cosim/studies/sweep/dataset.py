@@ -30,10 +30,9 @@ def dataset(
 ) -> xr.Dataset:
     """The numbers of each point's summary over the keys of the sweep, with their units.
 
-    The dimensions of a grid are the keys; a sample has the dimension ``point``, along which the
-    keys vary. A key is named without its table (:func:`_names`), and its coordinate has its unit,
-    its meaning and, as ``key``, its ``table.key``. Beside a knob stands what it stands for. NaN
-    stands for a point that failed, is still to be run, or has no such number. SI units.
+    A key's coordinate (:func:`_names`) has its unit, its meaning and, as ``key``, its
+    ``table.key``. Beside a knob stands what it stands for. NaN stands for a point that failed, is
+    still to be run, or has no such number. SI units.
     """
     numbers: dict[str, Array] = {}
     failures = np.full(len(design), "", dtype=object)
