@@ -8,7 +8,7 @@ import json
 import math
 import subprocess
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -31,8 +31,7 @@ from cosim.drive.surface.waveforms import (
     quaid_velocity,
 )
 from cosim.errors import BadInput
-from cosim.studies import paper
-from cosim.studies.paper import exact
+from cosim.studies.paper import errata_text, exact, theory
 from cosim.studies.paper.errata import errata
 from tests.helpers.examples import examples
 
@@ -396,7 +395,7 @@ def test_every_misprint_is_proved():
 
 
 def test_the_misprints_as_text():
-    text = paper.errata_text()
+    text = errata_text()
     assert text.count("confirmed.") == 7
     assert "NOT CONFIRMED" not in text
     assert max(len(line) for line in text.splitlines()) <= 92
@@ -466,29 +465,33 @@ def test_other_impossible_numbers(call):
 
 
 def test_the_files(tmp_path: Path):
-    numbers = paper.write(tmp_path / "out", paper.FIGURE_3)
+    found = theory()
+    found.save(tmp_path / "out")
+    numbers = found.numbers
     written = {path.name for path in (tmp_path / "out").iterdir()}
-    assert written == {"theory.json", "figure3.png", "figure4.png"}
+    assert written == {
+        *("theory.json", "knife_edge.csv"),
+        *("figure3.png", "figure4.png", "knife_edge.png"),
+    }
     assert json.loads((tmp_path / "out/theory.json").read_text("utf-8")) == numbers
     assert numbers["up"]["v_average_over_gT"] == pytest.approx(0.31065088757, abs=1e-11)
     assert numbers["normal_force"]["f_optimal"] == pytest.approx(6.7083044169, abs=1e-10)
     assert [row["a_max"] / G for row in numbers["figure4"]] == pytest.approx([5, 10, 15, 20])
-    for name in ("figure3.png", "figure4.png"):
+    for name in ("figure3.png", "figure4.png", "knife_edge.png"):
         assert (tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG")
-    assert "+152.37 mm/s" in paper.table(numbers)
+    assert "+152.37 mm/s" in repr(found)
 
 
-def test_variants_that_are_not_possible_are_named(tmp_path: Path):
-    numbers = paper.write(tmp_path, Transport(0.72, 0.2, 2.1 * G, 1.45, 0.01))
-    assert "not_possible" in numbers["down"]
-    assert "not_possible" in numbers["up_robust"]
-    assert "none: f_n = 1.45 is too small" in paper.table(numbers)
+def test_variants_that_are_not_possible_are_named():
+    found = theory(mu_s=0.72, mu_k=0.2, a_max=2.1 * G, f_n=1.45, period=0.01)
+    assert "not_possible" in found.numbers["down"]
+    assert "not_possible" in found.numbers["up_robust"]
+    assert "none: f_n = 1.45 is too small" in repr(found)
 
 
-def test_nothing_is_written_without_transport(tmp_path: Path):
-    with pytest.raises(BadInput):
-        paper.write(tmp_path / "out", replace(paper.FIGURE_3, f_n=1.0))
-    assert not (tmp_path / "out").exists()
+def test_there_is_no_theory_without_transport():
+    with pytest.raises(BadInput, match="too small"):
+        theory(f_n=1.0)
 
 
 def test_formulas_do_without_matplotlib():

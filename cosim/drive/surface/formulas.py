@@ -43,11 +43,6 @@ class Transport:
     robust: bool = False
     gravity: float = GRAVITY
 
-    @property
-    def sign(self) -> float:
-        """1 for up, −1 for down."""
-        return sign_of(self.direction)
-
     def coefficients(self) -> Friction:
         """Those of :func:`horizontal_equivalent`; BadInput where there is no such transport."""
         mu_s, mu_k, a_max, f_n = self.mu_s, self.mu_k, self.a_max, self.f_n
@@ -80,9 +75,9 @@ def average_velocity(case: Transport) -> float:
     Up: (µ_s f − 1)² (A² − (µ_k f + 1)²) g T/(4 A (µ_s + µ_k)² f²) with f = F_n/(m_P g) and
     A = a_max/g.
     """
-    return case.sign * horizontal_velocity(
-        *case.coefficients(), case.a_max, case.period, case.gravity
-    )
+    pair = case.coefficients()
+    speed = horizontal_velocity(*pair, case.a_max, case.period, case.gravity)
+    return sign_of(case.direction) * speed
 
 
 # The conditions (1) to (5)

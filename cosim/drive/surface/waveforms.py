@@ -75,7 +75,9 @@ def optimal_cycle(case: Transport, margin: float = 0.0) -> Cycle:
         raise BadInput(f"margin = {margin:g} must be at least 0 and less than 0.1.")
     static = pair.static - margin * (case.mu_k if case.robust else case.mu_s) * case.f_n
     end_first = case.period * (pair.kinetic / (static + pair.kinetic) + margin)
-    cycle = closed_cycle(end_first, case.period, static * case.gravity, case.a_max, case.sign)
+    cycle = closed_cycle(
+        end_first, case.period, static * case.gravity, case.a_max, sign_of(case.direction)
+    )
     if static <= 0.0 or cycle.times[2] >= case.period:
         raise BadInput(f"margin = {margin:g} leaves no transport with these numbers.")
     return cycle
@@ -131,4 +133,4 @@ def quaid_velocity(case: Transport, a_stick: float | None = None) -> float:
         )
     slowed = pair.kinetic * case.gravity
     share = case.a_max / (case.a_max + stick) - slowed / (slowed + stick)
-    return 0.5 * stick * case.period * share * case.sign
+    return 0.5 * stick * case.period * share * sign_of(case.direction)

@@ -1,9 +1,8 @@
 """Simulated against measured: a run and a tracked trial, through the same camera.
 
 The simulated heights are read at the trial's frame rate and differenced as the tracker does; only
-then are they laid over the measured ones. Where in its period the run meets the trial's first frame
-is not known: it is chosen so that the surfaces' velocities agree best. A trial that `cosim export`
-made of the same run is recognised by its heights; then the camera's own error is told too.
+then are they laid over the measured ones. A trial that `cosim export` made of the same run is
+recognised by its heights; then the camera's own error is told too.
 """
 
 from dataclasses import dataclass
@@ -130,11 +129,8 @@ def camera_error(waveforms: dict[str, Array], trial: Trial, start: float) -> Cam
         drawn = np.interp(time[shown], frames, getattr(measured, column)[known])
         return float(np.mean(np.abs(waveforms[column][shown] - drawn)))
 
-    return CameraError(
-        camera_surface_mm=1e3 * distance("z_surface"),
-        camera_part_mm=1e3 * distance("z_part"),
-        camera_velocity=distance("v_surface"),
-    )
+    surface, part = 1e3 * distance("z_surface"), 1e3 * distance("z_part")
+    return CameraError(surface, part, distance("v_surface"))
 
 
 def made_of(waveforms: dict[str, Array], trial: Trial, start: float) -> bool:
@@ -144,9 +140,9 @@ def made_of(waveforms: dict[str, Array], trial: Trial, start: float) -> bool:
         return False
     seen, tracked = film(waveforms, start, n), _of_trial(trial)
     # A trial has seven digits, and eight places of a second or millimetre.
-    return np.allclose(seen.time, tracked.time, rtol=6e-7, atol=6e-9) and all(
-        np.allclose(mine, theirs, rtol=6e-7, atol=6e-12)
-        for mine, theirs in ((seen.z_surface, tracked.z_surface), (seen.z_part, tracked.z_part))
+    return all(
+        np.allclose(getattr(seen, name), getattr(tracked, name), rtol=6e-7, atol=places)
+        for name, places in (("time", 6e-9), ("z_surface", 6e-12), ("z_part", 6e-12))
     )
 
 
@@ -174,4 +170,4 @@ def _horizontal(trial: Trial) -> float | None:
     if not known.any():
         return None
     squares = float(np.mean(across[known] ** 2)), float(np.mean(along[known] ** 2))
-    return squares[0] / (squares[0] + squares[1])
+    return squares[0] / sum(squares)

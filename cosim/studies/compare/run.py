@@ -18,6 +18,7 @@ from cosim.simulation.simulate import simulate
 from cosim.studies.compare.compare import CameraError, Metrics, camera_error, made_of, measure
 from cosim.trials.camera import FRAME_RATE, Frames
 from cosim.trials.tracked import Trial, read
+from cosim.waveforms.figure import PART, SURFACE
 from cosim.waveforms.formats.tracker import laid_over
 from cosim.waveforms.result import Result
 from cosim.waveforms.storage import read_csv, write_csv
@@ -46,10 +47,38 @@ class Comparison:
 
     def plot(self) -> Picture:
         """Heights and velocities of surface and part, simulated and measured."""
-        from cosim.studies.compare.figure import draw
-
-        title = f"{self.run} against {self.trial}"
-        return draw(self.simulated, self.measured, self.metrics, title)
+        metrics, figure = self.metrics, Picture(13.0, 7.2, "constrained")
+        axes = figure.subplots(2, 2, sharex=True)
+        dots = {"color": "0.25", "lw": 0.0, "marker": ".", "ms": 3.0, "label": "measured"}
+        for column, (body, color) in enumerate((("surface", SURFACE), ("part", PART))):
+            line = {"color": color, "lw": 1.4, "label": "simulated"}
+            for row, (kind, name) in enumerate((("z", "height"), ("v", "velocity"))):
+                axis = axes[row, column]
+                for frames, style in ((self.measured, dots), (self.simulated, line)):
+                    values = getattr(frames, f"{kind}_{body}")
+                    first = values[0] if kind == "z" else 0.0
+                    axis.plot(frames.time * 1e3, (values - first) * 1e3, **style)
+                axis.grid(alpha=0.25)
+                axis.set_ylabel(f"{name} of the {body} [{'mm' if kind == 'z' else 'mm/s'}]")
+            axes[1, column].set_xlabel("time [ms]")
+        for axis, words in (
+            (
+                axes[0, 0],
+                f"velocity R² {metrics.velocity_r2:.2f}; largest change from frame to frame "
+                f"{metrics.kick_simulated * 1e3:.0f} mm/s "
+                f"(measured {metrics.kick_measured * 1e3:.0f})",
+            ),
+            (
+                axes[0, 1],
+                f"mean error {metrics.mean_error_mm:.3f} mm ({metrics.mean_error_percent:.1f} %); "
+                f"drift {metrics.drift_simulated * 1e3:+.1f} mm/s "
+                f"(measured {metrics.drift_measured * 1e3:+.1f})",
+            ),
+        ):
+            axis.set_title(words, fontsize=10, loc="left")
+        axes[0, 1].legend(loc="upper left", fontsize=8)
+        figure.suptitle(f"{self.run} against {self.trial}", fontsize=12)
+        return figure
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``compare.json``, ``compare.csv``, ``frames.csv`` and ``compare.png``."""
@@ -57,12 +86,12 @@ class Comparison:
         write_json(out / "compare.json", {"run": self.run, "trial": self.trial, **numbers})
         rows = "".join(f"{name},{value!r}\n" for name, value in numbers.items())
         write_text(out / "compare.csv", f"metric,value\n{rows}")
-        table, units = {"time": self.simulated.time}, {"time": "s"}
+        table = {"time": self.simulated.time}
         for side in ("measured", "simulated"):
             for name in ("z_surface", "v_surface", "z_part", "v_part"):
                 table[f"{name}_{side}"] = getattr(getattr(self, side), name)
-                units[f"{name}_{side}"] = "m" if name.startswith("z") else "m/s"
-        write_csv(out / "frames.csv", table, units)
+        units = {"t": "s", "z": "m", "v": "m/s"}
+        write_csv(out / "frames.csv", table, {name: units[name[0]] for name in table})
         self.plot().write(out / "compare.png")
 
     def __repr__(self) -> str:

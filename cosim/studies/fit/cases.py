@@ -32,11 +32,6 @@ class Parameters:
     mu_s: float = published.MU_S
     mu_plate: float = 0.0
 
-    @property
-    def force_per_mass(self) -> float:
-        """F_n/m, m/s²."""
-        return self.force * published.GRAVITY
-
 
 class Case:
     """One trial, ready to be simulated; SI units."""
@@ -54,10 +49,10 @@ class Case:
         self.measured: Array = np.interp(self.grid, self.time, self.z_part)
         self.largest = float(np.abs(self.z_part).max())
         self._scratch = np.empty(3 * len(self.grid))
-        published_forces = zip(published.FORCES_MEASURED, published.FORCE_BOUNDS, strict=True)
-        known = dict(enumerate(published_forces, 1)).get(trial.number or 0)
-        self.measured_force = known[0] if known else None  # in weights of the part
-        self.bounds = known[1] if known else published.OTHER_BOUNDS
+        measured = dict(enumerate(published.FORCES_MEASURED, 1))
+        self.measured_force = measured.get(trial.number or 0)  # in weights of the part
+        bounds = dict(enumerate(published.FORCE_BOUNDS, 1))
+        self.bounds = bounds.get(trial.number or 0, published.OTHER_BOUNDS)
 
     def motion(self, parameters: Parameters, solver: Solver) -> part.PartMotion:
         """The part's simulated motion, every 0.1 ms."""
@@ -67,7 +62,7 @@ class Case:
             self.v_surface,
             mu_s=parameters.mu_s,
             mu_k=parameters.mu_k,
-            force_per_mass=parameters.force_per_mass,
+            force_per_mass=parameters.force * published.GRAVITY,
             gravity=published.GRAVITY,
             mu_plate=parameters.mu_plate,
             v0=self.v0,
@@ -75,13 +70,12 @@ class Case:
         )
 
     def errors(
-        self, forces: Array, mu_k: float, mu_plate: float, mu_s: float, solver: Solver
+        self, forces: npt.ArrayLike, mu_k: float, mu_plate: float, mu_s: float, solver: Solver
     ) -> Array:
         """The mean errors [m] for several normal forces [weights of the part], in one call."""
         weights = np.asarray(forces, dtype=np.float64) * published.GRAVITY
-        laws = np.empty((len(weights), 4))
+        laws = np.full((len(weights), 4), published.GRAVITY)
         laws[:, :3] = np.multiply.outer(weights, (mu_s, mu_k, mu_plate))
-        laws[:, 3] = published.GRAVITY
         found = np.empty(len(weights))
         part.part_library().part_errors(
             *(len(self.time), self.time.ctypes.data, self.v_surface.ctypes.data, self.v0),

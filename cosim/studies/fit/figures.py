@@ -36,10 +36,9 @@ def trials(results: Solved) -> Picture:
     figure = Picture(13.0, 1.0 + 2.35 * rows, "constrained")
     axes = figure.subplots(rows, columns, squeeze=False)
     result = results.numbers
-    for axis, case, motion, row in zip(
-        axes.flat, results.cases, results.motions, result["trials"], strict=False
-    ):
-        _trial(axis, case, motion, row)
+    shown = zip(axes.flat, results.cases, results.motions, result["trials"], strict=False)
+    for panel in shown:
+        _trial(*panel)
     for axis in list(axes.flat)[len(results.cases) :]:
         axis.set_visible(False)
     for axis in axes[-1]:
@@ -56,16 +55,12 @@ def trials(results: Solved) -> Picture:
 
 def _trial(axis: Axes, case: Case, motion: PartMotion, row: dict[str, Any]) -> None:
     name = f"Trial {row['trial']}" if case.trial.number is not None else case.trial.name
-    for time, z, style in (
-        (case.time, case.z_surface, {"color": SURFACE, "lw": 0.8, "label": "surface, measured"}),
-        (case.time, case.z_part, {"color": MEASURED, "lw": 1.3, "label": "part, measured"}),
-        (
-            motion.time,
-            motion.z,
-            {"color": SIMULATED, "lw": 1.3, "ls": DASHED, "label": "part, simulated"},
-        ),
+    for time, z, label, color, width, dashes in (
+        (case.time, case.z_surface, "surface, measured", SURFACE, 0.8, "-"),
+        (case.time, case.z_part, "part, measured", MEASURED, 1.3, "-"),
+        (motion.time, motion.z, "part, simulated", SIMULATED, 1.3, DASHED),
     ):
-        axis.plot(time * 1e3, z * 1e3, **style)
+        axis.plot(time * 1e3, z * 1e3, label=label, color=color, lw=width, ls=dashes)
     axis.set_xlim(0, case.time[-1] * 1e3)
     axis.grid(alpha=0.25)
     axis.set_ylabel("height [mm]")

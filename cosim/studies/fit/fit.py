@@ -9,11 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.errors import BadInput
-from cosim.files.atomic import write_json, write_text
+from cosim.files.atomic import write_json
 from cosim.files.picture import Picture
 from cosim.mechanics.part import PartMotion
 from cosim.studies.fit.cases import Case, Parameters, Solver
 from cosim.studies.fit.search import Fit, Solved, search
+from cosim.studies.tables import write_csv
 from cosim.trials import published
 from cosim.trials.tracked import read_folder
 
@@ -39,11 +40,37 @@ class TrialResults(Solved):
 
         out = Path(folder)
         write_json(out / "fit.json", self.numbers)
-        write_text(out / "fit.csv", _csv(self.numbers["trials"]))
+        rows = [
+            {name: f"{x:.10g}" if isinstance(x, float) else x for name, x in row.items()}
+            for row in self.numbers["trials"]
+        ]
+        write_csv(out / "fit.csv", rows)
         figures.draw_all(self, out)
 
     def __repr__(self) -> str:
-        return table(self.numbers)
+        result = self.numbers
+        lines = ["trial   force [m g]   measured   error [mm]   [%]   sticks"]
+        for row in result["trials"]:
+            measured = row["normal_force_measured_weights"]
+            lines.append(
+                f"{row['trial']!s:>5} {row['normal_force_weights']:>11.2f} "
+                f"{'–' if measured is None else format(measured, '.2f'):>12} "
+                f"{row['mean_error_mm']:>11.3f} {row['mean_error_percent']:>8.2f} "
+                f"{100 * row['stick_fraction']:>5.0f} %"
+            )
+        plate = f", mu_p {result['mu_plate']:.4g}" if result["mu_plate"] else ""
+        lines.append(
+            f"mu_k {result['mu_k']:.4g}{plate}: mean error {result['mean_error_mm']:.4f} mm, "
+            f"{result['mean_error_percent']:.2f} %"
+        )
+        if result["normal_force_change_mean_percent"] is not None:
+            lines.append(
+                f"normal force changed by {result['normal_force_change_mean_percent']:.2f} % mean, "
+                f"{result['normal_force_change_median_percent']:.2f} % median"
+            )
+        if "leave_one_out_mean_error_mm" in result:
+            lines.append(f"leave-one-out error {result['leave_one_out_mean_error_mm']:.4f} mm")
+        return "\n".join(lines)
 
 
 def fit(
@@ -84,32 +111,6 @@ def fit(
     return TrialResults(cases, parameters, motions, found, result)
 
 
-def table(result: dict[str, Any]) -> str:
-    """The result as a few lines to print."""
-    lines = ["trial   force [m g]   measured   error [mm]   [%]   sticks"]
-    for row in result["trials"]:
-        measured = row["normal_force_measured_weights"]
-        lines.append(
-            f"{row['trial']!s:>5} {row['normal_force_weights']:>11.2f} "
-            f"{'–' if measured is None else format(measured, '.2f'):>12} "
-            f"{row['mean_error_mm']:>11.3f} {row['mean_error_percent']:>8.2f} "
-            f"{100 * row['stick_fraction']:>5.0f} %"
-        )
-    plate = f", mu_p {result['mu_plate']:.4g}" if result["mu_plate"] else ""
-    lines.append(
-        f"mu_k {result['mu_k']:.4g}{plate}: mean error {result['mean_error_mm']:.4f} mm, "
-        f"{result['mean_error_percent']:.2f} %"
-    )
-    if result["normal_force_change_mean_percent"] is not None:
-        lines.append(
-            f"normal force changed by {result['normal_force_change_mean_percent']:.2f} % mean, "
-            f"{result['normal_force_change_median_percent']:.2f} % median"
-        )
-    if "leave_one_out_mean_error_mm" in result:
-        lines.append(f"leave-one-out error {result['leave_one_out_mean_error_mm']:.4f} mm")
-    return "\n".join(lines)
-
-
 def _published(cases: list[Case], folder: Path) -> list[Parameters]:
     numbers = [case.trial.number for case in cases]
     if numbers != list(range(1, len(published.FORCES_FITTED) + 1)):
@@ -119,12 +120,9 @@ def _published(cases: list[Case], folder: Path) -> list[Parameters]:
 
 def _errors(cases: list[Case], parameters: list[Parameters], solver: Solver) -> Array:
     """The mean error [m] in each trial."""
-    return np.array(
-        [
-            case.errors(np.array([p.force]), p.mu_k, p.mu_plate, p.mu_s, solver)[0]
-            for case, p in zip(cases, parameters, strict=True)
-        ]
-    )
+    pairs = zip(cases, parameters, strict=True)
+    errors = (case.errors([p.force], p.mu_k, p.mu_plate, p.mu_s, solver) for case, p in pairs)
+    return np.concatenate(list(errors))
 
 
 def _result(
@@ -134,13 +132,14 @@ def _result(
     solver: Solver,
     evaluate: str | None,
 ) -> dict[str, Any]:
-    errors = _errors(cases, parameters, solver)
-    trials = [
-        _trial(case, p, motion, float(error))
-        for case, p, motion, error in zip(cases, parameters, motions, errors, strict=True)
-    ]
+    errors = _errors(cases, parameters, solver).tolist()
+    trials = [*map(_trial, cases, parameters, motions, errors)]
     changes = [row["normal_force_change_percent"] for row in trials]
     changes = [change for change in changes if change is not None]
+
+    def mean(name: str) -> float:
+        return float(np.mean([row[name] for row in trials]))
+
     return {
         "parameters": "published" if evaluate else "fitted",
         "solver": solver,
@@ -148,13 +147,11 @@ def _result(
         "mu_k": parameters[0].mu_k,
         "mu_plate": parameters[0].mu_plate,
         "normal_force_weights": [p.force for p in parameters],
-        "mean_error_mm": float(errors.mean() * 1e3),
-        "mean_error_percent": float(np.mean([row["mean_error_percent"] for row in trials])),
+        "mean_error_mm": float(np.mean(errors) * 1e3),
+        "mean_error_percent": mean("mean_error_percent"),
         "normal_force_change_mean_percent": float(np.mean(changes)) if changes else None,
         "normal_force_change_median_percent": float(np.median(changes)) if changes else None,
-        "straight_line_mean_error_mm": float(
-            np.mean([row["straight_line_error_mm"] for row in trials])
-        ),
+        "straight_line_mean_error_mm": mean("straight_line_error_mm"),
         "trials": trials,
     }
 
@@ -211,13 +208,3 @@ def _sensitivity(
         told: {f"{sign * SENSITIVITY:+.0%}": mean(name, 1 + sign * SENSITIVITY) for sign in (-1, 1)}
         for told, name in names.items()
     }
-
-
-def _csv(rows: list[dict[str, Any]]) -> str:
-    def cell(value: object) -> str:
-        if value is None:
-            return ""
-        return f"{value:.10g}" if isinstance(value, float) else str(value)
-
-    lines = [rows[0], *(map(cell, row.values()) for row in rows)]
-    return "".join(",".join(line) + "\n" for line in lines)

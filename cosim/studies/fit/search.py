@@ -79,12 +79,9 @@ def best_force(
 ) -> tuple[float, float]:
     """The normal force [weights] with the smallest error in a case, and that error [m]."""
     low, high = case.bounds
-
-    def errors(forces: Array) -> Array:
-        return case.errors(forces, mu_k, mu_plate, mu_s, solver)
-
+    law = (mu_k, mu_plate, mu_s, solver)
     grid = np.linspace(low, high, FORCES)
-    found = errors(grid)
+    found = case.errors(grid, *law)
     padded = np.concatenate([[np.inf], found, [np.inf]])
     minima = np.flatnonzero((found <= padded[:-2]) & (found <= padded[2:]))
     chosen = minima[np.argsort(found[minima], kind="stable")[:CANDIDATES]]
@@ -93,7 +90,7 @@ def best_force(
         middle, width = float(grid[start]), float(grid[1] - grid[0])
         for _ in range(ROUNDS):
             near = np.clip(middle + width * np.linspace(-1, 1, POINTS), low, high)
-            values = errors(near)
+            values = case.errors(near, *law)
             i = int(values.argmin())
             middle, width = float(near[i]), width * 2 / (POINTS - 1)
             if values[i] < error:
@@ -104,14 +101,14 @@ def best_force(
 def search(cases: Sequence[Case], solver: Solver = "exact", plate: bool = False) -> Fit:
     """Fit µ_k in 0…µ_s, each normal force within its bounds and, with ``plate``, µ_p in 0…0.3."""
     mu_s = published.MU_S
-    done: dict[tuple[float, float], tuple[list[float], list[float]]] = {}
+    done: dict[tuple[float, float], Array] = {}  # the forces and the errors
 
     def look(plates: Iterable[float], mu_ks: Iterable[float]) -> None:
         for pair in product(plates, mu_ks):
             key = (round(pair[0], 9), round(pair[1], 9))
             if key not in done:
                 pairs = [best_force(case, key[1], key[0], mu_s, solver) for case in cases]
-                done[key] = ([force for force, _ in pairs], [error for _, error in pairs])
+                done[key] = np.transpose(pairs)
 
     def best() -> tuple[float, float]:
         return min(done, key=lambda key: sum(done[key][1]))
@@ -128,11 +125,8 @@ def search(cases: Sequence[Case], solver: Solver = "exact", plate: bool = False)
     if plate:  # the whole profile over µ_k, at the best µ_p
         look([best()[0]], _line(0.0, mu_s, MU_K_STEPS[0]))
     tried = sorted(done)
-    return Fit(
-        np.array(tried),
-        np.array([done[key][1] for key in tried]),
-        np.array([done[key][0] for key in tried]),
-    )
+    forces, errors = (np.array([done[key][k] for key in tried]) for k in (0, 1))
+    return Fit(np.array(tried), errors, forces)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -3,7 +3,7 @@
 The formulas themselves, with source and symbols, are in :mod:`cosim.drive.surface.formulas`.
 """
 
-from cosim.studies.paper.closed_forms import FIGURE_3, collect, table, write
 from cosim.studies.paper.errata import errata_text
+from cosim.studies.paper.theory import theory
 
-__all__ = ["FIGURE_3", "collect", "errata_text", "table", "write"]
+__all__ = ["errata_text", "theory"]

@@ -33,15 +33,8 @@ class Erratum:
 
 def errata() -> list[Erratum]:
     """The misprints; computing the proofs takes about a second."""
-    return [
-        _first_phase(),
-        _interval(),
-        _force_limit(),
-        _sticking_limit(),
-        _force_guideline(),
-        _order_of_coefficients(),
-        _growth(),
-    ]
+    proofs = (_first_phase, _interval, _force_limit, _sticking_limit)
+    return [proof() for proof in (*proofs, _force_guideline, _order_of_coefficients, _growth)]
 
 
 def errata_text() -> str:

@@ -50,10 +50,11 @@ def simulate(phases: Sequence[Phase], contact: Contact, periods: int = 3) -> lis
             left = length
             while left > 0:
                 part = _part_acceleration(slip, acceleration, contact)
-                step = _until_they_meet(slip, acceleration - part, left)
+                rate = acceleration - part
+                step = min(left, -slip / rate) if slip * rate < 0 else left
                 travelled += step * (surface - slip + part * step / 2)
                 stuck += step if slip == 0 and part == acceleration else 0
-                slip += (acceleration - part) * step
+                slip += rate * step
                 surface += acceleration * step
                 left -= step
         found.append(Period(travelled, stuck, surface - before))
@@ -89,10 +90,3 @@ def _part_acceleration(slip: Fraction, surface: Fraction, contact: Contact) -> F
         return surface
     faster = slip > 0 or (slip == 0 and surface > contact.held_high)
     return contact.up if faster else contact.down
-
-
-def _until_they_meet(slip: Fraction, rate: Fraction, left: Fraction) -> Fraction:
-    """The time until the slip is 0, at most ``left``."""
-    if slip * rate >= 0:
-        return left
-    return min(left, -slip / rate)

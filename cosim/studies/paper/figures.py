@@ -27,8 +27,7 @@ def draw_cycle(case: Transport) -> Picture:
     slowed = formulas.slipping_acceleration(case.mu_k, case.f_n, -1.0, gravity)
     figure = Picture(8.4, 8.6, "constrained")
     axes = figure.subplots(3, 1, sharex=True)
-    _accelerations(axes[0], cycle, slowed, gravity)
-    _motions(axes[1], axes[2], cycle, slowed)
+    _motion(axes, cycle, slowed, gravity)
     sticking = (0.0, cycle.times[1] * 1e3)
     for axis in axes:
         axis.axvspan(*sticking, color=STICKING, alpha=0.6, lw=0, zorder=0, label="sticking")
@@ -47,30 +46,24 @@ def draw_cycle(case: Transport) -> Picture:
     return figure
 
 
-def _accelerations(axis: Axes, cycle: Cycle, slowed: float, gravity: float) -> None:
-    edges = np.repeat(cycle.times, 2)[1:-1] * 1e3
-    surface = np.repeat(cycle.accelerations, 2) / gravity
-    part = np.repeat([cycle.accelerations[0], slowed, slowed], 2) / gravity
-    axis.plot(edges, surface, color=SURFACE, lw=1.4, label="surface")
-    axis.plot(edges, part, color=PART, lw=1.8, ls=DASHED, label="part")
-    axis.set_ylabel("acceleration [g]")
-
-
-def _motions(velocity: Axes, height: Axes, cycle: Cycle, slowed: float) -> None:
-    """Velocities and heights; the end of the period is its own time, not the next one's start."""
-    time = np.linspace(0.0, cycle.times[3], POINTS)
-    knots = cycle.knots()
+def _motion(axes: Sequence[Axes], cycle: Cycle, slowed: float, gravity: float) -> None:
+    """Accelerations, velocities, heights; the period's end is its own time, not the next start."""
+    time, knots = np.linspace(0.0, cycle.times[3], POINTS), cycle.knots()
+    first = cycle.accelerations[0]
     loose = np.maximum(time - cycle.times[1], 0.0)
     stuck = np.minimum(time, cycle.times[1])
-    part = knots[1][0] + cycle.accelerations[0] * stuck + slowed * loose
-    travelled = knots[1][0] * time + cycle.accelerations[0] * stuck * (0.5 * stuck + loose)
-    travelled += 0.5 * slowed * loose**2
-    for axis, surface, moved, name in (
-        (velocity, np.interp(time, *knots), part, "velocity [mm/s]"),
-        (height, cycle.position(time), travelled, "height [mm]"),
+    velocity = knots[1][0] + first * stuck + slowed * loose
+    height = knots[1][0] * time + first * stuck * (0.5 * stuck + loose)
+    height += 0.5 * slowed * loose**2
+    edges = np.repeat(cycle.times, 2)[1:-1]
+    accelerations = np.repeat([cycle.accelerations, (first, slowed, slowed)], 2, axis=1) / gravity
+    for axis, at, surface, part, name in (
+        (axes[0], edges, *accelerations, "acceleration [g]"),
+        (axes[1], time, np.interp(time, *knots) * 1e3, velocity * 1e3, "velocity [mm/s]"),
+        (axes[2], time, cycle.position(time) * 1e3, height * 1e3, "height [mm]"),
     ):
-        axis.plot(time * 1e3, surface * 1e3, color=SURFACE, lw=1.4)
-        axis.plot(time * 1e3, moved * 1e3, color=PART, lw=1.8, ls=DASHED)
+        axis.plot(at * 1e3, surface, color=SURFACE, lw=1.4, label="surface")
+        axis.plot(at * 1e3, part, color=PART, lw=1.8, ls=DASHED, label="part")
         axis.set_ylabel(name)
 
 

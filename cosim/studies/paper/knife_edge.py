@@ -6,18 +6,19 @@ that finds the end of slipping only to within its step, or to within a velocity 
 that error by itself.
 """
 
-import csv
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cosim.drive.surface.formulas import Transport, average_velocity, largest_force_ratio
 from cosim.drive.surface.waveforms import Cycle, closed_cycle, optimal_cycle
-from cosim.files.atomic import whole
+from cosim.files.picture import Picture
 from cosim.mechanics import part
+from cosim.studies.tables import write_csv
 
 PERIODS = 20
 STEP, V_MIN = part.PUBLISHED_STEP, part.PUBLISHED_V_MIN
@@ -33,6 +34,9 @@ METHODS: dict[str, Method] = {
         part.threshold, step=STEP / 100, v_min=V_MIN
     ),
 }
+COLORS = ("#1f6fb2", "#2a9d8f", "#e9a03b", "#d1495b")
+STYLES = ("-", "--", "-", "-")
+CLOSED_FORM: dict[str, Any] = {"color": "0.2", "alpha": 0.3, "label": "closed form"}
 
 
 def mistimed(cycle: Cycle, error: float) -> Cycle:
@@ -60,35 +64,49 @@ def simulated(method: Method, cycle: Cycle, case: Transport) -> float:
 def write(out_dir: Path, case: Transport) -> None:
     """Write ``knife_edge.csv`` and ``knife_edge.png``: v_ave over the timing error and over f_n."""
     sizes = np.logspace(-9, -2, 29)
-    errors = np.concatenate([-sizes[::-1], sizes])
-    cycle = optimal_cycle(case)
-    cycles = [mistimed(cycle, float(error)) for error in errors]
+    errors = [*(-sizes[::-1]).tolist(), *sizes.tolist()]
+    optimum = optimal_cycle(case)
     most = largest_force_ratio(case.mu_s, case.a_max, case.gravity) * 0.99
-    ratios = np.linspace(1.05 / case.mu_k, most, 40)
-    pressed = [replace(case, f_n=float(ratio)) for ratio in ratios]
-    over_error, over_force = {}, {}
-    for name, method in METHODS.items():
-        over_error[name] = [simulated(method, one, case) for one in cycles]
-        over_force[name] = [
-            simulated(method, optimal_cycle(one, margin=1e-6), one) for one in pressed
-        ]
+    ratios = np.linspace(1.05 / case.mu_k, most, 40).tolist()
+    pressed = [replace(case, f_n=ratio) for ratio in ratios]
+    mistaken = [(mistimed(optimum, error), case) for error in errors]
+    delayed = [(optimal_cycle(one, margin=1e-6), one) for one in pressed]
     theory = [average_velocity(one) for one in pressed]
-    with (
-        whole(out_dir / "knife_edge.csv") as temporary,
-        open(temporary, "w", newline="", encoding="utf-8") as file,
-    ):
-        table = csv.writer(file)
-        table.writerow(["over", "value", "method", "v_average [m/s]"])
-        for kind, values, curves in (
-            ("timing error [periods]", errors, over_error),
-            ("f_n [m_P g]", ratios, over_force | {"theory": theory}),
-        ):
-            for name, curve in curves.items():
-                table.writerows(
-                    [kind, repr(float(x)), name, repr(float(y))]
-                    for x, y in zip(values, curve, strict=True)
-                )
-    from cosim.studies.paper.knife_edge_figure import draw
 
-    path = out_dir / "knife_edge.png"
-    draw(path, errors, over_error, average_velocity(case), ratios, over_force, theory)
+    figure = Picture(13.0, 4.8, "constrained")
+    left, right = figure.subplots(1, 2)
+    left.set_xscale("symlog", linthresh=1e-9, linscale=0.4)
+    left.axhline(average_velocity(case) * 1e3, lw=3.0, **CLOSED_FORM)
+    right.plot(ratios, np.array(theory) * 1e3, lw=4.0, **CLOSED_FORM)
+    rows = []
+
+    def add(over: str, values: list[float], name: str, curve: list[float]) -> None:
+        rows.extend(
+            {"over": over, "value": x, "method": name, "v_average [m/s]": y}
+            for x, y in zip(values, curve, strict=True)
+        )
+
+    for axis, over, values, cycles in (
+        (left, "timing error [periods]", errors, mistaken),
+        (right, "f_n [m_P g]", ratios, delayed),
+    ):
+        for (name, method), color, style in zip(METHODS.items(), COLORS, STYLES, strict=True):
+            curve = [simulated(method, *one) for one in cycles]
+            add(over, values, name, curve)
+            axis.plot(values, np.array(curve) * 1e3, color=color, ls=style, lw=1.4, label=name)
+        axis.set_ylabel("mean velocity of the part [mm/s]")
+        axis.grid(alpha=0.25)
+        axis.axhline(0.0, color="0.5", lw=0.6)
+        axis.legend(fontsize=8)
+    add("f_n [m_P g]", ratios, "theory", theory)
+    left.set_xticks([-1e-2, -1e-4, -1e-6, -1e-8, 0, 1e-8, 1e-6, 1e-4, 1e-2])
+    left.set(
+        xlabel="first phase ends later than the optimum by [periods]",
+        title="A part that meets the surface early loses most of the transport",
+    )
+    right.set(
+        xlabel="normal force over the part's weight, f_n",
+        title="A solver with a velocity threshold meets it early by itself",
+    )
+    write_csv(out_dir / "knife_edge.csv", rows)
+    figure.write(out_dir / "knife_edge.png")

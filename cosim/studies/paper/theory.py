@@ -1,15 +1,30 @@
-"""The paper's closed forms for one case, as a user asks for them."""
+"""What the closed forms say of one case, as numbers, as a table and as the paper's two figures."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.drive.surface.formulas import Transport
-from cosim.studies.paper.closed_forms import FIGURE_3, collect, table, write
+from cosim.drive.surface import formulas
+from cosim.drive.surface.formulas import GRAVITY, Direction, Transport
+from cosim.drive.surface.waveforms import (
+    Cycle,
+    optimal_cycle,
+    quaid_cycle,
+    quaid_limit,
+    quaid_velocity,
+)
+from cosim.errors import BadInput
+from cosim.files.atomic import write_json
 
 if TYPE_CHECKING:
     from cosim.files.picture import Picture
+
+FIGURE_3 = Transport(mu_s=0.7, mu_k=0.6, a_max=10.0 * GRAVITY, f_n=5.0, period=0.05)
+"""The case of the paper's figure 3, which tells no period: this one is ours."""
+
+SHARES = (0.5, 1.0, 1.5, 2.0)
+"""The largest accelerations of figure 4's curves, in units of the one given."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -29,13 +44,30 @@ class Theory:
         """Write ``theory.json``, the paper's figures 3 and 4, and what the optimum costs when it is
         missed, ``knife_edge.csv`` and ``knife_edge.png``.
         """
-        from cosim.studies.paper import knife_edge
+        from cosim.studies.paper import figures, knife_edge
 
-        write(Path(folder), self.case)
-        knife_edge.write(Path(folder), self.case)
+        out = Path(folder)
+        write_json(out / "theory.json", self.numbers)
+        self.plot().write(out / "figure3.png")
+        peaks = [row["a_max"] for row in self.numbers["figure4"]]
+        figures.draw_velocities(self.case, peaks).write(out / "figure4.png")
+        knife_edge.write(out, self.case)
 
     def __repr__(self) -> str:
-        return table(self.numbers)
+        force, gravity = self.numbers["normal_force"], self.case.gravity
+        least = self.numbers["conditions"]["least_peak_acceleration"] / gravity
+        rows = {
+            "fastest transport up": _told(self.numbers["up"]),
+            "  robust variant": _told(self.numbers["up_robust"]),
+            "  Quaid's waveform": _told(self.numbers["up_quaid"]),
+            "fastest transport down": _told(self.numbers["down"]),
+            "best normal force": f"{force['f_optimal']:.4f} m_P g, with "
+            f"{force['v_at_optimal'] * 1e3:+.2f} mm/s",
+            "largest normal force": f"{force['f_max_sticking']:.4f} m_P g (a part that slides "
+            f"already: {force['f_max_sliding']:.4f} m_P g)",
+            "least peak acceleration": f"{least:.4g} g",
+        }
+        return "\n".join(f"  {name:<25}{value}" for name, value in rows.items())
 
 
 def theory(
@@ -57,3 +89,87 @@ def theory(
     """
     case = Transport(mu_s, mu_k, a_max, f_n, period)
     return Theory(case, collect(case))
+
+
+def collect(case: Transport) -> dict[str, Any]:
+    """All numbers of the theory, SI, for one case; velocities over g T beside those in m/s."""
+    case.coefficients()  # raises where there is no transport
+    mu_s, mu_k, f_n, gravity = case.mu_s, case.mu_k, case.f_n, case.gravity
+
+    def optimal(direction: Direction, robust: bool) -> dict[str, Any]:
+        variant = replace(case, direction=direction, robust=robust)
+        return _cycle(optimal_cycle(variant), formulas.average_velocity(variant), gravity)
+
+    def possible(direction: Direction, robust: bool) -> dict[str, Any]:
+        try:
+            return optimal(direction, robust)
+        except BadInput as error:
+            return {"not_possible": str(error)}
+
+    stick = quaid_limit(mu_s, f_n, "up", gravity)
+    quaid = quaid_cycle(stick, case.a_max, case.period)
+    peaks = [share * case.a_max for share in SHARES]
+    least = formulas.least_peak_acceleration_at_any_force(gravity)
+    names = ("mu_s", "mu_k", "a_max", "f_n", "period", "gravity")
+    return {
+        "inputs": {name: getattr(case, name) for name in names},
+        "conditions": {
+            "sticking_range": list(formulas.sticking_range(mu_s, f_n, gravity)),
+            "slipping_accelerations": [
+                formulas.slipping_acceleration(mu_k, f_n, sign, gravity) for sign in (-1.0, 1.0)
+            ],
+            "least_force_ratio": formulas.least_force_ratio(mu_s),
+            "least_peak_acceleration": formulas.least_peak_acceleration(mu_s, f_n, gravity),
+            "least_peak_acceleration_at_any_force": least,
+            "fulfilled": formulas.conditions(mu_s, mu_k, case.a_max, f_n, gravity),
+        },
+        "horizontal_equivalent": {
+            "up": formulas.horizontal_equivalent(mu_s, mu_k, f_n)._asdict(),
+            "down": formulas.horizontal_equivalent(mu_s, mu_k, f_n, "down")._asdict(),
+        },
+        "up": optimal("up", False),
+        "up_robust": possible("up", True),
+        "up_quaid": _cycle(quaid, quaid_velocity(case), gravity),
+        "down": possible("down", False),
+        "down_robust": possible("down", True),
+        "normal_force": _force(case, case.a_max),
+        "figure4": [_force(case, peak) for peak in peaks if peak > least],
+    }
+
+
+def _told(entry: dict[str, Any]) -> str:
+    if "not_possible" in entry:
+        return f"none: {entry['not_possible']}"
+    return f"{entry['v_average'] * 1e3:+.2f} mm/s, stroke {entry['stroke'] * 1e3:.3f} mm"
+
+
+def _cycle(cycle: Cycle, velocity: float, gravity: float) -> dict[str, Any]:
+    times, velocities = cycle.knots()
+    return {
+        "v_average": velocity,
+        "v_average_over_gT": velocity / (gravity * cycle.times[3]),
+        "t1": cycle.times[1],
+        "t2": cycle.times[2],
+        "stroke": cycle.stroke(),
+        "accelerations": list(cycle.accelerations),
+        "knot_times": times.tolist(),
+        "knot_velocities": velocities.tolist(),
+    }
+
+
+def _force(case: Transport, a_max: float) -> dict[str, float]:
+    """The limits of the normal force and its optimum, with another a_max."""
+    mu_s, mu_k, gravity = case.mu_s, case.mu_k, case.gravity
+    best = formulas.optimal_force_ratio(mu_s, mu_k, a_max, gravity)
+    pair = formulas.horizontal_equivalent(mu_s, mu_k, best)
+    velocity = formulas.horizontal_velocity(*pair, a_max, case.period, gravity)
+    return {
+        "a_max": a_max,
+        "f_min": formulas.least_force_ratio(mu_s),
+        "f_optimal": best,
+        "f_cubic": formulas.cubic_force_ratio(mu_s, mu_k, a_max, gravity),
+        "f_max_sticking": formulas.largest_force_ratio(mu_s, a_max, gravity),
+        "f_max_sliding": formulas.largest_force_ratio(mu_k, a_max, gravity),
+        "v_at_optimal": velocity,
+        "v_at_optimal_over_gT": velocity / (gravity * case.period),
+    }

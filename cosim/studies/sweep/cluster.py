@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterable, Iterator
+from contextlib import closing
 from itertools import islice
 from typing import Any
 
@@ -27,14 +28,35 @@ def run_on_cluster(
 
     Its workers must have this version of cosim. Raises BadInput where there is no such cluster.
     """
-    client = _client(address)
-    try:
+    waiting = iter(points)
+    numbers: dict[str, int] = {}
+    with closing(_client(address)) as client:
+        from distributed import as_completed
+
         threads = sum(client.nthreads().values())
         if not threads:
             raise BadInput(f"--dask {address}: this cluster has no workers.")
-        yield from _run(client, base, iter(points), _IN_FLIGHT * threads, whole_periods)
-    finally:
-        client.close()
+        shared = client.scatter(base, broadcast=True)
+
+        def submit(point: Point) -> Any:
+            number, values = point
+            future = client.submit(_evaluate, shared, dict(values), whole_periods, pure=False)
+            numbers[future.key] = number
+            return future
+
+        running = as_completed([submit(point) for point in islice(waiting, _IN_FLIGHT * threads)])
+        for future in running:
+            number, failure = numbers.pop(future.key), future.exception()
+            if failure is None:
+                outcome = future.result()
+            else:
+                # Its worker died with it, again and again, or something that no scene explains.
+                words = " ".join(str(failure).split())
+                outcome = Outcome({}, f"The cluster gave it up: {type(failure).__name__}: {words}")
+            following = next(waiting, None)
+            if following is not None:
+                running.add(submit(following))
+            yield number, outcome
 
 
 def _client(address: str) -> Any:
@@ -49,36 +71,6 @@ def _client(address: str) -> Any:
     except (OSError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise BadInput(f"--dask {address}: no cluster answers there ({reason}).") from error
-
-
-def _run(
-    client: Any, base: Scene, points: Iterator[Point], in_flight: int, whole_periods: bool
-) -> Iterator[tuple[int, Outcome]]:
-    from distributed import as_completed
-
-    shared = client.scatter(base, broadcast=True)
-
-    def submit(point: Point) -> Any:
-        number, values = point
-        future = client.submit(_evaluate, shared, dict(values), whole_periods, pure=False)
-        numbers[future.key] = number
-        return future
-
-    numbers: dict[str, int] = {}
-    running = as_completed([submit(point) for point in islice(points, in_flight)])
-    for future in running:
-        number = numbers.pop(future.key)
-        failure = future.exception()
-        if failure is not None:
-            # Its worker died with it, again and again, or something else that no scene explains.
-            words = " ".join(str(failure).split())
-            outcome = Outcome({}, f"The cluster gave it up: {type(failure).__name__}: {words}")
-        else:
-            outcome = future.result()
-        following = next(points, None)
-        if following is not None:
-            running.add(submit(following))
-        yield number, outcome
 
 
 def _evaluate(base: Scene, values: dict[str, float], whole_periods: bool) -> Outcome:

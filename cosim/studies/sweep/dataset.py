@@ -1,11 +1,13 @@
 """The result of a sweep as a labelled dataset, and as netCDF."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from cosim.files.atomic import whole
@@ -13,6 +15,8 @@ from cosim.scene import Scene, firmware, keys, to_toml
 from cosim.simulation.summary import UNITS
 from cosim.studies.sweep.design import Design
 from cosim.studies.sweep.point import Outcome
+
+Array = npt.NDArray[np.float64]
 
 FAILURE = "failure"
 """The variable that says why a point failed; empty where it did not."""
@@ -26,35 +30,32 @@ def dataset(
 ) -> xr.Dataset:
     """The numbers of each point's summary over the keys of the sweep, with their units.
 
-    The dimensions of a grid are the keys; a sample has the dimension ``point``, along which the
-    keys vary. A key is named without its table (:func:`_names`), and its coordinate has its unit,
-    its meaning and, as ``key``, its ``table.key``. Beside a knob stands what it stands for. NaN
-    stands for a point that failed, is still to be run, or has no such number. SI units.
+    A key's coordinate (:func:`_names`) has its unit, its meaning and, as ``key``, its
+    ``table.key``. Beside a knob stands what it stands for. NaN stands for a point that failed, is
+    still to be run, or has no such number. SI units.
     """
-    names: dict[str, None] = {}
-    found: list[tuple[int, Outcome]] = sorted(outcomes, key=lambda pair: pair[0])
-    for _, outcome in found:
-        names.update(dict.fromkeys(outcome.numbers))
-    numbers = np.full((len(names), len(design)), np.nan)
+    numbers: dict[str, Array] = {}
     failures = np.full(len(design), "", dtype=object)
-    places = {name: k for k, name in enumerate(names)}
-    for index, outcome in found:
+    for index, outcome in sorted(outcomes, key=lambda pair: pair[0]):
         failures[index] = outcome.failure
         for name, value in outcome.numbers.items():
-            numbers[places[name], index] = value
-    axes = _names(design, {*names, FAILURE, POINT})
+            numbers.setdefault(name, np.full(len(design), np.nan))[index] = value
+    axes = _names(design, {*numbers, FAILURE, POINT})
     dims = tuple(axes) if design.sample is None else (POINT,)
-    coordinates = {}
-    for k, (name, axis) in enumerate(zip(axes, design.axes, strict=True)):
-        key = axis.key
-        about = {"units": key.unit, "long_name": key.text, "key": key.full}
-        if design.sample is not None:
-            coordinates[name] = (POINT, [row[k] for row in design.sample], about)
-        else:
-            coordinates[name] = (name, list(axis.values), about)
+    columns = [list(axis.values) for axis in design.axes]
+    if design.sample is not None:
+        columns = [list(column) for column in zip(*design.sample, strict=True)]
+    coordinates = {
+        name: (
+            name if design.sample is None else POINT,
+            column,
+            {"units": axis.key.unit, "long_name": axis.key.text, "key": axis.key.full},
+        )
+        for name, column, axis in zip(axes, columns, design.axes, strict=True)
+    }
     variables = {
-        name: (dims, numbers[k].reshape(design.shape), {"units": UNITS.get(name, "1")})
-        for name, k in places.items()
+        name: (dims, values.reshape(design.shape), {"units": UNITS.get(name, "1")})
+        for name, values in numbers.items()
     }
     variables[FAILURE] = (
         dims,
@@ -91,19 +92,15 @@ def _meant(scene: Scene, data: xr.Dataset) -> dict[str, xr.DataArray]:
     """What the knobs that are swept stand for: ``amplitude``, ``frequency``, ``offset``."""
     axes = {data[name].attrs["key"].removeprefix("drive."): data[name] for name in swept(data)}
     found: dict[str, xr.DataArray] = {}
-    if "pot_max" in axes:
-        found["amplitude"] = xr.apply_ufunc(
-            firmware.knob_amplitude, axes["pot_max"], vectorize=True
-        )
-    if "pot_frequency" in axes:
-        found["frequency"] = xr.apply_ufunc(
-            firmware.knob_frequency, axes["pot_frequency"], vectorize=True
-        )
-    if "pot_offset" in axes:
-        amplitude = found.get("amplitude", axes.get("amplitude", scene.drive.amplitude))
-        found["offset"] = xr.apply_ufunc(
-            firmware.knob_offset, axes["pot_offset"], amplitude, vectorize=True
-        )
+
+    def add(name: str, meaning: Callable[..., float], knob: str, *others: Any) -> None:
+        if knob in axes:
+            found[name] = xr.apply_ufunc(meaning, axes[knob], *others, vectorize=True)
+
+    add("amplitude", firmware.knob_amplitude, "pot_max")
+    add("frequency", firmware.knob_frequency, "pot_frequency")
+    amplitude = found.get("amplitude", axes.get("amplitude", scene.drive.amplitude))
+    add("offset", firmware.knob_offset, "pot_offset", amplitude)
     about = {key.name: {"units": key.unit, "long_name": key.text} for key in keys()}
     for name, values in found.items():
         values.attrs = about[name]

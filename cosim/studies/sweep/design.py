@@ -1,6 +1,6 @@
 """Which settings a sweep visits: a grid of axes, or a sample of the ranges that they span."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, prod
 
@@ -104,43 +104,50 @@ def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: 
 def parse(options: Sequence[str]) -> dict[str, tuple[Number, ...]]:
     """The axes that ``--over table.key=start:stop:n`` or ``table.key=a,b,c`` options give."""
     axes: dict[str, tuple[Number, ...]] = {}
-    for text in options:
-        name, equals, right = (part.strip() for part in text.partition("="))
-        if not (equals and name and right):
-            raise BadInput(
-                f"--over {plain(text)}: must be table.key=start:stop:n or table.key=a,b,c."
-            )
-        if name in axes:
-            raise BadInput(f"--over {plain(name)}: this key is given twice.")
-        key = numeric_key(name, "--over")
-        axes[name] = _range(text, right, key) if ":" in right else _list(text, right, key)
+    for text, name, right in split(options, "table.key=start:stop:n or table.key=a,b,c"):
+        key = numeric_key(name)
+        if ":" in right:
+            axes[name] = _range(text, right, key)
+        else:
+            axes[name] = tuple(_number(text, part) for part in right.split(","))
     return axes
 
 
-def numeric_key(name: str, option: str) -> Key:
+def split(options: Sequence[str], form: str) -> Iterator[tuple[str, str, str]]:
+    """Each option of this form, its key, which no other one has, and its values; BadInput."""
+    names: set[str] = set()
+    for text in options:
+        name, _, right = (part.strip() for part in text.partition("="))
+        if not (name and right):
+            raise BadInput(f"--over {plain(text)}: must be {form}.")
+        if name in names:
+            raise BadInput(f"--over {plain(name)}: this key is given twice.")
+        names.add(name)
+        yield text, name, right
+
+
+def numeric_key(name: str) -> Key:
     """The key with this full name. Raises BadInput for one that is unknown or no number."""
-    numeric = [key for key in keys() if key.kind in (int, float) and not key.choices]
-    found = next((key for key in numeric if key.full == name), None)
-    if found is not None:
-        return found
+    numeric = {key.full: key for key in keys() if key.kind in (int, float) and not key.choices}
+    if name in numeric:
+        return numeric[name]
     if any(key.full == name for key in keys()):
-        raise BadInput(f"{option} {plain(name)}: this key is not a number.")
-    bare = [key.full for key in numeric if key.name == name]
-    hint = f"; did you mean {bare[0]}?" if bare else suggestion(name, [k.full for k in numeric])
-    raise BadInput(ended(f"{option} {plain(name)}: there is no such key{hint}"))
+        raise BadInput(f"--over {plain(name)}: this key is not a number.")
+    bare = [full for full, key in numeric.items() if key.name == name]
+    hint = f"; did you mean {bare[0]}?" if bare else suggestion(name, numeric)
+    raise BadInput(ended(f"--over {plain(name)}: there is no such key{hint}"))
 
 
 def _axis(name: str, values: Sequence[Number]) -> Axis:
-    key = numeric_key(name, "--over")
+    key = numeric_key(name)
     if len(values) == 0:
         raise BadInput(f"--over {name}: has no value.")
     if len(set(values)) < len(values):
         raise BadInput(f"--over {name}: a value stands there twice.")
     for value in values:
         assert key.low is not None and key.high is not None
-        if not (isfinite(value) and key.low <= value <= key.high):
-            raise BadInput(f"--over {name}: {value:g} must be {key.allowed}.")
-        if key.kind is int and value != int(value):
+        inside = isfinite(value) and key.low <= value <= key.high
+        if not inside or (key.kind is int and value != int(value)):
             raise BadInput(f"--over {name}: {value:g} must be {key.allowed}.")
     kind = int if key.kind is int else float
     return Axis(key, tuple(kind(value) for value in values))
@@ -152,17 +159,11 @@ def _range(text: str, right: str, key: Key) -> tuple[Number, ...]:
         raise BadInput(
             f"--over {plain(text)}: must be {key.full}=start:stop:n with n a whole number from 2."
         )
-    start, stop = _number(text, parts[0]), _number(text, parts[1])
+    start, stop, count = _number(text, parts[0]), _number(text, parts[1]), int(parts[2])
     if key.kind is int:
-        spread = [
-            round(start + (stop - start) * k / (int(parts[2]) - 1)) for k in range(int(parts[2]))
-        ]
+        spread = [round(start + (stop - start) * k / (count - 1)) for k in range(count)]
         return tuple(dict.fromkeys(spread))
-    return tuple(float(value) for value in np.linspace(start, stop, int(parts[2])))
-
-
-def _list(text: str, right: str, key: Key) -> tuple[Number, ...]:
-    return tuple(_number(text, part) for part in right.split(","))
+    return tuple(np.linspace(start, stop, count).tolist())
 
 
 def _number(text: str, part: str) -> float:

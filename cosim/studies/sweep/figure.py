@@ -15,6 +15,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 from cosim.files.picture import Picture
 from cosim.scene import firmware
 from cosim.studies.sweep.dataset import FAILURE, POINT, swept
+from cosim.studies.sweep.report import label, setting
 
 Array = npt.NDArray[np.float64]
 
@@ -22,6 +23,8 @@ STAYS = 0.05e-3
 """m/s; a part that moves more slowly than this counts as not transported."""
 
 MOST_SLICES = 4
+
+FAILED: dict[str, Any] = {"color": "#d1495b", "ls": "", "marker": "x", "ms": 6}
 
 
 @dataclass(frozen=True)
@@ -68,34 +71,32 @@ def _row(rows: Any, number: int, count: int) -> list[Axes]:
 
 
 def _values(data: xr.Dataset, quantity: Quantity) -> xr.DataArray:
-    if quantity.name not in data:
-        return xr.full_like(data[FAILURE], np.nan, dtype=np.float64)
-    return data[quantity.name] * quantity.scale
+    absent = xr.full_like(data[FAILURE], np.nan, dtype=np.float64)
+    return data.get(quantity.name, absent) * quantity.scale
 
 
 def _curves(figure: Figure, data: xr.Dataset, name: str) -> None:
-    axes = figure.subplots(2, 2)
-    x = data[name].values
-    for axis, quantity in zip(axes.flat, (V_AVERAGE, *OTHERS), strict=True):
-        axis.plot(x, _values(data, quantity).values, color="#1f6fb2", marker=".", lw=1.3)
-        _mark_failures(axis, x, np.full(len(x), 0.02), data, axis.get_xaxis_transform())
-        _x_axis(axis, data, name)
+    for axis, quantity in zip(figure.subplots(2, 2).flat, (V_AVERAGE, *OTHERS), strict=True):
+        values = _values(data, quantity).values
+        axis.plot(data[name].values, values, color="#1f6fb2", marker=".", lw=1.3)
+        _over_key(axis, data, name)
         axis.set(ylabel=f"[{quantity.unit}]")
         axis.set_title(quantity.title, loc="left", fontsize=10.5)
-        axis.grid(alpha=0.25)
-        _tell_absent(axis, _values(data, quantity).values)
-    axes[0, 0].axhline(0.0, color="0.3", lw=0.8)
+        _tell_absent(axis, values)
+    figure.axes[0].axhline(0.0, color="0.3", lw=0.8)
 
 
 def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
     """Two keys span the maps; a third gives slices; any further one stands at the best point."""
-    best = _best(data)
+    known = _values(data, V_AVERAGE).fillna(-np.inf)
+    best: Any = known.argmax(known.dims)
     *fixed, third, y, x = ["", *names] if len(names) == 2 else names
     said = []
     for name in [str(dim) for dim in data.dims if dim not in (x, y, third)]:
         data = data.isel({name: int(best[name])})
         if name in fixed:
             said.append(_setting(data, name))
+    data = data.sortby([x, y])
     slices = [data]
     here = data
     if third:
@@ -120,7 +121,7 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
             axis.figure.colorbar(shown, ax=[p[0] for p in panels], label=label)
     for axis, quantity in zip(others, OTHERS, strict=True):
         values = _values(here, quantity).values
-        shown = _map(axis, here, quantity, x, y, "viridis", _one_sided(values, quantity))
+        shown = _map(axis, here, quantity, x, y, "viridis", _one_sided(values, quantity.unit))
         axis.set_title(quantity.title, loc="left", fontsize=10.5)
         if not _tell_absent(axis, values):
             axis.figure.colorbar(shown, ax=axis, label=f"[{quantity.unit}]")
@@ -130,42 +131,44 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
 
 
 def _clouds(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
-    """The velocity over each key, and the four quantities over the first two keys."""
+    """The velocity over each key, and three quantities over the first two keys."""
     rows = figure.subfigures(2, 1)
     v = _values(data, V_AVERAGE).values
     norm = _two_sided(v)
+    edges: dict[str, Any] = {"edgecolors": "0.4", "linewidths": 0.3}
     top = _row(rows, 0, min(len(names), MOST_SLICES))
     for axis, name in zip(top, names, strict=False):
-        x = data[name].values
-        axis.scatter(x, v, c=v, cmap="RdBu", norm=norm, s=14, edgecolors="0.4", linewidths=0.3)
-        _mark_failures(axis, x, np.full(len(x), 0.02), data, axis.get_xaxis_transform())
-        _x_axis(axis, data, name)
+        axis.scatter(data[name].values, v, c=v, cmap="RdBu", norm=norm, s=14, **edges)
+        _over_key(axis, data, name)
         axis.axhline(0.0, color="0.3", lw=0.8)
-        axis.grid(alpha=0.25)
     top[0].set_ylabel(f"{V_AVERAGE.title} [mm/s]")
     if len(names) < 2:
         return
     x, y = data[names[0]].values, data[names[1]].values
     for axis, quantity in zip(_row(rows, 1, 3), (V_AVERAGE, *OTHERS[1:]), strict=True):
         values = _values(data, quantity).values
-        signed = quantity is V_AVERAGE
-        shown = axis.scatter(
-            x,
-            y,
-            c=values,
-            cmap="RdBu" if signed else "viridis",
-            norm=norm if signed else _one_sided(values, quantity),
-            s=22,
-            edgecolors="0.4",
-            linewidths=0.3,
+        colors = (
+            ("RdBu", norm)
+            if quantity is V_AVERAGE
+            else ("viridis", _one_sided(values, quantity.unit))
         )
-        _mark_failures(axis, x, y, data)
-        _x_axis(axis, data, names[0])
-        _turned_ticks(data[names[1]].attrs["key"], axis.get_ylim, axis.set_ylim, axis.set_yticks)
-        axis.set_ylabel(_label(data, names[1]))
+        shown = axis.scatter(x, y, c=values, cmap=colors[0], norm=colors[1], s=22, **edges)
+        failed = data[FAILURE].values != ""
+        axis.plot(x[failed], y[failed], **FAILED)
+        _name_axes(axis, data, names[0], names[1])
         axis.set_title(quantity.title, loc="left", fontsize=10.5)
         if not _tell_absent(axis, values):
             axis.figure.colorbar(shown, ax=axis, label=f"[{quantity.unit}]")
+
+
+def _over_key(axis: Axes, data: xr.Dataset, name: str) -> None:
+    """Name the key below the axis, and mark the points that failed there."""
+    failed = data[name].values[data[FAILURE].values != ""]
+    if failed.size:
+        bottom = np.full(failed.size, 0.02)
+        axis.plot(failed, bottom, transform=axis.get_xaxis_transform(), **FAILED)
+    _name_axes(axis, data, name)
+    axis.grid(alpha=0.25)
 
 
 def _map(
@@ -174,44 +177,23 @@ def _map(
     values = _values(data, quantity).transpose(y, x).values
     xs, ys = data[x].values, data[y].values
     shown = axis.pcolormesh(xs, ys, values, cmap=colors, norm=norm, shading="nearest")
-    if min(values.shape) > 1 and np.isfinite(values).sum() > 3:
-        ordered = np.argsort(xs), np.argsort(ys)
-        levels = _levels(norm)
-        if levels:
-            lines = axis.contour(
-                xs[ordered[0]],
-                ys[ordered[1]],
-                values[np.ix_(ordered[1], ordered[0])],
-                levels=levels,
-                colors="0.15",
-                linewidths=0.7,
-            )
-            axis.clabel(lines, fontsize=7.5, fmt=lambda level: f"{level:.4g}")
-    failed = data[FAILURE].transpose(y, x).values != ""
-    rows, columns = np.nonzero(failed)
-    axis.plot(xs[columns], ys[rows], "x", color="#d1495b", ms=6)
-    _x_axis(axis, data, x)
-    _turned_ticks(data[y].attrs["key"], axis.get_ylim, axis.set_ylim, axis.set_yticks)
-    axis.set_ylabel(_label(data, y))
+    levels = _levels(norm)
+    if min(values.shape) > 1 and np.isfinite(values).sum() > 3 and levels:
+        lines = axis.contour(xs, ys, values, levels=levels, colors="0.15", linewidths=0.7)
+        axis.clabel(lines, fontsize=7.5, fmt=lambda level: f"{level:.4g}")
+    rows, columns = np.nonzero(data[FAILURE].transpose(y, x).values != "")
+    axis.plot(xs[columns], ys[rows], **FAILED)
+    _name_axes(axis, data, x, y)
     return shown
 
 
 def _boundary(axis: Axes, data: xr.Dataset, x: str, y: str) -> None:
     """Where transport ends: hatched where the part stays."""
-    values = np.abs(data["v_average"].transpose(y, x).values) if "v_average" in data else None
-    if values is None or min(values.shape) < 2 or not (values < STAYS).any():
-        return
-    xs, ys = np.sort(data[x].values), np.sort(data[y].values)
-    ordered = values[np.ix_(np.argsort(data[y].values), np.argsort(data[x].values))]
-    axis.contourf(xs, ys, ordered, levels=[0.0, STAYS], colors="none", hatches=["////"])
-    axis.contour(xs, ys, ordered, levels=[STAYS], colors="k", linewidths=1.4)
-
-
-def _mark_failures(axis: Axes, x: Array, y: Array, data: xr.Dataset, transform: Any = None) -> None:
-    failed = data[FAILURE].values != ""
-    if failed.any():
-        options = {} if transform is None else {"transform": transform}
-        axis.plot(x[failed], y[failed], "x", color="#d1495b", ms=6, **options)
+    speeds = np.abs(_values(data, V_AVERAGE).transpose(y, x).values) / V_AVERAGE.scale
+    if min(speeds.shape) > 1 and (speeds < STAYS).any():
+        over = data[x].values, data[y].values, speeds
+        axis.contourf(*over, levels=[0.0, STAYS], colors="none", hatches=["////"])
+        axis.contour(*over, levels=[STAYS], colors="k", linewidths=1.4)
 
 
 def _two_sided(values: Array) -> Normalize:
@@ -222,9 +204,9 @@ def _two_sided(values: Array) -> Normalize:
     return TwoSlopeNorm(0.0, min(low, -least), max(high, least))
 
 
-def _one_sided(values: Array, quantity: Quantity) -> Normalize:
+def _one_sided(values: Array, unit: str) -> Normalize:
     known = values[np.isfinite(values)]
-    if quantity.unit == "%":
+    if unit == "%":
         return Normalize(0.0, 100.0)
     low, high = (known.min(), known.max()) if known.size else (1.0, 2.0)
     if low > 0 and high > 20 * low:
@@ -249,25 +231,10 @@ def _tell_absent(axis: Axes, values: Array) -> bool:
     return absent
 
 
-def _best(data: xr.Dataset) -> dict[str, int]:
-    """Place of the greatest mean velocity along each dimension."""
-    values = _values(data, V_AVERAGE).values
-    place = np.nanargmax(values) if np.isfinite(values).any() else 0
-    return dict(
-        zip(map(str, data.dims), map(int, np.unravel_index(place, values.shape)), strict=True)
-    )
-
-
-def _label(data: xr.Dataset, name: str) -> str:
-    key, unit = data[name].attrs["key"], data[name].attrs["units"]
-    return key if unit == "1" else f"{key} [{unit}]"
-
-
 def _setting(data: xr.Dataset, name: str) -> str:
-    value = float(data[name])
-    key, unit = data[name].attrs["key"], data[name].attrs["units"]
-    turned = _turned(key, value).replace("\n", ", ")
-    return f"{key} = {value:.4g}" + ("" if unit == "1" else f" {unit}") + turned
+    return f"{setting(data[name], 4)}{_turned(data[name].key, float(data[name]))}".replace(
+        "\n", ", "
+    )
 
 
 def _turned(key: str, value: float) -> str:
@@ -279,18 +246,15 @@ def _turned(key: str, value: float) -> str:
     return ""
 
 
-def _x_axis(axis: Axes, data: xr.Dataset, name: str) -> None:
-    axis.set_xlabel(_label(data, name))
+def _name_axes(axis: Axes, data: xr.Dataset, *names: str) -> None:
+    """Label x, and y if it is named; below the numbers of a knob stands what they stand for."""
     axis.xaxis.set_major_locator(MaxNLocator(6))
-    _turned_ticks(data[name].attrs["key"], axis.get_xlim, axis.set_xlim, axis.set_xticks)
-
-
-def _turned_ticks(key: str, limits: Any, set_limits: Any, set_ticks: Any) -> None:
-    """Write below the numbers of a knob what they stand for."""
-    if not _turned(key, 0.5):
-        return
-    low, high = limits()
-    shown = [tick for tick in np.linspace(0.0, 1.0, 6) if low <= tick <= high]
-    if len(shown) > 1:
-        set_ticks(shown, [f"{tick:.1f}{_turned(key, tick)}" for tick in shown], fontsize=8.5)
-        set_limits(low, high)
+    for name, line in zip(names, (axis.xaxis, axis.yaxis), strict=False):
+        key, unit = data[name].key, data[name].units
+        line.set_label_text(label(key, unit))
+        if _turned(key, 0.5):
+            low, high = line.get_view_interval()
+            shown = [tick for tick in np.linspace(0.0, 1.0, 6) if low <= tick <= high]
+            if len(shown) > 1:
+                words = [f"{tick:.1f}{_turned(key, tick)}" for tick in shown]
+                line.set_ticks(shown, words, fontsize=8.5)

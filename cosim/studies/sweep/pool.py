@@ -66,7 +66,12 @@ class Pool:
                 point = again.pop() if again else next(waiting, None)
                 if point is None:
                     break
-                busy.append(self._given(point))
+                idle = [worker for worker in self._workers if worker.point is None]
+                if not idle:
+                    idle = [_Worker(partial(_evaluate, self._base, self._whole_periods))]
+                    self._workers += idle
+                idle[0].give(point)
+                busy.append(idle[0])
             if not busy:
                 return
             ready = wait([worker.pipe for worker in busy], timeout=1.0)
@@ -89,7 +94,7 @@ class Pool:
                         continue
                     if kind == "progress":
                         continue
-                    outcome, spoilt = answer if kind == "result" else (_fault(answer), False)
+                    outcome, spoilt = answer
                     worker.point = None
                     if spoilt or worker.given == POINTS_A_WORKER:
                         self._drop(worker)
@@ -98,15 +103,6 @@ class Pool:
                     self._drop(worker)
                     words = f"The simulation hangs: no step was finished in {PATIENCE:g} s."
                     yield number, Outcome({}, words)
-
-    def _given(self, point: Point) -> _Worker:
-        """A worker, idle so far or new, that has been given the point."""
-        worker = next((worker for worker in self._workers if worker.point is None), None)
-        if worker is None:
-            worker = _Worker(partial(_evaluate, self._base, self._whole_periods))
-            self._workers.append(worker)
-        worker.give(point)
-        return worker
 
     def _drop(self, worker: _Worker, patience: float = 0.0) -> str:
         """Replace the worker; how it ended."""
@@ -117,11 +113,8 @@ class Pool:
 def workers_asked(workers: int | None) -> int:
     """The number of workers: those asked for, or one for each processor. Raises BadInput."""
     if workers is None:
-        return (
-            len(os.sched_getaffinity(0))
-            if hasattr(os, "sched_getaffinity")
-            else os.cpu_count() or 1
-        )
+        affinity = getattr(os, "sched_getaffinity", None)
+        return len(affinity(0)) if affinity else os.cpu_count() or 1
     if not 1 <= workers <= 1024:
         raise BadInput(f"--workers {workers}: must be a whole number from 1 to 1024.")
     return workers
@@ -134,17 +127,12 @@ def _evaluate(
     progress: Callable[[float], None],
 ) -> tuple[Outcome, bool]:
     """A point's outcome, and whether it has spoilt the process for others."""
-    return evaluate(base, values, whole_periods, progress), _library_spoilt(base)
-
-
-def _fault(error: Exception) -> Outcome:
-    """Of a point that meets what no scene should: the others go on."""
-    return Outcome({}, " ".join(f"{type(error).__name__}: {error}".split()))
-
-
-def _library_spoilt(base: Scene) -> bool:
+    try:
+        outcome = evaluate(base, values, whole_periods, progress)
+    except Exception as error:  # what no scene should meet: the other points go on
+        return Outcome({}, " ".join(f"{type(error).__name__}: {error}".split())), False
     if base.rung.own_netlist or not base.rung.ngspice:
-        return False
+        return outcome, False
     from cosim.circuit.ngspice import spoilt
 
-    return spoilt()
+    return outcome, spoilt()

@@ -5,6 +5,7 @@ from collections import Counter
 import numpy as np
 import xarray as xr
 
+from cosim.simulation.summary import UNITS
 from cosim.studies.sweep.dataset import FAILURE, swept
 
 MOST_REASONS = 5
@@ -33,8 +34,25 @@ def _at(data: xr.Dataset, place: np.intp) -> str:
     """The settings of a point by its number."""
     v = data["v_average"]
     point = v[dict(zip(v.dims, np.unravel_index(place, v.shape), strict=True))]
-    settings = [point[name] for name in swept(data)]
-    return ", ".join(
-        f"{setting.key} = {setting:.6g}" + ("" if setting.units == "1" else f" {setting.units}")
-        for setting in settings
-    )
+    return ", ".join(setting(point[name]) for name in swept(data))
+
+
+def setting(value: xr.DataArray, digits: int = 6) -> str:
+    """``table.key = number unit`` of a point's coordinate."""
+    return f"{value.key} = {with_unit(float(value), value.units, digits)}"
+
+
+def with_unit(value: float, unit: str, digits: int = 6) -> str:
+    """``number unit``; a plain number has no unit."""
+    return f"{value:.{digits}g}" + ("" if unit == "1" else f" {unit}")
+
+
+def label(name: str, unit: str) -> str:
+    """``name [unit]`` for an axis."""
+    return name if unit == "1" else f"{name} [{unit}]"
+
+
+def bench_unit(quantity: str) -> tuple[str, float]:
+    """The unit in which a number of the summary is shown, and how many of it are one in SI."""
+    unit = UNITS.get(quantity, "1")
+    return ("mm/s", 1e3) if unit == "m/s" else (unit, 1.0)

@@ -66,12 +66,9 @@ def sweep(
     """
     count = workers_asked(workers)
     scene = load(scene, overrides)
-    if samples is None:
-        if random:
-            raise BadInput("--random needs --samples N.")
-        design = grid(over)
-    else:
-        design = sample(over, samples, seed, random)
+    if random and samples is None:
+        raise BadInput("--random needs --samples N.")
+    design = grid(over) if samples is None else sample(over, samples, seed, random)
     if out is None:
         with TemporaryDirectory() as folder:
             return _sweep(scene, design, Path(folder), count, dask, progress)

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from cosim.files.picture import Picture
-from cosim.simulation.summary import UNITS
 from cosim.studies.sweep.design import numeric_key
+from cosim.studies.sweep.report import bench_unit, label, with_unit
 from cosim.studies.tune.found import TURNS, Search
 
 COLORS = ("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#8d99ae", "#6a4c93")
@@ -19,10 +19,8 @@ def draw(tuning: Search) -> Picture:
     figure = Picture(13.0, 8.0, "constrained")
     rows: Any = figure.subfigures(2, 1)
     top, bottom = rows
-    unit, scale = UNITS.get(tuning.quantity, "1"), 1.0
-    if unit == "m/s":
-        unit, scale = "mm/s", 1e3
-    label = tuning.quantity if unit == "1" else f"{tuning.quantity} [{unit}]"
+    unit, scale = bench_unit(tuning.quantity)
+    ylabel = label(tuning.quantity, unit)
     values = np.array([np.nan if run.value is None else run.value for run in tuning.runs]) * scale
     number = np.arange(1, len(values) + 1)
 
@@ -36,7 +34,7 @@ def draw(tuning: Search) -> Picture:
         failed, np.full(len(failed), 0.02), "x", color="#d1495b", ms=6,
         transform=path_axis.get_xaxis_transform(),
     )  # fmt: skip
-    path_axis.set(xlabel="run", ylabel=label)
+    path_axis.set(xlabel="run", ylabel=ylabel)
     words = "Every run, and the best so far" + (
         f"; {len(failed)} failed (×)" if len(failed) else ""
     )
@@ -49,7 +47,7 @@ def draw(tuning: Search) -> Picture:
         found = [np.nan if value is None else value * scale for value in row]
         heights = np.array([*found, tuning.best.value * scale])[order]
         turn_axis.plot(np.array(turns)[order], heights, color=color, marker="o", ms=4, label=key)
-    turn_axis.set(xlabel="turned by [% of the key's range]", ylabel=label)
+    turn_axis.set(xlabel="turned by [% of the key's range]", ylabel=ylabel)
     turn_axis.set_title("The neighbourhood of the best", loc="left", fontsize=10.5)
     if tuning.neighbours:
         turn_axis.legend(fontsize=8.5)
@@ -59,18 +57,16 @@ def draw(tuning: Search) -> Picture:
         settings = [run.values[key] for run in tuning.runs]
         shown = axis.scatter(settings, values, c=number, cmap="viridis", s=14)
         axis.axvline(tuning.best.values[key], color="#d1495b", lw=0.9)
-        about = numeric_key(key, "--over").unit
-        axis.set(xlabel=key if about == "1" else f"{key} [{about}]", ylabel=label)
+        axis.set(xlabel=label(key, numeric_key(key).unit), ylabel=ylabel)
         axis.xaxis.set_major_locator(MaxNLocator(6))
         if key == keys[-1]:
             bottom.colorbar(shown, ax=axis, label="run")
     for axis in figure.axes:
         if axis.get_label() != "<colorbar>":
             axis.grid(alpha=0.25)
-    best = tuning.best.value * scale
+    best = with_unit(tuning.best.value * scale, unit, 4)
     figure.suptitle(
-        f"{tuning.scene.name}: {tuning.quantity} {best:.4g}{'' if unit == '1' else f' {unit}'} "
-        f"after {len(values)} runs"
+        f"{tuning.scene.name}: {tuning.quantity} {best} after {len(values)} runs"
         + (f", and {tuning.scouts} ahead without ngspice" if tuning.scouts else ""),
         fontsize=12,
     )

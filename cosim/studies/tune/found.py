@@ -40,6 +40,11 @@ class Search:
     """Runs on the rung "limited" that went ahead; 0 where the scene needs no ngspice itself."""
     seed: int
 
+    @property
+    def failed(self) -> int:
+        """How many runs have no value."""
+        return sum(run.value is None for run in self.runs)
+
     def lost(self, turn: float) -> float | None:
         """Greatest loss when one key is turned by ``turn`` of its range either way.
 
@@ -48,13 +53,10 @@ class Search:
         assert self.best.value is not None
         losses = []
         for key, values in self.neighbours.items():
+            low, high = self.ranges[key]
             for place, value in zip(TURNS, values, strict=True):
-                if abs(place) != turn or not self._within(key, place):
-                    continue
-                change = inf if value is None else self.best.value - value
-                losses.append(change if self.largest or value is None else -change)
+                there = self.best.values[key] + place * (high - low)
+                if abs(place) == turn and low <= there <= high:
+                    change = inf if value is None else self.best.value - value
+                    losses.append(change if self.largest or value is None else -change)
         return max(losses) / (abs(self.best.value) or 1.0) if losses else None
-
-    def _within(self, key: str, turn: float) -> bool:
-        low, high = self.ranges[key]
-        return low <= self.best.values[key] + turn * (high - low) <= high

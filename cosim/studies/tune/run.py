@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass, field
 from math import inf, isfinite
 from pathlib import Path
 
@@ -130,7 +131,7 @@ def tune(
 
 def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
     for name, (low, high) in over.items():
-        key = numeric_key(name, "--over")
+        key = numeric_key(name)
         assert key.low is not None and key.high is not None
         if not (isfinite(low) and isfinite(high) and key.low <= low < high <= key.high):
             raise BadInput(f"--over {name}={low:g}:{high:g}: must be a range, of {key.allowed}.")
@@ -147,21 +148,16 @@ def _simplified(scene: Scene) -> Scene | None:
         return None
 
 
+@dataclass
 class _Trial:
     """Runs settings, each once, and remembers them in the order in which they were asked for."""
 
-    def __init__(
-        self,
-        pool: Pool,
-        quantity: str,
-        largest: bool,
-        ranges: dict[str, tuple[float, float]],
-        progress: Callable[[Run, Run | None], None],
-    ) -> None:
-        self.ranges = ranges
-        self.known: dict[tuple[float, ...], Run] = {}
-        self._pool, self._quantity, self._largest = pool, quantity, largest
-        self._progress = progress
+    pool: Pool
+    quantity: str
+    largest: bool
+    ranges: dict[str, tuple[float, float]]
+    progress: Callable[[Run, Run | None], None]
+    known: dict[tuple[float, ...], Run] = field(default_factory=dict)
 
     @property
     def best(self) -> Run | None:
@@ -182,9 +178,9 @@ class _Trial:
         new = [place for place in dict.fromkeys(places) if place not in self.known]
         runs: dict[int, Run] = {}
         settings = [self.settings(place) for place in new]
-        for number, outcome in self._pool.run(enumerate(settings)):
+        for number, outcome in self.pool.run(enumerate(settings)):
             runs[number] = Run(settings[number], outcome, self._value(outcome))
-            self._progress(runs[number], self.best)
+            self.progress(runs[number], self.best)
         for number, place in enumerate(new):
             self.known[place] = runs[number]
         return np.array([self._cost(self.known[place].value) for place in places]), len(new)
@@ -194,22 +190,22 @@ class _Trial:
         settings: dict[str, Number] = {}
         for (name, (low, high)), share in zip(self.ranges.items(), place, strict=True):
             value = min(max(low + share * (high - low), low), high)
-            settings[name] = round(value) if numeric_key(name, "--over").kind is int else value
+            settings[name] = round(value) if numeric_key(name).kind is int else value
         return settings
 
     def _value(self, outcome: Outcome) -> float | None:
         if outcome.failure:
             return None
-        if self._quantity not in outcome.numbers:
+        if self.quantity not in outcome.numbers:
             names = ", ".join(outcome.numbers)
-            raise BadInput(f"{self._quantity} is not a number of this scene's summary ({names}).")
-        value = outcome.numbers[self._quantity]
+            raise BadInput(f"{self.quantity} is not a number of this scene's summary ({names}).")
+        value = outcome.numbers[self.quantity]
         return value if isfinite(value) else None
 
     def _cost(self, value: float | None) -> float:
         if value is None:
             return inf
-        return -value if self._largest else value
+        return -value if self.largest else value
 
 
 def _turned(trial: _Trial, best: Run) -> dict[str, list[float | None]]:
@@ -217,13 +213,9 @@ def _turned(trial: _Trial, best: Run) -> dict[str, list[float | None]]:
     place = next(place for place, run in trial.known.items() if run is best)
     found: dict[str, list[float | None]] = {}
     for k, key in enumerate(trial.ranges):
-        row: list[tuple[float, ...] | None] = []
-        for turn in TURNS:
-            share = place[k] + turn
-            inside = 0.0 <= share <= 1.0
-            row.append((*place[:k], round(share, 9), *place[k + 1 :]) if inside else None)
-        inside = [point for point in row if point is not None]
+        row = [(*place[:k], round(place[k] + turn, 9), *place[k + 1 :]) for turn in TURNS]
+        inside = [point for point in row if 0.0 <= point[k] <= 1.0]
         if inside:
             trial.costs(np.array(inside))
-        found[key] = [None if point is None else trial.known[point].value for point in row]
+        found[key] = [trial.known[point].value if point in inside else None for point in row]
     return found
