@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from cosim.studies.accuracy import figures
+from cosim.files.picture import Picture
 from cosim.studies.accuracy import report as accuracy
 from cosim.studies.accuracy.runs import FALSE_CYCLE, Run
 from cosim.studies.accuracy.solvers import SOLVERS
-from cosim.studies.stability import report as stability
-from cosim.studies.stability.stability import METHODS, Limit
+from cosim.studies.stability import stability
+from cosim.studies.stability.limits import METHODS, Limit
 
 RESULTS = Path(__file__).parents[2] / "results"
 
@@ -35,8 +35,7 @@ def read(kind: type[Any], name: str) -> list[Any]:
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """Figures in the place of files."""
     found: list[Figure] = []
-    for module in (figures, stability):
-        monkeypatch.setattr(module, "save", lambda figure, path: found.append(figure))
+    monkeypatch.setattr(Picture, "write", lambda figure, path: found.append(figure))
     return found
 
 

@@ -29,7 +29,7 @@ def solver(errors: dict[float, float | str]) -> Solver:
             raise SimulationFailed(error)
         return Outcome(true + error * np.ptp(true), 0.01, 7)
 
-    return Solver("a method", "macro steps", "macro step [s]", run, lambda case: list(errors))
+    return Solver("a method", "macro step [s]", run, lambda case: list(errors))
 
 
 def test_error_and_order_of_known_runs() -> None:

@@ -5,6 +5,7 @@ they are chosen anew and the integration starts again. The walls are smooth enou
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from math import pi
 from time import process_time
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.drive.command import Command, command
+from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
 
 _SCALES = np.array([1.0, 10.0, *[1e-3, 0.1] * 3])
@@ -138,22 +140,20 @@ class Machine:
 def run(
     scene: Scene,
     times: Sequence[float],
-    rest: Sequence[float],
     rtol: float,
     make: Callable[[Scene, Command], Machine] = Machine,
 ) -> tuple[float, npt.NDArray[np.float64]]:
-    """CPU seconds, and the part's height (m) at ``times`` (s).
-
-    ``rest`` are the heights (m) of surface and ram in equilibrium.
-    """
+    """CPU seconds, and the part's height (m) at ``times`` (s)."""
     from scipy.integrate import solve_ivp
 
+    with closing(Mechanics(scene)) as mechanics:
+        rest = mechanics.sample()
     began = process_time()
     drive = command(scene)
     machine = make(scene, drive)
-    z, z_ram = rest
+    z = rest["z_surface"]
     y = np.zeros(len(machine.scales))
-    y[Q], y[Z] = z_ram - z, z
+    y[Q], y[Z] = rest["z_ram"] - z, z
     t, found = 0.0, [np.empty((2, 0))]
     wanted = np.asarray(times)
     while t < scene.run.duration:

@@ -24,9 +24,7 @@ LSODA_ERROR = 5e-4
 def compare(rounds: int) -> dict[str, Any]:
     """Spread of each peer's time over ours, with the errors of both."""
     ours = brief()
-    found = simulate(ours)
-    wanted = error(heights(found.columns))
-    rest = [found.columns[name][0] for name in ("z_surface", "z_ram")]
+    wanted = error(heights(simulate(ours).columns))
 
     def all_in_ngspice(reltol: float) -> Peer:
         scene = brief(f"circuit.reltol={reltol}", "circuit.max_step=1e-4")
@@ -37,7 +35,7 @@ def compare(rounds: int) -> dict[str, Any]:
         return lambda: naive.run(scene, times())
 
     def solve_ivp(rtol: float) -> Peer:
-        return lambda: lsoda.run(ours, times(), rest, rtol)
+        return lambda: lsoda.run(ours, times(), rtol)
 
     peers = {
         "all_in_ngspice_over_ours": (wanted, map(all_in_ngspice, (1e-7, 1e-8, 3e-9))),
