@@ -13,7 +13,7 @@ from scipy.optimize import differential_evolution
 
 from cosim.errors import BadInput
 from cosim.mechanics.part import exact
-from cosim.studies.bench.given_surface import solvers
+from cosim.studies.bench.timings import solvers
 from cosim.studies.fit.cases import Case
 from cosim.studies.fit.fit import TrialResults, fit
 from cosim.studies.fit.search import best_force, search

@@ -1,13 +1,17 @@
-"""The part on a given surface: the exact solution beside the authors' scheme."""
+"""Times of the part's two solvers beside each other, and of a sweep beside a bare loop."""
 
 from collections.abc import Callable, Sequence
 from statistics import median
+from time import perf_counter
 
 import numpy as np
 
 from cosim.mechanics import part
+from cosim.scene import Scene
 from cosim.studies.bench.sampling import ratios, take_turns
 from cosim.studies.fit.cases import Case, Solver
+from cosim.studies.sweep.point import evaluate
+from cosim.studies.sweep.pool import Pool
 from cosim.trials import published
 
 SOLVERS: tuple[Solver, Solver] = ("exact", "published")
@@ -26,6 +30,25 @@ def solvers(cases: Sequence[Case], rounds: int) -> dict[str, float]:
     )
     seconds = {solver: median(values) for solver, values in taken.items()}
     return {**seconds, "ratio": ratios(taken["exact"], taken["published"])["median"]}
+
+
+def throughput(scene: Scene, offsets: Sequence[float], rounds: int) -> dict[str, float]:
+    """Points a second of one worker over those of a bare loop: median, ``low`` and ``high``.
+
+    The points are ``scene`` with each of the ``offsets`` (V). Both ways take turns, both warm.
+    """
+    points = [(k, {"drive.offset": offset}) for k, offset in enumerate(offsets)]
+    bare, pooled = [], []
+    with Pool(scene, 1) as pool:
+        for _ in range(rounds + 1):
+            began = perf_counter()
+            list(pool.run(points))
+            between = perf_counter()
+            for _, values in points:
+                evaluate(scene, values, False)
+            bare.append(perf_counter() - between)
+            pooled.append(between - began)
+    return ratios(bare[1:], pooled[1:])  # the first round warms up
 
 
 def _call(case: Case, solver: Solver) -> Callable[[], int]:
