@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from cosim.simulation.peers import lsoda, naive, ngspice_alone
 from cosim.simulation.simulate import simulate
-from cosim.studies.bench.sampling import cpu, ratios
-from cosim.studies.bench.truth import brief, error, heights, times
+from cosim.studies.bench.measures import brief, cpu, error, own_error, ratios, times
 
 Peer = Callable[[], tuple[float, npt.NDArray[np.float64]]]
 """Gives the CPU seconds of a run and the part's heights, m."""
@@ -23,8 +22,7 @@ LSODA_ERROR = 5e-4
 
 def compare(rounds: int) -> dict[str, Any]:
     """Spread of each peer's time over ours, with the errors of both."""
-    ours = brief()
-    wanted = error(heights(simulate(ours).columns))
+    ours, wanted = brief(), own_error("amplifier", "amplifier")
 
     def all_in_ngspice(reltol: float) -> Peer:
         scene = brief(f"circuit.reltol={reltol}", "circuit.max_step=1e-4")
