@@ -14,7 +14,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from cosim.files.picture import Picture
-from cosim.studies.accuracy import report as accuracy
+from cosim.studies.accuracy import accuracy
 from cosim.studies.accuracy.runs import FALSE_CYCLE, Run
 from cosim.studies.accuracy.solvers import SOLVERS
 from cosim.studies.stability import stability

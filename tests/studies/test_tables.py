@@ -9,8 +9,8 @@ import pytest
 
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene
+from cosim.studies.accuracy.accuracy import error_in, order, time_to
 from cosim.studies.accuracy.cases import CASES, Case
-from cosim.studies.accuracy.report import error_in, order, time_to
 from cosim.studies.accuracy.runs import FALSE_CYCLE, Run, measure, reference
 from cosim.studies.accuracy.solvers import Outcome, Solver
 from cosim.studies.tables import write_csv, write_page
