@@ -41,6 +41,7 @@ class Machine:
         self.slip = 0  # sign of u, or 0 for sticking
         self.rail = 0  # +1 at the upper limit of the output, -1 at the lower
         circuit = scene.circuit
+        self._most_held = scene.friction.mu_s * scene.friction.normal_force
         self._bandwidth = 2 * pi * circuit.gain_bandwidth
         self._leak = self._bandwidth / 10 ** (circuit.open_loop_gain / 20)
         self.high = circuit.supply - circuit.swing_loss_high
@@ -99,12 +100,9 @@ class Machine:
 
     def events(self) -> list[Callable[[float, Any], float]]:
         """One of friction, one of the output; each falls through zero."""
-        limit = self._scene.friction.mu_s * self._scene.friction.normal_force
 
         def friction(t: float, y: Any) -> float:
-            if self.slip:
-                return self.slip * y[U] + _BEYOND
-            return limit - abs(self.forces(y)[2])
+            return self.friction_event(y)
 
         def output(t: float, y: Any) -> float:
             if self.rail:
@@ -114,6 +112,12 @@ class Machine:
         for event in (friction, output):
             event.terminal, event.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
         return [friction, output]
+
+    def friction_event(self, y: Any) -> float:
+        """Falls through zero where sticking or slipping ends."""
+        if self.slip:
+            return self.slip * y[U] + _BEYOND
+        return self._most_held - abs(self.forces(y)[2])
 
     def choose(self, t: float, y: Any) -> None:
         """The modes that hold from here on."""
@@ -129,12 +133,13 @@ class Machine:
     def choose_friction(self, y: Any) -> None:
         """Stick or slip."""
         friction = self.forces(y)[2]
-        limit = self._scene.friction.mu_s * self._scene.friction.normal_force
         if abs(y[U]) > 1e-9:
             self.slip = 1 if y[U] > 0 else -1
         else:
             y[U] = 0.0
-            self.slip = 0 if abs(friction) < limit * (1 - 1e-9) else (1 if friction > 0 else -1)
+            self.slip = (
+                0 if abs(friction) < self._most_held * (1 - 1e-9) else (1 if friction > 0 else -1)
+            )
 
 
 def run(

@@ -115,14 +115,8 @@ class _Smoothed(Machine):
     def choose_friction(self, y: Any) -> None:
         """There is nothing to choose."""
 
-    def events(self) -> list[Callable[[float, Any], float]]:
-        never, output = super().events()
-
-        def friction(t: float, y: Any) -> float:
-            return 1.0
-
-        vars(friction).update(vars(never))
-        return [friction, output]
+    def friction_event(self, y: Any) -> float:
+        return 1.0
 
 
 def in_the_machine() -> Iterator[Row]:

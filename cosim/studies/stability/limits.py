@@ -24,7 +24,6 @@ from cosim.studies.stability.machines import (
     PAPER,
     SLOW,
     STRONG,
-    Cut,
     Regime,
     circuit_of,
     linear_sides,
@@ -34,7 +33,7 @@ from cosim.studies.tables import Row
 
 LONGEST = 0.1
 """s; a method that is stable up to here counts as one without a limit."""
-_SHORTEST: dict[Cut, float] = {"coil in circuit": 1e-5, "coil in mechanics": 1e-8}
+_SHORTEST = {"coil in circuit": 1e-5, "coil in mechanics": 1e-8}
 _SEEN, _MOST_STEPS = 0.15, 6000
 """s, and macro steps, that a run is watched for."""
 _WATCHED = 120  # macro steps behind the limit
@@ -44,7 +43,6 @@ METHODS = methods.METHODS | {
     "iterated, plain": lambda a, b: Iterated(a, b, "plain", tolerance=1e-7),
     "iterated, Newton": lambda a, b: Iterated(a, b, "newton", tolerance=1e-7),
 }
-
 
 REGIMES = (
     Regime(DIRECT, "saturated"),
