@@ -26,8 +26,9 @@ from cosim.coupling.rewind.methods import ORDERS
 from cosim.coupling.rewind.predictor_corrector import PredictorCorrector
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.accuracy.cases import CASES, participants, reference_parameters
+from cosim.studies.accuracy.cases import CASES, participants
 from tests.reference import monolithic
+from tests.reference.parameters import reference_parameters
 
 pytestmark = pytest.mark.physics
 

@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 
 from cosim.scene import load
-from cosim.studies.accuracy.cases import CASES, Case, reference_parameters
+from cosim.studies.accuracy.cases import CASES, Case
 from tests.reference import monolithic
+from tests.reference.parameters import reference_parameters
 
 TOL, OTHER_TOL, OTHER_METHOD = 1e-13, 1e-12, "BDF"
 NUDGE = 1e-9

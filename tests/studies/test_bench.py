@@ -8,31 +8,26 @@ import pytest
 
 from cosim.scene import load
 from cosim.simulation.peers import lsoda, naive, ngspice_alone
-from cosim.simulation.simulate import simulate
-from cosim.studies.bench import bars, truth
+from cosim.studies.bench import bars
 from cosim.studies.bench.instructions import compiler_version, per_period
+from cosim.studies.bench.measures import brief, error, own_error, ratios, take_turns, times
 from cosim.studies.bench.parts import coupled_over_parts
-from cosim.studies.bench.sampling import ratios, take_turns
 
 RECORDED = Path(__file__).parents[2] / "results" / "bench.json"
 
 
 def test_reference_is_met_by_the_rungs() -> None:
     for circuit, allowed in (("amplifier", 3e-4), ("ideal", 1e-6)):
-        found = simulate(truth.brief(f"circuit.model={circuit}"))
-        assert truth.error(truth.heights(found.columns), circuit) < allowed
+        assert own_error(circuit, circuit) < allowed
 
 
 def test_peers_solve_the_same_problem() -> None:
     """Each comes as near to the reference as its method can; a wrong model does not."""
-    times = truth.times()
-    netlist = truth.brief("circuit.reltol=1e-8", "circuit.max_step=1e-4")
-    assert truth.error(ngspice_alone.run(netlist, times)[1]) < 3e-4
-    found = simulate(truth.brief()).columns
-    rest = [found["z_surface"][0], found["z_ram"][0]]
-    assert truth.error(lsoda.run(truth.brief(), times, rest, 1e-6)[1]) < 3e-5
-    seconds, path = naive.run(truth.brief("circuit.max_step=1e-5"), times)
-    assert truth.error(path) < 3e-4
+    netlist = brief("circuit.reltol=1e-8", "circuit.max_step=1e-4")
+    assert error(ngspice_alone.run(netlist, times())[1]) < 3e-4
+    assert error(lsoda.run(brief(), times(), 1e-6)[1]) < 3e-5
+    seconds, path = naive.run(brief("circuit.max_step=1e-5"), times())
+    assert error(path) < 3e-4
     assert seconds > 0.0
 
 

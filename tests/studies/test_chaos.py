@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from cosim.studies.accuracy.chaos import CHAOTIC, METHODS, SCENE, ensemble, growth
+from cosim.studies.accuracy.chaos import CHAOTIC, METHODS, SCENE, apart, ensemble, growth
 
 pytestmark = pytest.mark.physics
 
@@ -22,9 +22,9 @@ def test_a_chaotic_scene_is_told_from_one_that_is_not() -> None:
 )
 def test_methods_agree_in_what_an_ensemble_leaves_certain(other: Sequence[str]) -> None:
     """And a coil a third weaker does not: the spread does not hide everything."""
-    default = ensemble("default", SCENE, (), 6)
-    assert max(default.values["v_average"]) > min(default.values["v_average"])
-    same = ensemble("same", SCENE, other, 6)
-    weaker = ensemble("weaker", SCENE, ("coil.force_factor=0.4",), 6)
-    assert default.apart(same, "stick_fraction") < 5.0
-    assert default.apart(weaker, "stick_fraction") > 5.0
+    default = ensemble(SCENE, (), 6)
+    assert max(default["v_average"]) > min(default["v_average"])
+    same = ensemble(SCENE, other, 6)
+    weaker = ensemble(SCENE, ("coil.force_factor=0.4",), 6)
+    assert apart(default["stick_fraction"], same["stick_fraction"]) < 5.0
+    assert apart(default["stick_fraction"], weaker["stick_fraction"]) > 5.0

@@ -14,11 +14,11 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from cosim.files.picture import Picture
-from cosim.studies.accuracy import report as accuracy
+from cosim.studies.accuracy import accuracy
 from cosim.studies.accuracy.runs import FALSE_CYCLE, Run
 from cosim.studies.accuracy.solvers import SOLVERS
-from cosim.studies.stability import report as stability
-from cosim.studies.stability.stability import METHODS, Limit
+from cosim.studies.stability import stability
+from cosim.studies.stability.limits import METHODS, Limit
 
 RESULTS = Path(__file__).parents[2] / "results"
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from cosim.studies.stability.machines import DIRECT, PAPER
-from cosim.studies.stability.stability import LONGEST, Regime, observed, predicted
+from cosim.studies.stability.limits import LONGEST, observed, predicted
+from cosim.studies.stability.machines import DIRECT, PAPER, Regime
 
 pytestmark = pytest.mark.physics
 

@@ -9,8 +9,8 @@ import pytest
 
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene
+from cosim.studies.accuracy.accuracy import error_in, order, time_to
 from cosim.studies.accuracy.cases import CASES, Case
-from cosim.studies.accuracy.report import error_in, order, time_to
 from cosim.studies.accuracy.runs import FALSE_CYCLE, Run, measure, reference
 from cosim.studies.accuracy.solvers import Outcome, Solver
 from cosim.studies.tables import write_csv, write_page
@@ -29,7 +29,7 @@ def solver(errors: dict[float, float | str]) -> Solver:
             raise SimulationFailed(error)
         return Outcome(true + error * np.ptp(true), 0.01, 7)
 
-    return Solver("a method", "macro steps", "macro step [s]", run, lambda case: list(errors))
+    return Solver("a method", "macro step [s]", run, lambda case: list(errors))
 
 
 def test_error_and_order_of_known_runs() -> None:

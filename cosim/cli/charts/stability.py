@@ -7,10 +7,10 @@ from cosim.cli.options import add_study, writable
 
 
 def _run(arguments: Namespace) -> None:
-    from cosim.studies.stability import report
+    from cosim.studies.stability import stability
 
     with writable(arguments.out):
-        report.run(arguments.out, arguments.quick)
+        stability.run(arguments.out, arguments.quick)
 
 
 COMMAND = Command(

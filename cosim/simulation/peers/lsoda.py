@@ -5,6 +5,7 @@ they are chosen anew and the integration starts again. The walls are smooth enou
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from math import pi
 from time import process_time
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.drive.command import Command, command
+from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
 
 _SCALES = np.array([1.0, 10.0, *[1e-3, 0.1] * 3])
@@ -39,6 +41,7 @@ class Machine:
         self.slip = 0  # sign of u, or 0 for sticking
         self.rail = 0  # +1 at the upper limit of the output, -1 at the lower
         circuit = scene.circuit
+        self._most_held = scene.friction.mu_s * scene.friction.normal_force
         self._bandwidth = 2 * pi * circuit.gain_bandwidth
         self._leak = self._bandwidth / 10 ** (circuit.open_loop_gain / 20)
         self.high = circuit.supply - circuit.swing_loss_high
@@ -97,12 +100,9 @@ class Machine:
 
     def events(self) -> list[Callable[[float, Any], float]]:
         """One of friction, one of the output; each falls through zero."""
-        limit = self._scene.friction.mu_s * self._scene.friction.normal_force
 
         def friction(t: float, y: Any) -> float:
-            if self.slip:
-                return self.slip * y[U] + _BEYOND
-            return limit - abs(self.forces(y)[2])
+            return self.friction_event(y)
 
         def output(t: float, y: Any) -> float:
             if self.rail:
@@ -112,6 +112,12 @@ class Machine:
         for event in (friction, output):
             event.terminal, event.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
         return [friction, output]
+
+    def friction_event(self, y: Any) -> float:
+        """Falls through zero where sticking or slipping ends."""
+        if self.slip:
+            return self.slip * y[U] + _BEYOND
+        return self._most_held - abs(self.forces(y)[2])
 
     def choose(self, t: float, y: Any) -> None:
         """The modes that hold from here on."""
@@ -127,33 +133,32 @@ class Machine:
     def choose_friction(self, y: Any) -> None:
         """Stick or slip."""
         friction = self.forces(y)[2]
-        limit = self._scene.friction.mu_s * self._scene.friction.normal_force
         if abs(y[U]) > 1e-9:
             self.slip = 1 if y[U] > 0 else -1
         else:
             y[U] = 0.0
-            self.slip = 0 if abs(friction) < limit * (1 - 1e-9) else (1 if friction > 0 else -1)
+            self.slip = (
+                0 if abs(friction) < self._most_held * (1 - 1e-9) else (1 if friction > 0 else -1)
+            )
 
 
 def run(
     scene: Scene,
     times: Sequence[float],
-    rest: Sequence[float],
     rtol: float,
     make: Callable[[Scene, Command], Machine] = Machine,
 ) -> tuple[float, npt.NDArray[np.float64]]:
-    """CPU seconds, and the part's height (m) at ``times`` (s).
-
-    ``rest`` are the heights (m) of surface and ram in equilibrium.
-    """
+    """CPU seconds, and the part's height (m) at ``times`` (s)."""
     from scipy.integrate import solve_ivp
 
+    with closing(Mechanics(scene)) as mechanics:
+        rest = mechanics.sample()
     began = process_time()
     drive = command(scene)
     machine = make(scene, drive)
-    z, z_ram = rest
+    z = rest["z_surface"]
     y = np.zeros(len(machine.scales))
-    y[Q], y[Z] = z_ram - z, z
+    y[Q], y[Z] = rest["z_ram"] - z, z
     t, found = 0.0, [np.empty((2, 0))]
     wanted = np.asarray(times)
     while t < scene.run.duration:

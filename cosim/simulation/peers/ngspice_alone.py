@@ -50,11 +50,11 @@ Cz z 0 1 ic={z}
 Cp p 0 1 ic={z}"""
 
 
-def _netlist(scene: Scene) -> tuple[str, tuple[str, ...]]:
-    """The deck, and the vectors to log."""
+def _netlist(scene: Scene, rest: dict[str, float]) -> tuple[str, tuple[str, ...]]:
+    """The deck, and the vectors to log; ``rest`` are the heights (m) in equilibrium."""
     deck, _ = prepare(scene)
     saved = ("i(vemf)", "v(p)")
-    own = {"vemf": _mechanics(scene), ".save": f".save {' '.join(saved)}"}
+    own = {"vemf": _mechanics(scene, rest), ".save": f".save {' '.join(saved)}"}
     lines = [own.get(line.split()[0], line) for line in deck.splitlines()]
     # The trapezoidal rule is the better one for a mechanism.
     lines = [line.replace("method=gear", "method=trap") for line in lines]
@@ -67,16 +67,16 @@ def run(scene: Scene, times: Sequence[float]) -> tuple[float, npt.NDArray[np.flo
     with closing(Mechanics(scene)) as mechanics:
         recorder = Recorder(scene, mechanics, lambda _: None)
         still = np.zeros((_MOST_STEPS, 2))
-        circuit = Lead(scene, command(scene), recorder, deck=_netlist(scene), replay=still)
+        deck = _netlist(scene, mechanics.sample())
+        circuit = Lead(scene, command(scene), recorder, deck=deck, replay=still)
         circuit.run()
     log = circuit.log()
     path = np.interp(times, log["time"], 1e-3 * log["v(p)"])
     return process_time() - began, path
 
 
-def _mechanics(scene: Scene) -> str:
+def _mechanics(scene: Scene, rest: dict[str, float]) -> str:
     table = scene.mechanics
-    total = table.ram_mass + table.surface_mass + table.part_mass
     upper = f"uramp(v(q)-{1e3 * table.travel!r})"
     lower = f"uramp(-v(q)-{1e3 * table.travel!r})"
     rate = f"{table.contact_damping!r}*1e-3*(v(ram)-v(surface))"
@@ -95,13 +95,6 @@ def _mechanics(scene: Scene) -> str:
             f"+1e-3*v(q)*{table.suspension_k3!r}))"
             f"+{table.suspension_damping!r}*1e-3*(v(ram)-v(surface)))"
         ),
-        q=repr(1e3 * _rest(scene)),
-        z=repr(-1e3 * total * table.gravity / table.flexure_stiffness),
+        q=repr(1e3 * (rest["z_ram"] - rest["z_surface"])),
+        z=repr(1e3 * rest["z_surface"]),
     )
-
-
-def _rest(scene: Scene) -> float:
-    """Where the ram hangs, relative to the surface, m."""
-    m = scene.mechanics
-    roots = np.roots([m.suspension_k3, m.suspension_k2, m.suspension_k1, m.ram_mass * m.gravity])
-    return float(min(roots[np.abs(roots.imag) < 1e-12].real, key=abs))

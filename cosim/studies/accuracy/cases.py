@@ -1,7 +1,6 @@
 """The scenes of the studies, and the participants that can go back to run them with."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 from cosim.coupling.participants.amplifier import Amplifier
 from cosim.coupling.participants.linear import LinearParticipant, driven_regulated_coil
@@ -108,27 +107,3 @@ def participants(scene: Scene) -> tuple[LinearParticipant | Amplifier, FmuMechan
         )
         return side, mechanics
     return Amplifier(scene, command(scene)), mechanics
-
-
-_OF_THE_REFERENCE = {
-    "drive": ("waveform", "frequency", "amplitude", "offset"),
-    "circuit": (
-        "supply",
-        "sense_resistance",
-        "gain_bandwidth",
-        "open_loop_gain",
-        "slew_rate",
-        "swing_loss_high",
-        "swing_loss_low",
-    ),
-    "coil": ("resistance", "inductance", "force_factor", "b1", "b2", "count"),
-    "friction": ("mu_s", "mu_k", "normal_force", "mu_plate"),
-}
-
-
-def reference_parameters(scene: Scene) -> dict[str, Any]:
-    """A scene's numbers by the names of the reference solution's parameters, SI."""
-    flat = scene.mechanics.model_dump(exclude={"contact", "actuator"})
-    for table, names in _OF_THE_REFERENCE.items():
-        flat |= getattr(scene, table).model_dump(include=set(names))
-    return flat

@@ -8,13 +8,15 @@ ensemble's own spread leaves open.
 """
 
 from collections.abc import Sequence
+from math import hypot, sqrt
 from pathlib import Path
+from statistics import mean, stdev
+from typing import Any
 
 import numpy as np
 
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.accuracy.ensemble import Ensemble
 from cosim.studies.accuracy.figures import draw_chaos
 from cosim.studies.tables import Row, write_csv, write_page
 from cosim.waveforms.result import Result
@@ -37,6 +39,21 @@ METHODS = {
 """What is compared with the first of them."""
 
 
+Ensemble = dict[str, list[float]]
+"""Values of each statistic, one a member."""
+
+
+def average(values: Sequence[float]) -> tuple[float, float]:
+    """Mean and its standard error."""
+    return mean(values), stdev(values) / sqrt(len(values))
+
+
+def apart(one: Sequence[float], other: Sequence[float]) -> float:
+    """Distance of two means in units of the standard error of their difference."""
+    (a, ea), (b, eb) = average(one), average(other)
+    return abs(a - b) / (hypot(ea, eb) or 1.0)
+
+
 def solved(scene: Sequence[str], more: Sequence[str], change: float = 0.0) -> Result:
     """A run of ``paper`` with overrides, its normal force greater by the share ``change``."""
     force = load("paper", list(scene)).friction.normal_force * (1.0 + change)
@@ -50,24 +67,18 @@ def growth(scene: Sequence[str], more: Sequence[str] = ()) -> float:
     return float(np.abs(nudged - path).max() / np.ptp(path)) / NUDGE
 
 
-def ensemble(name: str, scene: Sequence[str], more: Sequence[str], members: int) -> Ensemble:
+def ensemble(scene: Sequence[str], more: Sequence[str], members: int) -> Ensemble:
     """The statistics of runs with normal forces apart by :data:`APART`."""
-    found: dict[str, list[float]] = {name: [] for name in STATISTICS}
-    for k in range(members):
-        summary = solved(scene, more, APART * k).summary
-        for statistic in STATISTICS:
-            value = summary[statistic]
-            assert isinstance(value, int | float)
-            found[statistic].append(float(value))
-    return Ensemble(name, found)
+    found: Any = [solved(scene, more, APART * k).summary for k in range(members)]
+    return {name: [float(summary[name]) for summary in found] for name in STATISTICS}
 
 
 def run(out: Path) -> str:
     """Write ``chaos`` as png, csv and md into ``out``; gives what it shows."""
     grown = growth(SCENE)
-    ensembles = [ensemble(name, SCENE, more, MEMBERS) for name, more in METHODS.items()]
-    first, *others = ensembles
-    most = max(first.apart(one, statistic) for one in others for statistic in STATISTICS)
+    ensembles = {name: ensemble(SCENE, more, MEMBERS) for name, more in METHODS.items()}
+    first = next(iter(ensembles.values()))
+    most = max(apart(first[name], one[name]) for one in ensembles.values() for name in STATISTICS)
     message = (
         f"In a chaotic scene no two paths agree, but the methods' statistics do: {most:.1f} "
         "standard errors apart at most"
@@ -81,23 +92,20 @@ def run(out: Path) -> str:
         "distance from the first method's mean, in standard errors of the difference.",
     ]
     raw = [
-        {"method": one.name, "run": k} | {name: one.values[name][k] for name in STATISTICS}
-        for one in ensembles
+        {"method": method, "run": k} | {name: values[k] for name, values in one.items()}
+        for method, one in ensembles.items()
         for k in range(MEMBERS)
     ]
+    table: list[Row] = [
+        {"method": method} | {name: _cell(one[name], first[name]) for name in STATISTICS}
+        for method, one in ensembles.items()
+    ]
     write_csv(out / "chaos.csv", raw)
-    write_page(out / "chaos.md", "A chaotic scene", notes, {"Ensembles": rows(ensembles)})
-    draw_chaos(ensembles, message, out / "chaos.png")
+    write_page(out / "chaos.md", "A chaotic scene", notes, {"Ensembles": table})
+    draw_chaos(ensembles, average, message, out / "chaos.png")
     return message
 
 
-def rows(ensembles: Sequence[Ensemble]) -> list[Row]:
-    """A row a method, a column a statistic."""
-
-    def cell(one: Ensemble, statistic: str) -> str:
-        middle, error = one.mean(statistic)
-        return f"{middle:.4g} ± {error:.2g} ({one.apart(ensembles[0], statistic):.1f})"
-
-    return [
-        {"method": one.name} | {name: cell(one, name) for name in STATISTICS} for one in ensembles
-    ]
+def _cell(values: Sequence[float], first: Sequence[float]) -> str:
+    middle, error = average(values)
+    return f"{middle:.4g} ± {error:.2g} ({apart(values, first):.1f})"

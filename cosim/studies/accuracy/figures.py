@@ -1,30 +1,19 @@
 """The figures of the accuracy study, of the friction laws and of a chaotic scene."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 
 from matplotlib.axes import Axes
 
 from cosim.studies.accuracy.cases import CASES
-from cosim.studies.accuracy.ensemble import Ensemble
 from cosim.studies.accuracy.runs import Run
-from cosim.studies.plots import (
-    BLUE,
-    FAINT,
-    GREEN,
-    PURPLE,
-    SKY,
-    VERMILION,
-    End,
-    label_ends,
-    panels,
-)
+from cosim.studies.plots import BLUE, FAINT, GREEN, PURPLE, SKY, VERMILION, End, label_ends, panels
 from cosim.studies.tables import Row
 
 CREEP, ERROR = "creep of a held part [µm/s]", "error in the machine / range"
 """Columns of the study of friction laws, and the labels of its axes."""
-_STYLES = ((VERMILION, "o"), (SKY, "v"), (BLUE, "s"), (GREEN, "D"), ("black", "P"), (PURPLE, "X"))
+_STYLES = tuple(zip((VERMILION, SKY, BLUE, GREEN, "black", PURPLE), "ovsDPX", strict=True))
 """Colours and markers of the strong lines, in their order."""
 
 
@@ -32,11 +21,11 @@ def draw_accuracy(runs: Sequence[Run], strong: Mapping[str, str], title: str, pa
     """Draw error over CPU time, a panel a scene; ``strong`` are names of methods by label."""
     scenes = list(dict.fromkeys(run.scene for run in runs))
     wide = min(len(scenes), 2)
-    size = (5.5 * wide, 4.0 * -(-len(scenes) // wide) + 0.5)
+    high = -(-len(scenes) // wide)
     note = (
         "Grey: the other methods. ×: diverged; at the top edge: failed or in a false limit cycle."
     )
-    figure, axes = panels(title, note, size, -(-len(scenes) // wide), wide)
+    figure, axes = panels(title, note, (5.5 * wide, 4.0 * high + 0.5), high, wide)
     for axis, scene in zip(axes, scenes, strict=True):
         _panel(axis, [run for run in runs if run.scene == scene], strong)
         axis.set_title(CASES[scene].title, fontsize=10.5, loc="left")
@@ -76,20 +65,24 @@ _STATISTICS = {
 """Labels, and factors to their units."""
 
 
-def draw_chaos(ensembles: Sequence[Ensemble], title: str, path: Path) -> None:
-    """Draw each statistic of each method: a tick a run, the mean and two standard errors."""
+def draw_chaos(
+    ensembles: Mapping[str, Mapping[str, Sequence[float]]],
+    average: Callable[[Sequence[float]], tuple[float, float]],
+    title: str,
+    path: Path,
+) -> None:
+    """Draw each method's values of each statistic: a tick a run, and their ``average``."""
     note = "One tick a run; dot and bar: their mean with two standard errors."
     figure, axes = panels(title, note, (11.0, 3.4), 1, len(_STATISTICS), sharey=True)
-    places = range(len(ensembles))
     for axis, (statistic, (label, scale)) in zip(axes, _STATISTICS.items(), strict=True):
-        for place, one in zip(places, ensembles, strict=True):
-            values = [scale * v for v in one.values[statistic]]
-            middle, error = (scale * v for v in one.mean(statistic))
+        for place, one in enumerate(ensembles.values()):
+            values = [scale * v for v in one[statistic]]
+            middle, error = average(values)
             axis.plot(values, [place] * len(values), "|", color="0.55", ms=11)
             axis.errorbar(middle, place, xerr=2 * error, fmt="o", color=BLUE, capsize=4, lw=2)
         axis.locator_params(axis="x", nbins=4)
         axis.set(xlabel=label, ylim=(len(ensembles) - 0.4, -0.6))
-    axes[0].set_yticks(places, [one.name for one in ensembles])
+    axes[0].set_yticks(range(len(ensembles)), list(ensembles))
     figure.write(path)
 
 

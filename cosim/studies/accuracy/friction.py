@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 
 from cosim.drive.command import Command
-from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, load
 from cosim.simulation.peers.lsoda import Machine, U
 from cosim.simulation.peers.lsoda import run as run_machine
@@ -40,11 +39,7 @@ Law = Callable[[float, float, float], tuple[float, float]]
 would keep the part on the surface."""
 
 
-LAWS = {
-    "tanh": (1e-3, 1e-4, 1e-5),
-    "Karnopp": (1e-3, 1e-4, 1e-5),
-    "LuGre": (1e4, 1e5, 1e6),
-}
+LAWS = {"tanh": (1e-3, 1e-4, 1e-5), "Karnopp": (1e-3, 1e-4, 1e-5), "LuGre": (1e4, 1e5, 1e6)}
 """Laws with their widths: m/s, or N/m for the bristle's stiffness."""
 COULOMB = "set-valued Coulomb"
 _RTOL_IN_THE_MACHINE = 1e-6
@@ -82,23 +77,23 @@ def run(out: Path) -> str:
 def law_of(name: str, width: float, scene: Scene) -> Law:
     """A smoothed law with a scene's coefficients; ``width`` as in :data:`LAWS`."""
     f, mu_s, mu_k = scene.friction.normal_force, scene.friction.mu_s, scene.friction.mu_k
+    damping = 2.0 * sqrt(width * scene.mechanics.part_mass)
+
+    def falling(u: float, over: float) -> float:
+        """Coefficient of friction: static at 0, kinetic beyond the slip velocity ``over``, m/s."""
+        share = (u / over) ** 2
+        return mu_k + (mu_s - mu_k) * (exp(-share) if share < 700.0 else 0.0)
 
     def smooth(u: float, z: float, load: float) -> tuple[float, float]:
-        falling = (u / (30.0 * width)) ** 2
-        fallen = exp(-falling) if falling < 700.0 else 0.0
-        return f * tanh(u / width) * (mu_k + (mu_s - mu_k) * fallen), 0.0
+        return f * tanh(u / width) * falling(u, 30.0 * width), 0.0
 
     def karnopp(u: float, z: float, load: float) -> tuple[float, float]:
         if abs(u) < width:
             return min(max(load, -mu_s * f), mu_s * f), 0.0
         return (mu_k * f if u > 0.0 else -mu_k * f), 0.0
 
-    damping, stribeck = 2.0 * sqrt(width * scene.mechanics.part_mass), 1e-3
-
     def lugre(u: float, z: float, load: float) -> tuple[float, float]:
-        falling = (u / stribeck) ** 2
-        bound = f * (mu_k + (mu_s - mu_k) * (exp(-falling) if falling < 700.0 else 0.0))
-        rate = u - width * abs(u) / bound * z
+        rate = u - width * abs(u) / (f * falling(u, 1e-3)) * z
         return width * z + damping * rate, rate
 
     return {"tanh": smooth, "Karnopp": karnopp, "LuGre": lugre}[name]
@@ -120,31 +115,18 @@ class _Smoothed(Machine):
     def choose_friction(self, y: Any) -> None:
         """There is nothing to choose."""
 
-    def events(self) -> list[Callable[[float, Any], float]]:
-        never, output = super().events()
-
-        def friction(t: float, y: Any) -> float:
-            return 1.0
-
-        vars(friction).update(vars(never))
-        return [friction, output]
+    def friction_event(self, y: Any) -> float:
+        return 1.0
 
 
 def in_the_machine() -> Iterator[Row]:
     """Of each law: error of the part's path on the scene ``stick-slip`` over its range, CPU s."""
     case = CASES["stick-slip"]
     scene = load("paper", [*case.overrides, f"run.duration={case.duration!r}"])
-    mechanics = Mechanics(scene)
-    try:
-        row = mechanics.sample()
-    finally:
-        mechanics.close()
-    rest = (row["z_surface"], row["z_ram"])
 
     def measured(make: Callable[[Scene, Command], Machine]) -> Row:
-        seconds, path = run_machine(scene, case.times(), rest, _RTOL_IN_THE_MACHINE, make)
-        error = reference(case.name).error(path[np.newaxis])
-        return {ERROR: error, "CPU time [s]": seconds}
+        seconds, path = run_machine(scene, case.times(), _RTOL_IN_THE_MACHINE, make)
+        return {ERROR: reference(case.name).error(path[np.newaxis]), "CPU time [s]": seconds}
 
     yield {"law": COULOMB, "width": ""} | measured(Machine)
     for name in ("tanh", "LuGre"):
@@ -161,40 +143,29 @@ def _width(name: str, width: float) -> str:
 def creep() -> Iterator[Row]:
     """Of each law: creep (µm/s), error in where the part comes to rest (µm), evaluations."""
     paper = load("paper")
-    m, g = paper.mechanics.part_mass, paper.mechanics.gravity
+    truth = _stops(paper)
 
-    def acceleration(t: float) -> float:
-        return ACCELERATION * cos(2.0 * pi * FREQUENCY * t)
+    def row(name: str, width: str, creep: float, error: float, evaluations: int) -> Row:
+        found = {CREEP: creep, "error of the stop [um]": error, "evaluations": evaluations}
+        return {"law": name, "width": width} | found
 
-    truth = _stops(acceleration, m, g, paper.friction.mu_k * paper.friction.normal_force)
-    yield {
-        "law": COULOMB,
-        "width": "",
-        CREEP: 0.0,
-        "error of the stop [um]": 0.0,
-        "evaluations": 0,
-    }
+    yield row(COULOMB, "", 0.0, 0.0, 0)
     for name, widths in LAWS.items():
         for width in widths:
-            law = law_of(name, width, paper)
-            settled, end, evaluations = _solved(law, acceleration, m, g)
-            yield {
-                "law": name,
-                "width": _width(name, width),
-                CREEP: 1e6 * (end - settled) / (DURATION - SETTLED),
-                "error of the stop [um]": 1e6 * (settled - truth),
-                "evaluations": evaluations,
-            }
+            settled, end, evaluations = _solved(law_of(name, width, paper), paper)
+            creep = 1e6 * (end - settled) / (DURATION - SETTLED)
+            yield row(name, _width(name, width), creep, 1e6 * (settled - truth), evaluations)
 
 
-def _stops(acceleration: Callable[[float], float], m: float, g: float, force: float) -> float:
+def _stops(scene: Scene) -> float:
     """Slip (m) until a part with set-valued friction is at rest, in closed form but for its time.
 
     With Ω the surface's angular frequency u = u0 + (A/Ω) sin Ωt - (force/m - g) t.
     """
     from scipy.optimize import brentq
 
-    omega, rate = 2.0 * pi * FREQUENCY, force / m - g
+    friction, mechanics, omega = scene.friction, scene.mechanics, 2.0 * pi * FREQUENCY
+    rate = friction.mu_k * friction.normal_force / mechanics.part_mass - mechanics.gravity
 
     def u(t: float) -> float:
         return SLIP + ACCELERATION / omega * np.sin(omega * t) - rate * t
@@ -207,17 +178,17 @@ def _stops(acceleration: Callable[[float], float], m: float, g: float, force: fl
     )
 
 
-def _solved(
-    law: Law, acceleration: Callable[[float], float], m: float, g: float
-) -> tuple[float, float, int]:
+def _solved(law: Law, scene: Scene) -> tuple[float, float, int]:
     """Slip (m) once settled and at the end, and the number of evaluations."""
     from scipy.integrate import solve_ivp
 
+    m, g = scene.mechanics.part_mass, scene.mechanics.gravity
+
     def rates(t: float, y: Any) -> list[float]:
         _, u, z = y
-        load = m * (acceleration(t) + g)
-        force, rate = law(u, z, load)
-        return [u, acceleration(t) - force / m + g, rate]
+        surface = ACCELERATION * cos(2.0 * pi * FREQUENCY * t)
+        force, rate = law(u, z, m * (surface + g))
+        return [u, surface - force / m + g, rate]
 
     found = solve_ivp(
         rates,

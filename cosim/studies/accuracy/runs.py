@@ -87,22 +87,13 @@ def measure(case: Case, solvers: Sequence[Solver], rounds: int) -> list[Run]:
                 seconds[k].append(process_time() - began)
             if not turn:
                 outcomes.append(outcome)
-    return _judged(case, plan, outcomes, [median(spent) for spent in seconds])
-
-
-def _judged(
-    case: Case,
-    plan: Sequence[tuple[Solver, float]],
-    outcomes: Sequence[Outcome | str],
-    seconds: Sequence[float],
-) -> list[Run]:
     runs: list[Run] = []
-    for (solver, value), outcome, time in zip(plan, outcomes, seconds, strict=True):
+    for (solver, value), outcome, spent in zip(plan, outcomes, seconds, strict=True):
         error, steps, failure = nan, 0, ""
         if isinstance(outcome, str):
             failure = outcome
         else:
-            leaky = case.smooth and solver.family == "ngspice leads"
+            leaky = case.smooth and solver.netlist
             judge = reference(f"{case.name}, netlist" if leaky else case.name)
             error, steps = judge.error(outcome.signals), outcome.steps
             before = runs[-1] if runs and runs[-1].method == solver.name else None
@@ -111,5 +102,5 @@ def _judged(
             elif before is not None and error > _WORSE * before.error:
                 failure = NOT_MONOTONE
         given = (case.name, solver.name, solver.setting, value)
-        runs.append(Run(*given, error, time, steps, failure))
+        runs.append(Run(*given, error, median(spent), steps, failure))
     return runs

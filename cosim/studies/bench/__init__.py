@@ -10,12 +10,12 @@ from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.bench.bars import held, table
 from cosim.studies.bench.instructions import compiler_version, per_period
+from cosim.studies.bench.measures import BRIEF, BRIEF_FULL
 from cosim.studies.bench.memory import growth
 from cosim.studies.bench.parts import coupled_over_parts
 from cosim.studies.bench.peers import compare
 from cosim.studies.bench.rungs import cost_exponent, real_time
 from cosim.studies.bench.timings import solvers, throughput
-from cosim.studies.bench.truth import BRIEF, BRIEF_FULL
 from cosim.studies.fit.cases import Case
 from cosim.studies.tables import machine
 from cosim.trials.camera import film

@@ -15,7 +15,7 @@ from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import command
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
-from cosim.studies.bench.sampling import ratios, take_turns
+from cosim.studies.bench.measures import ratios, take_turns
 
 Log = dict[str, npt.NDArray[np.float64]]
 

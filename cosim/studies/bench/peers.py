@@ -3,7 +3,9 @@
 Each peer runs at its coarsest setting whose error is no larger than ours.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -11,8 +13,7 @@ import numpy.typing as npt
 
 from cosim.simulation.peers import lsoda, naive, ngspice_alone
 from cosim.simulation.simulate import simulate
-from cosim.studies.bench.sampling import cpu, ratios
-from cosim.studies.bench.truth import brief, error, heights, times
+from cosim.studies.bench.measures import brief, cpu, error, own_error, ratios, times
 
 Peer = Callable[[], tuple[float, npt.NDArray[np.float64]]]
 """Gives the CPU seconds of a run and the part's heights, m."""
@@ -23,26 +24,20 @@ LSODA_ERROR = 5e-4
 
 def compare(rounds: int) -> dict[str, Any]:
     """Spread of each peer's time over ours, with the errors of both."""
-    ours = brief()
-    found = simulate(ours)
-    wanted = error(heights(found.columns))
-    rest = [found.columns[name][0] for name in ("z_surface", "z_ram")]
+    ours, wanted = brief(), own_error("amplifier", "amplifier")
 
-    def all_in_ngspice(reltol: float) -> Peer:
-        scene = brief(f"circuit.reltol={reltol}", "circuit.max_step=1e-4")
-        return lambda: ngspice_alone.run(scene, times())
-
-    def plain_calls(step: float) -> Peer:
-        scene = brief(f"circuit.max_step={step}")
-        return lambda: naive.run(scene, times())
-
-    def solve_ivp(rtol: float) -> Peer:
-        return lambda: lsoda.run(ours, times(), rest, rtol)
-
+    in_ngspice = (brief(f"circuit.reltol={x}", "circuit.max_step=1e-4") for x in (1e-7, 1e-8, 3e-9))
+    plain = (brief(f"circuit.max_step={x}") for x in (3e-5, 2e-5, 1.5e-5, 1e-5))
     peers = {
-        "all_in_ngspice_over_ours": (wanted, map(all_in_ngspice, (1e-7, 1e-8, 3e-9))),
-        "naive_over_ours": (wanted, map(plain_calls, (3e-5, 2e-5, 1.5e-5, 1e-5))),
-        "solve_ivp_over_ours": (LSODA_ERROR, map(solve_ivp, (1e-4, 5e-5, 3e-5))),
+        "all_in_ngspice_over_ours": (
+            wanted,
+            [partial(ngspice_alone.run, scene, times()) for scene in in_ngspice],
+        ),
+        "naive_over_ours": (wanted, [partial(naive.run, scene, times()) for scene in plain]),
+        "solve_ivp_over_ours": (
+            LSODA_ERROR,
+            [partial(lsoda.run, ours, times(), rtol) for rtol in (1e-4, 5e-5, 3e-5)],
+        ),
     }
     numbers = {}
     for name, (target, settings) in peers.items():
@@ -55,11 +50,11 @@ def compare(rounds: int) -> dict[str, Any]:
     return numbers
 
 
-def _coarsest(settings: Iterable[Peer], target: float) -> tuple[Peer, float]:
+def _coarsest(settings: Sequence[Peer], target: float) -> tuple[Peer, float]:
     """The first peer with an error of at most ``target``, or the last; and its error."""
-    tried: list[tuple[Peer, float]] = []
+    reached = inf
     for peer in settings:
-        tried.append((peer, error(peer()[1])))
-        if tried[-1][1] <= target:
-            break
-    return tried[-1]
+        reached = error(peer()[1])
+        if reached <= target:
+            return peer, reached
+    return settings[-1], reached

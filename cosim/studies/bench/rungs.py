@@ -10,8 +10,7 @@ from cosim.drive.surface.formulas import Transport, average_velocity
 from cosim.scene import Scene, load
 from cosim.simulation.rungs.given_surface import force_per_mass
 from cosim.simulation.simulate import simulate
-from cosim.studies.bench.sampling import spread, take_turns
-from cosim.studies.bench.truth import BRIEF_FULL, brief, error, heights
+from cosim.studies.bench.measures import BRIEF_FULL, own_error, spread, take_turns
 
 _FINER = ("circuit.reltol=1e-6", "circuit.max_step=5e-6")
 """There is no reference of the schematic: it is compared with itself at these steps."""
@@ -29,38 +28,30 @@ def real_time(rounds: int) -> dict[str, Any]:
     """
     cases: dict[str, tuple[Scene, Callable[[], float]]] = {
         "full": (load("paper-full", BRIEF_FULL), _error_of_full),
-        "amplifier": (load("paper"), lambda: _error("amplifier", "amplifier")),
-        "ideal": (load("paper", ["circuit.model=ideal"]), lambda: _error("ideal", "ideal")),
+        "amplifier": (load("paper"), partial(own_error, "amplifier", "amplifier")),
+        "ideal": (load("paper", ["circuit.model=ideal"]), partial(own_error, "ideal", "ideal")),
         "part": (load("optimal", _LONG_PART), _error_of_part),
         "limited": (
             load("paper", ["circuit.model=limited"]),
-            lambda: _error("limited", "amplifier"),
+            partial(own_error, "limited", "amplifier"),
         ),
     }
     calls = {name: partial(simulate, scene) for name, (scene, _) in cases.items()}
     taken = take_turns(calls, rounds)
     return {
-        name: {
-            **spread([scene.run.duration / seconds for seconds in taken[name]]),
-            "error": measured(),
-        }
+        name: spread([scene.run.duration / seconds for seconds in taken[name]])
+        | {"error": measured()}
         for name, (scene, measured) in cases.items()
     }
 
 
 def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
     """Exponent with which the CPU time of `paper` grows with its duration, by least squares."""
-    scenes = {str(n): load("paper", [f"run.duration={n / 20}"]) for n in periods}
-    calls = {name: partial(simulate, scene) for name, scene in scenes.items()}
+    calls = {str(n): partial(simulate, load("paper", [f"run.duration={n / 20}"])) for n in periods}
     taken = take_turns(calls, rounds)
     costs = np.log([taken[str(n)] for n in periods])
     exponents = np.polyfit(np.log(periods), costs, 1)[0]
     return {**spread(exponents.tolist()), "periods": list(periods)}
-
-
-def _error(circuit: str, reference: str) -> float:
-    found = simulate(brief(f"circuit.model={circuit}"))
-    return error(heights(found.columns), reference)
 
 
 def _error_of_full() -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.mechanics import part
 from cosim.scene import Scene
-from cosim.studies.bench.sampling import ratios, take_turns
+from cosim.studies.bench.measures import ratios, take_turns
 from cosim.studies.fit.cases import Case, Solver
 from cosim.studies.sweep.point import evaluate
 from cosim.studies.sweep.pool import Pool

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import nan
 from statistics import median
 from typing import Any
 
@@ -23,12 +24,12 @@ MOST, REPEATS = 3, {"full": 1}
 class Rung:
     """One circuit on one scene. ``cost`` are seconds of computing per simulated second: median,
     least, most. Errors are of v_average, relative; ``fall`` is the surface's greatest downward
-    acceleration, m/s², None with rigid walls."""
+    acceleration, m/s², NaN with rigid walls."""
 
     model: str
     cost: tuple[float, float, float]
     v_average: float
-    fall: float | None
+    fall: float
     off_top: float
     off_amplifier: float
 
@@ -48,9 +49,7 @@ def ladder(scene: Scene, progress: Callable[[], object] = lambda: None) -> list[
     numbers: dict[str, dict[str, Any]] = {}
     simulate(runs["limited"])  # loads and builds what the first run would wait for
     for repeat in range(MOST):
-        for model in RUNGS:
-            if repeat >= REPEATS.get(model, MOST):
-                continue
+        for model in (model for model in RUNGS if repeat < REPEATS.get(model, MOST)):
             began = time.perf_counter()
             try:
                 numbers[model] = simulate(runs[model]).summary
@@ -58,7 +57,17 @@ def ladder(scene: Scene, progress: Callable[[], object] = lambda: None) -> list[
                 raise SimulationFailed(f'With circuit.model = "{model}": {error}') from error
             spent[model].append((time.perf_counter() - began) / runs[model].run.duration)
             progress()
-    return [_rung(model, spent[model], numbers) for model in RUNGS]
+    averages = {model: found["v_average"] for model, found in numbers.items()}
+    return [
+        Rung(
+            model,
+            (median(spent[model]), min(spent[model]), max(spent[model])),
+            average,
+            nan if (low := numbers[model]["a_surface_min"]) is None else -low,
+            *(relative_error(average, averages[other]) for other in ("full", "amplifier")),
+        )
+        for model, average in averages.items()
+    ]
 
 
 def cheapest(rungs: list[Rung], tolerance: float) -> Rung:
@@ -80,16 +89,3 @@ def _on(scene: Scene, model: str) -> Scene:
     there = changed(scene, settings, f"scene {scene.name}")
     times = periods_made_whole(there)
     return changed(there, times | {"run.output_step": times["run.duration"] / 2.0}, "ladder")
-
-
-def _rung(model: str, spent: list[float], numbers: dict[str, dict[str, Any]]) -> Rung:
-    v_average = numbers[model]["v_average"]
-    fall = numbers[model]["a_surface_min"]
-    return Rung(
-        model,
-        (median(spent), min(spent), max(spent)),
-        v_average,
-        None if fall is None else -fall,
-        relative_error(v_average, numbers["full"]["v_average"]),
-        relative_error(v_average, numbers["amplifier"]["v_average"]),
-    )

@@ -1,8 +1,8 @@
 """The ladder in words, a table and a figure."""
 
 from collections.abc import Sequence
-from math import nan
 from pathlib import Path
+from typing import Any
 
 from cosim.scene import Scene
 from cosim.studies.circuit.ladder import Rung, cheapest
@@ -22,13 +22,12 @@ def write(folder: Path, found: Found) -> str:
     draw(found, folder / "ladder.png")
     printed: list[str] = []
     for (_, rungs), sentence in zip(found, said, strict=True):
-        printed += [sentence, ""]
-        printed += [
+        lines = [
             f"  {rung.model:<10}{rung.cost[0]:9.3g} s per simulated s {rung.v_average * 1e3:+9.3f} "
             f"mm/s {rung.off_amplifier:9.3%} off the amplifier {rung.off_top:9.3%} off the top"
             for rung in rungs
         ]
-        printed.append("")
+        printed += [sentence, "", *lines, ""]
     return "\n".join([*printed, f"Written to {folder}: ladder.csv, ladder.md, ladder.png"])
 
 
@@ -44,7 +43,7 @@ def rows(scene: Scene, rungs: list[Rung]) -> list[Row]:
             "v_average [mm/s]": rung.v_average * 1e3,
             "off the amplifier [%]": 100.0 * rung.off_amplifier,
             "off the top [%]": 100.0 * rung.off_top,
-            "peak downward acceleration [m/s2]": nan if rung.fall is None else rung.fall,
+            "peak downward acceleration [m/s2]": rung.fall,
         }
         for rung in rungs
     ]
@@ -80,29 +79,22 @@ def words(scene: Scene, rungs: list[Rung]) -> str:
 def draw(found: Found, path: Path) -> None:
     """Draw error over cost, a panel a scene, and mark the cheapest rung within the tolerance."""
     wide = min(len(found), 3)
+    high = -(-len(found) // wide)
     errors = [rung.off_top for _, rungs in found for rung in rungs]
     top = 200.0 * max(*errors, *(scene.run.tolerance for scene, _ in found))
-    size = (max(3.8 * wide, 6.0), 3.4 * -(-len(found) // wide) + 0.6)
+    size = (max(3.8 * wide, 6.0), 3.4 * high + 0.6)
     note = "Green: the cheapest rung within run.tolerance, which is shaded."
-    figure, axes = panels(
-        message(found), note, size, -(-len(found) // wide), wide, sharex=True, sharey=True
-    )
+    figure, axes = panels(message(found), note, size, high, wide, sharex=True, sharey=True)
     for axis, (scene, rungs) in zip(axes, found, strict=False):
         tolerance, taken = scene.run.tolerance, cheapest(rungs, scene.run.tolerance)
         axis.axhspan(0.0, 100.0 * tolerance, color=GREEN, alpha=0.12, lw=0)
         for rung in rungs:
-            cost, error = rung.cost[0], 100.0 * rung.off_top
-            color = GREEN if rung is taken else "0.45"
-            axis.plot(cost, error, "o", color=color, ms=9 if rung is taken else 6)
-            axis.annotate(
-                rung.model,
-                (cost, error),
-                (-8, 0) if rung is rungs[0] else (7, 6),
-                textcoords="offset points",
-                color=color,
-                ha="right" if rung is rungs[0] else "left",
-                fontweight="bold" if rung is taken else "normal",
-            )
+            place = (rung.cost[0], 100.0 * rung.off_top)
+            color, size, weight = (GREEN, 9, "bold") if rung is taken else ("0.45", 6, "normal")
+            off, side = ((-8, 0), "right") if rung is rungs[0] else ((7, 6), "left")
+            look: dict[str, Any] = {"color": color, "ha": side, "fontweight": weight}
+            axis.plot(*place, "o", color=color, ms=size)
+            axis.annotate(rung.model, place, off, textcoords="offset points", **look)
         axis.set_title(scene.name, loc="left")
         axis.set_xscale("log")
         axis.set_yscale("symlog", linthresh=0.1)

@@ -16,7 +16,6 @@ from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import Scene, changed
 from cosim.scene.tables import KNOBS
 from cosim.simulation.simulate import simulate
-from cosim.studies.sweep.point import Outcome
 from cosim.studies.sweep.pool import Pool, workers_asked
 
 Settings = dict[str, float | int]
@@ -111,14 +110,6 @@ class Motion:
     failure: str = ""
 
 
-@dataclass(frozen=True)
-class Contact:
-    """Greatest downward acceleration, m/s², at all and while the ram touches no wall."""
-
-    at_all: float | None
-    between_impacts: float
-
-
 @dataclass
 class Study:
     """The limits of one scene. Motions are keyed by the names of the limits."""
@@ -130,7 +121,9 @@ class Study:
     """The paper's mu_s F_n / m_p + g, m/s²."""
     unsteady: float
     """Largest change of v_average, m/s, by TREMBLES."""
-    contact: Contact
+    peaks: tuple[float, float]
+    """Greatest downward acceleration, m/s²: in all, NaN with rigid walls, which leave no number;
+    and while the ram touches no wall."""
     without: dict[str, Motion] = field(default_factory=dict)
     against: dict[str, Motion] = field(default_factory=dict)
     """What ``without`` is to be compared with: ``own``, or the same on the limit's rung."""
@@ -199,22 +192,26 @@ def study(scene: Scene, turn: bool, progress: Callable[[], object] = lambda: Non
         for key in ("friction.normal_force", "coil.force_factor")
         for change in TREMBLES
     ]
-    runs += [(limit.rung, limit.turned(base, _elsewhere(limit, base))) for limit in LIMITS]
+    # Where the scene has no steps, it is itself without the limit, and is run with them.
+    factors = {
+        limit.name: limit.gone if limit.factors or base.drive.quantised else 1.0 for limit in LIMITS
+    }
+    runs += [(limit.rung, limit.turned(base, factors[limit.name])) for limit in LIMITS]
     reduced = [limit for limit in LIMITS if limit.reduced]
     runs += [("limited", limit.turned(base, limit.gone)) for limit in reduced]
     places = [(limit, factor) for limit in LIMITS if limit.factors for factor in FACTORS if turn]
     runs += [(limit.rung, limit.turned(base, factor)) for limit, factor in places]
     found = iter(_run(base, runs, workers, progress))
 
-    own, ideal, limited = next(found), next(found), next(found)
-    for rung, motion in (("amplifier", own), ("ideal", ideal), ("limited", limited)):
+    own, ideal, limited = plain = next(found), next(found), next(found)
+    for (rung, _), motion in zip(runs, plain, strict=False):
         if motion.failure:
             raise SimulationFailed(f"With circuit.model = {rung}: {motion.failure}")
     unsteady = max(abs(next(found).v_average - own.v_average) for _ in range(2 * len(TREMBLES)))
-    result = Study(scene, own, ideal, needed_acceleration(base), unsteady, contact(base))
+    result = Study(scene, own, ideal, needed_acceleration(base), unsteady, _peaks(base))
     for limit in LIMITS:
         there, here = next(found), limited if limit.rung == "limited" else own
-        is_gone = _elsewhere(limit, base) != limit.gone  # so the scene itself is without it
+        is_gone = factors[limit.name] != limit.gone
         result.without[limit.name] = here if is_gone else there
         result.against[limit.name] = there if is_gone else here
     for limit in reduced:
@@ -255,21 +252,13 @@ def needed_acceleration(scene: Scene) -> float:
     return pull / mechanics.part_mass + mechanics.gravity
 
 
-def contact(base: Scene) -> Contact:
-    """The wall's part in the peak: a Hunt-Crossley wall has one, a rigid wall has no number."""
+def _peaks(base: Scene) -> tuple[float, float]:
     result = simulate(base)
-    waves, summary = result.columns, result.summary
+    waves, low = result.columns, result.summary["a_surface_min"]
     apart = np.abs(waves["z_ram"] - waves["z_surface"]) < base.mechanics.travel
     counted = apart & (waves["time"] >= base.run.settle)
-    peak = summary["a_surface_min"]
-    return Contact(
-        None if peak is None else -float(str(peak)), -float(waves["a_surface"][counted].min())
-    )
-
-
-def _elsewhere(limit: Limit, base: Scene) -> float:
-    """The factor to run besides the scene: without the limit, or with the steps it has not."""
-    return 1.0 if limit.turned is _steps and not base.drive.quantised else limit.gone
+    peak = nan if low is None else -float(str(low))
+    return peak, -float(waves["a_surface"][counted].min())
 
 
 def _joined(base: Scene, names: Iterable[str]) -> Settings:
@@ -293,19 +282,15 @@ def _run(
         points = [(number, values) for number, (own, values) in enumerate(runs) if own == rung]
         with Pool(scene, workers, whole_periods=True) as pool:
             for number, outcome in pool.run(points):
-                motions[number] = _motion(outcome)
+                found = outcome.numbers
+                motions[number] = Motion(
+                    found.get("v_average", nan),
+                    -found.get("a_surface_min", nan),
+                    found.get("saturated_fraction", nan),
+                    outcome.failure,
+                )
                 progress()
     return [motions[number] for number in range(len(runs))]
-
-
-def _motion(outcome: Outcome) -> Motion:
-    numbers = outcome.numbers
-    return Motion(
-        numbers.get("v_average", nan),
-        -numbers.get("a_surface_min", nan),
-        numbers.get("saturated_fraction", nan),
-        outcome.failure,
-    )
 
 
 def name_of(scene: Scene) -> str:

@@ -69,9 +69,9 @@ def _curves(axis: Any, study: Study, quantity: Any, legend: bool) -> None:
     for (name, row), color in zip(study.turned.items(), LINES * 2, strict=False):
         factors = sorted(row)
         heights = [quantity(row[factor]) for factor in factors]
-        style = (0.9, ":") if study.verdict(name) == "does not matter" else (1.6, "-")
+        width, style = (0.9, ":") if study.verdict(name) == "does not matter" else (1.6, "-")
         look: dict[str, Any] = {"color": color, "marker": "o", "ms": 3.5, "label": name}
-        axis.plot(factors, heights, lw=style[0], ls=style[1], **look)
+        axis.plot(factors, heights, lw=width, ls=style, **look)
     axis.set_xscale("log", base=2)
     ticks = sorted({factor for row in study.turned.values() for factor in row})
     axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
@@ -86,8 +86,7 @@ def _curves(axis: Any, study: Study, quantity: Any, legend: bool) -> None:
 
 def _peaks(axis: Any, studies: Sequence[Study]) -> None:
     places = np.arange(len(studies))
-    between = [study.contact.between_impacts for study in studies]
-    at_all = [study.contact.at_all or np.nan for study in studies]
+    at_all, between = np.transpose([study.peaks for study in studies])
     needed = [study.needed for study in studies]
     axis.bar(places - 0.2, at_all, 0.38, color="#8d99ae", label="in all, walls included")
     axis.bar(places + 0.2, between, 0.38, color="#1f6fb2", label="while no wall is touched")

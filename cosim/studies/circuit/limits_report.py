@@ -1,7 +1,7 @@
 """The limits in words, tables and a figure."""
 
 from collections.abc import Sequence
-from math import nan
+from math import isnan, nan
 from pathlib import Path
 
 from cosim.studies.circuit import limits_figure
@@ -28,11 +28,11 @@ def write(folder: Path, studies: Sequence[Study]) -> str:
     limits_figure.draw(studies, folder / "limits.png")
     printed: list[str] = []
     for study, sentence in zip(studies, said, strict=True):
-        printed += [sentence, ""]
-        for row in rows(study):
-            name, verdict, v_average, change, *_ = row.values()
-            printed.append(f"  {name:<20}{verdict:<18}{v_average:+8.3f} mm/s ({change:+.3f})")
-        printed.append("")
+        lines = [
+            f"  {name:<20}{verdict:<18}{v_average:+8.3f} mm/s ({change:+.3f})"
+            for name, verdict, v_average, change, *_ in (row.values() for row in rows(study))
+        ]
+        printed += [sentence, "", *lines, ""]
     return "\n".join([*printed, f"Written to {folder}: limits.csv, limits.md, limits.png"])
 
 
@@ -56,18 +56,16 @@ def rows(study: Study) -> list[Row]:
 
 def pairs(study: Study) -> list[Row]:
     """Two limits lifted together, the pair that gains most first."""
-    ranked = sorted(
-        study.pairs, key=lambda pair: -abs(study.pairs[pair].v_average - study.own.v_average)
-    )
-    return [
+    found: list[Row] = [
         {
             "limits": " + ".join(pair),
-            "v_average without both [mm/s]": study.pairs[pair].v_average * 1e3,
-            "change [mm/s]": (study.pairs[pair].v_average - study.own.v_average) * 1e3,
+            "v_average without both [mm/s]": motion.v_average * 1e3,
+            "change [mm/s]": (motion.v_average - study.own.v_average) * 1e3,
             "more than one by one [mm/s]": study.together(pair) * 1e3,
         }
-        for pair in ranked
+        for pair, motion in study.pairs.items()
     ]
+    return sorted(found, key=lambda row: -abs(row["change [mm/s]"]))
 
 
 def turned(study: Study) -> list[Row]:
@@ -87,7 +85,7 @@ def turned(study: Study) -> list[Row]:
 
 def words(study: Study) -> str:
     """The answer in a few sentences."""
-    own, ideal = study.own.v_average, study.ideal.v_average
+    own, ideal, (peak, between) = study.own.v_average, study.ideal.v_average, study.peaks
     said = [
         f"{name_of(study.scene)}: the circuit moves the part at {own * 1e3:+.3g} mm/s, an ideal "
         f"current source at {ideal * 1e3:+.3g} mm/s{_ratio(own, ideal)}."
@@ -109,8 +107,8 @@ def words(study: Study) -> str:
         said.append(f"Without any of them: {study.all_gone.v_average * 1e3:+.3g} mm/s.")
     said.append(
         f"The part slips where the surface falls away faster than {study.needed:.3g} m/s²; it "
-        f"reaches {study.contact.between_impacts:.3g} m/s² without its walls' help"
-        + (f" and {study.contact.at_all:.3g} m/s² with it." if study.contact.at_all else ".")
+        f"reaches {between:.3g} m/s² without its walls' help"
+        + ("." if isnan(peak) else f" and {peak:.3g} m/s² with it.")
     )
     if study.unsteady > 0.01 * max(abs(own), abs(ideal)):
         said.append(
