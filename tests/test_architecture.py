@@ -97,7 +97,6 @@ def test_the_reader_of_imports_sees_them() -> None:
 NOT_YET = pytest.mark.xfail(strict=True, reason="some arrows still point upwards")
 
 
-@NOT_YET
 def test_modules_have_no_circle() -> None:
     order(arrows())
 
