@@ -7,7 +7,7 @@ periods, velocities in g T; µ_s = 0.7 and µ_k = 0.6 as in its figures.
 
 import math
 import textwrap
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -130,8 +130,7 @@ def _sticking_limit() -> Erratum:
 
 
 def _force_guideline() -> Erratum:
-    peaks = (Fraction(10), Fraction(50))
-    best = [_best_f(peak) for peak in peaks]
+    best = [_best_f(Fraction(peak)) for peak in (10, 50)]
     right = [float(MU_S) * f for f in best]
     printed = [f / float(MU_S) for f in best]
     return Erratum(
@@ -148,9 +147,8 @@ def _force_guideline() -> Erratum:
 
 def _order_of_coefficients() -> Erratum:
     limit, peak = 2 / (MU_S - MU_K), Fraction(50)
-    below, above = (
-        float(simulate(_optimal(f, peak), _contact(f))[-1].stuck) for f in (limit - 5, limit + 5)
-    )
+    forces = (limit - 5, limit + 5)
+    below, above = (float(simulate(_optimal(f, peak), _contact(f))[-1].stuck) for f in forces)
     return Erratum(
         where="µ̃_s < µ̃_k in the mapping to horizontal transport",
         printed="without a condition on the normal force",
@@ -164,8 +162,7 @@ def _order_of_coefficients() -> Erratum:
 
 
 def _growth() -> Erratum:
-    peaks = (Fraction(1000), Fraction(8000))
-    best = [_best_f(peak) for peak in peaks]
+    best = [_best_f(Fraction(peak)) for peak in (1000, 8000)]
     exponent = math.log(best[1] / best[0]) / math.log(8.0)
     return Erratum(
         where="How the optimal normal force grows with a_max",
@@ -185,7 +182,7 @@ def _contact(f: Fraction) -> Contact:
 def _sliding(f: Fraction) -> Contact:
     """A part that, once it is not pushed up, offers no more than kinetic friction."""
     contact = _contact(f)
-    return Contact(contact.down, contact.held_high, contact.up, contact.down)
+    return replace(contact, held_low=contact.down)
 
 
 def _optimal(f: Fraction, peak: Fraction) -> list[Phase]:

@@ -57,11 +57,8 @@ def dataset(
         name: (dims, values.reshape(design.shape), {"units": UNITS.get(name, "1")})
         for name, values in numbers.items()
     }
-    variables[FAILURE] = (
-        dims,
-        failures.astype(str).reshape(design.shape),
-        {"long_name": "Why the point failed; empty where it did not"},
-    )
+    about = {"long_name": "Why the point failed; empty where it did not"}
+    variables[FAILURE] = (dims, failures.astype(str).reshape(design.shape), about)
     attributes = {
         "title": f"Sweep of {scene.name}",
         "scene": to_toml(scene),
@@ -101,9 +98,9 @@ def _meant(scene: Scene, data: xr.Dataset) -> dict[str, xr.DataArray]:
     add("frequency", firmware.knob_frequency, "pot_frequency")
     amplitude = found.get("amplitude", axes.get("amplitude", scene.drive.amplitude))
     add("offset", firmware.knob_offset, "pot_offset", amplitude)
-    about = {key.name: {"units": key.unit, "long_name": key.text} for key in keys()}
-    for name, values in found.items():
-        values.attrs = about[name]
+    for key in keys():
+        if key.table == "drive" and key.name in found:
+            found[key.name].attrs = {"units": key.unit, "long_name": key.text}
     return {name: values for name, values in found.items() if name not in axes}
 
 

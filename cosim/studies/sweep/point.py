@@ -59,10 +59,6 @@ def periods_made_whole(scene: Scene) -> dict[str, Number]:
     The mean over a broken period is off by per cents, which differ from frequency to frequency.
     """
     length = period(scene)
-    settle = _at_least(scene.run.settle, length)
-    span = _at_least(scene.run.duration - scene.run.settle, length)
+    times = scene.run.settle, scene.run.duration - scene.run.settle
+    settle, span = (max(1, ceil(time / length - 1e-9)) for time in times)
     return {"run.settle": settle * length, "run.duration": (settle + span) * length}
-
-
-def _at_least(time: float, period: float) -> int:
-    return max(1, ceil(time / period - 1e-9))
