@@ -60,15 +60,12 @@ class Leader(Protocol):
 
     def begin(self) -> None:
         """The callbacks act for this run from now on."""
-        ...
 
     def finish(self) -> None:
         """No further step comes; the last one was not told of."""
-        ...
 
     def stop(self) -> None:
         """Nothing is to be done any more: the sources become NaN, so that no step succeeds."""
-        ...
 
 
 @cache
@@ -83,7 +80,11 @@ def engine(callbacks: Callbacks) -> "Engine":
 
 def library_name() -> str:
     """The path or name of libngspice on this machine. Raises BadInput where it is missing."""
-    name = os.environ.get("NGSPICE_LIBRARY_PATH") or _find_library()
+    # Debian's runtime package has only the versioned name, which the loader's own search finds.
+    name = os.environ.get("NGSPICE_LIBRARY_PATH") or find_library("ngspice")
+    if name is None and sys.platform == "darwin":
+        paths = (f"{folder}/libngspice.dylib" for folder in ("/opt/homebrew/lib", "/usr/local/lib"))
+        name = next(filter(os.path.exists, paths), None)
     if name is None:
         raise BadInput(
             "libngspice was not found; install it (Debian and Ubuntu: libngspice0, macOS: brew "
@@ -95,16 +96,6 @@ def library_name() -> str:
 def spoilt() -> bool:
     """Whether ngspice has given up in this process: then another process must run the circuit."""
     return Engine.poisoned
-
-
-def _find_library() -> str | None:
-    """libngspice as the loader finds it: Debian's runtime package has only the versioned name."""
-    found = find_library("ngspice")
-    if found is None and sys.platform == "darwin":
-        for folder in ("/opt/homebrew/lib", "/usr/local/lib"):
-            if os.path.exists(path := f"{folder}/libngspice.dylib"):
-                return path
-    return found
 
 
 class Engine(Shared.NgSpiceShared):

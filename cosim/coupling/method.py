@@ -14,7 +14,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar
 
-from cosim.coupling.polynomials import History, Polynomial, Signal
+from cosim.coupling.polynomials import History, Polynomial
 
 
 class Past:
@@ -47,12 +47,12 @@ class Past:
         self.carried_slope: Any = 0.0
         """The slope that this share has by itself, V/s."""
 
-    def met(self, time: float, current: Signal, emf: Signal) -> None:
+    def met(self, time: float, current: Any, current_slope: Any, emf: Any, emf_slope: Any) -> None:
         """A communication point at ``time`` (s), with both outputs and their slopes; the slope is
         None where it is not known."""
         self.time = time
-        self.current.add(time, *current)
-        self.emf.add(time, *emf)
+        self.current.add(time, current, current_slope)
+        self.emf.add(time, emf, emf_slope)
 
     def stepped(self, time: float, end: Any, mean: Any) -> None:
         """The circuit has stepped to ``time`` (s)."""

@@ -64,7 +64,18 @@ def projected(coefficients: Any, h: float, degree: int) -> Polynomial:
 class History:
     """The last values of a signal at communication points, newest last, and the newest slope."""
 
-    __slots__ = ("_keep", "_slopes", "_times", "_values", "slope")
+    __slots__ = (
+        "_most",
+        "_number",
+        "_slopes",
+        "_t1",
+        "_t2",
+        "_v1",
+        "_v2",
+        "slope",
+        "time",
+        "value",
+    )
 
     def __init__(self, degree: int, slopes: bool) -> None:
         """Polynomials up to ``degree``; with ``slopes`` the newest slope counts as a known value.
@@ -72,46 +83,45 @@ class History:
         Without it older values are used instead, and the slope only fills in while there are not
         yet enough of them, so that a method begins with its own order.
         """
-        self._keep = max(degree, 1)
+        self._most = max(degree, 1) + 1
         self._slopes = slopes
-        self._times: tuple[float, ...] = ()
-        self._values: tuple[Any, ...] = ()
+        self._number = 0
+        self.time = self._t1 = self._t2 = 0.0
+        """Of the newest point, s."""
+        self.value: Any = None
+        """The newest value; older ones stay apart from it, for speed."""
+        self._v1 = self._v2 = self.value
         self.slope: Any = None
         """The newest slope, per second; None where it is not known."""
 
     def add(self, time: float, value: Any, slope: Any) -> None:
         """A new communication point at ``time`` (s)."""
-        keep = self._keep
-        self._times = (*self._times[-keep:], time)
-        self._values = (*self._values[-keep:], value)
+        self._t2, self._t1, self.time = self._t1, self.time, time
+        self._v2, self._v1, self.value = self._v1, self.value, value
         self.slope = slope
+        if self._number < self._most:
+            self._number += 1
 
     def restart(self) -> None:
         """Forget all but the newest point: what is older lies before an event."""
-        self._times, self._values = self._times[-1:], self._values[-1:]
-
-    @property
-    def value(self) -> Any:
-        """The newest value."""
-        return self._values[-1]
+        self._number = 1
 
     def polynomial(self, degree: int) -> Polynomial:
         """The polynomial of ``degree`` 0, 1 or 2 through the newest points, about the newest; of a
         lower degree while there are too few."""
-        values, times = self._values, self._times
-        newest = values[-1]
+        newest, slope = self.value, self.slope
         if degree == 0:
             return (newest,)
-        slopes = self.slope is not None and (self._slopes or len(times) <= degree)
-        points = min(degree + 1 - slopes, len(times))
+        slopes = slope is not None and (self._slopes or self._number <= degree)
+        points = min(degree + 1 - slopes, self._number)
         if points == 1:
-            return (newest, self.slope) if slopes else (newest,)
-        back = times[-2] - times[-1]
-        rise = (values[-2] - newest) / back
+            return (newest, slope) if slopes else (newest,)
+        back = self._t1 - self.time
+        rise = (self._v1 - newest) / back
         if points == 2:
-            return (newest, self.slope, (rise - self.slope) / back) if slopes else (newest, rise)
-        further = times[-3] - times[-1]
-        bend = ((values[-3] - newest) / further - rise) / (further - back)
+            return (newest, slope, (rise - slope) / back) if slopes else (newest, rise)
+        further = self._t2 - self.time
+        bend = ((self._v2 - newest) / further - rise) / (further - back)
         return (newest, rise - bend * back, bend)
 
     def polynomial_to(self, h: float, end: Any, degree: int) -> Polynomial:
@@ -119,16 +129,19 @@ class History:
         and the newest points, about the newest."""
         if degree == 0:
             return (end,)
-        newest = self._values[-1]
+        newest = self.value
         rise = (end - newest) / h
-        if degree == 1 or len(self._times) == 1:
+        if degree == 1 or self._number == 1:
             return (newest, rise)
-        back = self._times[-2] - self._times[-1]
-        bend = (rise - (self._values[-2] - newest) / back) / (h - back)
+        back = self._t1 - self.time
+        bend = (rise - (self._v1 - newest) / back) / (h - back)
         return (newest, rise - bend * h, bend)
 
     def save(self) -> tuple[Any, ...]:
-        return (self._times, self._values, self.slope)
+        times, values = (self.time, self._t1, self._t2), (self.value, self._v1, self._v2)
+        return (self._number, times, values[: self._number], self.slope)
 
     def restore(self, saved: tuple[Any, ...]) -> None:
-        self._times, self._values, self.slope = saved
+        self._number, times, values, self.slope = saved
+        self.time, self._t1, self._t2 = times
+        self.value, self._v1, self._v2 = (*values, None, None, None)[:3]

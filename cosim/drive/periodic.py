@@ -17,7 +17,15 @@ class Constant(Command):
         return level(inf, self.level, self.v_offset)
 
 
-class Sawtooth(Command):
+class _Periodic(Command):
+    """``frequency`` in Hz, ``amplitude`` (peak to peak) and ``offset`` in V."""
+
+    def __init__(self, frequency: float, amplitude: float, offset: float) -> None:
+        self.frequency, self.amplitude, self.offset = frequency, amplitude, offset
+        self.v_offset = offset_pin(offset, amplitude)
+
+
+class Sawtooth(_Periodic):
     """V1 = offset + amplitude (t/T - 1/2) on [0, T), then a sharp fall.
 
     With ``reset_time`` the rise takes T - reset_time and a linear fall the rest of the period;
@@ -27,11 +35,8 @@ class Sawtooth(Command):
     def __init__(
         self, frequency: float, amplitude: float, offset: float, reset_time: float = 0.0
     ) -> None:
-        self.frequency = frequency
-        self.amplitude = amplitude
-        self.offset = offset
+        super().__init__(frequency, amplitude, offset)
         self.reset_time = reset_time
-        self.v_offset = offset_pin(offset, amplitude)
         self._fall = reset_time * frequency
         self._rise = 1.0 - self._fall
         self._jumps = amplitude != 0.0 and reset_time == 0.0
@@ -56,14 +61,8 @@ class Sawtooth(Command):
         )
 
 
-class Sine(Command):
+class Sine(_Periodic):
     """V1 = offset + amplitude/2 sin(2 pi f t)."""
-
-    def __init__(self, frequency: float, amplitude: float, offset: float) -> None:
-        self.frequency = frequency
-        self.amplitude = amplitude
-        self.offset = offset
-        self.v_offset = offset_pin(offset, amplitude)
 
     def piece(self, t: float) -> Piece:
         f = self.frequency
@@ -81,17 +80,12 @@ class Sine(Command):
         )
 
 
-class Square(Command):
+class Square(_Periodic):
     """V1 = offset + amplitude/2 in the first half of each period, offset - amplitude/2 after."""
 
-    def __init__(self, frequency: float, amplitude: float, offset: float) -> None:
-        self.amplitude = amplitude
-        self.offset = offset
-        self.v_offset = offset_pin(offset, amplitude)
-        self._rate = 2 * frequency
-
     def piece(self, t: float) -> Piece:
-        half = edge_before(t, self._rate)
-        until = (half + 1) / self._rate if self.amplitude else inf
+        rate = 2 * self.frequency
+        half = edge_before(t, rate)
+        until = (half + 1) / rate if self.amplitude else inf
         high = self.offset + self.amplitude * (-0.5 if half % 2 else 0.5)
         return level(until, high, self.v_offset)

@@ -6,7 +6,7 @@ The one formula of a piece's value is in ``command.c``, which ngspice's callback
 from abc import ABC, abstractmethod
 from ctypes import POINTER, Structure, byref, c_double, c_int64, c_void_p
 from functools import cache
-from math import floor, inf, nextafter
+from math import floor
 from typing import Any
 
 import numpy as np
@@ -96,14 +96,6 @@ class Command(ABC):
     def next_jump(self, t: float) -> float:
         """Time of the first discontinuity of V1 or of a pin strictly after ``t``, s, or inf."""
         return self.piece(t).jump
-
-    def piece_before(self, t: float) -> Piece:
-        """The piece that holds just before ``t``."""
-        return self.piece(nextafter(t, -inf))
-
-    def value_before(self, t: float) -> float:
-        """Left limit of V1 at ``t``, V; differs from ``value`` at jumps only."""
-        return self.piece_before(t).before(t)
 
     def pieces(self, begin: float, end: float, most: int | None = None) -> list[Piece]:
         """The pieces from ``begin`` until ``end`` (s) is within the last, at most ``most`` of

@@ -1,6 +1,6 @@
 """The normal force of a grip that changes in time, as a file gives it."""
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from pathlib import Path
 
 from cosim.errors import BadInput
@@ -23,15 +23,8 @@ class NormalForce:
 
     def value(self, time: float) -> float:
         """The force at ``time`` (s), N; at a jump the one after it."""
-        return self._between(bisect_right(self.corners, time + _SAME_TIME), time)
-
-    def value_before(self, time: float) -> float:
-        """Left limit of the force at ``time`` (s), N."""
-        return self._between(bisect_left(self.corners, time - _SAME_TIME), time)
-
-    def _between(self, after: int, time: float) -> float:
-        """The force on the straight that ends at the corner with the index ``after``."""
         corners, forces = self.corners, self.forces
+        after = bisect_right(corners, time + _SAME_TIME)
         if after == 0 or after == len(corners):
             return forces[max(0, after - 1)]
         start, end = corners[after - 1], corners[after]

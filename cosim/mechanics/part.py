@@ -12,8 +12,10 @@ comparison; `published` is `threshold` as in the simulation of Yako, Nowak, Yuan
 
 import ctypes
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Required, TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -77,36 +79,38 @@ class PartMotion:
         return float(self.sticking @ np.diff(self.time) / span) if span > 0 else 0.0
 
 
+class Case(TypedDict, total=False):
+    """What the part is in and how it starts.
+
+    ``force_per_mass`` is F_n/m [m/s²]; ``gravity`` [m/s²] acts along the motion, downwards. The
+    part starts at ``z0`` [m] with the velocity ``v0`` [m/s], by default the surface's. The knots
+    are run through ``periods`` times, each following on the last.
+    """
+
+    mu_s: Required[float]
+    mu_k: Required[float]
+    force_per_mass: Required[float]
+    gravity: float
+    mu_plate: float
+    z0: float
+    v0: float | None
+    periods: int
+
+
 def exact(
-    time: Real,
-    v_surface: Real,
-    *,
-    mu_s: float,
-    mu_k: float,
-    force_per_mass: float,
-    gravity: float = 9.81,
-    mu_plate: float = 0.0,
-    z0: float = 0.0,
-    v0: float | None = None,
-    periods: int = 1,
-    output: Real | None = None,
+    time: Real, v_surface: Real, *, output: Real | None = None, **given: Unpack[Case]
 ) -> PartMotion:
     """The exact motion at the knots, or at the times ``output``.
-
-    ``force_per_mass`` is F_n/m [m/s²]; ``gravity`` acts along the motion, downwards. The part
-    starts at ``z0`` with the velocity ``v0``, by default the surface's. The knots are run through
-    ``periods`` times, each following on the last.
 
     A needed friction that exceeds µ_s F_n by no more than the rounding of the knots counts as
     equal to it. Knots whose times differ by no more than the rounding of the latest one are a jump.
     """
-    case = _Case(time, v_surface, mu_s, mu_k, force_per_mass, gravity, mu_plate, v0, periods)
+    case = _Case(time, v_surface, **given)
     at = None if output is None else case.times(output)
     times = case.all_knots() if at is None else at
-    rows = np.empty((3, len(times)))
-    z, v, stuck = rows
+    z, v, stuck = np.empty((3, len(times)))
     events = part_library().part_exact(
-        *case.arguments(z0),
+        *case.arguments(),
         *(len(times), None if at is None else at.ctypes.data),
         *(z.ctypes.data, v.ctypes.data, stuck.ctypes.data),
     )
@@ -117,97 +121,47 @@ def threshold(
     time: Real,
     v_surface: Real,
     *,
-    mu_s: float,
-    mu_k: float,
-    force_per_mass: float,
     step: float,
     v_min: float,
-    gravity: float = 9.81,
-    mu_plate: float = 0.0,
-    z0: float = 0.0,
-    v0: float | None = None,
-    periods: int = 1,
     output: Real | None = None,
+    **given: Unpack[Case],
 ) -> PartMotion:
     """Fixed steps of Bogacki and Shampine's third-order method, with a velocity threshold.
 
     The part counts as sticking while it differs from the surface by less than ``v_min`` [m/s], and
     the surface's acceleration is the difference quotient of its velocity since the last step.
-    Arguments as in `exact`; without ``output`` the times are the steps', with it heights and
-    velocities are interpolated linearly between them.
+    Without ``output`` the times are the steps', with it heights and velocities are interpolated
+    linearly between them.
     """
-    case = _Case(time, v_surface, mu_s, mu_k, force_per_mass, gravity, mu_plate, v0, periods)
+    case = _Case(time, v_surface, **given)
     if not v_min >= 0:
         raise BadInput(f"The velocity threshold must not be negative, and is {v_min:g} m/s.")
-    steps = case.steps(step)
-    rows = np.empty((3, steps + 1))
-    z, v, stuck = rows
-    events = part_library().part_threshold(
-        *case.arguments(z0), step, v_min, steps, z.ctypes.data, v.ctypes.data, stuck.ctypes.data
-    )
-    return case.stepped(step, rows, events, output)
+    return case.stepped(part_library().part_threshold, (step, v_min), output)
 
 
 def published(
-    time: Real,
-    v_surface: Real,
-    *,
-    mu_s: float,
-    mu_k: float,
-    force_per_mass: float,
-    gravity: float = 9.81,
-    mu_plate: float = 0.0,
-    z0: float = 0.0,
-    v0: float | None = None,
-    periods: int = 1,
-    output: Real | None = None,
+    time: Real, v_surface: Real, *, output: Real | None = None, **given: Unpack[Case]
 ) -> PartMotion:
     """The authors' scheme: `threshold` with a step of 0.1 ms and 10 µm/s.
 
     It stands for their Simulink model: solver ode3, no zero crossings, the tracked velocity
     interpolated and differentiated by a Derivative block.
     """
-    return threshold(
-        time,
-        v_surface,
-        mu_s=mu_s,
-        mu_k=mu_k,
-        force_per_mass=force_per_mass,
-        step=PUBLISHED_STEP,
-        v_min=PUBLISHED_V_MIN,
-        gravity=gravity,
-        mu_plate=mu_plate,
-        z0=z0,
-        v0=v0,
-        periods=periods,
-        output=output,
-    )
+    step, v_min = PUBLISHED_STEP, PUBLISHED_V_MIN
+    return threshold(time, v_surface, step=step, v_min=v_min, output=output, **given)
 
 
 def moreau(
     time: Real,
     v_surface: Real,
     *,
-    mu_s: float,
-    mu_k: float,
-    force_per_mass: float,
     step: float,
-    gravity: float = 9.81,
-    mu_plate: float = 0.0,
-    z0: float = 0.0,
-    v0: float | None = None,
-    periods: int = 1,
     output: Real | None = None,
+    **given: Unpack[Case],
 ) -> PartMotion:
-    """Fixed steps that are implicit in the friction (Moreau); arguments as in `threshold`."""
-    case = _Case(time, v_surface, mu_s, mu_k, force_per_mass, gravity, mu_plate, v0, periods)
-    steps = case.steps(step)
-    rows = np.empty((3, steps + 1))
-    z, v, stuck = rows
-    events = part_library().part_moreau(
-        *case.arguments(z0), step, steps, z.ctypes.data, v.ctypes.data, stuck.ctypes.data
-    )
-    return case.stepped(step, rows, events, output)
+    """Fixed steps that are implicit in the friction (Moreau); ``output`` as in `threshold`."""
+    case = _Case(time, v_surface, **given)
+    return case.stepped(part_library().part_moreau, (step,), output)
 
 
 def friction_law(
@@ -235,10 +189,11 @@ class _Case:
         mu_s: float,
         mu_k: float,
         force_per_mass: float,
-        gravity: float,
-        mu_plate: float,
-        v0: float | None,
-        periods: int,
+        gravity: float = 9.81,
+        mu_plate: float = 0.0,
+        z0: float = 0.0,
+        v0: float | None = None,
+        periods: int = 1,
     ) -> None:
         self.time = np.ascontiguousarray(time, dtype=np.float64)
         self.v = np.ascontiguousarray(v_surface, dtype=np.float64)
@@ -254,16 +209,16 @@ class _Case:
         if periods < 1:
             raise BadInput(f"The knots are to be run through {periods} times, not once or more.")
         self.law = friction_law(mu_s, mu_k, force_per_mass, gravity, mu_plate)
-        self.v0 = float(self.v[0] if v0 is None else v0)
+        self.z0, self.v0 = z0, float(self.v[0] if v0 is None else v0)
         self.periods = periods
         self.period = float(self.time[-1] - self.time[0])
         self.end = float(self.time[0]) + periods * self.period
 
-    def arguments(self, z0: float) -> tuple[int | float, ...]:
-        if not (np.isfinite(z0) and np.isfinite(self.v0)):
+    def arguments(self) -> tuple[int | float, ...]:
+        if not (np.isfinite(self.z0) and np.isfinite(self.v0)):
             raise BadInput("The part's first height and velocity must be finite.")
         surface = (len(self.time), self.time.ctypes.data, self.v.ctypes.data, self.periods)
-        return (*surface, self.law.ctypes.data, z0, self.v0)
+        return (*surface, self.law.ctypes.data, self.z0, self.v0)
 
     def all_knots(self) -> Array:
         if self.periods == 1:
@@ -281,15 +236,18 @@ class _Case:
             )
         return at
 
-    def steps(self, step: float) -> int:
-        """How many steps there are until the end, where the last whole one stops short of it."""
-        span = self.end - self.time[0]
+    def stepped(
+        self, solve: Callable[..., int], own: tuple[float, ...], output: Real | None
+    ) -> PartMotion:
+        """By a compiled routine with fixed steps and its ``own`` numbers, the step (s) first."""
+        step, span = own[0], self.end - self.time[0]
         if not step > 0 or span / step > MOST_STEPS:
             raise BadInput(f"The step must be positive, and no less than {span / MOST_STEPS:g} s.")
-        return int(np.floor(span / step + 1e-6))
-
-    def stepped(self, step: float, rows: Array, events: int, output: Real | None) -> PartMotion:
-        z, v, stuck = rows
+        # The last whole step may stop short of the end.
+        steps = int(np.floor(span / step + 1e-6))
+        z, v, stuck = rows = np.empty((3, steps + 1))
+        pointers = (row.ctypes.data for row in rows)
+        events = solve(*self.arguments(), *own, steps, *pointers)
         times = self.time[0] + np.arange(len(z)) * step
         if output is not None:
             at = self.times(output)

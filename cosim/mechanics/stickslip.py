@@ -14,48 +14,20 @@ from cosim.mechanics.normal_force import normal_force
 from cosim.scene import Scene, keys
 
 STEP_OUTPUTS = (
-    "back_emf",
-    "back_emf_slope",
-    "a_surface_max",
-    "a_surface_min",
-    "v_surface_max",
-    "v_surface_min",
-    "z_surface_max",
-    "z_surface_min",
+    *("back_emf", "back_emf_slope", "a_surface_max", "a_surface_min"),
+    *("v_surface_max", "v_surface_min", "z_surface_max", "z_surface_min"),
 )
 """What is read after every step: back-EMF of one coil (V, V/s), extremes within the step."""
 
 SAMPLE_OUTPUTS = (
-    "back_emf",
-    "z_surface",
-    "v_surface",
-    "a_surface",
-    "z_ram",
-    "v_ram",
-    "z_part",
-    "v_part",
-    "friction_force",
+    *("back_emf", "z_surface", "v_surface", "a_surface", "z_ram", "v_ram"),
+    *("z_part", "v_part", "friction_force"),
 )
-"""What a row of the waveforms takes, SI; ``sticking`` follows them."""
-
-SECOND_SAMPLE_OUTPUTS = (
-    "back_emf_2",
-    "z_surface_2",
-    "v_surface_2",
-    "a_surface_2",
-    "z_ram_2",
-    "v_ram_2",
-    "friction_force_2",
-)
-"""What a row takes besides where a second surface moves by itself; ``sticking_2`` ends the row."""
+"""What a row of the waveforms takes, SI; ``sticking`` follows them. Where a second surface moves by
+itself, its own follow, named with ``_2``; the part is one."""
 
 TOTALS = (
-    "z_part",
-    "stick_time",
-    "energy_in",
-    "energy_friction",
-    "energy_impact",
-    "energy_damping",
+    *("z_part", "stick_time", "energy_in", "energy_friction", "energy_impact", "energy_damping"),
     "energy_stored",
 )
 SOURCE_STEP_OUTPUTS = ("coil_current_max", "coil_current_min")
@@ -64,15 +36,9 @@ SOURCE_STEP_OUTPUTS = ("coil_current_max", "coil_current_min")
 SOURCE_SAMPLE_OUTPUTS = ("coil_current", "coil_voltage")
 """What a row takes besides then: current of one coil (A) and voltage across the coils (V)."""
 
-SECOND_SOURCE_SAMPLE_OUTPUTS = ("coil_current_2", "coil_voltage_2")
-
 SOURCE_TOTALS = (
-    "output_high_time",
-    "output_low_time",
-    "current_limit_time",
-    "energy_output",
-    "energy_copper",
-    "energy_magnetic",
+    *("output_high_time", "output_low_time", "current_limit_time"),
+    *("energy_output", "energy_copper", "energy_magnetic"),
 )
 
 COUNTERS = ("impacts", "stick_slip_events", "internal_steps", "internal_rejected")
@@ -98,8 +64,7 @@ class Mechanics:
         wholes, self.ports = ("sticking",), (given,)
         """Names of the inputs that are led from outside."""
         if scene.drive.phase_deg is not None:
-            sampled += SECOND_SAMPLE_OUTPUTS
-            sampled += SECOND_SOURCE_SAMPLE_OUTPUTS if self.has_source else ()
+            sampled += tuple(f"{name}_2" for name in sampled if not name.endswith("_part"))
             wholes += ("sticking_2",)
             self.ports += (f"{given}_2",)
             self.total_names += ("stick_time_2",)

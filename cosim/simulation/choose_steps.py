@@ -53,20 +53,20 @@ def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> R
     def timed(*settings: Any) -> Result:
         nonlocal seconds
         result = run(_with(scene, *settings))
-        seconds += _cost(result)
+        seconds += result.summary["wall_time"]
         return result
 
     level, best, finer = _meeting(scene.coupling.tolerance, timed)
     error = difference(best, finer)
-    usual = _cost(best)
+    least = CLEARLY * best.summary["wall_time"]
     for other in OTHERS:
         try:
             found = timed(level, other)
         except SimulationFailed:
             continue
         off = difference(found, finer)
-        if off <= scene.coupling.tolerance and _cost(found) < min(CLEARLY * usual, _cost(best)):
-            best, error = found, off
+        if off <= scene.coupling.tolerance and found.summary["wall_time"] < least:
+            best, error, least = found, off, found.summary["wall_time"]
     circuit, coupling = best.scene.circuit, best.scene.coupling
     taken: dict[str, Any] = {
         "coupling.method": coupling.method,
@@ -76,8 +76,7 @@ def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> R
     if coupling.method != "step-locked":
         taken["coupling.macro_step"] = coupling.macro_step
     found = {"wall_time": seconds, "error_estimate": error, "coupling_taken": taken}
-    summary = best.summary | found
-    return Result(best.scene, best.columns, summary)
+    return Result(best.scene, best.columns, best.summary | found)
 
 
 def _meeting(
@@ -123,10 +122,3 @@ def _with(scene: Scene, level: tuple[float, float], coupling: dict[str, Any]) ->
             "coupling": scene.coupling.model_copy(update=coupling),
         }
     )
-
-
-def _cost(result: Result) -> float:
-    """Run time, s."""
-    seconds = result.summary["wall_time"]
-    assert isinstance(seconds, float)
-    return seconds

@@ -91,11 +91,7 @@ def _simulate(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     return Result(scene, _waveforms(scene, recorder, driven), summary)
 
 
-def _waveforms(
-    scene: Scene,
-    recorder: Recorder,
-    driven: Driven,
-) -> dict[str, Array]:
+def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Array]:
     known = {"time": recorder.time, **driven.second}
     electric = driven.electric
     for command_2 in commands(scene)[1:]:

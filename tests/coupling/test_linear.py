@@ -83,7 +83,7 @@ class Stale(Joint):
     """Outputs are left as the last step ended."""
 
     def meet(self) -> None:
-        self.past.met(self.time, self.first.outputs(), self.second.outputs())
+        self.past.met(self.time, *self.first.outputs(), *self.second.outputs())
 
 
 @pytest.mark.parametrize(("refreshed", "limit"), [(True, 0.0128), (False, 0.871)])

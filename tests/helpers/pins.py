@@ -1,7 +1,19 @@
-"""Voltages of the firmware's two pins behind a command, from its pieces."""
+"""Left limits of a command, and the voltages of the firmware's two pins behind it."""
+
+from math import inf, nextafter
 
 from cosim.drive.pieces import LEVEL, Command, Piece
 from cosim.scene.firmware import GAIN
+
+
+def piece_before(drive: Command, t: float) -> Piece:
+    """The piece that holds just before ``t``."""
+    return drive.piece(nextafter(t, -inf))
+
+
+def value_before(drive: Command, t: float) -> float:
+    """Left limit of V1 at ``t``, V; differs from ``value`` at jumps only."""
+    return piece_before(drive, t).before(t)
 
 
 def v_dac(drive: Command, t: float) -> float:
@@ -11,7 +23,7 @@ def v_dac(drive: Command, t: float) -> float:
 
 def v_dac_before(drive: Command, t: float) -> float:
     """Its left limit."""
-    return _dac(drive, drive.piece_before(t), drive.value_before(t))
+    return _dac(drive, piece_before(drive, t), value_before(drive, t))
 
 
 def _dac(drive: Command, piece: Piece, command: float) -> float:
@@ -25,4 +37,4 @@ def pin(drive: Command, t: float) -> float:
 
 def pin_before(drive: Command, t: float) -> float:
     """Its left limit."""
-    return drive.piece_before(t).pin
+    return piece_before(drive, t).pin

@@ -96,7 +96,8 @@ def test_the_springed_plate_brakes_to_rest_and_no_further():
     motion = exact([0.0, 1.0], [7.0, 7.0], v0=3.0, **friction)
     assert motion.v[-1] == 0.0
     assert motion.z[-1] == pytest.approx(3.0**2 / 2 / (G + 10.0), rel=1e-14)
-    sliding = exact([0.0, 1.0], [7.0, 7.0], v0=3.0, **{**friction, "mu_plate": 0.1})
+    friction["mu_plate"] = 0.1
+    sliding = exact([0.0, 1.0], [7.0, 7.0], v0=3.0, **friction)
     assert sliding.v[-1] == pytest.approx(-(G - 5.0) * (1 - 3.0 / (G + 5.0)), rel=1e-14)
 
 

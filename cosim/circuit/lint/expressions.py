@@ -163,7 +163,8 @@ def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str |
         return f"the function {shown(name)} is not defined"
     if count != known[name]:
         return f"the function {name} takes {_counted(known[name])}, not {count}"
-    if name in _RANDOM and behavioural and not all(map(_is_plain, arguments)):
+    plain = all(_PLAIN.fullmatch(argument) and not _varies(argument) for argument in arguments)
+    if name in _RANDOM and behavioural and not plain:
         return _INSTEAD.get(
             name, f"in a B source {name}() takes plain numbers only; write it in a .param line"
         )
@@ -211,10 +212,6 @@ def _check_blanks(line: Line, own: set[str]) -> None:
 
 def _counted(count: int) -> str:
     return f"{count} argument{'' if count == 1 else 's'}"
-
-
-def _is_plain(argument: str) -> bool:
-    return _PLAIN.fullmatch(argument) is not None and not _varies(argument)
 
 
 def check_circles(top: Scope) -> None:
@@ -300,7 +297,7 @@ def _expressions(line: Line, element: Element | None) -> Iterator[tuple[str, boo
     if element is not None and element.kind == "b":
         # Braces make no difference there, up to the next key.
         start = len(text) - len(body(line))
-        key = _NEXT_KEY.search(_masked(text), start)
+        key = _NEXT_KEY.search(_unbraced(text), start)
         end = key.start() if key else len(text)
         yield text[start:end], True
     place = end
@@ -341,10 +338,6 @@ def _formals(text: str) -> tuple[str, ...]:
     return tuple(re.findall(r"\w+", text))
 
 
-def _masked(text: str) -> str:
-    """The text with what is in braces or quotes blanked out, place by place."""
-    return re.sub(r"\{[^{}]*\}|'[^']*'", lambda match: " " * len(match[0]), text)
-
-
 def _unbraced(text: str) -> str:
-    return re.sub(r"\{[^{}]*\}|'[^']*'", "{}", text)
+    """The text with what is in braces or quotes blanked out, place by place."""
+    return re.sub(r"\{[^{}]*\}|'[^']*'", lambda match: f"{{{' ' * (len(match[0]) - 2)}}}", text)

@@ -122,11 +122,6 @@ class Lead:
         return max(0, len(self._log) - 1)
 
     @property
-    def attempts(self) -> int:
-        """Steps that ngspice tried."""
-        return self.state.attempts
-
-    @property
     def ngspice(self) -> str:
         """Version of ngspice."""
         return str(_engine().ngspice_version)

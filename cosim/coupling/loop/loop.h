@@ -92,8 +92,8 @@ EXPORT int64_t recorder_follow(Recorder *r, int64_t n, const double *edges, cons
 /* One interval of a recorder with one port; false if it failed. */
 EXPORT int recorder_advance(Recorder *r, double time, double start, double end);
 
-/* Calculate the outputs anew with this input, which the last step did not end with. */
-EXPORT int recorder_refresh(Recorder *r, double value);
+/* The same; where `value` is not the `end`, the outputs are then calculated anew with it. */
+EXPORT int recorder_exchange(Recorder *r, double time, double start, double end, double value);
 
 /* --- lead.c: the callbacks of ngspice, which leads --- */
 

@@ -37,7 +37,9 @@ class MacroSteps:
     """Asks a method at each macro point of a run."""
 
     def __init__(self, scene: Scene, lead: Lead, recorder: Recorder, method: Method) -> None:
-        self._lead, self._recorder, self._method = lead, recorder, method
+        self._method, self._mechanics = method, recorder.mechanics
+        self._exchange = recorder.exchange
+        self._outputs = self._mechanics.step_outputs
         self._state, self._segment = lead.state, lead.state.segment
         self._coefficients = self._segment.c
         self._macro_step, self._duration = scene.coupling.macro_step, scene.run.duration
@@ -46,30 +48,25 @@ class MacroSteps:
         self._begin(0.0, 0.0)
 
     def _macro_point(self) -> None:
-        state, past, recorder = self._state, self._past, self._recorder
+        state, past = self._state, self._past
         time, current = state.time, state.current
         past.stepped(time, current, self._segment.charge / (time - past.time))
         line = projected(self._method.current(past), past.h, 1)
-        start = end = line[0]
-        if len(line) > 1:
-            end = start + past.h * line[1]
-        good = recorder.advance(time, start, end)
-        if good and end != current:
-            good = recorder.refresh(current)
-        if not good:
+        start = line[0]
+        end = start + past.h * line[1] if len(line) > 1 else start
+        if self._exchange(time, start, end, current):
+            self._begin(time, current)
+        else:
             state.status = FMU_FAILED
-            return
-        self._begin(time, current)
 
     def _begin(self, time: float, current: float) -> None:
         """Start a macro step."""
-        state, past, segment = self._state, self._past, self._segment
-        outputs = self._recorder.mechanics.step_outputs
-        past.met(time, (current, None), (outputs[0], outputs[1]))
+        state, past, segment, outputs = self._state, self._past, self._segment, self._outputs
+        past.met(time, current, None, outputs[0], outputs[1])
         if state.at_jump:
             past.restart()
         if self._method.carries_inertia:
-            past.gain = self._recorder.mechanics.inertial_gain(time)
+            past.gain = self._mechanics.inertial_gain(time)
             # The circuit's share starts from what it stands at, and leaks away.
             past.carried = state.carried
             past.carried_slope = past.gain * current - state.carried / LEAK_TIME

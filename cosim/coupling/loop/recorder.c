@@ -141,8 +141,12 @@ int recorder_advance(Recorder *r, double time, double start, double end)
     return recorder_follow(r, 1, &time, &start, &end, INT64_MAX / 2) == 1;
 }
 
-int recorder_refresh(Recorder *r, double value)
+int recorder_exchange(Recorder *r, double time, double start, double end, double value)
 {
+    if (!recorder_advance(r, time, start, end))
+        return 0;
+    if (end == value)
+        return 1;
     Fmu *f = r->fmu;
     r->inputs[0] = value;
     r->inputs[1] = 0.0;

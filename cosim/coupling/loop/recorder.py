@@ -3,6 +3,7 @@
 import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int32
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -90,6 +91,12 @@ class Recorder:
             plan=CALLBACK(self._planned),
         )
         self._state = ctypes.byref(self.state)
+        self.exchange: Callable[[float, float, float, float], int] = partial(
+            self._library.recorder_exchange, self._state
+        )
+        """Advance to a time (s), the one port's input (A or V) going linearly between two values,
+        and then set the last argument, which the step need not have ended with; 0 where it failed:
+        see ``failure``."""
         self._plan()
         with caught_signals(self._stop):
             if not self._library.recorder_begin(self._state) or self._fault:
@@ -121,16 +128,6 @@ class Recorder:
                 self.tell()
                 if self._fault:
                     raise self._fault
-
-    def advance(self, time: float, value: float, value_end: float) -> bool:
-        """Advance to ``time`` (s), the one port's input going linearly between the two (A or V);
-        false where it failed: see ``failure``."""
-        return bool(self._library.recorder_advance(self._state, time, value, value_end))
-
-    def refresh(self, value: float) -> bool:
-        """Calculate the mechanics' outputs anew with this input (A), which the last step did not
-        end with; false where it failed."""
-        return bool(self._library.recorder_refresh(self._state, value))
 
     def tell(self) -> None:
         """Tell how far the agenda has been worked off, where that is news."""

@@ -1,45 +1,36 @@
 """The structures and functions of ``loop.h``, which says what they hold."""
 
-from ctypes import (
-    CDLL,
-    CFUNCTYPE,
-    POINTER,
-    Structure,
-    c_char,
-    c_double,
-    c_int,
-    c_int32,
-    c_int64,
-    c_uint32,
-    c_void_p,
-    cast,
-)
+import ctypes
+from ctypes import POINTER, Structure, c_double, c_int32, c_int64, c_void_p
 from functools import cache
+from typing import Any
 
 from cosim.drive.pieces import Piece
 from cosim.toolchain.libraries import library
 
-CALLBACK = CFUNCTYPE(None)
+CALLBACK = ctypes.CFUNCTYPE(None)
+_DOUBLES, _INTEGERS, _PLACES = POINTER(c_double), POINTER(c_int32), POINTER(ctypes.c_uint32)
+
+
+def _of(kind: Any, *names: str) -> tuple[tuple[str, Any], ...]:
+    """Fields of one kind."""
+    return tuple((name, kind) for name in names)
 
 
 class Fmu(Structure):
     """One instance of an FMU, bound to its version of FMI."""
 
     _fields_ = (
-        ("instance", c_void_p),
-        *((name, c_void_p) for name in ("set_reals", "do_step", "get_reals", "get_integers")),
-        *((name, c_void_p) for name in ("set", "step", "get", "get_whole")),
-        ("status", c_int32),
-        ("failed", c_void_p),
-        ("time", c_double),
-        ("steps", c_int64),
+        *_of(c_void_p, "instance", "set_reals", "do_step", "get_reals", "get_integers"),
+        *_of(c_void_p, "set", "step", "get", "get_whole"),
+        *(("status", c_int32), ("failed", c_void_p), ("time", c_double), ("steps", c_int64)),
     )
 
 
 class Schedule(Structure):
     """A quantity over time that is an input of its own."""
 
-    _fields_ = (("times", c_void_p), ("values", c_void_p), ("n", c_int64))
+    _fields_ = (*_of(c_void_p, "times", "values"), ("n", c_int64))
 
 
 class RecorderState(Structure):
@@ -47,38 +38,21 @@ class RecorderState(Structure):
 
     _fields_ = (
         ("fmu", POINTER(Fmu)),
-        ("input_places", POINTER(c_uint32)),
-        ("ports", c_int64),
-        ("schedule", POINTER(Schedule)),
-        ("step_places", POINTER(c_uint32)),
-        ("step_outputs", c_int64),
-        ("real_places", POINTER(c_uint32)),
-        ("whole_places", POINTER(c_uint32)),
-        ("reals", c_int64),
-        ("wholes", c_int64),
-        ("total_places", POINTER(c_uint32)),
-        ("counter_places", POINTER(c_uint32)),
-        ("totals", c_int64),
-        ("counters", c_int64),
-        ("inputs", POINTER(c_double)),
-        ("outputs", POINTER(c_double)),
+        *(("input_places", _PLACES), ("ports", c_int64), ("schedule", POINTER(Schedule))),
+        *(("step_places", _PLACES), ("step_outputs", c_int64)),
+        *_of(_PLACES, "real_places", "whole_places"),
+        *_of(c_int64, "reals", "wholes"),
+        *_of(_PLACES, "total_places", "counter_places"),
+        *_of(c_int64, "totals", "counters"),
+        *_of(_DOUBLES, "inputs", "outputs"),
         ("settle", c_double),
-        ("times", c_void_p),
-        ("what", c_void_p),
-        ("n_times", c_int64),
-        ("next", c_int64),
-        ("rows", c_void_p),
-        ("frames", c_void_p),
-        ("n_rows", c_int64),
-        ("n_frames", c_int64),
-        ("z_surface", c_int64),
-        ("totals_at_settle", POINTER(c_double)),
-        ("counters_at_settle", POINTER(c_int32)),
-        ("extremes", POINTER(c_double)),
-        ("began", c_double),
-        ("inside", c_int64),
-        ("plan", CALLBACK),
-        ("stopped", c_int64),
+        *_of(c_void_p, "times", "what"),
+        *_of(c_int64, "n_times", "next"),
+        *_of(c_void_p, "rows", "frames"),
+        *_of(c_int64, "n_rows", "n_frames", "z_surface"),
+        *(("totals_at_settle", _DOUBLES), ("counters_at_settle", _INTEGERS)),
+        *(("extremes", _DOUBLES), ("began", c_double), ("inside", c_int64)),
+        *(("plan", CALLBACK), ("stopped", c_int64)),
     )
 
 
@@ -86,12 +60,8 @@ class Segment(Structure):
     """What the circuit knows of the mechanics between two macro points."""
 
     _fields_ = (
-        ("origin", c_double),
-        ("c", c_double * 3),
-        ("gain", c_double),
-        ("end", c_double),
-        ("start", c_double),
-        ("charge", c_double),
+        *(("origin", c_double), ("c", c_double * 3)),
+        *_of(c_double, "gain", "end", "start", "charge"),
     )
 
 
@@ -99,31 +69,19 @@ class LeadState(Structure):
     """``Lead``."""
 
     _fields_ = (
-        ("recorder", POINTER(RecorderState)),
-        ("macro_point", c_void_p),
-        ("segment", Segment),
-        ("replay", c_void_p),
-        ("pieces", POINTER(Piece)),
-        ("n_pieces", c_int64),
-        ("piece", c_int64),
-        ("gain", c_double),
-        ("v_offset", c_double),
-        ("count", c_double),
-        ("after_jump", c_double),
-        *((name, c_double) for name in ("time", "current", "carried", "jump")),
+        *(("recorder", POINTER(RecorderState)), ("macro_point", c_void_p)),
+        *(("segment", Segment), ("replay", c_void_p), ("pieces", POINTER(Piece))),
+        *_of(c_int64, "n_pieces", "piece"),
+        *_of(c_double, "gain", "v_offset", "count", "after_jump"),
+        *_of(c_double, "time", "current", "carried", "jump"),
         ("at_jump", c_int64),
-        ("told", c_double),
-        ("sent", c_double),
+        *_of(c_double, "told", "sent"),
         ("places", POINTER(c_int64)),
-        ("n_saved", c_int64),
-        ("motional", c_int64),
+        *_of(c_int64, "n_saved", "motional"),
         ("log", c_void_p),
-        *((name, c_int64) for name in ("n_log", "log_rows", "logged", "attempts", "quiet")),
-        ("status", c_int64),
-        ("stopped", c_int64),
-        ("source", c_char * 64),
-        ("refill", CALLBACK),
-        ("attend", CALLBACK),
+        *_of(c_int64, "n_log", "log_rows", "logged", "attempts", "quiet", "status", "stopped"),
+        ("source", ctypes.c_char * 64),
+        *_of(CALLBACK, "refill", "attend"),
     )
 
 
@@ -131,19 +89,18 @@ GOOD, FMU_FAILED, NOT_FINITE, UNKNOWN_SOURCE = range(4)
 """Values of ``LeadState.status``."""
 
 _FUNCTIONS = {
-    "fmu_bind": (None, (c_void_p, c_int)),
-    "recorder_begin": (c_int, (c_void_p,)),
+    "fmu_bind": (None, (c_void_p, ctypes.c_int)),
+    "recorder_begin": (ctypes.c_int, (c_void_p,)),
     "recorder_follow": (c_int64, (c_void_p, c_int64, c_void_p, c_void_p, c_void_p, c_int64)),
-    "recorder_advance": (c_int, (c_void_p, c_double, c_double, c_double)),
-    "recorder_refresh": (c_int, (c_void_p, c_double)),
+    "recorder_exchange": (ctypes.c_int, (c_void_p, *[c_double] * 4)),
     "lead_begin": (None, (c_void_p,)),
     "lead_finish": (None, (c_void_p,)),
-    "loop_size": (c_int64, (c_int,)),
+    "loop_size": (c_int64, (ctypes.c_int,)),
 }
 
 
 @cache
-def loop() -> CDLL:
+def loop() -> ctypes.CDLL:
     """The compiled loop."""
     found = library("loop")
     for name, (result, arguments) in _FUNCTIONS.items():
@@ -154,5 +111,4 @@ def loop() -> CDLL:
 
 def address(name: str) -> int:
     """Where a function of the compiled loop lies."""
-
-    return cast(getattr(loop(), name), c_void_p).value or 0
+    return ctypes.cast(getattr(loop(), name), c_void_p).value or 0

@@ -7,7 +7,7 @@ exponential; where one does is found by looking at points a fraction of the loop
 Input: back-EMF of one coil (V); output: its current (A). Commands of straight pieces only.
 """
 
-from collections import OrderedDict
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -47,7 +47,7 @@ class Amplifier:
         self._limits = {1: circuit.supply - high, -1: low - circuit.supply}
         ringing = np.sqrt(self._pole * self._sense / self._inductance)
         self._look = 1.0 / (_LOOKS_PER_RADIAN * ringing)
-        self._known: OrderedDict[tuple[float, Mode, float], Array] = OrderedDict()
+        self._propagators = lru_cache(_REMEMBERED)(self._new_propagators)
         self.time = 0.0
         self.mean: Array = np.zeros(1)
         self._x = np.zeros(_SIZE)
@@ -113,7 +113,7 @@ class Amplifier:
 
     def _piece(self, length: float, gain: float) -> float:
         """Go on by at most ``length`` s in one mode, and change it where it ends; time used, s."""
-        stack = self._propagators(length, gain)
+        stack = self._propagators(length, self._mode, gain)
         states = stack @ self._x
         ended = np.min(self._margins(states), axis=0) < 0.0
         if not ended.any():
@@ -122,7 +122,7 @@ class Amplifier:
         k = int(np.argmax(ended))
         step = length / len(stack)
         before = self._x if k == 0 else states[k - 1]
-        a = self._matrix(gain)
+        a = self._matrix(self._mode, gain)
 
         def then(s: float) -> Array:
             return np.asarray(expm(a * s) @ before, np.float64)
@@ -152,8 +152,8 @@ class Amplifier:
         else:
             self._mode = ("linear", 0)
 
-    def _matrix(self, gain: float) -> Array:
-        kind, side = self._mode
+    def _matrix(self, mode: Mode, gain: float) -> Array:
+        kind, side = mode
         a = np.zeros((_SIZE, _SIZE))
         a[_I, [_I, _VA, _E, _Q]] = np.array([-self._loop, 1.0, -1.0, -gain]) / self._inductance
         a[_Q, _I] = a[_E, _DE] = a[_DE, _DDE] = a[_V1, _DV1] = 1.0
@@ -163,21 +163,14 @@ class Amplifier:
             a[_VA, _ONE] = side * self._slew
         return a
 
-    def _propagators(self, length: float, gain: float) -> Array:
+    def _new_propagators(self, length: float, mode: Mode, gain: float) -> Array:
         """exp(A s) at the equally spaced looks s up to ``length``."""
-        key = (length, self._mode, gain)
-        if key in self._known:
-            self._known.move_to_end(key)
-            return self._known[key]
         looks = max(1, int(np.ceil(length / self._look)))
-        first = expm(self._matrix(gain) * (length / looks))
+        first = expm(self._matrix(mode, gain) * (length / looks))
         found = np.empty((looks, _SIZE, _SIZE))
         found[0] = first
         for k in range(1, looks):
             found[k] = first @ found[k - 1]
-        self._known[key] = found
-        if len(self._known) > _REMEMBERED:
-            self._known.popitem(last=False)
         return found
 
     def outputs(self, inputs: Signal | None = None) -> Signal:

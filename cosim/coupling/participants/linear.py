@@ -5,7 +5,7 @@ map is read (see :mod:`cosim.coupling.rewind.stability`). Sources are states of 
 constant, or the two states of a sine.
 """
 
-from collections import OrderedDict
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,7 @@ class LinearParticipant:
         self.mean: Array = np.zeros(outputs)
         self._input: Array = np.zeros(inputs)
         self._input_slope: Array = np.zeros(inputs)
-        self._known: OrderedDict[tuple[float, int, float], Array] = OrderedDict()
+        self._propagator = lru_cache(_REMEMBERED)(self._new_propagator)
 
     def advance(self, h: float, inputs: Array, gain: float = 0.0) -> None:
         n, degree = len(self._a), len(inputs) - 1
@@ -73,11 +73,7 @@ class LinearParticipant:
     def restore(self, saved: Any) -> None:
         self.state, self.mean, self._input, self._input_slope = saved
 
-    def _propagator(self, h: float, degree: int, gain: float) -> Array:
-        key = (h, degree, gain)
-        if key in self._known:
-            self._known.move_to_end(key)
-            return self._known[key]
+    def _new_propagator(self, h: float, degree: int, gain: float) -> Array:
         n, outputs, inputs = len(self._a), len(self._c), self._b.shape[1]
         size = n + outputs + inputs * (degree + 1)
         m = np.zeros((size, size))
@@ -90,17 +86,14 @@ class LinearParticipant:
         for k in range(degree):
             low = n + outputs + k * inputs
             m[low : low + inputs, low + inputs : low + 2 * inputs] = np.eye(inputs)
-        found = np.asarray(expm(m * h)[: n + outputs], np.float64)
-        self._known[key] = found
-        if len(self._known) > _REMEMBERED:
-            self._known.popitem(last=False)
-        return found
+        return np.asarray(expm(m * h)[: n + outputs], np.float64)
 
 
 def coil(resistance: float, inductance: float, current: float = 0.0) -> LinearParticipant:
     """A coil (Ω, H) on a voltage that stands still: the input is its back-EMF, V, the output the
     current, A. A clamped output is such a circuit, with the sense resistor in ``resistance``."""
-    return LinearParticipant(*_coil(resistance, inductance), state=[current])
+    a, b = [[-resistance / inductance]], [[-1.0 / inductance]]
+    return LinearParticipant(a, b, [[1.0]], state=[current])
 
 
 def regulated_coil(
@@ -110,63 +103,25 @@ def regulated_coil(
     gain_bandwidth: float,
     open_loop_gain: float,
     current: float = 0.0,
+    sine: tuple[float, float] | None = None,
 ) -> LinearParticipant:
-    """A coil in the feedback of an amplifier with one pole, whose command stands still.
+    """A coil in the feedback of an amplifier with one pole; input back-EMF, output current.
 
-    ``gain_bandwidth`` in Hz, ``open_loop_gain`` a plain number; input back-EMF, output current.
+    ``gain_bandwidth`` in Hz, ``open_loop_gain`` a plain number. The command stands still, or is
+    A sin(2π f t) with ``sine`` = (A, f) in V and Hz.
     """
-    matrices = _regulated(resistance, inductance, sense_resistance, gain_bandwidth, open_loop_gain)
-    return LinearParticipant(*matrices, state=[current, 0.0])
-
-
-def driven_regulated_coil(
-    resistance: float,
-    inductance: float,
-    sense_resistance: float,
-    gain_bandwidth: float,
-    open_loop_gain: float,
-    amplitude: float,
-    frequency: float,
-) -> LinearParticipant:
-    """The same, commanded by ``amplitude`` sin(2π ``frequency`` t), V, and at rest at t = 0."""
-    matrices = _regulated(resistance, inductance, sense_resistance, gain_bandwidth, open_loop_gain)
-    return _on_sine(matrices, [0.0, 2.0 * np.pi * gain_bandwidth], amplitude, frequency)
-
-
-_Matrices = tuple[Any, Any, Any]
-
-
-def _coil(resistance: float, inductance: float) -> _Matrices:
-    return [[-resistance / inductance]], [[-1.0 / inductance]], [[1.0]]
-
-
-def _regulated(
-    resistance: float,
-    inductance: float,
-    sense_resistance: float,
-    gain_bandwidth: float,
-    open_loop_gain: float,
-) -> _Matrices:
     rate = 2.0 * np.pi * gain_bandwidth
     loop = resistance + sense_resistance
     a = [
         [-loop / inductance, 1.0 / inductance],
         [-rate * sense_resistance, -rate / open_loop_gain],
     ]
-    return a, [[-1.0 / inductance], [0.0]], [[1.0, 0.0]]
-
-
-def _on_sine(
-    matrices: _Matrices, enters: list[float], amplitude: float, frequency: float
-) -> LinearParticipant:
-    """At rest at t = 0; a sine with this amplitude ``enters`` the states' rates."""
-    a, b, c = (np.array(m, float) for m in matrices)
-    n, w = len(a), 2.0 * np.pi * frequency
-    whole = np.zeros((n + 2, n + 2))
-    whole[:n, :n], whole[:n, n] = a, enters
-    whole[n, n + 1], whole[n + 1, n] = w, -w
-    still = np.zeros((2, b.shape[1]))
-    outputs = np.hstack([c, np.zeros((len(c), 2))])
-    return LinearParticipant(
-        whole, np.vstack([b, still]), outputs, state=[0.0] * (n + 1) + [amplitude]
-    )
+    b, c = [[-1.0 / inductance], [0.0]], [[1.0, 0.0]]
+    if sine is None:
+        return LinearParticipant(a, b, c, state=[current, 0.0])
+    amplitude, w = sine[0], 2.0 * np.pi * sine[1]
+    whole = np.zeros((4, 4))
+    whole[:2, :2], whole[1, 2] = a, rate
+    whole[2, 3], whole[3, 2] = w, -w
+    state = [current, 0.0, 0.0, amplitude]
+    return LinearParticipant(whole, [*b, [0.0], [0.0]], [[1.0, 0.0, 0.0, 0.0]], state=state)

@@ -43,7 +43,7 @@ class Joint:
         a side has direct feedthrough, an output not calculated anew is one of the step before.
         """
         answer = self.second.outputs(self.first.outputs())
-        self.past.met(self.time, self.first.outputs(answer), answer)
+        self.past.met(self.time, *self.first.outputs(answer), *answer)
 
     def restart(self) -> None:
         """Forget what lies before an event."""

@@ -10,7 +10,7 @@ it is seen whether what is exchanged grows.
 """
 
 from collections.abc import Callable
-from math import inf, isfinite
+from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
@@ -36,13 +36,8 @@ class Steps(Protocol):
     def restore(self, saved: Any) -> None: ...
 
 
-def linear_map(make: Callable[[], Steps], h: float) -> Array:
-    """The matrix by which one macro step of ``h`` (s) takes what the method keeps to the next.
-
-    ``make`` gives the method between two homogeneous linear participants. Raises SimulationFailed
-    where an iteration in it does not converge.
-    """
-    method = make()
+def _linear_map(method: Steps, h: float) -> Array:
+    """The matrix by which one macro step of ``h`` (s) takes what the method keeps to the next."""
     for _ in range(_WARM_UP):
         method.step(h)
     shape = method.save()
@@ -53,46 +48,36 @@ def linear_map(make: Callable[[], Steps], h: float) -> Array:
     return np.concatenate(_leaves(method.save()))
 
 
-def spectral_radius(make: Callable[[], Steps], h: float) -> float:
-    """Largest magnitude of an eigenvalue of the map; inf where a step cannot be done at all."""
+def _is_stable(make: Callable[[], Steps], h: float) -> bool:
+    """Whether no eigenvalue of the map is larger than 1; not where a step cannot be done at all."""
     try:
-        m = linear_map(make, h)
+        m = _linear_map(make(), h)
     except SimulationFailed:
-        return inf
-    if not np.isfinite(m).all():
-        return inf
-    return float(np.abs(np.linalg.eigvals(m)).max())
+        return False
+    return bool(np.isfinite(m).all() and np.abs(np.linalg.eigvals(m)).max() <= 1.0 + _MARGIN)
 
 
 def largest_stable_step(
-    make: Callable[[], Steps],
-    low: float,
-    high: float,
-    tolerance: float = 1e-3,
-    leap: float = 1.15,
+    make: Callable[[], Steps], low: float, high: float, leap: float = 1.15
 ) -> float:
     """The macro step (s) between ``low`` and ``high`` up to which the coupling is predicted stable.
 
-    The first limit from below; ``high`` where there is none, 0 where ``low`` is already unstable.
-    ``tolerance`` is relative; an unstable interval within a ``leap`` (a ratio) may be missed.
+    The first limit from below, within a thousandth; ``high`` where there is none, 0 where ``low``
+    is already unstable. An unstable interval within a ``leap`` (a ratio) may be missed. ``make``
+    gives the method between two homogeneous linear participants.
     """
-    stable = lambda h: spectral_radius(make, h) <= 1.0 + _MARGIN  # noqa: E731
-    return _first_limit(stable, low, high, tolerance, leap)
+    return _first_limit(lambda h: _is_stable(make, h), low, high, 1e-3, leap)
 
 
 def observed_limit(
-    make: Callable[[], Steps],
-    low: float,
-    high: float,
-    tolerance: float = 0.02,
-    steps: int = 600,
-    leap: float = 1.15,
+    make: Callable[[], Steps], low: float, high: float, steps: int = 600, leap: float = 1.15
 ) -> float:
-    """The same by running the method itself; ``make`` gives it disturbed from its equilibrium."""
-    return _first_limit(lambda h: remains_bounded(make, h, steps), low, high, tolerance, leap)
+    """The same within a fiftieth by running the method itself; ``make`` gives it disturbed from
+    its equilibrium."""
+    return _first_limit(lambda h: _remains_bounded(make, h, steps), low, high, 0.02, leap)
 
 
-def remains_bounded(make: Callable[[], Steps], h: float, steps: int = 600) -> bool:
+def _remains_bounded(make: Callable[[], Steps], h: float, steps: int) -> bool:
     """Whether what is exchanged has stopped growing after ``steps`` macro steps of ``h`` (s).
 
     It is compared in the last quarter of the steps with the second quarter.

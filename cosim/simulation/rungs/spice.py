@@ -39,7 +39,7 @@ class Spice(Rung):
             _electrics(scene, command(scene), log, recorder.time),
             method=scene.coupling.method,
             circuit_steps=lead.steps,
-            circuit_rejected=lead.attempts - lead.steps,
+            circuit_rejected=lead.state.attempts - lead.steps,
             versions={"ngspice": lead.ngspice},
         )
 
@@ -57,12 +57,7 @@ def _log_alone(scene: Scene, fmi_version: int) -> dict[str, Array]:
         mechanics.close()
 
 
-def _electrics(
-    scene: Scene,
-    command: Command,
-    log: dict[str, Array],
-    rows: Array,
-) -> Electrics:
+def _electrics(scene: Scene, command: Command, log: dict[str, Array], rows: Array) -> Electrics:
     """From the vectors at the accepted points of the circuit.
 
     Energies are sums of step times means over the step: for them the trapezoidal companion of an

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from cosim.coupling.participants.amplifier import Amplifier
-from cosim.coupling.participants.linear import LinearParticipant, driven_regulated_coil
+from cosim.coupling.participants.linear import LinearParticipant, regulated_coil
 from cosim.coupling.participants.stickslip import FmuMechanics
 from cosim.drive.command import command
 from cosim.errors import BadInput
@@ -96,14 +96,13 @@ def participants(scene: Scene) -> tuple[LinearParticipant | Amplifier, FmuMechan
     mechanics = FmuMechanics(scene)
     if drive.waveform == "sine" and drive.offset == 0.0:
         # Without limits, and exact, where the command is no straight line.
-        side = driven_regulated_coil(
+        side = regulated_coil(
             coil.resistance,
             coil.inductance,
             circuit.sense_resistance * coil.count,
             circuit.gain_bandwidth,
             10.0 ** (circuit.open_loop_gain / 20.0),
-            0.5 * drive.amplitude,
-            drive.frequency,
+            sine=(0.5 * drive.amplitude, drive.frequency),
         )
         return side, mechanics
     return Amplifier(scene, command(scene)), mechanics

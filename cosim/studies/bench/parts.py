@@ -62,6 +62,6 @@ def _replay(scene: Scene, log: Log) -> npt.NDArray[np.float64]:
         current = (log["i(vemf)"] / scene.coil.count).tolist()
         pairs = []
         for k, time in enumerate(log["time"].tolist()[1:]):
-            recorder.advance(time, current[k], current[k + 1])
+            recorder.exchange(time, current[k], current[k + 1], current[k + 1])
             pairs.append(mechanics.step_outputs[:2])
         return np.array([*pairs, pairs[-1]])
