@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import SimulationFailed
 from cosim.files.spill import blocks
 from cosim.scene import Scene
-
-Array = npt.NDArray[np.float64]
 
 BURST = 12
 """Swings in a row that make a burst. A loop with 4° of phase margin, ringing after a flyback, makes

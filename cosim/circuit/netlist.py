@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import Line, read, refuse
@@ -19,8 +20,6 @@ from cosim.circuit.lint.elements import Element
 from cosim.circuit.lint.words import definitions
 from cosim.files.resources import circuits
 from cosim.scene import Scene
-
-Array = npt.NDArray[np.float64]
 
 REQUIRED = ("i(vemf)", "v(out)", "v(sense)")
 """What every netlist has: the coils' total current, and the two ends of the coil."""

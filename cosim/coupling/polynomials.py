@@ -8,9 +8,8 @@ asks for a polynomial at each of its macro points, where arrays would cost more 
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from cosim.arrays import Array
 
 Polynomial = tuple[Any, ...]
 """Coefficients, the constant one first."""

@@ -3,11 +3,9 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.drive.pieces import SINE, Command, Piece
-
-Array = npt.NDArray[np.float64]
 
 _CHORDS = 1000
 """Straights a period of a sine: within 5e-6 of the amplitude."""

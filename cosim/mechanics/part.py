@@ -20,10 +20,10 @@ from typing import Required, TypedDict, Unpack
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.toolchain.libraries import library
 
-Array = npt.NDArray[np.float64]
 Real = npt.ArrayLike
 
 PUBLISHED_STEP = 1e-4  # s

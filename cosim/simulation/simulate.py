@@ -4,9 +4,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-import numpy as np
-import numpy.typing as npt
-
+from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import commands
 from cosim.files.spill import Tape, blocks
@@ -22,8 +20,6 @@ from cosim.toolchain.processes import isolated
 from cosim.toolchain.versions import versions
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.result import Result
-
-Array = npt.NDArray[np.float64]
 
 Progress = Callable[[float], None]
 

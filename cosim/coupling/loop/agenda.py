@@ -5,9 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.trials.camera import FRAME_RATE
-
-Array = npt.NDArray[np.float64]
 
 ENTRIES = 1 << 14
 """Rows and frames of the camera that are planned, and taken, at a time."""

@@ -6,16 +6,14 @@ from ctypes import c_double, c_int32
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.coupling.loop import agenda
 from cosim.coupling.loop.structures import CALLBACK, Fmu, RecorderState, Schedule, loop
 from cosim.files.spill import BLOCK, Tape
 from cosim.mechanics.stickslip import COUNTERS, Mechanics
 from cosim.scene import Scene
 from cosim.toolchain.interrupts import caught_signals
-
-Array = npt.NDArray[np.float64]
 
 STEPS = 4096
 """Steps between two looks at what Python has to do, about ten milliseconds."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.drive.surface.formulas import (
     GRAVITY,
     Direction,
@@ -14,8 +15,6 @@ from cosim.drive.surface.formulas import (
     sticking_range,
 )
 from cosim.errors import BadInput
-
-Array = npt.NDArray[np.float64]
 
 ROUNDING_MARGIN = 1e-9
 """The ``margin`` of :func:`optimal_cycle` that rounding needs; solvers whose events are less exact

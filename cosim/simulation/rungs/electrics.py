@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.drive.pieces import Command
 from cosim.files.spill import Tape, blocks
 from cosim.scene import Scene
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.coupling.loop.agenda import grid
 from cosim.errors import BadInput
 from cosim.files.columns import read_timetable
@@ -20,8 +20,6 @@ from cosim.mechanics import part
 from cosim.scene import Scene
 from cosim.scene.messages import plain
 from cosim.trials.camera import FRAME_RATE, three_point_accelerations
-
-Array = npt.NDArray[np.float64]
 
 SINE_KNOTS = 2000
 """Knots a period of a sine: its chord error is 1.3e-6 of the amplitude."""

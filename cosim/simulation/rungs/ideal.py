@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import commands
 from cosim.drive.pieces import Command
@@ -13,8 +13,6 @@ from cosim.files.spill import Tape, blocks
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
 from cosim.simulation.rungs.rung import Driven, Rung
-
-Array = npt.NDArray[np.float64]
 
 
 class Ideal(Rung):

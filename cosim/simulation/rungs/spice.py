@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import command
 from cosim.drive.pieces import Command
@@ -14,8 +14,6 @@ from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
 from cosim.simulation.rungs.rung import Driven, Rung
-
-Array = npt.NDArray[np.float64]
 
 
 class Spice(Rung):

@@ -8,13 +8,11 @@ recognised by its heights; then the camera's own error is told too.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.trials.camera import FRAME_RATE, Frames, film, frame_count
 from cosim.trials.tracked import Trial
-
-Array = npt.NDArray[np.float64]
 
 SHIFTS = 400
 """Phases that are tried within a period."""

@@ -4,9 +4,7 @@ import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
+from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.files.atomic import write_json, write_text
 from cosim.files.picture import Picture
@@ -22,8 +20,6 @@ from cosim.waveforms.figure import PART, SURFACE
 from cosim.waveforms.formats.tracker import laid_over
 from cosim.waveforms.result import Result
 from cosim.waveforms.storage import read_csv, write_csv
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.mechanics import part
 from cosim.trials import published
 from cosim.trials.tracked import Trial
 
-Array = npt.NDArray[np.float64]
 Solver = Literal["exact", "published"]
 
 FIRST_ROW, LAST_ROWS = 3, 2

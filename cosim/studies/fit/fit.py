@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.files.atomic import write_json
 from cosim.files.picture import Picture
@@ -17,8 +17,6 @@ from cosim.studies.fit.search import Fit, Solved, search
 from cosim.studies.tables import write_csv
 from cosim.trials import published
 from cosim.trials.tracked import read_folder
-
-Array = npt.NDArray[np.float64]
 
 SENSITIVITY = 0.05  # relative change of a parameter
 RESAMPLES = 2000  # of the trials, for the interval of µ_k

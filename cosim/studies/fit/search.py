@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.mechanics.part import PartMotion
 from cosim.studies.fit.cases import Case, Parameters, Solver
 from cosim.trials import published
-
-Array = npt.NDArray[np.float64]
 
 FORCES = 49  # on the first grid of normal forces
 CANDIDATES = 2  # minima of it that are looked into

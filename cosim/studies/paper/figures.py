@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
@@ -11,8 +10,6 @@ from cosim.drive.surface import formulas
 from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import Cycle, optimal_cycle
 from cosim.files.picture import Picture
-
-Array = npt.NDArray[np.float64]
 
 # The colours of surface and part in all figures.
 SURFACE, PART, STICKING = "#1f6fb2", "#d1495b", "#f4e3c1"

@@ -7,16 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from cosim.arrays import Array
 from cosim.files.atomic import whole
 from cosim.scene import Scene, firmware, keys, to_toml
 from cosim.simulation.summary import UNITS
 from cosim.studies.sweep.design import Design
 from cosim.studies.sweep.point import Outcome
-
-Array = npt.NDArray[np.float64]
 
 FAILURE = "failure"
 """The variable that says why a point failed; empty where it did not."""

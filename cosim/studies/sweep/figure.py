@@ -5,19 +5,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator
 
+from cosim.arrays import Array
 from cosim.files.picture import Picture
 from cosim.scene import firmware
 from cosim.studies.sweep.dataset import FAILURE, POINT, swept
 from cosim.studies.sweep.report import label, setting
-
-Array = npt.NDArray[np.float64]
 
 STAYS = 0.05e-3
 """m/s; a part that moves more slowly than this counts as not transported."""

@@ -8,8 +8,8 @@ from math import inf, isfinite
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.errors import BadInput, SimulationFailed
 from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
@@ -20,8 +20,6 @@ from cosim.studies.sweep.pool import Pool, workers_asked
 from cosim.studies.tune import files
 from cosim.studies.tune.found import TURNS, Run, Search
 from cosim.studies.tune.search import apart, search
-
-Array = npt.NDArray[np.float64]
 
 KNOBS: dict[str, tuple[float, float]] = {
     f"drive.{knob}": (0.0, 1.0) for knob in ("pot_max", "pot_frequency", "pot_offset")

@@ -8,9 +8,8 @@ ridges aslant to the knobs, which samples from a normal distribution can lie alo
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from cosim.arrays import Array
 
 EXPLORED = 0.4
 """Share of the runs that listens to the whole range."""
