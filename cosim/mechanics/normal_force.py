@@ -3,10 +3,9 @@
 from bisect import bisect_right
 from pathlib import Path
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.files.columns import read_timetable
 from cosim.scene import Scene
-from cosim.scene.messages import plain
 
 _SAME_TIME = 1e-12  # s; times closer than this are one, as in the recorder
 

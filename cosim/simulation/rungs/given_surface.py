@@ -14,11 +14,10 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.coupling.loop.agenda import grid
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.files.columns import read_timetable
 from cosim.mechanics import part
 from cosim.scene import Scene
-from cosim.scene.messages import plain
 from cosim.trials.camera import FRAME_RATE, three_point_accelerations
 
 SINE_KNOTS = 2000

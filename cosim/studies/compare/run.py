@@ -5,12 +5,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from cosim.arrays import Array
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.files.atomic import write_json, write_text
 from cosim.files.picture import Picture
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
-from cosim.scene.messages import plain
 from cosim.simulation.rungs.given_surface import knots
 from cosim.simulation.simulate import simulate
 from cosim.studies.compare.compare import CameraError, Metrics, camera_error, made_of, measure

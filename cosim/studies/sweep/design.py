@@ -6,9 +6,9 @@ from math import isfinite, prod
 
 import numpy as np
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.scene import Key, keys
-from cosim.scene.messages import ended, plain, suggestion
+from cosim.scene.messages import ended, suggestion
 from cosim.studies.sweep.point import Number
 
 MOST_POINTS = 10_000_000

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from math import inf, isfinite
 from pathlib import Path
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.files.atomic import write_json, write_text
 from cosim.scene import to_toml
-from cosim.scene.messages import plain
 from cosim.scene.tables import KNOBS
 from cosim.studies.sweep.design import numeric_key, split
 from cosim.studies.sweep.report import bench_unit, with_unit
