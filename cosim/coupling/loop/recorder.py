@@ -88,7 +88,8 @@ class Recorder:
             extremes=self.extremes,
             plan=CALLBACK(self._planned),
         )
-        self._state = ctypes.byref(self.state)
+        # Not byref: Python cannot see a circle through what that gives, so it would never go.
+        self._state = ctypes.addressof(self.state)
         self.exchange: Callable[[float, float, float, float], int] = partial(
             self._library.recorder_exchange, self._state
         )
