@@ -280,13 +280,18 @@ def test_interrupt_where_compiled_code_calls_back(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Between the call and its first line nothing in the callback itself can catch it."""
-    planned = Recorder._planned
+    original = Recorder._weakly_planned
 
-    def struck(self: Recorder) -> None:
-        signal.raise_signal(signal.SIGINT)
-        planned(self)
+    def struck(self: Recorder) -> Callable[[], None]:
+        planned = original(self)
 
-    monkeypatch.setattr(Recorder, "_planned", struck)
+        def called() -> None:
+            signal.raise_signal(signal.SIGINT)
+            planned()
+
+        return called
+
+    monkeypatch.setattr(Recorder, "_weakly_planned", struck)
     arguments = [
         "run",
         "ideal-current",

@@ -8,6 +8,7 @@ import ctypes
 from collections.abc import Callable
 from ctypes import c_int64
 from typing import Any
+from weakref import WeakMethod
 
 import numpy as np
 import numpy.typing as npt
@@ -132,16 +133,19 @@ class Lead:
 
     def use(self, macro_point: Callable[[], None]) -> None:
         """Ask ``macro_point`` at each macro point from now on."""
-        self._macro_point = self.callback(macro_point)  # the structure keeps no reference
-        self.state.macro_point = ctypes.cast(self._macro_point, ctypes.c_void_p).value
+        called = self.callback(macro_point)
+        self._macro_point = macro_point, called  # which the structure does not keep
+        self.state.macro_point = ctypes.cast(called, ctypes.c_void_p).value
 
     def callback(self, act: Callable[[], None]) -> Any:
-        """``act`` as C can call it; what it raises ends the run. Whoever passes it on keeps it."""
+        """The method ``act`` as C can call it; what it raises ends the run. It is not kept alive:
+        a finished run would hold itself, and its blocks, until Python looks for circles."""
+        method = WeakMethod(act)
 
         def called() -> None:
             # An exception cannot pass through C.
             try:
-                act()
+                method()()  # pyright: ignore[reportOptionalCall]
             except BaseException as failure:
                 _engine().fail(failure)
 

@@ -4,6 +4,7 @@ import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int32
 from functools import partial
+from weakref import WeakMethod
 
 import numpy as np
 
@@ -86,9 +87,8 @@ class Recorder:
             totals_at_settle=self._totals,
             counters_at_settle=self._counters,
             extremes=self.extremes,
-            plan=CALLBACK(self._planned),
+            plan=CALLBACK(self._weakly_planned()),
         )
-        # Not byref: Python cannot see a circle through what that gives, so it would never go.
         self._state = ctypes.addressof(self.state)
         self.exchange: Callable[[float, float, float, float], int] = partial(
             self._library.recorder_exchange, self._state
@@ -145,12 +145,18 @@ class Recorder:
         error = RuntimeError(f"{name} failed with status {fmu.status}")
         return self.mechanics.failed(error, fmu.time)
 
-    def _planned(self) -> None:
-        # An exception cannot pass through C.
-        try:
-            self._plan()
-        except BaseException as fault:
-            self._stop(fault)
+    def _weakly_planned(self) -> Callable[[], None]:
+        """``_plan`` as C can call it, without a circle: a finished run is let go at once."""
+        plan, stop = WeakMethod(self._plan), WeakMethod(self._stop)
+
+        def planned() -> None:
+            # An exception cannot pass through C.
+            try:
+                plan()()  # pyright: ignore[reportOptionalCall]
+            except BaseException as fault:
+                stop()(fault)  # pyright: ignore[reportOptionalCall]
+
+        return planned
 
     def _stop(self, fault: BaseException) -> None:
         self._fault = fault
