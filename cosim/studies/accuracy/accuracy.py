@@ -160,7 +160,9 @@ def write(out: Path, runs: Sequence[Run]) -> str:
         "velocity of ram and surface and the current too), in units of its range, against a "
         "monolithic solution by SUNDIALS restarted at each event, which differs from another "
         f"integration method by at most {trust:.1e}. Time: CPU seconds, median of interleaved "
-        "runs where it is short. Every run is in accuracy.csv.",
+        "runs where it is short. The default and the methods in ngspice share one compiled loop; "
+        "the other methods run between participants in Python, so times are like for like within "
+        "each of these groups only. Every run is in accuracy.csv.",
         "Scenes: " + "; ".join(CASES[name].title for name in study.scenes) + ". A change of the "
         f"normal force by 1e-9 of itself moves their paths by at most {growth:.2g} times as much: "
         f"none is chaotic. From {chaos.CHAOTIC:g} on only statistics are compared (chaos.md).",
