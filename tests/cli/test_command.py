@@ -16,8 +16,10 @@ import pytest
 
 import cosim
 from cosim.cli.main import main
+from cosim.coupling.loop import recorder
 from cosim.coupling.loop.lead import Lead
 from cosim.coupling.loop.recorder import Recorder
+from cosim.coupling.loop.structures import CALLBACK
 from cosim.coupling.methods.mean_current import MeanCurrent
 from cosim.drive.command import Sawtooth
 from cosim.scene import load
@@ -280,18 +282,20 @@ def test_interrupt_where_compiled_code_calls_back(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Between the call and its first line nothing in the callback itself can catch it."""
-    original = Recorder._weakly_planned
+    original = recorder.callback
 
-    def struck(self: Recorder) -> Callable[[], None]:
-        planned = original(self)
+    def struck(
+        act: Callable[[], None], fail: Callable[[BaseException], None]
+    ) -> Callable[[], None]:
+        planned = original(act, fail)
 
         def called() -> None:
             signal.raise_signal(signal.SIGINT)
             planned()
 
-        return called
+        return CALLBACK(called)
 
-    monkeypatch.setattr(Recorder, "_weakly_planned", struck)
+    monkeypatch.setattr(recorder, "callback", struck)
     arguments = [
         "run",
         "ideal-current",

@@ -8,7 +8,6 @@ import ctypes
 from collections.abc import Callable
 from ctypes import c_int64
 from typing import Any
-from weakref import WeakMethod
 
 import numpy as np
 import numpy.typing as npt
@@ -17,12 +16,12 @@ from cosim.circuit import ngspice
 from cosim.circuit.netlist import MOTIONAL, prepare
 from cosim.coupling.loop.recorder import Recorder
 from cosim.coupling.loop.structures import (
-    CALLBACK,
     FMU_FAILED,
     NOT_FINITE,
     UNKNOWN_SOURCE,
     LeadState,
     address,
+    callback,
     loop,
 )
 from cosim.drive.pieces import Command, Piece
@@ -85,8 +84,8 @@ class Lead:
             motional=motional,
             log=self._block.ctypes.data,
             log_rows=_POINTS,
-            refill=self.callback(self._refill),
-            attend=self.callback(self._attend),
+            refill=callback(self._refill, self._fail),
+            attend=callback(self._attend, self._fail),
         )
         emf, slope = recorder.mechanics.step_outputs[:2]
         segment = self.state.segment
@@ -133,23 +132,12 @@ class Lead:
 
     def use(self, macro_point: Callable[[], None]) -> None:
         """Ask ``macro_point`` at each macro point from now on."""
-        called = self.callback(macro_point)
+        called = callback(macro_point, self._fail)
         self._macro_point = macro_point, called  # which the structure does not keep
         self.state.macro_point = ctypes.cast(called, ctypes.c_void_p).value
 
-    def callback(self, act: Callable[[], None]) -> Any:
-        """The method ``act`` as C can call it; what it raises ends the run. It is not kept alive:
-        a finished run would hold itself, and its blocks, until Python looks for circles."""
-        method = WeakMethod(act)
-
-        def called() -> None:
-            # An exception cannot pass through C.
-            try:
-                method()()  # pyright: ignore[reportOptionalCall]
-            except BaseException as failure:
-                _engine().fail(failure)
-
-        return CALLBACK(called)
+    def _fail(self, failure: BaseException) -> None:
+        _engine().fail(failure)
 
     # What ngspice's engine asks for (see cosim.circuit.ngspice.Leader).
 

@@ -4,13 +4,12 @@ import ctypes
 from collections.abc import Callable
 from ctypes import c_double, c_int32
 from functools import partial
-from weakref import WeakMethod
 
 import numpy as np
 
 from cosim.arrays import Array
 from cosim.coupling.loop import agenda
-from cosim.coupling.loop.structures import CALLBACK, Fmu, RecorderState, Schedule, loop
+from cosim.coupling.loop.structures import Fmu, RecorderState, Schedule, callback, loop
 from cosim.files.spill import BLOCK, Tape
 from cosim.mechanics.stickslip import COUNTERS, Mechanics
 from cosim.scene import Scene
@@ -87,7 +86,7 @@ class Recorder:
             totals_at_settle=self._totals,
             counters_at_settle=self._counters,
             extremes=self.extremes,
-            plan=CALLBACK(self._weakly_planned()),
+            plan=callback(self._plan, self._stop),
         )
         self._state = ctypes.addressof(self.state)
         self.exchange: Callable[[float, float, float, float], int] = partial(
@@ -144,19 +143,6 @@ class Recorder:
         name = next((name for name in _CALLS if getattr(fmu, name) == fmu.failed), "?")
         error = RuntimeError(f"{name} failed with status {fmu.status}")
         return self.mechanics.failed(error, fmu.time)
-
-    def _weakly_planned(self) -> Callable[[], None]:
-        """``_plan`` as C can call it, without a circle: a finished run is let go at once."""
-        plan, stop = WeakMethod(self._plan), WeakMethod(self._stop)
-
-        def planned() -> None:
-            # An exception cannot pass through C.
-            try:
-                plan()()  # pyright: ignore[reportOptionalCall]
-            except BaseException as fault:
-                stop()(fault)  # pyright: ignore[reportOptionalCall]
-
-        return planned
 
     def _stop(self, fault: BaseException) -> None:
         self._fault = fault

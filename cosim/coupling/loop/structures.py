@@ -1,9 +1,11 @@
 """The structures and functions of ``loop.h``, which says what they hold."""
 
 import ctypes
+from collections.abc import Callable
 from ctypes import POINTER, Structure, c_double, c_int32, c_int64, c_void_p
 from functools import cache
 from typing import Any
+from weakref import WeakMethod
 
 from cosim.drive.pieces import Piece
 from cosim.toolchain.libraries import library
@@ -97,6 +99,24 @@ _FUNCTIONS = {
     "lead_finish": (None, (c_void_p,)),
     "loop_size": (c_int64, (ctypes.c_int,)),
 }
+
+
+def callback(act: Callable[[], None], fail: Callable[[BaseException], None]) -> Any:
+    """The method ``act`` as C can call it; the method ``fail`` is told what it raises, since an
+    exception cannot pass through C.
+
+    Neither's object is kept alive: what holds the structure that holds this would hold itself, and
+    its blocks, until Python looks for circles.
+    """
+    weak_act, weak_fail = WeakMethod(act), WeakMethod(fail)
+
+    def called() -> None:
+        try:
+            weak_act()()  # pyright: ignore[reportOptionalCall]
+        except BaseException as failure:
+            weak_fail()(failure)  # pyright: ignore[reportOptionalCall]
+
+    return CALLBACK(called)
 
 
 @cache

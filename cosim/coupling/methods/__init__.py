@@ -1,17 +1,15 @@
 """The coupling methods, one a file; a file in this folder is a method."""
 
 from functools import cache
-from importlib import import_module
-from pkgutil import iter_modules
 
 from cosim.coupling.method import Method
+from cosim.files.declared import modules
 
 
 @cache
 def methods() -> dict[str, type[Method]]:
     """Each method by its name, as ``coupling.method`` has it."""
-    for module in iter_modules(__path__):
-        import_module(f"{__name__}.{module.name}")
+    modules(__name__)
     return {kind.name: kind for kind in _kinds(Method)}
 
 

@@ -7,16 +7,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.coupling.loop.recorder import Recorder
+from cosim.files.declared import modules
 from cosim.scene import Scene
-from cosim.simulation import rungs as folder
 from cosim.simulation.rungs.electrics import Electrics
 
 
@@ -52,6 +50,5 @@ class Rung(ABC):
 @cache
 def rungs() -> dict[str, Rung]:
     """Each rung with mechanics by its names; a file in this folder is a rung."""
-    for module in iter_modules(folder.__path__):
-        import_module(f"{folder.__name__}.{module.name}")
+    modules(__name__.rpartition(".")[0])
     return {name: kind() for kind in Rung.__subclasses__() for name in kind.names}
