@@ -175,8 +175,9 @@ static void choose_parameters(fmi2Component c3, fmi2Component c2)
 {
     for (unsigned i = 0; i < N_REALS; i++) {
         const fmi2ValueReference vr = REFERENCE_REALS + i;
-        const double value = REAL_INFO[i].start * uniform(0.7, 1.3);
-        if (REAL_INFO[i].kind != KIND_PARAMETER || strncmp(REAL_INFO[i].name, "mu_", 3) == 0)
+        const double value = stickslip_real_info[i].start * uniform(0.7, 1.3);
+        if (stickslip_real_info[i].kind != KIND_PARAMETER ||
+            strncmp(stickslip_real_info[i].name, "mu_", 3) == 0)
             continue;
         CHECK(fmi2SetReal(c2, &vr, 1, &value) == fmi2OK);
         CHECK(fmi3SetFloat64(c3, &vr, 1, &value, 1) == fmi3OK);

@@ -128,7 +128,7 @@ static void unit_definition(const char *unit)
 static int used_before(size_t place)
 {
     for (size_t i = 0; i < place; i++)
-        if (strcmp(REAL_INFO[i].unit, REAL_INFO[place].unit) == 0)
+        if (strcmp(stickslip_real_info[i].unit, stickslip_real_info[place].unit) == 0)
             return 1;
     return 0;
 }
@@ -138,7 +138,7 @@ static void unit_definitions(void)
     puts("  <UnitDefinitions>");
     for (size_t i = 0; i < N_REALS; i++)
         if (!used_before(i))
-            unit_definition(REAL_INFO[i].unit);
+            unit_definition(stickslip_real_info[i].unit);
     puts("  </UnitDefinitions>");
 }
 
@@ -198,9 +198,9 @@ static void variables(int version)
                "variability=\"continuous\" unit=\"s\"/>\n",
                REFERENCE_TIME);
     for (size_t i = 0; i < N_REALS; i++)
-        variable(version, REFERENCE_REALS + (unsigned)i, &REAL_INFO[i], 1);
+        variable(version, REFERENCE_REALS + (unsigned)i, &stickslip_real_info[i], 1);
     for (size_t i = 0; i < N_INTEGERS; i++)
-        variable(version, REFERENCE_INTEGERS + (unsigned)i, &INTEGER_INFO[i], 0);
+        variable(version, REFERENCE_INTEGERS + (unsigned)i, &stickslip_integer_info[i], 0);
     puts("  </ModelVariables>");
 }
 
@@ -240,7 +240,7 @@ static void unknowns(int version, const char *element, int with_dependencies)
 {
     const char *key = version == 2 ? "index" : "valueReference";
     for (size_t i = 0; i < N_REALS; i++) {
-        if (REAL_INFO[i].kind != KIND_OUTPUT)
+        if (stickslip_real_info[i].kind != KIND_OUTPUT)
             continue;
         printf("    <%s %s=\"%u\"", element, key, real_key(version, i));
         if (with_dependencies && has_feedthrough(i))
@@ -260,7 +260,7 @@ static void unknowns(int version, const char *element, int with_dependencies)
         puts("/>");
     }
     for (size_t i = 0; i < N_INTEGERS; i++)
-        if (INTEGER_INFO[i].kind == KIND_OUTPUT)
+        if (stickslip_integer_info[i].kind == KIND_OUTPUT)
             printf("    <%s %s=\"%u\"%s/>\n", element, key, integer_key(version, i),
                    with_dependencies ? " dependencies=\"\" dependenciesKind=\"\"" : "");
 }
@@ -324,7 +324,7 @@ static void model_description(int version, char **sources, int n_sources)
          "sticking and slipping\"/>\n"
          "  </LogCategories>");
     printf("  <DefaultExperiment startTime=\"0\" stopTime=\"0.1\" stepSize=\"1e-4\"");
-    number("tolerance", REAL_INFO[PLACE(tolerance)].start);
+    number("tolerance", stickslip_real_info[PLACE(tolerance)].start);
     puts("/>");
     variables(version);
     structure(version);

@@ -26,15 +26,15 @@ static void send(const Instance *inst, Severity severity, const char *category, 
 static fmi2Status unsupported(fmi2Component c, const char *function)
 {
     if (c)
-        instance_refuse(c, function, "this co-simulation FMU does not provide it");
+        stickslip_refuse(c, function, "this co-simulation FMU does not provide it");
     return fmi2Error;
 }
 
 static fmi2Status none_of_type(fmi2Component c, const char *function, size_t n)
 {
-    if (!c || !instance_allowed(c, function, ANY_PHASE))
+    if (!c || !stickslip_allowed(c, function, ANY_PHASE))
         return fmi2Error;
-    return status_of(n == 0 || instance_refuse(c, function, "there is no variable of this type"));
+    return status_of(n == 0 || stickslip_refuse(c, function, "there is no variable of this type"));
 }
 
 const char *fmi2GetTypesPlatform(void)
@@ -50,7 +50,7 @@ const char *fmi2GetVersion(void)
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
                                const fmi2String categories[])
 {
-    return status_of(instance_set_logging(c, __func__, on, n, categories));
+    return status_of(stickslip_set_logging(c, __func__, on, n, categories));
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
@@ -63,10 +63,10 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         log.callback = (AnyFunction)functions->logger;
         log.environment = functions->componentEnvironment;
     }
-    Instance *inst = instance_new(__func__, name, guid, &log);
+    Instance *inst = stickslip_new(__func__, name, guid, &log);
     if (inst && type != fmi2CoSimulation) {
-        instance_refuse(inst, __func__, "only co-simulation is provided");
-        instance_free(inst);
+        stickslip_refuse(inst, __func__, "only co-simulation is provided");
+        stickslip_free(inst);
         return NULL;
     }
     return inst;
@@ -74,57 +74,57 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 
 void fmi2FreeInstance(fmi2Component c)
 {
-    instance_free(c);
+    stickslip_free(c);
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,
                                fmi2Real start_time, fmi2Boolean has_stop_time, fmi2Real stop_time)
 {
-    return status_of(instance_set_up(c, __func__, has_tolerance, tolerance, start_time,
-                                     has_stop_time, stop_time));
+    return status_of(stickslip_set_up(c, __func__, has_tolerance, tolerance, start_time,
+                                      has_stop_time, stop_time));
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    return status_of(instance_enter_initialisation(c, __func__));
+    return status_of(stickslip_enter_initialisation(c, __func__));
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
-    return status_of(instance_exit_initialisation(c, __func__));
+    return status_of(stickslip_exit_initialisation(c, __func__));
 }
 
 fmi2Status fmi2Terminate(fmi2Component c)
 {
-    return status_of(instance_terminate(c, __func__));
+    return status_of(stickslip_terminate(c, __func__));
 }
 
 fmi2Status fmi2Reset(fmi2Component c)
 {
-    return status_of(instance_reset(c, __func__));
+    return status_of(stickslip_reset(c, __func__));
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real values[])
 {
-    return status_of(instance_get_reals(c, __func__, vr, n, values));
+    return status_of(stickslip_get_reals(c, __func__, vr, n, values));
 }
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                           fmi2Integer values[])
 {
-    return status_of(instance_get_integers(c, __func__, vr, n, values));
+    return status_of(stickslip_get_integers(c, __func__, vr, n, values));
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                        const fmi2Real values[])
 {
-    return status_of(instance_set_reals(c, __func__, vr, n, values));
+    return status_of(stickslip_set_reals(c, __func__, vr, n, values));
 }
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                           const fmi2Integer values[])
 {
-    return status_of(instance_set_integers(c, __func__, vr, n, values));
+    return status_of(stickslip_set_integers(c, __func__, vr, n, values));
 }
 
 #define NO_VARIABLES(function, constant, type)                                                     \
@@ -141,33 +141,33 @@ NO_VARIABLES(fmi2SetString, const, fmi2String)
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    return status_of(instance_get_state(c, __func__, state));
+    return status_of(stickslip_get_state(c, __func__, state));
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
-    return status_of(instance_set_state(c, __func__, state));
+    return status_of(stickslip_set_state(c, __func__, state));
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    return status_of(instance_free_state(c, __func__, state));
+    return status_of(stickslip_free_state(c, __func__, state));
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
-    return status_of(instance_state_size(c, __func__, state, size));
+    return status_of(stickslip_state_size(c, __func__, state, size));
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 {
-    return status_of(instance_serialise(c, __func__, state, bytes, size));
+    return status_of(stickslip_serialise(c, __func__, state, bytes, size));
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
                                    fmi2FMUstate *state)
 {
-    return status_of(instance_deserialise(c, __func__, bytes, size, state));
+    return status_of(stickslip_deserialise(c, __func__, bytes, size, state));
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknowns[],
@@ -175,20 +175,20 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         size_t n_knowns, const fmi2Real seed[],
                                         fmi2Real sensitivity[])
 {
-    return status_of(instance_derivative(c, __func__, unknowns, n_unknowns, knowns, n_knowns, seed,
-                                         sensitivity));
+    return status_of(stickslip_derivative(c, __func__, unknowns, n_unknowns, knowns, n_knowns, seed,
+                                          sensitivity));
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                        const fmi2Integer orders[], const fmi2Real values[])
 {
-    return status_of(instance_set_slopes(c, __func__, vr, n, orders, values));
+    return status_of(stickslip_set_slopes(c, __func__, vr, n, orders, values));
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean no_set_state_before)
 {
     (void)no_set_state_before;
-    return status_of(instance_step(c, __func__, time, h));
+    return status_of(stickslip_step(c, __func__, time, h));
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)

@@ -17,22 +17,22 @@ static void send(const Instance *inst, Severity severity, const char *category, 
 static fmi3Status unsupported(fmi3Instance c, const char *function)
 {
     if (c)
-        instance_refuse(c, function, "this co-simulation FMU does not provide it");
+        stickslip_refuse(c, function, "this co-simulation FMU does not provide it");
     return fmi3Error;
 }
 
 static int one_each(const Instance *inst, const char *function, size_t n, size_t n_values)
 {
-    return inst && (n == n_values ||
-                    instance_refuse(inst, function, "%zu values for %zu scalar variables", n_values,
-                                    n));
+    return inst &&
+           (n == n_values ||
+            stickslip_refuse(inst, function, "%zu values for %zu scalar variables", n_values, n));
 }
 
 static fmi3Status none_of_type(fmi3Instance c, const char *function, size_t n)
 {
-    if (!c || !instance_allowed(c, function, ANY_PHASE))
+    if (!c || !stickslip_allowed(c, function, ANY_PHASE))
         return fmi3Error;
-    return status_of(n == 0 || instance_refuse(c, function, "there is no variable of this type"));
+    return status_of(n == 0 || stickslip_refuse(c, function, "there is no variable of this type"));
 }
 
 const char *fmi3GetVersion(void)
@@ -43,7 +43,7 @@ const char *fmi3GetVersion(void)
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n,
                                const fmi3String categories[])
 {
-    return status_of(instance_set_logging(c, __func__, on, n, categories));
+    return status_of(stickslip_set_logging(c, __func__, on, n, categories));
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(
@@ -56,10 +56,10 @@ fmi3Instance fmi3InstantiateCoSimulation(
     (void)resources, (void)visible, (void)early_return_allowed, (void)intermediate;
     (void)intermediate_update;
     const Log log = {send, (AnyFunction)log_message, environment, logging_on};
-    Instance *inst = instance_new(__func__, name, token, &log);
+    Instance *inst = stickslip_new(__func__, name, token, &log);
     if (inst && (event_mode_used || n_intermediate > 0)) {
-        instance_refuse(inst, __func__, "there is neither event mode nor intermediate update");
-        instance_free(inst);
+        stickslip_refuse(inst, __func__, "there is neither event mode nor intermediate update");
+        stickslip_free(inst);
         return NULL;
     }
     return inst;
@@ -70,7 +70,7 @@ static fmi3Instance only_co_simulation(const char *function, fmi3InstanceEnviron
 {
     const Instance none = {
         .send = send, .callback = (AnyFunction)log_message, .environment = environment};
-    instance_refuse(&none, function, "only co-simulation is provided");
+    stickslip_refuse(&none, function, "only co-simulation is provided");
     return NULL;
 }
 
@@ -96,59 +96,59 @@ fmi3Instance fmi3InstantiateScheduledExecution(
 
 void fmi3FreeInstance(fmi3Instance c)
 {
-    instance_free(c);
+    stickslip_free(c);
 }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance,
                                        fmi3Float64 tolerance, fmi3Float64 start_time,
                                        fmi3Boolean has_stop_time, fmi3Float64 stop_time)
 {
-    return status_of(instance_set_up(c, __func__, has_tolerance, tolerance, start_time,
-                                     has_stop_time, stop_time) &&
-                     instance_enter_initialisation(c, __func__));
+    return status_of(stickslip_set_up(c, __func__, has_tolerance, tolerance, start_time,
+                                      has_stop_time, stop_time) &&
+                     stickslip_enter_initialisation(c, __func__));
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
 {
-    return status_of(instance_exit_initialisation(c, __func__));
+    return status_of(stickslip_exit_initialisation(c, __func__));
 }
 
 fmi3Status fmi3Terminate(fmi3Instance c)
 {
-    return status_of(instance_terminate(c, __func__));
+    return status_of(stickslip_terminate(c, __func__));
 }
 
 fmi3Status fmi3Reset(fmi3Instance c)
 {
-    return status_of(instance_reset(c, __func__));
+    return status_of(stickslip_reset(c, __func__));
 }
 
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                           fmi3Float64 values[], size_t n_values)
 {
     return status_of(one_each(c, __func__, n, n_values) &&
-                     instance_get_reals(c, __func__, vr, n, values));
+                     stickslip_get_reals(c, __func__, vr, n, values));
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                           const fmi3Float64 values[], size_t n_values)
 {
     return status_of(one_each(c, __func__, n, n_values) &&
-                     instance_set_reals(c, __func__, vr, n, values));
+                     stickslip_set_reals(c, __func__, vr, n, values));
 }
 
 fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Int32 values[],
                         size_t n_values)
 {
     return status_of(one_each(c, __func__, n, n_values) &&
-                     instance_get_integers(c, __func__, vr, n, values));
+                     stickslip_get_integers(c, __func__, vr, n, values));
 }
 
 fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                         const fmi3Int32 values[], size_t n_values)
 {
     return status_of(one_each(c, __func__, n, n_values) &&
-                     instance_set_integers(c, __func__, vr, n, values));
+                     stickslip_set_integers(c, __func__, vr, n, values));
 }
 
 #define NO_VARIABLES(name)                                                                         \
@@ -204,33 +204,33 @@ fmi3Status fmi3SetClock(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
 
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
 {
-    return status_of(instance_get_state(c, __func__, state));
+    return status_of(stickslip_get_state(c, __func__, state));
 }
 
 fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
 {
-    return status_of(instance_set_state(c, __func__, state));
+    return status_of(stickslip_set_state(c, __func__, state));
 }
 
 fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state)
 {
-    return status_of(instance_free_state(c, __func__, state));
+    return status_of(stickslip_free_state(c, __func__, state));
 }
 
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size)
 {
-    return status_of(instance_state_size(c, __func__, state, size));
+    return status_of(stickslip_state_size(c, __func__, state, size));
 }
 
 fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size)
 {
-    return status_of(instance_serialise(c, __func__, state, bytes, size));
+    return status_of(stickslip_serialise(c, __func__, state, bytes, size));
 }
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size,
                                    fmi3FMUState *state)
 {
-    return status_of(instance_deserialise(c, __func__, bytes, size, state));
+    return status_of(stickslip_deserialise(c, __func__, bytes, size, state));
 }
 
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
@@ -240,8 +240,8 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
 {
     return status_of(one_each(c, __func__, n_knowns, n_seed) &&
                      one_each(c, __func__, n_unknowns, n_sensitivity) &&
-                     instance_derivative(c, __func__, unknowns, n_unknowns, knowns, n_knowns, seed,
-                                         sensitivity));
+                     stickslip_derivative(c, __func__, unknowns, n_unknowns, knowns, n_knowns, seed,
+                                          sensitivity));
 }
 
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 h,
@@ -249,7 +249,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 h,
                       fmi3Boolean *terminate, fmi3Boolean *early_return, fmi3Float64 *last_time)
 {
     (void)no_set_state_before;
-    const int done = instance_step(c, __func__, time, h);
+    const int done = stickslip_step(c, __func__, time, h);
     if (event_handling_needed)
         *event_handling_needed = fmi3False;
     if (terminate)

@@ -12,7 +12,7 @@
 
 enum { MESSAGE_SIZE = MODEL_MESSAGE_SIZE + 256 };
 
-int instance_refuse(const Instance *inst, const char *function, const char *format, ...)
+int stickslip_refuse(const Instance *inst, const char *function, const char *format, ...)
 {
     char message[MESSAGE_SIZE];
     int used = snprintf(message, sizeof message, "%s: ", function);
@@ -25,28 +25,28 @@ int instance_refuse(const Instance *inst, const char *function, const char *form
     return 0;
 }
 
-int instance_allowed(const Instance *inst, const char *function, int phases)
+int stickslip_allowed(const Instance *inst, const char *function, int phases)
 {
     if (!inst)
         return 0;
     const int phase = inst->state.phase;
     if (phase & phases)
         return 1;
-    return instance_refuse(inst, function, "not allowed %s",
-                           phase == INSTANTIATED   ? "before the initialization mode"
-                           : phase == INITIALISING ? "in the initialization mode"
-                           : phase == STEPPING     ? "once the initialization mode was left"
-                                                   : "after termination");
+    return stickslip_refuse(inst, function, "not allowed %s",
+                            phase == INSTANTIATED   ? "before the initialization mode"
+                            : phase == INITIALISING ? "in the initialization mode"
+                            : phase == STEPPING     ? "once the initialization mode was left"
+                                                    : "after termination");
 }
 
 static void start_over(Instance *inst)
 {
     memset(&inst->state, 0, sizeof inst->state);
-    model_defaults(&inst->state.model);
+    stickslip_model_defaults(&inst->state.model);
     inst->state.phase = INSTANTIATED;
 }
 
-Instance *instance_new(const char *function, const char *name, const char *token, const Log *log)
+Instance *stickslip_new(const char *function, const char *name, const char *token, const Log *log)
 {
     Instance *inst = calloc(1, sizeof *inst);
     if (!inst)
@@ -60,21 +60,21 @@ Instance *instance_new(const char *function, const char *name, const char *token
     if (inst->name) {
         strcpy(inst->name, known);
         if (!*known)
-            instance_refuse(inst, function, "the instance has no name");
+            stickslip_refuse(inst, function, "the instance has no name");
         else if (!token || strcmp(token, TOKEN_TEXT) != 0)
-            instance_refuse(inst, function,
-                            "the model description belongs to another build (%.100s, here %s)",
-                            token ? token : "none", TOKEN_TEXT);
+            stickslip_refuse(inst, function,
+                             "the model description belongs to another build (%.100s, here %s)",
+                             token ? token : "none", TOKEN_TEXT);
         else {
             start_over(inst);
             return inst;
         }
     }
-    instance_free(inst);
+    stickslip_free(inst);
     return NULL;
 }
 
-void instance_free(Instance *inst)
+void stickslip_free(Instance *inst)
 {
     if (!inst)
         return;
@@ -82,10 +82,10 @@ void instance_free(Instance *inst)
     free(inst);
 }
 
-int instance_set_logging(Instance *inst, const char *function, int on, size_t n,
-                         const char *const categories[])
+int stickslip_set_logging(Instance *inst, const char *function, int on, size_t n,
+                          const char *const categories[])
 {
-    if (!instance_allowed(inst, function, ANY_PHASE))
+    if (!stickslip_allowed(inst, function, ANY_PHASE))
         return 0;
     int events = n == 0; /* no names mean all of them */
     for (size_t i = 0; i < n; i++) {
@@ -93,52 +93,54 @@ int instance_set_logging(Instance *inst, const char *function, int on, size_t n,
         if (category && strcmp(category, "logEvents") == 0)
             events = 1;
         else if (!category || strcmp(category, "logStatusError") != 0)
-            return instance_refuse(inst, function, "no log category is called %.100s",
-                                   category ? category : "(null)");
+            return stickslip_refuse(inst, function, "no log category is called %.100s",
+                                    category ? category : "(null)");
     }
     if (events)
         inst->log_events = on;
     return 1;
 }
 
-int instance_set_up(Instance *inst, const char *function, int has_tolerance, double tolerance,
-                    double start_time, int has_stop_time, double stop_time)
+int stickslip_set_up(Instance *inst, const char *function, int has_tolerance, double tolerance,
+                     double start_time, int has_stop_time, double stop_time)
 {
     char message[MODEL_MESSAGE_SIZE];
-    if (!instance_allowed(inst, function, INSTANTIATED))
+    if (!stickslip_allowed(inst, function, INSTANTIATED))
         return 0;
     State *s = &inst->state;
     if (!isfinite(start_time))
-        return instance_refuse(inst, function, "the start time must be finite");
+        return stickslip_refuse(inst, function, "the start time must be finite");
     if (has_stop_time && !(stop_time >= start_time))
-        return instance_refuse(inst, function, "the stop time %g s is not after the start time %g s",
-                               stop_time, start_time);
+        return stickslip_refuse(inst, function,
+                                "the stop time %g s is not after the start time %g s", stop_time,
+                                start_time);
     if (has_tolerance && !s->tolerance_set &&
-        model_set_real(&s->model, offsetof(Reals, tolerance) / sizeof(double), tolerance, message))
-        return instance_refuse(inst, function, "%s", message);
+        stickslip_model_set_real(&s->model, offsetof(Reals, tolerance) / sizeof(double), tolerance,
+                                 message))
+        return stickslip_refuse(inst, function, "%s", message);
     s->time = start_time;
     s->has_stop_time = has_stop_time != 0;
     s->stop_time = has_stop_time ? stop_time : 0.0;
     return 1;
 }
 
-int instance_enter_initialisation(Instance *inst, const char *function)
+int stickslip_enter_initialisation(Instance *inst, const char *function)
 {
-    if (!instance_allowed(inst, function, INSTANTIATED))
+    if (!stickslip_allowed(inst, function, INSTANTIATED))
         return 0;
     inst->state.phase = INITIALISING;
     return 1;
 }
 
-int instance_exit_initialisation(Instance *inst, const char *function)
+int stickslip_exit_initialisation(Instance *inst, const char *function)
 {
     char message[MODEL_MESSAGE_SIZE];
-    if (!instance_allowed(inst, function, INITIALISING))
+    if (!stickslip_allowed(inst, function, INITIALISING))
         return 0;
     Model start = inst->state.model;
     start.initialised = 0;
-    if (model_initialise(&start, message))
-        return instance_refuse(inst, function, "%s", message);
+    if (stickslip_model_initialise(&start, message))
+        return stickslip_refuse(inst, function, "%s", message);
     inst->state.model = start;
     inst->state.outputs_stale = 0;
     inst->state.phase = STEPPING;
@@ -158,28 +160,28 @@ static void tell_events(const Instance *inst, const char *function, const Model 
     inst->send(inst, SEVERITY_OK, "logEvents", message);
 }
 
-int instance_step(Instance *inst, const char *function, double time, double h)
+int stickslip_step(Instance *inst, const char *function, double time, double h)
 {
     char message[MODEL_MESSAGE_SIZE];
-    if (!instance_allowed(inst, function, STEPPING))
+    if (!stickslip_allowed(inst, function, STEPPING))
         return 0;
     State *s = &inst->state;
     if (!(h > 0.0) || !isfinite(time + h))
-        return instance_refuse(inst, function,
-                               "a step of %g s from %g s: it must be positive and finite", h, time);
+        return stickslip_refuse(
+            inst, function, "a step of %g s from %g s: it must be positive and finite", h, time);
     const double slack = 1e-9 * h + 4.0 * DBL_EPSILON * fmax(fabs(time), fabs(s->time));
     if (!(fabs(time - s->time) <= slack))
-        return instance_refuse(inst, function,
-                               "the communication point %.17g s is not the current time %.17g s",
-                               time, s->time);
+        return stickslip_refuse(inst, function,
+                                "the communication point %.17g s is not the current time %.17g s",
+                                time, s->time);
     /* Importers that add up their steps miss the stop time by far more than an ulp. */
     if (s->has_stop_time && time + h > s->stop_time + slack + 1e-3 * h)
-        return instance_refuse(inst, function, "a step to %.17g s goes past the stop time %.17g s",
-                               time + h, s->stop_time);
+        return stickslip_refuse(inst, function, "a step to %.17g s goes past the stop time %.17g s",
+                                time + h, s->stop_time);
     Model before = s->model;
-    if (model_step(&s->model, h, message)) {
+    if (stickslip_model_step(&s->model, h, message)) {
         s->model = before;
-        return instance_refuse(inst, function, "%s", message);
+        return stickslip_refuse(inst, function, "%s", message);
     }
     s->time = time + h;
     s->outputs_stale = 1;
@@ -188,17 +190,17 @@ int instance_step(Instance *inst, const char *function, double time, double h)
     return 1;
 }
 
-int instance_terminate(Instance *inst, const char *function)
+int stickslip_terminate(Instance *inst, const char *function)
 {
-    if (!instance_allowed(inst, function, STEPPING))
+    if (!stickslip_allowed(inst, function, STEPPING))
         return 0;
     inst->state.phase = TERMINATED;
     return 1;
 }
 
-int instance_reset(Instance *inst, const char *function)
+int stickslip_reset(Instance *inst, const char *function)
 {
-    if (!instance_allowed(inst, function, ANY_PHASE))
+    if (!stickslip_allowed(inst, function, ANY_PHASE))
         return 0;
     start_over(inst);
     return 1;

@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "../physics/internal.h"
 #include "../physics/model.h"
 
 typedef enum {
@@ -52,44 +53,49 @@ typedef struct {
     int log_events;
 } Log;
 
-Instance *instance_new(const char *function, const char *name, const char *token, const Log *log);
-void instance_free(Instance *inst);
+STICKSLIP_INTERNAL_BEGIN
+
+Instance *stickslip_new(const char *function, const char *name, const char *token, const Log *log);
+void stickslip_free(Instance *inst);
 
 /* Reports "function: sentence" as an error. Always 0. */
-int instance_refuse(const Instance *inst, const char *function, const char *format, ...);
-int instance_allowed(const Instance *inst, const char *function, int phases);
-int instance_set_logging(Instance *inst, const char *function, int on, size_t n,
-                         const char *const categories[]);
+int stickslip_refuse(const Instance *inst, const char *function, const char *format, ...);
+int stickslip_allowed(const Instance *inst, const char *function, int phases);
+int stickslip_set_logging(Instance *inst, const char *function, int on, size_t n,
+                          const char *const categories[]);
 
-int instance_set_up(Instance *inst, const char *function, int has_tolerance, double tolerance,
-                    double start_time, int has_stop_time, double stop_time);
-int instance_enter_initialisation(Instance *inst, const char *function);
-int instance_exit_initialisation(Instance *inst, const char *function);
-int instance_step(Instance *inst, const char *function, double time, double h);
-int instance_terminate(Instance *inst, const char *function);
-int instance_reset(Instance *inst, const char *function);
+int stickslip_set_up(Instance *inst, const char *function, int has_tolerance, double tolerance,
+                     double start_time, int has_stop_time, double stop_time);
+int stickslip_enter_initialisation(Instance *inst, const char *function);
+int stickslip_exit_initialisation(Instance *inst, const char *function);
+int stickslip_step(Instance *inst, const char *function, double time, double h);
+int stickslip_terminate(Instance *inst, const char *function);
+int stickslip_reset(Instance *inst, const char *function);
 
-int instance_get_reals(Instance *inst, const char *function, const uint32_t vr[], size_t n,
-                       double values[]);
-int instance_set_reals(Instance *inst, const char *function, const uint32_t vr[], size_t n,
-                       const double values[]);
-int instance_get_integers(Instance *inst, const char *function, const uint32_t vr[], size_t n,
-                          int values[]);
-int instance_set_integers(Instance *inst, const char *function, const uint32_t vr[], size_t n,
-                          const int values[]);
+int stickslip_get_reals(Instance *inst, const char *function, const uint32_t vr[], size_t n,
+                        double values[]);
+int stickslip_set_reals(Instance *inst, const char *function, const uint32_t vr[], size_t n,
+                        const double values[]);
+int stickslip_get_integers(Instance *inst, const char *function, const uint32_t vr[], size_t n,
+                           int values[]);
+int stickslip_set_integers(Instance *inst, const char *function, const uint32_t vr[], size_t n,
+                           const int values[]);
 /* First time derivatives of current and normal_force. */
-int instance_set_slopes(Instance *inst, const char *function, const uint32_t vr[], size_t n,
-                        const int orders[], const double values[]);
-int instance_derivative(Instance *inst, const char *function, const uint32_t unknowns[],
-                        size_t n_unknowns, const uint32_t knowns[], size_t n_knowns,
-                        const double seed[], double sensitivity[]);
+int stickslip_set_slopes(Instance *inst, const char *function, const uint32_t vr[], size_t n,
+                         const int orders[], const double values[]);
+int stickslip_derivative(Instance *inst, const char *function, const uint32_t unknowns[],
+                         size_t n_unknowns, const uint32_t knowns[], size_t n_knowns,
+                         const double seed[], double sensitivity[]);
 
-int instance_get_state(Instance *inst, const char *function, void **state);
-int instance_set_state(Instance *inst, const char *function, void *state);
-int instance_free_state(Instance *inst, const char *function, void **state);
-int instance_state_size(Instance *inst, const char *function, void *state, size_t *size);
-int instance_serialise(Instance *inst, const char *function, void *state, void *bytes, size_t size);
-int instance_deserialise(Instance *inst, const char *function, const void *bytes, size_t size,
-                         void **state);
+int stickslip_get_state(Instance *inst, const char *function, void **state);
+int stickslip_set_state(Instance *inst, const char *function, void *state);
+int stickslip_free_state(Instance *inst, const char *function, void **state);
+int stickslip_state_size(Instance *inst, const char *function, void *state, size_t *size);
+int stickslip_serialise(Instance *inst, const char *function, void *state, void *bytes,
+                        size_t size);
+int stickslip_deserialise(Instance *inst, const char *function, const void *bytes, size_t size,
+                          void **state);
+
+STICKSLIP_INTERNAL_END
 
 #endif

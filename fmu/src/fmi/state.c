@@ -30,26 +30,26 @@ static int is_own(const Instance *inst, const char *function, const Snapshot *sn
     if (snapshot && snapshot->magic == MAGIC && snapshot->size == sizeof *snapshot &&
         memcmp(snapshot->token, TOKEN, sizeof TOKEN) == 0)
         return 1;
-    return instance_refuse(inst, function, "this is not a state of this build of the FMU");
+    return stickslip_refuse(inst, function, "this is not a state of this build of the FMU");
 }
 
 static Snapshot *room_for(const Instance *inst, const char *function, void **state)
 {
     if (!state) {
-        instance_refuse(inst, function, "a null pointer for the state");
+        stickslip_refuse(inst, function, "a null pointer for the state");
         return NULL;
     }
     if (*state)
         return is_own(inst, function, *state) ? *state : NULL;
     Snapshot *snapshot = calloc(1, sizeof *snapshot);
     if (!snapshot)
-        instance_refuse(inst, function, "out of memory");
+        stickslip_refuse(inst, function, "out of memory");
     return snapshot;
 }
 
-int instance_get_state(Instance *inst, const char *function, void **state)
+int stickslip_get_state(Instance *inst, const char *function, void **state)
 {
-    if (!instance_allowed(inst, function, ANY_PHASE))
+    if (!stickslip_allowed(inst, function, ANY_PHASE))
         return 0;
     Snapshot *snapshot = room_for(inst, function, state);
     if (!snapshot)
@@ -62,17 +62,17 @@ int instance_get_state(Instance *inst, const char *function, void **state)
     return 1;
 }
 
-int instance_set_state(Instance *inst, const char *function, void *state)
+int stickslip_set_state(Instance *inst, const char *function, void *state)
 {
-    if (!instance_allowed(inst, function, ANY_PHASE) || !is_own(inst, function, state))
+    if (!stickslip_allowed(inst, function, ANY_PHASE) || !is_own(inst, function, state))
         return 0;
     memcpy(&inst->state, &((Snapshot *)state)->state, sizeof inst->state);
     return 1;
 }
 
-int instance_free_state(Instance *inst, const char *function, void **state)
+int stickslip_free_state(Instance *inst, const char *function, void **state)
 {
-    if (!instance_allowed(inst, function, ANY_PHASE))
+    if (!stickslip_allowed(inst, function, ANY_PHASE))
         return 0;
     if (!state || !*state)
         return 1;
@@ -83,41 +83,41 @@ int instance_free_state(Instance *inst, const char *function, void **state)
     return 1;
 }
 
-int instance_state_size(Instance *inst, const char *function, void *state, size_t *size)
+int stickslip_state_size(Instance *inst, const char *function, void *state, size_t *size)
 {
-    if (!instance_allowed(inst, function, ANY_PHASE) || !is_own(inst, function, state))
+    if (!stickslip_allowed(inst, function, ANY_PHASE) || !is_own(inst, function, state))
         return 0;
     if (!size)
-        return instance_refuse(inst, function, "a null pointer for the size");
+        return stickslip_refuse(inst, function, "a null pointer for the size");
     *size = sizeof(Snapshot);
     return 1;
 }
 
-int instance_serialise(Instance *inst, const char *function, void *state, void *bytes, size_t size)
+int stickslip_serialise(Instance *inst, const char *function, void *state, void *bytes, size_t size)
 {
-    if (!instance_allowed(inst, function, ANY_PHASE) || !is_own(inst, function, state))
+    if (!stickslip_allowed(inst, function, ANY_PHASE) || !is_own(inst, function, state))
         return 0;
     if (!bytes || size < sizeof(Snapshot))
-        return instance_refuse(inst, function, "%zu bytes are needed", sizeof(Snapshot));
+        return stickslip_refuse(inst, function, "%zu bytes are needed", sizeof(Snapshot));
     Snapshot *snapshot = state;
     snapshot->checksum = checksum(&snapshot->state);
     memcpy(bytes, snapshot, sizeof *snapshot);
     return 1;
 }
 
-int instance_deserialise(Instance *inst, const char *function, const void *bytes, size_t size,
-                         void **state)
+int stickslip_deserialise(Instance *inst, const char *function, const void *bytes, size_t size,
+                          void **state)
 {
     Snapshot read;
-    if (!instance_allowed(inst, function, ANY_PHASE))
+    if (!stickslip_allowed(inst, function, ANY_PHASE))
         return 0;
     if (!bytes || size != sizeof read)
-        return instance_refuse(inst, function, "%zu bytes are not a state of this FMU", size);
+        return stickslip_refuse(inst, function, "%zu bytes are not a state of this FMU", size);
     memcpy(&read, bytes, sizeof read);
     if (!is_own(inst, function, &read))
         return 0;
     if (read.checksum != checksum(&read.state))
-        return instance_refuse(inst, function, "the serialised state is damaged");
+        return stickslip_refuse(inst, function, "the serialised state is damaged");
     Snapshot *snapshot = room_for(inst, function, state);
     if (!snapshot)
         return 0;

@@ -12,7 +12,7 @@ static int arrays_given(const Instance *inst, const char *function, size_t n, co
 {
     if (n == 0 || (a && b))
         return 1;
-    return instance_refuse(inst, function, "a null pointer for %zu variables", n);
+    return stickslip_refuse(inst, function, "a null pointer for %zu variables", n);
 }
 
 /* What may still be set in the initialization mode acts on the state it starts from. */
@@ -27,24 +27,24 @@ static int outputs_fresh(Instance *inst, const char *function)
 {
     State *s = &inst->state;
     if (s->phase == INSTANTIATED)
-        return instance_refuse(inst, function, "outputs have no value before initialisation");
+        return stickslip_refuse(inst, function, "outputs have no value before initialisation");
     if (!s->model.initialised) {
         char message[MODEL_MESSAGE_SIZE];
         Model start = s->model;
-        if (model_initialise(&start, message))
-            return instance_refuse(inst, function, "%s", message);
+        if (stickslip_model_initialise(&start, message))
+            return stickslip_refuse(inst, function, "%s", message);
         s->model = start;
     } else if (s->outputs_stale) {
-        model_outputs(&s->model);
+        stickslip_model_outputs(&s->model);
     }
     s->outputs_stale = 0;
     return 1;
 }
 
-int instance_get_reals(Instance *inst, const char *function, const uint32_t vr[], size_t n,
-                       double values[])
+int stickslip_get_reals(Instance *inst, const char *function, const uint32_t vr[], size_t n,
+                        double values[])
 {
-    if (!instance_allowed(inst, function, ANY_PHASE) ||
+    if (!stickslip_allowed(inst, function, ANY_PHASE) ||
         !arrays_given(inst, function, n, vr, values))
         return 0;
     const char *reals = (const char *)&inst->state.model.r;
@@ -55,29 +55,28 @@ int instance_get_reals(Instance *inst, const char *function, const uint32_t vr[]
             continue;
         }
         if (place >= N_REALS)
-            return instance_refuse(inst, function, "no real variable has the value reference %u",
-                                   (unsigned)vr[i]);
-        if (REAL_INFO[place].kind == KIND_OUTPUT && !outputs_fresh(inst, function))
+            return stickslip_refuse(inst, function, "no real variable has the value reference %u",
+                                    (unsigned)vr[i]);
+        if (stickslip_real_info[place].kind == KIND_OUTPUT && !outputs_fresh(inst, function))
             return 0;
         memcpy(&values[i], reals + place * sizeof(double), sizeof(double));
     }
     return 1;
 }
 
-int instance_get_integers(Instance *inst, const char *function, const uint32_t vr[], size_t n,
-                          int values[])
+int stickslip_get_integers(Instance *inst, const char *function, const uint32_t vr[], size_t n,
+                           int values[])
 {
-    if (!instance_allowed(inst, function, ANY_PHASE) ||
+    if (!stickslip_allowed(inst, function, ANY_PHASE) ||
         !arrays_given(inst, function, n, vr, values))
         return 0;
     const char *integers = (const char *)&inst->state.model.n;
     for (size_t i = 0; i < n; i++) {
         const size_t place = (size_t)vr[i] - REFERENCE_INTEGERS;
         if (place >= N_INTEGERS)
-            return instance_refuse(inst, function,
-                                   "no integer variable has the value reference %u",
-                                   (unsigned)vr[i]);
-        if (INTEGER_INFO[place].kind == KIND_OUTPUT && !outputs_fresh(inst, function))
+            return stickslip_refuse(
+                inst, function, "no integer variable has the value reference %u", (unsigned)vr[i]);
+        if (stickslip_integer_info[place].kind == KIND_OUTPUT && !outputs_fresh(inst, function))
             return 0;
         memcpy(&values[i], integers + place * sizeof(int), sizeof(int));
     }
@@ -88,14 +87,14 @@ int instance_get_integers(Instance *inst, const char *function, const uint32_t v
 static int undo(Instance *inst, const char *function, const State *before, const char *message)
 {
     inst->state = *before;
-    return instance_refuse(inst, function, "%s", message);
+    return stickslip_refuse(inst, function, "%s", message);
 }
 
-int instance_set_reals(Instance *inst, const char *function, const uint32_t vr[], size_t n,
-                       const double values[])
+int stickslip_set_reals(Instance *inst, const char *function, const uint32_t vr[], size_t n,
+                        const double values[])
 {
     char message[MODEL_MESSAGE_SIZE];
-    if (!instance_allowed(inst, function, INSTANTIATED | INITIALISING | STEPPING) ||
+    if (!stickslip_allowed(inst, function, INSTANTIATED | INITIALISING | STEPPING) ||
         !arrays_given(inst, function, n, vr, values))
         return 0;
     const State before = inst->state;
@@ -105,7 +104,7 @@ int instance_set_reals(Instance *inst, const char *function, const uint32_t vr[]
         const size_t place = (size_t)vr[i] - REFERENCE_REALS;
         if (vr[i] == REFERENCE_TIME)
             return undo(inst, function, &before, "time cannot be set");
-        if (model_set_real(&s->model, place, values[i], message))
+        if (stickslip_model_set_real(&s->model, place, values[i], message))
             return undo(inst, function, &before, message);
         if (place == PLACE(tolerance))
             s->tolerance_set = 1;
@@ -113,27 +112,27 @@ int instance_set_reals(Instance *inst, const char *function, const uint32_t vr[]
     return 1;
 }
 
-int instance_set_integers(Instance *inst, const char *function, const uint32_t vr[], size_t n,
-                          const int values[])
+int stickslip_set_integers(Instance *inst, const char *function, const uint32_t vr[], size_t n,
+                           const int values[])
 {
     char message[MODEL_MESSAGE_SIZE];
-    if (!instance_allowed(inst, function, INSTANTIATED | INITIALISING | STEPPING) ||
+    if (!stickslip_allowed(inst, function, INSTANTIATED | INITIALISING | STEPPING) ||
         !arrays_given(inst, function, n, vr, values))
         return 0;
     const State before = inst->state;
     about_to_set(&inst->state);
     for (size_t i = 0; i < n; i++)
-        if (model_set_integer(&inst->state.model, (size_t)vr[i] - REFERENCE_INTEGERS, values[i],
-                              message))
+        if (stickslip_model_set_integer(&inst->state.model, (size_t)vr[i] - REFERENCE_INTEGERS,
+                                        values[i], message))
             return undo(inst, function, &before, message);
     return 1;
 }
 
-int instance_set_slopes(Instance *inst, const char *function, const uint32_t vr[], size_t n,
-                        const int orders[], const double values[])
+int stickslip_set_slopes(Instance *inst, const char *function, const uint32_t vr[], size_t n,
+                         const int orders[], const double values[])
 {
     char message[MODEL_MESSAGE_SIZE];
-    if (!instance_allowed(inst, function, INSTANTIATED | INITIALISING | STEPPING) ||
+    if (!stickslip_allowed(inst, function, INSTANTIATED | INITIALISING | STEPPING) ||
         !arrays_given(inst, function, n, vr, values) ||
         !arrays_given(inst, function, n, vr, orders))
         return 0;
@@ -157,7 +156,7 @@ int instance_set_slopes(Instance *inst, const char *function, const uint32_t vr[
         else
             return undo(inst, function, &before,
                         "only currents, commands and normal_force can be given with a derivative");
-        if (model_set_real(&inst->state.model, slope, values[i], message))
+        if (stickslip_model_set_real(&inst->state.model, slope, values[i], message))
             return undo(inst, function, &before, message);
     }
     return 1;
@@ -166,17 +165,17 @@ int instance_set_slopes(Instance *inst, const char *function, const uint32_t vr[
 static int known_kind(const Instance *inst, const char *function, uint32_t vr, Kind kind)
 {
     const size_t place = (size_t)vr - REFERENCE_REALS;
-    if (place < N_REALS && REAL_INFO[place].kind == kind)
+    if (place < N_REALS && stickslip_real_info[place].kind == kind)
         return 1;
-    return instance_refuse(inst, function, "the value reference %u is not a real %s", (unsigned)vr,
-                           kind == KIND_OUTPUT ? "output" : "input");
+    return stickslip_refuse(inst, function, "the value reference %u is not a real %s", (unsigned)vr,
+                            kind == KIND_OUTPUT ? "output" : "input");
 }
 
-int instance_derivative(Instance *inst, const char *function, const uint32_t unknowns[],
-                        size_t n_unknowns, const uint32_t knowns[], size_t n_knowns,
-                        const double seed[], double sensitivity[])
+int stickslip_derivative(Instance *inst, const char *function, const uint32_t unknowns[],
+                         size_t n_unknowns, const uint32_t knowns[], size_t n_knowns,
+                         const double seed[], double sensitivity[])
 {
-    if (!instance_allowed(inst, function, INITIALISING | STEPPING) ||
+    if (!stickslip_allowed(inst, function, INITIALISING | STEPPING) ||
         !arrays_given(inst, function, n_unknowns, unknowns, sensitivity) ||
         !arrays_given(inst, function, n_knowns, knowns, seed))
         return 0;
@@ -187,16 +186,16 @@ int instance_derivative(Instance *inst, const char *function, const uint32_t unk
         if (!known_kind(inst, function, knowns[j], KIND_INPUT))
             return 0;
         if (!isfinite(seed[j]))
-            return instance_refuse(inst, function, "the seed must be finite");
+            return stickslip_refuse(inst, function, "the seed must be finite");
     }
     if (!outputs_fresh(inst, function))
         return 0;
     for (size_t i = 0; i < n_unknowns; i++) {
         sensitivity[i] = 0.0;
         for (size_t j = 0; j < n_knowns; j++)
-            sensitivity[i] += seed[j] * model_derivative(&inst->state.model,
-                                                         unknowns[i] - REFERENCE_REALS,
-                                                         knowns[j] - REFERENCE_REALS);
+            sensitivity[i] += seed[j] * stickslip_model_derivative(&inst->state.model,
+                                                                   unknowns[i] - REFERENCE_REALS,
+                                                                   knowns[j] - REFERENCE_REALS);
     }
     return 1;
 }

@@ -19,14 +19,14 @@ typedef struct {
 
 static void evaluate(const Model *m, Point *point)
 {
-    state_rates(m, m->mode, point->y, point->tau, point->dy);
-    point->n = event_functions(m, point->y, point->tau, point->functions);
+    stickslip_state_rates(m, m->mode, point->y, point->tau, point->dy);
+    point->n = stickslip_event_functions(m, point->y, point->tau, point->functions);
 }
 
 /* The point that one whole Runge-Kutta step of length h reaches from start. */
 static double try_step(const Model *m, const Point *start, double h, Point *end)
 {
-    double error = trial_step(m, start->tau, h, start->y, start->dy, end->y, end->dy);
+    double error = stickslip_trial_step(m, start->tau, h, start->y, start->dy, end->y, end->dy);
     end->tau = start->tau + h;
     return error;
 }
@@ -34,7 +34,7 @@ static double try_step(const Model *m, const Point *start, double h, Point *end)
 static void try_with_functions(const Model *m, const Point *start, double h, Point *end)
 {
     try_step(m, start, h, end);
-    end->n = event_functions(m, end->y, end->tau, end->functions);
+    end->n = stickslip_event_functions(m, end->y, end->tau, end->functions);
 }
 
 /* Root of function (or, with use_rate, zero of its rate) for step lengths in [low, high], whose
@@ -181,14 +181,14 @@ static void set_surface(Model *m)
         m->y[W] -= jump;
 }
 
-int advance(Model *m, double h, char *message)
+int stickslip_advance(Model *m, double h, char *message)
 {
     Point now, end;
     int events = 0;
 
     if (m->n.prescribed)
         set_surface(m);
-    settle_mode(m, 0.0);
+    stickslip_settle_mode(m, 0.0);
     start_from(m, 0.0, &now);
     m->r.a_surface_max = m->r.a_surface_min = now.dy[V];
     m->r.v_surface_max = m->r.v_surface_min = now.y[V];
@@ -215,7 +215,7 @@ int advance(Model *m, double h, char *message)
         double error = try_step(m, &now, wanted, &end);
         if (!(error <= 1.0) && wanted > STEP_MIN) {
             m->n.internal_rejected++;
-            m->step = wanted * step_factor(error);
+            m->step = wanted * stickslip_step_factor(error);
             continue;
         }
         if (!(error < 1e30)) {
@@ -226,7 +226,7 @@ int advance(Model *m, double h, char *message)
         }
         if (last)
             end.tau = h;
-        end.n = event_functions(m, end.y, end.tau, end.functions);
+        end.n = stickslip_event_functions(m, end.y, end.tau, end.functions);
 
         int which = -1;
         double found = first_event(m, &now, &end, &which);
@@ -238,7 +238,7 @@ int advance(Model *m, double h, char *message)
             else
                 end = now;
         } else {
-            double next = wanted * step_factor(error);
+            double next = wanted * stickslip_step_factor(error);
             if (!last || next > m->step)
                 m->step = next;
         }
@@ -248,7 +248,8 @@ int advance(Model *m, double h, char *message)
         take_up(m, &end);
         if (found >= 0.0) {
             events++;
-            apply_event(m, now.functions[which].surface, end.tau, now.functions[which].kind);
+            stickslip_apply_event(m, now.functions[which].surface, end.tau,
+                                  now.functions[which].kind);
             start_from(m, end.tau, &now);
             note_extremes(m, &now);
         } else {

@@ -46,8 +46,8 @@ static int functions_of(const Model *m, const double all[N_ALL], int s, double t
     const double *y = all + s * N_STATES;
     Forces f;
     ForceRates rate;
-    forces(m, m->mode, all, s, tau, &f);
-    force_rates(m, m->mode, all, s, tau, &f, &rate);
+    stickslip_forces(m, m->mode, all, s, tau, &f);
+    stickslip_force_rates(m, m->mode, all, s, tau, &f, &rate);
 
     const double length = 1e-15 * p->travel, force = force_noise(&f);
     const double speed = 1e-16;
@@ -92,12 +92,12 @@ static int functions_of(const Model *m, const double all[N_ALL], int s, double t
     }
 #undef ADD
     if (m->n.source)
-        n = source_events(m, y, s, tau, back_emf_slope(m, y, f.a_q), functions, n);
+        n = stickslip_source_events(m, y, s, tau, back_emf_slope(m, y, f.a_q), functions, n);
     return n;
 }
 
-int event_functions(const Model *m, const double y[N_ALL], double tau,
-                    EventFunction functions[MAX_EVENT_FUNCTIONS])
+int stickslip_event_functions(const Model *m, const double y[N_ALL], double tau,
+                              EventFunction functions[MAX_EVENT_FUNCTIONS])
 {
     int n = 0;
     for (int s = 0; s < moving(m); s++)
@@ -138,7 +138,8 @@ static void stop_ram(Model *m, int s)
         jump_to(m, s, 0.0);
         return;
     }
-    const double ram = m->r.ram_mass, body = m->r.surface_mass + carried_mass(m, m->mode, s);
+    const double ram = m->r.ram_mass,
+                 body = m->r.surface_mass + stickslip_carried_mass(m, m->mode, s);
     const int held = m->mode[s].plate == 0 && plate_acts(m); /* then nothing moves but the ram */
     const double share = held ? 0.0 : ram / (ram + body);
     const double loss = m->n.ram_fixed ? body : ram * (1.0 - share);
@@ -157,7 +158,7 @@ static double pressing(const Model *m, int s, double tau, int side)
     Mode free[N_MOVING] = {m->mode[0], m->mode[1]};
     Forces f;
     free[s].wall = WALL_FREE;
-    forces(m, free, m->y, s, tau, &f);
+    stickslip_forces(m, free, m->y, s, tau, &f);
     return side * f.a_q;
 }
 
@@ -277,14 +278,14 @@ static int consistent(const Model *m, int s, double tau, int slip, int second, d
         mode[1 - s].slip = second;
     else
         mode[s].plate = second;
-    forces(m, mode, m->y, s, tau, &f);
+    stickslip_forces(m, mode, m->y, s, tau, &f);
 
     if (slip == 0 && second == 0 && m->n.prescribed && f.a_surface != 0.0)
         return 0; /* the surface moves off, and takes the part from the plate or leaves it */
     if (!slips_so(m, mode, s, &f, slack))
         return 0;
     if (m->n.independent) {
-        forces(m, mode, m->y, 1 - s, tau, &f);
+        stickslip_forces(m, mode, m->y, 1 - s, tau, &f);
         return slips_so(m, mode, 1 - s, &f, slack);
     }
     if (!plate_acts(m))
@@ -362,13 +363,13 @@ static void settle(Model *m, int s, double tau, int keep)
             break;
     }
     for (int k = 0; k < moving(m); k++)
-        source_settle_output(m, k, tau);
+        stickslip_source_settle_output(m, k, tau);
 }
 
-void settle_mode(Model *m, double tau)
+void stickslip_settle_mode(Model *m, double tau)
 {
     for (int k = 0; k < moving(m); k++)
-        source_settle_command(m, k, tau);
+        stickslip_source_settle_command(m, k, tau);
     settle(m, 0, tau, 1);
 }
 
@@ -383,7 +384,7 @@ static void end_slip_of_both(Model *m, int s)
     shove(m, s, w);
 }
 
-void apply_event(Model *m, int s, double tau, EventKind kind)
+void stickslip_apply_event(Model *m, int s, double tau, EventKind kind)
 {
     double *y = m->y + s * N_STATES;
     const Mode before = m->mode[s];
@@ -401,13 +402,13 @@ void apply_event(Model *m, int s, double tau, EventKind kind)
         settle_friction(m, s, tau, 1);
         return;
     case EVENT_WALL_PARTING:
-        /* While parted, E_IMPACT counts all that the spring holds as lost; model_outputs takes off
+        /* While parted, E_IMPACT counts all that the spring holds as lost; the outputs take off
          * what it still holds. */
         if (m->mode[s].wall == WALL_TOUCH) {
             m->mode[s].wall = WALL_PARTING;
-            y[E_IMPACT] += wall_energy(m, m->mode + s, y);
+            y[E_IMPACT] += stickslip_wall_energy(m, m->mode + s, y);
         } else {
-            y[E_IMPACT] -= wall_energy(m, m->mode + s, y);
+            y[E_IMPACT] -= stickslip_wall_energy(m, m->mode + s, y);
             m->mode[s].wall = WALL_TOUCH;
         }
         break;
@@ -444,7 +445,7 @@ void apply_event(Model *m, int s, double tau, EventKind kind)
     case EVENT_CURRENT_MET:
     case EVENT_OUTPUT_HIGH:
     case EVENT_OUTPUT_LOW:
-        source_apply(m, s, tau, kind);
+        stickslip_source_apply(m, s, tau, kind);
         return;
     case N_EVENTS:
         break;

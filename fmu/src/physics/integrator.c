@@ -35,7 +35,7 @@ static inline double step_of(const int n, const Model *m, double tau, double h,
         }
         for (int j = 0; j < n; j++)
             y1[j] = y0[j] + h * sum[j];
-        state_rates(m, m->mode, y1, tau + C[s] * h, k[s + 1]);
+        stickslip_state_rates(m, m->mode, y1, tau + C[s] * h, k[s + 1]);
     }
     for (int j = 0; j < n; j++)
         dy1[j] = k[6][j];
@@ -58,8 +58,8 @@ static inline double step_of(const int n, const Model *m, double tau, double h,
     return worst;
 }
 
-double trial_step(const Model *m, double tau, double h, const double y0[N_ALL],
-                  const double dy0[N_ALL], double y1[N_ALL], double dy1[N_ALL])
+double stickslip_trial_step(const Model *m, double tau, double h, const double y0[N_ALL],
+                            const double dy0[N_ALL], double y1[N_ALL], double dy1[N_ALL])
 {
     if (moving(m) > 1)
         return step_of(N_ALL, m, tau, h, y0, dy0, y1, dy1);
@@ -72,7 +72,7 @@ double trial_step(const Model *m, double tau, double h, const double y0[N_ALL],
     return step_of(I_COIL, m, tau, h, y0, dy0, y1, dy1);
 }
 
-double step_factor(double error)
+double stickslip_step_factor(double error)
 {
     /* The fifth root belongs here. Square roots are exact on every platform where pow is not, and
      * the fourth root below 1 and the eighth above err on the safe side. */

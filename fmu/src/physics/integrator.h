@@ -3,15 +3,20 @@
 #ifndef STICKSLIP_INTEGRATOR_H
 #define STICKSLIP_INTEGRATOR_H
 
+#include "internal.h"
 #include "state.h"
+
+STICKSLIP_INTERNAL_BEGIN
 
 /* Step from y0 (time tau, rates dy0) over h in the model's present mode, to y1 with rates dy1.
  * Returns the local error over the model's tolerance: accept up to 1. NaN or infinity where the
  * trial left the range of numbers. */
-double trial_step(const Model *m, double tau, double h, const double y0[N_ALL],
-                  const double dy0[N_ALL], double y1[N_ALL], double dy1[N_ALL]);
+double stickslip_trial_step(const Model *m, double tau, double h, const double y0[N_ALL],
+                            const double dy0[N_ALL], double y1[N_ALL], double dy1[N_ALL]);
 
 /* The factor by which the next step may differ, for an error as trial_step returns it. */
-double step_factor(double error);
+double stickslip_step_factor(double error);
+
+STICKSLIP_INTERNAL_END
 
 #endif

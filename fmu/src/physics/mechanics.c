@@ -5,15 +5,15 @@
 #include "coil.h"
 #include "source.h"
 
-double part_mass_per_surface(const Model *m)
+double stickslip_part_mass_per_surface(const Model *m)
 {
     return m->r.part_mass / m->n.n_surfaces;
 }
 
-double rest_height(const Model *m)
+double stickslip_rest_height(const Model *m)
 {
     const double ram = m->n.ram_fixed ? 0.0 : m->r.ram_mass;
-    return -(ram + m->r.surface_mass + part_mass_per_surface(m)) * m->r.gravity /
+    return -(ram + m->r.surface_mass + stickslip_part_mass_per_surface(m)) * m->r.gravity /
            m->r.flexure_stiffness;
 }
 
@@ -39,7 +39,7 @@ static double normal_force_at(const Model *m, double tau)
 static void forces_on_part(const Model *m, const Mode *mode, double tau, double a_surface, Forces *f)
 {
     const Reals *p = &m->r;
-    const double part = part_mass_per_surface(m), weight = part * p->gravity;
+    const double part = stickslip_part_mass_per_surface(m), weight = part * p->gravity;
     const int held = held_by_plate(m, mode);
 
     f->a_surface = a_surface;
@@ -100,7 +100,7 @@ static inline void load_on(const Model *m, const Mode *mode, const double y[N_ST
     const double q = y[Q], u = y[U];
     const int rest = mode->wall == WALL_REST;
     l->suspension = suspension_force(m, q, u);
-    l->drive = force_factor_at(m, q) * coil_current(m, y, s, tau);
+    l->drive = force_factor_at(m, q) * stickslip_coil_current(m, y, s, tau);
     l->wall = 0.0;
     if (mode->wall == WALL_TOUCH) {
         double depth = penetration(m, mode, y);
@@ -113,10 +113,10 @@ static inline void load_on(const Model *m, const Mode *mode, const double y[N_ST
               (rest ? 0.0 : on_ram);
 }
 
-double carried_mass(const Model *m, const Mode mode[N_MOVING], int s)
+double stickslip_carried_mass(const Model *m, const Mode mode[N_MOVING], int s)
 {
     if (!m->n.independent)
-        return part_mass_per_surface(m);
+        return stickslip_part_mass_per_surface(m);
     const Mode *other = &mode[1 - s];
     if (other->slip != 0)
         return m->r.part_mass;
@@ -136,8 +136,8 @@ static double lift_on(const Model *m, const Mode mode[N_MOVING], const double y[
     return l.load + l.body * m->r.gravity;
 }
 
-void forces(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL], int s, double tau,
-            Forces *f)
+void stickslip_forces(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL], int s,
+                      double tau, Forces *f)
 {
     if (m->n.prescribed) {
         forces_on_part(m, modes, tau, m->r.surface_acceleration, f);
@@ -149,7 +149,7 @@ void forces(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL],
 
     if (mode->wall == WALL_REST && m->n.ram_fixed) {
         forces_on_part(m, mode, tau, 0.0, f);
-        f->drive = force_factor_at(m, y[Q]) * coil_current(m, y, s, tau);
+        f->drive = force_factor_at(m, y[Q]) * stickslip_coil_current(m, y, s, tau);
         f->wall = -p->flexure_stiffness * y[Z] - p->surface_mass * p->gravity - f->friction -
                   f->drive - suspension_force(m, y[Q], y[U]);
         return;
@@ -159,7 +159,7 @@ void forces(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL],
     f->drive = l.drive;
     f->wall = l.wall;
     f->normal = normal_force_at(m, tau);
-    const double part = carried_mass(m, modes, s), body = l.body;
+    const double part = stickslip_carried_mass(m, modes, s), body = l.body;
     const double lift = m->n.independent ? lift_on(m, modes, all, s, tau, f->normal) : 0.0;
     const int held = held_by_plate(m, mode);
 
@@ -200,8 +200,8 @@ static double ram_rate(const Model *m, const Mode *mode, const double y[N_STATES
 {
     const Reals *p = &m->r;
     const double q = y[Q], u = y[U];
-    return force_factor_rate(m, q, u) * coil_current(m, y, s, tau) +
-           force_factor_at(m, q) * coil_current_rate(m, mode, y, s) -
+    return force_factor_rate(m, q, u) * stickslip_coil_current(m, y, s, tau) +
+           force_factor_at(m, q) * stickslip_coil_current_rate(m, mode, y, s) -
            (p->suspension_k1 + q * (2.0 * p->suspension_k2 + q * 3.0 * p->suspension_k3)) * u -
            p->suspension_damping * f->a_q;
 }
@@ -231,13 +231,13 @@ static double lift_rate(const Model *m, const Mode mode[N_MOVING], const double 
     const double *own = y + other * N_STATES;
     Forces f;
     double wall;
-    forces(m, mode, y, other, tau, &f);
+    stickslip_forces(m, mode, y, other, tau, &f);
     return load_rate(m, &mode[other], own, &f, ram_rate(m, &mode[other], own, other, tau, &f),
                      &wall);
 }
 
-void force_rates(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL], int s,
-                 double tau, const Forces *f, ForceRates *rate)
+void stickslip_force_rates(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL],
+                           int s, double tau, const Forces *f, ForceRates *rate)
 {
     if (m->n.prescribed) {
         rates_on_part(m, modes, f, rate);
@@ -246,7 +246,7 @@ void force_rates(const Model *m, const Mode modes[N_MOVING], const double all[N_
     const Reals *p = &m->r;
     const Mode *mode = modes + s;
     const double *y = all + s * N_STATES;
-    const double part = carried_mass(m, modes, s);
+    const double part = stickslip_carried_mass(m, modes, s);
     const int rest = mode->wall == WALL_REST;
     const int held = held_by_plate(m, mode);
 
@@ -282,8 +282,8 @@ void force_rates(const Model *m, const Mode modes[N_MOVING], const double all[N_
         rate->wall = p->ram_mass * jerk - own;
 }
 
-void state_rates(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL], double tau,
-                 double rates[N_ALL])
+void stickslip_state_rates(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL],
+                           double tau, double rates[N_ALL])
 {
     const Reals *p = &m->r;
     for (int s = 0; s < moving(m); s++) {
@@ -291,7 +291,7 @@ void state_rates(const Model *m, const Mode modes[N_MOVING], const double all[N_
         const double *y = all + s * N_STATES;
         double *dy = rates + s * N_STATES;
         Forces f;
-        forces(m, modes, all, s, tau, &f);
+        stickslip_forces(m, modes, all, s, tau, &f);
         dy[Z] = y[V];
         dy[V] = f.a_surface;
         dy[Q] = y[U];
@@ -303,7 +303,7 @@ void state_rates(const Model *m, const Mode modes[N_MOVING], const double all[N_
         dy[E_DAMPING] = m->n.prescribed ? 0.0
                                         : p->flexure_damping * y[V] * y[V] +
                                               p->suspension_damping * y[U] * y[U];
-        source_rates(m, mode, y, s, dy);
+        stickslip_source_rates(m, mode, y, s, dy);
         dy[E_IMPACT] = 0.0;
         if (mode->wall == WALL_TOUCH) {
             /* What the wall takes, less what its spring stores. */
@@ -314,7 +314,7 @@ void state_rates(const Model *m, const Mode modes[N_MOVING], const double all[N_
     }
 }
 
-double wall_energy(const Model *m, const Mode *mode, const double y[N_STATES])
+double stickslip_wall_energy(const Model *m, const Mode *mode, const double y[N_STATES])
 {
     if (mode->wall != WALL_TOUCH && mode->wall != WALL_PARTING)
         return 0.0;
@@ -338,13 +338,13 @@ static double energy_of_surface(const Model *m, const Mode *mode, const double y
     double springs = 0.5 * p->flexure_stiffness * y[Z] * y[Z] +
                      q * q * (p->suspension_k1 / 2.0 +
                               q * (p->suspension_k2 / 3.0 + q * p->suspension_k3 / 4.0));
-    return kinetic + weight + springs + wall_energy(m, mode, y);
+    return kinetic + weight + springs + stickslip_wall_energy(m, mode, y);
 }
 
-double energy_stored(const Model *m, const double y[N_ALL])
+double stickslip_energy_stored(const Model *m, const double y[N_ALL])
 {
     if (!m->n.independent)
-        return energy_of_surface(m, m->mode, y, part_mass_per_surface(m));
+        return energy_of_surface(m, m->mode, y, stickslip_part_mass_per_surface(m));
     return energy_of_surface(m, m->mode, y, m->r.part_mass) +
            energy_of_surface(m, m->mode + 1, y + N_STATES, 0.0);
 }

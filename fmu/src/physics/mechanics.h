@@ -2,7 +2,10 @@
 #ifndef STICKSLIP_MECHANICS_H
 #define STICKSLIP_MECHANICS_H
 
+#include "internal.h"
 #include "state.h"
+
+STICKSLIP_INTERNAL_BEGIN
 
 typedef struct {
     double a_surface, a_q, a_slip; /* d2 z_s/dt2, d2 q/dt2, dw/dt, m/s2 */
@@ -18,24 +21,26 @@ typedef struct {
 
 /* For surface s, of the modes and states of all that move. tau is the time since the inputs were
  * brought up to date (the start of the step), s. */
-void forces(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], int s, double tau,
-            Forces *f);
-void force_rates(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], int s,
-                 double tau, const Forces *f, ForceRates *rate);
+void stickslip_forces(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], int s,
+                      double tau, Forces *f);
+void stickslip_force_rates(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], int s,
+                           double tau, const Forces *f, ForceRates *rate);
 /* Mass that moves with surface s while the part sticks to it, without the surface and its ram, kg. */
-double carried_mass(const Model *m, const Mode mode[N_MOVING], int s);
+double stickslip_carried_mass(const Model *m, const Mode mode[N_MOVING], int s);
 
 /* For all surfaces that move. */
-void state_rates(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], double tau,
-                 double dy[N_ALL]);
-double energy_stored(const Model *m, const double y[N_ALL]);
+void stickslip_state_rates(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL],
+                           double tau, double dy[N_ALL]);
+double stickslip_energy_stored(const Model *m, const double y[N_ALL]);
 
 /* For one surface, of its own mode and states. */
 
-double part_mass_per_surface(const Model *m);
+double stickslip_part_mass_per_surface(const Model *m);
 /* Height of the surface at rest, under the weight of all that it carries, m. */
-double rest_height(const Model *m);
+double stickslip_rest_height(const Model *m);
 /* What the spring of a touched compliant wall holds, J. */
-double wall_energy(const Model *m, const Mode *mode, const double y[N_STATES]);
+double stickslip_wall_energy(const Model *m, const Mode *mode, const double y[N_STATES]);
+
+STICKSLIP_INTERNAL_END
 
 #endif

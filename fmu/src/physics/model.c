@@ -15,7 +15,7 @@
 #define OUTPUT(name, unit, text) {#name, unit, text, KIND_OUTPUT, 0.0, 0.0, 0.0},
 #define INT_PARAMETER(name, start, min, max, text)
 #define INT_OUTPUT(name, text)
-const VariableInfo REAL_INFO[N_REALS] = {
+const VariableInfo stickslip_real_info[N_REALS] = {
 #include "variables.def"
 };
 #undef PARAMETER
@@ -29,7 +29,7 @@ const VariableInfo REAL_INFO[N_REALS] = {
 #define OUTPUT(name, unit, text)
 #define INT_PARAMETER(name, start, min, max, text) {#name, "1", text, KIND_PARAMETER, start, min, max},
 #define INT_OUTPUT(name, text) {#name, "1", text, KIND_OUTPUT, 0.0, 0.0, 0.0},
-const VariableInfo INTEGER_INFO[N_INTEGERS] = {
+const VariableInfo stickslip_integer_info[N_INTEGERS] = {
 #include "variables.def"
 };
 
@@ -42,13 +42,13 @@ static int say(char *message, const char *sentence)
     return -1;
 }
 
-void model_defaults(Model *m)
+void stickslip_model_defaults(Model *m)
 {
     memset(m, 0, sizeof *m);
     for (size_t i = 0; i < N_REALS; i++)
-        ((double *)&m->r)[i] = REAL_INFO[i].start;
+        ((double *)&m->r)[i] = stickslip_real_info[i].start;
     for (size_t i = 0; i < N_INTEGERS; i++)
-        ((int *)&m->n)[i] = (int)INTEGER_INFO[i].start;
+        ((int *)&m->n)[i] = (int)stickslip_integer_info[i].start;
 }
 
 static int check(const Model *m, const VariableInfo *info, double value, char *message)
@@ -66,21 +66,21 @@ static int check(const Model *m, const VariableInfo *info, double value, char *m
     return 0;
 }
 
-int model_set_real(Model *m, size_t place, double value, char *message)
+int stickslip_model_set_real(Model *m, size_t place, double value, char *message)
 {
     if (place >= N_REALS)
         return say(message, "no real variable has this value reference");
-    if (check(m, &REAL_INFO[place], value, message))
+    if (check(m, &stickslip_real_info[place], value, message))
         return -1;
     ((double *)&m->r)[place] = value;
     return 0;
 }
 
-int model_set_integer(Model *m, size_t place, int value, char *message)
+int stickslip_model_set_integer(Model *m, size_t place, int value, char *message)
 {
     if (place >= N_INTEGERS)
         return say(message, "no integer variable has this value reference");
-    if (check(m, &INTEGER_INFO[place], value, message))
+    if (check(m, &stickslip_integer_info[place], value, message))
         return -1;
     ((int *)&m->n)[place] = value;
     return 0;
@@ -122,7 +122,7 @@ static void hang_ram(Model *m)
     m->y[Q] = fabs(ram_balance(m, low)) < fabs(ram_balance(m, high)) ? low : high;
 }
 
-int model_initialise(Model *m, char *message)
+int stickslip_model_initialise(Model *m, char *message)
 {
     if (m->r.mu_k > m->r.mu_s) {
         snprintf(message, MODEL_MESSAGE_SIZE, "mu_k = %g is larger than mu_s = %g", m->r.mu_k,
@@ -142,28 +142,28 @@ int model_initialise(Model *m, char *message)
     } else {
         if (!m->n.ram_fixed)
             hang_ram(m);
-        m->y[Z] = rest_height(m);
+        m->y[Z] = stickslip_rest_height(m);
     }
     m->mode[1] = m->mode[0];
     memcpy(m->y + N_STATES, m->y, N_STATES * sizeof *m->y);
     if (!isfinite(m->y[Q]))
         return say(message, "the ram has no static equilibrium: the suspension is too weak");
     m->step = 1e-6;
-    m->energy_at_start = energy_stored(m, m->y);
-    settle_mode(m, 0.0);
+    m->energy_at_start = stickslip_energy_stored(m, m->y);
+    stickslip_settle_mode(m, 0.0);
     m->r.stick_time = m->r.stick_time_2 = 0.0;
     m->r.output_high_time = m->r.output_low_time = m->r.current_limit_time = 0.0;
     m->r.coil_current_max = m->r.coil_current_min = 0.0;
     m->n.impacts = m->n.stick_slip_events = m->n.internal_steps = m->n.internal_rejected = 0;
     m->initialised = 1;
-    model_outputs(m);
+    stickslip_model_outputs(m);
     m->r.a_surface_max = m->r.a_surface_min = m->r.a_surface;
     m->r.v_surface_max = m->r.v_surface_min = m->r.v_surface;
     m->r.z_surface_max = m->r.z_surface_min = m->r.z_surface;
     return 0;
 }
 
-int model_step(Model *m, double h, char *message)
+int stickslip_model_step(Model *m, double h, char *message)
 {
     if (!m->initialised)
         return say(message, "a step before initialisation");
@@ -173,7 +173,7 @@ int model_step(Model *m, double h, char *message)
     const double normal = m->r.normal_force + m->r.normal_force_slope * h;
     if (normal < -1e-12 * m->r.normal_force)
         return say(message, "normal_force falls below 0 N within the step; its slope is too steep");
-    if (advance(m, h, message))
+    if (stickslip_advance(m, h, message))
         return -1;
     m->r.current = current;
     m->r.command += m->r.command_slope * h;
@@ -195,7 +195,7 @@ static void outputs_of_second(Model *m)
     Forces f;
     const double *y = m->y + N_STATES;
     Reals *r = &m->r;
-    forces(m, m->mode, m->y, 1, 0.0, &f);
+    stickslip_forces(m, m->mode, m->y, 1, 0.0, &f);
     r->z_surface_2 = y[Z];
     r->v_surface_2 = y[V];
     r->a_surface_2 = f.a_surface;
@@ -204,23 +204,23 @@ static void outputs_of_second(Model *m)
     r->back_emf_2 = force_factor_at(m, y[Q]) * y[U];
     r->friction_force_2 = f.friction;
     r->coil_current_2 = y[I_COIL];
-    r->coil_voltage_2 = m->n.source ? coil_voltage(m, m->mode + 1, y, 1) : 0.0;
-    r->energy_magnetic += magnetic_energy(m, y);
+    r->coil_voltage_2 = m->n.source ? stickslip_coil_voltage(m, m->mode + 1, y, 1) : 0.0;
+    r->energy_magnetic += stickslip_magnetic_energy(m, y);
     if (m->mode[1].wall == WALL_PARTING)
-        r->energy_impact -= wall_energy(m, m->mode + 1, y);
+        r->energy_impact -= stickslip_wall_energy(m, m->mode + 1, y);
     m->n.sticking_2 = m->mode[1].slip == 0;
 }
 
-void model_outputs(Model *m)
+void stickslip_model_outputs(Model *m)
 {
     Forces f;
     const double *y = m->y;
     Reals *r = &m->r;
-    forces(m, m->mode, y, 0, 0.0, &f);
+    stickslip_forces(m, m->mode, y, 0, 0.0, &f);
     r->z_surface = y[Z];
     r->v_surface = y[V];
     r->a_surface = f.a_surface;
-    r->z_ram = m->n.ram_fixed && !m->n.prescribed ? rest_height(m) : y[Z] + y[Q];
+    r->z_ram = m->n.ram_fixed && !m->n.prescribed ? stickslip_rest_height(m) : y[Z] + y[Q];
     r->v_ram = y[V] + y[U];
     r->a_ram = f.a_surface + f.a_q;
     r->z_part = y[Z] + y[D];
@@ -238,14 +238,14 @@ void model_outputs(Model *m)
     r->energy_friction = sum_of(m, E_FRICTION);
     r->energy_impact = sum_of(m, E_IMPACT);
     if (m->mode[0].wall == WALL_PARTING)
-        r->energy_impact -= wall_energy(m, m->mode, y);
+        r->energy_impact -= stickslip_wall_energy(m, m->mode, y);
     r->energy_damping = sum_of(m, E_DAMPING);
-    r->energy_stored = energy_stored(m, y) - m->energy_at_start;
+    r->energy_stored = stickslip_energy_stored(m, y) - m->energy_at_start;
     r->coil_current = y[I_COIL];
-    r->coil_voltage = m->n.source ? coil_voltage(m, m->mode, y, 0) : 0.0;
+    r->coil_voltage = m->n.source ? stickslip_coil_voltage(m, m->mode, y, 0) : 0.0;
     r->energy_output = sum_of(m, E_OUTPUT);
     r->energy_copper = sum_of(m, E_COPPER);
-    r->energy_magnetic = magnetic_energy(m, y);
+    r->energy_magnetic = stickslip_magnetic_energy(m, y);
     m->n.output_clamped = m->mode[0].output;
     m->n.command_limited = m->mode[0].limited;
     m->n.sticking = m->mode[0].slip == 0;
@@ -254,7 +254,7 @@ void model_outputs(Model *m)
         outputs_of_second(m);
 }
 
-double model_derivative(const Model *m, size_t output, size_t input)
+double stickslip_model_derivative(const Model *m, size_t output, size_t input)
 {
     Model a = *m;
     double *inputs[] = {&a.r.current, &a.r.current_2, &a.r.normal_force,
@@ -267,21 +267,21 @@ double model_derivative(const Model *m, size_t output, size_t input)
 
     if (output == offsetof(Reals, coil_voltage) / sizeof(double) &&
         input == offsetof(Reals, command_slope) / sizeof(double))
-        return coil_voltage_per_slope(m, 0);
+        return stickslip_coil_voltage_per_slope(m, 0);
     if (output == offsetof(Reals, coil_voltage_2) / sizeof(double) &&
         input == offsetof(Reals, command_2_slope) / sizeof(double))
-        return m->n.independent ? coil_voltage_per_slope(m, 1) : 0.0;
+        return m->n.independent ? stickslip_coil_voltage_per_slope(m, 1) : 0.0;
     for (int i = 0; i < 4; i++) {
         if (input != places[i])
             continue;
         *inputs[i] = 0.0;
-        forces(&a, a.mode, a.y, 0, 0.0, &low);
+        stickslip_forces(&a, a.mode, a.y, 0, 0.0, &low);
         if (m->n.independent)
-            forces(&a, a.mode, a.y, 1, 0.0, &low_2);
+            stickslip_forces(&a, a.mode, a.y, 1, 0.0, &low_2);
         *inputs[i] = 1.0;
-        forces(&a, a.mode, a.y, 0, 0.0, &high);
+        stickslip_forces(&a, a.mode, a.y, 0, 0.0, &high);
         if (m->n.independent)
-            forces(&a, a.mode, a.y, 1, 0.0, &high_2);
+            stickslip_forces(&a, a.mode, a.y, 1, 0.0, &high_2);
         switch (output) {
 #define PLACE(name) offsetof(Reals, name) / sizeof(double)
         case PLACE(a_surface):

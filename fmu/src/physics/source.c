@@ -71,14 +71,15 @@ static double output_limit(const Model *m, int side)
     return side > 0 ? m->r.output_high : m->r.output_low;
 }
 
-double coil_current(const Model *m, const double y[N_STATES], int s, double tau)
+double stickslip_coil_current(const Model *m, const double y[N_STATES], int s, double tau)
 {
     if (m->n.source)
         return y[I_COIL];
     return s ? m->r.current_2 + m->r.current_2_slope * tau : m->r.current + m->r.current_slope * tau;
 }
 
-double coil_current_rate(const Model *m, const Mode *mode, const double y[N_STATES], int s)
+double stickslip_coil_current_rate(const Model *m, const Mode *mode, const double y[N_STATES],
+                                   int s)
 {
     if (!m->n.source)
         return s ? m->r.current_2_slope : m->r.current_slope;
@@ -87,15 +88,15 @@ double coil_current_rate(const Model *m, const Mode *mode, const double y[N_STAT
     return (output_limit(m, mode->output) - output_at_rest(m, y)) / m->r.inductance;
 }
 
-double coil_voltage(const Model *m, const Mode *mode, const double y[N_STATES], int s)
+double stickslip_coil_voltage(const Model *m, const Mode *mode, const double y[N_STATES], int s)
 {
     const double output =
         mode->output ? output_limit(m, mode->output) : needed(m, mode, y, s);
     return output - m->n.coil_count * m->r.sense_resistance * y[I_COIL];
 }
 
-void source_rates(const Model *m, const Mode *mode, const double y[N_STATES], int s,
-                  double dy[N_STATES])
+void stickslip_source_rates(const Model *m, const Mode *mode, const double y[N_STATES], int s,
+                            double dy[N_STATES])
 {
     dy[I_COIL] = dy[I_EDDY] = dy[E_OUTPUT] = dy[E_COPPER] = 0.0;
     if (!m->n.source)
@@ -103,15 +104,15 @@ void source_rates(const Model *m, const Mode *mode, const double y[N_STATES], in
     const double i = y[I_COIL], eddy = eddy_voltage(m, y);
     const double output =
         mode->output ? output_limit(m, mode->output) : needed(m, mode, y, s);
-    dy[I_COIL] = coil_current_rate(m, mode, y, s);
+    dy[I_COIL] = stickslip_coil_current_rate(m, mode, y, s);
     if (has_eddy(m))
         dy[I_EDDY] = eddy / m->r.eddy_inductance;
     dy[E_OUTPUT] = output * i;
     dy[E_COPPER] = loop_resistance(m) * i * i + eddy * (i - y[I_EDDY]);
 }
 
-int source_events(const Model *m, const double y[N_STATES], int s, double tau, double emf_rate,
-                  EventFunction functions[MAX_EVENT_FUNCTIONS], int n)
+int stickslip_source_events(const Model *m, const double y[N_STATES], int s, double tau,
+                            double emf_rate, EventFunction functions[MAX_EVENT_FUNCTIONS], int n)
 {
     const Mode *mode = m->mode + s;
     const double limit = limit_of_coil(m), asked = commanded(m, s, tau), slope = commanded_rate(m, s);
@@ -125,7 +126,7 @@ int source_events(const Model *m, const double y[N_STATES], int s, double tau, d
         ADD(EVENT_COMMAND_HIGH, limit - asked, -slope, amperes);
         ADD(EVENT_COMMAND_LOW, limit + asked, slope, amperes);
     }
-    const double rate = coil_current_rate(m, mode, y, s);
+    const double rate = stickslip_coil_current_rate(m, mode, y, s);
     if (mode->output) {
         ADD(EVENT_CURRENT_MET, mode->output * (target(m, mode, s, tau) - y[I_COIL]),
             mode->output * (target_rate(m, mode, s) - rate), amperes);
@@ -141,7 +142,7 @@ int source_events(const Model *m, const double y[N_STATES], int s, double tau, d
     return n;
 }
 
-void source_apply(Model *m, int s, double tau, EventKind kind)
+void stickslip_source_apply(Model *m, int s, double tau, EventKind kind)
 {
     Mode *mode = m->mode + s;
     switch (kind) {
@@ -168,10 +169,10 @@ void source_apply(Model *m, int s, double tau, EventKind kind)
     }
     if (mode->output == 0)
         m->y[s * N_STATES + I_COIL] = target(m, mode, s, tau); /* to the last bit, and not as near as time is */
-    source_settle_output(m, s, tau);
+    stickslip_source_settle_output(m, s, tau);
 }
 
-void source_settle_command(Model *m, int s, double tau)
+void stickslip_source_settle_command(Model *m, int s, double tau)
 {
     if (!m->n.source)
         return;
@@ -179,7 +180,7 @@ void source_settle_command(Model *m, int s, double tau)
     m->mode[s].limited = fabs(asked) <= limit_of_coil(m) ? 0 : asked > 0.0 ? 1 : -1;
 }
 
-void source_settle_output(Model *m, int s, double tau)
+void stickslip_source_settle_output(Model *m, int s, double tau)
 {
     if (!m->n.source)
         return;
@@ -195,14 +196,14 @@ void source_settle_output(Model *m, int s, double tau)
     mode->output = wanted > m->r.output_high ? 1 : wanted < m->r.output_low ? -1 : 0;
 }
 
-double coil_voltage_per_slope(const Model *m, int s)
+double stickslip_coil_voltage_per_slope(const Model *m, int s)
 {
     if (!m->n.source || m->mode[s].output || m->mode[s].limited)
         return 0.0;
     return m->r.inductance / (m->r.sense_resistance * m->n.coil_count);
 }
 
-double magnetic_energy(const Model *m, const double y[N_STATES])
+double stickslip_magnetic_energy(const Model *m, const double y[N_STATES])
 {
     return 0.5 * (m->r.inductance * y[I_COIL] * y[I_COIL] +
                   m->r.eddy_inductance * y[I_EDDY] * y[I_EDDY]);

@@ -14,30 +14,36 @@
 #define STICKSLIP_SOURCE_H
 
 #include "event.h"
+#include "internal.h"
+
+STICKSLIP_INTERNAL_BEGIN
 
 /* Current of one coil, A, and its rate, A/s; with a source or as given. */
-double coil_current(const Model *m, const double y[N_STATES], int s, double tau);
-double coil_current_rate(const Model *m, const Mode *mode, const double y[N_STATES], int s);
+double stickslip_coil_current(const Model *m, const double y[N_STATES], int s, double tau);
+double stickslip_coil_current_rate(const Model *m, const Mode *mode, const double y[N_STATES],
+                                   int s);
 
 /* Voltage across the coils, V. */
-double coil_voltage(const Model *m, const Mode *mode, const double y[N_STATES], int s);
+double stickslip_coil_voltage(const Model *m, const Mode *mode, const double y[N_STATES], int s);
 
 /* Rates of I_COIL ... E_COPPER. */
-void source_rates(const Model *m, const Mode *mode, const double y[N_STATES], int s,
-                  double dy[N_STATES]);
+void stickslip_source_rates(const Model *m, const Mode *mode, const double y[N_STATES], int s,
+                            double dy[N_STATES]);
 
 /* Appends the events of the present mode from place n on; returns the new number. emf_rate is the
  * slope of the back-EMF, V/s. */
-int source_events(const Model *m, const double y[N_STATES], int s, double tau, double emf_rate,
-                  EventFunction functions[MAX_EVENT_FUNCTIONS], int n);
-void source_apply(Model *m, int s, double tau, EventKind kind);
+int stickslip_source_events(const Model *m, const double y[N_STATES], int s, double tau,
+                            double emf_rate, EventFunction functions[MAX_EVENT_FUNCTIONS], int n);
+void stickslip_source_apply(Model *m, int s, double tau, EventKind kind);
 
 /* Make the mode agree with the command, which may have jumped, and with everything else. */
-void source_settle_command(Model *m, int s, double tau);
-void source_settle_output(Model *m, int s, double tau);
+void stickslip_source_settle_command(Model *m, int s, double tau);
+void stickslip_source_settle_output(Model *m, int s, double tau);
 
 /* d(coil_voltage)/d(command_slope) in the present mode, s. */
-double coil_voltage_per_slope(const Model *m, int s);
-double magnetic_energy(const Model *m, const double y[N_STATES]);
+double stickslip_coil_voltage_per_slope(const Model *m, int s);
+double stickslip_magnetic_energy(const Model *m, const double y[N_STATES]);
+
+STICKSLIP_INTERNAL_END
 
 #endif

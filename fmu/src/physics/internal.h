@@ -1,0 +1,15 @@
+/* What the FMU's files share among themselves is declared between these two: it stays out of the
+ * library's interface, whatever the compiler options are. An exported name can be taken for one of
+ * the host's: glibc, too, has an advance. */
+#ifndef STICKSLIP_INTERNAL_H
+#define STICKSLIP_INTERNAL_H
+
+#if defined __GNUC__ && !defined _WIN32 /* elsewhere only what is marked is exported */
+#define STICKSLIP_INTERNAL_BEGIN _Pragma("GCC visibility push(hidden)")
+#define STICKSLIP_INTERNAL_END _Pragma("GCC visibility pop")
+#else
+#define STICKSLIP_INTERNAL_BEGIN
+#define STICKSLIP_INTERNAL_END
+#endif
+
+#endif

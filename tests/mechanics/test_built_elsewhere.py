@@ -1,0 +1,122 @@
+"""The FMU's sources, compiled by others: FMPy's own build, and a plain call of the compiler."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from build_c import compiler
+from cosim.mechanics import package as fmu
+
+# Impacts on rigid walls, stick and slip, and the source at its limits, in 500 steps.
+SIMULATE = """
+import sys
+import fmpy
+import numpy as np
+
+signals = np.zeros(1001, [("time", float), ("command", float)])
+signals["time"] = np.linspace(0.0, 0.1, 1001)
+signals["command"] = 9.0 * (signals["time"] * 25.0 % 1.0 - 0.5)
+rows = fmpy.simulate_fmu(
+    sys.argv[1],
+    stop_time=0.1,
+    output_interval=2e-4,
+    start_values={"source": 1, "contact": 2, "output_high": 8.0, "output_low": -8.0},
+    input=signals,
+    output=["z_part", "z_ram", "coil_current", "energy_friction", "impacts",
+            "stick_slip_events", "output_high_time"],
+)
+assert rows["impacts"][-1] > 3
+assert rows["stick_slip_events"][-1] > 3
+assert rows["output_high_time"][-1] > 0.0
+sys.stdout.buffer.write(rows.tobytes())
+"""
+
+
+def simulated(path: Path) -> bytes:
+    """All rows of a run in a process of its own, since what is linked wrongly can hang."""
+    command = [sys.executable, "-c", SIMULATE, str(path)]
+    done = subprocess.run(command, capture_output=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr.decode()[-2000:]
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def packed(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    return fmu.pack(tmp_path_factory.mktemp("packed"))
+
+
+@pytest.fixture(scope="module")
+def shipped(packed: dict[int, Path]) -> bytes:
+    """The rows of the binary that is shipped; both files hold the same."""
+    return simulated(packed[2])
+
+
+def exported(library: Path) -> set[str]:
+    """What a library offers to others, without what the linker adds."""
+    nm = shutil.which("nm")
+    if not nm or fmpy.system != "linux":
+        pytest.skip("needs nm on Linux")
+    listing = subprocess.run(
+        [nm, "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True
+    )
+    return {line.split()[-1] for line in listing.stdout.splitlines()} - {"_init", "_fini"}
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_fmpy_compile_gives_the_same_bits(
+    packed: dict[int, Path], shipped: bytes, version: int, tmp_path: Path
+) -> None:
+    path = tmp_path / "own.fmu"
+    shutil.copy(packed[version], path)
+    tools = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    done = subprocess.run(
+        [sys.executable, "-m", "fmpy", "compile", str(path)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PATH": tools},
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    folder = Path(fmpy.extract(str(path), str(tmp_path / "own")))
+    library = next(folder.glob("binaries/*/*"))
+    assert library.read_bytes() != next(fmu.unpacked(version).glob("binaries/*/*")).read_bytes()
+    assert simulated(path) == shipped
+    assert {name for name in exported(library) if not name.startswith(("fmi2", "fmi3"))} == set()
+
+
+def test_what_is_internal_stays_inside_without_flags(
+    packed: dict[int, Path], tmp_path: Path
+) -> None:
+    sources = Path(fmpy.extract(str(packed[3]), str(tmp_path / "fmu"))) / "sources"
+    files = sorted(map(str, sources.glob("*/*.c")))
+    library = tmp_path / "own.so"
+    subprocess.run([*compiler(), "-shared", "-fPIC", *files, "-lm", "-o", str(library)], check=True)
+    names = exported(library)
+    assert len(names) > 100
+    assert {name for name in names if not name.startswith(("fmi2", "fmi3"))} == set()
+
+
+def test_internal_names_have_one_prefix(packed: dict[int, Path], tmp_path: Path) -> None:
+    """So that they meet no other's where an FMU is linked statically."""
+    nm = shutil.which("nm")
+    if not nm:
+        pytest.skip("needs nm")
+    sources = Path(fmpy.extract(str(packed[2]), str(tmp_path / "fmu"))) / "sources"
+    files = sorted(map(str, sources.glob("*/*.c")))
+    subprocess.run([*compiler(), "-c", *files], cwd=tmp_path, check=True)
+    listing = subprocess.run(
+        [nm, "-g", "--defined-only", *map(str, sorted(tmp_path.glob("*.o")))],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    words = [line.split() for line in listing.stdout.splitlines()]
+    names = {word[-1].removeprefix("_") for word in words if len(word) == 3}
+    own = {name for name in names if not name.startswith(("fmi2", "fmi3"))}
+    assert len(own) > 40
+    assert {name for name in own if not name.startswith("stickslip_")} == set()
