@@ -53,17 +53,24 @@ class Case:
     name: str
     contact: str
     circuit: str
-    params: Mapping[str, float] = field(default_factory=dict)
+    params: Mapping[str, float | str] = field(default_factory=dict)
     duration: float = 0.6  # s
     settle: float = 0.3  # s
 
 
-def case(name: str, contact: str, circuit: str, **params: float) -> Case:
+def case(name: str, contact: str, circuit: str, **params: float | str) -> Case:
     return Case(name, contact, circuit, params)
 
 
 FAST = {"frequency": 50.8, "amplitude": 9.0}  # Hz, V: where the output limits tell
 GRIPPER = {"n_surfaces": 2, "count": 2, "part_mass": 0.017}
+# As the scene direct-drive-stops: the back-EMF of a strong coil jumps as the surface hits its stops.
+DIRECT = {
+    "actuator": "direct",
+    **{"resistance": 4.3, "inductance": 0.83e-3, "force_factor": -4.38},
+    **{"surface_mass": 0.00783, "flexure_stiffness": 936.0, "flexure_damping": 0.475},
+    **{"suspension_k1": 0.0, "suspension_k3": 0.0, "suspension_damping": 0.0, "travel": 4.6e-3},
+}
 CASES = (
     Case("paper", "compliant", "amplifier", {}, 2.0, 1.0),
     Case("paper-ideal", "compliant", "ideal", {}, 2.0, 1.0),
@@ -107,6 +114,9 @@ CASES = (
     case("gripper-limited", "compliant", "limited", **GRIPPER, amplitude=10.6, normal_force=0.6),
     case("plate-limited", "compliant", "limited", mu_plate=0.1, inductance=3e-3),
     case("bent-bl-limited", "rigid", "limited", b1=60.0, b2=-5e4, amplitude=9.0),
+    case("direct", "compliant", "amplifier", **DIRECT),
+    case("direct-rigid", "rigid", "amplifier", **DIRECT),
+    case("direct-rigid-limited", "rigid", "limited", **DIRECT),
     case("no-walls-limited", "compliant", "limited", travel=1e-2, force_factor=2.0, frequency=35.0),
 )
 

@@ -49,6 +49,7 @@ class Params:
     """Scene keys, flattened; the defaults are those of the scene `paper`."""
 
     waveform: str = "sawtooth"  # or "sine"
+    actuator: str = "ram"  # or "direct": what is called the ram here stands on the ground
     frequency: float = 20.0  # Hz
     amplitude: float = 8.0  # V peak-to-peak at V1
     offset: float = -1.2  # V
@@ -139,6 +140,9 @@ class _Model:
         circuits = ("amplifier", "limited", "ideal")
         if contact not in ("rigid", "compliant") or circuit not in circuits:
             raise ValueError(f"contact {contact!r}, circuit {circuit!r}")
+        if p.actuator not in ("ram", "direct"):
+            raise ValueError(f"actuator {p.actuator!r}")
+        self.direct = p.actuator == "direct"
         self.p, self.rigid, self.ideal = p, contact == "rigid", circuit == "ideal"
         self.limited = circuit == "limited"
         self.with_energies = energies
@@ -234,7 +238,9 @@ class _Model:
         i, va, q, dq, _, vs, _, u = y[:8]
         ram, load, mass = self.forces(t, y)
         a_s, a_p, f, f_plate = self.friction_balance(load, mass, self.friction, self.plate)
-        ddq = 0.0 if self.wall == REST else ram / p.ram_mass - p.gravity - a_s
+        ddq = 0.0 if self.wall == REST else -a_s
+        if not self.direct and self.wall != REST:
+            ddq += ram / p.ram_mass - p.gravity
         emf, r_loop = self.bl(q) * dq, p.resistance + self.sense
         di = dva = 0.0
         if self.limited:
@@ -358,10 +364,11 @@ class _Model:
         p, y = self.p, self.y
         closing, vs, v_part = y[3], y[5], y[5] - y[7]
         m_r, m_s, eps = p.ram_mass, p.surface_mass, p.restitution
+        share = 1.0 if self.direct else m_r / (m_r + m_s)
         y[2], y[3] = side * p.travel, -eps * closing
-        y[5] = vs + (1.0 + eps) * closing * m_r / (m_r + m_s)
+        y[5] = vs + (1.0 + eps) * closing * share
         y[7] = y[5] - v_part
-        self.impact_loss += 0.5 * m_r * m_s / (m_r + m_s) * (1.0 - eps * eps) * closing**2
+        self.impact_loss += 0.5 * m_s * share * (1.0 - eps * eps) * closing**2
         self.choose_friction(t)
         if abs(y[3]) < REST_SPEED and side * self.rates(t, y)[3] > 0.0:
             y[3] = 0.0
@@ -415,6 +422,9 @@ class _Model:
     def _equilibrium(self) -> list[float]:
         """Static state without current, part sticking, plate unloaded; sets the wall's mode."""
         p = self.p
+        if self.direct:  # q = 0 where the surface rests
+            carried = p.surface_mass + self.part_mass
+            return [0.0] * 4 + [-carried * p.gravity / p.flexure_stiffness] + [0.0] * 3
         self.wall, self.side = (FREE, 0) if self.rigid else (TOUCH, -1)
 
         def net(q: float) -> float:

@@ -25,11 +25,11 @@ FULL_NAME = {key.name: key.full for key in keys()}
 # Allowed differences of a trajectory's samples in the first 60 ms, SI: about five times what the
 # coupling's error makes; without ngspice only the two integrators differ.
 EARLY = {
-    "amplifier": {"z_surface": 2e-6, "z_ram": 1e-5, "z_part": 2e-6, "v_part": 1e-3},
+    "amplifier": {"z_surface": 1e-6, "z_ram": 5e-6, "z_part": 1e-6, "v_part": 5e-4},
     "limited": {"current": 1e-7, "z_surface": 2e-9, "z_ram": 5e-9, "z_part": 2e-9, "v_part": 5e-7},
     "ideal": {"z_surface": 2e-9, "z_ram": 5e-9, "z_part": 2e-9, "v_part": 5e-7},
 }
-AVERAGE = {"amplifier": 2e-3, "limited": 1e-6, "ideal": 1e-6}  # relative, of v_average
+AVERAGE = {"amplifier": 5e-4, "limited": 1e-6, "ideal": 1e-6}  # relative, of v_average
 
 
 def scene_of(case: dict) -> Scene:
@@ -47,7 +47,8 @@ def check_early(case: dict, result: Result) -> None:
     times = np.array(GOLDEN["sample_times"])
     rows = np.round(times / result.scene.run.output_step).astype(int)
     np.testing.assert_allclose(result.columns["time"][rows], times, rtol=0, atol=1e-12)
-    for name, allowed in EARLY[case["circuit"]].items():
+    judged = EARLY[case["circuit"]]
+    for name, allowed in ((n, a) for n, a in judged.items() if n in result.columns):
         found, expected = result.columns[name][rows], case["trajectory"][name]
         np.testing.assert_allclose(found, expected, rtol=0, atol=allowed, err_msg=name)
 

@@ -53,9 +53,9 @@ class Lead:
         deck: tuple[str, tuple[str, ...]] | None = None,
         replay: npt.NDArray[np.float64] | None = None,
     ) -> None:
-        """``deck`` and its saved vectors replace the scene's. With ``replay``, pairs of back-EMF
-        (V) and slope (V/s) after each step, there are no mechanics: the circuit takes the steps of
-        the run that these are from.
+        """``deck`` and its saved vectors replace the scene's. With ``replay``, back-EMF (V),
+        slope (V/s) and next impact (s) after each step, there are no mechanics: the circuit takes
+        the steps of the run that these are from.
         """
         self._duration = scene.run.duration
         self._command = command
@@ -70,6 +70,7 @@ class Lead:
         self._pieces: list[Piece] = []
         self._row: Any = None
         self._time = 0.0
+        coil, loop_resistance = scene.coil, scene.circuit.sense_resistance * scene.coil.count
         motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else -1
         self.state = LeadState(
             recorder=ctypes.pointer(recorder.state),
@@ -77,8 +78,10 @@ class Lead:
             replay=None if replay is None else replay.ctypes.data,
             gain=GAIN,
             v_offset=command.v_offset,
-            count=scene.coil.count,
+            count=coil.count,
             after_jump=min(_AFTER_JUMP, _SHARE_AFTER_JUMP * scene.circuit.max_step),
+            time_constant=coil.inductance / (coil.resistance + loop_resistance),
+            range=scene.drive.amplitude or 1.0,
             places=self.places,
             n_saved=len(self._saved),
             motional=motional,
@@ -87,7 +90,8 @@ class Lead:
             refill=callback(self._refill, self._fail),
             attend=callback(self._attend, self._fail),
         )
-        emf, slope = recorder.mechanics.step_outputs[:2]
+        emf, slope, flux = recorder.mechanics.step_outputs[:3]
+        self.state.flux_at_start = flux
         segment = self.state.segment
         segment.c[0], segment.c[1], segment.end = emf, slope, -np.inf
         self._refill()

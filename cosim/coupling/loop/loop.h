@@ -47,6 +47,9 @@ typedef struct {
     int64_t n;
 } Schedule;
 
+/* Places among the outputs of a step: V, V/s, V s, s. */
+enum { BACK_EMF, SLOPE, FLUX, TIME_TO_IMPACT, EXTREMES };
+
 enum { ROW = 1, FRAME = 2, SETTLED = 4 }; /* what is to be written down at a time */
 
 typedef struct Recorder {
@@ -55,7 +58,7 @@ typedef struct Recorder {
     const uint32_t *input_places; /* of each input: its value, its slope */
     int64_t ports;                /* inputs that are led from outside, linear over an interval */
     const Schedule *schedule;     /* of one more input that follows the time alone; or NULL */
-    const uint32_t *step_places;  /* a back-EMF and its slope, then pairs of maximum and minimum */
+    const uint32_t *step_places;  /* as the enum above has them, then pairs of maximum and minimum */
     int64_t step_outputs;
     const uint32_t *real_places, *whole_places; /* of a row: the reals, then the whole numbers */
     int64_t reals, wholes;
@@ -111,13 +114,21 @@ typedef struct Lead {
     Recorder *recorder;
     void (*macro_point)(struct Lead *); /* see above; Python's takes no notice of the argument */
     Segment segment;
-    const double *replay; /* back-EMF and slope after each step, for macro_point_replayed() */
+    const double *replay; /* back-EMF, slope and impact after each step, for macro_point_replayed() */
     const Piece *pieces;  /* of the command in the order of time; one of them holds */
     int64_t n_pieces, piece;
     double gain, v_offset;        /* of the difference amplifier; mean voltage of the pin, V */
     double count;                 /* of coils */
     double after_jump;            /* s; longest step after a jump of the command */
+    double time_constant;         /* s; of the current in coil and sense resistor */
+    double range;                 /* V; from the least to the largest command */
+    double answer_step;           /* s; longest step while the current answers a jump */
+    double answered;              /* s; when it has done so */
     double time, current, carried; /* at the last accepted point: s; A of one coil; V carried */
+    double emf;                    /* V; that the circuit had there */
+    double given;                  /* V s; its integral since the start, by the trapezoidal rule */
+    double flux_at_start;          /* V s; that of the mechanics */
+    double impact;                 /* s; a step ends on it, just after a rigid impact; inf: none */
     double jump;                  /* s; the command's next one */
     int64_t at_jump;              /* the macro point lies on one */
     double told;                  /* s; time of the last accepted step that ngspice told of */

@@ -52,8 +52,8 @@ static int step(Recorder *r, double time)
     f->time = time;
     f->steps++;
     if (time > r->settle) {
-        const double *found = r->outputs + 2;
-        for (int64_t k = 0; k < r->step_outputs - 2; k += 2) {
+        const double *found = r->outputs + EXTREMES;
+        for (int64_t k = 0; k < r->step_outputs - EXTREMES; k += 2) {
             if (found[k] > r->extremes[k])
                 r->extremes[k] = found[k];
             if (found[k + 1] < r->extremes[k + 1])

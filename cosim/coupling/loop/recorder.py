@@ -45,7 +45,7 @@ class Recorder:
         self._new_frames = np.empty(agenda.ENTRIES + 1)
         self._totals = (c_double * len(mechanics.total_names))()
         self._counters = (c_int32 * len(COUNTERS))()
-        extremes = len(mechanics.step_outputs) - 2
+        extremes = len(mechanics.step_outputs) - 4
         self.extremes = (c_double * extremes)(*[-np.inf, np.inf] * (extremes // 2))
         """Largest and smallest values after settling, in pairs: acceleration (m/s²), velocity (m/s)
         and height (m) of the surface, and current of the coil (A) where the mechanics have the

@@ -75,7 +75,8 @@ class LeadState(Structure):
         *(("segment", Segment), ("replay", c_void_p), ("pieces", POINTER(Piece))),
         *_of(c_int64, "n_pieces", "piece"),
         *_of(c_double, "gain", "v_offset", "count", "after_jump"),
-        *_of(c_double, "time", "current", "carried", "jump"),
+        *_of(c_double, "time_constant", "range", "answer_step", "answered"),
+        *_of(c_double, "time", "current", "carried", "emf", "given", "flux_at_start", "impact", "jump"),
         ("at_jump", c_int64),
         *_of(c_double, "told", "sent"),
         ("places", POINTER(c_int64)),
@@ -96,6 +97,7 @@ _FUNCTIONS = {
     "recorder_follow": (c_int64, (c_void_p, c_int64, c_void_p, c_void_p, c_void_p, c_int64)),
     "recorder_exchange": (ctypes.c_int, (c_void_p, *[c_double] * 4)),
     "lead_begin": (None, (c_void_p,)),
+    "macro_point_step_locked": (None, (c_void_p,)),
     "lead_finish": (None, (c_void_p,)),
     "loop_size": (c_int64, (ctypes.c_int,)),
 }

@@ -4,7 +4,14 @@ The circuit solves [t_n, t_n+1] against the back-EMF extrapolated from t_n with 
 FMU knows the ram's acceleration); then the mechanics take the same interval with the current
 linear between its two ends, which carries the circuit's charge exactly. Both sides are of second
 order where nothing jumps. The extrapolation uses nothing older than t_n, so a jump of the source or
-an event in the mechanics is forgotten at the next step: within its own step it costs first order.
+an event in the mechanics is forgotten at the next step. Two things are done about the step that
+holds the event:
+
+- A rigid impact, at which the back-EMF jumps, is expected by the mechanics; the circuit's step is
+  cut to end just after it, and the next one is short.
+- The flux that the circuit was given, the integral of its back-EMF, falls behind that of the
+  mechanics, which their displacement alone tells. What is owed is paid back over the next steps, so
+  that no event leaves an error that lasts.
 
 Explicit and sequential (Gauss-Seidel) in the sense of Busch, "Continuous approximation techniques
 for co-simulation methods", ZAMM 96 (2016) 1061; the step sizes are those of ngspice. There

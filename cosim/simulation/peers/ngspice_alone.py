@@ -66,7 +66,7 @@ def run(scene: Scene, times: Sequence[float]) -> tuple[float, npt.NDArray[np.flo
     began = process_time()
     with closing(Mechanics(scene)) as mechanics:
         recorder = Recorder(scene, mechanics, lambda _: None)
-        still = np.zeros((_MOST_STEPS, 2))
+        still = np.tile((0.0, 0.0, np.inf), (_MOST_STEPS, 1))
         deck = _netlist(scene, mechanics.sample())
         circuit = Lead(scene, command(scene), recorder, deck=deck, replay=still)
         circuit.run()

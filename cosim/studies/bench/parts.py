@@ -5,6 +5,7 @@ steps; the mechanics alone get its current.
 """
 
 from contextlib import closing
+from ctypes import byref
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy.typing as npt
 
 from cosim.coupling.loop.lead import Lead
 from cosim.coupling.loop.recorder import Recorder
+from cosim.coupling.loop.structures import LeadState, loop
 from cosim.drive.command import command
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
@@ -23,7 +25,7 @@ Log = dict[str, npt.NDArray[np.float64]]
 def coupled_over_parts(scene: Scene, rounds: int) -> dict[str, Any]:
     """Spread of the ratio, and how many steps both circuits took."""
     log = _coupled(scene).log()
-    replay = _replay(scene, log)
+    replay = _replay(scene)
     # Each call makes its own instance, as both sides of the ratio need one.
     calls = {
         "coupled": lambda: _coupled(scene),
@@ -55,13 +57,25 @@ def _mechanics(scene: Scene, log: Log) -> None:
         recorder.follow(log["time"][1:], current[:-1, np.newaxis], current[1:, np.newaxis])
 
 
-def _replay(scene: Scene, log: Log) -> npt.NDArray[np.float64]:
-    """Back-EMF and its slope after each step, the last one twice."""
+def _replay(scene: Scene) -> npt.NDArray[np.float64]:
+    """Back-EMF, slope and next impact that the circuit was told of after each step, the last ones
+    twice."""
     with closing(Mechanics(scene)) as mechanics:
-        recorder = Recorder(scene, mechanics, lambda _: None)
-        current = (log["i(vemf)"] / scene.coil.count).tolist()
-        pairs = []
-        for k, time in enumerate(log["time"].tolist()[1:]):
-            recorder.exchange(time, current[k], current[k + 1], current[k + 1])
-            pairs.append(mechanics.step_outputs[:2])
-        return np.array([*pairs, pairs[-1]])
+        lead = Lead(scene, command(scene), Recorder(scene, mechanics, lambda _: None))
+        listener = _Listener(lead.state)
+        lead.use(listener.macro_point)
+        lead.run()
+        return np.array([*listener.told, listener.told[-1]])
+
+
+class _Listener:
+    """Writes down what the method step-locked tells the circuit."""
+
+    def __init__(self, state: LeadState) -> None:
+        self._state = state
+        self.told: list[tuple[float, float, float]] = []
+
+    def macro_point(self) -> None:
+        loop().macro_point_step_locked(byref(self._state))
+        emf, slope, _ = self._state.segment.c
+        self.told.append((emf, slope, self._state.impact))

@@ -11,6 +11,12 @@ static inline double force_factor_at(const Model *m, double q)
     return m->r.force_factor * (1.0 + q * (m->r.b1 + q * m->r.b2));
 }
 
+/* Wb; the integral of the force factor from q = 0 */
+static inline double motional_flux(const Model *m, double q)
+{
+    return m->r.force_factor * q * (1.0 + q * (m->r.b1 / 2.0 + q * m->r.b2 / 3.0));
+}
+
 /* N/(A s) */
 static inline double force_factor_rate(const Model *m, double q, double u)
 {

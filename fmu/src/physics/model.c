@@ -190,6 +190,9 @@ static double sum_of(const Model *m, int state)
     return m->n.independent ? m->y[state] + m->y[N_STATES + state] : m->y[state];
 }
 
+
+static const double NO_IMPACT = 1e9; /* s; as variables.def has it */
+
 static void outputs_of_second(Model *m)
 {
     Forces f;
@@ -209,6 +212,27 @@ static void outputs_of_second(Model *m)
     if (m->mode[1].wall == WALL_PARTING)
         r->energy_impact -= stickslip_wall_energy(m, m->mode + 1, y);
     m->n.sticking_2 = m->mode[1].slip == 0;
+}
+
+/* Time until q reaches `place` at the velocity u and the acceleration a, all in its direction. */
+static double time_to(double gap, double u, double a)
+{
+    if (gap <= 0.0)
+        return u > 0.0 ? 0.0 : NO_IMPACT;
+    const double square = u * u + 2.0 * a * gap;
+    if (square < 0.0 || (u <= 0.0 && a <= 0.0))
+        return NO_IMPACT;
+    /* Of the two forms of the root, the one that does not cancel. */
+    return u > 0.0 ? 2.0 * gap / (u + sqrt(square)) : (sqrt(square) - u) / a;
+}
+
+static double time_to_impact(const Model *m, const double y[N_STATES], double a_q)
+{
+    if (m->n.contact == 1 || m->n.prescribed || m->mode[0].wall != WALL_FREE)
+        return NO_IMPACT;
+    const double above = time_to(m->r.travel - y[Q], y[U], a_q);
+    const double below = time_to(m->r.travel + y[Q], -y[U], -a_q);
+    return above < below ? above : below;
 }
 
 void stickslip_model_outputs(Model *m)
@@ -231,6 +255,8 @@ void stickslip_model_outputs(Model *m)
     r->q_rate = y[U];
     r->back_emf = force_factor_at(m, y[Q]) * y[U];
     r->back_emf_slope = back_emf_slope(m, y, f.a_q);
+    r->time_to_impact = time_to_impact(m, y, f.a_q);
+    r->motional_flux = motional_flux(m, y[Q]);
     r->friction_force = f.friction;
     r->plate_force = f.plate;
     r->wall_force = f.wall;
