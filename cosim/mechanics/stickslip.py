@@ -14,7 +14,14 @@ from cosim.mechanics.normal_force import normal_force
 from cosim.scene import Scene, keys
 
 STEP_OUTPUTS = (
-    *("back_emf", "back_emf_slope", "motional_flux", "time_to_impact", "a_surface_max", "a_surface_min"),
+    *(
+        "back_emf",
+        "back_emf_slope",
+        "motional_flux",
+        "time_to_impact",
+        "a_surface_max",
+        "a_surface_min",
+    ),
     *("v_surface_max", "v_surface_min", "z_surface_max", "z_surface_min"),
 )
 """What is read after every step: back-EMF of one coil (V, V/s) and its integral over time (Wb),

@@ -77,6 +77,7 @@ def _simulate(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     finally:
         mechanics.close()
     summary = summarise(scene, recorder, totals, driven.electric) | {
+        "v_average_error": driven.v_average_error,
         "circuit_steps": driven.circuit_steps,
         "circuit_rejected": driven.circuit_rejected,
         "fmu_steps": recorder.steps,

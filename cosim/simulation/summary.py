@@ -13,6 +13,7 @@ from cosim.trials.camera import three_point_accelerations
 
 UNITS = {
     "v_average": "m/s",
+    "v_average_error": "m/s",
     "transport_per_cycle": "m",
     "stick_fraction": "1",
     **dict.fromkeys(("a_surface_max", "a_surface_min", "a_camera_max", "a_camera_min"), "m/s2"),

@@ -12,6 +12,7 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
     taken = "{circuit_model}: {circuit_model_why}" if "circuit_model" in summary else ""
     rows = [
         ("part's mean velocity", _scaled(summary["v_average"], 1e3, "mm/s", "+.3f")),
+        ("  off by its own steps", _own_error(summary)),
         ("", _broken_periods(scene)),
         ("transport per cycle", _scaled(summary["transport_per_cycle"], 1e6, "µm", "+.1f")),
         ("sticking", _scaled(summary["stick_fraction"], 100, "% of the time", ".1f")),
@@ -34,6 +35,12 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
     ]
     return "\n".join(f"  {name:<24}{value}" for name, value in rows if value)
+
+
+def _own_error(summary: dict[str, Any]) -> str:
+    """The estimate of what the circuit's steps did to the mean velocity."""
+    error = summary.get("v_average_error")
+    return "" if error is None else f"about {abs(error) * 1e3:.1g} mm/s"
 
 
 def _error(summary: dict[str, Any]) -> str:

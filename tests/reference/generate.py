@@ -64,7 +64,7 @@ def case(name: str, contact: str, circuit: str, **params: float | str) -> Case:
 
 FAST = {"frequency": 50.8, "amplitude": 9.0}  # Hz, V: where the output limits tell
 GRIPPER = {"n_surfaces": 2, "count": 2, "part_mass": 0.017}
-# As the scene direct-drive-stops: the back-EMF of a strong coil jumps as the surface hits its stops.
+# As the scene direct-drive-stops: the back-EMF of a strong coil jumps at the stops.
 DIRECT = {
     "actuator": "direct",
     **{"resistance": 4.3, "inductance": 0.83e-3, "force_factor": -4.38},
@@ -123,7 +123,7 @@ CASES = (
 
 def run(c: Case, tol: float, method: str = "Adams", **changes: float) -> Result:
     """Solves a set with some parameters changed by parts of themselves."""
-    params = asdict(Params()) | dict(c.params)
+    params: dict[str, Any] = asdict(Params()) | dict(c.params)
     for name, change in changes.items():
         params[name] *= 1.0 + change
     return simulate(

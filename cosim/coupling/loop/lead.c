@@ -108,12 +108,26 @@ static double held(Lead *c, int source, double t)
 
 /* --- the log and the mechanics --- */
 
+/* The row of the log that is filled next. */
+static double *row_of(const Lead *c)
+{
+    return c->log + c->n_log * (LOG_SAVED + c->n_saved);
+}
+
 static void write_down(Lead *c, double time, double emf)
 {
-    c->log[c->n_log * (2 + c->n_saved)] = time;
-    c->log[c->n_log * (2 + c->n_saved) + 1] = emf;
+    double *row = row_of(c);
+    row[LOG_TIME] = time;
+    row[LOG_EMF] = emf;
+    row[LOG_OWED] = c->owed;
     c->n_log++;
     c->logged++;
+}
+
+/* V s; how far the flux given to the circuit lags that of the mechanics, at a macro point. */
+static double flux_owed(const Lead *c)
+{
+    return c->recorder->outputs[FLUX] - c->flux_at_start - c->given;
 }
 
 static void set_line(Lead *c, double emf, double slope)
@@ -132,8 +146,7 @@ void macro_point_step_locked(Lead *c)
         return;
     }
     const double *found = c->recorder->outputs;
-    const double owed = found[FLUX] - c->flux_at_start - c->given;
-    set_line(c, found[BACK_EMF] + CARRIED * owed / h, found[SLOPE]);
+    set_line(c, found[BACK_EMF] + CARRIED * flux_owed(c) / h, found[SLOPE]);
     c->impact = c->time + found[TIME_TO_IMPACT] + PAST_IMPACT;
 }
 
@@ -159,7 +172,8 @@ static void pass_jump(Lead *c)
 /* The values that were sent last stand where the next row of the log begins to be filled. */
 static double accepted(Lead *c, double time, double next_step)
 {
-    const double *values = c->log + c->n_log * (2 + c->n_saved) + 2;
+    double *row = row_of(c);
+    const double *values = row + LOG_SAVED;
     double sum = 0.0;
     for (int64_t k = 0; k < c->n_saved; k++)
         sum += values[k];
@@ -190,6 +204,7 @@ static double accepted(Lead *c, double time, double next_step)
         c->macro_point(c);
         if (!going(c))
             return next_step;
+        row[LOG_OWED] = c->owed = flux_owed(c);
     }
     if (c->segment.end > time && c->segment.end - time < next_step)
         next_step = c->segment.end - time;
@@ -233,7 +248,7 @@ EXPORT int lead_data(VectorValues *data, int n, int ident, void *user)
     Lead *c = run;
     if (!c)
         return 0;
-    double *values = c->log + c->n_log * (2 + c->n_saved) + 2;
+    double *values = row_of(c) + LOG_SAVED;
     for (int64_t k = 0; k < c->n_saved; k++)
         values[k] = data->vectors[c->places[k]]->creal;
     c->sent = data->vectors[c->places[c->n_saved]]->creal;

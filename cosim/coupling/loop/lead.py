@@ -35,6 +35,10 @@ _AFTER_JUMP, _SHARE_AFTER_JUMP = 1e-7, 1e-2
 remembers of the slopes before it misleads its choice of the step. The start is one too: V1 leaves 0
 at once. This step is of first order and nothing judges it, so finer runs must shorten it too."""
 
+LOG = ("time", "emf", "owed")
+"""Time, s; the back-EMF that the circuit was given, V; by how much the integral of that lagged the
+flux of the mechanics at the last macro point, V s."""
+
 _POINTS = 4096
 """Places for accepted points between two emptyings of the log."""
 
@@ -62,7 +66,7 @@ class Lead:
         self._recorder = recorder
         self._replay = replay
         self._deck, self._saved = deck or prepare(scene)
-        width = 2 + len(self._saved)
+        width = len(LOG) + len(self._saved)
         self._log = Tape(width)
         # With `uic`, ngspice accepts t = 0 before it has sent any value.
         self._block = np.zeros((_POINTS, width))
@@ -131,8 +135,8 @@ class Lead:
         return str(_engine().ngspice_version)
 
     def log(self) -> dict[str, npt.NDArray[np.float64]]:
-        """Time (s), the back-EMF given (V) and the saved vectors (A, V) at the accepted points."""
-        return dict(zip(("time", "emf", *self._saved), self._log.array().T, strict=True))
+        """LOG and the saved vectors (A, V) at the accepted points."""
+        return dict(zip((*LOG, *self._saved), self._log.array().T, strict=True))
 
     def use(self, macro_point: Callable[[], None]) -> None:
         """Ask ``macro_point`` at each macro point from now on."""

@@ -110,6 +110,9 @@ typedef struct {
     double charge; /* A s; integral of that current since then */
 } Segment;
 
+/* Places in a row of the log; the saved values follow them. */
+enum { LOG_TIME, LOG_EMF, LOG_OWED, LOG_SAVED };
+
 typedef struct Lead {
     Recorder *recorder;
     void (*macro_point)(struct Lead *); /* see above; Python's takes no notice of the argument */
@@ -127,6 +130,7 @@ typedef struct Lead {
     double time, current, carried; /* at the last accepted point: s; A of one coil; V carried */
     double emf;                    /* V; that the circuit had there */
     double given;                  /* V s; its integral since the start, by the trapezoidal rule */
+    double owed;                   /* V s; flux of the mechanics less the given, at the macro point */
     double flux_at_start;          /* V s; that of the mechanics */
     double impact;                 /* s; a step ends on it, just after a rigid impact; inf: none */
     double jump;                  /* s; the command's next one */
@@ -136,7 +140,7 @@ typedef struct Lead {
     const int64_t *places;        /* of the saved vectors among those sent; then that of the time */
     int64_t n_saved;
     int64_t motional;             /* which of them is the share that the circuit carries; or -1 */
-    double *log;                  /* a row: time, back-EMF, the saved values */
+    double *log;                  /* rows: see the enum above */
     int64_t n_log, log_rows;      /* filled; places for */
     int64_t logged, attempts;     /* points and attempted steps so far */
     int64_t quiet;                /* attempts since Python was last called */

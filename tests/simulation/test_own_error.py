@@ -1,0 +1,29 @@
+"""The estimate of v_average's own error against its true one."""
+
+import pytest
+
+from cosim.scene import load
+from cosim.simulation.simulate import simulate
+from tests.simulation.test_against_reference import CASES, scene_of
+
+pytestmark = pytest.mark.physics
+
+
+@pytest.mark.parametrize("name", ["bent-bl", "pressed", "asymmetric"])
+def test_it_is_the_true_error_within_a_factor(name: str) -> None:
+    """Against the monolithic reference; these sets feel the circuit's steps most."""
+    found = simulate(load(scene_of(CASES[name]), {"circuit.reltol": 1e-4})).summary
+    true = found["v_average"] - CASES[name]["result"]["v_average"]
+    assert 0.5 < found["v_average_error"] / true < 2.0
+
+
+def test_it_is_not_told_where_nothing_is_known() -> None:
+    """Without a node that tells of the swing, or where the mechanics got another charge."""
+    gauss_seidel = {"coupling.method": "gauss-seidel", "run.duration": 0.1, "run.settle": 0.0}
+    assert simulate(load("paper", gauss_seidel)).summary["v_average_error"] is None
+    assert (
+        simulate(load("paper-limited", {"run.duration": 0.1, "run.settle": 0.0})).summary[
+            "v_average_error"
+        ]
+        is None
+    )
