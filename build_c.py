@@ -36,6 +36,8 @@ DESCRIBE = FMU / "src/fmi/describe.c"
 # Without contraction every platform computes the same bits.
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-Wall", "-Wextra")
 LIBRARY_FLAGS = ("-fPIC", "-fvisibility=hidden")
+# A shared library has FMI's functions by their plain names; source code has them with a prefix.
+PLAIN_NAMES = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 
@@ -148,27 +150,28 @@ def _place(file: Path) -> str:
 
 def _make_fmu(target: Path, work: Path) -> None:
     token = _hash([*_fmu_files(), DESCRIBE])[:32]
-    flags = (f"-I{FMU / 'include'}", f"-DFMU_TOKEN={token}")
+    flags = (f"-I{FMU / 'include'}", f"-DFMU_TOKEN={token}", *PLAIN_NAMES)
     objects = _objects(fmu_sources(), work, *flags)
     library = work / (MODEL + SUFFIX)
     link(objects, library, "-shared")
     describe = work / ("describe.exe" if sys.platform == "win32" else "describe")
     link([*objects, *_objects([DESCRIBE], work, *flags)], describe)
 
-    def described(what: str) -> bytes:
-        names = map(_place, fmu_sources())
-        return _run(str(describe), what, *names).replace(b"\r\n", b"\n")
+    def described(*what: str) -> bytes:
+        return _run(str(describe), *what).replace(b"\r\n", b"\n")
 
-    for version, binaries in zip(("2", "3"), _platforms(), strict=True):
+    for version, other, binaries in zip("23", "32", _platforms(), strict=True):
+        # The library has both interfaces, the sources only the file's own.
+        own = [file for file in _fmu_files() if not file.name.startswith(f"fmi{other}")]
+        names = [_place(file) for file in own if file.suffix == ".c"]
         contents = {
-            "modelDescription.xml": described(version),
+            "modelDescription.xml": described(version, *names),
             f"binaries/{binaries}/{library.name}": library.read_bytes(),
             "documentation/licenses/license.txt": (ROOT / "LICENSE").read_bytes(),
-            **{f"sources/{_place(file)}": file.read_bytes() for file in _fmu_files()},
+            **{f"sources/{_place(file)}": file.read_bytes() for file in own},
             "sources/fmi/token.h": f"#define FMU_TOKEN {token}\n".encode(),
+            "sources/buildDescription.xml": described("build", version, *names),
         }
-        if version == "3":
-            contents["sources/buildDescription.xml"] = described("build")
         for name, data in contents.items():
             path = target / f"fmi{version}" / name
             path.parent.mkdir(parents=True, exist_ok=True)

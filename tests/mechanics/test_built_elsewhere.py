@@ -4,12 +4,15 @@ import os
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import fmpy
 import pytest
+from fmpy.model_description import read_build_description
 
-from build_c import compiler
+from build_c import FLAGS, FMU, PLAIN_NAMES, compiler
 from cosim.mechanics import package as fmu
 
 # Impacts on rigid walls, stick and slip, and the source at its limits, in 500 steps.
@@ -64,7 +67,7 @@ def exported(library: Path) -> set[str]:
     listing = subprocess.run(
         [nm, "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True
     )
-    return {line.split()[-1] for line in listing.stdout.splitlines()} - {"_init", "_fini"}
+    return {line.split()[-1] for line in listing.stdout.splitlines()}
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -86,7 +89,7 @@ def test_fmpy_compile_gives_the_same_bits(
     library = next(folder.glob("binaries/*/*"))
     assert library.read_bytes() != next(fmu.unpacked(version).glob("binaries/*/*")).read_bytes()
     assert simulated(path) == shipped
-    assert {name for name in exported(library) if not name.startswith(("fmi2", "fmi3"))} == set()
+    assert {name for name in exported(library) if not name.startswith(f"fmi{version}")} == set()
 
 
 def test_what_is_internal_stays_inside_without_flags(
@@ -97,8 +100,8 @@ def test_what_is_internal_stays_inside_without_flags(
     library = tmp_path / "own.so"
     subprocess.run([*compiler(), "-shared", "-fPIC", *files, "-lm", "-o", str(library)], check=True)
     names = exported(library)
-    assert len(names) > 100
-    assert {name for name in names if not name.startswith(("fmi2", "fmi3"))} == set()
+    assert len(names) > 50
+    assert {name for name in names if not name.startswith("stickslip_fmi3")} == set()
 
 
 def test_internal_names_have_one_prefix(packed: dict[int, Path], tmp_path: Path) -> None:
@@ -117,6 +120,56 @@ def test_internal_names_have_one_prefix(packed: dict[int, Path], tmp_path: Path)
     )
     words = [line.split() for line in listing.stdout.splitlines()]
     names = {word[-1].removeprefix("_") for word in words if len(word) == 3}
-    own = {name for name in names if not name.startswith(("fmi2", "fmi3"))}
-    assert len(own) > 40
-    assert {name for name in own if not name.startswith("stickslip_")} == set()
+    assert len(names) > 80
+    assert {name for name in names if not name.startswith("stickslip_")} == set()
+
+
+@pytest.mark.skipif(fmpy.system != "linux", reason="libraries are linked otherwise there")
+def test_both_link_statically_beside_others(packed: dict[int, Path], tmp_path: Path) -> None:
+    """As libraries of the standard's name, made with the Modelica Association's headers."""
+    description = fmpy.read_model_description(str(packed[2]))
+    references = {v.name: str(v.valueReference) for v in description.modelVariables}
+    arguments = [references[name] for name in ("current", "contact", "z_part", "z_ram")]
+    headers = f"-I{FMU / 'include'}"
+    libraries = []
+    for version, path in packed.items():
+        folder = Path(fmpy.extract(str(path), str(tmp_path / f"fmi{version}")))
+        for header in folder.glob("sources/fmi/fmi*.h"):
+            header.unlink()  # an importer uses its own
+        sources = sorted(map(str, folder.glob("sources/*/*.c")))
+        subprocess.run([*compiler(), headers, "-c", *sources], cwd=folder, check=True)
+        libraries.append(folder / "libstickslip.a")
+        objects = sorted(map(str, folder.glob("*.o")))
+        subprocess.run(["ar", "rc", str(libraries[-1]), *objects], check=True)
+
+    def printed(name: str, *inputs: str) -> str:
+        program = tmp_path / name
+        source = Path(__file__).with_name("fmu_host.c")
+        command = [*compiler(), *FLAGS, headers, str(source), *inputs, "-lm", "-o", str(program)]
+        subprocess.run(command, check=True)
+        done = subprocess.run(
+            [str(program), fmu.token(), *arguments], capture_output=True, text=True, timeout=60
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        return done.stdout
+
+    binary = next(fmu.unpacked(2).glob("binaries/*/*"))
+    shared = printed("shared", *PLAIN_NAMES, str(binary))
+    assert printed("static", *map(str, libraries)) == shared
+    rows = [[float.fromhex(number) for number in line.split()] for line in shared.splitlines()]
+    assert len(rows) == 500
+    assert all(row[:2] == row[2:] for row in rows)
+    assert max(row[1] for row in rows) - min(row[1] for row in rows) > 1e-3
+
+
+def test_the_build_description_names_what_is_linked(packed: dict[int, Path]) -> None:
+    for version, path in packed.items():
+        with zipfile.ZipFile(path) as archive:
+            text = archive.read("sources/buildDescription.xml")
+        assert len(read_build_description(str(path), validate=True)) == 1
+        build = ElementTree.fromstring(text)
+        (library,) = build.findall("BuildConfiguration/Library")
+        assert (library.get("name"), library.get("external")) == ("m", "true")
+        (definition,) = build.iter("PreprocessorDefinition")
+        assert definition.get("name") == f"FMI{version}_OVERRIDE_FUNCTION_PREFIX"
+        assert definition.get("optional") == "true"

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from build_c import FLAGS, FMU, compiler, fmu_sources
+from build_c import FLAGS, FMU, PLAIN_NAMES, compiler, fmu_sources
 from tests.helpers.examples import examples
 
 pytestmark = pytest.mark.reliability
@@ -20,7 +20,7 @@ LEAK = "#include <stdlib.h>\nint main(void) { char *volatile p = malloc(9); p = 
 
 def compile_with_sanitizers(sources: list[Path], program: Path) -> subprocess.CompletedProcess:
     includes = [f"-I{FMU / 'include'}", f"-I{FMU / 'src'}", "-DFMU_TOKEN=harness"]
-    command = [*compiler(), *FLAGS, *SANITIZE, *includes, *map(str, sources)]
+    command = [*compiler(), *FLAGS, *SANITIZE, *PLAIN_NAMES, *includes, *map(str, sources)]
     return subprocess.run([*command, "-o", str(program), "-lm"], capture_output=True, text=True)
 
 

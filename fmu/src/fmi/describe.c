@@ -1,9 +1,9 @@
 /* Prints the XML files of the FMU from the table of variables. Runs at build time; not a part of
  * the FMU.
  *
- *     describe 2 SOURCE...      modelDescription.xml, FMI 2.0
- *     describe 3                modelDescription.xml, FMI 3.0
- *     describe build SOURCE...  buildDescription.xml, FMI 3.0 */
+ *     describe 2 SOURCE...         modelDescription.xml, FMI 2.0
+ *     describe 3                   modelDescription.xml, FMI 3.0
+ *     describe build 2 SOURCE...   buildDescription.xml, FMI 2.0 (from 2.0.4 on) or 3.0 */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -331,14 +331,21 @@ static void model_description(int version, char **sources, int n_sources)
     puts("</fmiModelDescription>");
 }
 
-static void build_description(char **sources, int n_sources)
+static void build_description(const char *version, char **sources, int n_sources)
 {
     puts(HEAD "<fmiBuildDescription fmiVersion=\"3.0\">\n"
               "  <BuildConfiguration modelIdentifier=\"stickslip\">\n"
               "    <SourceFileSet language=\"C11\" compiler=\"gcc\" "
               "compilerOptions=\"-O2 -ffp-contract=off\">");
     source_files(sources, n_sources, "SourceFile");
-    puts("    </SourceFileSet>\n  </BuildConfiguration>\n</fmiBuildDescription>");
+    printf("      <PreprocessorDefinition name=\"FMI%s_OVERRIDE_FUNCTION_PREFIX\" value=\"1\" "
+           "optional=\"true\"\n        description=\"For a shared library: functions without the "
+           "prefix stickslip_\"/>\n",
+           version);
+    puts("    </SourceFileSet>\n"
+         "    <Library name=\"m\" external=\"true\" description=\"libm, the functions of math.h, "
+         "where it is not a part of the C library\"/>\n"
+         "  </BuildConfiguration>\n</fmiBuildDescription>");
 }
 
 int main(int argc, char **argv)
@@ -348,10 +355,10 @@ int main(int argc, char **argv)
         model_description(2, argv + 2, argc - 2);
     else if (strcmp(what, "3") == 0)
         model_description(3, NULL, 0);
-    else if (strcmp(what, "build") == 0)
-        build_description(argv + 2, argc - 2);
+    else if (strcmp(what, "build") == 0 && argc > 2)
+        build_description(argv[2], argv + 3, argc - 3);
     else {
-        fputs("usage: describe 2|3|build SOURCE...\n", stderr);
+        fputs("usage: describe 2|3|build 2|build 3 SOURCE...\n", stderr);
         return 2;
     }
     return fflush(stdout) || ferror(stdout) ? 1 : 0;

@@ -1,5 +1,15 @@
 /* FMI 2.0 Co-Simulation. */
+/* The standard gives source code names with this prefix; FMI2_OVERRIDE_FUNCTION_PREFIX, or a header
+ * of the importer's own, takes it off for a shared library. */
+#ifndef FMI2_FUNCTION_PREFIX
+#define FMI2_FUNCTION_PREFIX stickslip_
+#endif
+/* The importer's header; for one who has none, the standard's lies beside. */
+#if __has_include(<fmi2Functions.h>)
+#include <fmi2Functions.h>
+#else
 #include "fmi2Functions.h"
+#endif
 
 #include "instance.h"
 

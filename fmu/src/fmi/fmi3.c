@@ -1,5 +1,15 @@
 /* FMI 3.0 Co-Simulation. */
+/* The standard gives source code names with this prefix; FMI3_OVERRIDE_FUNCTION_PREFIX, or a header
+ * of the importer's own, takes it off for a shared library. */
+#ifndef FMI3_FUNCTION_PREFIX
+#define FMI3_FUNCTION_PREFIX stickslip_
+#endif
+/* The importer's header; for one who has none, the standard's lies beside. */
+#if __has_include(<fmi3Functions.h>)
+#include <fmi3Functions.h>
+#else
 #include "fmi3Functions.h"
+#endif
 
 #include "instance.h"
 
