@@ -352,6 +352,13 @@ class Run(Table):
         1.0, "s", 0.0, 1e5, "Start of the averages; half of the duration by default"
     )
     output_step: float = _number(5e-5, "s", 1e-9, 1e3, "Time between rows of the waveforms")
+    shutter: float = _number(
+        0.0,
+        "1",
+        0.0,
+        1.0,
+        "Exposure of the camera that reads the run, as a share of the time between its frames",
+    )
     tolerance: float = _number(
         0.01,
         "1",

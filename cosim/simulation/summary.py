@@ -9,7 +9,7 @@ from cosim.coupling.loop.recorder import Recorder
 from cosim.files.spill import blocks
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Electrics
-from cosim.trials.camera import three_point_accelerations
+from cosim.trials.camera import FRAME_RATE, accelerations, instants_a_frame, shown
 
 UNITS = {
     "v_average": "m/s",
@@ -37,13 +37,13 @@ def summarise(
     energies those of both.
 
     A rigid impact changes velocities in no time: there ``a_surface_max`` and ``a_surface_min`` are
-    None. The camera's reading is of the true surface at each frame, through three-point second
-    differences.
+    None. The camera's reading is of the true surface while each frame is exposed, through Tracker's
+    five-point differences.
     """
     run, before = scene.run, recorder.at_settle
     span = run.duration - run.settle
     v_average = (totals["z_part"] - before["z_part"]) / span
-    seen_max, seen_min = _seen(recorder.frames)
+    seen_max, seen_min = _seen(recorder.frames, run.shutter / FRAME_RATE)
     rigid = scene.mechanics.contact == "rigid"
     a_max, a_min, v_max, v_min, z_max, z_min = recorder.extremes[:6]
     driven = scene.circuit.model != "none"
@@ -71,13 +71,18 @@ def summarise(
     return result | _energies(scene, totals, electric)
 
 
-def _seen(frames: npt.NDArray[np.float64]) -> tuple[float, float] | tuple[None, None]:
-    """The largest and smallest acceleration (m/s²) that a camera reads from heights (m)."""
-    most, least = -np.inf, np.inf
-    for part in blocks(len(frames) - 2):
-        read = three_point_accelerations(frames[part.start : part.stop + 2])
+def _seen(
+    heights: npt.NDArray[np.float64], exposure: float
+) -> tuple[float, float] | tuple[None, None]:
+    """The largest and smallest acceleration (m/s²) that a camera reads from heights (m) at the
+    instants of its frames.
+    """
+    n, most, least = instants_a_frame(exposure), -np.inf, np.inf
+    frames = len(heights) // n
+    for part in blocks(frames - 4):
+        read = accelerations(shown(heights[n * part.start : n * (part.stop + 4)], exposure))[2:-2]
         most, least = max(most, float(read.max())), min(least, float(read.min()))
-    return (most, least) if len(frames) > 2 else (None, None)
+    return (most, least) if frames > 4 else (None, None)
 
 
 def _energies(

@@ -1,7 +1,11 @@
 """The camera of the published trials: what it sees of a run, and how Tracker differences that.
 
-Tracker (physlets.org/tracker) takes velocities over three frames and accelerations over five, by
-least squares; the columns of the trials hold these.
+A frame shows where a body was on average while the shutter was open: Tracker's user, or its
+template matching, marks the middle of what is blurred. The exposure lies about the frame's time.
+
+Tracker (physlets.org/tracker) takes velocities over three frames and accelerations over five:
+v_i = (z_i+1 − z_i−1)/(2 Δt) and a_i = (2 z_i+2 − z_i+1 − 2 z_i − z_i−1 + 2 z_i−2)/(7 Δt²), the
+parabola through five points by least squares. The columns of the trials hold these.
 """
 
 from collections.abc import Mapping
@@ -12,6 +16,12 @@ import numpy as np
 from cosim.arrays import Array
 
 FRAME_RATE = 960.0  # 1/s
+
+INSTANTS = 16
+"""Of an exposure, whose mean a frame shows. A velocity that jumps by 0.3 m/s within the longest
+exposure makes this mean wrong by 0.2 µm at most."""
+
+SHORTEST = 1e-6  # s; a shorter exposure is an instant
 
 
 @dataclass(frozen=True)
@@ -30,33 +40,57 @@ def frame_count(waveforms: Mapping[str, Array], start: float) -> int:
     return max(0, int((waveforms["time"][-1] - start) * FRAME_RATE + 1e-6) + 1)
 
 
-def film(waveforms: Mapping[str, Array], start: float, count: int) -> Frames:
-    """``count`` frames of a run (its waveforms, SI, by name) from ``start`` (s) on."""
-    time = start + np.arange(count) / FRAME_RATE
+def frame_times(start: float, count: int) -> Array:
+    """Times (s) of ``count`` frames of the published trials' camera, the first at ``start``."""
+    return start + np.arange(count) / FRAME_RATE
+
+
+def instants_a_frame(exposure: float) -> int:
+    """How many instants stand for an exposure (s)."""
+    return INSTANTS if exposure >= SHORTEST else 1
+
+
+def instants(frames: Array, exposure: float) -> Array:
+    """Times (s) within the exposure (s) of each frame, evenly spread, frame after frame."""
+    n = instants_a_frame(exposure)
+    return np.add.outer(frames, exposure * ((np.arange(n) + 0.5) / n - 0.5)).ravel()
+
+
+def shown(heights: Array, exposure: float) -> Array:
+    """What frames show of the heights at their instants: the mean of each exposure (s)."""
+    return heights.reshape(-1, instants_a_frame(exposure)).mean(axis=1)
+
+
+def film(waveforms: Mapping[str, Array], frames: Array, exposure: float) -> Frames:
+    """A run (its waveforms, SI, by name) as frames at these times (s) with this exposure (s)
+    show it. Where an exposure reaches beyond the run, the bodies stand still there.
+    """
+    time = waveforms["time"]
+    at = np.clip(instants(frames, exposure), time[0], time[-1])
     z_surface, z_part = (
-        hermite(time, waveforms["time"], waveforms[f"z_{body}"], waveforms[f"v_{body}"])
+        shown(hermite(at, time, waveforms[f"z_{body}"], waveforms[f"v_{body}"]), exposure)
         for body in ("surface", "part")
     )
-    return Frames(time - start, z_surface, velocities(z_surface), z_part, velocities(z_part))
+    return Frames(
+        *(frames - frames[0], z_surface, velocities(frames, z_surface)),
+        *(z_part, velocities(frames, z_part)),
+    )
 
 
-def velocities(z: Array) -> Array:
+def velocities(time: Array, z: Array) -> Array:
     """Central differences of heights frame by frame; NaN in the first and the last frame."""
     v = np.full(len(z), np.nan)
-    v[1:-1] = (z[2:] - z[:-2]) * FRAME_RATE / 2.0
+    v[1:-1] = (z[2:] - z[:-2]) / (time[2:] - time[:-2])
     return v
 
 
 def accelerations(z: Array) -> Array:
-    """Tracker's five-point differences of heights; NaN in the first two and the last two frames."""
+    """Five-point differences of heights at FRAME_RATE, m/s² for m; NaN in the first two and the
+    last two frames.
+    """
     a = np.full(len(z), np.nan)
     a[2:-2] = (2 * z[4:] - z[3:-1] - 2 * z[2:-2] - z[1:-3] + 2 * z[:-4]) * FRAME_RATE**2 / 7.0
     return a
-
-
-def three_point_accelerations(z: Array) -> Array:
-    """Second differences of heights, without the first and the last frame."""
-    return np.diff(z, 2) * FRAME_RATE**2
 
 
 def hermite(at: Array, time: Array, z: Array, v: Array) -> Array:

@@ -13,7 +13,7 @@ from cosim.arrays import Array
 from cosim.files.picture import Picture
 from cosim.files.spill import release
 from cosim.scene import Scene
-from cosim.trials.camera import FRAME_RATE, three_point_accelerations
+from cosim.trials.camera import FRAME_RATE, accelerations, film
 
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
 GRIP, SECOND = "#7a5195", "#6fb7e9"
@@ -236,12 +236,13 @@ def _power_of_ten(value: float, _: float) -> str:
 
 def _acceleration(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) -> None:
     axis.plot(time, cut["a_surface"], color=SURFACE, lw=0.8, label="true")
-    first, last = cut["time"][[0, -1]] * FRAME_RATE
-    frames = np.arange(np.ceil(first), last) / FRAME_RATE
-    if len(frames) > 2:
-        read = three_point_accelerations(np.interp(frames, cut["time"], cut["z_surface"]))
+    exposure = scene.run.shutter / FRAME_RATE
+    first, last = cut["time"][[0, -1]] + np.array([exposure, -exposure]) / 2
+    frames = np.arange(np.ceil(first * FRAME_RATE), last * FRAME_RATE) / FRAME_RATE
+    if len(frames) > 4:
+        read = accelerations(film(cut, frames, exposure).z_surface)
         label = f"read from {FRAME_RATE:.0f} frames/s"
-        axis.plot(frames[1:-1] * 1e3, read, color="0.2", lw=0.9, marker=".", ms=4, label=label)
+        axis.plot(frames * 1e3, read, color="0.2", lw=0.9, marker=".", ms=4, label=label)
     if np.abs(axis.dataLim.intervaly).max() > LINEAR:
         axis.set_yscale("symlog", linthresh=LINEAR)
         axis.yaxis.set_major_formatter(_power_of_ten)

@@ -1,6 +1,7 @@
 """Runs with a given surface: against the theory, and against the FMU in its prescribed mode."""
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -197,3 +198,20 @@ def test_energies_against_a_fine_quadrature() -> None:
     h = np.diff(w["time"])
     assert np.dot(power_in[:-1], h) == pytest.approx(summary["energy_in"], rel=1e-3)
     assert np.dot(lost[:-1], h) == pytest.approx(summary["energy_friction"], rel=1e-3)
+
+
+def test_a_shutter_blurs_a_sine_as_the_closed_form_has_it() -> None:
+    """Over an exposure ε a sine of frequency f shrinks by sin(π f ε)/(π f ε), and Tracker's
+    five-point difference takes (4 cos 2φ − 2 cos φ − 2)/(7 Δt²) of it, φ = 2 π f Δt.
+    """
+    f, dt, speed = 80.0, 1 / 960, 0.1
+    scene = ["drive.waveform=sine", f"drive.frequency={f}", f"drive.velocity_amplitude={speed}"]
+    phase = 2 * math.pi * f * dt
+    differenced = (4 * math.cos(2 * phase) - 2 * math.cos(phase) - 2) / (7 * dt**2)
+    sharp = speed / (2 * math.pi * f) * abs(differenced)
+    for shutter in (0.0, 0.4, 1.0):
+        found = simulate(load("optimal", [*scene, "run.duration=0.5", f"run.shutter={shutter}"]))
+        blur = np.sinc(f * shutter * dt)
+        for extreme in ("max", "min"):  # twelve frames a period meet both crests
+            read = abs(found.summary[f"a_camera_{extreme}"])
+            assert read == pytest.approx(blur * sharp, rel=2e-4), (shutter, extreme)

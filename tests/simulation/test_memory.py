@@ -47,6 +47,7 @@ CASES = {
     "full": ("paper-full", ["run.duration=0.02"]),
     "two surfaces": ("two-surfaces", ["run.duration=0.1"]),
     "changing grip": ("closed-loop-grasp", ["run.duration=0.1", "run.output_step=1.7e-4"]),
+    "a shutter": ("ideal-current", ["run.duration=0.2", "run.shutter=0.3"]),
     "many frames to a row": ("ideal-current", ["run.duration=0.5", "run.output_step=0.04"]),
 }
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from matplotlib.image import imread
+from scipy.signal import savgol_filter
 
 from cosim.cli.main import main
 from cosim.scene import Scene, load, to_toml
@@ -241,6 +242,11 @@ def test_extremes_of_the_surface(run: Run) -> None:
         assert summary["a_surface_min"] <= a.min() + 1e-6
 
 
+def parabolas(heights: Array) -> Array:
+    """Second derivatives of the least-squares parabolas through five frames each, by SciPy."""
+    return np.asarray(savgol_filter(heights, 5, 2, deriv=2, delta=1 / 960)[2:-2])
+
+
 def test_acceleration_as_a_camera_reads_it(run: Run) -> None:
     settings, time = run.scene.run, run["time"]
     first, last = math.ceil(settings.settle * 960 - 1e-9), int(settings.duration * 960 + 1e-9)
@@ -254,9 +260,27 @@ def test_acceleration_as_a_camera_reads_it(run: Run) -> None:
         + s**2 * (3 - 2 * s) * z[k + 1]
         + h * s * (1 - s) * ((1 - s) * v[k] - s * v[k + 1])
     )
-    read = (heights[2:] - 2 * heights[1:-1] + heights[:-2]) * 960.0**2
+    read = parabolas(heights)
     assert run.summary["a_camera_max"] == pytest.approx(read.max(), rel=0.01, abs=0.5)
     assert run.summary["a_camera_min"] == pytest.approx(read.min(), rel=0.01, abs=0.5)
+
+
+def test_a_shutter_shows_the_mean_of_its_exposure(tmp_path: Path) -> None:
+    """Against the mean of rows far denser than what the camera takes of a run with impacts."""
+    dense, shutter = 200, 0.75
+    scene = ("ideal-current", "run.duration=0.2", "run.settle=0.05")
+    rows = f"run.output_step={1 / (960 * dense)!r}"
+    sharp = cosim_run(tmp_path / "sharp", *scene, rows)
+    blurred = cosim_run(tmp_path / "blurred", *scene, f"run.shutter={shutter}")
+    z, half = sharp["z_surface"], round(dense * shutter / 2)
+    frames = range(math.ceil((0.05 * 960 * dense + half) / dense), (len(z) - half - 1) // dense + 1)
+    means = [np.trapezoid(z[dense * k - half : dense * k + half + 1]) / (2 * half) for k in frames]
+    for name, extreme in (("max", np.max), ("min", np.min)):
+        found = blurred.summary[f"a_camera_{name}"]
+        assert found == pytest.approx(extreme(parabolas(np.array(means))), rel=1e-3)
+    # The drop is blurred: it reads less steep.
+    assert blurred.summary["a_camera_min"] > 0.995 * sharp.summary["a_camera_min"]
+    assert blurred.summary["v_average"] == pytest.approx(sharp.summary["v_average"], rel=1e-6)
 
 
 def test_current_and_energy(run: Run) -> None:

@@ -10,7 +10,7 @@ from cosim.cli.main import main
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.compare.compare import explained, measure
-from cosim.trials.camera import FRAME_RATE, film, hermite, velocities
+from cosim.trials.camera import FRAME_RATE, film, frame_times, hermite, velocities
 from cosim.trials.tracked import read
 
 
@@ -27,7 +27,7 @@ def write_trial(path: Path, time: np.ndarray, surface: np.ndarray, part: np.ndar
 def test_a_run_compared_with_itself_through_the_camera(tmp_path: Path) -> None:
     scene = load("ideal-current", ["run.duration=0.8", "run.settle=0.3"])
     waves = simulate(scene).columns
-    frames = film(waves, 0.3125, 300)
+    frames = film(waves, frame_times(0.3125, 300), 0.0)
     write_trial(tmp_path / "own.csv", frames.time, frames.z_surface, frames.z_part)
     metrics, simulated, measured = measure(waves, read(tmp_path / "own.csv"), 0.3, 0.05)
     # The phase is searched on a grid of an eighth of a millisecond; the true one is on it.
@@ -43,7 +43,7 @@ def test_a_run_compared_with_itself_through_the_camera(tmp_path: Path) -> None:
 def test_metrics_of_a_known_difference(tmp_path: Path) -> None:
     scene = load("ideal-current", ["run.duration=0.8", "run.settle=0.3"])
     waves = simulate(scene).columns
-    frames = film(waves, 0.3, 300)
+    frames = film(waves, frame_times(0.3, 300), 0.0)
     slower = frames.z_part - 2e-3 * frames.time  # drifts 2 mm/s less
     write_trial(tmp_path / "own.csv", frames.time, frames.z_surface, slower)
     metrics, _, _ = measure(waves, read(tmp_path / "own.csv"), 0.3, 0.05)
@@ -100,7 +100,7 @@ def test_interpolation_is_exact_for_cubics() -> None:
 
 def test_differences_and_r2() -> None:
     time = np.arange(20) / FRAME_RATE
-    v = velocities(3.0 * time**2)
+    v = velocities(time, 3.0 * time**2)
     assert np.isnan(v[[0, -1]]).all()
     np.testing.assert_allclose(v[1:-1], 6.0 * time[1:-1], atol=1e-9)
     wanted = np.sin(time * 300)

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.arrays import Array
-from cosim.trials.camera import FRAME_RATE
+from cosim.trials.camera import FRAME_RATE, instants, instants_a_frame
 
 ENTRIES = 1 << 14
 """Rows and frames of the camera that are planned, and taken, at a time."""
@@ -22,22 +22,24 @@ def grid(step: float, end: float) -> Array:
 
 
 def agendas(
-    row_step: float, duration: float, settle: float, stops: list[float]
+    row_step: float, duration: float, settle: float, stops: list[float], shutter: float
 ) -> Iterator[tuple[Array, npt.NDArray[np.int32]]]:
     """Times (s) at which something is to be written down, and what, part after part; not more than
     ENTRIES rows and frames in one. The last time of all is endless.
+
+    Of frames, which are exposed for a share ``shutter`` of their interval, the instants.
     """
     frame_step = 1.0 / FRAME_RATE
     extra, kinds = np.array([settle, *stops]), np.array([_SETTLED, *[0] * len(stops)], np.int32)
     # Whole numbers of _SAME_TIME, so that no part ends between times that are one.
-    length = max(1, int(ENTRIES / 3 * min(row_step, frame_step) / _SAME_TIME))
+    shortest = min(row_step, frame_step / instants_a_frame(shutter * frame_step))
+    length = max(1, int(ENTRIES / 3 * shortest / _SAME_TIME))
     last = int(np.rint(duration / _SAME_TIME)) + 1
     for begin in range(0, last, length):
         # To the last one belongs what rounding puts behind the end.
         end = begin + length if begin + length < last else _NEVER
         rows = _within(row_step, duration, begin, end)
-        frames = _within(frame_step, duration, begin, end)
-        frames = frames[frames >= settle]
+        frames = exposures(duration, settle, shutter, begin, end)
         here = (np.rint(extra / _SAME_TIME) >= begin) & (np.rint(extra / _SAME_TIME) < end)
         times = np.concatenate([rows, frames, extra[here]])
         what = np.concatenate(
@@ -53,6 +55,22 @@ def agendas(
             yield np.append(times[first], np.inf), np.append(joined, np.int32(0))
         elif len(first):
             yield times[first], joined
+
+
+def exposures(
+    duration: float, settle: float, shutter: float, begin: int = 0, end: int = _NEVER
+) -> Array:
+    """The instants (s), from ``begin`` until before ``end`` (multiples of _SAME_TIME), of the
+    frames that are exposed wholly after ``settle`` and before ``duration`` (s).
+    """
+    exposure = shutter / FRAME_RATE
+    reach = int(exposure / _SAME_TIME) + 1
+    frames = _within(1.0 / FRAME_RATE, duration, begin - reach, end + reach)
+    opened, closed = frames - exposure / 2, frames + exposure / 2
+    frames = frames[(opened >= settle) & (closed <= duration * (1 + 1e-12))]
+    times = instants(frames, exposure)
+    place = np.rint(times / _SAME_TIME)
+    return times[(place >= begin) & (place < end)]
 
 
 def _within(step: float, duration: float, begin: int, end: int) -> Array:

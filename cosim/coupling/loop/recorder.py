@@ -55,7 +55,7 @@ class Recorder:
         grip = mechanics.normal_force
         corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
         self._agendas = agenda.agendas(
-            run.output_step, run.duration, run.settle, [*corners, run.duration]
+            *(run.output_step, run.duration, run.settle, [*corners, run.duration], run.shutter)
         )
         self._corners = np.array([grip.corners, grip.forces] if grip else [])
         schedule = None
@@ -184,7 +184,7 @@ class Recorder:
 
     @property
     def frames(self) -> Array:
-        """The surface's height (m) at each frame of the camera after settling."""
+        """The surface's height (m) at the instants of each frame of the camera after settling."""
         self._take()
         return self._frames.column()
 

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.coupling.loop.agenda import grid
+from cosim.coupling.loop.agenda import exposures, grid
 from cosim.errors import BadInput, plain
 from cosim.files.columns import read_timetable
 from cosim.mechanics import part
 from cosim.scene import Scene
-from cosim.trials.camera import FRAME_RATE, three_point_accelerations
+from cosim.trials.camera import FRAME_RATE, accelerations, shown
 
 SINE_KNOTS = 2000
 """Knots a period of a sine: its chord error is 1.3e-6 of the amplitude."""
@@ -106,8 +106,7 @@ def simulate_part(scene: Scene, progress: Callable[[float], None]) -> tuple[dict
         )
     run, friction, mechanics = scene.run, scene.friction, scene.mechanics
     rows = grid(run.output_step, run.duration)
-    frames = grid(1.0 / FRAME_RATE, run.duration)
-    frames = frames[frames >= run.settle]
+    frames = exposures(run.duration, run.settle, run.shutter)
     wanted = np.unique(np.concatenate([rows, frames, [run.settle, run.duration]]))
     motion = part.exact(
         times,
@@ -146,7 +145,8 @@ def simulate_part(scene: Scene, progress: Callable[[float], None]) -> tuple[dict
     span = run.duration - run.settle
     v_average = float(motion.z[-1] - motion.z[after][0]) / span
     peaks = surface.extremes(run.settle, run.duration)
-    camera = three_point_accelerations(z[np.searchsorted(wanted, frames)])
+    seen = shown(z[np.searchsorted(wanted, frames)], run.shutter / FRAME_RATE)
+    camera = accelerations(seen)[2:-2]
     shares = motion.sticking[after[:-1]]
     periodic = scene.drive.file is None
     summary = {

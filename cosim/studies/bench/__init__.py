@@ -18,7 +18,7 @@ from cosim.studies.bench.rungs import cost_exponent, real_time
 from cosim.studies.bench.timings import solvers, throughput
 from cosim.studies.fit.cases import Case
 from cosim.studies.tables import machine
-from cosim.trials.camera import film
+from cosim.trials.camera import film, frame_times
 from cosim.trials.tracked import Track, Trial, read_folder
 
 _OFFSETS = [-2.0 + 0.05 * k for k in range(40)]
@@ -73,7 +73,7 @@ def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
 
 def _made_up(number: int) -> Trial:
     scene = load("ideal-current", ["run.duration=0.8", "run.settle=0.4"])
-    frames = film(simulate(scene).columns, 0.4 + 0.003 * number, FRAMES)
+    frames = film(simulate(scene).columns, frame_times(0.4 + 0.003 * number, FRAMES), 0.0)
     nothing = np.full(FRAMES, np.nan)
     surface = Track(frames.z_surface, frames.v_surface, nothing, nothing)
     part = Track(frames.z_part, frames.v_part, nothing, nothing)

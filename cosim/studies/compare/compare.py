@@ -11,7 +11,7 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput
-from cosim.trials.camera import FRAME_RATE, Frames, film, frame_count
+from cosim.trials.camera import FRAME_RATE, Frames, film, frame_count, frame_times
 from cosim.trials.tracked import Trial
 
 SHIFTS = 400
@@ -65,17 +65,23 @@ class CameraError:
 
 
 def measure(
-    waveforms: dict[str, Array], trial: Trial, earliest: float, period: float
+    waveforms: dict[str, Array],
+    trial: Trial,
+    earliest: float,
+    period: float,
+    shutter: float = 0.0,
 ) -> tuple[Metrics, Frames, Frames]:
     """Metrics, and both sides at the trial's frames, the run shifted for the best agreement.
 
-    ``earliest`` is the first time of the run that may be laid over the trial's first frame, s.
+    ``earliest`` is the first time of the run that may be laid over the trial's first frame, s;
+    ``shutter`` the exposure as a share of the time between frames.
     """
+    exposure = shutter / FRAME_RATE
     measured = _of_trial(trial)
     for body, z in (("platform", measured.z_surface), ("part", measured.z_part)):
         if np.ptp(z) == 0.0:
             raise BadInput(f"{trial.name}: the {body} does not move: there is nothing to compare.")
-    own = made_of(waveforms, trial, earliest)
+    own = made_of(waveforms, trial, earliest, shutter)
     end = float(waveforms["time"][-1])
     if period == 0.0 and not own:  # the run begins with the first frame whose velocity is known
         first = int(np.argmax(np.isfinite(trial.platform.v)))
@@ -90,10 +96,10 @@ def measure(
         )
     latest = earliest if own else max(earliest, min(room, earliest + period))
     starts = np.linspace(earliest, latest, SHIFTS)
-    candidates = (film(waveforms, float(start), n) for start in starts)
+    candidates = (film(waveforms, frame_times(float(start), n), exposure) for start in starts)
     fits = [explained(frames.v_surface, measured.v_surface) for frames in candidates]
     start = float(starts[int(np.argmax(fits))])
-    simulated = film(waveforms, start, n)
+    simulated = film(waveforms, frame_times(start, n), exposure)
     moved = simulated.z_part - simulated.z_part[0], measured.z_part - measured.z_part[0]
     error = float(np.nanmean(np.abs(moved[0] - moved[1])))
     span = float(measured.time[-1] - measured.time[0])
@@ -131,12 +137,13 @@ def camera_error(waveforms: dict[str, Array], trial: Trial, start: float) -> Cam
     return CameraError(surface, part, distance("v_surface"))
 
 
-def made_of(waveforms: dict[str, Array], trial: Trial, start: float) -> bool:
+def made_of(waveforms: dict[str, Array], trial: Trial, start: float, shutter: float = 0.0) -> bool:
     """Whether the trial's heights are this run's from ``start`` (s) on, to a trial's digits."""
     n = len(trial.time)
     if n > frame_count(waveforms, start):
         return False
-    seen, tracked = film(waveforms, start, n), _of_trial(trial)
+    seen = film(waveforms, frame_times(start, n), shutter / FRAME_RATE)
+    tracked = _of_trial(trial)
     # A trial has seven digits, and eight places of a second or millimetre.
     return all(
         np.allclose(getattr(seen, name), getattr(tracked, name), rtol=6e-7, atol=places)

@@ -120,8 +120,9 @@ def compare(
     measured = read(Path(trial))
     name, waveforms, scene = _run(run, overrides, measured)
     start, period = laid_over(scene)
-    metrics, simulated, frames = measure(waveforms, measured, start, period)
-    own = made_of(waveforms, measured, start)
+    shutter = scene.run.shutter
+    metrics, simulated, frames = measure(waveforms, measured, start, period, shutter)
+    own = made_of(waveforms, measured, start, shutter)
     camera = camera_error(waveforms, measured, start) if own else None
     return Comparison(name, measured.name, metrics, simulated, frames, camera)
 

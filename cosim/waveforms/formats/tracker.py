@@ -1,16 +1,24 @@
 """A tracked trial made of a run: the header, units, sampling and digits of the published trials.
 
-The camera is that of `cosim compare`, without noise. What the model holds at rest is written as
-resting: platform and part across, and the springed plate.
+The camera is that of `cosim compare`, with the shutter of the run's scene and without noise. What
+the model holds at rest is written as resting: platform and part across, and the springed plate.
 """
 
+from functools import partial
 from io import BytesIO
 
 import numpy as np
 
 from cosim.errors import BadInput, plain
 from cosim.scene import Scene, load
-from cosim.trials.camera import FRAME_RATE, accelerations, film, frame_count, velocities
+from cosim.trials.camera import (
+    FRAME_RATE,
+    accelerations,
+    film,
+    frame_count,
+    frame_times,
+    velocities,
+)
 from cosim.trials.tracked import FEWEST_ROWS
 from cosim.waveforms.formats.source import Format, Run
 
@@ -23,7 +31,8 @@ MISSING = "\ufffd"
 
 def write(run: Run, file: BytesIO) -> str:
     """Platform p, part o and springed plate s, mm, frame by frame."""
-    start, _ = laid_over(load(run.folder / "scene.toml"))
+    scene = load(run.folder / "scene.toml")
+    start, _ = laid_over(scene)
     n = frame_count(run.waveforms, start)
     if not FEWEST_ROWS <= n <= MOST_FRAMES:
         shortest, longest = ((rows - 1) / FRAME_RATE for rows in (FEWEST_ROWS, MOST_FRAMES))
@@ -32,13 +41,19 @@ def write(run: Run, file: BytesIO) -> str:
             f"the camera sees {n} of this run; run.duration must be {shortest:.4g} s to "
             f"{longest:.4g} s more than {start:g} s."
         )
-    frames = film(run.waveforms, start, n)
+    exposure = scene.run.shutter / FRAME_RATE
+    frames = film(run.waveforms, frame_times(start, n), exposure)
     columns = {"t": frames.time}
     rest = np.zeros(n)
     for body, z in (("p", frames.z_surface), ("o", frames.z_part), ("s", rest)):
-        for kind, of in (("", np.copy), ("v", velocities), ("a", accelerations)):
-            columns[f"{kind}x{body}"] = of(rest)
-            columns[f"{kind}z{body}"] = of(1e3 * z)
+        across, along = rest, 1e3 * z
+        for kind, of in (
+            ("", np.copy),
+            ("v", partial(velocities, frames.time)),
+            ("a", accelerations),
+        ):
+            columns[f"{kind}x{body}"] = of(across)
+            columns[f"{kind}z{body}"] = of(along)
     rows = zip(*(map(number, values.tolist()) for values in columns.values()), strict=True)
     text = "\r\n".join([",".join(columns), *map(",".join, rows)])
     file.write(text.encode())
