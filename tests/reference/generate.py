@@ -53,15 +53,16 @@ class Case:
     name: str
     contact: str
     circuit: str
-    params: Mapping[str, float] = field(default_factory=dict)
+    params: Mapping[str, float | str] = field(default_factory=dict)
     duration: float = 0.6  # s
     settle: float = 0.3  # s
 
 
-def case(name: str, contact: str, circuit: str, **params: float) -> Case:
+def case(name: str, contact: str, circuit: str, **params: float | str) -> Case:
     return Case(name, contact, circuit, params)
 
 
+SINE = {"waveform": "sine", "mu_plate": 0.2, "amplitude": 5.0, "offset": 1.0}
 FAST = {"frequency": 50.8, "amplitude": 9.0}  # Hz, V: where the output limits tell
 GRIPPER = {"n_surfaces": 2, "count": 2, "part_mass": 0.017}
 CASES = (
@@ -108,12 +109,18 @@ CASES = (
     case("plate-limited", "compliant", "limited", mu_plate=0.1, inductance=3e-3),
     case("bent-bl-limited", "rigid", "limited", b1=60.0, b2=-5e4, amplitude=9.0),
     case("no-walls-limited", "compliant", "limited", travel=1e-2, force_factor=2.0, frequency=35.0),
+    Case("sine-limited", "compliant", "limited", SINE, 2.0, 1.0),
+    case("sine-rigid-ideal", "rigid", "ideal", waveform="sine", mu_plate=0.1),
+    case(
+        *("sine-rigid-limited", "rigid", "limited"),
+        **{"waveform": "sine", "mu_plate": 0.2, "inductance": 4e-3, "frequency": 40.0},
+    ),
 )
 
 
 def run(c: Case, tol: float, method: str = "Adams", **changes: float) -> Result:
     """Solves a set with some parameters changed by parts of themselves."""
-    params = asdict(Params()) | dict(c.params)
+    params: dict[str, Any] = asdict(Params()) | dict(c.params)
     for name, change in changes.items():
         params[name] *= 1.0 + change
     return simulate(
