@@ -53,6 +53,13 @@ class Piece(Structure):
         """V1 at ``t`` in the piece, V."""
         return _formula().command_value(byref(self), t)
 
+    def values(self, times: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """V1 at each of ``times`` in the piece, V."""
+        at = np.ascontiguousarray(times)
+        values = np.empty_like(at)
+        _formula().command_values(byref(self), at.size, at.ctypes.data, values.ctypes.data)
+        return values
+
     def before(self, t: float) -> float:
         """Left limit of V1 at ``t``, V, after the begin of the piece."""
         return self.end if t >= self.until else self.value(t)

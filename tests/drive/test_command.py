@@ -1,6 +1,7 @@
 """The command V1(t): shapes, exact jumps, no drift, and the firmware's staircase."""
 
 from fractions import Fraction
+from itertools import pairwise
 from math import floor, inf, nextafter, pi
 
 import numpy as np
@@ -20,6 +21,7 @@ from cosim.drive.command import (
     command,
     commands,
 )
+from cosim.drive.straights import straights
 from cosim.scene import load
 from cosim.scene.firmware import passes, staircase
 from tests.helpers.pins import pin, pin_before, v_dac, v_dac_before, value_before
@@ -60,6 +62,33 @@ def test_sine() -> None:
     assert drive.values([0, 0.0125, 0.025, 0.0375]) == pytest.approx([-1.2, 2.8, -1.2, -5.2])
     assert drive.next_jump(0.0) == inf
     assert drive.value(1000 * 0.05 + 0.0125) == pytest.approx(2.8, abs=1e-12)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.3])
+def test_straights_of_a_sine_have_its_integrals(lag: float) -> None:
+    f, offset, half, periods = 20.0, -1.2, 4.0, 3
+    turn = 2 * pi * f
+    shapes = [Sine(f, 2 * half, offset), Lagging(Sine(f, 2 * half, offset), lag / f)]
+    blocks = list(straights(shapes, periods / f))
+    # Each begins where the one before ended, and so does its voltage.
+    for before, after in pairwise(blocks):
+        assert before[0][-1] == after[0][0]
+        assert before[2][-1] == pytest.approx(after[1][0], abs=1e-13)
+    times = np.concatenate([[0.0], *(edges[1:] for edges, _, _ in blocks)])
+    start = np.concatenate([first for _, first, _ in blocks])
+    end = np.concatenate([last for _, _, last in blocks])
+    h = np.diff(times)
+    for k, begin in enumerate((0.0, lag / f)):
+        middle, reach = 0.5 * (times[1:] + times[:-1]) - begin, 0.5 * turn * h
+        mean = offset + half * np.sin(turn * middle) * np.sin(reach) / reach
+        # Those that end with a piece of either command are not all as long as the others.
+        whole = h > 0.999 * h.max()
+        assert whole.sum() > 0.99 * len(h)
+        np.testing.assert_allclose(
+            0.5 * (start[:, k] + end[:, k])[whole], mean[whole], rtol=0, atol=3e-12
+        )
+        squares = np.sum(h * (start[:, k] ** 2 + start[:, k] * end[:, k] + end[:, k] ** 2)) / 3
+        assert squares * f / periods == pytest.approx(offset**2 + half**2 / 2, rel=1e-11)
 
 
 def test_square() -> None:

@@ -62,6 +62,7 @@ def case(name: str, contact: str, circuit: str, **params: float | str) -> Case:
     return Case(name, contact, circuit, params)
 
 
+SINE = {"waveform": "sine", "mu_plate": 0.2, "amplitude": 5.0, "offset": 1.0}
 FAST = {"frequency": 50.8, "amplitude": 9.0}  # Hz, V: where the output limits tell
 GRIPPER = {"n_surfaces": 2, "count": 2, "part_mass": 0.017}
 # As the scene direct-drive-stops: the back-EMF of a strong coil jumps at the stops.
@@ -118,6 +119,12 @@ CASES = (
     case("direct-rigid", "rigid", "amplifier", **DIRECT),
     case("direct-rigid-limited", "rigid", "limited", **DIRECT),
     case("no-walls-limited", "compliant", "limited", travel=1e-2, force_factor=2.0, frequency=35.0),
+    Case("sine-limited", "compliant", "limited", SINE, 2.0, 1.0),
+    case("sine-rigid-ideal", "rigid", "ideal", waveform="sine", mu_plate=0.1),
+    case(
+        *("sine-rigid-limited", "rigid", "limited"),
+        **{"waveform": "sine", "mu_plate": 0.2, "inductance": 4e-3, "frequency": 40.0},
+    ),
 )
 
 

@@ -171,6 +171,14 @@ class _Model:
             return self.p.offset + self.p.amplitude * wave
         return self.p.offset + self.p.amplitude * (t / self.period - self.cycle - 0.5)
 
+    def drive_slope(self, t: float) -> float:
+        """dV1/dt between jumps [V/s]."""
+        p = self.p
+        if self.sine:
+            turns = 2.0 * math.pi * p.frequency
+            return 0.5 * p.amplitude * turns * math.cos(turns * t)
+        return p.amplitude / self.period
+
     def current(self, t: float, i: float) -> float:
         """Current of one coil [A]."""
         given = self.ideal or (self.limited and self.amp == LINEAR)
@@ -178,9 +186,9 @@ class _Model:
 
     def following(self, t: float, y: Sequence[float]) -> float:
         """Output voltage at which the coil's current would be the command [V]."""
-        p, slope = self.p, self.p.amplitude / self.period  # of V1 [V/s]
+        p = self.p
         ohmic = (1.0 + p.resistance / self.sense) * self.drive(t)
-        return ohmic + p.inductance * slope / self.sense + self.bl(y[2]) * y[3]
+        return ohmic + p.inductance * self.drive_slope(t) / self.sense + self.bl(y[2]) * y[3]
 
     def bl(self, q: float) -> float:
         """Force factor at the ram's position [N/A]."""
@@ -245,7 +253,7 @@ class _Model:
         di = dva = 0.0
         if self.limited:
             if self.amp == LINEAR:
-                va, di = self.following(t, y), p.amplitude / (self.period * self.sense)
+                va, di = self.following(t, y), self.drive_slope(t) / self.sense
                 i = self.current(t, i)
             else:
                 va = self.high if self.amp_sign > 0 else self.low

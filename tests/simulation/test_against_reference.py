@@ -23,13 +23,15 @@ CASES = {case["name"]: case for case in GOLDEN["cases"]}
 FULL_NAME = {key.name: key.full for key in keys()}
 
 # Allowed differences of a trajectory's samples in the first 60 ms, SI: about five times what the
-# coupling's error makes; without ngspice only the two integrators differ.
+# coupling's error makes; without ngspice only the two integrators differ, and by 2e-7 of half its
+# height the sine, which the FMU is given in straights.
 EARLY = {
     "amplifier": {"z_surface": 1e-6, "z_ram": 5e-6, "z_part": 1e-6, "v_part": 5e-4},
-    "limited": {"current": 1e-7, "z_surface": 2e-9, "z_ram": 5e-9, "z_part": 2e-9, "v_part": 5e-7},
+    "limited": {"current": 3e-7, "z_surface": 2e-9, "z_ram": 5e-9, "z_part": 2e-9, "v_part": 5e-7},
     "ideal": {"z_surface": 2e-9, "z_ram": 5e-9, "z_part": 2e-9, "v_part": 5e-7},
 }
-AVERAGE = {"amplifier": 5e-4, "limited": 1e-6, "ideal": 1e-6}  # relative, of v_average
+# Of v_average: relative, or absolute, m/s
+AVERAGE = {"amplifier": (5e-4, 1e-6), "limited": (1e-6, 1e-9), "ideal": (1e-6, 1e-9)}
 
 
 def scene_of(case: dict) -> Scene:
@@ -55,8 +57,9 @@ def check_early(case: dict, result: Result) -> None:
 
 def check_statistics(case: dict, result: Result) -> None:
     expected, found = case["result"], result.summary
-    allowed = AVERAGE[case["circuit"]] * (2.5 if case["delicate"] else 1.0)
-    assert found["v_average"] == pytest.approx(expected["v_average"], rel=allowed, abs=2e-6)
+    relative, absolute = AVERAGE[case["circuit"]]
+    relative *= 2.5 if case["delicate"] else 1.0
+    assert found["v_average"] == pytest.approx(expected["v_average"], rel=relative, abs=absolute)
     if (own := found.get("v_average_error")) is not None:
         off = found["v_average"] - expected["v_average"]
         # It leaves out that the back-EMF of a strong coil answers the better current.

@@ -44,6 +44,7 @@ CASES = {
         ["run.duration=0.2", "coil.eddy_inductance=1e-3", "coil.eddy_resistance=4"],
     ),
     "limited": ("paper", ["circuit.model=limited", "run.duration=0.2"]),
+    "sine": ("paper", ["circuit.model=limited", "drive.waveform=sine", "run.duration=0.07"]),
     "full": ("paper-full", ["run.duration=0.02"]),
     "two surfaces": ("two-surfaces", ["run.duration=0.1"]),
     "changing grip": ("closed-loop-grasp", ["run.duration=0.1", "run.output_step=1.7e-4"]),

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 
 from cosim.coupling.polynomials import Array, Signal, shifted, value
 from cosim.drive.pieces import Command
-from cosim.drive.straights import end_of_straight
+from cosim.drive.straights import straight
 from cosim.errors import SimulationFailed
 from cosim.scene import Scene
 
@@ -81,9 +81,7 @@ class Amplifier:
     def _straight(self) -> None:
         """Take the straight piece of the command that begins now."""
         command, now = self._command, max(self.time, self._corner)
-        piece = command.piece(now)
-        self._corner = end_of_straight(piece, now)
-        first, last = piece.value(now), piece.before(self._corner)
+        self._corner, first, last = straight(command.piece(now), now)
         self._x[_V1], self._x[_DV1] = first, (last - first) / (self._corner - now)
         self._choose()
 
