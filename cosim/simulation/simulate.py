@@ -77,7 +77,6 @@ def _simulate(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     finally:
         mechanics.close()
     summary = summarise(scene, recorder, totals, driven.electric) | {
-        "v_average_error": driven.v_average_error,
         "circuit_steps": driven.circuit_steps,
         "circuit_rejected": driven.circuit_rejected,
         "fmu_steps": recorder.steps,
@@ -85,6 +84,8 @@ def _simulate(scene: Scene, progress: Progress, fmi_version: int) -> Result:
         "method": driven.method,
         "versions": {**versions(), **driven.versions},
     }
+    if scene.rung.ngspice:
+        summary["v_average_error"] = driven.v_average_error
     return Result(scene, _waveforms(scene, recorder, driven), summary)
 
 
