@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from cosim.studies.compare.run import compare
     from cosim.studies.fit.fit import fit
     from cosim.studies.paper.theory import theory
+    from cosim.studies.spread import spread
     from cosim.studies.sweep import sweep
     from cosim.studies.tune import tune
     from cosim.waveforms.result import Result
@@ -30,6 +31,7 @@ __all__ = [
     "fit",
     "load",
     "run",
+    "spread",
     "sweep",
     "theory",
     "tune",
@@ -39,6 +41,7 @@ _HOMES = {
     "Result": "cosim.waveforms.result",
     "load": "cosim.scene",
     "run": "cosim.simulation.run",
+    "spread": "cosim.studies.spread",
     "sweep": "cosim.studies.sweep",
     "tune": "cosim.studies.tune",
     "compare": "cosim.studies.compare.run",

@@ -15,8 +15,16 @@ class BadInput(CosimError):
     exit_code = 2
 
 
-class NoEffect(UserWarning):
+class Note(UserWarning):
+    """What the user should know of something that was done all the same."""
+
+
+class NoEffect(Note):
     """Something was asked for that does nothing here; the rest is done."""
+
+
+class BeyondModel(Note):
+    """A run has left what the model or a part's data sheet holds for."""
 
 
 class SimulationFailed(CosimError):

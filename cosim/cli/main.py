@@ -11,7 +11,7 @@ from io import TextIOWrapper
 from typing import NoReturn
 
 from cosim.cli.command import add_commands
-from cosim.errors import BadInput, CosimError, NoEffect
+from cosim.errors import BadInput, CosimError, Note
 from cosim.files.declared import declared
 from cosim.version import __version__
 
@@ -46,7 +46,7 @@ def main(argv: list[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="replace")  # prints ? for what the encoding lacks
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("always", NoEffect)
+            warnings.simplefilter("always", Note)
             warnings.showwarning = _note
             argv = sys.argv[1:] if argv is None else argv
             arguments = _parser(argv).parse_args(argv)
@@ -71,8 +71,10 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _note(message: Warning | str, *_: object, **__: object) -> None:
-    """Print a warning on one line, without its place in the program."""
-    print("cosim: note:", " ".join(str(message).split()), file=sys.stderr)
+    """Print a warning on one line, without its place in the program, above a progress bar."""
+    from tqdm import tqdm
+
+    tqdm.write(f"cosim: note: {' '.join(str(message).split())}", file=sys.stderr)
 
 
 def _told(sentence: str, code: int) -> int:

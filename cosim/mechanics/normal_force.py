@@ -30,6 +30,12 @@ class NormalForce:
         share = min(max((time - start) / (end - start), 0.0), 1.0)
         return (1.0 - share) * forces[after - 1] + share * forces[after]
 
+    def least(self, duration: float) -> tuple[float, float]:
+        """The least force, N, from 0 to ``duration`` (s), and when, s."""
+        ends = [(self.value(time), time) for time in (0.0, duration)]
+        pairs = zip(self.forces, self.corners, strict=True)
+        return min([*ends, *(pair for pair in pairs if 0.0 <= pair[1] <= duration)])
+
 
 def normal_force(scene: Scene) -> NormalForce | None:
     """The force in ``friction.normal_force_file``, or None where it is constant.

@@ -3,8 +3,9 @@
 The part of mass m is pressed with a constant normal force F_n; the surface's velocity is linear
 between knots (time, v), and a time given twice is a jump of it. Coulomb's law is set-valued: the
 part sticks while that needs no more friction than µ_s F_n, |a_surface + g| ≤ µ_s F_n/m, else it
-slips and the surface pulls it with µ_k F_n. The springed plate behind it may rub with µ_p F_n
-against the part's own velocity, set-valued at rest. Units: s, m, m/s, m/s².
+slips and the surface pulls it with µ_k F_n. So a part that meets the surface and needs between µ_k
+F_n and µ_s F_n sticks, although to slip on would agree with the law too. The springed plate behind
+it may rub with µ_p F_n against the part's own velocity, set-valued at rest. Units: s, m, m/s, m/s².
 
 `exact` goes from event to event in closed form. `threshold` and `moreau` step through the time, for
 comparison; `published` is `threshold` as in the simulation of Yako, Nowak, Yuan and Salisbury.

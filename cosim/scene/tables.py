@@ -284,7 +284,9 @@ class Mechanics(Table):
 class Friction(Table):
     """Friction on the part."""
 
-    law: Literal["coulomb"] = _choice("coulomb", "Law of friction, exact in sticking")
+    law: Literal["coulomb"] = _choice(
+        "coulomb", "Law of friction, exact in sticking; a part that may stick or slip on sticks"
+    )
     mu_s: float = _of_fmu("mu_s")
     mu_k: float = _of_fmu("mu_k")
     normal_force: float = _of_fmu("normal_force")

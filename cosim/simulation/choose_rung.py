@@ -80,6 +80,16 @@ def relative_error(value: float, reference: float) -> float:
     return abs(value - reference) / max(abs(reference), LEAST)
 
 
+def without_ngspice(scene: Scene) -> Scene | None:
+    """The scene on the rung "limited"; None where ngspice does not run it, or it cannot be."""
+    if scene.rung.own_netlist or not scene.rung.ngspice:
+        return None
+    try:
+        return changed(scene, {"circuit.model": "limited", "drive.pwm_ripple": False}, "limited")
+    except BadInput:
+        return None
+
+
 def _few_rows(scene: Scene) -> Scene:
     return changed(scene, {"run.output_step": scene.run.duration / 2.0}, "auto")
 

@@ -1,8 +1,10 @@
 """A scene's run, as a user of the library asks for it."""
 
 import os
+import warnings
 from collections.abc import Callable
 
+from cosim.errors import BeyondModel
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.simulate import simulate
@@ -20,6 +22,9 @@ def run(
     simulated time, s, now and then. A netlist of the user's own (``circuit.netlist``) runs in a
     process of its own.
 
+    Where the run leaves what the model or a data sheet holds for, ``summary["notes"]`` says so, a
+    sentence each, and a warning :class:`cosim.errors.BeyondModel` is given.
+
     Raises BadInput for what cannot be simulated, SimulationFailed with where, when, and what to
     try.
 
@@ -27,4 +32,7 @@ def run(
     >>> result.waveforms.z_part.units
     'm'
     """
-    return simulate(load(scene, overrides), progress)
+    result = simulate(load(scene, overrides), progress)
+    for sentence in result.summary["notes"]:
+        warnings.warn(sentence, BeyondModel, stacklevel=2)
+    return result

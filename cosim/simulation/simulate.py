@@ -12,6 +12,7 @@ from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, changed
 from cosim.simulation.choose_rung import choose
 from cosim.simulation.choose_steps import simulate_within_tolerance
+from cosim.simulation.guards import notes
 from cosim.simulation.rungs.electrics import commanded
 from cosim.simulation.rungs.given_surface import simulate_part
 from cosim.simulation.rungs.rung import Driven, rungs
@@ -36,7 +37,8 @@ def simulate(scene: Scene, progress: Progress = lambda _: None, fmi_version: int
         return _cheapest(scene, again)
     if scene.surface_is_given:
         waveforms, summary = simulate_part(scene, progress)
-        return Result(scene, waveforms, summary | {"versions": versions()})
+        told = {"notes": notes(scene, waveforms, summary), "versions": versions()}
+        return Result(scene, waveforms, summary | told)
     if scene.coupling.method == "auto" and scene.rung.ngspice:
         return simulate_within_tolerance(scene, again)
     if _needs_own_process(scene):
@@ -86,7 +88,9 @@ def _simulate(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     }
     if scene.rung.ngspice:
         summary["v_average_error"] = driven.v_average_error
-    return Result(scene, _waveforms(scene, recorder, driven), summary)
+    waveforms = _waveforms(scene, recorder, driven)
+    told = {"notes": notes(scene, waveforms, summary, mechanics.normal_force)}
+    return Result(scene, waveforms, summary | told)
 
 
 def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Array]:

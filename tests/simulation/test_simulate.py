@@ -47,7 +47,7 @@ LIMITS = {
         "slew_fraction",
     },
 }
-WORDS = ["method", "versions"]
+WORDS = ["method", "notes", "versions"]
 
 RUNS = {
     "paper": ("paper", "run.duration=0.4", "run.settle=0.1"),
@@ -171,6 +171,7 @@ def test_summary_has_every_key(run: Run) -> None:
     assert all(type(summary[error]) is float for error in own)
     assert all(0.0 <= summary[limit] <= 1.0 for limit in limits)
     assert isinstance(summary["method"], str)
+    assert summary["notes"] == []
     assert all(isinstance(version, str) for version in summary["versions"].values())
     assert ("ngspice" in summary["versions"]) == (summary["circuit_steps"] > 0)
 

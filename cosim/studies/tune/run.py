@@ -14,6 +14,7 @@ from cosim.errors import BadInput, SimulationFailed
 from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
+from cosim.simulation.choose_rung import without_ngspice
 from cosim.studies.sweep.design import FREQUENCIES, numeric_key
 from cosim.studies.sweep.point import Number, Outcome, periods_made_whole
 from cosim.studies.sweep.pool import Pool, workers_asked
@@ -102,7 +103,7 @@ def tune(
     whole_periods = any(key in FREQUENCIES for key in ranges)
     searched = min(round(SEARCHED * budget), budget - turned)
     scouts, hints = 0, None
-    ahead = _simplified(scene)
+    ahead = without_ngspice(scene)
     # Quantities that only the scene's own rung has find no scouts.
     with suppress(BadInput), Pool(ahead or scene, workers_asked(workers), whole_periods) as pool:
         if ahead is not None:
@@ -134,16 +135,6 @@ def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, 
         if not (isfinite(low) and isfinite(high) and key.low <= low < high <= key.high):
             raise BadInput(f"--over {name}={low:g}:{high:g}: must be a range, of {key.allowed}.")
     return dict(over)
-
-
-def _simplified(scene: Scene) -> Scene | None:
-    """The scene without ngspice; None where it is so already, or cannot be."""
-    if scene.rung.own_netlist or not scene.rung.ngspice:
-        return None
-    try:
-        return changed(scene, {"circuit.model": "limited", "drive.pwm_ripple": False}, "tune")
-    except BadInput:
-        return None
 
 
 @dataclass

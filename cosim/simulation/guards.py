@@ -1,0 +1,153 @@
+"""Where a scene or its run leaves the physics that the model holds for: one sentence each.
+
+Only what is published or follows from the model's own laws has a limit here.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from cosim.arrays import Array
+from cosim.drive.command import commands, period
+from cosim.files.spill import blocks
+from cosim.mechanics.normal_force import NormalForce
+from cosim.scene import Scene
+
+LM348_SUPPLY = 18.0
+"""V, both signs: absolute maximum of the LM348 (data sheet SNOSBT8)."""
+
+OPA548_SUPPLY = (4.0, 30.0)
+"""V, both signs: the range of supplies of the OPA548 (data sheet SBOS070D)."""
+
+CARLTON_HEAT = 5.0**2 / 7.1
+"""W: the most that any drive within the 3.6 to 10 V peak-to-peak of the Carlton's data sheet
+(C-151L337V5R2) makes of its 7.1 Ohm: a square wave without offset. It gives no power; the authors
+saw the housing melt (README of their repository)."""
+
+CARLTON_LENGTH = 34.3e-3
+"""m: the Carlton lies lengthwise in the paper's finger (data sheet); the finger's own length is not
+published."""
+
+SHALLOW = 0.1
+"""Share of the travel that a wall may give: Hertz's law, in Hunt and Crossley's, is for a contact
+much smaller than the bodies."""
+
+
+def notes(
+    scene: Scene,
+    columns: Mapping[str, Array],
+    summary: Mapping[str, Any],
+    force: NormalForce | None = None,
+) -> list[str]:
+    """A sentence for each limit that the scene or its run leaves: quantity, value, limit.
+
+    ``columns`` are the run's waveforms, ``summary`` its numbers, SI, and ``force`` the normal force
+    where it changes in time. What moves is judged by the rows of the waveforms.
+    """
+    found = [*_grip(scene, force), *_supply(scene)]
+    if scene.rung.driven:
+        found += _coil(scene, summary)
+    if not scene.surface_is_given:
+        for surface in ("", "_2"):
+            if f"z_surface{surface}" in columns:
+                found += _ram(scene, columns, surface)
+        found += _part(scene, columns)
+    return found
+
+
+def _grip(scene: Scene, force: NormalForce | None) -> Iterator[str]:
+    friction, mechanics = scene.friction, scene.mechanics
+    least, when = friction.normal_force, ""
+    if force is not None:
+        least, at = force.least(scene.run.duration)
+        when = f" at {at:.4g} s"
+    held = mechanics.n_surfaces * (friction.mu_s + friction.mu_plate) * least
+    weight = mechanics.part_mass * mechanics.gravity
+    if held < weight:
+        mu = "(mu_s + mu_plate)" if friction.mu_plate else "mu_s"
+        yield (
+            f"the grip is too weak to hold the part at rest (condition (1) of the paper): friction "
+            f"of at most n_surfaces {mu} normal_force = {held:.4g} N{when} is below the "
+            f"part's weight of {weight:.4g} N."
+        )
+
+
+def _supply(scene: Scene) -> Iterator[str]:
+    if not (scene.rung.has_limits and scene.rung.on_ladder):
+        return
+    supply, (low, high) = scene.circuit.supply, OPA548_SUPPLY
+    if scene.rung.firmware and supply > LM348_SUPPLY:
+        yield (
+            f"circuit.supply = {supply:g} V is above the {LM348_SUPPLY:g} V that the LM348 bears "
+            "at most (its data sheet)."
+        )
+    if not low <= supply <= high:
+        yield (
+            f"circuit.supply = {supply:g} V is outside the {low:g} to {high:g} V that the OPA548 "
+            "is made for (its data sheet)."
+        )
+
+
+def _coil(scene: Scene, summary: Mapping[str, Any]) -> Iterator[str]:
+    coil = scene.coil
+    if scene.mechanics.actuator != "ram" or scene.run.duration < period(scene):
+        return
+    # energy_copper has the sense resistor's share, unless that is the affair of a user's netlist.
+    sense = 0.0 if scene.rung.own_netlist else coil.count * scene.circuit.sense_resistance
+    coils = coil.count * len(commands(scene))
+    heat = summary["energy_copper"] / coils / scene.run.duration
+    heat *= coil.resistance / (coil.resistance + sense)
+    if heat > CARLTON_HEAT:
+        yield (
+            f"the heat of {heat:.3g} W in a coil, on average over the run, is above the "
+            f"{CARLTON_HEAT:.3g} W that the Carlton actuator's 10 V peak-to-peak make at most (its "
+            "data sheet)."
+        )
+
+
+def _ram(scene: Scene, columns: Mapping[str, Array], surface: str) -> Iterator[str]:
+    mechanics, coil = scene.mechanics, scene.coil
+    body = columns[f"z_surface{surface}"]
+    # In direct drive the reaction body stands where the surface is at rest.
+    ram = columns.get(f"z_ram{surface}")
+    low, high = _range(body, ram, body[0])
+    moving = "surface" if ram is None else "second ram" if surface else "ram"
+    deep = max(high, -low) - mechanics.travel
+    if deep > SHALLOW * mechanics.travel:
+        yield (
+            f"the {moving} presses {deep * 1e3:.3g} mm into its wall, more than a tenth of "
+            f"mechanics.travel = {mechanics.travel * 1e3:.4g} mm; the law of the contact is for "
+            "small deformations."
+        )
+    if not scene.rung.driven:
+        return
+    places = [low, high]
+    if coil.b2:
+        places += [q for q in [-coil.b1 / (2.0 * coil.b2)] if low < q < high]
+    shape, q = min((1.0 + coil.b1 * q + coil.b2 * q**2, q) for q in places)
+    if shape <= 0.0:
+        yield (
+            f"the {moving} reaches q = {q * 1e3:.4g} mm, where Bl (1 + b1 q + b2 q^2) = "
+            f"{coil.force_factor * shape:.3g} N/A has turned its sign: coil.b1 and coil.b2 do not "
+            "hold so far out."
+        )
+
+
+def _part(scene: Scene, columns: Mapping[str, Array]) -> Iterator[str]:
+    part, surface = columns["z_part"], columns["z_surface"]
+    low, high = _range(surface, part, surface[0])
+    far = max(high, low, key=abs)
+    if abs(far) > CARLTON_LENGTH:
+        yield (
+            f"the part moves {far * 1e3:+.4g} mm along the surface, further than the actuator in "
+            f"the paper's finger is long ({CARLTON_LENGTH * 1e3:.4g} mm): a real part may have "
+            "left it, the model's surface has no end."
+        )
+
+
+def _range(below: Array, above: Array | None, still: float) -> tuple[float, float]:
+    """Least and greatest of ``above - below``; where None is above, that is ``still``."""
+    low, high = float("inf"), -float("inf")
+    for part in blocks(len(below)):
+        apart = (still if above is None else above[part]) - below[part]
+        low, high = min(low, float(apart.min())), max(high, float(apart.max()))
+    return low, high
