@@ -6,8 +6,9 @@ small and always there, so a part shows it; what separates "ideal" from "limited
 runs. "limited" leaves out the amplifier's ringing: its loop has a phase margin of a few degrees, so
 each return from a limit is followed by some 0.2 ms of ringing, which matters where a slip begins or
 ends in it and nowhere else. Whether it does is seen in the trial alone, roughly: its difference
-counts MARGIN times. What the rungs differ in acts on the current: where a ten-thousandth more or less of it moves
-v_average much, the motion being chaotic or near another one, no simpler rung can be relied on.
+counts MARGIN times. What the rungs differ in acts on the current: where a ten-thousandth more or
+less of it moves v_average much, the motion being chaotic or near another one, no simpler rung can
+be relied on.
 """
 
 from collections.abc import Callable

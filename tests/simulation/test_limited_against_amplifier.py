@@ -5,8 +5,8 @@ v_average move where the normal force, the force factor or the inductance change
 two rungs differ by more than such a change, for example by the microsecond that the amplifier's
 output slews at each fall.
 
-These are settings with the scene's own swing loss. Where the amplifier's ringing after a limit reaches
-into a slip, the rungs part (see test_choose_rung.py).
+These are settings with the scene's own swing loss. Where the amplifier's ringing after a limit
+reaches into a slip, the rungs part (see test_choose_rung.py).
 
     regular     it moves by less than 0.3 %: the rungs must agree within 0.3 %
     marginal    by less than 3 %: within 3 %
