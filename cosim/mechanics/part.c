@@ -5,13 +5,15 @@
        [1] mu_k F_n/m   what it does while the part slips
        [2] mu_p F_n/m   friction of the springed plate, against the part's own velocity
        [3] g            gravity along the motion, downwards
-   The surface's velocity is linear between knots (time, v); a time that is repeated is a jump. The
-   knots repeat `periods` times. Every function writes height, velocity and the time spent sticking
-   so far, and returns the number of changes between sticking and slipping. */
+   The surface's velocity is linear between knots (time, v), or part of a sine; a time that is
+   repeated is a jump. The knots repeat `periods` times. Every function writes height, velocity and
+   the time spent sticking so far, and returns the number of changes between sticking and slipping. */
 
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
+
+#include "surface.h"
 
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
@@ -29,29 +31,40 @@ typedef struct {
 } Surface;
 
 typedef struct {
-    double a;  /* acceleration of the part */
+    double a;  /* acceleration of the part; sticking, about */
     int side;  /* sign of part minus surface velocity; 0 sticks */
 } Mode;
+
+/* What part_exact tells besides, as it stands just before a jump: the surface's motion and its
+   friction on the part, and sums from the start, of energies over the part's mass. */
+enum { STICKS, HEIGHT, SPEED, SLOPE, FRICTION, WORK, HEAT, EVENTS, N_TOLD };
 
 typedef struct {
     long count, next; /* of times; the next to be written */
     const double *time; /* NULL: at the knots */
     double *z, *v, *stuck;
+    double *told; /* rows of N_TOLD, or NULL */
 } Output;
 
 static int sign(double x) { return (x > 0) - (x < 0); }
 
-/* What moves the part from here on, while the surface's acceleration is `slope`. Sticking comes
-   first, as the law has it; else the surface pulls the part the way that sticking would have
+/* What friction must give a part that sticks besides the surface's acceleration, about `slope`. */
+static double burden(const double *law, double v, double slope)
+{
+    const int way = sign(v), going = way ? way : sign(slope);
+    if (going == 0) /* all at rest: the plate carries what it can */
+        return copysign(fmax(0.0, fabs(law[GRAVITY]) - law[PLATE]), law[GRAVITY]);
+    return law[GRAVITY] + going * law[PLATE];
+}
+
+/* What moves the part from here on, while the surface's acceleration is about `slope`. Sticking
+   comes first, as the law has it; else the surface pulls the part the way that sticking would have
    needed, but too weakly. `slack` is what rounding leaves open of the needed acceleration. */
 static Mode decide(const double *law, double relative, double v, double slope, double slack)
 {
     int side = sign(relative), way = sign(v);
     if (side == 0) {
-        const int going = way ? way : sign(slope);
-        double need = slope + law[GRAVITY] + going * law[PLATE];
-        if (going == 0) /* all at rest: the plate carries what it can */
-            need = copysign(fmax(0.0, fabs(law[GRAVITY]) - law[PLATE]), law[GRAVITY]);
+        const double need = slope + burden(law, v, slope);
         if (fabs(need) <= law[STATIC] + slack)
             return (Mode){slope, 0};
         side = need > 0 ? -1 : 1;
@@ -65,101 +78,166 @@ static Mode decide(const double *law, double relative, double v, double slope, d
     return (Mode){-down - way * law[PLATE], side};
 }
 
-static void emit(Output *out, double z, double v, double stuck)
+static void emit(Output *out, double z, double v, double stuck, const double *told)
 {
     out->z[out->next] = z;
     out->v[out->next] = v;
-    out->stuck[out->next++] = stuck;
+    out->stuck[out->next] = stuck;
+    if (out->told)
+        for (int k = 0; k < N_TOLD; k++)
+            out->told[out->next * N_TOLD + k] = told[k];
+    out->next++;
 }
 
-/* Exact: from event to event in closed form. A difference of velocities below what rounding can
-   have made of zero (`noise`, a bound that grows with each piece and begins anew when the part
-   sticks) is zero, so that an event on a knot is not missed by a bit. Times are known to
-   `resolution`: knots no farther apart are a jump, and a velocity that the forces give or take
-   within it (`least`) is zero, or an interval of 1e-309 s would decide whether the part slips. */
-EXPORT long part_exact(long knots, const double *time, const double *v_surface, long periods,
-                       const double *law, double z, double v, long outputs, const double *at,
-                       double *z_out, double *v_out, double *stuck_out)
+/* The part at the begin of a stretch without events. */
+typedef struct {
+    double z, v, stuck;
+} State;
+
+/* The state `tau` (s) after `from`, into a piece; it ends at the velocity `v`. */
+static inline State later(const State *s, const Piece *p, int sticks, double from, double tau,
+                          double v)
+{
+    const double up = sticks && p->turn > 0 ? risen(p, from, from + tau) : 0.5 * tau * (s->v + v);
+    return (State){s->z + up, v, s->stuck + (sticks ? tau : 0.0)};
+}
+
+/* What is to be told once the part, which was in the state `s`, has risen by `up` in that time. */
+static void tell(const State *s, const Piece *p, const double *law, int side, double from,
+                 double tau, double up, double told[N_TOLD])
+{
+    const double before = speed_at(p, from), height = risen(p, from, from + tau);
+    told[STICKS] = side == 0;
+    told[HEIGHT] += height;
+    told[SPEED] = speed_at(p, from + tau);
+    told[SLOPE] = slope_at(p, from + tau);
+    if (side == 0) {
+        const double carried = burden(law, s->v, p->slope);
+        told[FRICTION] = told[SLOPE] + carried;
+        told[WORK] += 0.5 * (told[SPEED] - before) * (told[SPEED] + before) + carried * height;
+    } else {
+        told[FRICTION] = -side * law[KINETIC];
+        told[WORK] += told[FRICTION] * height;
+        told[HEAT] += law[KINETIC] * fabs(up - height);
+    }
+    told[HEAT] += law[PLATE] * fabs(up);
+}
+
+/* Exact: from event to event in closed form. With `turn` (rad/s) the surface's velocity is
+   half sin(turn t); then each piece lies within a quarter turn, and all of it needs either more or
+   less than static friction. A difference of velocities below what rounding can have made of zero
+   (`noise`, a bound that grows with each piece and begins anew when the part sticks) is zero, so that
+   an event on a knot is not missed by a bit. Times are known to `resolution`: knots no farther apart
+   are a jump, and a velocity that the forces give or take within it (`least`) is zero, or an interval
+   of 1e-309 s would decide whether the part slips. */
+static long follow(long knots, const double *time, const double *v_surface, long periods,
+                          const double *law, double z, double v, double half, double turn,
+                          long outputs, const double *at, double *z_out, double *v_out,
+                          double *stuck_out, double *told_out)
 {
     const double period = time[knots - 1] - time[0], eps = DBL_EPSILON;
     const double forces = law[STATIC] + law[PLATE] + fabs(law[GRAVITY]);
     const double resolution = eps * fmax(fabs(time[0]), fabs(time[knots - 1]));
     const double least = forces * resolution;
-    Output out = {at ? outputs : periods * knots, 0, at, z_out, v_out, stuck_out};
-    double stuck = 0.0, noise = least;
+    Output out = {at ? outputs : periods * knots, 0, at, z_out, v_out, stuck_out, told_out};
+    State now = {z, v, 0.0};
+    double told[N_TOLD] = {0.0};
+    double noise = least;
     int sticks = -1; /* unknown yet */
     long events = 0;
 
     for (long k = 0; k < periods; k++) {
         const double shift = (double)k * period;
-        while (at && k == 0 && out.next < out.count && at[out.next] <= time[0])
-            emit(&out, z, v, stuck);
         if (!at)
-            emit(&out, z, v, stuck);
+            emit(&out, now.z, now.v, now.stuck, told);
         for (long i = 1; i < knots; i++) {
             const double start = time[i - 1], length = time[i] - start;
             const double begin = v_surface[i - 1], end = v_surface[i];
             double left = length, done = 0.0, speed = begin;
             if (length > resolution) {
-                const double slope = (end - begin) / length;
+                const Piece piece = piece_between(time + i - 1, v_surface + i - 1, half, turn);
+                const double slope = piece.slope;
                 const double late = eps * (fabs(start) + fabs(time[i])); /* rounding of times */
                 const double slack = 4 * eps * (forces + fabs(slope))
                     + (2 * eps * (fabs(begin) + fabs(end)) + late * fabs(slope)) / length;
                 const double here = 2 * eps * (fabs(begin) + fabs(end)) + late * fabs(slope);
                 for (int n = 0; left > 0; n++) {
-                    double relative = v - speed;
+                    double relative = now.v - speed;
                     if (fabs(relative) <= noise)
                         relative = 0.0;
-                    if (law[PLATE] > 0 && fabs(v) <= noise)
-                        v = 0.0;
-                    const Mode mode = decide(law, relative, v, slope, slack);
-                    const double rate = mode.a - slope;
+                    if (law[PLATE] > 0 && fabs(now.v) <= noise)
+                        now.v = 0.0;
+                    const Mode mode = decide(law, relative, now.v, slope, slack);
+                    const int follows = mode.side == 0 && turn > 0; /* the sine, to its end */
                     double tau = left;
                     int meet = 0, rest = 0;
-                    const int open = n < MOST_EVENTS;
-                    if (open && relative * rate < 0 && -relative / rate <= tau) {
-                        tau = -relative / rate;
-                        meet = 1;
-                    }
-                    if (open && law[PLATE] > 0 && v * mode.a < 0 && -v / mode.a <= tau) {
-                        meet = meet && -v / mode.a == tau;
-                        tau = -v / mode.a;
-                        rest = 1;
+                    if (n < MOST_EVENTS && !follows) {
+                        const double next =
+                            meeting(&piece, done, now.v, mode.a, relative, mode.side);
+                        if (next >= 0 && next <= tau) {
+                            tau = next;
+                            meet = 1;
+                        }
+                        if (law[PLATE] > 0 && now.v * mode.a < 0 && -now.v / mode.a <= tau) {
+                            meet = meet && -now.v / mode.a == tau;
+                            tau = -now.v / mode.a;
+                            rest = 1;
+                        }
                     }
                     if (sticks >= 0 && sticks != (mode.side == 0))
                         events++;
                     sticks = mode.side == 0;
+                    told[EVENTS] = (double)events;
 
                     const int last = !(tau < left);
                     while (at && out.next < out.count) {
+                        /* What rounding puts behind the end of a stretch is at its end. */
                         const double since = at[out.next] - shift - start - done;
-                        if (!(since <= tau))
+                        if (!(since <= tau + 4 * eps * fabs(at[out.next])))
                             break;
-                        const double dt = since > 0 ? since : 0.0;
-                        emit(&out, z + dt * (v + 0.5 * mode.a * dt), v + mode.a * dt,
-                             stuck + (sticks ? dt : 0.0));
+                        const double dt = since > tau ? tau : since > 0 ? since : 0.0;
+                        const double v_then =
+                            follows ? speed_at(&piece, done + dt) : now.v + mode.a * dt;
+                        const State then = later(&now, &piece, sticks, done, dt, v_then);
+                        emit(&out, then.z, then.v, then.stuck, told);
+                        if (told_out)
+                            tell(&now, &piece, law, mode.side, done, dt, then.z - now.z,
+                                 told_out + (out.next - 1) * N_TOLD);
                     }
-                    const double before = v;
+                    const State before = now;
+                    const double from = done;
                     done += tau;
                     left = last ? 0.0 : length - done;
-                    speed = last ? end : begin + slope * done;
-                    v = rest ? 0.0 : sticks || meet ? speed : v + mode.a * tau;
-                    z += 0.5 * tau * (before + v);
-                    stuck += sticks ? tau : 0.0;
+                    speed = last ? end : speed_at(&piece, done);
+                    now = later(&before, &piece, sticks, from, tau,
+                                rest              ? 0.0
+                                : sticks || meet ? speed
+                                                 : before.v + mode.a * tau);
+                    if (told_out)
+                        tell(&before, &piece, law, mode.side, from, tau, now.z - before.z, told);
                     if (sticks || meet)
                         noise = least;
-                    noise += here + 2 * eps * (fabs(before) + fabs(v)) + late * fabs(mode.a);
+                    noise += here + 2 * eps * (fabs(before.v) + fabs(now.v)) + late * fabs(mode.a);
                 }
             } else {
                 noise += forces * length;
             }
             if (!at)
-                emit(&out, z, v, stuck);
+                emit(&out, now.z, now.v, now.stuck, told);
         }
     }
     while (out.next < out.count) /* times that rounding puts behind the end */
-        emit(&out, z, v, stuck);
+        emit(&out, now.z, now.v, now.stuck, told);
     return events;
+}
+
+EXPORT long part_exact(long knots, const double *time, const double *v_surface, long periods,
+                       const double *law, double z, double v, double half, double turn,
+                       long outputs, const double *at, double *z_out, double *v_out,
+                       double *stuck_out, double *told_out)
+{
+    return follow(knots, time, v_surface, periods, law, z, v, half, turn, outputs, at, z_out, v_out,
+                  stuck_out, told_out);
 }
 
 /* The surface as the stepping schemes see it: times that never decrease. */
@@ -215,11 +293,11 @@ EXPORT long part_threshold(long knots, const double *time, const double *v_surfa
                            long steps, double *z_out, double *v_out, double *stuck_out)
 {
     Threshold h = {{{knots, time, v_surface, periods}, 0, 0}, law, v_min, INFINITY, 0.0};
-    Output out = {steps + 1, 0, NULL, z_out, v_out, stuck_out};
+    Output out = {steps + 1, 0, NULL, z_out, v_out, stuck_out, NULL};
     double stuck = 0.0;
     int before = -1, sticks, minor;
     long events = 0;
-    emit(&out, z, v, stuck);
+    emit(&out, z, v, stuck, NULL);
     for (long n = 0; n < steps; n++) {
         const double t = time[0] + (double)n * step;
         const double a1 = regularised(&h, 1, t, v, &sticks), v2 = v + 0.5 * step * a1;
@@ -231,7 +309,7 @@ EXPORT long part_threshold(long knots, const double *time, const double *v_surfa
         stuck += sticks ? step : 0.0;
         events += before >= 0 && sticks != before;
         before = sticks;
-        emit(&out, z, v, stuck);
+        emit(&out, z, v, stuck, NULL);
     }
     return events;
 }
@@ -243,12 +321,12 @@ EXPORT long part_moreau(long knots, const double *time, const double *v_surface,
                         double *z_out, double *v_out, double *stuck_out)
 {
     Cursor c = {{knots, time, v_surface, periods}, 0, 0};
-    Output out = {steps + 1, 0, NULL, z_out, v_out, stuck_out};
+    Output out = {steps + 1, 0, NULL, z_out, v_out, stuck_out, NULL};
     const double plate = step * law[PLATE];
     double stuck = 0.0;
     int before = -1;
     long events = 0;
-    emit(&out, z, v, stuck);
+    emit(&out, z, v, stuck, NULL);
     for (long n = 0; n < steps; n++) {
         const double t = time[0] + (double)(n + 1) * step, speed = velocity(&c, t);
         const double free = v - step * law[GRAVITY], old = v;
@@ -268,7 +346,7 @@ EXPORT long part_moreau(long knots, const double *time, const double *v_surface,
         stuck += sticks ? step : 0.0;
         events += before >= 0 && sticks != before;
         before = sticks;
-        emit(&out, z, v, stuck);
+        emit(&out, z, v, stuck, NULL);
     }
     return events;
 }
@@ -285,8 +363,8 @@ EXPORT void part_errors(long knots, const double *time, const double *v_surface,
             part_threshold(knots, time, v_surface, 1, laws + 4 * i, 0.0, v, step, v_min,
                            outputs - 1, z, v_out, stuck);
         else
-            part_exact(knots, time, v_surface, 1, laws + 4 * i, 0.0, v, outputs, at, z, v_out,
-                       stuck);
+            follow(knots, time, v_surface, 1, laws + 4 * i, 0.0, v, 0.0, 0.0, outputs, at, z, v_out,
+                   stuck, NULL);
         double sum = 0.0;
         for (long k = 0; k < outputs; k++)
             sum += fabs(z[k] - measured[k]);

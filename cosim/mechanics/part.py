@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from cosim.arrays import Array
 from cosim.errors import BadInput
+from cosim.mechanics.surface import Surface
 from cosim.toolchain.libraries import library
 
 Real = npt.ArrayLike
@@ -36,7 +37,7 @@ _POINTER, _LONG, _REAL = ctypes.c_void_p, ctypes.c_long, ctypes.c_double
 _SURFACE = (_LONG, _POINTER, _POINTER, _LONG, _POINTER, _REAL, _REAL)
 _RESULT = (_POINTER, _POINTER, _POINTER)
 _ARGUMENTS = {
-    "part_exact": (*_SURFACE, _LONG, _POINTER, *_RESULT),
+    "part_exact": (*_SURFACE, _REAL, _REAL, _LONG, _POINTER, *_RESULT, _POINTER),
     "part_threshold": (*_SURFACE, _REAL, _REAL, _LONG, *_RESULT),
     "part_moreau": (*_SURFACE, _REAL, _LONG, *_RESULT),
     "part_errors": (
@@ -80,6 +81,38 @@ class PartMotion:
         return float(self.sticking @ np.diff(self.time) / span) if span > 0 else 0.0
 
 
+_TOLD = ("sticks", "z_surface", "v_surface", "a_surface", "friction", "work", "heat", "events")
+
+
+@dataclass(frozen=True)
+class Account:
+    """Part and surface at ``time`` [s], and what passed between them, a value for each time.
+
+    Where the surface's velocity or acceleration jumps, the values are those before the jump.
+    """
+
+    time: Array
+    z: Array
+    """Of the part, m; ``v`` its velocity, m/s."""
+    v: Array
+    stuck: Array
+    """Time spent sticking so far, s."""
+    sticks: Array
+    """1 while the part sticks, else 0."""
+    z_surface: Array
+    """m, from 0; ``v_surface`` in m/s, ``a_surface`` in m/s²."""
+    v_surface: Array
+    a_surface: Array
+    friction: Array
+    """Of the surface on the part, over the part's mass, m/s²."""
+    work: Array
+    """What the surface has done on the part so far, over the part's mass, J/kg."""
+    heat: Array
+    """What friction at surface and plate has taken so far, over the part's mass, J/kg."""
+    events: Array
+    """Changes between sticking and slipping so far."""
+
+
 class Case(TypedDict, total=False):
     """What the part is in and how it starts.
 
@@ -112,10 +145,43 @@ def exact(
     z, v, stuck = np.empty((3, len(times)))
     events = part_library().part_exact(
         *case.arguments(),
-        *(len(times), None if at is None else at.ctypes.data),
-        *(z.ctypes.data, v.ctypes.data, stuck.ctypes.data),
+        *(0.0, 0.0, len(times), None if at is None else at.ctypes.data),
+        *(z.ctypes.data, v.ctypes.data, stuck.ctypes.data, None),
     )
     return PartMotion(times, z, v, _shares(times, stuck), events)
+
+
+def account(
+    surface: Surface,
+    output: Real,
+    *,
+    mu_s: float,
+    mu_k: float,
+    force_per_mass: float,
+    gravity: float = 9.81,
+    mu_plate: float = 0.0,
+) -> Account:
+    """The exact motion on a surface at the times ``output``, and what passed between the two; the
+    part starts at the height 0 with the surface's velocity. See :class:`Case`."""
+    law = (mu_s, mu_k, force_per_mass, gravity, mu_plate)
+    case = _Case(surface.times, surface.velocities, *law, periods=surface.periods)
+    times = case.times(output)
+    z, v, stuck = np.empty((3, len(times)))
+    told = np.empty((len(times), len(_TOLD)))
+    part_library().part_exact(
+        *(*case.arguments(), surface.half, surface.turn, len(times), times.ctypes.data),
+        *(z.ctypes.data, v.ctypes.data, stuck.ctypes.data, told.ctypes.data),
+    )
+    return Account(times, z, v, stuck, **dict(zip(_TOLD, told.T, strict=True)))
+
+
+def bounds(
+    mu_s: float, force_per_mass: float, gravity: float = 9.81, mu_plate: float = 0.0
+) -> Array:
+    """The accelerations of the surface, m/s², at which a part that sticks to it may slip: more of
+    them than there are, as the way of the part decides which side the plate's friction is on."""
+    static, _, plate, g = friction_law(mu_s, 0.0, force_per_mass, gravity, mu_plate)
+    return np.array([side * static - way * plate - g for side in (1, -1) for way in (1, 0, -1)])
 
 
 def threshold(

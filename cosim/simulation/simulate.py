@@ -3,6 +3,8 @@
 import time
 from collections.abc import Callable
 from functools import partial
+from math import inf
+from typing import Any
 
 from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
@@ -15,7 +17,7 @@ from cosim.simulation.choose_steps import simulate_within_tolerance
 from cosim.simulation.guards import notes
 from cosim.simulation.rungs.electrics import commanded
 from cosim.simulation.rungs.given_surface import simulate_part
-from cosim.simulation.rungs.rung import Driven, rungs
+from cosim.simulation.rungs.rung import Driven, Motion, rungs
 from cosim.simulation.summary import summarise
 from cosim.toolchain.processes import isolated
 from cosim.toolchain.versions import versions
@@ -36,9 +38,7 @@ def simulate(scene: Scene, progress: Progress = lambda _: None, fmi_version: int
     if scene.rung.automatic:
         return _cheapest(scene, again)
     if scene.surface_is_given:
-        waveforms, summary = simulate_part(scene, progress)
-        told = {"notes": notes(scene, waveforms, summary), "versions": versions()}
-        return Result(scene, waveforms, summary | told)
+        return _follow_surface(scene, progress)
     if scene.coupling.method == "auto" and scene.rung.ngspice:
         return simulate_within_tolerance(scene, again)
     if _needs_own_process(scene):
@@ -69,6 +69,14 @@ def _needs_own_process(scene: Scene) -> bool:
     return spoilt()
 
 
+def _follow_surface(scene: Scene, progress: Progress) -> Result:
+    began = time.perf_counter()
+    waveforms, motion = simulate_part(scene)
+    progress(scene.run.duration)
+    summary = _summary(scene, motion, Driven(None, "exact"), 0, began)
+    return Result(scene, waveforms, summary | {"notes": notes(scene, waveforms, summary)})
+
+
 def _simulate(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     began = time.perf_counter()
     mechanics = Mechanics(scene, fmi_version)
@@ -78,19 +86,35 @@ def _simulate(scene: Scene, progress: Progress, fmi_version: int) -> Result:
         totals = mechanics.totals()
     finally:
         mechanics.close()
-    summary = summarise(scene, recorder, totals, driven.electric) | {
-        "circuit_steps": driven.circuit_steps,
-        "circuit_rejected": driven.circuit_rejected,
-        "fmu_steps": recorder.steps,
-        "wall_time": time.perf_counter() - began,
-        "method": driven.method,
-        "versions": {**versions(), **driven.versions},
-    }
+    motion = Motion(totals, recorder.at_settle, _extremes(scene, recorder), recorder.frames)
+    summary = _summary(scene, motion, driven, recorder.steps, began)
     if scene.rung.ngspice:
         summary["v_average_error"] = driven.v_average_error
     waveforms = _waveforms(scene, recorder, driven)
     told = {"notes": notes(scene, waveforms, summary, mechanics.normal_force)}
     return Result(scene, waveforms, summary | told)
+
+
+def _extremes(scene: Scene, recorder: Recorder) -> dict[str, float]:
+    names = (f"{what}_surface_{end}" for what in "avz" for end in ("max", "min"))
+    found = dict(zip(names, recorder.extremes, strict=False))  # the current's follow
+    if scene.mechanics.contact == "rigid":  # an impact changes velocities in no time
+        found |= {"a_surface_max": inf, "a_surface_min": -inf}
+    return found
+
+
+def _summary(
+    scene: Scene, motion: Motion, driven: Driven, steps: int, began: float
+) -> dict[str, Any]:
+    """``steps`` are those of the FMU; the run began at ``began`` on the clock."""
+    return summarise(scene, motion, driven.electric) | {
+        "circuit_steps": driven.circuit_steps,
+        "circuit_rejected": driven.circuit_rejected,
+        "fmu_steps": steps,
+        "wall_time": time.perf_counter() - began,
+        "method": driven.method,
+        "versions": {**versions(), **driven.versions},
+    }
 
 
 def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Array]:

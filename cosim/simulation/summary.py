@@ -1,14 +1,16 @@
 """The numbers of a run: what ``summary.json`` holds and the table that is printed."""
 
+import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.coupling.loop.recorder import Recorder
 from cosim.files.spill import blocks
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Electrics
+from cosim.simulation.rungs.rung import Motion
 from cosim.trials.camera import FRAME_RATE, accelerations, instants_a_frame, shown
 
 UNITS = {
@@ -28,36 +30,34 @@ UNITS = {
 """Units of the numbers that have one; the others are counts, shares of time or ratios."""
 
 
-def summarise(
-    scene: Scene, recorder: Recorder, totals: dict[str, float], electric: Electrics | None
-) -> dict[str, Any]:
+def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[str, Any]:
     """Averages, extremes and counts after ``run.settle``; energies over the whole run. SI.
 
     Where two surfaces move by themselves, extremes and limits are those of the first, counts and
     energies those of both.
 
-    A rigid impact changes velocities in no time: there ``a_surface_max`` and ``a_surface_min`` are
-    None. The camera's reading is of the true surface while each frame is exposed, through Tracker's
-    five-point differences.
+    Where the surface's velocity jumps, by a rigid impact or as it is given, ``a_surface_max`` and
+    ``a_surface_min`` are None. The camera's reading is of the true surface while each frame is
+    exposed, through Tracker's five-point differences.
     """
-    run, before = scene.run, recorder.at_settle
+    run, totals, before, extremes = scene.run, motion.totals, motion.at_settle, motion.extremes
     span = run.duration - run.settle
     v_average = (totals["z_part"] - before["z_part"]) / span
-    seen_max, seen_min = _seen(recorder.frames, run.shutter / FRAME_RATE)
-    rigid = scene.mechanics.contact == "rigid"
-    a_max, a_min, v_max, v_min, z_max, z_min = recorder.extremes[:6]
-    driven = scene.circuit.model != "none"
+    seen_max, seen_min = _seen(motion.frames, run.shutter / FRAME_RATE)
+    a_max, a_min = extremes["a_surface_max"], extremes["a_surface_min"]
+    bounded = math.isfinite(a_max) and math.isfinite(a_min)
+    repeated = scene.drive.waveform != "file" if scene.surface_is_given else scene.rung.driven
     result: dict[str, Any] = {
         "v_average": v_average,
-        "transport_per_cycle": v_average / scene.drive.frequency if driven else None,
+        "transport_per_cycle": v_average / scene.drive.frequency if repeated else None,
         "stick_fraction": (totals["stick_time"] - before["stick_time"]) / span,
-        "a_surface_max": None if rigid else a_max,
-        "a_surface_min": None if rigid else a_min,
+        "a_surface_max": a_max if bounded else None,
+        "a_surface_min": a_min if bounded else None,
         "a_camera_max": seen_max,
         "a_camera_min": seen_min,
-        "v_surface_max": v_max,
-        "v_surface_min": v_min,
-        "z_surface_pp": z_max - z_min,
+        "v_surface_max": extremes["v_surface_max"],
+        "v_surface_min": extremes["v_surface_min"],
+        "z_surface_pp": extremes["z_surface_max"] - extremes["z_surface_min"],
     }
     if electric is not None:
         result["current_max"] = electric.current_max
@@ -67,7 +67,7 @@ def summarise(
     if "stick_time_2" in totals:
         result["stick_fraction_2"] = (totals["stick_time_2"] - before["stick_time_2"]) / span
     for counter in ("impacts", "stick_slip_events"):
-        result[counter] = totals[counter] - before[counter]
+        result[counter] = round(totals[counter] - before[counter])
     return result | _energies(scene, totals, electric)
 
 
@@ -86,7 +86,7 @@ def _seen(
 
 
 def _energies(
-    scene: Scene, totals: dict[str, float], electric: Electrics | None
+    scene: Scene, totals: Mapping[str, float], electric: Electrics | None
 ) -> dict[str, float]:
     """The account of the whole run, J, of all ``coil.count`` actuators."""
     count = scene.coil.count
@@ -95,17 +95,12 @@ def _energies(
         for kind in ("friction", "impact", "damping")
     }
     stored = count * totals["energy_stored"]
-    energy_in, copper = 0.0, 0.0
+    energy_in, copper = count * totals["energy_in"], 0.0
     if electric is not None:
         energy_in, copper = electric.energy_in, electric.energy_copper
         stored += electric.energy_magnetic
     missing = energy_in - copper - sum(lost.values()) - stored
-    mechanics = scene.mechanics
-    ram = 0.0 if mechanics.actuator == "direct" else mechanics.ram_mass
-    mass = ram + mechanics.surface_mass + mechanics.part_mass / mechanics.n_surfaces
-    # In the flexures from the start: what a scene without a drive is measured against.
-    hanging = count * (mass * mechanics.gravity) ** 2 / (2.0 * mechanics.flexure_stiffness)
-    scale = max(abs(energy_in), copper + sum(lost.values()), abs(stored), hanging)
+    scale = max(abs(energy_in), copper + sum(lost.values()), abs(stored), _hanging(scene))
     return {
         "energy_in": energy_in,
         "energy_copper": copper,
@@ -113,3 +108,14 @@ def _energies(
         "energy_stored": stored,
         "energy_residual": abs(missing) / scale if scale > 0.0 else 0.0,
     }
+
+
+def _hanging(scene: Scene) -> float:
+    """In the flexures from the start, J: what a scene without a drive is measured against."""
+    if scene.surface_is_given:
+        return 0.0
+    mechanics = scene.mechanics
+    ram = 0.0 if mechanics.actuator == "direct" else mechanics.ram_mass
+    mass = ram + mechanics.surface_mass + mechanics.part_mass / mechanics.n_surfaces
+    force = mass * mechanics.gravity
+    return scene.coil.count * force**2 / (2.0 * mechanics.flexure_stiffness)

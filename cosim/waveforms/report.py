@@ -99,6 +99,6 @@ def _limits(summary: dict[str, Any]) -> str:
 
 
 def _acceleration(scene: Scene, summary: dict[str, Any]) -> str:
-    if scene.mechanics.contact == "rigid":
+    if scene.mechanics.contact == "rigid" and not scene.surface_is_given:
         return 'without bound at a rigid impact (mechanics.contact = "compliant" has a peak)'
     return _range(summary, "a_surface", 1, "m/s²", "+.0f") or "without bound: velocity jumps"

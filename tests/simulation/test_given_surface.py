@@ -9,13 +9,14 @@ import pytest
 
 from cosim.cli.main import main
 from cosim.drive.surface.formulas import Transport, average_velocity
-from cosim.drive.surface.waveforms import quaid_velocity
+from cosim.drive.surface.waveforms import quaid_cycle, quaid_velocity
 from cosim.errors import BadInput
 from cosim.mechanics import part
 from cosim.scene import Scene, load
 from cosim.simulation.rungs import given_surface as prescribed
 from cosim.simulation.simulate import simulate
 from tests.helpers.fmu_bench import Bench
+from tests.helpers.sine_part import SinePart
 
 pytestmark = pytest.mark.physics
 
@@ -128,11 +129,61 @@ def test_horizontal_scene_meets_the_closed_form() -> None:
     assert found == pytest.approx(expected, rel=1e-6)
 
 
-def test_sine_gives_the_surface_its_velocity() -> None:
-    scene = load("optimal", ["drive.waveform=sine", "drive.velocity_amplitude=0.2"])
-    waves = simulate(scene).columns
-    expected = 0.2 * np.sin(2 * np.pi * 20.0 * waves["time"])
-    np.testing.assert_allclose(waves["v_surface"], expected, rtol=0, atol=3e-7)
+def sine_scene(half: float, mu_plate: float = 0.0, *more: str) -> Scene:
+    """A surface that moves as a sine of 20 Hz; averages from its second period on."""
+    sine = ["drive.waveform=sine", f"drive.velocity_amplitude={half}"]
+    times = ["run.settle=0.1", "run.duration=0.52"]
+    return load("optimal", [*sine, f"friction.mu_plate={mu_plate}", *times, *more])
+
+
+def test_sine_gives_the_surface_its_motion() -> None:
+    waves = simulate(sine_scene(0.2)).columns
+    turn = 2 * np.pi * 20.0
+    phase = turn * waves["time"]
+    for name, expected in (
+        ("z_surface", 0.2 / turn * (1 - np.cos(phase))),
+        ("v_surface", 0.2 * np.sin(phase)),
+        ("a_surface", 0.2 * turn * np.cos(phase)),
+    ):
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(waves[name], expected, rtol=0, atol=1e-12 * scale, err_msg=name)
+
+
+@pytest.mark.parametrize("mu_plate", [0.0, 0.1])
+@pytest.mark.parametrize("half", [0.15, 0.2, 0.35, 0.6])
+def test_a_sine_agrees_with_another_solver(half: float, mu_plate: float) -> None:
+    scene = sine_scene(half, mu_plate, "run.output_step=0.02", "coil.count=3")
+    mass, force = scene.mechanics.part_mass, prescribed.force_per_mass(scene)
+    mu_s, mu_k = scene.friction.mu_s, scene.friction.mu_k
+    other = SinePart(half, scene.drive.frequency, mu_s * force, mu_k * force, mu_plate * force)
+    settled, end = other.height_at(0.1), other.height_at(0.52)
+    found = simulate(scene).summary
+    assert found["v_average"] == pytest.approx((end - settled) / 0.42, rel=1e-9)
+    assert found["stick_slip_events"] == sum(0.1 <= t < 0.52 for t in other.events)
+    assert found["energy_in"] == pytest.approx(3 * mass * other.work, rel=1e-10)
+    assert found["energy_friction"] == pytest.approx(3 * mass * other.heat, rel=1e-10, abs=1e-18)
+    assert found["energy_residual"] < 1e-13
+
+
+def test_extremes_are_those_of_the_motion_however_far_apart_the_rows() -> None:
+    found = simulate(sine_scene(0.2, 0.0, "run.output_step=0.02")).summary
+    turn = 2 * np.pi * 20.0
+    for name, half in (("v", 0.2), ("a", 0.2 * turn)):
+        assert found[f"{name}_surface_max"] == pytest.approx(half, rel=1e-14)
+        assert found[f"{name}_surface_min"] == pytest.approx(-half, rel=1e-14)
+    assert found["z_surface_pp"] == pytest.approx(2 * 0.2 / turn, rel=1e-12)
+    scene = load("quaid", ["run.output_step=0.02", "run.settle=0.0613"])
+    found = simulate(scene).summary
+    slow = (0.7 * 5 - 1) * 9.81
+    cycle = quaid_cycle(slow, scene.drive.acceleration_max, 0.05)
+    top = cycle.knots()[1].max()
+    assert (found["v_surface_max"], found["v_surface_min"]) == pytest.approx((top, -top), rel=1e-8)
+    assert found["z_surface_pp"] == pytest.approx(cycle.stroke(), rel=1e-8)
+    # Before the surface turns back for the first time.
+    found = simulate(load("quaid", ["run.settle=0.001", "run.duration=0.011"])).summary
+    assert found["v_surface_max"] == pytest.approx(0.011 * slow, rel=1e-8)
+    assert found["v_surface_min"] == pytest.approx(0.001 * slow, rel=1e-8)
+    assert found["z_surface_pp"] == pytest.approx(slow * (0.011**2 - 0.001**2) / 2, rel=1e-8)
 
 
 def test_own_waveforms_move_the_part_again(tmp_path: Path) -> None:
@@ -190,14 +241,51 @@ def test_command_writes_only_what_the_scene_has(name: str, tmp_path: Path) -> No
     assert summary["method"] == "exact" and summary["fmu_steps"] == 0
 
 
-def test_energies_against_a_fine_quadrature() -> None:
-    result = simulate(load("quaid", ["run.duration=0.2", "run.output_step=1e-6"]))
-    w, summary = result.columns, result.summary
+@pytest.mark.parametrize("mu_plate", [0.0, 0.05])
+def test_energies_against_a_fine_quadrature(mu_plate: float) -> None:
+    settings = ["run.duration=0.2", f"friction.mu_plate={mu_plate}"]
+    fine = simulate(load("quaid", [*settings, "run.output_step=1e-6"]))
+    w, friction = fine.columns, fine.scene.friction
     power_in = w["friction_force"] * w["v_surface"]
     lost = w["friction_force"] * (w["v_surface"] - w["v_part"])
+    lost += mu_plate * friction.normal_force * np.abs(w["v_part"])
     h = np.diff(w["time"])
-    assert np.dot(power_in[:-1], h) == pytest.approx(summary["energy_in"], rel=1e-3)
-    assert np.dot(lost[:-1], h) == pytest.approx(summary["energy_friction"], rel=1e-3)
+    coarse = simulate(load("quaid", [*settings, "run.output_step=0.02"])).summary
+    assert np.dot(power_in[1:], h) == pytest.approx(coarse["energy_in"], rel=1e-4)
+    assert np.dot(lost[1:], h) == pytest.approx(coarse["energy_friction"], rel=1e-4)
+    for name in ("energy_in", "energy_friction", "energy_stored"):
+        assert coarse[name] == pytest.approx(fine.summary[name], rel=1e-10), name
+    assert coarse["energy_residual"] < 1e-12
+
+
+def test_rows_are_of_one_side_of_a_corner(tmp_path: Path) -> None:
+    """Corners and jumps of the surface's velocity are on rows, which hold what is before them."""
+    knots = np.arange(21) * 0.01
+    speeds = np.cumsum(np.random.default_rng(2).choice([-0.9, -0.25, 0.3, 0.6], 21))
+    times = np.insert(knots, 11, knots[10])  # a jump
+    speeds = np.insert(speeds, 11, speeds[10] + 0.1)
+    table = "\n".join(f"{t!r},{v!r}" for t, v in zip(times.tolist(), speeds.tolist(), strict=True))
+    (tmp_path / "own.csv").write_text(f"time,velocity\n{table}\n")
+    settings = [f"drive.file={tmp_path / 'own.csv'}", "friction.mu_plate=0.05"]
+    times_of_run = ["run.duration=0.2", "run.settle=0", "run.output_step=1e-3"]
+    scene = load("trial", [*settings, *times_of_run])
+    w, friction, mechanics = simulate(scene).columns, scene.friction, scene.mechanics
+
+    slopes = np.diff(speeds)[np.diff(times) > 0] / 0.01
+    piece = np.maximum(np.ceil(np.arange(201) / 10).astype(int) - 1, 0)
+    np.testing.assert_allclose(w["a_surface"], slopes[piece], rtol=0, atol=1e-9)
+    assert w["v_surface"][100] == pytest.approx(speeds[10], abs=1e-12)
+    plate = -0.05 * friction.normal_force * np.sign(w["v_part"])
+    a_part = (w["friction_force"] + plate) / mechanics.part_mass - mechanics.gravity
+    sticks = w["sticking"] == 1.0
+    assert 20 < sticks.sum() < 180
+    np.testing.assert_allclose(a_part[sticks], w["a_surface"][sticks], rtol=0, atol=1e-9)
+    # Means of the steps that end in the rows, of those in which nothing changes.
+    mean = np.diff(w["v_part"]) / 1e-3
+    whole = np.abs(np.diff(w["friction_force"]) + np.diff(plate)) < 1e-12
+    assert whole.sum() > 120
+    np.testing.assert_allclose(a_part[1:][whole], mean[whole], rtol=0, atol=1e-8)
+    assert whole[9::10].sum() > 12  # steps that end on corners
 
 
 def test_a_shutter_blurs_a_sine_as_the_closed_form_has_it() -> None:

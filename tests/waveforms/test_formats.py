@@ -246,7 +246,6 @@ def test_the_sound_is_the_surfaces_velocity(sine: Path, step: float, tmp_path: P
     assert place == pytest.approx(SPEED / 32767, rel=1e-3)
     spoken = SPEED * np.sin(2 * math.pi * FREQUENCY * time)
     far = slice(400, -400)  # from the ends, where the filter has to guess
-    # The sine is drawn with chords, whose error is below 1.3e-6 of its amplitude.
     assert np.abs(heard - spoken)[far].max() < 0.5 * place + 4e-6 * SPEED
     assert np.abs(heard - spoken).max() < 0.02 * SPEED
 

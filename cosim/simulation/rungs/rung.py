@@ -35,6 +35,23 @@ class Driven:
     """Columns of the second surface's coil."""
 
 
+@dataclass(frozen=True)
+class Motion:
+    """What surface and part did in a run; SI."""
+
+    totals: Mapping[str, float]
+    """At the end, counted from the start, of one actuator: the part's height, times, counts and
+    energies by the names of the mechanics' outputs; ``energy_in`` is what the coil's force, or the
+    surface that is given its velocity, has done."""
+    at_settle: Mapping[str, float]
+    """The same when settling ended."""
+    extremes: Mapping[str, float]
+    """After settling, largest and smallest ``a_surface``, ``v_surface`` and ``z_surface``; infinite
+    where there is none."""
+    frames: npt.NDArray[np.float64]
+    """The surface's height at each instant of the camera's frames after settling."""
+
+
 class Rung(ABC):
     """A way to drive the mechanics."""
 

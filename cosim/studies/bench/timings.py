@@ -57,11 +57,12 @@ def _call(case: Case, solver: Solver) -> Callable[[], int]:
     force = float(fitted) * published.GRAVITY
     law = part.friction_law(published.MU_S, published.MU_K_FITTED, force, published.GRAVITY, 0.0)
     rows = np.empty((3, len(case.time) if solver == "exact" else len(case.grid)))
-    motion = tuple(row.ctypes.data for row in rows)
+    motion: tuple[int | None, ...] = tuple(row.ctypes.data for row in rows)
     given = (len(case.time), case.time.ctypes.data, case.v_surface.ctypes.data, 1)
     given = (*given, law.ctypes.data, 0.0, case.v0)
     if solver == "exact":
-        function, asked = part.part_library().part_exact, (len(case.time), None)
+        function, asked = part.part_library().part_exact, (0.0, 0.0, len(case.time), None)
+        motion = (*motion, None)
     else:
         steps = len(case.grid) - 1
         function = part.part_library().part_threshold

@@ -10,7 +10,7 @@ from cosim.files.atomic import write_json, write_text
 from cosim.files.picture import Picture
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
-from cosim.simulation.rungs.given_surface import knots
+from cosim.simulation.rungs.given_surface import surface
 from cosim.simulation.simulate import simulate
 from cosim.studies.compare.compare import CameraError, Metrics, camera_error, made_of, measure
 from cosim.trials.camera import FRAME_RATE, Frames
@@ -144,6 +144,6 @@ def _run(
     span = len(trial.time) / FRAME_RATE + 1.0 / scene.drive.frequency
     longer = {"duration": max(scene.run.duration, scene.run.settle + span)}
     if scene.drive.waveform == "file":
-        longer = {"duration": float(knots(scene)[0][-1]), "settle": 0.0}
+        longer = {"duration": float(surface(scene).times[-1]), "settle": 0.0}
     scene = scene.model_copy(update={"run": scene.run.model_copy(update=longer)})
     return name, simulate(scene).columns, scene
