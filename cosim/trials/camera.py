@@ -61,16 +61,18 @@ def shown(heights: Array, exposure: float) -> Array:
     return heights.reshape(-1, instants_a_frame(exposure)).mean(axis=1)
 
 
-def film(waveforms: Mapping[str, Array], frames: Array, exposure: float) -> Frames:
-    """A run (its waveforms, SI, by name) as frames at these times (s) with this exposure (s)
-    show it. Where an exposure reaches beyond the run, the bodies stand still there.
+def heights(waveforms: Mapping[str, Array], body: str, frames: Array, exposure: float) -> Array:
+    """Heights (m) of a body of a run (its waveforms, SI, by name) as frames at these times (s) with
+    this exposure (s) show them. Where an exposure reaches beyond the run, it stands still there.
     """
     time = waveforms["time"]
     at = np.clip(instants(frames, exposure), time[0], time[-1])
-    z_surface, z_part = (
-        shown(hermite(at, time, waveforms[f"z_{body}"], waveforms[f"v_{body}"]), exposure)
-        for body in ("surface", "part")
-    )
+    return shown(hermite(at, time, waveforms[f"z_{body}"], waveforms[f"v_{body}"]), exposure)
+
+
+def film(waveforms: Mapping[str, Array], frames: Array, exposure: float) -> Frames:
+    """:func:`heights` of surface and part, and their velocities."""
+    z_surface, z_part = (heights(waveforms, body, frames, exposure) for body in ("surface", "part"))
     return Frames(
         *(frames - frames[0], z_surface, velocities(frames, z_surface)),
         *(z_part, velocities(frames, z_part)),

@@ -133,9 +133,9 @@ def changed(row: int, column: str, value: str) -> str:
     [
         ("", "holds no table"),
         ("# only a comment\n", "holds no table"),
-        (b"\x00\x01\x02\x03", "row 1: a header with the column t is missing"),
-        ("a,b\n1,2\n", "row 1: a header with the column t is missing"),
-        ("t,zp\n0,0\n", "there is no column zo (found: t, zp)"),
+        (b"\x00\x01\x02\x03", "row 1: no column is understood"),
+        ("a,b\n1,2\n", "row 1: no column is understood (found: a, b)"),
+        ("t,zp\n" + "".join(f"{i},0\n" for i in range(9)), "no column zo (found: t, zp)"),
         ("t,zp,zo,zp\n0,0,0,0\n", "row 1: the column zp stands there twice"),
         (changed(5, "zp", "abc"), "row 6, column zp: “abc” is not a number"),
         (changed(5, "vzo", "1_0"), "row 6, column vzo: “1_0” is not a number"),
@@ -166,7 +166,7 @@ def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     for path in (tmp_path / "none.csv", tmp_path):
         with pytest.raises(BadInput, match="cannot be read"):
             read(path)
-    monkeypatch.setattr("cosim.trials.tracked.LARGEST_FILE", 100)
+    monkeypatch.setattr("cosim.trials.table.LARGEST_FILE", 100)
     with pytest.raises(BadInput, match="too large"):
         read(write(tmp_path / "trial.csv", text(table())))
 

@@ -72,7 +72,8 @@ def read_surface(path: Path) -> tuple[Array, Array]:
     """Time from 0 (s) and velocity (m/s) of a surface: a tracked trial, or a CSV with both.
 
     The CSV has a header with ``time [s]`` and ``v_surface [m/s]`` (as ``waveforms.csv`` has), or
-    ``time`` and ``velocity``; other columns do not matter.
+    ``time`` and ``velocity``; other columns do not matter. Other units and heights are understood
+    as :mod:`cosim.trials.table` has them.
     """
     table = read_timetable(path, ("time [s]", "time"), ("v_surface [m/s]", "velocity"))
     if table is None:
@@ -82,11 +83,11 @@ def read_surface(path: Path) -> tuple[Array, Array]:
 
 
 def _trial(path: Path) -> tuple[Array, Array]:
-    from cosim.trials.tracked import read
+    from cosim.trials.tracked import read_platform
 
-    trial = read(path)
-    known = np.isfinite(trial.platform.v)
-    times, velocities = trial.time[known], trial.platform.v[known]
+    times, platform = read_platform(path)
+    known = np.isfinite(platform.v)
+    times, velocities = times[known], platform.v[known]
     return times - times[0], velocities
 
 

@@ -19,7 +19,7 @@ from cosim.trials.camera import (
     frame_times,
     velocities,
 )
-from cosim.trials.tracked import FEWEST_ROWS
+from cosim.trials.table import FEWEST_ROWS
 from cosim.waveforms.formats.source import Format, Run
 
 MOST_FRAMES = 200_000

@@ -1,0 +1,117 @@
+"""Reading what any instrument measured: names and units, times, and what is told of them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.errors import BadInput
+from cosim.trials.recording import read_recording
+from cosim.trials.tracked import read_platform
+
+ROWS = np.arange(12)
+
+
+def write(path: Path, header: str, *columns: np.ndarray) -> Path:
+    rows = [",".join(f"{x!r}" for x in row) for row in np.array(columns).T.tolist()]
+    path.write_text("\n".join([header, *rows]), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "signal", "unit"),
+    [
+        ("velocity [m/s]", "v_surface", 1.0),
+        ("Velocity (mm/s)", "v_surface", 1e-3),
+        ("v_surface [µm/s]", "v_surface", 1e-6),  # the micro sign
+        ("height [μm]", "z_surface", 1e-6),  # the Greek letter
+        ("displacement [um]", "z_surface", 1e-6),
+        ("zp", "z_surface", 1e-3),  # as the trials have it
+        ("zp [m]", "z_surface", 1.0),
+        ("part [cm]", "z_part", 1e-2),
+        ("vzo", "v_part", 1e-3),
+        ("current [A]", "current", 1.0),
+        ("Coil current [mA]", "current", 1e-3),
+        ("voltage [mV]", "coil_voltage", 1e-3),
+        ("coil_voltage [V]", "coil_voltage", 1.0),
+        ("command [V]", "command", 1.0),
+    ],
+)
+def test_names_and_units(header: str, signal: str, unit: float, tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", f"time [ms],{header}", 2.5 * ROWS + 7, ROWS**2 + 0.5)
+    found = read_recording(path)
+    np.testing.assert_allclose(found.time, 2.5e-3 * ROWS, atol=1e-15)  # from the first row on
+    np.testing.assert_allclose(found.signals[signal], unit * (ROWS**2 + 0.5), rtol=1e-15)
+    others = {"z_surface": {"v_surface"}, "z_part": {"v_part"}}.get(signal, set())
+    assert set(found.signals) == {signal} | others
+    assert found.notes == ()
+
+
+def test_velocities_of_uneven_heights_are_central_differences(tmp_path: Path) -> None:
+    time = np.cumsum(1.0 + ROWS % 3)
+    path = write(tmp_path / "a.csv", "time [ms],height [mm]", time, 3.0 * time)
+    v = read_recording(path).signals["v_surface"]
+    assert np.isnan(v[[0, -1]]).all()
+    np.testing.assert_allclose(v[1:-1], 3.0)  # mm/ms
+
+
+def test_what_is_taken_for_granted_is_told(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", "velocity,temperature [K]", ROWS, ROWS)
+    found = read_recording(path)
+    np.testing.assert_allclose(found.time, ROWS / 960)
+    assert found.signals["v_surface"][-1] == 11.0
+    unit, unknown, rate = found.notes
+    assert "velocity in m/s" in unit
+    assert unknown.startswith("Left out, not understood: temperature [K]. Understood are: time;")
+    assert "960 frames/s" in rate
+
+
+def test_rounded_times_of_a_trial_are_made_even(tmp_path: Path) -> None:
+    even = np.arange(300) / 960
+    path = write(tmp_path / "a.csv", "t,zp", np.round(even, 8), 1.0 + even)
+    np.testing.assert_array_equal(read_recording(path).time, even)
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("time [s],foo [V]", "no column to compare. Understood are: time; z_surface or surface"),
+        ("when,foo", "no column is understood (found: when, foo). Understood are: time; z_surface"),
+        ("time [s],velocity [mm]", "column velocity [mm]: the unit mm is not m/s, mm/s, µm/s"),
+        ("time [furlong],velocity [mm/s]", "column time [furlong]: the unit furlong is not s"),
+        ("velocity [m/s],v_surface [m/s]", "velocity [m/s] and v_surface [m/s] are the same"),
+    ],
+)
+def test_bad_headers(header: str, words: str, tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", header, ROWS, ROWS)
+    with pytest.raises(BadInput) as caught:
+        read_recording(path)
+    told = str(caught.value)
+    assert words in told and told.startswith(f"{path}: ") and "\n" not in told
+
+
+def test_gaps(tmp_path: Path) -> None:
+    """A velocity may be missing here and there, a height may not."""
+    gap = np.where(ROWS == 5, np.nan, ROWS)
+    found = read_recording(write(tmp_path / "a.csv", "time [s],velocity [m/s]", ROWS, gap))
+    np.testing.assert_array_equal(found.signals["v_surface"], gap)
+    with pytest.raises(BadInput, match=r"row 7, column height \[m\]: the value is missing"):
+        read_recording(write(tmp_path / "b.csv", "time [s],height [m]", ROWS, gap))
+    none = np.full(12, np.nan)
+    with pytest.raises(BadInput, match=r"column current \[A\]: it has fewer than two values"):
+        read_recording(write(tmp_path / "c.csv", "time [s],current [A]", ROWS, none))
+    with pytest.raises(BadInput, match="fewer than two velocities of the surface"):
+        read_platform(write(tmp_path / "d.csv", "time [s],velocity [m/s]", ROWS, none))
+
+
+def test_a_surface_alone(tmp_path: Path) -> None:
+    """What moves a scene's surface needs a time, and one of its height and velocity."""
+    time, surface = read_platform(
+        write(tmp_path / "a.csv", "time [ms],velocity [mm/s]", 4 * ROWS, 5.0 * ROWS)
+    )
+    np.testing.assert_allclose(time, 4e-3 * ROWS)
+    np.testing.assert_allclose(surface.v, 5e-3 * ROWS)
+    with pytest.raises(BadInput, match="no column with the time"):
+        read_platform(write(tmp_path / "b.csv", "velocity [mm/s]", ROWS))
+    with pytest.raises(BadInput, match="no column with the surface's motion"):
+        read_platform(write(tmp_path / "c.csv", "time [s],current [A]", ROWS, ROWS))
