@@ -37,6 +37,10 @@ LEAST = 1e-4
 """m/s: errors of v_average are relative to no less than this."""
 
 
+WITHOUT_NGSPICE = {"circuit.model": "limited", "drive.pwm_ripple": False}
+"""What makes a scene one that ngspice need not run."""
+
+
 @dataclass(frozen=True)
 class Choice:
     """The rung to take, why, and the relative error of v_average found for each simpler one."""
@@ -93,7 +97,7 @@ def without_ngspice(scene: Scene) -> Scene | None:
     if scene.rung.own_netlist or not scene.rung.ngspice:
         return None
     try:
-        return changed(scene, {"circuit.model": "limited", "drive.pwm_ripple": False}, "limited")
+        return changed(scene, WITHOUT_NGSPICE, "limited")
     except BadInput:
         return None
 

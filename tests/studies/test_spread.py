@@ -58,7 +58,7 @@ def test_the_ends_are_those_of_runs_of_their_own(
 
 def test_where_the_cheap_circuit_is_wrong_all_is_run_on_the_scenes_own():
     """The rung "limited" has no slew rate, which here takes a millisecond from each reset."""
-    keys = {"circuit.slew_rate": 1e4, "run.duration": 0.4, "run.settle": 0.2}
+    keys = {"circuit.slew_rate": 1e4, "run.duration": 0.2, "run.settle": 0.1}
     found = cosim.spread("paper", keys)
     assert {run.circuit_model for run in found.runs} == {"amplifier"}
     own = cosim.run("paper", keys).summary["v_average"]

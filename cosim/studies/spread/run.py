@@ -1,14 +1,14 @@
 """Runs a scene with each knob turned a little, on the cheapest circuit that suffices."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import Scene, changed, keys, load
 from cosim.scene.loading import Overrides
-from cosim.simulation.choose_rung import relative_error, without_ngspice
+from cosim.simulation.choose_rung import WITHOUT_NGSPICE, relative_error, without_ngspice
 from cosim.studies.spread.turns import TURN, Settings, turns
 from cosim.studies.sweep.pool import Pool, workers_asked
 from cosim.studies.sweep.report import with_unit
@@ -42,14 +42,16 @@ class Spread:
     @property
     def least(self) -> Turned:
         """The run with the least v_average."""
-        return min(self._known(), key=_speed)
+        return min(self.known, key=_speed)
 
     @property
     def most(self) -> Turned:
         """The run with the greatest v_average."""
-        return max(self._known(), key=_speed)
+        return max(self.known, key=_speed)
 
-    def _known(self) -> list[Turned]:
+    @property
+    def known(self) -> list[Turned]:
+        """The runs that did not fail."""
         return [run for run in self.runs if run.v_average is not None]
 
     def summary(self) -> dict[str, Any]:
@@ -101,37 +103,39 @@ def spread(
     every: list[Settings] = [{}, *turns(scene)]
     done = 0
 
-    def run(base: Scene, numbers: Iterable[int]) -> dict[int, Turned]:
+    def run(numbers: Iterable[int], circuit: Mapping[str, str | bool]) -> dict[int, Turned]:
         nonlocal done
-        model, found, points = base.circuit.model, {}, {}
+        found: dict[int, Turned] = {}
+        points: dict[int, dict[str, float | str]] = {}
+        model = str(circuit.get("circuit.model", scene.circuit.model))
         for n in numbers:
             try:
-                changed(base, every[n], "--spread")
+                changed(scene, {**every[n], **circuit}, "--spread")
             except BadInput as error:
                 found[n] = Turned(every[n], model, None, str(error))
             else:
-                points[n] = every[n]
-        with Pool(base, min(count, len(every)), whole_periods=True) as pool:
-            for n, outcome in pool.run(points.items()):
-                value = None if outcome.failure else outcome.numbers["v_average"]
-                found[n] = Turned(every[n], model, value, outcome.failure)
-                done += 1
-                progress(done)
+                points[n] = {**every[n], **circuit}
+        for n, outcome in pool.run(points.items()):
+            value = None if outcome.failure else outcome.numbers["v_average"]
+            found[n] = Turned(every[n], model, value, outcome.failure)
+            done += 1
+            progress(done)
         return found
 
-    simple = without_ngspice(scene)
-    if simple is None:
-        found = run(scene, range(len(every)))
-    else:
-        found = run(simple, range(len(every)))
-        known = [n for n, one in found.items() if one.v_average is not None]
-        ends = {0, *(end(known, key=lambda n: _speed(found[n])) for end in (min, max) if known)}
-        exact = run(scene, ends)
-        if any(_off(found[n], exact[n]) > scene.run.tolerance for n in ends):
-            exact |= run(scene, set(range(len(every))) - ends)
-        found |= exact
-    made = Spread([found[n] for n in range(len(every))])
-    if not made._known():
+    numbers = set(range(len(every)))
+    with Pool(scene, min(count, len(every)), whole_periods=True) as pool:
+        if without_ngspice(scene) is None:
+            found = run(numbers, {})
+        else:
+            found = run(numbers, WITHOUT_NGSPICE)
+            known = [n for n, one in found.items() if one.v_average is not None]
+            ends = {0, *(end(known, key=lambda n: _speed(found[n])) for end in (min, max) if known)}
+            exact = run(ends, {})
+            if any(_off(found[n], exact[n]) > scene.run.tolerance for n in ends):
+                exact |= run(numbers - ends, {})
+            found |= exact
+    made = Spread([found[n] for n in sorted(found)])
+    if not made.known:
         raise SimulationFailed(f"No setting could be run; the first one: {made.runs[0].failure}")
     return made
 

@@ -24,11 +24,11 @@ class Outcome:
 
 def evaluate(
     base: Scene,
-    values: Mapping[str, Number],
+    values: Mapping[str, Number | str],
     whole_periods: bool,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Outcome:
-    """Run ``base`` with ``values`` (``table.key``: number, SI). Whatever is wrong is an outcome.
+    """Run ``base`` with ``values`` (``table.key`` and value, SI). Whatever is wrong is an outcome.
 
     Waveforms are not made: the rows of a run are communication points too, so the numbers agree
     with those of `cosim run` within rounding, and the run is several times as fast.
@@ -37,7 +37,7 @@ def evaluate(
 
     try:
         if not base.surface_is_given:  # whose peaks are those of the rows
-            few_rows = values.get("run.duration", base.run.duration) / 2.0
+            few_rows = float(values.get("run.duration", base.run.duration)) / 2.0
             values = {"run.output_step": few_rows, **values}
         scene = changed(base, values, "--over")
         if whole_periods:

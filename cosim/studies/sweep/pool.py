@@ -21,7 +21,7 @@ POINTS_A_WORKER = 250
 TRIES = 3
 """A worker may die of something else than its point, such as a kill from outside."""
 
-Point = tuple[int, Mapping[str, Number]]
+Point = tuple[int, Mapping[str, Number | str]]
 
 
 class _Worker(Worker):
@@ -123,7 +123,7 @@ def workers_asked(workers: int | None) -> int:
 def _evaluate(
     base: Scene,
     whole_periods: bool,
-    values: Mapping[str, Number],
+    values: Mapping[str, Number | str],
     progress: Callable[[float], None],
 ) -> tuple[Outcome, bool]:
     """A point's outcome, and whether it has spoilt the process for others."""
