@@ -26,7 +26,8 @@ from cosim.scene.tables import (
 _SHORT_STEP = 2e-5  # s
 
 FASTEST = 1e-6
-"""Least time constant of a coil, s, that the integration in the FMU can follow."""
+"""Least time constant, s, that the integration in the FMU can follow all the time: of a coil, of a
+damper with its mass, and of a spring with its mass (the time of a radian)."""
 
 
 class Scene(BaseModel):
@@ -83,6 +84,32 @@ class Scene(BaseModel):
                     "the current changes too fast to be solved with the mechanics",
                     *("coil.resistance", "coil.eddy_resistance", "coil.count"),
                     "circuit.sense_resistance",
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _check_speed_of_mechanics(self) -> "Scene":
+        """The same of what acts on the bodies at every moment; for the rest see Pace."""
+        if self.surface_is_given:
+            return self
+        rig = self.mechanics
+        surface, masses = rig.surface_mass, f"mechanics.surface_mass = {rig.surface_mass:g} kg"
+        both, of_both = surface, masses
+        if rig.actuator == "ram":
+            both = 1.0 / (1.0 / surface + 1.0 / rig.ram_mass)
+            of_both = f"mechanics.ram_mass = {rig.ram_mass:g} kg and {masses}"
+        for key, most, named in (
+            ("flexure_damping", surface / FASTEST, masses),
+            ("flexure_stiffness", surface / FASTEST**2, masses),
+            ("suspension_damping", both / FASTEST, of_both),
+            ("suspension_k1", both / FASTEST**2, of_both),
+        ):
+            value = getattr(rig, key)
+            if value > most:
+                unit = next(one.unit for one in keys() if one.full == f"mechanics.{key}")
+                raise fault(
+                    f"mechanics.{key} = {value:g} {unit} must be at most {most:.3g} {unit} with "
+                    f"{named}, or the bodies move too fast to be solved"
                 )
         return self
 

@@ -11,12 +11,14 @@ from cosim.arrays import Array
 from cosim.coupling.loop import agenda
 from cosim.coupling.loop.structures import Fmu, RecorderState, Schedule, callback, loop
 from cosim.files.spill import BLOCK, Tape
+from cosim.mechanics.pace import Pace
 from cosim.mechanics.stickslip import COUNTERS, Mechanics
 from cosim.scene import Scene
 from cosim.toolchain.interrupts import caught_signals
 
 STEPS = 4096
-"""Steps between two looks at what Python has to do, about ten milliseconds."""
+"""Steps between two looks at what Python has to do, about ten milliseconds; fewer at first, since
+nobody knows yet how long a step takes."""
 
 _CALLS = ("set_reals", "do_step", "get_reals", "get_integers")
 
@@ -34,6 +36,8 @@ class Recorder:
         self.mechanics = mechanics
         self._library = loop()
         self._progress = progress
+        self._pace = Pace(scene, mechanics)
+        self._at_once = 1
         self._told = -1.0
         self._reached = 0.0
         self._fault: BaseException | None = None
@@ -118,17 +122,22 @@ class Recorder:
                     edges.ctypes.data + 8 * done,
                     start.ctypes.data + 8 * ports * done,
                     end.ctypes.data + 8 * ports * done,
-                    STEPS,
+                    self._at_once,
                 )
                 if taken < 0:
                     raise self.failure()
                 done += taken
+                self._at_once = min(2 * self._at_once, STEPS)
                 self.tell()
                 if self._fault:
                     raise self._fault
 
     def tell(self) -> None:
-        """Tell how far the agenda has been worked off, where that is news."""
+        """Tell how far the agenda has been worked off, where that is news.
+
+        Raises SimulationFailed where it goes too slowly to be worked off at all.
+        """
+        self._pace.judge(self._fmu.time, self.steps)
         done = self.state.next
         reached = float(self._agenda[0][done - 1]) if done else self._reached
         if reached > self._told:
