@@ -69,7 +69,7 @@ def _words(name: str, found: Found) -> str:
     ]
     both, words = {
         "z_part": ("drift", "drift"),
-        "v_surface": ("kick", "largest change from row to row"),
+        "v_surface": ("kick", "largest change"),
     }.get(name, ("", ""))
     if f"{both}_measured" in numbers:
         run, measured = (
