@@ -148,7 +148,7 @@ def test_tune_theory_and_compare(tmp_path: Path, result: cosim.Result) -> None:
     assert main(["export", str(tmp_path), "--as", "tracker"]) == 0
     compared = [cosim.compare(run, tmp_path / "tracker.csv") for run in (long, tmp_path)]
     for found in compared:
-        assert found.metrics.velocity_r2 == pytest.approx(1.0, abs=1e-6)
+        assert found.numbers["velocity_r2"] == pytest.approx(1.0, abs=1e-6)
         assert isinstance(found.plot(), Figure)
 
 

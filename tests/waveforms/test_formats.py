@@ -392,7 +392,7 @@ def test_compare_refuses_a_trial_in_which_nothing_moves(
     assert main(["export", str(run), "--as", "tracker"]) == 0
     trial = str(run / "tracker.csv")
     assert main(["compare", str(run), trial, "--out", str(tmp_path / "out")]) == 2
-    assert "the platform does not move" in capsys.readouterr().err
+    assert "the height of the surface does not change" in capsys.readouterr().err
 
 
 def test_all_forms_of_a_part_alone(

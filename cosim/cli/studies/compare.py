@@ -9,7 +9,9 @@ from cosim.cli.options import add_out, add_overrides, writable
 
 def _options(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN|SCENE", help="a folder that cosim run wrote or a scene")
-    parser.add_argument("trial", type=Path, metavar="TRIAL.csv", help="a tracked trial")
+    parser.add_argument(
+        "trial", type=Path, metavar="TRIAL.csv", help="a tracked trial, or other measurements"
+    )
     add_overrides(parser)
     add_out(parser, "results/compare")
 

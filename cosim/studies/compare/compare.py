@@ -1,178 +1,229 @@
-"""Simulated against measured: a run and a tracked trial, through the same camera.
+"""Simulated against measured: a run and a recording, seen by the same instruments.
 
-The simulated heights are read at the trial's frame rate and differenced as the tracker does; only
-then are they laid over the measured ones. A trial that `cosim export` made of the same run is
-recognised by its heights; then the camera's own error is told too.
+Simulated heights are read at the recording's times, exposed as its camera does and differenced as
+its tracker does; velocities, currents and voltages that were measured by themselves are read as
+they are. Only then are they laid over the measured ones.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from cosim.arrays import Array
-from cosim.errors import BadInput
-from cosim.trials.camera import FRAME_RATE, Frames, film, frame_count, frame_times
-from cosim.trials.tracked import Trial
+from cosim.errors import BadInput, plain
+from cosim.studies.compare.periods import period_of
+from cosim.studies.compare.scores import (
+    Number,
+    Score,
+    Signals,
+    both_sides,
+    explained,
+    horizontal_share,
+    scores,
+)
+from cosim.trials.camera import heights, velocities
+from cosim.trials.recording import Recording
+from cosim.waveforms.columns import COLUMNS
 
 SHIFTS = 400
-"""Phases that are tried within a period."""
+"""Phases that are tried within a period, before the best one is refined."""
 
-STICKS = 0.01
-"""m/s; part and surface that differ by less between frames count as sticking, on both sides."""
+GUIDES = ("v_surface", "current", "coil_voltage", "command", "v_part")
+"""The first of these that was measured tells the period, and where in it the run is laid over."""
 
-
-@dataclass(frozen=True)
-class Metrics:
-    """How far apart a run and a trial are; SI but for ``_mm`` and ``_percent``."""
-
-    mean_error_mm: float
-    """Mean distance of the part's heights, both from their first: the paper's error."""
-    mean_error_percent: float
-    """The same, of the part's greatest measured distance from its first height."""
-    velocity_r2: float
-    """Share of the variance of the surface's measured velocity that the run explains."""
-    drift_measured: float
-    """Mean velocity of the part, m/s."""
-    drift_simulated: float
-    """The same of the run."""
-    drift_error: float
-    slip_fraction_measured: float
-    """Share of the frames in which part and surface differ by more than 10 mm/s."""
-    slip_fraction_simulated: float
-    kick_measured: float
-    """Largest change of the surface's velocity from frame to frame, m/s: all that 960 frames/s
-    show of an impact."""
-    kick_simulated: float
-    horizontal_share: float | None
-    """Share of the surface's measured motion (mean square velocity) that is horizontal, None where
-    that was not tracked; the simulation has none."""
-    start: float
-    """Time of the run, s, that is laid over the trial's first frame."""
+APART = 0.05
+"""Of a period by which run and recording may drift apart before their frequencies differ."""
 
 
 @dataclass(frozen=True)
-class CameraError:
-    """What the camera alone makes of a run: mean distances of the run's rows from the straight
-    lines between the frames, as scripts that interpolate a trial draw them.
+class Found:
+    """A run laid over a recording, from ``start`` (s) of the run on.
+
+    ``recording`` is the stretch that was compared, ``simulated`` has its signals.
     """
 
-    camera_surface_mm: float
-    """Of the surface's height."""
-    camera_part_mm: float
-    """Of the part's height."""
-    camera_velocity: float
-    """Of the surface's velocity, m/s."""
+    recording: Recording
+    simulated: Signals
+    start: float
+    scores: list[Score]
+    numbers: list[Number]
+    notes: list[str]
 
 
 def measure(
-    waveforms: dict[str, Array],
-    trial: Trial,
+    waveforms: Mapping[str, Array],
+    recording: Recording,
     earliest: float,
-    period: float,
+    period: float | None,
     shutter: float = 0.0,
-) -> tuple[Metrics, Frames, Frames]:
-    """Metrics, and both sides at the trial's frames, the run shifted for the best agreement.
+) -> Found:
+    """Scores and numbers, and both sides at the recording's times.
 
-    ``earliest`` is the first time of the run that may be laid over the trial's first frame, s;
-    ``shutter`` the exposure as a share of the time between frames.
+    ``earliest`` is the first time of the run that may be laid over the recording's first row, s;
+    ``period`` that of the drive, s, within which it is shifted for the best agreement, or None
+    where there is nothing to shift; ``shutter`` the exposure as a share of the time between rows.
     """
-    exposure = shutter / FRAME_RATE
-    measured = _of_trial(trial)
-    for body, z in (("platform", measured.z_surface), ("part", measured.z_part)):
-        if np.ptp(z) == 0.0:
-            raise BadInput(f"{trial.name}: the {body} does not move: there is nothing to compare.")
-    own = made_of(waveforms, trial, earliest, shutter)
+    recording, notes = _comparable(recording, waveforms)
+    exposure = shutter * float(np.median(np.diff(recording.time)))
+    own = made_of(waveforms, recording, earliest, exposure)
     end = float(waveforms["time"][-1])
-    if period == 0.0 and not own:  # the run begins with the first frame whose velocity is known
-        first = int(np.argmax(np.isfinite(trial.platform.v)))
-        last = first + int(end * FRAME_RATE + 1e-6) + 1
-        measured = Frames(*(values[first:last] for values in vars(measured).values()))
-    n = len(measured.time)
-    room = end - (n - 1) / FRAME_RATE
-    if room < earliest - 1e-9:
+    if period is None and not own:
+        recording = _covered(recording, end - earliest)
+    rows, span = len(recording.time), float(recording.time[-1])
+    if earliest + span > end + 1e-9:
+        needed = earliest + span * rows / (rows - 1)
         raise BadInput(
-            f"The run ends at {end:.4g} s, too early to cover the {n} frames of {trial.name}: "
-            f"run.duration must be at least {earliest + n / FRAME_RATE:.4g} s."
+            f"The run ends at {end:.4g} s, too early to cover the {rows} rows of "
+            f"{plain(recording.name)}: run.duration must be at least {needed:.4g} s."
         )
-    latest = earliest if own else max(earliest, min(room, earliest + period))
+    start = earliest
+    if period is not None and not own:
+        latest = max(earliest, min(end - span, earliest + period))
+        start = _laid_over(waveforms, recording, earliest, latest, exposure)
+    simulated = observe(waveforms, recording, start, exposure)
+    repeats = _period(recording)
+    if repeats is None:
+        notes.append("The recording does not repeat: there is no ceiling, and no whole period.")
+    elif period and (apart := abs(1.0 / repeats - 1.0 / period) * span) > APART:
+        notes.append(
+            f"The frequencies differ: the recording repeats at {1.0 / repeats:.4g} Hz, the run is "
+            f"driven at {1.0 / period:.4g} Hz (drive.frequency). At the end of the recording they "
+            f"are {apart:.2g} periods apart, which spoils the scores."
+        )
+    numbers = both_sides(recording, simulated, (repeats, period or repeats))
+    rate = 1.0 / float(np.median(np.diff(recording.time)))
+    numbers += [
+        *filter(None, [horizontal_share(recording)]),
+        Number("rate", rate, "1/s", "rows of the recording in a second, the median"),
+        Number("start", start, "s", "time of the run that is laid over the recording's first row"),
+    ]
+    if own:
+        numbers += _camera_errors(waveforms, recording, start)
+        notes.append(
+            "This trial is the run's own. Both sides went through the same camera: mean_error_mm "
+            "is what the digits of the file make, and camera_… is the error that the camera alone "
+            "makes, the run's rows against straight lines between the frames."
+        )
+    found = scores(recording, simulated, repeats)
+    return Found(recording, simulated, start, found, numbers, notes)
+
+
+def observe(
+    waveforms: Mapping[str, Array], recording: Recording, start: float, exposure: float
+) -> Signals:
+    """The recording's signals, of the run from ``start`` (s) on; ``exposure`` of a frame, s."""
+    return {
+        name: _signal(waveforms, recording, name, start, exposure) for name in recording.signals
+    }
+
+
+def _signal(
+    waveforms: Mapping[str, Array], recording: Recording, name: str, start: float, exposure: float
+) -> Array:
+    at, (quantity, _, body) = recording.time + start, name.partition("_")
+    if f"z_{body}" not in recording.signals:
+        return np.interp(at, waveforms["time"], waveforms[name])
+    z = heights(waveforms, body, at, exposure)
+    return z if quantity == "z" else velocities(at, z)
+
+
+def _comparable(
+    recording: Recording, waveforms: Mapping[str, Array]
+) -> tuple[Recording, list[str]]:
+    """The recording with those of its signals that the run has, and its notes."""
+    notes = list(recording.notes)
+    kept = {name: values for name, values in recording.signals.items() if name in waveforms}
+    names = ", ".join(COLUMNS[name].long_name for name in recording.signals if name not in kept)
+    if not kept:
+        raise BadInput(f"{plain(recording.name)}: the run has no {names} to compare it with.")
+    if names:
+        notes.append(f"Left out, since the run has none: {names}.")
+    for name, values in kept.items():
+        if np.ptp(values[np.isfinite(values)]) == 0.0:
+            words = f"the {COLUMNS[name].long_name} does not change"
+            raise BadInput(f"{plain(recording.name)}: {words}: there is nothing to compare.")
+    return replace(recording, signals=kept), notes
+
+
+def _covered(recording: Recording, length: float) -> Recording:
+    """What a run of this length (s) covers, from the first row whose velocity is known: with that
+    begins a run whose surface is a recording's.
+    """
+    v = recording.signals.get("v_surface")
+    first = 0 if v is None else int(np.argmax(np.isfinite(v)))
+    time = recording.time - recording.time[first]
+    rows = slice(first, int(np.searchsorted(time, length + 1e-9, side="right")))
+    return replace(
+        recording,
+        time=time[rows],
+        signals={name: values[rows] for name, values in recording.signals.items()},
+        v_across=recording.v_across[rows],
+    )
+
+
+def _laid_over(
+    waveforms: Mapping[str, Array],
+    recording: Recording,
+    earliest: float,
+    latest: float,
+    exposure: float,
+) -> float:
+    """The time (s) of the run at which it explains most of the guiding signal."""
+    name = next(name for name in GUIDES if name in recording.signals)
+    wanted = recording.signals[name]
+
+    def missed(start: float) -> float:
+        return -explained(_signal(waveforms, recording, name, start, exposure), wanted)
+
     starts = np.linspace(earliest, latest, SHIFTS)
-    candidates = (film(waveforms, frame_times(float(start), n), exposure) for start in starts)
-    fits = [explained(frames.v_surface, measured.v_surface) for frames in candidates]
-    start = float(starts[int(np.argmax(fits))])
-    simulated = film(waveforms, frame_times(start, n), exposure)
-    moved = simulated.z_part - simulated.z_part[0], measured.z_part - measured.z_part[0]
-    error = float(np.nanmean(np.abs(moved[0] - moved[1])))
-    span = float(measured.time[-1] - measured.time[0])
-    drifts = [float(z[-1] - z[0]) / span for z in moved]
-    metrics = Metrics(
-        mean_error_mm=error * 1e3,
-        mean_error_percent=100.0 * error / float(np.nanmax(np.abs(moved[1]))),
-        velocity_r2=max(fits),
-        drift_measured=drifts[1],
-        drift_simulated=drifts[0],
-        drift_error=drifts[0] - drifts[1],
-        slip_fraction_measured=_slipping(measured),
-        slip_fraction_simulated=_slipping(simulated),
-        kick_measured=float(np.nanmax(np.abs(np.diff(measured.v_surface)))),
-        kick_simulated=float(np.nanmax(np.abs(np.diff(simulated.v_surface)))),
-        horizontal_share=_horizontal(trial),
-        start=start,
-    )
-    return metrics, simulated, measured
+    best = int(np.argmin([missed(float(start)) for start in starts]))
+    around = starts[max(best - 1, 0)], starts[min(best + 1, SHIFTS - 1)]
+    finer = minimize_scalar(missed, bounds=around, method="bounded", options={"xatol": 1e-6})
+    return min((float(starts[best]), float(finer.x)), key=missed)
 
 
-def camera_error(waveforms: dict[str, Array], trial: Trial, start: float) -> CameraError:
-    """The camera's error in a trial made of this run, whose first frame is at ``start`` (s)."""
-    measured = _of_trial(trial)
-    known = np.isfinite(measured.v_surface)
-    frames = (start + np.arange(len(known)) / FRAME_RATE)[known]
-    time = waveforms["time"]
-    shown = (time >= frames[0] - 1e-9) & (time <= frames[-1] + 1e-9)
-
-    def distance(column: str) -> float:
-        drawn = np.interp(time[shown], frames, getattr(measured, column)[known])
-        return float(np.mean(np.abs(waveforms[column][shown] - drawn)))
-
-    surface, part = 1e3 * distance("z_surface"), 1e3 * distance("z_part")
-    return CameraError(surface, part, distance("v_surface"))
+def _period(recording: Recording) -> float | None:
+    guides = (recording.signals[name] for name in GUIDES if name in recording.signals)
+    return next((found for found in (period_of(recording.time, v) for v in guides) if found), None)
 
 
-def made_of(waveforms: dict[str, Array], trial: Trial, start: float, shutter: float = 0.0) -> bool:
-    """Whether the trial's heights are this run's from ``start`` (s) on, to a trial's digits."""
-    n = len(trial.time)
-    if n > frame_count(waveforms, start):
+def made_of(
+    waveforms: Mapping[str, Array], recording: Recording, start: float, exposure: float
+) -> bool:
+    """Whether the heights are this run's from ``start`` (s) on, to the digits of an exported trial:
+    seven, and eight places of a millimetre. A recording without heights is no trial.
+    """
+    at, signals = recording.time + start, recording.signals
+    bodies = [body for body in ("surface", "part") if f"z_{body}" in signals]
+    if not bodies or at[-1] > waveforms["time"][-1] + 1e-9:
         return False
-    seen = film(waveforms, frame_times(start, n), shutter / FRAME_RATE)
-    tracked = _of_trial(trial)
-    # A trial has seven digits, and eight places of a second or millimetre.
     return all(
-        np.allclose(getattr(seen, name), getattr(tracked, name), rtol=6e-7, atol=places)
-        for name, places in (("time", 6e-9), ("z_surface", 6e-12), ("z_part", 6e-12))
+        np.allclose(heights(waveforms, body, at, exposure), signals[f"z_{body}"], 6e-7, 6e-12)
+        for body in bodies
     )
 
 
-def _of_trial(trial: Trial) -> Frames:
-    platform, part = trial.platform, trial.part
-    return Frames(trial.time - trial.time[0], platform.z, platform.v, part.z, part.v)
-
-
-def explained(found: Array, wanted: Array) -> float:
-    """R²: the share of the variance of ``wanted`` that ``found`` explains."""
-    known = np.isfinite(found) & np.isfinite(wanted)
-    wanted, found = wanted[known], found[known]
-    return 1.0 - float(np.sum((wanted - found) ** 2) / np.sum((wanted - wanted.mean()) ** 2))
-
-
-def _slipping(frames: Frames) -> float:
-    apart = np.abs(frames.v_part - frames.v_surface)
-    known = np.isfinite(apart)
-    return float(np.mean(apart[known] > STICKS))
-
-
-def _horizontal(trial: Trial) -> float | None:
-    across, along = trial.platform.v_across, trial.platform.v
-    known = np.isfinite(across) & np.isfinite(along)
-    if not known.any():
-        return None
-    squares = float(np.mean(across[known] ** 2)), float(np.mean(along[known] ** 2))
-    return squares[0] / sum(squares)
+def _camera_errors(
+    waveforms: Mapping[str, Array], recording: Recording, start: float
+) -> list[Number]:
+    """Mean distances of the run's rows from the straight lines between the frames, as scripts that
+    interpolate a trial draw them.
+    """
+    found, time = [], waveforms["time"]
+    for signal, name, unit, scale, words in (
+        ("z_surface", "camera_surface_mm", "mm", 1e3, "height of the surface"),
+        ("z_part", "camera_part_mm", "mm", 1e3, "height of the part"),
+        ("v_surface", "camera_velocity", "m/s", 1.0, "velocity of the surface"),
+    ):
+        if signal not in recording.signals:
+            continue
+        known = np.isfinite(recording.signals.get("v_surface", recording.time))
+        frames = (recording.time + start)[known]
+        shown = (time >= frames[0] - 1e-9) & (time <= frames[-1] + 1e-9)
+        drawn = np.interp(time[shown], frames, recording.signals[signal][known])
+        value = scale * float(np.mean(np.abs(waveforms[signal][shown] - drawn)))
+        meaning = f"mean error of the {words} that the camera alone makes"
+        found.append(Number(name, value, unit, meaning))
+    return found

@@ -9,6 +9,7 @@ from io import BytesIO
 
 import numpy as np
 
+from cosim.drive.command import period
 from cosim.errors import BadInput, plain
 from cosim.scene import Scene, load
 from cosim.trials.camera import (
@@ -60,11 +61,14 @@ def write(run: Run, file: BytesIO) -> str:
     return f"{n} frames at {FRAME_RATE:g} frames/s from {start:g} s on"
 
 
-def laid_over(scene: Scene) -> tuple[float, float]:
-    """The first time of a run that may be laid over a trial's first frame, s, and its period, s."""
+def laid_over(scene: Scene) -> tuple[float, float | None]:
+    """The first time of a run that may be laid over a trial's first frame, s, and its period, s;
+    None where nothing drives it, or a trial's own surface does: then there is nothing to shift.
+    """
     if scene.drive.file is not None:
-        return 0.0, 0.0  # the trial's own surface: there is nothing to shift
-    return scene.run.settle, 1.0 / scene.drive.frequency
+        return 0.0, None
+    driven = scene.rung.driven or scene.surface_is_given
+    return scene.run.settle, period(scene) if driven else None
 
 
 def number(value: float) -> str:

@@ -1,0 +1,80 @@
+"""The figure of a comparison: every measured signal with the run's, over time."""
+
+from matplotlib.axes import Axes
+
+from cosim.files.picture import Picture
+from cosim.studies.compare.compare import Found
+from cosim.studies.compare.scores import R2
+from cosim.waveforms.columns import COLUMNS
+from cosim.waveforms.figure import DRIVE, PART, SURFACE
+
+PANELS = (
+    (("z_surface", SURFACE), ("v_surface", SURFACE)),
+    (("z_part", PART), ("v_part", PART)),
+    (("command", DRIVE), ("current", DRIVE), ("coil_voltage", DRIVE)),
+)
+"""Signals and colours, column by column."""
+
+SCALED = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+
+
+def draw(title: str, found: Found) -> Picture:
+    """A column of panels for each body that was measured, and one for the circuit."""
+    columns = [[p for p in column if p[0] in found.simulated] for column in PANELS]
+    columns = [column for column in columns if column]
+    rows = max(map(len, columns))
+    figure = Picture(6.5 * max(len(columns), 1.4), 1.0 + 3.1 * rows, "constrained")
+    axes = figure.subplots(rows, len(columns), sharex=True, squeeze=False)
+    for k, column in enumerate(columns):
+        for axis, panel in zip(axes[:, k], column, strict=False):
+            _panel(axis, *panel, found)
+        for axis in axes[len(column) :, k]:
+            axis.set_visible(False)
+        axes[len(column) - 1, k].set_xlabel("time [ms]")
+        axes[len(column) - 1, k].tick_params(labelbottom=True)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    figure.suptitle(title, fontsize=12)
+    return figure
+
+
+def _panel(axis: Axes, name: str, color: str, found: Found) -> None:
+    scale, unit = SCALED.get(COLUMNS[name].unit, (1.0, COLUMNS[name].unit))
+    time = found.recording.time * 1e3
+    measured, simulated = found.recording.signals[name], found.simulated[name]
+    # Dots of a long recording cover each other, and the run's line.
+    size = 3.0 if len(time) < 2000 else 1.0
+    for values, style in (
+        (measured, {"color": "0.25", "ls": "", "marker": ".", "ms": size, "label": "measured"}),
+        (simulated, {"color": color, "lw": 1.4, "label": "simulated"}),
+    ):
+        first = values[0] if name.startswith("z") else 0.0
+        axis.plot(time, (values - first) * scale, **style)
+    axis.grid(alpha=0.25)
+    axis.set_ylabel(f"{COLUMNS[name].long_name} [{unit}]")
+    axis.set_title(_words(name, found), fontsize=10, loc="left")
+
+
+def _words(name: str, found: Found) -> str:
+    """The scores of a panel, and what both sides say of it."""
+    numbers = {number.name: number.value for number in found.numbers}
+    said = [
+        f"{words} {score.values[0]:{form}}{unit}"
+        + ("" if score.values[1] is None else f" (ceiling {score.values[1]:{form}})")
+        for score in found.scores
+        for wanted, words, form, unit in (
+            ("mean_error_mm", "mean error", ".3f", " mm"),
+            (R2.get(name, ("",))[0], "R²", ".2f", ""),
+        )
+        if score.name == wanted and (wanted != "mean_error_mm" or name == "z_part")
+    ]
+    both, words = {
+        "z_part": ("drift", "drift"),
+        "v_surface": ("kick", "largest change"),
+    }.get(name, ("", ""))
+    if f"{both}_measured" in numbers:
+        run, measured = (
+            1e3 * (numbers[f"{both}_{side}"] or 0.0) for side in ("simulated", "measured")
+        )
+        form = "+.1f" if both == "drift" else ".0f"
+        said.append(f"{words} {run:{form}} mm/s (measured {measured:{form}})")
+    return "; ".join(said)

@@ -1,0 +1,156 @@
+"""What a comparison says: scores beside what needs no model, and the same numbers of both sides."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.studies.compare.periods import drift, one_period_later, whole_periods
+from cosim.trials.camera import FRAME_RATE
+from cosim.trials.recording import Recording
+
+STICKS = 0.01
+"""m/s; part and surface that differ by less between frames count as sticking, on both sides."""
+
+LINES = ("run", "ceiling", "no_motion", "straight_line")
+"""What a score is given for: the run; the measured motion's forecast of itself one period later,
+which no model need beat; and, as floors, nothing that moves and the best straight line."""
+
+Signals = dict[str, Array]
+Distance = Callable[[Array, Array], float]
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number of a comparison, with its unit and meaning; None where it cannot be told."""
+
+    name: str
+    value: float | None
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Score:
+    """How far a signal and its measured one are apart; ``values`` for each of ``LINES``."""
+
+    name: str
+    unit: str
+    meaning: str
+    values: tuple[float | None, ...]
+
+
+def explained(found: Array, wanted: Array) -> float:
+    """R²: the share of the variance of ``wanted`` that ``found`` explains."""
+    known = np.isfinite(found) & np.isfinite(wanted)
+    wanted, found = wanted[known], found[known]
+    return 1.0 - float(np.sum((wanted - found) ** 2) / np.sum((wanted - wanted.mean()) ** 2))
+
+
+def mean_distance(found: Array, wanted: Array) -> float:
+    """Mean of the distances, where both are known."""
+    return float(np.nanmean(np.abs(found - wanted)))
+
+
+SHARE = "share of the variance of the measured {} that the run explains"
+R2 = {
+    "v_surface": ("velocity_r2", "velocity of the surface"),
+    "current": ("current_r2", "current of the coil"),
+    "coil_voltage": ("voltage_r2", "voltage of the coil"),
+    "command": ("command_r2", "command V1"),
+    "v_part": ("part_velocity_r2", "velocity of the part"),
+}
+
+
+def scores(recording: Recording, simulated: Signals, period: float | None) -> list[Score]:
+    """The scores of all signals; ``period`` is the measured one, s."""
+    found, time = [], recording.time
+    if "z_part" in simulated:
+        measured, run = (side["z_part"] for side in (recording.signals, simulated))
+        moved = measured - measured[0]
+        gained = drift(time, moved, period) * period if period else 0.0
+        values = _lines(time, moved, run - run[0], period, gained, mean_distance)
+        apart = "mean distance of the part's heights, both from their first"
+        largest = float(np.abs(moved).max())
+        for name, unit, scale, words in (
+            ("mean_error_mm", "mm", 1e3, f"{apart}: the paper's error"),
+            ("mean_error_percent", "%", 100.0 / largest, "the same, of the part's greatest height"),
+        ):
+            scaled = tuple(value and value * scale for value in values)
+            found.append(Score(name, unit, words, scaled))
+    for signal, (name, words) in R2.items():
+        if signal in simulated:
+            values = _lines(
+                time, recording.signals[signal], simulated[signal], period, 0.0, explained
+            )
+            found.append(Score(name, "1", SHARE.format(words), values))
+    return found
+
+
+def _lines(
+    time: Array, measured: Array, run: Array, period: float | None, gained: float, score: Distance
+) -> tuple[float | None, ...]:
+    known = np.isfinite(measured)
+    line = np.polynomial.Polynomial.fit(time[known], measured[known], 1)
+    later = one_period_later(time, measured, period, gained) if period else None
+    return (
+        score(run, measured),
+        None if later is None else score(later, measured),
+        score(np.zeros(len(time)), measured),
+        score(line(time), measured),
+    )
+
+
+def both_sides(
+    recording: Recording, simulated: Signals, periods: tuple[float | None, float | None]
+) -> list[Number]:
+    """Numbers of the measured signals and of the run's; ``periods`` are those of both, s."""
+    time, found = recording.time, []
+    sides = (("measured", recording.signals), ("simulated", simulated))
+
+    def pair(name: str, unit: str, meaning: str, values: list[float | None]) -> None:
+        for (side, _), value in zip(sides, values, strict=True):
+            found.append(Number(f"{name}_{side}", value, unit, meaning))
+
+    frequencies = [1.0 / period if period else None for period in periods]
+    pair("frequency", "Hz", "how often the motion repeats", frequencies)
+    if "z_part" in simulated:
+        counts = [whole_periods(time, period) if period else 0 for period in periods]
+        each = " and ".join(map(str, dict.fromkeys(counts)))
+        words = f"over {each} whole periods" if all(counts) else "from end to end"
+        drifts = [
+            drift(time, signals["z_part"], period if all(counts) else None)
+            for (_, signals), period in zip(sides, periods, strict=True)
+        ]
+        pair("drift", "m/s", f"mean velocity of the part, {words}", [*drifts])
+        error = drifts[1] - drifts[0]
+        found.append(Number("drift_error", error, "m/s", "drift simulated less measured"))
+    if {"v_surface", "v_part"} <= set(simulated):
+        shares = [_slipping(signals) for _, signals in sides]
+        words = "share of the rows in which part and surface differ by more than 10 mm/s"
+        pair("slip_fraction", "1", words, [*shares])
+    if "v_surface" in simulated:
+        # Rows may lie closer: what happens between two of them would depend on how close.
+        apart = max(1, round(1.0 / FRAME_RATE / float(np.median(np.diff(time)))))
+        velocities = [signals["v_surface"] for _, signals in sides]
+        kicks = [float(np.nanmax(np.abs(v[apart:] - v[:-apart]))) for v in velocities]
+        words = f"largest change of the surface's velocity in {time[apart] * 1e3:.3g} ms"
+        pair("kick", "m/s", f"{words}: what impacts show", [*kicks])
+    return found
+
+
+def _slipping(signals: Signals) -> float:
+    apart = np.abs(signals["v_part"] - signals["v_surface"])
+    return float(np.mean(apart[np.isfinite(apart)] > STICKS))
+
+
+def horizontal_share(recording: Recording) -> Number | None:
+    """The share of the surface's measured motion that is horizontal; the simulation has none."""
+    across, along = recording.v_across, recording.signals.get("v_surface", np.array(np.nan))
+    known = np.isfinite(across) & np.isfinite(along)
+    if not known.any():
+        return None
+    squares = float(np.mean(across[known] ** 2)), float(np.mean(along[known] ** 2))
+    words = "share of the surface's measured mean square velocity that is horizontal"
+    return Number("horizontal_share", squares[0] / sum(squares), "1", words)
