@@ -23,7 +23,8 @@ from cosim.scene.tables import (
     fault,
 )
 
-_SHORT_STEP = 2e-5  # s
+_CAREFUL = {"max_step": 2e-5, "reltol": 1e-5}
+"""For circuits that nobody here knows; s, 1."""
 
 FASTEST = 1e-6
 """Least time constant, s, that the integration in the FMU can follow all the time: of a coil, of a
@@ -48,24 +49,13 @@ class Scene(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _fill(cls, data: Any) -> Any:
-        """Defaults that depend on other keys: the firmware's staircase where the circuit has the
-        firmware; shorter steps where the back-EMF jumps (rigid walls) or the netlist is unknown.
-        """
+        """A netlist of one's own is solved with smaller steps and a smaller tolerance by default."""
         if not isinstance(data, dict):
             return data
-        data = dict(data)
-        drive, circuit = data.get("drive", {}), data.get("circuit", {})
-        mechanics = data.get("mechanics", {})
-        if isinstance(circuit, dict):
-            model = circuit.get("model")
-            rung = RUNGS.get(model) if isinstance(model, str) else None
-            sawtooth = isinstance(drive, dict) and drive.get("waveform", "sawtooth") == "sawtooth"
-            if rung and rung.firmware and sawtooth and not drive.get("reset_time"):
-                data["drive"] = {"quantised": True} | drive
-            rigid = isinstance(mechanics, dict) and mechanics.get("contact") == "rigid"
-            if rigid or (rung and rung.own_netlist):
-                data["circuit"] = {"max_step": _SHORT_STEP} | circuit
-        return data
+        circuit = data.get("circuit", {})
+        model = circuit.get("model") if isinstance(circuit, dict) else None
+        rung = RUNGS.get(model) if isinstance(model, str) else None
+        return data | {"circuit": _CAREFUL | circuit} if rung and rung.own_netlist else data
 
     @model_validator(mode="after")
     def _check_speed(self) -> "Scene":

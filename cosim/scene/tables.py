@@ -116,7 +116,7 @@ class Drive(Table):
     )
     quantised: bool = _choice(
         False,
-        "Firmware's staircase of 10-bit codes every 50 us; default of a sharp sawtooth in full",
+        "Firmware's staircase of 10-bit codes every 50 us: ten times the time in full",
     )
     loop_time: float = _number(
         0.0, "s", 0.0, 1e-3, "Pass of the firmware's loop, about 22 us; 0 makes steps of 50 us"
@@ -226,9 +226,11 @@ class Circuit(Table):
     snubber_capacitance: float | None = _number(
         None, "F", 1e-12, 1.0, "Capacitance in series with snubber_resistance; give both or neither"
     )
-    reltol: float = _number(1e-5, "1", 1e-9, 1e-2, "Relative tolerance of ngspice")
+    reltol: float = _number(
+        1e-4, "1", 1e-9, 1e-2, "Relative tolerance of ngspice; 1e-05 by default with file"
+    )
     max_step: float = _number(
-        5e-5, "s", 1e-9, 1e-2, "Largest step of ngspice; 2e-05 by default with rigid walls or file"
+        1e-4, "s", 1e-9, 1e-2, "Largest step of ngspice; 2e-05 by default with file"
     )
 
     @model_validator(mode="after")

@@ -21,6 +21,8 @@ static const double CARRIED = 0.2;
 /* Share of the flux still owed to the circuit that the next step pays back. With equal steps what is
    owed dies out by 0.77 a step; it still dies out where the steps double. */
 
+static const double AT_LIMIT = 0.5; /* V; |v(swing)| from which on the output is at its limit */
+
 static const double SETTLED_SHARE = 0.0025; /* of the command's range: an answer that is over */
 
 typedef struct {
@@ -164,9 +166,26 @@ static void pass_jump(Lead *c)
     const double before = piece_at(c, nextafter(c->jump, 0.0))->end;
     const Piece *p = piece_at(c, c->jump);
     const double share = fabs(command_value(p, c->jump) - before) / c->range;
+    c->restart_step = c->after_jump / fmax(share, 1e-9);
     if (share > SETTLED_SHARE)
         c->answered = fmax(c->answered, c->jump + c->time_constant * log(share / SETTLED_SHARE));
     c->jump = p->jump;
+}
+
+/* The longest next step for what lies behind. ngspice judges its steps by their truncation errors
+   alone, which are small where the current is wrong for long. */
+static double longest_step(const Lead *c, const double *values)
+{
+    double step = INFINITY;
+    if (c->at_jump)
+        step = c->restart_step;
+    if (c->time >= c->impact - ON_TIME)
+        step = fmin(step, c->after_jump);
+    if (c->time < c->answered)
+        step = fmin(step, c->answer_step);
+    if (c->swing >= 0 && fabs(values[c->swing]) >= AT_LIMIT)
+        step = fmin(step, c->limited_step);
+    return step;
 }
 
 /* The values that were sent last stand where the next row of the log begins to be filled. */
@@ -196,10 +215,7 @@ static double accepted(Lead *c, double time, double next_step)
     c->at_jump = time >= c->jump - ON_TIME;
     if (c->at_jump)
         pass_jump(c);
-    if (time < c->answered && c->answer_step < next_step)
-        next_step = c->answer_step;
-    if ((c->at_jump || time >= c->impact - ON_TIME) && c->after_jump < next_step)
-        next_step = c->after_jump;
+    next_step = fmin(next_step, longest_step(c, values));
     if (time >= c->segment.end - ON_TIME) {
         c->macro_point(c);
         if (!going(c))
@@ -208,6 +224,9 @@ static double accepted(Lead *c, double time, double next_step)
     }
     if (c->segment.end > time && c->segment.end - time < next_step)
         next_step = c->segment.end - time;
+    /* A limit that a passing back-EMF touches is not to be stepped over. */
+    const double gentle = c->emf_change / fabs(c->segment.c[1]);
+    next_step = fmin(next_step, fmax(gentle, c->answer_step));
     if (c->impact - time < next_step)
         next_step = c->impact - time;
     return c->jump - time < next_step ? c->jump - time : next_step;
@@ -282,6 +301,7 @@ void lead_begin(Lead *c)
     c->jump = piece_at(c, 0.0)->jump;
     c->impact = INFINITY;
     c->answer_step = c->time_constant / 20.0;
+    c->limited_step = c->time_constant / 5.0;
     c->answered = c->time_constant * log(1.0 / SETTLED_SHARE); /* V1 leaves 0 at once */
     run = c;
 }

@@ -35,6 +35,9 @@ _AFTER_JUMP, _SHARE_AFTER_JUMP = 1e-7, 1e-2
 remembers of the slopes before it misleads its choice of the step. The start is one too: V1 leaves 0
 at once. This step is of first order and nothing judges it, so finer runs must shorten it too."""
 
+_EMF_CHANGE = 3e-3
+"""Most that the back-EMF may change in a step, in units of the supply."""
+
 LOG = ("time", "emf", "owed")
 """Time, s; the back-EMF that the circuit was given, V; by how much the integral of that lagged the
 flux of the mechanics at the last macro point, V s."""
@@ -76,6 +79,7 @@ class Lead:
         self._time = 0.0
         coil, loop_resistance = scene.coil, scene.circuit.sense_resistance * scene.coil.count
         motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else -1
+        swing = self._saved.index("v(swing)") if "v(swing)" in self._saved else -1
         self.state = LeadState(
             recorder=ctypes.pointer(recorder.state),
             macro_point=address(f"macro_point_{'step_locked' if replay is None else 'replayed'}"),
@@ -86,8 +90,10 @@ class Lead:
             after_jump=min(_AFTER_JUMP, _SHARE_AFTER_JUMP * scene.circuit.max_step),
             time_constant=coil.inductance / (coil.resistance + loop_resistance),
             range=scene.drive.amplitude or 1.0,
+            emf_change=_EMF_CHANGE * scene.circuit.supply,
             places=self.places,
             n_saved=len(self._saved),
+            swing=swing,
             motional=motional,
             log=self._block.ctypes.data,
             log_rows=_POINTS,

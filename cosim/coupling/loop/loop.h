@@ -126,6 +126,9 @@ typedef struct Lead {
     double time_constant;         /* s; of the current in coil and sense resistor */
     double range;                 /* V; from the least to the largest command */
     double answer_step;           /* s; longest step while the current answers a jump */
+    double limited_step;          /* s; longest step while the output is at its limit */
+    double restart_step;          /* s; longest step after the last jump */
+    double emf_change;            /* V; most that the back-EMF may change in a step */
     double answered;              /* s; when it has done so */
     double time, current, carried; /* at the last accepted point: s; A of one coil; V carried */
     double emf;                    /* V; that the circuit had there */
@@ -139,6 +142,7 @@ typedef struct Lead {
     double sent;                  /* s; time of the last values that it sent */
     const int64_t *places;        /* of the saved vectors among those sent; then that of the time */
     int64_t n_saved;
+    int64_t swing;                /* which of them tells that the output is at its limit; or -1 */
     int64_t motional;             /* which of them is the share that the circuit carries; or -1 */
     double *log;                  /* rows: see the enum above */
     int64_t n_log, log_rows;      /* filled; places for */
