@@ -49,7 +49,7 @@ class Scene(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _fill(cls, data: Any) -> Any:
-        """A netlist of one's own is solved with smaller steps and a smaller tolerance by default."""
+        """A netlist of one's own is solved with smaller steps and tolerance by default."""
         if not isinstance(data, dict):
             return data
         circuit = data.get("circuit", {})

@@ -67,7 +67,7 @@ def trapezoidal(monkeypatch: pytest.MonkeyPatch) -> None:
     begin = lead.Lead.begin
 
     def begin_freely(self: lead.Lead) -> None:
-        self.state.time_constant = 0.0
+        self.state.time_constant = 1e9
         begin(self)
 
     monkeypatch.setattr(lead, "prepare", prepare)

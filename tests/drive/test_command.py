@@ -202,7 +202,7 @@ def test_loop_time_is_the_firmware(maximum: int, frequency: float, loop_time: fl
 
 
 def test_loop_time_lowers_the_frequency() -> None:
-    drive = made("drive.loop_time=22e-6", scene="paper-full")
+    drive = made("drive.loop_time=22e-6", "drive.quantised=true", scene="paper-full")
     assert isinstance(drive, Staircase)
     # by hand: 50 us are reached at the third pass; 999 steps of three passes, the maximum for two
     # passes and 0 for one
@@ -231,7 +231,7 @@ def test_real_period_is_rounded_up_to_whole_steps(frequency: float, steps: int) 
 
 
 def test_staircase_of_the_paper() -> None:
-    drive = made(scene="paper-full")
+    drive = made("drive.quantised=true", scene="paper-full")
     # by hand: 8 V / 3.1915 = 2.5067 V -> code 778; offset pin 2.8 V / 3.1915 -> code 272
     assert v_dac(drive, 0.0) == pytest.approx(778 / 1024 * 3.3)
     assert drive.v_offset == pytest.approx(272 / 1024 * 3.3)
@@ -262,7 +262,9 @@ def test_silent_knob() -> None:
 
 
 def test_knobs_reach_the_pins() -> None:
-    drive = made("drive.pot_max=0.7", "drive.pot_offset=0.4", scene="paper-full")
+    drive = made(
+        "drive.pot_max=0.7", "drive.pot_offset=0.4", "drive.quantised=true", scene="paper-full"
+    )
     assert v_dac(drive, 0.0) == pytest.approx(716 / 1024 * 3.3)
     assert drive.v_offset == pytest.approx(409 / 1024 * 3.3)
 
@@ -273,7 +275,7 @@ PWM = 488.28125
 
 
 def test_pwm_of_the_paper() -> None:
-    drive = made("drive.pwm_ripple=true", scene="paper-full")
+    drive = made("drive.pwm_ripple=true", "drive.quantised=true", scene="paper-full")
     # by hand: code 272 of 1024, a period of 2048 us; a pulse is 544 us wide, its middle at 0
     mean = 272 / 1024 * 3.3
     assert drive.v_offset == pytest.approx(mean)
@@ -290,7 +292,9 @@ def test_pwm_of_the_paper() -> None:
 
 
 def test_pwm_changes_nothing_else() -> None:
-    plain, drive = made(scene="paper-full"), made("drive.pwm_ripple=true", scene="paper-full")
+    stairs = "drive.quantised=true"
+    plain = made(stairs, scene="paper-full")
+    drive = made(stairs, "drive.pwm_ripple=true", scene="paper-full")
     times = np.linspace(0, 0.2, 7001)
     assert list(drive.values(times)) == list(plain.values(times))
     for t in map(float, times[:300]):
@@ -302,7 +306,7 @@ def test_pwm_changes_nothing_else() -> None:
 @pytest.mark.parametrize("pot", [0, 1])
 def test_pwm_without_edges(pot: int) -> None:
     drive = made("drive.pwm_ripple=true", "drive.pot_max=0", f"drive.pot_offset={pot}",
-                 scene="paper-full")  # fmt: skip
+                 "drive.quantised=true", scene="paper-full")  # fmt: skip
     assert drive.next_jump(0.0) == (inf if pot == 0 else 1023 / 1024 / 2 / PWM)
     assert pin(drive, 0.3) in (0.0, 3.3)
 
@@ -310,7 +314,7 @@ def test_pwm_without_edges(pot: int) -> None:
 def test_pwm_edges_do_not_stand_beside_those_of_the_staircase() -> None:
     # every 25 periods an edge meets one of the 50 us steps, within rounding
     drive = made("drive.pwm_ripple=true", "drive.pot_max=1", "drive.pot_offset=0.2442",
-                 "drive.frequency=20", scene="paper-full")  # fmt: skip
+                 "drive.frequency=20", "drive.quantised=true", scene="paper-full")  # fmt: skip
     gaps, both, t = [], 0, 0.0
     while t < 3.0:
         before, t = t, drive.next_jump(t)

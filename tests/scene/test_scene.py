@@ -52,8 +52,8 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "output_resistance": 0,
         "snubber_resistance": None,
         "snubber_capacitance": None,
-        "reltol": 1e-5,
-        "max_step": 5e-5,
+        "reltol": 1e-4,
+        "max_step": 1e-4,
     },
     "coil": {
         "resistance": 7.1,
@@ -196,17 +196,10 @@ def test_built_in_scenes() -> None:
     assert weight < gripper.friction.mu_s * gripper.friction.normal_force
 
 
-def test_staircase_is_the_default_of_the_full_circuit_only(tmp_path: Path) -> None:
-    assert load("paper-full").drive.quantised
-    assert load("paper", ["circuit.model=full"]).drive.quantised
-    assert not load("paper-full", ["circuit.model=amplifier"]).drive.quantised
-    assert not load("paper-full", ["drive.quantised=false"]).drive.quantised
-    assert load("paper", ["drive.quantised=true"]).drive.quantised
-    # where there is no staircase, none is assumed
-    assert not load("paper-full", ["drive.waveform=sine"]).drive.quantised
-    assert not load("paper-full", ["drive.reset_time=1e-3"]).drive.quantised
-    resolved = written(tmp_path, to_toml(load("paper", ["circuit.model=full"])))
-    assert load(resolved).drive.quantised
+def test_no_circuit_has_the_staircase_unless_asked() -> None:
+    """It costs ten times the time and changes v_average of `paper` by 0.3 %."""
+    assert not load("paper-full").drive.quantised
+    assert load("paper-full", ["drive.quantised=true"]).drive.quantised
 
 
 def test_file_changes_only_its_keys(tmp_path: Path) -> None:
@@ -365,7 +358,7 @@ ALL_BUT_NONE = 'it acts in "full", "amplifier", "limited", "ideal" or "file".'
         ),
         ("paper-limited", "circuit.slew_rate=1e5", 'it acts in "full", "amplifier" or "file".'),
         ("paper-limited", "circuit.gain_bandwidth=1e5", 'in "full", "amplifier" or "file".'),
-        ("ideal-current", "circuit.reltol=1e-4", 'it acts in "full", "amplifier" or "file".'),
+        ("ideal-current", "circuit.reltol=1e-5", 'it acts in "full", "amplifier" or "file".'),
         ("held", "circuit.sense_resistance=5", f'circuit.model = "none"; {ALL_BUT_NONE}'),
         ("held", "coil.resistance=5", f'circuit.model = "none"; {ALL_BUT_NONE}'),
         ("held", "drive.frequency=30", f'drive.waveform = "sawtooth"; {ALL_BUT_NONE}'),

@@ -42,7 +42,7 @@ def test_the_tolerance_is_met_and_the_error_told(name: str, tolerance: float) ->
 
 
 def test_a_smaller_tolerance_takes_more_steps() -> None:
-    coarse, fine = (simulate(scene("paper", tolerance)).summary for tolerance in (1e-3, 1e-5))
+    coarse, fine = (simulate(scene("paper", tolerance)).summary for tolerance in (1e-3, 5e-6))
     assert isinstance(coarse["circuit_steps"], int) and isinstance(fine["circuit_steps"], int)
     assert coarse["circuit_steps"] < fine["circuit_steps"]
 

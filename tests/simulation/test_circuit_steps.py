@@ -10,11 +10,11 @@ NETLIST = "circuit.netlist=circuits/examples/h_bridge.cir"
 @pytest.mark.parametrize(
     ("overrides", "step"),
     [
-        ([], 5e-5),
-        (["circuit.model=full"], 5e-5),
-        (["mechanics.contact=rigid"], 2e-5),
+        ([], 1e-4),
+        (["circuit.model=full"], 1e-4),
+        (["mechanics.contact=rigid"], 1e-4),
         (["circuit.model=file", NETLIST], 2e-5),
-        (["mechanics.contact=rigid", "circuit.max_step=1e-4"], 1e-4),
+        (["circuit.model=file", NETLIST, "circuit.max_step=1e-4"], 1e-4),
     ],
 )
 def test_largest_step(overrides: list[str], step: float) -> None:

@@ -341,7 +341,7 @@ def test_both_fmi_versions_agree(name: str) -> None:
 
 def test_two_coils_on_two_surfaces_are_one_twice() -> None:
     """At half the sense resistor and twice the part, each actuator sees what a single one does."""
-    short = ["run.duration=0.15", "run.settle=0.05"]
+    short = ["run.duration=0.15", "run.settle=0.05", "circuit.reltol=1e-5", "circuit.max_step=2e-5"]
     one = simulate(load("paper", short))
     twice = [
         "coil.count=2", "mechanics.n_surfaces=2", "mechanics.part_mass=0.018",
@@ -382,7 +382,9 @@ def test_energy_balances_with_other_coils_and_commands(
     model: str, changes: tuple[str, ...]
 ) -> None:
     scene = load("paper", ["run.duration=0.12", f"circuit.model={model}", *changes])
-    allowed = {"ideal": 1e-6, "limited": 1e-9, "amplifier": 1e-4}[model]
+    # Of each small step of the staircase ngspice sees the first microsecond roughly.
+    rough = 3e-4 if scene.drive.quantised else 1e-4
+    allowed = {"ideal": 1e-6, "limited": 1e-9, "amplifier": rough}[model]
     assert simulate(scene).summary["energy_residual"] < allowed  # type: ignore
 
 

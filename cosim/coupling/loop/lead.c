@@ -23,6 +23,9 @@ static const double CARRIED = 0.2;
 
 static const double AT_LIMIT = 0.5; /* V; |v(swing)| from which on the output is at its limit */
 
+static const double SMALL_JUMP = 0.1;
+/* In units of the command's range: the first step after a jump grows as that is smaller, till here. */
+
 static const double SETTLED_SHARE = 0.0025; /* of the command's range: an answer that is over */
 
 typedef struct {
@@ -166,7 +169,7 @@ static void pass_jump(Lead *c)
     const double before = piece_at(c, nextafter(c->jump, 0.0))->end;
     const Piece *p = piece_at(c, c->jump);
     const double share = fabs(command_value(p, c->jump) - before) / c->range;
-    c->restart_step = c->after_jump / fmax(share, 1e-9);
+    c->restart_step = c->after_jump / fmax(share, SMALL_JUMP);
     if (share > SETTLED_SHARE)
         c->answered = fmax(c->answered, c->jump + c->time_constant * log(share / SETTLED_SHARE));
     c->jump = p->jump;
