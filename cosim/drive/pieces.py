@@ -91,6 +91,8 @@ class Command(ABC):
 
     v_offset: float
     """Mean voltage of the offset pin, V."""
+    period: float
+    """After which it repeats, s."""
 
     @abstractmethod
     def piece(self, t: float) -> Piece:
