@@ -3,6 +3,7 @@
 #include <math.h>
 
 static const double PI = 3.141592653589793;
+static const double SAME_TIME = 1e-12; /* s; as in the recorder, which rows are from */
 
 double command_value(const Piece *p, double t)
 {
@@ -30,5 +31,14 @@ void command_values(const Piece *p, int64_t n, const double *times, double *valu
         while (times[k] >= p->until)
             p++;
         values[k] = command_value(p, times[k]);
+    }
+}
+
+void command_values_before(const Piece *p, int64_t n, const double *times, double *values)
+{
+    for (int64_t k = 0; k < n; k++) {
+        while (times[k] > p->until + SAME_TIME)
+            p++;
+        values[k] = times[k] >= p->until ? p->end : command_value(p, times[k]);
     }
 }

@@ -29,7 +29,9 @@ typedef struct {
    the shape phase / span in a RISE and (1 - phase) / span in a FALL, kept within 0 and 1. */
 EXPORT double command_value(const Piece *p, double t);
 
-/* V1 at each of `n` times, which do not fall, from pieces that cover them. */
+/* V1 at each of `n` times, which do not fall, from pieces that cover them; or its left limits there,
+   times within 1e-12 s after a corner being on it. */
 EXPORT void command_values(const Piece *p, int64_t n, const double *times, double *values);
+EXPORT void command_values_before(const Piece *p, int64_t n, const double *times, double *values);
 
 #endif

@@ -20,7 +20,7 @@ class Lagging(Command):
     def __init__(self, command: Command, lag: float) -> None:
         self._command = command
         self._lag = lag
-        self.v_offset = command.v_offset
+        self.v_offset, self.period = command.v_offset, command.period
 
     def piece(self, t: float) -> Piece:
         piece = self._command.piece(self._own(t))
@@ -41,10 +41,12 @@ class Lagging(Command):
 
 
 def period(scene: Scene) -> float:
-    """Period of the command, s; that of the firmware's staircase differs from 1 / frequency."""
+    """Period of what drives a scene, s; infinite where nothing does. That of the firmware's
+    staircase differs from 1 / ``drive.frequency``, and a surface moved by a file has none: inf.
+    """
     if scene.surface_is_given:
-        return 1.0 / scene.drive.frequency
-    return getattr(command(scene), "period", 1.0 / scene.drive.frequency)
+        return inf if scene.drive.waveform == "file" else 1.0 / scene.drive.frequency
+    return command(scene).period
 
 
 def commands(scene: Scene) -> list[Command]:
@@ -52,7 +54,7 @@ def commands(scene: Scene) -> list[Command]:
     first = command(scene)
     if scene.drive.phase_deg is None:
         return [first]
-    return [first, Lagging(first, scene.drive.phase_deg / 360.0 * period(scene))]
+    return [first, Lagging(first, scene.drive.phase_deg / 360.0 * first.period)]
 
 
 def command(scene: Scene) -> Command:

@@ -12,6 +12,7 @@ class Constant(Command):
     def __init__(self, level: float = 0.0) -> None:
         self.level = level
         self.v_offset = level / GAIN
+        self.period = inf
 
     def piece(self, t: float) -> Piece:
         return level(inf, self.level, self.v_offset)
@@ -23,6 +24,7 @@ class _Periodic(Command):
     def __init__(self, frequency: float, amplitude: float, offset: float) -> None:
         self.frequency, self.amplitude, self.offset = frequency, amplitude, offset
         self.v_offset = offset_pin(offset, amplitude)
+        self.period = 1.0 / frequency
 
 
 class Sawtooth(_Periodic):

@@ -76,8 +76,9 @@ def _formula() -> Any:
     found = library("loop")
     found.command_value.restype = c_double
     found.command_value.argtypes = (POINTER(Piece), c_double)
-    found.command_values.restype = None
-    found.command_values.argtypes = (POINTER(Piece), c_int64, c_void_p, c_void_p)
+    for several in (found.command_values, found.command_values_before):
+        several.restype = None
+        several.argtypes = (POINTER(Piece), c_int64, c_void_p, c_void_p)
     return found
 
 
@@ -91,6 +92,8 @@ class Command(ABC):
 
     v_offset: float
     """Mean voltage of the offset pin, V."""
+    period: float
+    """After which it repeats, s."""
 
     @abstractmethod
     def piece(self, t: float) -> Piece:
@@ -116,13 +119,23 @@ class Command(ABC):
         return found
 
     def values(self, times: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """V1 at each of ``times``, which do not fall, V."""
+        """V1 at each of ``times``, which do not fall, V; at a jump the value after it."""
+        return self._values(times, 0.0, _formula().command_values)
+
+    def values_before(self, times: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Left limits of V1 at each of ``times``, which do not fall, V; a time up to 1e-12 s after
+        a jump is on it."""
+        return self._values(times, 2e-12, _formula().command_values_before)
+
+    def _values(
+        self, times: npt.ArrayLike, earlier: float, formula: Any
+    ) -> npt.NDArray[np.float64]:
         at = np.ascontiguousarray(times, np.float64)
         values = np.empty_like(at)
         if at.size:
-            pieces = self.pieces(float(at[0]), float(at[-1]))
+            pieces = self.pieces(float(at[0]) - earlier, float(at[-1]))
             row = (Piece * len(pieces))(*pieces)
-            _formula().command_values(row, at.size, at.ctypes.data, values.ctypes.data)
+            formula(row, at.size, at.ctypes.data, values.ctypes.data)
         return values
 
 

@@ -21,7 +21,6 @@ class Staircase(Command):
         self.v_offset = v_offset
         self._rate = rate
         self.period = len(codes) / rate
-        """What the period has become, s."""
         self._edges = [k for k in range(len(codes)) if codes[k] != codes[k - 1]]
 
     def piece(self, t: float) -> Piece:
@@ -42,10 +41,10 @@ class Staircase(Command):
 class WithPwm(Command):
     """Another command, with the offset pin as its PWM: 0 or 3.3 V, its duty the mean's share.
 
-    Times count from the middle of a pulse, which is where the filter behind the pin, settled at the
-    mean, has its mean; how the real PWM lies to the sawtooth is left to chance. Before 0 there is
-    the mean itself, so that all begins settled. Edges within a nanosecond of a jump of the command
-    are moved onto it.
+    Its period is the command's, which holds no whole number of pulses. Times count from the middle
+    of a pulse, which is where the filter behind the pin, settled at the mean, has its mean; how the
+    real PWM lies to the sawtooth is left to chance. Before 0 there is the mean itself, so that all
+    begins settled. Edges within a nanosecond of a jump of the command are moved onto it.
     """
 
     _SAME = 1e-9  # s
@@ -53,6 +52,7 @@ class WithPwm(Command):
     def __init__(self, command: Command) -> None:
         self._command = command
         self.v_offset = command.v_offset
+        self.period = command.period
         duty = command.v_offset / V_REFERENCE
         self._half = 0.5 * duty
         self._still = not 1e-5 < duty < 1 - 1e-5  # pulses or gaps not wider than _SAME

@@ -1,6 +1,6 @@
 """The normal force of a grip that changes in time, as a file gives it."""
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from pathlib import Path
 
 from cosim.errors import BadInput, plain
@@ -29,6 +29,12 @@ class NormalForce:
         start, end = corners[after - 1], corners[after]
         share = min(max((time - start) / (end - start), 0.0), 1.0)
         return (1.0 - share) * forces[after - 1] + share * forces[after]
+
+    def before(self, time: float) -> float:
+        """The force at ``time`` (s), N; at a jump the one before it."""
+        at = bisect_left(self.corners, time - _SAME_TIME)
+        on_corner = at < len(self.corners) and self.corners[at] <= time + _SAME_TIME
+        return self.forces[at] if on_corner else self.value(time)
 
     def least(self, duration: float) -> tuple[float, float]:
         """The least force, N, from 0 to ``duration`` (s), and when, s."""

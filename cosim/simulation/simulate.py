@@ -135,6 +135,6 @@ def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Ar
     if (force := recorder.mechanics.normal_force) is not None:
         forces = Tape(1)
         for part in blocks(len(known["time"])):
-            forces.append([force.value(t) for t in known["time"][part].tolist()])
+            forces.append([force.before(t) for t in known["time"][part].tolist()])
         known["normal_force"] = forces.column()
     return {name: known[name] for name in COLUMNS if name in known}

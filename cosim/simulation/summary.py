@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cosim.drive.command import period
 from cosim.files.spill import blocks
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Electrics
@@ -46,11 +47,11 @@ def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[
     seen_max, seen_min = _seen(motion.frames, run.shutter / FRAME_RATE)
     a_max, a_min = extremes["a_surface_max"], extremes["a_surface_min"]
     bounded = math.isfinite(a_max) and math.isfinite(a_min)
-    repeated = scene.drive.waveform != "file" if scene.surface_is_given else scene.rung.driven
+    cycle = period(scene)
     result: dict[str, Any] = {
         "v_average": v_average,
-        "transport_per_cycle": v_average / scene.drive.frequency if repeated else None,
-        "stick_fraction": (totals["stick_time"] - before["stick_time"]) / span,
+        "transport_per_cycle": v_average * cycle if math.isfinite(cycle) else None,
+        "stick_fraction": min(1.0, (totals["stick_time"] - before["stick_time"]) / span),
         "a_surface_max": a_max if bounded else None,
         "a_surface_min": a_min if bounded else None,
         "a_camera_max": seen_max,

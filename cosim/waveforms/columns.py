@@ -37,6 +37,10 @@ COLUMNS: dict[str, Column] = _FIRST | {
     f"{name}_2": Column(_FIRST[name].unit, f"{_FIRST[name].long_name}, second surface")
     for name in _SECOND
 }
-"""Every column by its name, in the order of the files. Absent participants have none."""
+"""Every column by its name, in the order of the files. Absent participants have none.
+
+A row at a jump (of the command, of a given surface, of the grip) holds in all columns what is just
+before it; the first row is the machine at rest, without command, or a given surface's start.
+"""
 
 UNITS = {name: column.unit for name, column in COLUMNS.items()}

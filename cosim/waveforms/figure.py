@@ -1,5 +1,6 @@
 """The figure of a run: what the circuit did, and what the mechanics made of it."""
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -10,6 +11,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from cosim.arrays import Array
+from cosim.drive.command import period
 from cosim.files.picture import Picture
 from cosim.files.spill import release
 from cosim.scene import Scene
@@ -63,12 +65,11 @@ def draw(scene: Scene, waves: dict[str, Array], numbers: dict[str, Any]) -> Pict
 def _last_periods(scene: Scene, time: Array) -> slice:
     """The rows of the last few periods; of the last part of the run where nothing is driven."""
     run = scene.run
-    if scene.drive.file is not None:
-        span = run.duration
-    elif not (scene.rung.driven or scene.surface_is_given):
-        span = run.duration / 10
+    length = period(scene)
+    if math.isfinite(length):
+        span = PERIODS_SHOWN * length
     else:
-        span = PERIODS_SHOWN / scene.drive.frequency
+        span = run.duration if scene.surface_is_given else run.duration / 10
     first = int(np.searchsorted(time, time[-1] - span))
     return slice(max(min(first, len(time) - 2), len(time) - _MOST_ROWS, 0), None)
 
@@ -99,8 +100,10 @@ def _title(scene: Scene, numbers: dict[str, Any]) -> str:
     if not scene.rung.driven:
         return f"{words}; no drive"
     late = "" if drive.phase_deg is None else f", second coil {drive.phase_deg:.4g}° late"
+    commanded, real = f"{drive.frequency:.4g}", f"{1.0 / period(scene):.4g}"
+    rate = f"{real} Hz" if real == commanded else f"{real} Hz ({commanded} Hz commanded)"
     return (
-        f"{words}; {drive.waveform} {drive.frequency:.4g} Hz, {drive.amplitude:.3g} V "
+        f"{words}; {drive.waveform} {rate}, {drive.amplitude:.3g} V "
         f"peak-to-peak, offset {drive.offset:+.3g} V{late}, circuit “{scene.circuit.model}”"
     )
 

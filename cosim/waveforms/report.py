@@ -1,7 +1,9 @@
 """A run's numbers for a reader: the table that is printed."""
 
+import math
 from typing import Any
 
+from cosim.drive.command import period
 from cosim.scene import Scene
 
 
@@ -54,9 +56,10 @@ def _error(summary: dict[str, Any]) -> str:
 
 def _broken_periods(scene: Scene) -> str:
     """A word where the averages end within a period, which makes them untrue."""
-    if scene.drive.waveform == "file" or not (scene.rung.driven or scene.surface_is_given):
+    length = period(scene)
+    if math.isinf(length):
         return ""
-    periods = (scene.run.duration - scene.run.settle) * scene.drive.frequency
+    periods = (scene.run.duration - scene.run.settle) / length
     if abs(periods - round(periods)) < 1e-6 or periods > MANY:
         return ""
     return f"over {periods:.4g} periods; whole ones give a truer mean"

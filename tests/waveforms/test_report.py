@@ -1,12 +1,15 @@
 """The printed table says what a reader must know of the numbers."""
 
+import numpy as np
 import pytest
 
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
+from cosim.waveforms.formats.tracker import laid_over
 from cosim.waveforms.report import table
 
 SHORT = ["run.duration=0.1", "run.settle=0.05"]
+SLOW = ["drive.quantised=true", "drive.loop_time=2.2e-5"]
 
 
 @pytest.mark.parametrize(
@@ -15,6 +18,9 @@ SHORT = ["run.duration=0.1", "run.settle=0.05"]
         (SHORT, None),
         (["run.duration=0.1", "run.settle=0.033"], "over 1.34 periods"),
         ([*SHORT, "drive.frequency=50.8"], "over 2.54 periods"),
+        # 3000 passes of the firmware's loop, 66 ms
+        ([*SLOW, "run.duration=0.198", "run.settle=0.066"], None),
+        ([*SLOW, "run.duration=0.2", "run.settle=0.1"], "over 1.515 periods"),
     ],
 )
 def test_broken_periods_are_told(overrides: list[str], told: str | None) -> None:
@@ -22,6 +28,25 @@ def test_broken_periods_are_told(overrides: list[str], told: str | None) -> None
     text = table(scene, simulate(scene).summary)
     assert ("periods" in text) == (told is not None)
     assert told is None or told in text
+
+
+@pytest.mark.parametrize("more", [[], ["circuit.model=full", "drive.pwm_ripple=true"]])
+def test_a_cycle_is_one_of_the_real_command(more: list[str]) -> None:
+    """As long as from one fall of V1 to the next: 66 ms where 50 ms are commanded."""
+    duration = 0.002 if more else 0.198
+    overrides = ["circuit.model=ideal", *SLOW, "run.output_step=2.2e-5", "run.settle=0", *more]
+    result = simulate(load("paper", [*overrides, f"run.duration={duration}"]))
+    if not more:
+        time, command = result.columns["time"], result.columns["command"]
+        falls = time[1:][np.diff(command) < -1.0]
+        assert np.diff(falls) == pytest.approx(0.066, rel=1e-3)
+    summary = result.summary
+    assert summary["transport_per_cycle"] == pytest.approx(0.066 * summary["v_average"], rel=1e-12)
+    assert laid_over(result.scene) == (0.0, pytest.approx(0.066))
+    picture = result.plot()
+    words = [picture.get_suptitle(), *(axis.get_title(loc="left") for axis in picture.axes)]
+    words += [axis.get_title() for axis in picture.axes]
+    assert any("sawtooth 15.15 Hz (20 Hz commanded)" in text for text in words)
 
 
 def test_a_large_energy_residual_is_told() -> None:

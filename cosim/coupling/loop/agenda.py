@@ -11,14 +11,19 @@ from cosim.trials.camera import FRAME_RATE, instants, instants_a_frame
 ENTRIES = 1 << 14
 """Rows and frames of the camera that are planned, and taken, at a time."""
 
-_SAME_TIME = 1e-12  # s; communication points closer than this are one
+SAME_TIME = 1e-12  # s; communication points closer than this are one
 _ROW, _FRAME, _SETTLED = 1, 2, 4
-_NEVER = 1 << 80  # multiples of _SAME_TIME
+_NEVER = 1 << 80  # multiples of SAME_TIME
 
 
 def grid(step: float, end: float) -> Array:
     """0, step, 2 step ... up to ``end``, which counts as reached within rounding."""
-    return step * np.arange(int(end / step * (1 + 1e-12)) + 1, dtype=np.float64)
+    return step * np.arange(count(step, end), dtype=np.float64)
+
+
+def count(step: float, end: float) -> int:
+    """How many times :func:`grid` has."""
+    return int(end / step * (1 + 1e-12)) + 1
 
 
 def agendas(
@@ -31,23 +36,23 @@ def agendas(
     """
     frame_step = 1.0 / FRAME_RATE
     extra, kinds = np.array([settle, *stops]), np.array([_SETTLED, *[0] * len(stops)], np.int32)
-    # Whole numbers of _SAME_TIME, so that no part ends between times that are one.
+    # Whole numbers of SAME_TIME, so that no part ends between times that are one.
     shortest = min(row_step, frame_step / instants_a_frame(shutter * frame_step))
-    length = max(1, int(ENTRIES / 3 * shortest / _SAME_TIME))
-    last = int(np.rint(duration / _SAME_TIME)) + 1
+    length = max(1, int(ENTRIES / 3 * shortest / SAME_TIME))
+    last = int(np.rint(duration / SAME_TIME)) + 1
     for begin in range(0, last, length):
         # To the last one belongs what rounding puts behind the end.
         end = begin + length if begin + length < last else _NEVER
         rows = _within(row_step, duration, begin, end)
         frames = exposures(duration, settle, shutter, begin, end)
-        here = (np.rint(extra / _SAME_TIME) >= begin) & (np.rint(extra / _SAME_TIME) < end)
+        here = (np.rint(extra / SAME_TIME) >= begin) & (np.rint(extra / SAME_TIME) < end)
         times = np.concatenate([rows, frames, extra[here]])
         what = np.concatenate(
             [np.repeat(np.array([_ROW, _FRAME], np.int32), [len(rows), len(frames)]), kinds[here]]
         )
         # Of times that are one the first is taken.
         _, first, place = np.unique(
-            np.rint(times / _SAME_TIME), return_index=True, return_inverse=True
+            np.rint(times / SAME_TIME), return_index=True, return_inverse=True
         )
         joined = np.zeros(len(first), np.int32)
         np.bitwise_or.at(joined, place, what)
@@ -60,25 +65,24 @@ def agendas(
 def exposures(
     duration: float, settle: float, shutter: float, begin: int = 0, end: int = _NEVER
 ) -> Array:
-    """The instants (s), from ``begin`` until before ``end`` (multiples of _SAME_TIME), of the
+    """The instants (s), from ``begin`` until before ``end`` (multiples of SAME_TIME), of the
     frames that are exposed wholly after ``settle`` and before ``duration`` (s).
     """
     exposure = shutter / FRAME_RATE
-    reach = int(exposure / _SAME_TIME) + 1
+    reach = int(exposure / SAME_TIME) + 1
     frames = _within(1.0 / FRAME_RATE, duration, begin - reach, end + reach)
     opened, closed = frames - exposure / 2, frames + exposure / 2
     frames = frames[(opened >= settle) & (closed <= duration * (1 + 1e-12))]
     times = instants(frames, exposure)
-    place = np.rint(times / _SAME_TIME)
+    place = np.rint(times / SAME_TIME)
     return times[(place >= begin) & (place < end)]
 
 
 def _within(step: float, duration: float, begin: int, end: int) -> Array:
-    """What :func:`grid` has from ``begin`` until before ``end``, multiples of _SAME_TIME."""
-    count = int(duration / step * (1 + 1e-12)) + 1
+    """What :func:`grid` has from ``begin`` until before ``end``, multiples of SAME_TIME."""
     # One more at either side, and then those that rounding puts there.
-    low = max(0, int(begin * _SAME_TIME / step) - 1)
-    high = min(count, int(end * _SAME_TIME / step) + 2)
+    low = max(0, int(begin * SAME_TIME / step) - 1)
+    high = min(count(step, duration), int(end * SAME_TIME / step) + 2)
     times = step * np.arange(low, high, dtype=np.float64)
-    place = np.rint(times / _SAME_TIME)
+    place = np.rint(times / SAME_TIME)
     return times[(place >= begin) & (place < end)]

@@ -17,7 +17,11 @@ from cosim.scene import Scene
 
 @dataclass(frozen=True)
 class Electrics:
-    """What the electrical side did; arrays hold a value for each row of the waveforms."""
+    """What the electrical side did; arrays hold a value for each row of the waveforms.
+
+    In a row at a jump stands what is before it, as in the mechanics' columns, whose state a row
+    is: the first row is the machine at rest, without command and current.
+    """
 
     command: Array
     """V1, V."""
@@ -41,10 +45,11 @@ class Electrics:
 
 
 def commanded(command: Command, rows: Array) -> Array:
-    """V1 (V) at the times of the rows (s)."""
+    """V1 (V) at the times of the rows (s), at a jump the value before it; 0 in the first row, where
+    the command has not begun."""
     made = Tape(1)
     for part in blocks(len(rows)):
-        made.append(command.values(rows[part]))
+        made.append(np.where(rows[part] > 0.0, command.values_before(rows[part]), 0.0))
     return made.column()
 
 

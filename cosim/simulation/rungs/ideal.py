@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.coupling.loop.agenda import SAME_TIME, count
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import commands
 from cosim.drive.pieces import Command
@@ -23,83 +24,86 @@ class Ideal(Rung):
     def drive(self, scene: Scene, recorder: Recorder) -> Driven:
         drives = commands(scene)
         share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
-        times, currents = Tape(1), [Tape(2) for _ in drives]
-        times.append(0.0)
+        coils = [_Coil(scene) for _ in drives]
         for edges, start, end in straights(drives, scene.run.duration):
             start, end = share * start, share * end
             recorder.follow(edges[1:], start, end)
-            times.append(edges[1:])
-            for k, tape in enumerate(currents):
-                tape.append(np.stack([start[:, k], end[:, k]], axis=1))
-        logs = [
-            {"time": times.column(), "start": tape.column(0), "end": tape.column(1)}
-            for tape in currents
-        ]
+            for k, coil in enumerate(coils):
+                coil.follow(edges, start[:, k], end[:, k])
         motion = recorder.mechanics.totals()["energy_in"]
-        rows = recorder.time
-        electric = _electrics(scene, drives[0], logs[0], rows, recorder.column("back_emf"), motion)
+        electric = coils[0].electrics(recorder, drives[0], "back_emf", motion)
         if len(drives) == 1:
             return Driven(electric)
         # The work that both coils did is in the first one's account.
-        other = _electrics(scene, drives[1], logs[1], rows, recorder.column("back_emf_2"), 0.0)
+        other = coils[1].electrics(recorder, drives[1], "back_emf_2", 0.0)
         energies = ("energy_in", "energy_copper", "energy_magnetic")
         sums = {name: getattr(electric, name) + getattr(other, name) for name in energies}
         second = {"current_2": other.current, "coil_voltage_2": other.coil_voltage}
         return Driven(replace(electric, **sums), second=second)
 
 
-def _electrics(
-    scene: Scene, command: Command, log: dict[str, Array], rows: Array, emf: Array, motion: float
-) -> Electrics:
-    """From a prescribed current, linear on intervals: ``log`` holds ``time``, the intervals' ends
-    (s), and ``start`` and ``end``, the current of one coil (A) at the two ends of each.
+class _Coil:
+    """The account of one coil whose current is prescribed, linear on intervals."""
 
-    ``emf`` is the back-EMF (V) at the rows, ``motion`` the work (J) that one coil did. The source
-    gives whatever voltage the current takes, so what it delivers is the sum of where it goes.
-    """
-    coil, settle = scene.coil, scene.run.settle
-    times, count = log["time"], len(log["start"])
-    squares, eddy = 0.0, Eddy(scene)
-    most, least = -np.inf, np.inf
-    waves, done = Tape(2), 0
-    # At the corners, and where settling ends.
-    settled = max(0, int(np.searchsorted(times, settle, side="right")) - 1)
-    for part in blocks(count):
-        edges, start, end = times[part.start : part.stop + 1], log["start"][part], log["end"][part]
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._squares, self._eddy = 0.0, Eddy(scene)
+        self._most, self._least = -np.inf, np.inf
+        self._last = 0.0
+        self._waves = Tape(2)
+        self._waves.append([0.0, 0.0])  # the first row: at rest
+        self._rows = count(scene.run.output_step, scene.run.duration)
+
+    def follow(self, edges: Array, start: Array, end: Array) -> None:
+        """Go on through the intervals between ``edges`` (s), with the current (A) at the start and
+        the end of each."""
+        scene, eddy = self._scene, self._eddy
         h = np.diff(edges)
-        squares += total(h, start**2 + start * end + end**2)
         slope = (end - start) / h
-        stop = len(rows) if part.stop == count else int(np.searchsorted(rows, edges[-1]))
+        self._squares += total(h, start**2 + start * end + end**2)
+        self._last = float(end[-1])
+        late = edges[1:] > scene.run.settle
+        if late.any():
+            first = start[late] + slope[late] * np.maximum(scene.run.settle - edges[:-1][late], 0.0)
+            self._most = max(self._most, float(first.max()), float(end[late].max()))
+            self._least = min(self._least, float(first.min()), float(end[late].min()))
         branch = eddy.follow(h, start, end)
-        for few in blocks(stop - done):
-            row = rows[done:stop][few]
-            at = np.clip(np.searchsorted(edges, row, side="right") - 1, 0, len(h) - 1)
-            current = start[at] + slope[at] * (row - edges[at])
-            voltage = coil.resistance * current + coil.inductance * slope[at] + emf[done:stop][few]
+        step = scene.run.output_step
+        stop = min(count(step, edges[-1] + SAME_TIME), self._rows)
+        for few in blocks(stop - len(self._waves)):
+            first_row = len(self._waves)
+            row = step * np.arange(first_row, first_row + few.stop - few.start)
+            # A row on an edge belongs to what is before it.
+            at = np.clip(np.searchsorted(edges, row - SAME_TIME) - 1, 0, len(h) - 1)
+            since = row - edges[at]
+            current = start[at] + slope[at] * since
+            voltage = scene.coil.resistance * current + scene.coil.inductance * slope[at]
             if branch is not None:
                 lag = slope[at] * eddy.tau
                 rest = start[at] - branch[at] - lag
-                voltage += eddy.resistance * (lag + rest * np.exp(-(row - edges[at]) / eddy.tau))
-            waves.append(np.stack([current, voltage], axis=1))
-        done = stop
-        if part.start <= settled < part.stop:
-            here = settled - part.start
-            most = least = start[here] + slope[here] * (settle - edges[here])
-        after = [end[max(settled - part.start, 0) :], start[max(settled + 1 - part.start, 0) :]]
-        most = max(most, *(values.max(initial=-np.inf) for values in after))
-        least = min(least, *(values.min(initial=np.inf) for values in after))
-    squares /= 3.0
-    heat = (coil.resistance + coil.count * scene.circuit.sense_resistance) * squares
-    copper = coil.count * (heat + eddy.heat)
-    held = magnetic(scene, float(log["end"][-1]), eddy.current)
-    return Electrics(
-        command=commanded(command, rows),
-        current=waves.column(0),
-        coil_voltage=waves.column(1),
-        energy_in=copper + held + coil.count * motion,
-        energy_copper=copper,
-        energy_magnetic=held,
-        current_max=float(most),
-        current_min=float(least),
-        limited={"output": 0.0},
-    )
+                voltage += eddy.resistance * (lag + rest * np.exp(-since / eddy.tau))
+            self._waves.append(np.stack([current, voltage], axis=1))
+
+    def electrics(self, recorder: Recorder, command: Command, emf: str, motion: float) -> Electrics:
+        """At the end of the run; ``emf`` is the recorder's column of the back-EMF, ``motion`` the
+        work (J) that one coil did. The source gives whatever voltage the current takes, so what it
+        delivers is the sum of where it goes.
+        """
+        scene, coil = self._scene, self._scene.coil
+        heat = (coil.resistance + coil.count * scene.circuit.sense_resistance) * self._squares / 3.0
+        copper = coil.count * (heat + self._eddy.heat)
+        held = magnetic(scene, self._last, self._eddy.current)
+        waves, voltage, moved = self._waves.array(), Tape(1), recorder.column(emf)
+        for few in blocks(len(waves)):
+            voltage.append(waves[few, 1] + moved[few])
+        return Electrics(
+            command=commanded(command, recorder.time),
+            current=self._waves.column(0),
+            coil_voltage=voltage.column(),
+            energy_in=copper + held + coil.count * motion,
+            energy_copper=copper,
+            energy_magnetic=held,
+            current_max=self._most,
+            current_min=self._least,
+            limited={"output": 0.0},
+        )

@@ -29,10 +29,7 @@ class Limited(Rung):
 
 
 def _electrics(scene: Scene, command: Command, recorder: Recorder) -> Electrics:
-    """From the mechanics' own current source, at the end of its run.
-
-    In a row at a corner or jump of the command stands the voltage before it.
-    """
+    """From the mechanics' own current source, at the end of its run."""
     count, run = scene.coil.count, scene.run
     totals, before = recorder.mechanics.totals(), recorder.at_settle
     share = {

@@ -13,7 +13,7 @@ from cosim.studies.sweep.point import Number
 
 MOST_POINTS = 10_000_000
 
-FREQUENCIES = ("drive.frequency", "drive.pot_frequency")
+FREQUENCIES = ("drive.frequency", "drive.pot_frequency", "drive.loop_time")
 
 
 @dataclass(frozen=True)

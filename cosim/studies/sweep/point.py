@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import ceil, nan
+from math import ceil, isinf, nan
 
 from cosim.drive.command import period
 from cosim.errors import CosimError
@@ -57,8 +57,11 @@ def periods_made_whole(scene: Scene) -> dict[str, Number]:
     """``run.settle`` and ``run.duration``, s, at least as long as now and whole periods apart.
 
     The mean over a broken period is off by per cents, which differ from frequency to frequency.
+    They stay as they are where nothing repeats.
     """
     length = period(scene)
+    if isinf(length):
+        return {"run.settle": scene.run.settle, "run.duration": scene.run.duration}
     times = scene.run.settle, scene.run.duration - scene.run.settle
     settle, span = (max(1, ceil(time / length - 1e-9)) for time in times)
     return {"run.settle": settle * length, "run.duration": (settle + span) * length}

@@ -6,6 +6,7 @@ the model holds at rest is written as resting: platform and part across, and the
 
 from functools import partial
 from io import BytesIO
+from math import isfinite
 
 import numpy as np
 
@@ -67,8 +68,8 @@ def laid_over(scene: Scene) -> tuple[float, float | None]:
     """
     if scene.drive.file is not None:
         return 0.0, None
-    driven = scene.rung.driven or scene.surface_is_given
-    return scene.run.settle, period(scene) if driven else None
+    length = period(scene)
+    return scene.run.settle, length if isfinite(length) else None
 
 
 def number(value: float) -> str:
