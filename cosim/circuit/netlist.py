@@ -141,17 +141,26 @@ def _carry_inertia(external: dict[Line, str], title: Line, present: set[str]) ->
     )
 
 
-def limits_at_work(log: dict[str, Array]) -> dict[str, npt.NDArray[np.bool_]]:
-    """Which limits of the amplifier act, at each point of the log, by name; only those known."""
+AT_WORK, AT_WORK_HERE = 0.5, 1e-3
+"""V: from which magnitude on the nodes ``swing`` and ``climit`` tell that a limit acts, in a user's
+netlist and in those of ``circuits/``, where they are 0 else."""
+
+
+def limits_at_work(
+    log: dict[str, Array], least: float = AT_WORK
+) -> dict[str, npt.NDArray[np.bool_]]:
+    """Which limits of the amplifier act, at each point of the log, by name; only those known.
+    ``least`` is the magnitude, V, from which on a node tells that its limit acts.
+    """
     nothing = np.zeros(len(log["time"]))
     known: dict[str, npt.NDArray[np.bool_]] = {}
-    limited = np.abs(log.get("v(climit)", nothing)) >= 0.5
+    limited = np.abs(log.get("v(climit)", nothing)) >= least
     swing = log.get("v(swing)", nothing)
     if "v(swing)" in log:
-        known["swing_high"] = (swing >= 0.5) & ~limited
-        known["swing_low"] = (swing <= -0.5) & ~limited
+        known["swing_high"] = (swing >= least) & ~limited
+        known["swing_low"] = (swing <= -least) & ~limited
     if "v(climit)" in log:
         known["current_limit"] = limited
     if "v(slewing)" in log:
-        known["slew"] = (np.abs(log["v(slewing)"]) >= 0.5) & (np.abs(swing) < 0.5) & ~limited
+        known["slew"] = (np.abs(log["v(slewing)"]) >= 0.5) & (np.abs(swing) < least) & ~limited
     return known

@@ -67,7 +67,7 @@ def check_statistics(case: dict, result: Result) -> None:
         assert abs(own) < 5 * abs(off) + 1e-3 * abs(expected["v_average"]), (off, own)
     for name, spread in (
         ("stick_fraction", 2e-3),
-        ("saturated_fraction", 1e-3),
+        ("saturated_fraction", 2e-3 * expected["saturated_fraction"] + 1e-6),
         ("z_surface_pp", 4e-3 * expected["z_surface_pp"]),
         ("v_surface_max", 2e-3 * abs(expected["v_surface_max"])),
         ("v_surface_min", 2e-3 * abs(expected["v_surface_min"])),

@@ -66,19 +66,13 @@ def _electrics(scene: Scene, command: Command, log: dict[str, Array], rows: Arra
     Energies are sums of step times means over the step: for them the trapezoidal companion of an
     inductance, which ngspice integrates with, balances exactly.
     """
-    from cosim.circuit.netlist import limits_at_work
-
     coil, circuit, settle = scene.coil, scene.circuit, scene.run.settle
     copper = coil.resistance / coil.count
     if circuit.netlist is None:
         copper += circuit.sense_resistance
     made = "v(v1)" in log and circuit.model != "amplifier"  # by the circuit, not given to it
-    after = sum(
-        float((np.diff(part["time"]) * (part["time"][1:] > settle)).sum()) for part in _points(log)
-    )
     delivered, squares, eddy = 0.0, 0.0, Eddy(scene)
     most, least = -np.inf, np.inf
-    limited: dict[str, float] = {}
     waves, done = Tape(3 if made else 2), 0
     end = log["time"][-1]
     for part in _points(log):
@@ -91,16 +85,6 @@ def _electrics(scene: Scene, command: Command, log: dict[str, Array], rows: Arra
         delivered += total(h, mean * (0.5 * (lost[1:] + lost[:-1])))
         squares += total(h, mean**2)
         eddy.follow(h, current[:-1], current[1:])
-        spent = h * (time[1:] > settle)
-        spent /= after
-        limits = limits_at_work(part)
-        at_limit = [acts for name, acts in limits.items() if name != "slew"]
-        if at_limit:
-            limits["output"] = np.any(at_limit, axis=0)
-        for name, acts in limits.items():
-            # A step that only begins or ends at the limit counts half.
-            share = total(spent, 0.5 * acts[1:] + 0.5 * acts[:-1])
-            limited[name] = limited.get(name, 0.0) + share
         settled = current[time >= settle]
         most, least = settled.max(initial=most), settled.min(initial=least)
         stop = len(rows) if time[-1] == end else int(np.searchsorted(rows, time[-1]))
@@ -118,8 +102,29 @@ def _electrics(scene: Scene, command: Command, log: dict[str, Array], rows: Arra
         energy_magnetic=magnetic(scene, float(log["i(vemf)"][-1] / coil.count), eddy.current),
         current_max=float(most),
         current_min=float(least),
-        limited=limited,
+        limited=_limited(scene, log),
     )
+
+
+def _limited(scene: Scene, log: dict[str, Array]) -> dict[str, float]:
+    """The share of the time after settling in which each limit acted, of those known."""
+    from cosim.circuit.limits import shares_of_steps
+    from cosim.circuit.netlist import AT_WORK, AT_WORK_HERE
+
+    least = AT_WORK_HERE if scene.circuit.netlist is None else AT_WORK
+    spent: dict[str, float] = {}
+    whole = 0.0
+    for steps in blocks(len(log["time"]) - 1):
+        # One step more, for what leads to the first.
+        lead = min(steps.start, 1)
+        reach = slice(steps.start - lead, steps.stop + 1)
+        part = {name: np.ascontiguousarray(values[reach]) for name, values in log.items()}
+        h = np.diff(part["time"])[lead:]
+        h = h * (part["time"][1 + lead :] > scene.run.settle)
+        whole += float(h.sum())
+        for name, shares in shares_of_steps(part, least).items():
+            spent[name] = spent.get(name, 0.0) + total(h, shares[lead:])
+    return {name: time / whole for name, time in spent.items()}
 
 
 def _points(log: dict[str, Array]) -> Iterator[dict[str, Array]]:

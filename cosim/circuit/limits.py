@@ -1,0 +1,48 @@
+"""For how much of each step of the circuit the amplifier's limits act."""
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.arrays import Array
+from cosim.circuit.netlist import limits_at_work
+
+_NODES = {"swing": ("v(swing)", "v(out)"), "current_limit": ("v(climit)", "i(vemf)")}
+"""The node that tells of a limit, which falls about straight while the limit ceases to act; and
+what the limit holds, which came there about straight."""
+
+
+def shares_of_steps(log: dict[str, Array], least: float) -> dict[str, Array]:
+    """The share of each step of the log in which each known limit acts, by name, and ``output`` for
+    any of them but the slew rate; ``least`` is that of :func:`limits_at_work`.
+
+    Where a limit begins or ends within a step, the straight line through the two points before it
+    tells when: there what the limit holds reaches the value that it then has, and the limit's node
+    falls to ``least``. Where a line leads nowhere, as for a node that only says yes or no, the step
+    counts half.
+    """
+    found: dict[str, Array] = {}
+    time = log["time"]
+    for name, acts in limits_at_work(log, least).items():
+        shares = 0.5 * acts[1:] + 0.5 * acts[:-1]
+        kind = name.removesuffix("_high").removesuffix("_low")
+        if kind in _NODES:
+            node, held = (log[vector] for vector in _NODES[kind])
+            begins = np.flatnonzero(~acts[:-2] & ~acts[1:-1] & acts[2:]) + 1
+            ends = np.flatnonzero(acts[:-2] & acts[1:-1] & ~acts[2:]) + 1
+            shares[begins] = 1.0 - _place(time, held, begins, held[begins + 1])
+            shares[ends] = _place(time, np.abs(node), ends, np.full(len(ends), least))
+        found[name] = shares
+    at_limit = [shares for name, shares in found.items() if name != "slew"]
+    if at_limit:
+        found["output"] = np.minimum(np.sum(at_limit, axis=0), 1.0)
+    return found
+
+
+def _place(time: Array, values: Array, steps: npt.NDArray[np.int64], goal: Array) -> Array:
+    """Where in each of the steps, as a share of it, the values reach the goal if they go on as in
+    the step before; a half where they do not go there."""
+    slope = (values[steps] - values[steps - 1]) / (time[steps] - time[steps - 1])
+    needed, possible = goal - values[steps], slope * (time[steps + 1] - time[steps])
+    place = np.full(len(steps), 0.5)
+    np.divide(needed, possible, out=place, where=needed * possible > 0.0)
+    return np.minimum(place, 1.0)
