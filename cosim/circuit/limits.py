@@ -13,7 +13,8 @@ what the limit holds, which came there about straight."""
 
 def shares_of_steps(log: dict[str, Array], least: float) -> dict[str, Array]:
     """The share of each step of the log in which each known limit acts, by name, and ``output`` for
-    any of them but the slew rate; ``least`` is that of :func:`limits_at_work`.
+    any of them but the slew rate, if the swing is known; ``least`` is that of
+    :func:`limits_at_work`.
 
     Where a limit begins or ends within a step, the straight line through the two points before it
     tells when: there what the limit holds reaches the value that it then has, and the limit's node
@@ -33,7 +34,7 @@ def shares_of_steps(log: dict[str, Array], least: float) -> dict[str, Array]:
             shares[ends] = _place(time, np.abs(node), ends, np.full(len(ends), least))
         found[name] = shares
     at_limit = [shares for name, shares in found.items() if name != "slew"]
-    if at_limit:
+    if "v(swing)" in log:
         found["output"] = np.minimum(np.sum(at_limit, axis=0), 1.0)
     return found
 

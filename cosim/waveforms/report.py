@@ -94,11 +94,15 @@ LIMITS = {
 
 
 def _limits(summary: dict[str, Any]) -> str:
-    """Which limits of the amplifier acted, and for which share of the time."""
+    """Which limits of the amplifier acted, and for which share of the time, of those known."""
     acted = [
         f"{name} {summary[key] * 100:.3g} %" for key, name in LIMITS.items() if summary.get(key)
     ]
-    return f"{', '.join(acted)} of the time" if acted else "never"
+    told = f"{', '.join(acted)} of the time" if acted else ""
+    if "saturated_fraction" in summary:
+        return told or "never"
+    untold = "not known: the netlist has no node swing"
+    return f"{told}; of the swing {untold}" if told else untold
 
 
 def _acceleration(scene: Scene, summary: dict[str, Any]) -> str:

@@ -1,12 +1,15 @@
 """The printed table says what a reader must know of the numbers."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.waveforms.formats.tracker import laid_over
-from cosim.waveforms.report import table
+from cosim.waveforms.report import LIMITS, table
 
 SHORT = ["run.duration=0.1", "run.settle=0.05"]
 SLOW = ["drive.quantised=true", "drive.loop_time=2.2e-5"]
@@ -54,6 +57,26 @@ def test_a_large_energy_residual_is_told() -> None:
     summary = dict(simulate(scene).summary)
     assert "too much" not in table(scene, summary)
     assert "too much" in table(scene, summary | {"energy_residual": 0.02})
+
+
+@pytest.mark.parametrize("climit", [None, 0, 1])
+def test_limits_that_a_netlist_does_not_tell_of_are_not_known(
+    climit: int | None, tmp_path: Path
+) -> None:
+    """Not 0, nor never."""
+    bridge = Path("circuits/examples/h_bridge.cir").read_text(encoding="utf-8")
+    told = re.sub(r"(?m)^Bswing.*\n", "" if climit is None else f"Vc climit 0 {climit}\n", bridge)
+    netlist = tmp_path / "silent.cir"
+    netlist.write_text(told, encoding="utf-8")
+    own = ["circuit.model=file", f"circuit.netlist={netlist}", *SHORT, "run.duration=0.06"]
+    scene = load("paper", own)
+    summary = simulate(scene).summary
+    limits = {key for key in summary if key in ("saturated_fraction", *LIMITS)}
+    assert limits == (set() if climit is None else {"current_limit_fraction"})
+    lines = table(scene, summary).splitlines()
+    line = next(line for line in lines if "amplifier at a limit" in line)
+    assert "not known: the netlist has no node swing" in line and "never" not in line
+    assert ("current limit 100 % of the time" in line) == (climit == 1)
 
 
 def test_rigid_walls_have_no_peak_and_rest_no_sign() -> None:
