@@ -12,7 +12,7 @@ from multiprocessing.connection import wait
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import Scene
-from cosim.studies.sweep.point import Number, Outcome, evaluate
+from cosim.studies.sweep.point import Number, Outcome, evaluate, failed
 from cosim.toolchain.processes import PATIENCE, Worker
 
 POINTS_A_WORKER = 250
@@ -129,8 +129,8 @@ def _evaluate(
     """A point's outcome, and whether it has spoilt the process for others."""
     try:
         outcome = evaluate(base, values, whole_periods, progress)
-    except Exception as error:  # what no scene should meet: the other points go on
-        return Outcome({}, " ".join(f"{type(error).__name__}: {error}".split())), False
+    except Exception as error:
+        return failed(error), False
     if base.rung.own_netlist or not base.rung.ngspice:
         return outcome, False
     from cosim.circuit.ngspice import spoilt
