@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.scene.firmware import GAIN
 from cosim.toolchain.libraries import library
 
@@ -104,6 +105,13 @@ class Command(ABC):
         """Time of the first discontinuity of V1 or of a pin strictly after ``t``, s, or inf."""
         return self.piece(t).jump
 
+    def lines(self, begin: float, end: float, most: int) -> tuple[Array, Array, Array] | None:
+        """The pieces from the corner ``begin`` until ``end`` (s) is reached, at most ``most`` of
+        them: their corners, one more than pieces, and V1 (V) where each begins and ends. None where
+        :meth:`piece` must be asked for one after the other.
+        """
+        return None
+
     def pieces(self, begin: float, end: float, most: int | None = None) -> list[Piece]:
         """The pieces from ``begin`` until ``end`` (s) is within the last, at most ``most`` of
         them."""
@@ -120,7 +128,11 @@ class Command(ABC):
         at = np.ascontiguousarray(times, np.float64)
         values = np.empty_like(at)
         if at.size:
-            pieces = self.pieces(float(at[0]), float(at[-1]))
+            # Those that hold at none of the times are left out.
+            pieces, done = [], 0
+            while done < at.size:
+                pieces.append(self.piece(float(at[done])))
+                done = int(at.searchsorted(pieces[-1].until))
             row = (Piece * len(pieces))(*pieces)
             _formula().command_values(row, at.size, at.ctypes.data, values.ctypes.data)
         return values
