@@ -5,7 +5,7 @@ those of single runs, to the last bit.
 """
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import Any
 
 from cosim.coupling.batch.threads import Threads
@@ -56,7 +56,7 @@ class _Run:
 
 def summaries(
     scenes: Iterable[tuple[int, Callable[[], Scene]]], count: int
-) -> Iterator[tuple[int, Summary | Exception]]:
+) -> Generator[tuple[int, Summary | Exception], None, None]:
     """The summaries, without notes, of numbered scenes, in the order in which ``count`` threads
     finish them; or what the run of a scene, or the making of it, raised.
 

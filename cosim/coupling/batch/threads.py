@@ -27,7 +27,8 @@ class Job(Structure):
 
 
 @cache
-def _compiled() -> Any:
+def compiled() -> Any:
+    """The functions of ``threads.c``."""
     found = library("loop")
     for name, result, arguments in (
         ("threads_start", c_void_p, (c_int64,)),
@@ -45,7 +46,7 @@ class Threads:
     """``count`` threads; to be used in a ``with`` block, whose end stops what they still do."""
 
     def __init__(self, count: int) -> None:
-        self._library = _compiled()
+        self._library = compiled()
         self._count = count
         self._threads = None
         self._under_way: dict[int, tuple[Job, Recorder, Block]] = {}
