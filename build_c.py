@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parent
 FMU = ROOT / "fmu"
 MODEL = "stickslip"
 LIBRARIES = {
-    "loop": (ROOT / "cosim/coupling/loop", ROOT / "cosim/drive"),
+    "loop": (ROOT / "cosim/coupling/loop", ROOT / "cosim/coupling/batch", ROOT / "cosim/drive"),
     "part": (ROOT / "cosim/mechanics",),
 }
 """The package's libraries; each is made of all C files of its folders."""
@@ -35,6 +35,8 @@ DESCRIBE = FMU / "src/fmi/describe.c"
 
 # Without contraction every platform computes the same bits.
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-Wall", "-Wextra")
+# Older systems have threads in a library of their own.
+THREADS = () if sys.platform == "win32" else ("-pthread",)
 LIBRARY_FLAGS = ("-fPIC", "-fvisibility=hidden")
 # A shared library has FMI's functions by their plain names; source code has them with a prefix.
 PLAIN_NAMES = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
@@ -63,7 +65,8 @@ def make(folder: Path) -> None:
         work, new = Path(name), Path(name) / "new"
         new.mkdir()
         for library, folders in LIBRARIES.items():
-            link(_objects(_code(folders, "*.c"), work), new / (library + SUFFIX), "-shared")
+            objects = _objects(_code(folders, "*.c"), work)
+            link(objects, new / (library + SUFFIX), "-shared", *THREADS)
         if sys.platform != "win32":
             link([REPLAY], new / "replay", "-ldl")
         _make_fmu(new, work)

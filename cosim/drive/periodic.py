@@ -1,7 +1,10 @@
 """Commands with a shape of their own: constant, sawtooth, sine and square."""
 
-from math import inf
+from math import ceil, inf
 
+import numpy as np
+
+from cosim.arrays import Array
 from cosim.drive.pieces import FALL, RISE, SINE, Command, Piece, edge_before, level
 from cosim.scene.firmware import GAIN, offset_pin
 
@@ -62,6 +65,14 @@ class Sawtooth(_Periodic):
             pin=self.v_offset,
         )
 
+    def lines(self, begin: float, end: float, most: int) -> tuple[Array, Array, Array] | None:
+        if self._fall > 0.0:
+            return None
+        f, half = self.frequency, 0.5 * self.amplitude
+        count = min(most, ceil((end - begin) * f) + 1)
+        corners = (edge_before(begin, f) + np.arange(count + 1)) / f
+        return corners, np.full(count, self.offset - half), np.full(count, self.offset + half)
+
 
 class Sine(_Periodic):
     """V1 = offset + amplitude/2 sin(2 pi f t)."""
@@ -91,3 +102,12 @@ class Square(_Periodic):
         until = (half + 1) / rate if self.amplitude else inf
         high = self.offset + self.amplitude * (-0.5 if half % 2 else 0.5)
         return level(until, high, self.v_offset)
+
+    def lines(self, begin: float, end: float, most: int) -> tuple[Array, Array, Array] | None:
+        if not self.amplitude:
+            return None
+        rate = 2 * self.frequency
+        count = min(most, ceil((end - begin) * rate) + 1)
+        halves = edge_before(begin, rate) + np.arange(count + 1)
+        levels = self.offset + self.amplitude * np.where(halves[:-1] % 2, -0.5, 0.5)
+        return halves / rate, levels, levels

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.scene.firmware import GAIN
 from cosim.toolchain.libraries import library
 
@@ -107,6 +108,13 @@ class Command(ABC):
         """Time of the first discontinuity of V1 or of a pin strictly after ``t``, s, or inf."""
         return self.piece(t).jump
 
+    def lines(self, begin: float, end: float, most: int) -> tuple[Array, Array, Array] | None:
+        """The pieces from the corner ``begin`` until ``end`` (s) is reached, at most ``most`` of
+        them: their corners, one more than pieces, and V1 (V) where each begins and ends. None where
+        :meth:`piece` must be asked for one after the other.
+        """
+        return None
+
     def pieces(self, begin: float, end: float, most: int | None = None) -> list[Piece]:
         """The pieces from ``begin`` until ``end`` (s) is within the last, at most ``most`` of
         them."""
@@ -133,10 +141,20 @@ class Command(ABC):
         at = np.ascontiguousarray(times, np.float64)
         values = np.empty_like(at)
         if at.size:
-            pieces = self.pieces(float(at[0]) - earlier, float(at[-1]))
+            before = at[0] - earlier
+            pieces = self.pieces(float(before), float(at[-1])) if earlier else self._at(at)
             row = (Piece * len(pieces))(*pieces)
             formula(row, at.size, at.ctypes.data, values.ctypes.data)
         return values
+
+    def _at(self, times: Array) -> list[Piece]:
+        """Those that hold at one of ``times``."""
+        pieces: list[Piece] = []
+        done = 0
+        while done < times.size:
+            pieces.append(self.piece(float(times[done])))
+            done = int(times.searchsorted(pieces[-1].until))
+        return pieces
 
 
 def edge_before(t: float, rate: float) -> int:

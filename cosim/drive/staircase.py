@@ -1,8 +1,11 @@
 """The command as the firmware makes it: a staircase of DAC codes, and the offset pin's PWM."""
 
 from bisect import bisect_right
-from math import floor, inf
+from math import ceil, floor, inf
 
+import numpy as np
+
+from cosim.arrays import Array
 from cosim.drive.pieces import Command, Piece, edge_before, level
 from cosim.scene.firmware import GAIN, PWM_FREQUENCY, STEPS_PER_SECOND, V_REFERENCE, volts
 
@@ -28,6 +31,19 @@ class Staircase(Command):
         period, step = divmod(edge_before(t, self._rate), count)
         dac = volts(self.codes[step])
         return level(self._until(period, step), GAIN * (self.v_offset - dac), self.v_offset, dac)
+
+    def lines(self, begin: float, end: float, most: int) -> tuple[Array, Array, Array] | None:
+        if not self._edges:
+            return None
+        count, edges = len(self.codes), np.array(self._edges)
+        most = min(most, ceil((end - begin) * self._rate) + 1)
+        period, step = divmod(edge_before(begin, self._rate), count)
+        first = period * len(edges) + bisect_right(self._edges, step)
+        periods, places = np.divmod(first + np.arange(most), len(edges))
+        corners = (periods * count + edges[places]) / self._rate
+        levels = np.array([GAIN * (self.v_offset - volts(code)) for code in self.codes])
+        held = levels[np.append(step, edges[places[:-1]])]
+        return np.append(begin, corners), held, held
 
     def _until(self, period: int, step: int) -> float:
         if not self._edges:

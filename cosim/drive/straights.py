@@ -28,6 +28,9 @@ def straights(commands: Sequence[Command], duration: float) -> Iterator[tuple[Ar
     start and the end of each interval between two of them, until ``duration``, block after block.
     The commands are of one shape.
     """
+    if len(commands) == 1 and commands[0].lines(0.0, 0.0, 1) is not None:
+        yield from _lines(commands[0], duration)
+        return
     edges = [0.0]
     pieces = [command.piece(0.0) for command in commands]
     rows: list[tuple[list[float], list[float]]] = []
@@ -50,6 +53,23 @@ def straights(commands: Sequence[Command], duration: float) -> Iterator[tuple[Ar
             start, end = np.array(rows).swapaxes(0, 1)
             yield np.array(edges), start, end
             edges, rows = edges[-1:], []
+
+
+def _lines(command: Command, duration: float) -> Iterator[tuple[Array, Array, Array]]:
+    """The straights of a command that knows them at once."""
+    begin = 0.0
+    while begin < duration:
+        found = command.lines(begin, duration, _TOGETHER)
+        assert found is not None
+        corners, start, end = found
+        count = int(corners.searchsorted(duration))
+        if count < len(corners):
+            corners, start, end = corners[: count + 1], start[:count], end[:count]
+            if corners[count] > duration:
+                last = command.piece(float(corners[count - 1])).before(duration)
+                corners, end = np.append(corners[:count], duration), np.append(end[:-1], last)
+        yield corners, start[:, np.newaxis], end[:, np.newaxis]
+        begin = float(corners[-1])
 
 
 def straight(piece: Piece, begin: float) -> tuple[float, float, float]:

@@ -191,24 +191,21 @@ def _text(message: bytes | None) -> str:
 
 INTERFACES: dict[int, type[Interface]] = {2: Fmi2, 3: Fmi3}
 
-_idle: dict[int, Interface] = {}
+_idle: dict[int, list[Interface]] = {version: [] for version in INTERFACES}
 
 
 def borrow(version: int) -> Interface:
-    """An instance whose parameters can be set: the one that was given back last, or a new one.
+    """An instance whose parameters can be set: one that was given back, or a new one.
 
     Making one takes as long as a tenth of a short run.
     """
-    kept = _idle.pop(version, None)
-    if kept is None:
+    if not _idle[version]:
         return INTERFACES[version]()
+    kept = _idle[version].pop()
     kept.restart()
     return kept
 
 
 def give_back(instance: Interface) -> None:
-    """Keep a borrowed instance for the next run."""
-    other = _idle.pop(instance.version, None)
-    if other is not None:
-        other.close()
-    _idle[instance.version] = instance
+    """Keep a borrowed instance for the next run: so many stay as ran at once."""
+    _idle[instance.version].append(instance)

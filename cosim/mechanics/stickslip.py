@@ -49,7 +49,8 @@ SOURCE_TOTALS = (
     *("energy_output", "energy_copper", "energy_magnetic"),
 )
 
-COUNTERS = ("impacts", "stick_slip_events", "internal_steps", "internal_rejected")
+INTERNAL = ("internal_steps", "internal_rejected")
+COUNTERS = ("impacts", "stick_slip_events", *INTERNAL)
 
 CONTACT_LAWS = {"compliant": 1, "rigid": 2}
 
@@ -90,6 +91,7 @@ class Mechanics:
             "wholes": places(wholes),
             "totals": places(self.total_names),
             "counters": places(COUNTERS),
+            "internal": places(INTERNAL),
         }
         """Value references by role."""
         self.inputs = (c_double * (2 * len(inputs)))()

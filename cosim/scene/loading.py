@@ -70,8 +70,8 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
         changes = _Layer("--set", _tables(_parsed(overrides or ()), "--set"))
     if changes.tables:
         layers.append(changes)
-    scene, origins = _checked(layers, base)
-    _tell_idle(scene, layers, origins)
+    scene = _checked(layers, base)
+    _tell_idle(scene, layers)
     return scene
 
 
@@ -81,7 +81,13 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
     ``origin`` names in messages where the values come from. Raises :class:`BadInput`.
     """
     layer = _Layer(origin, _tables(values.items(), origin))
-    return _checked([_Layer(f"scene {scene.name}", scene.as_dict()), layer], origin)[0]
+    # A table that stays the same is not checked again, but the scene as a whole is.
+    same = {name: getattr(scene, name) for name in ("name", "description", *TABLES)}
+    below = {name: scene.table(name) for name in layer.tables}
+    try:
+        return Scene.model_validate(same | _merge([_Layer("", below), layer]))
+    except ValidationError:
+        return _checked([_Layer(f"scene {scene.name}", scene.as_dict()), layer], origin)
 
 
 def _layers(source: str) -> list[_Layer]:
@@ -217,44 +223,53 @@ def _value(text: str) -> Any:
     return data["value"] if data.keys() == {"value"} else text
 
 
-def _checked(layers: list[_Layer], default: str) -> tuple[Scene, dict[str, tuple[int, str]]]:
-    """The scene of the layers and :func:`_merge`'s origins; ``default`` is that of other faults."""
-    merged, origins = _merge(layers)
+def _checked(layers: list[_Layer], default: str) -> Scene:
+    """The scene of the layers; ``default`` is the origin of faults that no layer has."""
     try:
-        return Scene.model_validate(merged), origins
+        return Scene.model_validate(_merge(layers))
     except ValidationError as error:
-        raise BadInput(messages.explain(error, origins, default)) from None
+        raise BadInput(messages.explain(error, _origins(layers), default)) from None
 
 
-def _merge(layers: list[_Layer]) -> tuple[dict[str, Any], dict[str, tuple[int, str]]]:
-    """The layers as one, and for each key the rank and origin of the layer that gave it."""
+_TWINS = {
+    "drive": KNOBS | {key: knob for knob, key in KNOBS.items()},
+    "friction": dict(zip(NORMAL_FORCES, reversed(NORMAL_FORCES), strict=True)),
+}
+"""Keys of which one replaces the other, both ways, by table."""
+
+
+def _merge(layers: list[_Layer]) -> dict[str, Any]:
+    """The layers as one."""
     merged: dict[str, Any] = {}
-    origins: dict[str, tuple[int, str]] = {}
-    twins = {
-        "drive": KNOBS | {key: knob for knob, key in KNOBS.items()},
-        "friction": dict(zip(NORMAL_FORCES, reversed(NORMAL_FORCES), strict=True)),
-    }
-    for rank, layer in enumerate(layers):
+    for layer in layers:
         for table, content in layer.tables.items():
             if table not in TABLES:
                 merged[table] = content
-                origins[table] = (rank, layer.origin)
                 continue
             below = merged.setdefault(table, {})
-            for key in content:
-                if twin := twins.get(table, {}).get(key):
-                    below.pop(twin, None)
-            for key, value in content.items():
-                below[key] = value
-                origins[f"{table}.{key}"] = (rank, layer.origin)
-    return merged, origins
+            twins = _TWINS.get(table, {})
+            for key in twins.keys() & content.keys():
+                below.pop(twins[key], None)
+            below.update(content)
+    return merged
 
 
-def _tell_idle(scene: Scene, layers: list[_Layer], origins: dict[str, tuple[int, str]]) -> None:
+def _origins(layers: list[_Layer]) -> dict[str, tuple[int, str]]:
+    """For each key the rank and origin of the layer that gave it."""
+    origins: dict[str, tuple[int, str]] = {}
+    for rank, layer in enumerate(layers):
+        for table, content in layer.tables.items():
+            names = [f"{table}.{key}" for key in content] if table in TABLES else [table]
+            origins |= dict.fromkeys(names, (rank, layer.origin))
+    return origins
+
+
+def _tell_idle(scene: Scene, layers: list[_Layer]) -> None:
     """Warn of each key that the user changed although circuit, waveform or method ignore it.
 
     Not where a later layer chose these, nor for a scene.toml, which has every key.
     """
+    origins = _origins(layers)
     chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
     every = [k for k in keys() if k.default is not None and k.name not in KNOBS.values()]
     silent = [

@@ -186,15 +186,17 @@ class Scene(BaseModel):
     def as_dict(self) -> dict[str, Any]:
         """The scene as plain tables that load to an equal scene, without absent or doubled keys."""
         data: dict[str, Any] = {"name": self.name, "description": self.description}
-        for table in TABLES:
-            values = getattr(self, table).model_dump(exclude_none=True)
-            for knob, key in KNOBS.items():
-                if table == "drive" and knob in values:
-                    del values[key]
-            if values.get("normal_force_file"):
-                del values["normal_force"]
-            data[table] = values
-        return data
+        return data | {table: self.table(table) for table in TABLES}
+
+    def table(self, name: str) -> dict[str, Any]:
+        """One of the tables of :meth:`as_dict`."""
+        values = getattr(self, name).model_dump(exclude_none=True)
+        for knob, key in KNOBS.items():
+            if name == "drive" and knob in values:
+                del values[key]
+        if values.get("normal_force_file"):
+            del values["normal_force"]
+        return values
 
 
 def toml_value(value: bool | float | int | str) -> str:

@@ -3,8 +3,6 @@
 import time
 from collections.abc import Callable
 from functools import partial
-from math import inf
-from typing import Any
 
 from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
@@ -15,12 +13,11 @@ from cosim.scene import Scene, changed
 from cosim.simulation.choose_rung import choose
 from cosim.simulation.choose_steps import simulate_within_tolerance
 from cosim.simulation.guards import notes
+from cosim.simulation.numbers import motion, numbers
 from cosim.simulation.rungs.electrics import commanded
 from cosim.simulation.rungs.given_surface import simulate_part
-from cosim.simulation.rungs.rung import Driven, Motion, rungs
-from cosim.simulation.summary import summarise
+from cosim.simulation.rungs.rung import Driven, rungs
 from cosim.toolchain.processes import isolated
-from cosim.toolchain.versions import versions
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.result import Result
 
@@ -71,9 +68,9 @@ def _needs_own_process(scene: Scene) -> bool:
 
 def _follow_surface(scene: Scene, progress: Progress) -> Result:
     began = time.perf_counter()
-    waveforms, motion = simulate_part(scene)
+    waveforms, moved = simulate_part(scene)
     progress(scene.run.duration)
-    summary = _summary(scene, motion, Driven(None, "exact"), 0, began)
+    summary = numbers(scene, moved, Driven(None, "exact"), 0, began)
     return Result(scene, waveforms, summary | {"notes": notes(scene, waveforms, summary)})
 
 
@@ -83,38 +80,13 @@ def _simulate(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     try:
         recorder = Recorder(scene, mechanics, progress)
         driven = rungs()[scene.circuit.model].drive(scene, recorder)
-        totals = mechanics.totals()
+        moved = motion(scene, recorder)
     finally:
         mechanics.close()
-    motion = Motion(totals, recorder.at_settle, _extremes(scene, recorder), recorder.frames)
-    summary = _summary(scene, motion, driven, recorder.steps, began)
-    if scene.rung.ngspice:
-        summary["v_average_error"] = driven.v_average_error
+    summary = numbers(scene, moved, driven, recorder.steps, began)
     waveforms = _waveforms(scene, recorder, driven)
     told = {"notes": notes(scene, waveforms, summary, mechanics.normal_force)}
     return Result(scene, waveforms, summary | told)
-
-
-def _extremes(scene: Scene, recorder: Recorder) -> dict[str, float]:
-    names = (f"{what}_surface_{end}" for what in "avz" for end in ("max", "min"))
-    found = dict(zip(names, recorder.extremes, strict=False))  # the current's follow
-    if scene.mechanics.contact == "rigid":  # an impact changes velocities in no time
-        found |= {"a_surface_max": inf, "a_surface_min": -inf}
-    return found
-
-
-def _summary(
-    scene: Scene, motion: Motion, driven: Driven, steps: int, began: float
-) -> dict[str, Any]:
-    """``steps`` are those of the FMU; the run began at ``began`` on the clock."""
-    return summarise(scene, motion, driven.electric) | {
-        "circuit_steps": driven.circuit_steps,
-        "circuit_rejected": driven.circuit_rejected,
-        "fmu_steps": steps,
-        "wall_time": time.perf_counter() - began,
-        "method": driven.method,
-        "versions": {**versions(), **driven.versions},
-    }
 
 
 def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Array]:

@@ -39,6 +39,12 @@ serve(pipe)
 Progress = Callable[[float], None]
 
 
+def processors() -> int:
+    """How many this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
+
+
 class Worker:
     """A process that calls ``function(argument, progress)`` with one argument after another.
 

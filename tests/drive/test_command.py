@@ -91,6 +91,31 @@ def test_straights_of_a_sine_have_its_integrals(lag: float) -> None:
         assert squares * f / periods == pytest.approx(offset**2 + half**2 / 2, rel=1e-11)
 
 
+@given(
+    shape=st.sampled_from(
+        [[], ["drive.waveform=square"], ["drive.quantised=true"], ["drive.reset_time=1e-4"]]
+    ),
+    frequency=st.one_of(st.floats(1.0, 3000.0), st.integers(1, 500)),
+    amplitude=st.sampled_from([0.0, 0.3, 7.0]),
+    duration=st.floats(0.002, 0.4),
+)
+@example(shape=["drive.quantised=true"], frequency=20.0, amplitude=7.0, duration=0.4)
+@example(shape=[], frequency=20, amplitude=7.0, duration=0.1)
+def test_straights_at_once_are_those_one_after_the_other(
+    shape: list[str], frequency: float, amplitude: float, duration: float
+) -> None:
+    """Many corners of one command are made at once; of two commands, here equal ones, piece by
+    piece. To the last bit."""
+    offset = 0.0 if "drive.quantised=true" in shape else -1.2
+    settings = {"frequency": frequency, "amplitude": amplitude, "offset": offset}
+    drive = made(*(f"drive.{key}={value}" for key, value in settings.items()), *shape)
+    alone, both = (list(straights([drive] * count, duration)) for count in (1, 2))
+    for one, two in zip(alone, both, strict=True):
+        np.testing.assert_array_equal(one[0], two[0])
+        for ends, twice in zip(one[1:], two[1:], strict=True):
+            np.testing.assert_array_equal(ends[:, 0], twice[:, 0])
+
+
 def test_square() -> None:
     drive = made("drive.waveform=square")
     assert drive.values([0, 0.0249, 0.025, 0.0499]) == pytest.approx([2.8, 2.8, -5.2, -5.2])

@@ -15,15 +15,20 @@ from tests.helpers import needs
 
 pytestmark = pytest.mark.reliability
 
-KNOBS = ("drive.pot_max", "drive.pot_frequency", "drive.pot_offset")
+THREADS, PROCESSES = "ideal-current", "optimal"
+OVER = {
+    THREADS: [f"drive.{knob}=0.05:0.9" for knob in ("pot_max", "pot_frequency", "pot_offset")],
+    PROCESSES: ["drive.acceleration_max=50:150", "drive.frequency=50:90", "friction.mu_k=0.3:0.6"],
+}
+"""Scenes whose points run in threads and in processes, and what their sweeps go over."""
 
 
-def arguments(points: int, out: Path) -> list[str]:
-    """A sweep over the three knobs, short runs with the commanded current."""
-    over = (f"--over={knob}=0.05:0.9:{points}" for knob in KNOBS)
+def arguments(points: int, out: Path, scene: str = THREADS) -> list[str]:
+    """A sweep of short runs."""
+    over = (f"--over={axis}:{points}" for axis in OVER[scene])
     short = ("--set=run.duration=0.02", "--set=run.settle=0.01")
     return [
-        sys.executable, "-m", "cosim", "sweep", "ideal-current", *over, *short,
+        sys.executable, "-m", "cosim", "sweep", scene, *over, *short,
         "--workers=2", f"--out={out}",
     ]  # fmt: skip
 
@@ -36,16 +41,23 @@ def lines(out: Path) -> int:
 
 
 @needs.posix
-@pytest.mark.parametrize(("points", "kills"), [(4, 3), pytest.param(10, 6, marks=pytest.mark.slow)])
-def test_killed(points: int, kills: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("scene", "points", "kills"),
+    [
+        (THREADS, 4, 3),
+        (PROCESSES, 4, 1),
+        *(pytest.param(scene, 10, 6, marks=pytest.mark.slow) for scene in OVER),
+    ],
+)
+def test_killed(scene: str, points: int, kills: int, tmp_path: Path) -> None:
     calm, wild = tmp_path / "calm", tmp_path / "wild"
-    subprocess.run(arguments(points, calm), check=True, capture_output=True, timeout=300)
+    subprocess.run(arguments(points, calm, scene), check=True, capture_output=True, timeout=300)
     dice = random.Random(points)
     total = points**3
     resumed_at = []
     for _ in range(kills):
         process = subprocess.Popen(
-            arguments(points, wild), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+            arguments(points, wild, scene), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
         )
         goal = lines(wild) + 1 + int(dice.uniform(0.2, 0.8) * total / (kills + 1))
         while lines(wild) < goal and process.poll() is None:
@@ -53,8 +65,10 @@ def test_killed(points: int, kills: int, tmp_path: Path) -> None:
         if process.poll() == 0 and resumed_at:
             break  # a loaded machine may look too late
         workers = psutil.Process(process.pid).children()
-        # The sweep goes on without it, unless it has not begun: the busiest one has.
-        max(workers, key=lambda worker: worker.cpu_times().user).kill()
+        assert bool(workers) == (scene == PROCESSES)
+        if workers:
+            # The sweep goes on without it, unless it has not begun: the busiest one has.
+            max(workers, key=lambda worker: worker.cpu_times().user).kill()
         time.sleep(dice.uniform(0.0, 0.05))
         process.kill()
         _, said = process.communicate(timeout=300)
@@ -63,16 +77,17 @@ def test_killed(points: int, kills: int, tmp_path: Path) -> None:
         _, alive = psutil.wait_procs(workers, timeout=120)
         assert not alive, "workers outlive their parent"
     assert resumed_at == sorted(resumed_at) and 0 < resumed_at[0] <= resumed_at[-1] < total + 1
-    subprocess.run(arguments(points, wild), check=True, capture_output=True, timeout=300)
+    subprocess.run(arguments(points, wild, scene), check=True, capture_output=True, timeout=300)
     assert (wild / "sweep.nc").read_bytes() == (calm / "sweep.nc").read_bytes()
     assert lines(wild) == total + 1, "a point was repeated or lost"
 
 
 @needs.posix
-def test_interrupted(tmp_path: Path) -> None:
+@pytest.mark.parametrize("scene", OVER)
+def test_interrupted(scene: str, tmp_path: Path) -> None:
     """Ctrl-C reaches parent and workers; what was complete is kept."""
     process = subprocess.Popen(
-        arguments(10, tmp_path), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        arguments(10, tmp_path, scene), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         start_new_session=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip

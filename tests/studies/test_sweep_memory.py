@@ -7,20 +7,21 @@ import psutil
 import pytest
 
 from cosim.scene import load
+from cosim.studies.sweep.batch import runner
 from cosim.studies.sweep.design import grid
 from cosim.studies.sweep.journal import Journal
-from cosim.studies.sweep.pool import Pool
 
 pytestmark = pytest.mark.reliability
 
 
 @pytest.mark.slow
-def test_parent_stays_flat(tmp_path: Path) -> None:
-    scene = load("held", ["run.duration=0.002", "run.settle=0.001"])
+@pytest.mark.parametrize("name", ["optimal", "held"])  # in processes, in threads
+def test_parent_stays_flat(name: str, tmp_path: Path) -> None:
+    scene = load(name, ["run.duration=0.002", "run.settle=0.001"])
     design = grid({"friction.mu_s": [0.6 + 1e-5 * k for k in range(6000)]})
     process = psutil.Process()
     sizes = []
-    with Journal(tmp_path / "journal", "test") as journal, Pool(scene, 2) as pool:
+    with Journal(tmp_path / "journal", "test") as journal, runner(scene, 2) as pool:
         points = ((k, design.point(k)) for k in range(len(design)))
         for number, outcome in pool.run(points):
             assert not outcome.failure

@@ -23,6 +23,10 @@ nobody knows yet how long a step takes."""
 _CALLS = ("set_reals", "do_step", "get_reals", "get_integers")
 
 
+Block = tuple[Array, Array, Array]
+"""Intervals as :meth:`Recorder.follow` takes them: ``edges``, ``start``, ``end``."""
+
+
 class Recorder:
     """The waveforms of the mechanics, filled as ``follow`` or ``advance`` is called.
 
@@ -36,8 +40,9 @@ class Recorder:
         self.mechanics = mechanics
         self._library = loop()
         self._progress = progress
-        self._pace = Pace(scene, mechanics)
-        self._at_once = 1
+        self.pace = Pace(scene, mechanics)
+        self.at_once = 1
+        """Steps of the next call of the compiled loop."""
         self._told = -1.0
         self._reached = 0.0
         self._fault: BaseException | None = None
@@ -122,12 +127,12 @@ class Recorder:
                     edges.ctypes.data + 8 * done,
                     start.ctypes.data + 8 * ports * done,
                     end.ctypes.data + 8 * ports * done,
-                    self._at_once,
+                    self.at_once,
                 )
                 if taken < 0:
                     raise self.failure()
                 done += taken
-                self._at_once = min(2 * self._at_once, STEPS)
+                self.at_once = min(2 * self.at_once, STEPS)
                 self.tell()
                 if self._fault:
                     raise self._fault
@@ -137,7 +142,7 @@ class Recorder:
 
         Raises SimulationFailed where it goes too slowly to be worked off at all.
         """
-        self._pace.judge(self._fmu.time, self.steps)
+        self.pace.judge(self._fmu.time, self.steps)
         done = self.state.next
         reached = float(self._agenda[0][done - 1]) if done else self._reached
         if reached > self._told:

@@ -1,33 +1,34 @@
 """Rung ``ideal``: the coil's current is the command's, whatever voltage it takes."""
 
+from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
 
 from cosim.arrays import Array
 from cosim.coupling.loop.agenda import SAME_TIME, count
-from cosim.coupling.loop.recorder import Recorder
+from cosim.coupling.loop.recorder import Block, Recorder
 from cosim.drive.command import commands
 from cosim.drive.pieces import Command
 from cosim.drive.straights import straights
 from cosim.files.spill import Tape, blocks
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
-from cosim.simulation.rungs.rung import Driven, Rung
+from cosim.simulation.rungs.rung import Driven, Led
 
 
-class Ideal(Rung):
+class Ideal(Led):
     """The current is given; the coil's voltage follows from it."""
 
     names = ("ideal",)
 
-    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
+    def lead(self, scene: Scene, recorder: Recorder) -> Generator[Block, None, Driven]:
         drives = commands(scene)
         share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
         coils = [_Coil(scene) for _ in drives]
         for edges, start, end in straights(drives, scene.run.duration):
             start, end = share * start, share * end
-            recorder.follow(edges[1:], start, end)
+            yield edges[1:], start, end
             for k, coil in enumerate(coils):
                 coil.follow(edges, start[:, k], end[:, k])
         motion = recorder.mechanics.totals()["energy_in"]

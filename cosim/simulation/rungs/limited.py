@@ -3,24 +3,26 @@
 The source's command is an input of the FMU; there is no ngspice.
 """
 
-from cosim.coupling.loop.recorder import Recorder
+from collections.abc import Generator
+
+from cosim.coupling.loop.recorder import Block, Recorder
 from cosim.drive.command import commands
 from cosim.drive.pieces import Command
 from cosim.drive.straights import straights
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Electrics, commanded
-from cosim.simulation.rungs.rung import Driven, Rung
+from cosim.simulation.rungs.rung import Driven, Led
 
 
-class Limited(Rung):
+class Limited(Led):
     """One monolithic solution of source, coil and mechanics."""
 
     names = ("limited",)
 
-    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
+    def lead(self, scene: Scene, recorder: Recorder) -> Generator[Block, None, Driven]:
         drives = commands(scene)
         for edges, start, end in straights(drives, scene.run.duration):
-            recorder.follow(edges[1:], start, end)
+            yield edges[1:], start, end
         second = {}
         if len(drives) > 1:
             columns = {"current_2": "coil_current_2", "coil_voltage_2": "coil_voltage_2"}

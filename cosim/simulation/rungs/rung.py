@@ -4,7 +4,7 @@
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import ClassVar
@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from cosim.coupling.loop.recorder import Recorder
+from cosim.coupling.loop.recorder import Block, Recorder
 from cosim.files.declared import modules
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Electrics
@@ -66,8 +66,29 @@ class Rung(ABC):
         """
 
 
+class Led(Rung):
+    """A rung whose inputs to the mechanics are known beforehand."""
+
+    @abstractmethod
+    def lead(self, scene: Scene, recorder: Recorder) -> Generator[Block, None, Driven]:
+        """Blocks for the recorder, which must have followed each before the next is asked for.
+
+        Raises BadInput and SimulationFailed.
+        """
+
+    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
+        leading = self.lead(scene, recorder)
+        while True:
+            try:
+                block = next(leading)
+            except StopIteration as end:
+                return end.value
+            recorder.follow(*block)
+
+
 @cache
 def rungs() -> dict[str, Rung]:
     """Each rung with mechanics by its names; a file in this folder is a rung."""
     modules(__name__.rpartition(".")[0])
-    return {name: kind() for kind in Rung.__subclasses__() for name in kind.names}
+    kinds = [kind for kind in (*Rung.__subclasses__(), *Led.__subclasses__()) if kind is not Led]
+    return {name: kind() for kind in kinds for name in kind.names}

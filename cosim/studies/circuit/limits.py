@@ -16,7 +16,8 @@ from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import Scene, changed
 from cosim.scene.tables import KNOBS
 from cosim.simulation.simulate import simulate
-from cosim.studies.sweep.pool import Pool, workers_asked
+from cosim.studies.sweep.batch import runner
+from cosim.studies.sweep.pool import workers_asked
 
 Settings = dict[str, float | int]
 
@@ -280,7 +281,7 @@ def _run(
     for rung in dict.fromkeys(rung for rung, _ in runs):
         scene = changed(base, {"circuit.model": rung}, "rung")
         points = [(number, values) for number, (own, values) in enumerate(runs) if own == rung]
-        with Pool(scene, workers, whole_periods=True) as pool:
+        with runner(scene, workers, whole_periods=True) as pool:
             for number, outcome in pool.run(points):
                 found = outcome.numbers
                 motions[number] = Motion(

@@ -10,7 +10,8 @@ from cosim.scene import Scene, changed, keys, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.choose_rung import WITHOUT_NGSPICE, relative_error, without_ngspice
 from cosim.studies.spread.turns import TURN, Settings, turns
-from cosim.studies.sweep.pool import Pool, workers_asked
+from cosim.studies.sweep.batch import runner
+from cosim.studies.sweep.pool import workers_asked
 from cosim.studies.sweep.report import with_unit
 
 UNITS = {key.full: key.unit for key in keys()}
@@ -123,7 +124,7 @@ def spread(
         return found
 
     numbers = set(range(len(every)))
-    with Pool(scene, min(count, len(every)), whole_periods=True) as pool:
+    with runner(scene, min(count, len(every)), whole_periods=True) as pool:
         if without_ngspice(scene) is None:
             found = run(numbers, {})
         else:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import ceil, isinf, nan
+from typing import Any
 
 from cosim.drive.command import period
 from cosim.errors import CosimError
@@ -36,21 +37,35 @@ def evaluate(
     from cosim.simulation.simulate import simulate
 
     try:
-        if not base.surface_is_given:  # whose peaks are those of the rows
-            few_rows = float(values.get("run.duration", base.run.duration)) / 2.0
-            values = {"run.output_step": few_rows, **values}
-        scene = changed(base, values, "--over")
-        if whole_periods:
-            scene = changed(scene, periods_made_whole(scene), "--over")
-        summary = simulate(scene, progress).summary
+        return outcome(simulate(point(base, values, whole_periods), progress).summary)
     except CosimError as error:
-        return Outcome({}, " ".join(str(error).split()))
+        return failed(error)
+
+
+def point(base: Scene, values: Mapping[str, Number | str], whole_periods: bool) -> Scene:
+    """The scene of a point. Raises BadInput."""
+    if not base.surface_is_given:  # whose peaks are those of the rows
+        few_rows = float(values.get("run.duration", base.run.duration)) / 2.0
+        values = {"run.output_step": few_rows, **values}
+    scene = changed(base, values, "--over")
+    return changed(scene, periods_made_whole(scene), "--over") if whole_periods else scene
+
+
+def outcome(summary: Mapping[str, Any]) -> Outcome:
+    """The numbers of a summary."""
     numbers = {
         name: nan if value is None else float(value)
         for name, value in summary.items()
         if name not in UNREPEATABLE and (value is None or isinstance(value, int | float))
     }
     return Outcome(numbers)
+
+
+def failed(error: Exception) -> Outcome:
+    """Why a point has no numbers."""
+    # What is no CosimError, no scene should meet: the other points go on.
+    kind = "" if isinstance(error, CosimError) else f"{type(error).__name__}: "
+    return Outcome({}, " ".join(f"{kind}{error}".split()))
 
 
 def periods_made_whole(scene: Scene) -> dict[str, Number]:

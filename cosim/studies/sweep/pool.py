@@ -4,7 +4,6 @@ ngspice leaks a little with every run, and can be spoilt for good. Workers are t
 after some points, after one that has spoilt the library, and after their death.
 """
 
-import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
@@ -12,8 +11,8 @@ from multiprocessing.connection import wait
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import Scene
-from cosim.studies.sweep.point import Number, Outcome, evaluate
-from cosim.toolchain.processes import PATIENCE, Worker
+from cosim.studies.sweep.point import Number, Outcome, evaluate, failed
+from cosim.toolchain.processes import PATIENCE, Worker, processors
 
 POINTS_A_WORKER = 250
 """Points after which a worker is replaced: what ngspice leaks stays below some MB."""
@@ -113,8 +112,7 @@ class Pool:
 def workers_asked(workers: int | None) -> int:
     """The number of workers: those asked for, or one for each processor. Raises BadInput."""
     if workers is None:
-        affinity = getattr(os, "sched_getaffinity", None)
-        return len(affinity(0)) if affinity else os.cpu_count() or 1
+        return processors()
     if not 1 <= workers <= 1024:
         raise BadInput(f"--workers {workers}: must be a whole number from 1 to 1024.")
     return workers
@@ -129,8 +127,8 @@ def _evaluate(
     """A point's outcome, and whether it has spoilt the process for others."""
     try:
         outcome = evaluate(base, values, whole_periods, progress)
-    except Exception as error:  # what no scene should meet: the other points go on
-        return Outcome({}, " ".join(f"{type(error).__name__}: {error}".split())), False
+    except Exception as error:
+        return failed(error), False
     if base.rung.own_netlist or not base.rung.ngspice:
         return outcome, False
     from cosim.circuit.ngspice import spoilt

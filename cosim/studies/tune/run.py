@@ -15,6 +15,7 @@ from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.choose_rung import without_ngspice
+from cosim.studies.sweep.batch import Batch, runner
 from cosim.studies.sweep.design import FREQUENCIES, numeric_key
 from cosim.studies.sweep.point import Number, Outcome, periods_made_whole
 from cosim.studies.sweep.pool import Pool, workers_asked
@@ -105,12 +106,12 @@ def tune(
     scouts, hints = 0, None
     ahead = without_ngspice(scene)
     # Quantities that only the scene's own rung has find no scouts.
-    with suppress(BadInput), Pool(ahead or scene, workers_asked(workers), whole_periods) as pool:
+    with suppress(BadInput), runner(ahead or scene, workers_asked(workers), whole_periods) as pool:
         if ahead is not None:
             trial = _Trial(pool, quantity, largest, ranges, scouting)
             search(trial.costs, len(ranges), SCOUTS * searched, seed)
             scouts, hints = len(trial.known), apart(trial.ranked(), HINTS_APART)[:HINTS]
-    with Pool(scene, workers_asked(workers), whole_periods) as pool:
+    with runner(scene, workers_asked(workers), whole_periods) as pool:
         trial = _Trial(pool, quantity, largest, ranges, progress)
         search(trial.costs, len(ranges), searched, seed, hints)
         if trial.best is None:
@@ -141,7 +142,7 @@ def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, 
 class _Trial:
     """Runs settings, each once, and remembers them in the order in which they were asked for."""
 
-    pool: Pool
+    pool: Batch | Pool
     quantity: str
     largest: bool
     ranges: dict[str, tuple[float, float]]

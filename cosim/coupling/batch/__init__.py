@@ -1,0 +1,1 @@
+"""Threads that lead the mechanics of many runs at once."""
