@@ -50,16 +50,18 @@ def agendas(
         what = np.concatenate(
             [np.repeat(np.array([_ROW, _FRAME], np.int32), [len(rows), len(frames)]), kinds[here]]
         )
+        if not len(times):
+            continue
+        place = np.rint(times / SAME_TIME)
+        order = place.argsort(kind="stable")
+        place = place[order]
         # Of times that are one the first is taken.
-        _, first, place = np.unique(
-            np.rint(times / SAME_TIME), return_index=True, return_inverse=True
-        )
-        joined = np.zeros(len(first), np.int32)
-        np.bitwise_or.at(joined, place, what)
+        first = np.flatnonzero(np.append(True, place[1:] != place[:-1]))
+        times, joined = times[order[first]], np.bitwise_or.reduceat(what[order], first)
         if end == _NEVER:
-            yield np.append(times[first], np.inf), np.append(joined, np.int32(0))
-        elif len(first):
-            yield times[first], joined
+            yield np.append(times, np.inf), np.append(joined, np.int32(0))
+        else:
+            yield times, joined
 
 
 def exposures(
