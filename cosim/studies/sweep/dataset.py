@@ -33,11 +33,14 @@ def dataset(
     still to be run, or has no such number. SI units.
     """
     numbers: dict[str, Array] = {}
-    failures = np.full(len(design), "", dtype=object)
+    count = len(design)
+    failures = np.full(count, "", dtype=object)
     for index, outcome in sorted(outcomes, key=lambda pair: pair[0]):
         failures[index] = outcome.failure
         for name, value in outcome.numbers.items():
-            numbers.setdefault(name, np.full(len(design), np.nan))[index] = value
+            if name not in numbers:
+                numbers[name] = np.full(count, np.nan)
+            numbers[name][index] = value
     axes = _names(design, {*numbers, FAILURE, POINT})
     dims = tuple(axes) if design.sample is None else (POINT,)
     columns = [list(axis.values) for axis in design.axes]
