@@ -103,8 +103,8 @@ def written(directory: Path, text: str, name: str = "mine.toml") -> Path:
     return path
 
 
-def test_paper_is_the_defaults() -> None:
-    scene = load("paper")
+def test_reference_is_the_defaults() -> None:
+    scene = load("reference")
     assert {table: getattr(scene, table).model_dump() for table in DEFAULTS} == DEFAULTS
     bare = {"name": scene.name, "description": scene.description}
     assert scene == Scene.model_validate(bare)
@@ -179,7 +179,7 @@ def test_built_in_scenes() -> None:
         "paper", "paper-full", "paper-limited", "gripper", "ideal-current", "held",
         "optimal", "quaid", "trial", "umbanhowar",
         "direct-drive", "direct-drive-stops", "gripper-17g", "gripper-169g", "square",
-        "down-grip", "down-waveform", "closed-loop-grasp", "two-surfaces",
+        "down-grip", "down-waveform", "closed-loop-grasp", "two-surfaces", "reference",
         *(f"regime-{n:02}" for n in range(1, 11)),
     }  # fmt: skip
     for name, description in scenes.items():

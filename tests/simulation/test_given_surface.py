@@ -189,7 +189,7 @@ def test_extremes_are_those_of_the_motion_however_far_apart_the_rows() -> None:
 def test_own_waveforms_move_the_part_again(tmp_path: Path) -> None:
     from cosim.waveforms.storage import write_csv
 
-    first = simulate(load("paper", ["circuit.model=ideal", "run.duration=0.2"]))
+    first = simulate(load("reference", ["circuit.model=ideal", "run.duration=0.2"]))
     write_csv(tmp_path / "w.csv", first.columns, dict.fromkeys(first.columns, "s"))
     text = (tmp_path / "w.csv").read_text().replace("v_surface [s]", "v_surface [m/s]")
     (tmp_path / "w.csv").write_text(text)
