@@ -380,7 +380,10 @@ def test_pwm_edges_are_exact(code: int, inner: str, t: float) -> None:
 
 
 def test_a_lagging_command_is_the_other_one_later() -> None:
-    first, second = commands(load("two-surfaces", ["drive.phase_deg=90"]))
+    every = ["drive.frequency=20", "drive.phase_deg=90"]
+    first, second = commands(
+        load("two-surfaces", ["drive.amplitude=8", "drive.offset=-1.2", *every])
+    )
     times = np.linspace(1e-5, 0.3, 997)
     np.testing.assert_allclose(second.values(times + 0.0125), first.values(times), atol=1e-9)
     assert second.next_jump(0.0) == 0.0125

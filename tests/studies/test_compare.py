@@ -114,13 +114,18 @@ def test_drift_is_that_of_whole_periods(periods: float, uneven: bool) -> None:
     assert drift(time, z, None) == drift(time, z, 10.0) == pytest.approx(ends)
 
 
-@pytest.mark.parametrize(("number", "frequency"), [(1, 9.82), (3, 9.72)])
-def test_drift_of_trials_with_few_periods(number: int, frequency: float, trials: Path) -> None:
+@pytest.mark.parametrize(
+    ("number", "frequency", "offset", "force"), [(1, 9.82, 1.0, 0.979), (3, 9.72, 2.6, 0.466)]
+)
+def test_drift_of_trials_with_few_periods(
+    number: int, frequency: float, offset: float, force: float, trials: Path
+) -> None:
     """Trials of 3.2 and 2.6 periods: the run drifts by its own mean velocity, and the frequencies
     are those that were found in the trials before.
     """
     whole = {"run.settle": 1.0, "run.duration": 1.0 + 9 / frequency}
-    found = cosim.run("reference", whole | {"drive.frequency": frequency})
+    drive = {"drive.frequency": frequency, "drive.amplitude": 7.4, "drive.offset": offset}
+    found = cosim.run("reference", whole | drive | {"friction.normal_force": force})
     compared = cosim.compare(found, trials / f"Trial #{number}.csv")
     numbers = compared.numbers
     assert numbers["drift_simulated"] == pytest.approx(found.summary["v_average"], abs=5e-5)
