@@ -75,7 +75,7 @@ def test_failures_are_those_of_single_runs(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(pace, "ENOUGH", 3e4)
     monkeypatch.setattr(pace, "ORDINARY", 1e4)
     monkeypatch.setattr(pace, "BUDGET", 1e6)
-    scene = load("reference", ["circuit.model=ideal", *SHORT])
+    scene = load("reference", {"circuit.model": "ideal", **SHORT})
     changes: list[dict[str, Any]] = [
         {"mechanics.suspension_k2": 1e15, "mechanics.travel": 1.0, "drive.amplitude": 100.0},
         {"mechanics.contact_damping": 1e6, "drive.offset": 6.0, "run.duration": 100.0},

@@ -17,6 +17,10 @@ from cosim.simulation.simulate import simulate
 NETLIST = Path(__file__).parents[2] / "circuits" / "amplifier.cir"
 G = 9.81
 BRIEF = {"run.duration": 0.02, "run.settle": 0.01}
+GRIPPER = {
+    **{"drive.amplitude": 10.0, "drive.offset": -2.5, "coil.count": 2},
+    **{"mechanics.n_surfaces": 2, "mechanics.part_mass": 0.05, "friction.normal_force": 1.4},
+}
 
 
 def told(word: str, name: str, overrides: Mapping[str, Any]) -> list[str]:
@@ -181,9 +185,13 @@ def test_a_part_off_the_finger_is_told(length: float, count: int):
     assert len(notes) == count and all(f"{-length * 1e3:.4g} mm" in note for note in notes)
 
 
-@pytest.mark.parametrize("name", ["paper-limited", "gripper", "held", "optimal", "umbanhowar"])
-def test_ordinary_scenes_are_silent(name: str):
-    model = {"circuit.model": "limited"} if name == "gripper" else {}
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [("reference", {}), ("reference", GRIPPER), ("held", {}), ("optimal", {}), ("umbanhowar", {})],
+    ids=["one surface", "gripper", "held", "optimal", "umbanhowar"],
+)
+def test_ordinary_scenes_are_silent(name: str, keys: Mapping[str, Any]):
+    model = {"circuit.model": "limited"} if name == "reference" else {}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert cosim.run(name, model).summary["notes"] == []
+        assert cosim.run(name, {**keys, **model}).summary["notes"] == []

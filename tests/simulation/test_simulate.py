@@ -60,7 +60,11 @@ RUNS = {
         "run.output_step=3e-5",
     ),
     "limited": ("reference", "circuit.model=limited", "run.duration=0.4", "run.settle=0.1"),
-    "gripper": ("gripper", "run.duration=0.3", "run.settle=0.1"),
+    "gripper": (
+        *("reference", "coil.count=2", "mechanics.n_surfaces=2", "mechanics.part_mass=0.05"),
+        *("drive.amplitude=10", "drive.offset=-2.5", "friction.normal_force=1.4"),
+        *("run.duration=0.3", "run.settle=0.1"),
+    ),
     "ideal": ("reference", "circuit.model=ideal", "run.duration=0.4", "run.settle=0.1"),
     "held": ("held", "run.duration=0.3", "run.settle=0.1"),
     "rigid": ("reference", "run.duration=0.3", "run.settle=0.1", "mechanics.contact=rigid"),
