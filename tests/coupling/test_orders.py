@@ -152,7 +152,7 @@ def test_error_control_keeps_to_its_tolerance_and_the_audit_rejects() -> None:
 
 
 def test_events_are_met_by_cutting_steps() -> None:
-    """At the first event of the paper's scene, a slip at the command's fall, the step is cut."""
+    """At the first event of the scene reference, a slip at the command's fall, the step is cut."""
     circuit, mechanics = participants(load("reference"))
     try:
         method = EventAware(Joint(circuit, mechanics, Jacobi(1, slopes=False)), within=1e-8)

@@ -36,12 +36,12 @@ def made(*overrides: str, scene: str = "reference") -> Command:
 @pytest.mark.parametrize(
     ("t", "v1"), [(0.0, -5.2), (0.0125, -3.2), (0.025, -1.2), (0.049, 2.64), (0.05, -5.2)]
 )
-def test_paper_sawtooth(t: float, v1: float) -> None:
+def test_sawtooth(t: float, v1: float) -> None:
     drive = made()
     assert drive.value(t) == pytest.approx(v1)
 
 
-def test_paper_sawtooth_jumps() -> None:
+def test_sawtooth_jumps() -> None:
     drive = made()
     assert drive.next_jump(0.0) == 0.05
     assert value_before(drive, 0.05) == pytest.approx(2.8)

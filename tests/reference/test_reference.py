@@ -192,7 +192,7 @@ def test_current_limit_is_refused() -> None:
         simulate({"offset": 15.0}, 0.01, 0.0, circuit="ideal")
 
 
-def test_paper_scene_as_an_independent_model_has_it() -> None:
+def test_reference_scene_as_an_independent_model_has_it() -> None:
     known = {"reference": 13.043e-3, "reference-ideal": 12.042e-3}
     found = {c["name"]: c["result"]["v_average"] for c in _golden()}
     assert {k: found[k] for k in known} == pytest.approx(known, rel=1e-3)

@@ -30,7 +30,7 @@ def named(settings: dict[str, float]) -> str:
 def test_the_ends_are_those_of_runs_of_their_own(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
-    """At 20.6 Hz the paper's rig changes its motion within a hundredth of the frequency."""
+    """At 20.6 Hz the rig changes its motion within a hundredth of the frequency."""
     keys = SHORT | {"drive.frequency": 20.6}
     sets = [f"--set={key}={value}" for key, value in keys.items()]
     assert main(["run", "reference", *sets, "--spread", "--out", str(tmp_path)]) == 0

@@ -130,8 +130,8 @@ def test_scouts_without_ngspice() -> None:
 
 
 GRID_BEST = 37.598e-3
-"""m/s: the fastest of `cosim sweep paper --set circuit.max_step=5e-5` over the three knobs, each at
-ten places from 0 to 1, at (8/9, 4/9, 3/9)."""
+"""m/s: the fastest of `cosim sweep reference --set circuit.max_step=5e-5` over the three knobs,
+each at ten places from 0 to 1, at (8/9, 4/9, 3/9)."""
 
 
 @pytest.mark.slow
