@@ -33,7 +33,7 @@ def test_there_are_examples():
 
 
 def test_the_agreed_names_are_those_that_the_host_fills():
-    assert set(NAMES) == set(parameters(load("paper")))
+    assert set(NAMES) == set(parameters(load("reference")))
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

@@ -39,7 +39,7 @@ WORST = [
 def scene(case: tuple, reltol: float) -> Scene:
     bandwidth, (frequency, amplitude, offset), inductance = case
     return load(
-        "paper",
+        "reference",
         [
             f"circuit.gain_bandwidth={bandwidth}",
             "circuit.slew_rate=1e9",

@@ -115,9 +115,9 @@ FILES = [
     ("[drive]\npot_frequency = 1\nfrequency = 3", "drive.pot_frequency and drive.frequency"),
     ("[drive]\npot_offset = 1\noffset = 3", "drive.pot_offset and drive.offset"),
     (f"[drive]\npot_offset = 1\namplitude = 1{'0' * 400}", "must be a number from 0 to 100 V"),
-    ("base = 'paper-full'\n[drive]\namplitude = 11", "from 0 to 10.53 V with circuit.model"),
+    ("[circuit]\nmodel = 'full'\n[drive]\namplitude = 11", "from 0 to 10.53 V with circuit.model"),
     (
-        "base = 'paper-full'\n[drive]\noffset = -4.5",
+        "[circuit]\nmodel = 'full'\n[drive]\noffset = -4.5",
         "drive.offset = -4.5 V must be a number from -4",
     ),
     ("[drive]\nquantised = true\noffset = 7", "to 6.532 V with drive.quantised = true"),

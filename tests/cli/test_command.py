@@ -464,9 +464,9 @@ def test_scenes(tmp_path: Path) -> None:
     assert names == [
         "paper", "paper-full", "paper-limited", "closed-loop-grasp", "direct-drive",
         "direct-drive-stops", "down-grip", "down-waveform", "gripper", "gripper-169g",
-        "gripper-17g", "held", "ideal-current", "optimal", "quaid", "regime-01", "regime-02",
-        "regime-03", "regime-04", "regime-05", "regime-06", "regime-07", "regime-08", "regime-09",
-        "regime-10", "square", "trial", "two-surfaces", "umbanhowar",
+        "gripper-17g", "held", "ideal-current", "optimal", "quaid", "reference", "regime-01",
+        "regime-02", "regime-03", "regime-04", "regime-05", "regime-06", "regime-07",
+        "regime-08", "regime-09", "regime-10", "square", "trial", "two-surfaces", "umbanhowar",
     ]  # fmt: skip
 
 

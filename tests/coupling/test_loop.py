@@ -32,22 +32,28 @@ BRIEF = ["run.duration=0.02", "run.settle=0.0049", "run.output_step=3.1e-5"]
 AMPLIFIER = (circuits() / "amplifier.cir").read_text(encoding="utf-8")
 
 CASES = {
-    "paper": ("paper", LAST),
-    "rigid": ("paper", [*LAST, "mechanics.contact=rigid"]),
+    "reference": ("reference", LAST),
+    "rigid": ("reference", [*LAST, "mechanics.contact=rigid"]),
     "gripper": ("gripper", LAST),
-    "no row but the ends": ("paper", [*LAST, "run.output_step=0.05"]),
-    "slow reset": ("paper", [*LAST, "drive.reset_time=0.005"]),
-    "held for long": ("paper", [*LAST, "friction.mu_s=5", "friction.mu_k=4", "drive.amplitude=1"]),
-    "sine": ("paper", [*LAST, "drive.waveform=sine", "drive.frequency=50"]),
-    "square": ("paper", [*LAST, "drive.waveform=square", "drive.frequency=50"]),
-    "fast square": ("paper", [*LAST, "drive.waveform=square", "drive.frequency=137.3"]),
-    "staircase": ("paper", [*BRIEF, "drive.quantised=true"]),
-    "eddy currents": ("paper", [*BRIEF, "coil.eddy_inductance=1e-3", "coil.eddy_resistance=4"]),
-    "full": ("paper-full", BRIEF),
-    "full with the pin's ripple": ("paper-full", [*BRIEF, "drive.pwm_ripple=true"]),
-    "full, ramp": ("paper-full", [*BRIEF, "drive.quantised=false"]),
-    "ideal": ("ideal-current", LAST),
-    "ideal sine": ("ideal-current", [*LAST, "drive.waveform=sine"]),
+    "no row but the ends": ("reference", [*LAST, "run.output_step=0.05"]),
+    "slow reset": ("reference", [*LAST, "drive.reset_time=0.005"]),
+    "held for long": (
+        "reference",
+        [*LAST, "friction.mu_s=5", "friction.mu_k=4", "drive.amplitude=1"],
+    ),
+    "sine": ("reference", [*LAST, "drive.waveform=sine", "drive.frequency=50"]),
+    "square": ("reference", [*LAST, "drive.waveform=square", "drive.frequency=50"]),
+    "fast square": ("reference", [*LAST, "drive.waveform=square", "drive.frequency=137.3"]),
+    "staircase": ("reference", [*BRIEF, "drive.quantised=true"]),
+    "eddy currents": ("reference", [*BRIEF, "coil.eddy_inductance=1e-3", "coil.eddy_resistance=4"]),
+    "full": ("reference", [*BRIEF, "circuit.model=full"]),
+    "full with the pin's ripple": (
+        "reference",
+        ["circuit.model=full", *BRIEF, "drive.pwm_ripple=true"],
+    ),
+    "full, ramp": ("reference", ["circuit.model=full", *BRIEF, "drive.quantised=false"]),
+    "ideal": ("reference", [*LAST, "circuit.model=ideal"]),
+    "ideal sine": ("reference", ["circuit.model=ideal", *LAST, "drive.waveform=sine"]),
     "undriven": ("held", LAST),
 }
 
@@ -77,7 +83,7 @@ def test_blocks_change_nothing(name: str, monkeypatch: pytest.MonkeyPatch) -> No
 
 @pytest.mark.parametrize("method", ["step-locked", *METHODS])
 def test_same_bits_through_fmi_2(method: str) -> None:
-    scene = load("paper", [*BRIEF, f"coupling.method={method}"])
+    scene = load("reference", [*BRIEF, f"coupling.method={method}"])
     assert_same(simulate(scene), simulate(scene, fmi_version=2))
 
 
@@ -86,8 +92,8 @@ def test_same_bits_with_a_netlist_of_ones_own(tmp_path: Path) -> None:
     netlist.write_text(AMPLIFIER)
     own = ["circuit.model=file", f"circuit.netlist={netlist}", "circuit.max_step=1e-4"]
     own.append("circuit.reltol=1e-4")
-    found = simulate(load("paper", [*BRIEF, *own]))
-    expected = simulate(load("paper", BRIEF))
+    found = simulate(load("reference", [*BRIEF, *own]))
+    expected = simulate(load("reference", BRIEF))
     for name, values in expected.columns.items():
         if name != "command":  # which a netlist of one's own makes itself
             assert values.tobytes() == found.columns[name].tobytes(), name
@@ -98,9 +104,11 @@ def test_no_step_goes_through_python(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("a step in Python")
 
     monkeypatch.setattr(Fmi3, "do_step", refuse)
-    for scene in ("paper", "paper-full", "ideal-current", "two-surfaces", "closed-loop-grasp"):
+    for model in ("amplifier", "full", "ideal"):
+        simulate(load("reference", [*BRIEF, f"circuit.model={model}"]))
+    for scene in ("two-surfaces", "closed-loop-grasp"):
         simulate(load(scene, BRIEF))
-    simulate(load("paper", [*BRIEF, "coupling.method=jacobi"]))
+    simulate(load("reference", [*BRIEF, "coupling.method=jacobi"]))
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -109,7 +117,7 @@ def test_a_method_does_the_same_between_both_masters(name: str) -> None:
     a hundredth of what the method itself is off at this macro step."""
     h, steps = 1e-4, 120
     fine = ["circuit.reltol=1e-8", "circuit.max_step=1e-6", f"run.output_step={h}"]
-    scene = load("paper", [*fine, f"run.duration={(steps + 0.5) * h}", "run.settle=0"])
+    scene = load("reference", [*fine, f"run.duration={(steps + 0.5) * h}", "run.settle=0"])
     default = simulate(scene).columns["z_surface"][: steps + 1]
     chosen = {"method": name, "macro_step": h}
     led = scene.model_copy(update={"coupling": scene.coupling.model_copy(update=chosen)})
@@ -133,7 +141,9 @@ def test_structures_have_the_size_of_their_twins() -> None:
 
 
 def test_mechanics_fail_with_the_words_of_the_fmu() -> None:
-    scene = load("ideal-current", ["mechanics.suspension_k2=-1e15", "drive.offset=6"])
+    scene = load(
+        "reference", ["circuit.model=ideal", "mechanics.suspension_k2=-1e15", "drive.offset=6"]
+    )
     with pytest.raises(SimulationFailed, match=r"failed at t = .* internal steps"):
         simulate(scene)
 
@@ -148,9 +158,9 @@ DO_STEP = ctypes.CFUNCTYPE(
 )
 
 
-@pytest.mark.parametrize("name", ["paper", "ideal-current"])
-def test_a_call_of_the_mechanics_fails(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = load(name, BRIEF)
+@pytest.mark.parametrize("model", ["amplifier", "ideal"])
+def test_a_call_of_the_mechanics_fails(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = load("reference", [*BRIEF, f"circuit.model={model}"])
     before, original, calls = simulate(scene), Fmi3.addresses, iter(range(300))
     kept = []
 
@@ -180,7 +190,7 @@ def test_a_call_of_the_mechanics_fails(name: str, monkeypatch: pytest.MonkeyPatc
 def test_python_fails_below_ngspice(
     owner: type, name: str, failure: BaseException, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = load("paper", BRIEF)
+    scene = load("reference", BRIEF)
     before, original, calls = simulate(scene), getattr(owner, name), iter(range(4))
 
     def failing(*arguments: object) -> object:
@@ -193,7 +203,7 @@ def test_python_fails_below_ngspice(
         patch.setattr(lead, "_PIECES", 1)
         patch.setattr(owner, name, failing)
         with pytest.raises(type(failure)):
-            simulate(load("paper", [*BRIEF, "run.duration=10"]))
+            simulate(load("reference", [*BRIEF, "run.duration=10"]))
     assert_same(simulate(scene), before)
 
 
@@ -206,7 +216,7 @@ def test_a_source_that_nothing_feeds(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(lead, "prepare", strange)
     with pytest.raises(SimulationFailed, match="external source vodd that nothing feeds"):
-        simulate(load("paper", BRIEF))
+        simulate(load("reference", BRIEF))
 
 
 def test_values_out_of_range(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -218,11 +228,11 @@ def test_values_out_of_range(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(Mechanics, "__init__", poisoned)
     with pytest.raises(SimulationFailed, match=r"range of numbers|ngspice stopped at t = 0 s"):
-        simulate(load("paper", BRIEF))
+        simulate(load("reference", BRIEF))
 
 
 def test_progress_goes_on_within_long_steps_of_the_command() -> None:
     told: list[float] = []
-    simulate(load("paper", ["run.duration=1"]), told.append)
+    simulate(load("reference", ["run.duration=1"]), told.append)
     assert told == sorted(told) and told[0] == 0.0 and told[-1] == 1.0
     assert len(told) > 3

@@ -40,7 +40,7 @@ SAMPLES = 20
 def reference(duration: float, **changes: Any) -> dict[str, np.ndarray]:
     """The judged signals at equally spaced times, the last at ``duration`` (s)."""
     times = [duration * k / SAMPLES for k in range(1, SAMPLES + 1)]
-    parameters = reference_parameters(load("paper", SMOOTH.overrides)) | changes
+    parameters = reference_parameters(load("reference", SMOOTH.overrides)) | changes
     found = monolithic.simulate(parameters, duration, 0.0, tol=1e-14, times=times)
     return {name: found.samples[name] for name in JUDGED}
 
@@ -63,7 +63,7 @@ EXPECTED = reference(DURATION)
 
 
 def joined_error(make: Make, steps: int) -> float:
-    circuit, mechanics = participants(load("paper", SMOOTH.overrides))
+    circuit, mechanics = participants(load("reference", SMOOTH.overrides))
     found: dict[str, list[float]] = {name: [] for name in JUDGED}
     try:
         joint = make(circuit, mechanics)
@@ -110,7 +110,7 @@ def test_the_default_method_is_of_second_order() -> None:
     """
     duration = 0.05
     # The netlist's pole, 1 uF, leaks through 1 Gohm too, as if the open-loop gain were less.
-    scene = load("paper", SMOOTH.overrides)
+    scene = load("reference", SMOOTH.overrides)
     rate = 2.0 * math.pi * scene.circuit.gain_bandwidth
     leak = 10.0 ** (-scene.circuit.open_loop_gain / 20.0) + 1e-3 / rate
     expected = reference(duration, open_loop_gain=-20.0 * math.log10(leak))
@@ -123,7 +123,7 @@ def test_the_default_method_is_of_second_order() -> None:
             f"circuit.max_step={max_step!r}",
             "circuit.reltol=1e-2",
         ]
-        waves = simulate(load("paper", overrides)).columns
+        waves = simulate(load("reference", overrides)).columns
         errors.append(error({name: waves[name][1:] for name in JUDGED}, expected))
     assert all(e < 9e-6 * (h / 1e-5) ** 2 for e, h in zip(errors, steps, strict=True)), errors
     assert min(slopes(errors)) > 1.5, errors
@@ -134,7 +134,7 @@ def test_error_control_keeps_to_its_tolerance_and_the_audit_rejects() -> None:
     is set at a share that its tolerance alone does not keep, steps are put back by it."""
 
     def taken(tolerance: float, share: float | None = None) -> ErrorControlled:
-        circuit, mechanics = participants(load("paper", SMOOTH.overrides))
+        circuit, mechanics = participants(load("reference", SMOOTH.overrides))
         try:
             joint = Joint(circuit, mechanics, Jacobi(1, slopes=False))
             control = ErrorControlled(joint, 1, 1e-5, tolerance, tolerance, energy_share=share)
@@ -152,8 +152,8 @@ def test_error_control_keeps_to_its_tolerance_and_the_audit_rejects() -> None:
 
 
 def test_events_are_met_by_cutting_steps() -> None:
-    """At the first event of the paper's scene, a slip at the command's fall, the step is cut."""
-    circuit, mechanics = participants(load("paper"))
+    """At the first event of the scene reference, a slip at the command's fall, the step is cut."""
+    circuit, mechanics = participants(load("reference"))
     try:
         method = EventAware(Joint(circuit, mechanics, Jacobi(1, slopes=False)), within=1e-8)
         before = method.time

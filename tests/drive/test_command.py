@@ -29,19 +29,19 @@ from tests.helpers.pins import pin, pin_before, v_dac, v_dac_before, value_befor
 GAIN = 15 / 4.7
 
 
-def made(*overrides: str, scene: str = "paper") -> Command:
+def made(*overrides: str, scene: str = "reference") -> Command:
     return command(load(scene, overrides))
 
 
 @pytest.mark.parametrize(
     ("t", "v1"), [(0.0, -5.2), (0.0125, -3.2), (0.025, -1.2), (0.049, 2.64), (0.05, -5.2)]
 )
-def test_paper_sawtooth(t: float, v1: float) -> None:
+def test_sawtooth(t: float, v1: float) -> None:
     drive = made()
     assert drive.value(t) == pytest.approx(v1)
 
 
-def test_paper_sawtooth_jumps() -> None:
+def test_sawtooth_jumps() -> None:
     drive = made()
     assert drive.next_jump(0.0) == 0.05
     assert value_before(drive, 0.05) == pytest.approx(2.8)
@@ -227,7 +227,7 @@ def test_loop_time_is_the_firmware(maximum: int, frequency: float, loop_time: fl
 
 
 def test_loop_time_lowers_the_frequency() -> None:
-    drive = made("drive.loop_time=22e-6", "drive.quantised=true", scene="paper-full")
+    drive = made("drive.loop_time=22e-6", "drive.quantised=true", "circuit.model=full")
     assert isinstance(drive, Staircase)
     # by hand: 50 us are reached at the third pass; 999 steps of three passes, the maximum for two
     # passes and 0 for one
@@ -256,7 +256,7 @@ def test_real_period_is_rounded_up_to_whole_steps(frequency: float, steps: int) 
 
 
 def test_staircase_of_the_paper() -> None:
-    drive = made("drive.quantised=true", scene="paper-full")
+    drive = made("drive.quantised=true", "circuit.model=full")
     # by hand: 8 V / 3.1915 = 2.5067 V -> code 778; offset pin 2.8 V / 3.1915 -> code 272
     assert v_dac(drive, 0.0) == pytest.approx(778 / 1024 * 3.3)
     assert drive.v_offset == pytest.approx(272 / 1024 * 3.3)
@@ -288,7 +288,7 @@ def test_silent_knob() -> None:
 
 def test_knobs_reach_the_pins() -> None:
     drive = made(
-        "drive.pot_max=0.7", "drive.pot_offset=0.4", "drive.quantised=true", scene="paper-full"
+        "drive.pot_max=0.7", "drive.pot_offset=0.4", "drive.quantised=true", "circuit.model=full"
     )
     assert v_dac(drive, 0.0) == pytest.approx(716 / 1024 * 3.3)
     assert drive.v_offset == pytest.approx(409 / 1024 * 3.3)
@@ -300,7 +300,7 @@ PWM = 488.28125
 
 
 def test_pwm_of_the_paper() -> None:
-    drive = made("drive.pwm_ripple=true", "drive.quantised=true", scene="paper-full")
+    drive = made("drive.pwm_ripple=true", "drive.quantised=true", "circuit.model=full")
     # by hand: code 272 of 1024, a period of 2048 us; a pulse is 544 us wide, its middle at 0
     mean = 272 / 1024 * 3.3
     assert drive.v_offset == pytest.approx(mean)
@@ -318,8 +318,8 @@ def test_pwm_of_the_paper() -> None:
 
 def test_pwm_changes_nothing_else() -> None:
     stairs = "drive.quantised=true"
-    plain = made(stairs, scene="paper-full")
-    drive = made(stairs, "drive.pwm_ripple=true", scene="paper-full")
+    plain = made(stairs, "circuit.model=full")
+    drive = made(stairs, "drive.pwm_ripple=true", "circuit.model=full")
     times = np.linspace(0, 0.2, 7001)
     assert list(drive.values(times)) == list(plain.values(times))
     for t in map(float, times[:300]):
@@ -331,7 +331,7 @@ def test_pwm_changes_nothing_else() -> None:
 @pytest.mark.parametrize("pot", [0, 1])
 def test_pwm_without_edges(pot: int) -> None:
     drive = made("drive.pwm_ripple=true", "drive.pot_max=0", f"drive.pot_offset={pot}",
-                 "drive.quantised=true", scene="paper-full")  # fmt: skip
+                 "drive.quantised=true", "circuit.model=full")  # fmt: skip
     assert drive.next_jump(0.0) == (inf if pot == 0 else 1023 / 1024 / 2 / PWM)
     assert pin(drive, 0.3) in (0.0, 3.3)
 
@@ -339,7 +339,7 @@ def test_pwm_without_edges(pot: int) -> None:
 def test_pwm_edges_do_not_stand_beside_those_of_the_staircase() -> None:
     # every 25 periods an edge meets one of the 50 us steps, within rounding
     drive = made("drive.pwm_ripple=true", "drive.pot_max=1", "drive.pot_offset=0.2442",
-                 "drive.frequency=20", "drive.quantised=true", scene="paper-full")  # fmt: skip
+                 "drive.frequency=20", "drive.quantised=true", "circuit.model=full")  # fmt: skip
     gaps, both, t = [], 0, 0.0
     while t < 3.0:
         before, t = t, drive.next_jump(t)
@@ -380,12 +380,15 @@ def test_pwm_edges_are_exact(code: int, inner: str, t: float) -> None:
 
 
 def test_a_lagging_command_is_the_other_one_later() -> None:
-    first, second = commands(load("two-surfaces", ["drive.phase_deg=90"]))
+    every = ["drive.frequency=20", "drive.phase_deg=90"]
+    first, second = commands(
+        load("two-surfaces", ["drive.amplitude=8", "drive.offset=-1.2", *every])
+    )
     times = np.linspace(1e-5, 0.3, 997)
     np.testing.assert_allclose(second.values(times + 0.0125), first.values(times), atol=1e-9)
     assert second.next_jump(0.0) == 0.0125
     assert (value_before(second, 0.0125), second.value(0.0125)) == pytest.approx((2.8, -5.2))
-    assert len(commands(load("paper"))) == 1
+    assert len(commands(load("reference"))) == 1
 
 
 def test_a_staircase_lags_by_a_share_of_its_own_period() -> None:

@@ -86,7 +86,10 @@ def test_against_the_reference(contact: str, tmp_path: Path):
     )
     rows = [(t, start + slope * t) for t in (0.0, 0.0212345, 0.07)]
     run = ["run.duration=0.06", "run.settle=0", "run.output_step=1e-4"]
-    scene = load("ideal-current", [written(tmp_path, rows), f"mechanics.contact={contact}", *run])
+    scene = load(
+        "reference",
+        ["circuit.model=ideal", written(tmp_path, rows), f"mechanics.contact={contact}", *run],
+    )
     result = simulate(scene)
     assert expected.stick_slip_events > 8
     assert result.summary["stick_fraction"] == pytest.approx(expected.stick_fraction, abs=1e-6)
@@ -100,9 +103,11 @@ def test_against_the_reference(contact: str, tmp_path: Path):
 @pytest.mark.parametrize("model", ["none", "ideal", "amplifier", "full"])
 def test_a_constant_force_in_a_file_is_a_constant_force(model: str, tmp_path: Path):
     run = [f"circuit.model={model}", "run.duration=0.05"]
-    scene = load("paper", [written(tmp_path, [(0.0, 0.6), (0.01, 0.6), (0.02, 0.6)]), *run])
+    scene = load("reference", [written(tmp_path, [(0.0, 0.6), (0.01, 0.6), (0.02, 0.6)]), *run])
     found = evaluate(scene, {"run.duration": 0.05}, whole_periods=False)
-    expected = evaluate(load("paper", ["friction.normal_force=0.6", *run]), {}, whole_periods=False)
+    expected = evaluate(
+        load("reference", ["friction.normal_force=0.6", *run]), {}, whole_periods=False
+    )
     assert not found.failure
     assert found.numbers["v_average"] == pytest.approx(
         expected.numbers["v_average"], rel=1e-4, abs=1e-9

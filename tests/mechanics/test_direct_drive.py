@@ -87,10 +87,10 @@ def test_against_the_reference_with_an_endless_ram(contact: str):
     )
     tables = {"mechanics": values | springs, "coil": coil, "drive": drive}
     scene = load(
-        "direct-drive",
+        "reference",
         [f"{table}.{key}={value}" for table, keys in tables.items() for key, value in keys.items()]
-        + [f"mechanics.contact={contact}", "circuit.model=ideal", "run.duration=0.06"]
-        + ["run.settle=0", "run.output_step=1e-4"],
+        + [f"mechanics.contact={contact}", "mechanics.actuator=direct", "circuit.model=ideal"]
+        + ["run.duration=0.06", "run.settle=0", "run.output_step=1e-4"],
     )
     result = simulate(scene)
     assert expected.impacts >= 3 and expected.stick_slip_events >= 2

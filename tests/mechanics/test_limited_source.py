@@ -38,7 +38,7 @@ def root(function: Callable[[float], float], most: float) -> float:
 
 
 def locked(*changes: str) -> Result:
-    return simulate(load("paper-limited", [*LOCKED, *FINE, *changes]))
+    return simulate(load("reference", ["circuit.model=limited", *LOCKED, *FINE, *changes]))
 
 
 def test_step_into_a_clamped_output() -> None:
@@ -172,8 +172,10 @@ ABLE = "circuit.current_limit=100"
 @pytest.mark.parametrize("contact", ["compliant", "rigid"])
 def test_without_limits_it_is_the_ideal_source(contact: str) -> None:
     common = [*SMOOTH, f"mechanics.contact={contact}", "coil.b1=50"]
-    ideal = simulate(load("paper", ["circuit.model=ideal", *common]))
-    limited = simulate(load("paper-limited", ["circuit.supply=900", ABLE, *common]))
+    ideal = simulate(load("reference", ["circuit.model=ideal", *common]))
+    limited = simulate(
+        load("reference", ["circuit.model=limited", "circuit.supply=900", ABLE, *common])
+    )
     phase = ideal.columns["time"] * 20.0 % 1.0
     off_corners = np.minimum(phase % 0.6, 1.0 - phase) > 1e-9
     assert limited.summary["saturated_fraction"] == 0.0
@@ -192,11 +194,13 @@ def test_without_limits_it_is_the_ideal_source(contact: str) -> None:
 
 def test_it_nears_the_ideal_source_as_the_supply_grows() -> None:
     """With jumps the current needs L Δi / V: the difference falls as one over the supply."""
-    ideal = simulate(load("ideal-current", SHORT)).summary["v_average"]
+    ideal = simulate(load("reference", ["circuit.model=ideal", *SHORT])).summary["v_average"]
     off = []
     for supply in (104.0, 204.0, 404.0, 804.0):
         changes = [f"circuit.supply={supply}", ABLE, *SHORT]
-        found = simulate(load("paper-limited", changes)).summary["v_average"]
+        found = simulate(load("reference", ["circuit.model=limited", *changes])).summary[
+            "v_average"
+        ]
         off.append(abs(found - ideal))  # type: ignore
     assert off[-1] < 2e-3 * abs(ideal)  # type: ignore
     np.testing.assert_allclose(np.divide(off[:-1], off[1:]), 2.0, rtol=0.1)

@@ -45,14 +45,14 @@ HEADER = "time [s],normal_force [N]\n"
 def test_a_bad_file_is_told_in_a_sentence(text: str, part: str, tmp_path: Path) -> None:
     path = tmp_path / "grip.csv"
     path.write_text(text, encoding="utf-8")
-    scene = load("paper", [f"friction.normal_force_file={path}"])
+    scene = load("reference", [f"friction.normal_force_file={path}"])
     with pytest.raises(BadInput, match=r"grip\.csv") as error:
         normal_force(scene)
     assert part in str(error.value)
 
 
 def test_a_missing_file_is_told() -> None:
-    scene = load("paper", ["friction.normal_force_file=no-such.csv"])
+    scene = load("reference", ["friction.normal_force_file=no-such.csv"])
     with pytest.raises(BadInput, match=r"no-such\.csv: cannot be read"):
         normal_force(scene)
 
@@ -61,7 +61,7 @@ def test_file_and_number_replace_each_other(tmp_path: Path) -> None:
     (tmp_path / "grip.csv").write_text(HEADER + "0,1\n1,2\n", encoding="utf-8")
     file = tmp_path / "rig.toml"
     file.write_text(
-        'base = "paper"\n[friction]\nnormal_force_file = "grip.csv"\n', encoding="utf-8"
+        'base = "reference"\n[friction]\nnormal_force_file = "grip.csv"\n', encoding="utf-8"
     )
     scene = load(str(file))
     assert scene.friction.normal_force_file == str(tmp_path / "grip.csv")

@@ -79,13 +79,21 @@ def test_two_surfaces_that_meet_the_part_at_once_are_a_point_apart(late: float):
         assert bench.get("sticking", "sticking_2") == [not late] * 2
 
 
-def test_the_scene_of_two_surfaces_has_a_point_apart():
-    def v_average(name: str, **drive: float) -> float:
-        keys = {f"drive.{key}": value for key, value in drive.items()}
-        few = {"run.duration": 0.5, "run.settle": 0.25, "run.output_step": 0.25}
-        return simulate(load(name, keys | few)).summary["v_average"]
+def test_a_rig_of_two_surfaces_has_a_point_apart():
+    def v_average(keys: dict[str, float]) -> float:
+        few = {
+            "circuit.model": "limited",
+            "run.duration": 0.5,
+            "run.settle": 0.25,
+            "run.output_step": 0.25,
+        }
+        return simulate(load("reference", keys | few)).summary["v_average"]
 
-    tie, near = v_average("two-surfaces", phase_deg=0.0), v_average("two-surfaces", phase_deg=1e-7)
-    assert tie == pytest.approx(v_average("paper-limited"), rel=1e-6)
-    assert near == pytest.approx(v_average("two-surfaces", phase_deg=1e-5), rel=1e-6)
+    def late(degrees: float) -> float:
+        twice = {"mechanics.n_surfaces": 2, "mechanics.part_mass": 0.018}
+        return v_average({"drive.phase_deg": degrees, **twice})
+
+    tie, near = late(0.0), late(1e-7)
+    assert tie == pytest.approx(v_average({}), rel=1e-6)
+    assert near == pytest.approx(late(1e-5), rel=1e-6)
     assert abs(near / tie - 1.0) > 1e-3

@@ -15,6 +15,10 @@ pytestmark = pytest.mark.physics
 
 SURFACE, PART, MU_S, MU_K, NORMAL = 0.0145, 0.009, 0.72, 0.59, 0.5
 PAIR = {"independent": 1, "n_surfaces": 2}
+TWICE = [  # the rig of the scene reference
+    "circuit.model=limited", "drive.phase_deg=90", "mechanics.n_surfaces=2",
+    "mechanics.part_mass=0.018",
+]  # fmt: skip
 ENERGIES = ("energy_in", "energy_friction", "energy_impact", "energy_damping", "energy_stored")
 
 
@@ -51,8 +55,8 @@ def test_in_phase_they_are_one_surface_with_half_the_part(contact: int):
 @pytest.mark.parametrize("model", ["ideal", "limited"])
 def test_a_scene_in_phase_is_the_scene_of_one(model: str):
     run = [f"circuit.model={model}", "run.duration=0.5", "run.settle=0.25"]
-    one = simulate(load("paper", run)).summary
-    result = simulate(load("two-surfaces", [*run, "drive.phase_deg=0"]))
+    one = simulate(load("reference", run)).summary
+    result = simulate(load("reference", [*TWICE, *run, "drive.phase_deg=0"]))
     two, waves = result.summary, result.columns
     assert two["v_average"] == pytest.approx(one["v_average"], rel=1e-7)
     assert two["stick_fraction"] == pytest.approx(one["stick_fraction"], rel=1e-8)
@@ -69,7 +73,7 @@ def test_the_energy_account_closes_at_any_phase(model: str, contact: str):
     for phase in (0, 45, 180, 299):
         keys = [f"circuit.model={model}", f"mechanics.contact={contact}"]
         run = ["run.duration=0.3", "run.settle=0.1", "run.output_step=1e-3"]
-        scene = load("two-surfaces", [*keys, f"drive.phase_deg={phase}", *run])
+        scene = load("reference", [*TWICE, *keys, f"drive.phase_deg={phase}", *run])
         assert simulate(scene).summary["energy_residual"] < 1e-9  # pyright: ignore
 
 
@@ -122,7 +126,7 @@ def test_against_the_reference(phase: float):
     frequency, amplitude, offset, sense = 20.0, 8.0, -1.2, 4.0
     lag = phase / 360.0 / frequency
     run = ["circuit.model=ideal", f"drive.phase_deg={phase}", "run.duration=0.1", "run.settle=0"]
-    scene = load("two-surfaces", [*run, "run.output_step=1e-4"])
+    scene = load("reference", [*TWICE, *run, "run.output_step=1e-4"])
     waves = simulate(scene).columns
     jumps = [n / frequency for n in range(1, 3)] + [n / frequency + lag for n in range(2)]
 
@@ -159,4 +163,4 @@ def test_against_the_reference(phase: float):
 )  # fmt: skip
 def test_what_two_surfaces_cannot_do_is_refused(key: str):
     with pytest.raises(BadInput, match=key.partition("=")[0].replace(".", r"\.")):
-        load("two-surfaces", [key])
+        load("reference", [*TWICE, key])

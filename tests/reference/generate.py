@@ -48,7 +48,7 @@ NUMBERS = (
 
 @dataclass(frozen=True)
 class Case:
-    """A parameter set: rungs, and what differs from the scene `paper`."""
+    """A parameter set: rungs, and what differs from the scene `reference`."""
 
     name: str
     contact: str
@@ -73,10 +73,10 @@ DIRECT = {
     **{"suspension_k1": 0.0, "suspension_k3": 0.0, "suspension_damping": 0.0, "travel": 4.6e-3},
 }
 CASES = (
-    Case("paper", "compliant", "amplifier", {}, 2.0, 1.0),
-    Case("paper-ideal", "compliant", "ideal", {}, 2.0, 1.0),
-    case("paper-rigid", "rigid", "amplifier"),
-    case("paper-rigid-ideal", "rigid", "ideal"),
+    Case("reference", "compliant", "amplifier", {}, 2.0, 1.0),
+    Case("reference-ideal", "compliant", "ideal", {}, 2.0, 1.0),
+    case("reference-rigid", "rigid", "amplifier"),
+    case("reference-rigid-ideal", "rigid", "ideal"),
     case("fast", "compliant", "amplifier", **FAST),
     case("fast-ideal", "compliant", "ideal", **FAST),
     case("fast-rigid", "rigid", "amplifier", **FAST),
@@ -106,8 +106,8 @@ CASES = (
     case("wide", "compliant", "amplifier", travel=4e-3, frequency=35.0, amplitude=6.0),
     case("low-swing", "compliant", "amplifier", swing_loss_high=8.0, swing_loss_low=6.0),
     case("no-walls", "compliant", "amplifier", travel=1e-2, frequency=35.0, amplitude=6.0),
-    Case("paper-limited", "compliant", "limited", {}, 2.0, 1.0),
-    case("paper-rigid-limited", "rigid", "limited"),
+    Case("reference-limited", "compliant", "limited", {}, 2.0, 1.0),
+    case("reference-rigid-limited", "rigid", "limited"),
     case("fast-limited", "compliant", "limited", **FAST),
     case("quick-rigid-limited", "rigid", "limited", frequency=40.0, amplitude=10.0),
     case("low-supply-limited", "compliant", "limited", supply=10.0),

@@ -1,4 +1,4 @@
-"""Writes cosim/studies/bench/reference.json: the part's path in the scene `paper`, which `cosim
+"""Writes cosim/studies/bench/reference.json: the part's path in the scene `reference`, which `cosim
 bench` takes for the truth.
 
     python -m tests.reference.generate_bench

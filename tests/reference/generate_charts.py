@@ -34,7 +34,7 @@ PATH = Path(__file__).parents[2] / "cosim" / "studies" / "accuracy" / "reference
 
 def solve(case: Case, known: dict[str, Any]) -> dict[str, Any]:
     """The entry of a case: as it is known, if nothing about it has changed."""
-    scene = load("paper", case.overrides)
+    scene = load("reference", case.overrides)
     p = replace(monolithic.Params(), **reference_parameters(scene))
     if case.netlist:
         # The netlist's pole, 1 uF, leaks through 1 Gohm too, as if the gain were less.

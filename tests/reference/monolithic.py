@@ -46,7 +46,7 @@ SCALES = (1.0, 10.0, 1e-3, 0.1, 1e-3, 0.1, 1e-3, 0.1) + (1e-3,) * len(ENERGIES)
 
 @dataclass(frozen=True)
 class Params:
-    """Scene keys, flattened; the defaults are those of the scene `paper`."""
+    """Scene keys, flattened; the defaults are those of the scene `reference`."""
 
     waveform: str = "sawtooth"  # or "sine"
     actuator: str = "ram"  # or "direct": what is called the ram here stands on the ground

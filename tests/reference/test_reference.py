@@ -192,13 +192,13 @@ def test_current_limit_is_refused() -> None:
         simulate({"offset": 15.0}, 0.01, 0.0, circuit="ideal")
 
 
-def test_paper_scene_as_an_independent_model_has_it() -> None:
-    known = {"paper": 13.043e-3, "paper-ideal": 12.042e-3}
+def test_reference_scene_as_an_independent_model_has_it() -> None:
+    known = {"reference": 13.043e-3, "reference-ideal": 12.042e-3}
     found = {c["name"]: c["result"]["v_average"] for c in _golden()}
     assert {k: found[k] for k in known} == pytest.approx(known, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", ["paper-rigid-ideal", "plate-rigid", "loose"])
+@pytest.mark.parametrize("name", ["reference-rigid-ideal", "plate-rigid", "loose"])
 def test_golden_results_are_those_of_this_model(name: str) -> None:
     (case,) = (c for c in _golden() if c["name"] == name)
     r = simulate(

@@ -103,8 +103,8 @@ def written(directory: Path, text: str, name: str = "mine.toml") -> Path:
     return path
 
 
-def test_paper_is_the_defaults() -> None:
-    scene = load("paper")
+def test_reference_is_the_defaults() -> None:
+    scene = load("reference")
     assert {table: getattr(scene, table).model_dump() for table in DEFAULTS} == DEFAULTS
     bare = {"name": scene.name, "description": scene.description}
     assert scene == Scene.model_validate(bare)
@@ -179,7 +179,7 @@ def test_built_in_scenes() -> None:
         "paper", "paper-full", "paper-limited", "gripper", "ideal-current", "held",
         "optimal", "quaid", "trial", "umbanhowar",
         "direct-drive", "direct-drive-stops", "gripper-17g", "gripper-169g", "square",
-        "down-grip", "down-waveform", "closed-loop-grasp", "two-surfaces",
+        "down-grip", "down-waveform", "closed-loop-grasp", "two-surfaces", "reference",
         *(f"regime-{n:02}" for n in range(1, 11)),
     }  # fmt: skip
     for name, description in scenes.items():
@@ -208,7 +208,7 @@ def test_file_changes_only_its_keys(tmp_path: Path) -> None:
     assert scene.name == "mine"
     assert scene.mechanics.travel == 2e-3
     assert scene.coil.force_factor == 1.0 and isinstance(scene.coil.force_factor, float)
-    assert scene.mechanics.model_copy(update={"travel": 1.9e-3}) == load("paper").mechanics
+    assert scene.mechanics.model_copy(update={"travel": 1.9e-3}) == load("reference").mechanics
 
 
 def test_file_on_a_base(tmp_path: Path) -> None:
@@ -274,8 +274,8 @@ def test_knob_and_value_replace_each_other_between_layers(tmp_path: Path) -> Non
 
 
 def test_text_is_deterministic_and_complete() -> None:
-    text = to_toml(load("paper"))
-    assert text == to_toml(load("paper"))
+    text = to_toml(load("reference"))
+    assert text == to_toml(load("reference"))
     for key in keys():
         assert (f"\n{key.name} = " in text) == (key.default is not None), key.full
         (line,) = (line for line in text.splitlines() if line.endswith(key.text))

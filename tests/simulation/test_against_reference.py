@@ -42,7 +42,7 @@ def scene_of(case: dict) -> Scene:
         f"run.duration={case['duration']}",
         f"run.settle={case['settle']}",
     ]
-    return load("paper", overrides)
+    return load("reference", overrides)
 
 
 def check_early(case: dict, result: Result) -> None:

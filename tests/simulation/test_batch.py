@@ -48,7 +48,7 @@ def test_equal_to_single_runs(model: str, tmp_path: Path, monkeypatch: pytest.Mo
     scenes = []
     for shape in SHAPES * 2:
         knobs = {key: dice.uniform(*ends) for key, ends in KNOBS.items()}
-        scenes.append(load("paper", {"circuit.model": model, **SHORT, **knobs, **shape}))
+        scenes.append(load("reference", {"circuit.model": model, **SHORT, **knobs, **shape}))
     scenes.append(load("direct-drive", {**SHORT, "circuit.model": "none"}))
     check(scenes)
 
@@ -75,7 +75,7 @@ def test_failures_are_those_of_single_runs(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(pace, "ENOUGH", 3e4)
     monkeypatch.setattr(pace, "ORDINARY", 1e4)
     monkeypatch.setattr(pace, "BUDGET", 1e6)
-    scene = load("ideal-current", SHORT)
+    scene = load("reference", {"circuit.model": "ideal", **SHORT})
     changes: list[dict[str, Any]] = [
         {"mechanics.suspension_k2": 1e15, "mechanics.travel": 1.0, "drive.amplitude": 100.0},
         {"mechanics.contact_damping": 1e6, "drive.offset": 6.0, "run.duration": 100.0},
@@ -97,8 +97,8 @@ def test_failures_are_those_of_single_runs(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_what_runs_is_stopped() -> None:
     """A run that would take hours ends with the `with` block, and so when Ctrl-C leaves it."""
-    endless = {"run.duration": 1e5, "run.output_step": 1e3}
-    making = [partial(load, "ideal-current", changes) for changes in (endless, SHORT)]
+    endless = {"circuit.model": "ideal", "run.duration": 1e5, "run.output_step": 1e3}
+    making = [partial(load, "reference", changes) for changes in (endless, endless | SHORT)]
     found = summaries(enumerate(making), 2)
     number, summary = next(found)
     assert number == 1 and isinstance(summary, dict)

@@ -13,7 +13,7 @@ from cosim.simulation.simulate import simulate
 SHORT = ["run.duration=1", "run.settle=0.5", "run.output_step=0.1"]
 
 
-def summary(*changes: str, source: str = "paper") -> Any:
+def summary(*changes: str, source: str = "reference") -> Any:
     return simulate(load(source, [*SHORT, *changes])).summary
 
 
@@ -58,10 +58,10 @@ def test_refused_where_nothing_can_be_told(knobs: tuple[float, float, float]) ->
     ],
 )
 def test_ringing_that_reaches_the_slip_is_seen(changes: list[str]) -> None:
-    found = simulate(load("paper", [*changes, "circuit.model=auto"])).summary
+    found = simulate(load("reference", [*changes, "circuit.model=auto"])).summary
     assert found["circuit_model"] == "amplifier"
-    limited = simulate(load("paper", [*changes, "circuit.model=limited"])).summary
-    tolerance = load("paper", changes).run.tolerance
+    limited = simulate(load("reference", [*changes, "circuit.model=limited"])).summary
+    tolerance = load("reference", changes).run.tolerance
     assert abs(limited["v_average"] / found["v_average"] - 1) > tolerance
 
 
@@ -72,7 +72,7 @@ def test_coil_too_fast_for_the_limited_rung() -> None:
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     changes = [f"--set={change}" for change in [*SHORT, "circuit.model=auto", "run.tolerance=0.02"]]
-    assert main(["run", "paper", *changes, "--out", str(tmp_path)]) == 0
+    assert main(["run", "reference", *changes, "--out", str(tmp_path)]) == 0
     assert "circuit taken           limited: at most about" in capsys.readouterr().out
     written = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert written["circuit_model"] == "limited" and set(written["circuit_model_errors"]) == {

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.physics
 def scene(name: str, tolerance: float, *more: str) -> Scene:
     case = CASES[name]
     return load(
-        "paper",
+        "reference",
         [
             *case.overrides,
             f"run.duration={case.duration!r}",
@@ -29,7 +29,7 @@ def scene(name: str, tolerance: float, *more: str) -> Scene:
     )
 
 
-@pytest.mark.parametrize(("name", "tolerance"), [("paper", 1e-3), ("stick-slip", 1e-3)])
+@pytest.mark.parametrize(("name", "tolerance"), [("reference", 1e-3), ("stick-slip", 1e-3)])
 def test_the_tolerance_is_met_and_the_error_told(name: str, tolerance: float) -> None:
     result = simulate(scene(name, tolerance))
     true = reference(name).error(result.columns["z_part"][np.newaxis, 1:])
@@ -42,7 +42,7 @@ def test_the_tolerance_is_met_and_the_error_told(name: str, tolerance: float) ->
 
 
 def test_a_smaller_tolerance_takes_more_steps() -> None:
-    coarse, fine = (simulate(scene("paper", tolerance)).summary for tolerance in (1e-3, 5e-6))
+    coarse, fine = (simulate(scene("reference", tolerance)).summary for tolerance in (1e-3, 5e-6))
     assert isinstance(coarse["circuit_steps"], int) and isinstance(fine["circuit_steps"], int)
     assert coarse["circuit_steps"] < fine["circuit_steps"]
 
@@ -52,12 +52,12 @@ def test_what_cannot_be_met_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         "cosim.simulation.choose_steps.LEVELS", ((1e-3, 1e-4), (1e-4, 1e-4), (1e-5, 1e-4))
     )
     with pytest.raises(SimulationFailed, match=r"coupling.tolerance = 1e-06 is not met.*differ by"):
-        simulate(scene("paper", 1e-6))
+        simulate(scene("reference", 1e-6))
 
 
 def test_steps_that_it_chooses_itself_have_no_effect() -> None:
     with pytest.warns(NoEffect, match="circuit.max_step has no effect.*auto.*chooses it"):
-        scene("paper", 1e-3, "circuit.max_step=2e-6")
+        scene("reference", 1e-3, "circuit.max_step=2e-6")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        load("paper", ["circuit.max_step=2e-6", "coupling.method=companion"])
+        load("reference", ["circuit.max_step=2e-6", "coupling.method=companion"])

@@ -28,7 +28,7 @@ AMPLIFIER = (circuits() / "amplifier.cir").read_text(encoding="utf-8")
 
 
 def good_run() -> np.ndarray:
-    return simulate(load("paper", SHORT)).columns["z_part"]
+    return simulate(load("reference", SHORT)).columns["z_part"]
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def own(tmp_path: Path, text: str) -> list[str]:
 def test_bad_netlist(name: str, tmp_path: Path, before: np.ndarray) -> None:
     text, told = NETLISTS[name]
     with pytest.raises(BadInput, match=rf"(?i){told}") as caught:
-        simulate(load("paper", own(tmp_path, text)))
+        simulate(load("reference", own(tmp_path, text)))
     assert caught.value.exit_code == 2
     assert "\n" not in str(caught.value)
     assert np.array_equal(good_run(), before)
@@ -93,7 +93,7 @@ def test_bad_netlist(name: str, tmp_path: Path, before: np.ndarray) -> None:
 def test_failing_circuit(name: str, tmp_path: Path, before: np.ndarray) -> None:
     text, told = SIMULATIONS[name]
     with pytest.raises(SimulationFailed, match=told) as caught:
-        simulate(load("paper", own(tmp_path, text)))
+        simulate(load("reference", own(tmp_path, text)))
     assert caught.value.exit_code == 3
     assert np.array_equal(good_run(), before)
 
@@ -155,7 +155,7 @@ def test_exception_in_a_method(
 
     monkeypatch.setattr(Jacobi, name, fail)
     with pytest.raises(type(failure)):
-        simulate(load("paper", [*SHORT, "coupling.method=jacobi"]))
+        simulate(load("reference", [*SHORT, "coupling.method=jacobi"]))
     monkeypatch.undo()
     assert np.array_equal(good_run(), before)
 
@@ -164,7 +164,7 @@ def test_not_a_number_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.n
     calls = itertools.count()
     monkeypatch.setattr(Jacobi, "emf", lambda self, past: (np.nan if next(calls) > 20 else 0.0,))
     with pytest.raises(SimulationFailed, match=r"range of numbers|stopped at t = 0\.00"):
-        simulate(load("paper", [*SHORT, "coupling.method=jacobi"]))
+        simulate(load("reference", [*SHORT, "coupling.method=jacobi"]))
     monkeypatch.undo()
     assert np.array_equal(good_run(), before)
 
@@ -178,7 +178,7 @@ def test_early_end_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndar
 
     monkeypatch.setattr(lead, "prepare", shortened)
     with pytest.raises(SimulationFailed, match=r"stopped at t = 0\.004 s of 0\.01 s"):
-        simulate(load("paper", SHORT))
+        simulate(load("reference", SHORT))
     monkeypatch.undo()
     assert np.array_equal(good_run(), before)
 
@@ -193,7 +193,7 @@ def test_early_end_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndar
 )
 def test_false_alarms_do_not_fail_a_run(text: str, tmp_path: Path, before: np.ndarray) -> None:
     as_built_in = "circuit.max_step=5e-5"  # which a netlist of one's own has finer
-    result = simulate(load("paper", [*own(tmp_path, text), as_built_in]))
+    result = simulate(load("reference", [*own(tmp_path, text), as_built_in]))
     assert np.allclose(result.columns["z_part"], before, rtol=0, atol=1e-9)
 
 
@@ -204,7 +204,7 @@ def test_startup_file_in_the_working_folder_is_not_run(tmp_path: Path) -> None:
     here = Path.cwd()
     os.chdir(tmp_path)
     try:
-        processes.isolated(_run_scene, ["paper", SHORT], lambda _: None)
+        processes.isolated(_run_scene, ["reference", SHORT], lambda _: None)
     finally:
         os.chdir(here)
     assert not marker.exists()

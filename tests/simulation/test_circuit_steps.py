@@ -18,4 +18,4 @@ NETLIST = "circuit.netlist=circuits/examples/h_bridge.cir"
     ],
 )
 def test_largest_step(overrides: list[str], step: float) -> None:
-    assert load("paper", overrides).circuit.max_step == step
+    assert load("reference", overrides).circuit.max_step == step

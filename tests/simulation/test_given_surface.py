@@ -186,16 +186,18 @@ def test_extremes_are_those_of_the_motion_however_far_apart_the_rows() -> None:
     assert found["z_surface_pp"] == pytest.approx(slow * (0.011**2 - 0.001**2) / 2, rel=1e-8)
 
 
+GIVEN = ["circuit.model=none", "drive.waveform=file"]
+
+
 def test_own_waveforms_move_the_part_again(tmp_path: Path) -> None:
     from cosim.waveforms.storage import write_csv
 
-    first = simulate(load("paper", ["circuit.model=ideal", "run.duration=0.2"]))
+    first = simulate(load("reference", ["circuit.model=ideal", "run.duration=0.2"]))
     write_csv(tmp_path / "w.csv", first.columns, dict.fromkeys(first.columns, "s"))
     text = (tmp_path / "w.csv").read_text().replace("v_surface [s]", "v_surface [m/s]")
     (tmp_path / "w.csv").write_text(text)
-    again = simulate(
-        load("trial", [f"drive.file={tmp_path / 'w.csv'}", "run.duration=0.2", "run.settle=0.1"])
-    )
+    given = [*GIVEN, f"drive.file={tmp_path / 'w.csv'}", "run.output_step=1e-4"]
+    again = simulate(load("reference", [*given, "run.duration=0.2", "run.settle=0.1"]))
     assert again.summary["v_average"] == pytest.approx(first.summary["v_average"], rel=0.04)
 
 
@@ -268,7 +270,7 @@ def test_rows_are_of_one_side_of_a_corner(tmp_path: Path) -> None:
     (tmp_path / "own.csv").write_text(f"time,velocity\n{table}\n")
     settings = [f"drive.file={tmp_path / 'own.csv'}", "friction.mu_plate=0.05"]
     times_of_run = ["run.duration=0.2", "run.settle=0", "run.output_step=1e-3"]
-    scene = load("trial", [*settings, *times_of_run])
+    scene = load("reference", [*GIVEN, *settings, *times_of_run])
     w, friction, mechanics = simulate(scene).columns, scene.friction, scene.mechanics
 
     slopes = np.diff(speeds)[np.diff(times) > 0] / 0.01

@@ -36,5 +36,4 @@ def test_a_heavy_part_goes_slowly():
         evaluate(load(name, ["circuit.model=ideal"]), {}, whole_periods=False).numbers["v_average"]
         for name in ("gripper-17g", "gripper-169g")
     )
-    assert light == pytest.approx(19.7e-3, rel=0.01)
-    assert heavy == pytest.approx(6.25e-3, rel=0.01)
+    assert heavy / light == pytest.approx(1 / 3, rel=0.1)  # as its description says

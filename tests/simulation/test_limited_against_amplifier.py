@@ -54,7 +54,7 @@ def settings(knobs: Knobs) -> list[str]:
     """The knobs, and about a second of whole periods."""
     names = ("pot_max", "pot_frequency", "pot_offset")
     turned = [f"drive.{name}={value}" for name, value in zip(names, knobs, strict=True)]
-    frequency = load("paper", turned).drive.frequency
+    frequency = load("reference", turned).drive.frequency
     settle, counted = max(1, round(0.4 * frequency)), max(2, round(0.6 * frequency))
     return [
         *turned,
@@ -67,8 +67,10 @@ def settings(knobs: Knobs) -> list[str]:
 def run(model: str, common: list[str], key: str = NORMAL_FORCE, change: float = 0.0) -> dict:
     """The summary with one key changed by a part of itself."""
     table, name = key.split(".")
-    value = getattr(getattr(load("paper"), table), name) * (1.0 + change)
-    return simulate(load("paper", [*common, f"circuit.model={model}", f"{key}={value!r}"])).summary
+    value = getattr(getattr(load("reference"), table), name) * (1.0 + change)
+    return simulate(
+        load("reference", [*common, f"circuit.model={model}", f"{key}={value!r}"])
+    ).summary
 
 
 def relative(value: float, to: float) -> float:
@@ -97,7 +99,7 @@ def compare(knobs: Knobs) -> Class:
     found, expected = limited["v_average"], amplifier["v_average"]
     kind, moved = classify(common, found)
     print(
-        f"{load('paper', common).drive.frequency:5.1f} Hz {knobs} {kind:8} {moved:7.1e}  "
+        f"{load('reference', common).drive.frequency:5.1f} Hz {knobs} {kind:8} {moved:7.1e}  "
         f"v {1e3 * expected:9.4f} {1e3 * found:9.4f} mm/s  {relative(found, expected):7.2%}  "
         f"limited {limited['saturated_fraction']:.3f} of the time"
     )

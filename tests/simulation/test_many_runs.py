@@ -11,9 +11,9 @@ from cosim.simulation.simulate import simulate
 pytestmark = pytest.mark.reliability
 
 MIXED = [
-    load("ideal-current", ["run.duration=0.02"]),
-    load("paper", ["run.duration=0.004", "run.output_step=1e-4"]),
-    load("paper-full", ["run.duration=0.001", "run.output_step=1e-4"]),
+    load("reference", ["circuit.model=ideal", "run.duration=0.02"]),
+    load("reference", ["run.duration=0.004", "run.output_step=1e-4"]),
+    load("reference", ["circuit.model=full", "run.duration=0.001", "run.output_step=1e-4"]),
     load("gripper", ["run.duration=0.004", "mechanics.contact=rigid"]),
 ]
 

@@ -38,18 +38,26 @@ def test_memory_is_bounded(model: str, durations: tuple[float, float], rows: flo
 
 
 CASES = {
-    "amplifier": ("paper", ["run.duration=0.2"]),
+    "amplifier": ("reference", ["run.duration=0.2"]),
     "ideal, with eddy currents": (
-        "ideal-current",
-        ["run.duration=0.2", "coil.eddy_inductance=1e-3", "coil.eddy_resistance=4"],
+        "reference",
+        [
+            "circuit.model=ideal",
+            "run.duration=0.2",
+            "coil.eddy_inductance=1e-3",
+            "coil.eddy_resistance=4",
+        ],
     ),
-    "limited": ("paper", ["circuit.model=limited", "run.duration=0.2"]),
-    "sine": ("paper", ["circuit.model=limited", "drive.waveform=sine", "run.duration=0.07"]),
-    "full": ("paper-full", ["run.duration=0.02"]),
+    "limited": ("reference", ["circuit.model=limited", "run.duration=0.2"]),
+    "sine": ("reference", ["circuit.model=limited", "drive.waveform=sine", "run.duration=0.07"]),
+    "full": ("reference", ["circuit.model=full", "run.duration=0.02"]),
     "two surfaces": ("two-surfaces", ["run.duration=0.1"]),
     "changing grip": ("closed-loop-grasp", ["run.duration=0.1", "run.output_step=1.7e-4"]),
-    "a shutter": ("ideal-current", ["run.duration=0.2", "run.shutter=0.3"]),
-    "many frames to a row": ("ideal-current", ["run.duration=0.5", "run.output_step=0.04"]),
+    "a shutter": ("reference", ["circuit.model=ideal", "run.duration=0.2", "run.shutter=0.3"]),
+    "many frames to a row": (
+        "reference",
+        ["circuit.model=ideal", "run.duration=0.5", "run.output_step=0.04"],
+    ),
 }
 
 
@@ -127,9 +135,9 @@ def test_disk_that_takes_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
             raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(tape.tempfile, "TemporaryFile", lambda **_: Full())
-    for name in ("paper", "ideal-current"):
+    for model in ("amplifier", "ideal"):
         with (
             tape.on_disk_in(tmp_path),
             pytest.raises(BadInput, match=r"cannot hold the waveforms .*No space left"),
         ):
-            simulate.simulate(load(name, ["run.duration=0.1"]))
+            simulate.simulate(load("reference", ["run.duration=0.1", f"circuit.model={model}"]))

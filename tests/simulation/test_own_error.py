@@ -20,6 +20,6 @@ def test_it_is_the_true_error_within_a_factor(name: str) -> None:
 def test_it_is_not_told_where_nothing_is_known() -> None:
     """Without a node that tells of the swing, or where the mechanics got another charge."""
     gauss_seidel = {"coupling.method": "gauss-seidel", "run.duration": 0.1, "run.settle": 0.0}
-    assert simulate(load("paper", gauss_seidel)).summary["v_average_error"] is None
-    limited = {"run.duration": 0.1, "run.settle": 0.0}
-    assert "v_average_error" not in simulate(load("paper-limited", limited)).summary
+    assert simulate(load("reference", gauss_seidel)).summary["v_average_error"] is None
+    limited = {"circuit.model": "limited", "run.duration": 0.1, "run.settle": 0.0}
+    assert "v_average_error" not in simulate(load("reference", limited)).summary

@@ -37,7 +37,7 @@ def missing(scene: Scene, w: dict[str, np.ndarray]) -> np.ndarray:
 @pytest.mark.parametrize("model", ["ideal", "limited", "amplifier"])
 def test_forces_balance_in_every_row(model: str, drive: str) -> None:
     settings = [f"circuit.model={model}", "run.duration=0.2", "run.settle=0.1", *DRIVES[drive]]
-    scene = load("paper", settings)
+    scene = load("reference", settings)
     w = simulate(scene).columns
     jumps = np.flatnonzero(np.abs(np.diff(w["command"])) > 4.0)
     assert len(jumps) >= 3
@@ -72,7 +72,9 @@ def test_friction_belongs_to_the_normal_force_of_its_row(tmp_path: Path) -> None
     grip = tmp_path / "grip.csv"
     grip.write_text("time [s],normal_force [N]\n0,0.5\n0.05,0.5\n0.05,0.9\n0.08,0.3\n")
     settings = [f"friction.normal_force_file={grip}", "run.duration=0.1", "run.settle=0"]
-    w = simulate(load("paper", ["circuit.model=ideal", "drive.frequency=70", *settings])).columns
+    w = simulate(
+        load("reference", ["circuit.model=ideal", "drive.frequency=70", *settings])
+    ).columns
     jump = np.searchsorted(w["time"], 0.05)
     assert w["normal_force"][jump] == 0.5 < w["normal_force"][jump + 1]
     slips = w["sticking"] == 0.0

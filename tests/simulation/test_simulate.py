@@ -50,14 +50,24 @@ LIMITS = {
 WORDS = ["method", "notes", "versions"]
 
 RUNS = {
-    "paper": ("paper", "run.duration=0.4", "run.settle=0.1"),
+    "reference": ("reference", "run.duration=0.4", "run.settle=0.1"),
     # rows out of step with the staircase of 50 µs
-    "paper-full": ("paper-full", "run.duration=0.15", "run.settle=0.06", "run.output_step=3e-5"),
-    "paper-limited": ("paper-limited", "run.duration=0.4", "run.settle=0.1"),
-    "gripper": ("gripper", "run.duration=0.3", "run.settle=0.1"),
-    "ideal-current": ("ideal-current", "run.duration=0.4", "run.settle=0.1"),
+    "full": (
+        "reference",
+        "circuit.model=full",
+        "run.duration=0.15",
+        "run.settle=0.06",
+        "run.output_step=3e-5",
+    ),
+    "limited": ("reference", "circuit.model=limited", "run.duration=0.4", "run.settle=0.1"),
+    "gripper": (
+        *("reference", "coil.count=2", "mechanics.n_surfaces=2", "mechanics.part_mass=0.05"),
+        *("drive.amplitude=10", "drive.offset=-2.5", "friction.normal_force=1.4"),
+        *("run.duration=0.3", "run.settle=0.1"),
+    ),
+    "ideal": ("reference", "circuit.model=ideal", "run.duration=0.4", "run.settle=0.1"),
     "held": ("held", "run.duration=0.3", "run.settle=0.1"),
-    "rigid": ("paper", "run.duration=0.3", "run.settle=0.1", "mechanics.contact=rigid"),
+    "rigid": ("reference", "run.duration=0.3", "run.settle=0.1", "mechanics.contact=rigid"),
 }
 
 
@@ -271,7 +281,7 @@ def test_acceleration_as_a_camera_reads_it(run: Run) -> None:
 def test_a_shutter_shows_the_mean_of_its_exposure(tmp_path: Path) -> None:
     """Against the mean of rows far denser than what the camera takes of a run with impacts."""
     dense, shutter = 200, 0.75
-    scene = ("ideal-current", "run.duration=0.2", "run.settle=0.05")
+    scene = ("reference", "circuit.model=ideal", "run.duration=0.2", "run.settle=0.05")
     rows = f"run.output_step={1 / (960 * dense)!r}"
     sharp = cosim_run(tmp_path / "sharp", *scene, rows)
     blurred = cosim_run(tmp_path / "blurred", *scene, f"run.shutter={shutter}")
@@ -330,9 +340,9 @@ def test_undriven_part_hangs_still(runs: dict[str, Run]) -> None:
 # --- whole runs against each other -----------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["paper", "paper-limited"])
-def test_both_fmi_versions_agree(name: str) -> None:
-    scene = load(name, ["run.duration=0.12"])
+@pytest.mark.parametrize("model", ["amplifier", "limited"])
+def test_both_fmi_versions_agree(model: str) -> None:
+    scene = load("reference", ["run.duration=0.12", f"circuit.model={model}"])
     second, third = (simulate(scene, fmi_version=version) for version in (2, 3))
     for name, values in third.columns.items():
         np.testing.assert_allclose(second.columns[name], values, rtol=1e-12, atol=1e-12)
@@ -342,12 +352,12 @@ def test_both_fmi_versions_agree(name: str) -> None:
 def test_two_coils_on_two_surfaces_are_one_twice() -> None:
     """At half the sense resistor and twice the part, each actuator sees what a single one does."""
     short = ["run.duration=0.15", "run.settle=0.05", "circuit.reltol=1e-5", "circuit.max_step=2e-5"]
-    one = simulate(load("paper", short))
+    one = simulate(load("reference", short))
     twice = [
         "coil.count=2", "mechanics.n_surfaces=2", "mechanics.part_mass=0.018",
         "circuit.sense_resistance=2",
     ]  # fmt: skip
-    two = simulate(load("paper", short + twice))
+    two = simulate(load("reference", short + twice))
     # The circuits' steps differ, and what ngspice has lies between them: 2e-3 from finer runs.
     within = {"current": 3e-3, "coil_voltage": 3e-3}
     for name in ("current", "coil_voltage", "z_surface", "z_ram", "z_part", "friction_force"):
@@ -381,7 +391,7 @@ def test_two_coils_on_two_surfaces_are_one_twice() -> None:
 def test_energy_balances_with_other_coils_and_commands(
     model: str, changes: tuple[str, ...]
 ) -> None:
-    scene = load("paper", ["run.duration=0.12", f"circuit.model={model}", *changes])
+    scene = load("reference", ["run.duration=0.12", f"circuit.model={model}", *changes])
     # Of each small step of the staircase ngspice sees the first microsecond roughly.
     rough = 3e-4 if scene.drive.quantised else 1e-4
     allowed = {"ideal": 1e-6, "limited": 1e-9, "amplifier": rough}[model]
@@ -389,7 +399,7 @@ def test_energy_balances_with_other_coils_and_commands(
 
 
 def test_sine_command() -> None:
-    scene = load("paper", ["run.duration=0.12", "drive.waveform=sine", "drive.amplitude=6"])
+    scene = load("reference", ["run.duration=0.12", "drive.waveform=sine", "drive.amplitude=6"])
     waves = simulate(scene).columns
     time = waves["time"][1:]
     expected = -1.2 + 3.0 * np.sin(2 * np.pi * 20 * time)
@@ -400,7 +410,7 @@ def test_sine_command() -> None:
 
 def test_square_command() -> None:
     changes = ["run.duration=0.12", "drive.waveform=square", "drive.amplitude=4"]
-    waves = simulate(load("paper", changes)).columns
+    waves = simulate(load("reference", changes)).columns
     phase = waves["time"] * 20 % 1
     near = np.minimum(phase, np.minimum(np.abs(phase - 0.5), 1 - phase)) < 0.02
     expected = np.where(phase < 0.5, 0.8, -3.2)
@@ -411,10 +421,10 @@ def test_square_command() -> None:
 
 def test_finer_circuit_gives_the_same_average() -> None:
     short = ["run.duration=0.8", "run.settle=0.4"]
-    usual = simulate(load("paper", short))
+    usual = simulate(load("reference", short))
     circuit = usual.scene.circuit
     fine = [f"circuit.max_step={circuit.max_step / 2}", f"circuit.reltol={circuit.reltol / 10}"]
-    finer = simulate(load("paper", short + fine))
+    finer = simulate(load("reference", short + fine))
     assert finer.summary["circuit_steps"] > 1.5 * usual.summary["circuit_steps"]  # type: ignore
     expected = pytest.approx(finer.summary["v_average"], rel=1e-3)
     assert usual.summary["v_average"] == expected
@@ -425,14 +435,16 @@ def test_macro_steps_end_with_the_run(method: str) -> None:
     """Also where that is in the midst of a macro step."""
     overrides = ["drive.frequency=33", "run.duration=0.3", "run.output_step=1e-3"]
     overrides += [f"coupling.method={method}", "coupling.macro_step=2e-4"]
-    result = simulate(load("paper", [*overrides, "circuit.reltol=1e-3", "circuit.max_step=1e-4"]))
+    result = simulate(
+        load("reference", [*overrides, "circuit.reltol=1e-3", "circuit.max_step=1e-4"])
+    )
     assert result.columns["time"][-1] == pytest.approx(0.3)
     assert len(result.columns["time"]) == 301
 
 
 def test_progress_goes_from_start_to_end() -> None:
     told: list[float] = []
-    simulate(load("paper", ["run.duration=0.02"]), progress=told.append)
+    simulate(load("reference", ["run.duration=0.02"]), progress=told.append)
     assert told[0] == 0.0
     assert told[-1] == pytest.approx(0.02, rel=1e-9)
     assert told == sorted(told)

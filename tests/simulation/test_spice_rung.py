@@ -108,10 +108,10 @@ def solve(scene: Scene, times: Array) -> Solution:
         ["circuit.swing_loss_high=9", "circuit.swing_loss_low=2", "coil.inductance=3e-3"],
         ["circuit.open_loop_gain=40"],
     ],
-    ids=["paper", "two-coils", "slewing", "lopsided", "little-gain"],
+    ids=["reference", "two-coils", "slewing", "lopsided", "little-gain"],
 )
 def test_current_and_output(changes: list[str]) -> None:
-    scene = load("paper", LOCKED + FINE + FLYBACKS + changes)
+    scene = load("reference", LOCKED + FINE + FLYBACKS + changes)
     result = simulate(scene)
     waves = result.columns
     expected = solve(scene, waves["time"])
@@ -131,7 +131,7 @@ def test_current_and_output(changes: list[str]) -> None:
 
 def test_the_paper_rig_saturates_and_rings() -> None:
     """What the comparison above is about: a clamped flyback, then the loop's own oscillation."""
-    scene = load("paper", LOCKED + FINE + FLYBACKS)
+    scene = load("reference", LOCKED + FINE + FLYBACKS)
     waves = simulate(scene).columns
     time, current = waves["time"], waves["current"]
     output = waves["coil_voltage"] + scene.circuit.sense_resistance * current
@@ -156,7 +156,7 @@ def test_coil_voltage_is_that_of_the_coil(model: str, bl: str) -> None:
     changes = ["run.duration=0.045", "run.output_step=1e-6"]
     if model == "amplifier":
         changes.append("circuit.max_step=1e-6")
-    scene = load("paper", [f"circuit.model={model}", bl, *changes])
+    scene = load("reference", [f"circuit.model={model}", bl, *changes])
     waves = simulate(scene).columns
     rows = waves["time"] >= 1e-3
     time, voltage, current, emf = (

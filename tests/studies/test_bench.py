@@ -31,9 +31,10 @@ def test_peers_solve_the_same_problem() -> None:
     assert seconds > 0.0
 
 
-@pytest.mark.parametrize("name", ["paper", "paper-full"])
-def test_parts_take_the_steps_of_the_whole(name: str) -> None:
-    found = coupled_over_parts(load(name, ["run.duration=0.02", "run.settle=0.01"]), 1)
+@pytest.mark.parametrize("model", ["amplifier", "full"])
+def test_parts_take_the_steps_of_the_whole(model: str) -> None:
+    short = ["run.duration=0.02", "run.settle=0.01"]
+    found = coupled_over_parts(load("reference", [*short, f"circuit.model={model}"]), 1)
     assert found["steps"] == found["steps_replayed"] > 300
     assert found["low"] <= found["median"] <= found["high"]
 

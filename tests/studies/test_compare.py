@@ -27,7 +27,9 @@ def write(path: Path, header: str, *columns: Array) -> Path:
 @pytest.fixture(scope="module")
 def run() -> cosim.Result:
     """A run that repeats, with impacts, at 20 Hz."""
-    return cosim.run("ideal-current", {"run.duration": 0.8, "run.settle": 0.3})
+    return cosim.run(
+        "reference", {"circuit.model": "ideal", "run.duration": 0.8, "run.settle": 0.3}
+    )
 
 
 def compare(run: cosim.Result, recording: Path) -> dict[str, float]:
@@ -112,13 +114,18 @@ def test_drift_is_that_of_whole_periods(periods: float, uneven: bool) -> None:
     assert drift(time, z, None) == drift(time, z, 10.0) == pytest.approx(ends)
 
 
-@pytest.mark.parametrize(("number", "frequency"), [(1, 9.82), (3, 9.72)])
-def test_drift_of_trials_with_few_periods(number: int, frequency: float, trials: Path) -> None:
+@pytest.mark.parametrize(
+    ("number", "frequency", "offset", "force"), [(1, 9.82, 1.0, 0.979), (3, 9.72, 2.6, 0.466)]
+)
+def test_drift_of_trials_with_few_periods(
+    number: int, frequency: float, offset: float, force: float, trials: Path
+) -> None:
     """Trials of 3.2 and 2.6 periods: the run drifts by its own mean velocity, and the frequencies
     are those that were found in the trials before.
     """
     whole = {"run.settle": 1.0, "run.duration": 1.0 + 9 / frequency}
-    found = cosim.run(f"regime-{number:02d}", whole)
+    drive = {"drive.frequency": frequency, "drive.amplitude": 7.4, "drive.offset": offset}
+    found = cosim.run("reference", whole | drive | {"friction.normal_force": force})
     compared = cosim.compare(found, trials / f"Trial #{number}.csv")
     numbers = compared.numbers
     assert numbers["drift_simulated"] == pytest.approx(found.summary["v_average"], abs=5e-5)
@@ -189,7 +196,9 @@ def test_straight_lines_score_on_the_trials_as_published(
     run: cosim.Result, trials: Path, tmp_path: Path
 ) -> None:
     """0.144 mm over the ten trials; and a trial forecasts itself better than that."""
-    longer = cosim.run("ideal-current", {"run.duration": 0.6, "run.settle": 0.05})
+    longer = cosim.run(
+        "reference", {"circuit.model": "ideal", "run.duration": 0.6, "run.settle": 0.05}
+    )
     found = [compare(longer, path) for path in sorted(trials.glob("Trial*.csv"))]
     assert len(found) == 10
     lines = [numbers["mean_error_mm_straight_line"] for numbers in found]
@@ -282,9 +291,9 @@ def test_signals_that_the_run_has_not(run: cosim.Result, tmp_path: Path) -> None
 
 def test_a_shutter_is_that_of_the_trial(tmp_path: Path) -> None:
     """A trial of a run whose frames were exposed is met by the run with that shutter alone."""
-    settings = {"run.duration": 0.6, "run.settle": 0.2}
+    settings = {"circuit.model": "ideal", "run.duration": 0.6, "run.settle": 0.2}
     blurred, sharp = (
-        cosim.run("ideal-current", settings | {"run.shutter": share}) for share in (1.0, 0.0)
+        cosim.run("reference", settings | {"run.shutter": share}) for share in (1.0, 0.0)
     )
     times = frame_times(0.25, 300)
     frames = film(sharp.columns, times, 1 / FRAME_RATE)

@@ -74,10 +74,10 @@ def test_every_method_is_a_line_or_the_page_says_why(drawn: list[Figure], tmp_pa
 
 
 def test_a_false_limit_cycle_is_marked_and_not_joined(drawn: list[Figure], tmp_path: Path) -> None:
-    runs = [run for run in read(Run, "accuracy.csv") if run.scene == "paper"]
+    runs = [run for run in read(Run, "accuracy.csv") if run.scene == "reference"]
     accuracy.write(tmp_path, runs)
     method = next(solver for solver in SOLVERS if solver.takes_macro_steps)
-    given = ("paper", method.name, method.setting, 1e-6)
+    given = ("reference", method.name, method.setting, 1e-6)
     accuracy.write(tmp_path, [*runs, Run(*given, float("nan"), 0.123, 0, FALSE_CYCLE)])
     before, after = (figure.axes[0].lines for figure in drawn)
     marks = [line for line in after if list(line.get_xdata()) == [0.123]]  # pyright: ignore

@@ -15,9 +15,9 @@ def test_creep_of_a_held_part() -> None:
     """Held without vibration tanh slips at v0 atanh(m g / (mu F_n)), which vibration changes
     little; all laws come to the exact stop as their width goes to zero."""
     rows = {(row["law"], row["width"]): row for row in creep()}
-    paper = load("paper")
-    share = paper.mechanics.part_mass * paper.mechanics.gravity
-    share /= paper.friction.mu_s * paper.friction.normal_force
+    rig = load("reference")
+    share = rig.mechanics.part_mass * rig.mechanics.gravity
+    share /= rig.friction.mu_s * rig.friction.normal_force
     still = 1e6 * 1e-5 * atanh(share)
     assert rows["tanh", "10 µm/s"][CREEP] == pytest.approx(still, rel=0.1)
     assert rows["Karnopp", "10 µm/s"][CREEP] == pytest.approx(10.0, rel=1e-3)

@@ -24,13 +24,20 @@ def summary(scene: Scene) -> Any:
 
 
 def on(model: str, *changes: str) -> Any:
-    return summary(load("paper", [f"circuit.model={model}", "run.output_step=0.05", *changes]))
+    return summary(load("reference", [f"circuit.model={model}", "run.output_step=0.05", *changes]))
 
 
 def test_back_emf_is_turned_alone() -> None:
     """Within the limits: the same motion, and a voltage less by what is gone of the back-EMF."""
     base = load(
-        "paper-limited", [*QUICK, "drive.waveform=sine", "circuit.supply=100", "coil.count=2"]
+        "reference",
+        [
+            *QUICK,
+            "circuit.model=limited",
+            "drive.waveform=sine",
+            "circuit.supply=100",
+            "coil.count=2",
+        ],
     )
     less = changed(base, BY_NAME["back-EMF"].turned(base, 0.25), "test")
     own, other = simulate(base).columns, simulate(less).columns
@@ -41,20 +48,22 @@ def test_back_emf_is_turned_alone() -> None:
 
 
 def test_sense_resistance_leaves_the_current() -> None:
-    base = load("ideal-current", QUICK)
+    base = load("reference", ["circuit.model=ideal", *QUICK])
     less = changed(base, BY_NAME["sense resistance"].turned(base, 0.03), "test")
     assert summary(less)["v_average"] == pytest.approx(summary(base)["v_average"], rel=1e-9)
 
 
 def test_needed_acceleration() -> None:
     """0.72 x 0.5 N / 9 g + g; two surfaces of a gripper hold twice."""
-    assert needed_acceleration(load("paper")) == pytest.approx(49.81)
-    assert needed_acceleration(load("paper", ["mechanics.n_surfaces=2"])) == pytest.approx(89.81)
+    assert needed_acceleration(load("reference")) == pytest.approx(49.81)
+    assert needed_acceleration(load("reference", ["mechanics.n_surfaces=2"])) == pytest.approx(
+        89.81
+    )
 
 
 def test_study_agrees_with_single_runs() -> None:
     whole = ["drive.frequency=50", "drive.amplitude=9", *QUICK, "circuit.max_step=5e-5"]
-    found = study(load("paper", whole), turn=False)
+    found = study(load("reference", whole), turn=False)
     near = 1e-4  # rows are communication points too, and there are other ones
     assert found.own.v_average == pytest.approx(on("amplifier", *whole)["v_average"], rel=near)
     assert found.ideal.v_average == pytest.approx(on("ideal", *whole)["v_average"], rel=1e-6)
@@ -75,7 +84,7 @@ def test_study_agrees_with_single_runs() -> None:
 
 
 def test_knobs_are_resolved() -> None:
-    scene = load("paper", ["drive.pot_max=0.8", "drive.pot_offset=0.3"])
+    scene = load("reference", ["drive.pot_max=0.8", "drive.pot_offset=0.3"])
     base = prepared(scene)
     assert base.drive.pot_max is None and base.drive.amplitude == scene.drive.amplitude
     assert base.drive.offset == scene.drive.offset
@@ -104,7 +113,7 @@ def test_how_much_an_ideal_current_promises(changes: list[str], low: float, high
 
 
 def test_ladder() -> None:
-    scene = load("paper", [*QUICK, "run.tolerance=0.2"])
+    scene = load("reference", [*QUICK, "run.tolerance=0.2"])
     rungs = ladder(scene)
     assert [rung.model for rung in rungs] == list(RUNGS)
     for rung in rungs[:3]:
@@ -119,11 +128,11 @@ def test_ladder() -> None:
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     short = [f"--set={change}" for change in ("run.duration=0.1", "run.settle=0.05")]
-    assert main(["chart", "ladder", "paper", *short, "--out", str(tmp_path)]) == 0
+    assert main(["chart", "ladder", "reference", *short, "--out", str(tmp_path)]) == 0
     assert "within 0.01 of the top the cheapest rung is" in capsys.readouterr().out
     with open(tmp_path / "ladder.csv", encoding="utf-8", newline="") as file:
         assert [row["circuit.model"] for row in csv.DictReader(file)] == list(RUNGS)
-    assert main(["chart", "limits", "paper", *short, "--out", str(tmp_path)]) == 0
+    assert main(["chart", "limits", "reference", *short, "--out", str(tmp_path)]) == 0
     assert "The part slips where the surface falls away" in capsys.readouterr().out
     with open(tmp_path / "limits.csv", encoding="utf-8", newline="") as file:
         assert {row["limit"] for row in csv.DictReader(file)} == set(BY_NAME)

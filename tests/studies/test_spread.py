@@ -30,18 +30,18 @@ def named(settings: dict[str, float]) -> str:
 def test_the_ends_are_those_of_runs_of_their_own(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
-    """At 20.6 Hz the paper's rig changes its motion within a hundredth of the frequency."""
+    """At 20.6 Hz the rig changes its motion within a hundredth of the frequency."""
     keys = SHORT | {"drive.frequency": 20.6}
     sets = [f"--set={key}={value}" for key, value in keys.items()]
-    assert main(["run", "paper", *sets, "--spread", "--out", str(tmp_path)]) == 0
+    assert main(["run", "reference", *sets, "--spread", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     told = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["spread"]
 
     own = {"drive.amplitude": 8.0, "drive.frequency": 20.6, "drive.offset": -1.2}
-    expected = {"": alone("paper", own)}
+    expected = {"": alone("reference", own)}
     for key, value in own.items():
         for place in (0.99 * value, 1.01 * value):
-            expected[f"{key} = {place:.6g}"] = alone("paper", own | {key: place})
+            expected[f"{key} = {place:.6g}"] = alone("reference", own | {key: place})
     found = {named(run["settings"]): run for run in told["runs"]}
     assert found.keys() == expected.keys()
     for place, run in found.items():
@@ -59,11 +59,11 @@ def test_the_ends_are_those_of_runs_of_their_own(
 def test_where_the_cheap_circuit_is_wrong_all_is_run_on_the_scenes_own():
     """The rung "limited" has no slew rate, which here takes a millisecond from each reset."""
     keys = {"circuit.slew_rate": 1e4, "run.duration": 0.2, "run.settle": 0.1}
-    found = cosim.spread("paper", keys)
+    found = cosim.spread("reference", keys)
     assert {run.circuit_model for run in found.runs} == {"amplifier"}
-    own = cosim.run("paper", keys).summary["v_average"]
+    own = cosim.run("reference", keys).summary["v_average"]
     assert found.runs[0].v_average == pytest.approx(own, rel=1e-4)
-    simple = cosim.run("paper", {**SHORT, "circuit.model": "limited"}).summary["v_average"]
+    simple = cosim.run("reference", {**SHORT, "circuit.model": "limited"}).summary["v_average"]
     assert simple != pytest.approx(own, rel=0.05)
 
 
@@ -88,14 +88,14 @@ def test_where_the_cheap_circuit_is_wrong_all_is_run_on_the_scenes_own():
     ],
 )  # fmt: skip
 def test_turns(keys: dict[str, float], expected: list[tuple[str, float]]):
-    found = turns(load("paper", keys))
+    found = turns(load("reference", keys))
     assert found == [{f"drive.{name}": value} for name, value in expected]
 
 
 def test_a_setting_that_cannot_be_is_told_and_costs_only_itself():
     reach = firmware.GAIN * firmware.V_REFERENCE
     keys = {"drive.quantised": True, "drive.amplitude": 10.5, "drive.offset": 0.0}
-    found = cosim.spread("ideal-current", keys | {"run.duration": 0.1})
+    found = cosim.spread("reference", keys | {"circuit.model": "ideal", "run.duration": 0.1})
     (failed,) = (run for run in found.runs if run.failure)
     assert failed.settings == {"drive.amplitude": 10.605} and failed.v_average is None
     assert f"10.605 V must be a number from 0 to {reach:.4g} V" in failed.failure

@@ -3,7 +3,7 @@
 import pytest
 
 from cosim.studies.stability.limits import LONGEST, observed, predicted
-from cosim.studies.stability.machines import DIRECT, PAPER, Regime
+from cosim.studies.stability.machines import DIRECT, REFERENCE, Regime
 
 pytestmark = pytest.mark.physics
 
@@ -13,8 +13,8 @@ pytestmark = pytest.mark.physics
     [
         ("Jacobi k = 0", Regime(DIRECT, "saturated")),
         ("Gauss-Seidel k = 1", Regime(DIRECT, "saturated")),
-        ("EMF's slope, linear current", Regime(PAPER, "saturated", slips=True)),
-        ("EMF's slope, linear current", Regime(PAPER, "saturated", cut="coil in mechanics")),
+        ("EMF's slope, linear current", Regime(REFERENCE, "saturated", slips=True)),
+        ("EMF's slope, linear current", Regime(REFERENCE, "saturated", cut="coil in mechanics")),
     ],
 )
 def test_prediction_and_observation_agree(method: str, regime: Regime) -> None:

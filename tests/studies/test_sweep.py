@@ -39,7 +39,7 @@ def test_closed_form(tmp_path: Path) -> None:
 
 def test_agrees_with_single_runs(tmp_path: Path) -> None:
     over = {"drive.amplitude": [6.0, 8.0], "drive.offset": [-1.5, -1.0, -0.5]}
-    scene = load("ideal-current", SHORT)
+    scene = load("reference", ["circuit.model=ideal", *SHORT])
     data = sweep(scene, over, out=tmp_path, workers=2)
     assert data.sizes == {"amplitude": 2, "offset": 3}
     for amplitude in (6.0, 8.0):
@@ -47,7 +47,10 @@ def test_agrees_with_single_runs(tmp_path: Path) -> None:
             values = {"drive.amplitude": amplitude, "drive.offset": offset}
             point = data.sel(amplitude=amplitude, offset=offset)
             alone = simulate(
-                load("ideal-current", [*SHORT, *(f"{k}={v}" for k, v in values.items())])
+                load(
+                    "reference",
+                    ["circuit.model=ideal", *SHORT, *(f"{k}={v}" for k, v in values.items())],
+                )
             ).summary
             for name in ("v_average", "stick_fraction", "a_camera_max", "energy_in"):
                 assert float(point[name]) == pytest.approx(alone[name], rel=1e-6, abs=1e-12)
@@ -57,7 +60,7 @@ def test_agrees_with_single_runs(tmp_path: Path) -> None:
 def test_read_by_others(tmp_path: Path) -> None:
     """The netCDF library, which this project does not write with, reads the same."""
     over = {"drive.frequency": [10.0, 20.0], "drive.amplitude": [3.0, 99.0]}
-    scene = load("ideal-current", [*SHORT, "drive.quantised=true"])
+    scene = load("reference", ["circuit.model=ideal", *SHORT, "drive.quantised=true"])
     data = sweep(scene, over, out=tmp_path, workers=1)
     with netCDF4.Dataset(tmp_path / "sweep.nc") as file:
         assert file["v_average"].dimensions == ("frequency", "amplitude")
@@ -70,14 +73,19 @@ def test_read_by_others(tmp_path: Path) -> None:
 
 
 def test_frequencies_last_whole_periods() -> None:
-    base = load("ideal-current", ["run.duration=0.5", "run.settle=0.25"])
+    base = load("reference", ["circuit.model=ideal", "run.duration=0.5", "run.settle=0.25"])
     broken = evaluate(base, {"drive.frequency": 14.0}, False).numbers["v_average"]
     whole = evaluate(base, {"drive.frequency": 14.0}, True).numbers["v_average"]
     # Seven whole periods of 1/14 s, written out by hand.
     known: Any = simulate(
         load(
-            "ideal-current",
-            [f"run.duration={8 / 14}", f"run.settle={4 / 14}", "drive.frequency=14"],
+            "reference",
+            [
+                "circuit.model=ideal",
+                f"run.duration={8 / 14}",
+                f"run.settle={4 / 14}",
+                "drive.frequency=14",
+            ],
         )
     ).summary["v_average"]
     assert whole == pytest.approx(known, rel=1e-9)
@@ -100,7 +108,7 @@ def test_failures_cost_only_themselves(tmp_path: Path) -> None:
         (["circuit.model=ideal", *SHORT], {"friction.mu_k": [0.5, 0.9]}, 1),
     ):
         data = sweep(
-            load("paper", source),
+            load("reference", source),
             over,
             out=tmp_path / str(lost) / str(len(over)) / next(iter(over)),
             workers=1,
@@ -108,14 +116,14 @@ def test_failures_cost_only_themselves(tmp_path: Path) -> None:
         assert data["failure"].values.tolist()[0] == ""
         assert data["failure"].values.tolist()[lost] != ""
         assert np.isfinite(data["v_average"].values[0]) and np.isnan(data["v_average"].values[lost])
-    scene = load("paper", ["circuit.model=file", f"circuit.netlist={netlist}", *SHORT])
+    scene = load("reference", ["circuit.model=file", f"circuit.netlist={netlist}", *SHORT])
     data = sweep(scene, {"drive.offset": [-1.2]}, out=tmp_path / "circuit", workers=1)
     assert str(data["failure"].values[0]) != ""
 
 
 def test_worker_that_keeps_dying() -> None:
     """A point whose worker dies again and again is a failure; the others do not notice."""
-    scene = load("ideal-current", SHORT)
+    scene = load("reference", ["circuit.model=ideal", *SHORT])
     points = [
         (0, {"run.duration": 2000.0}),
         *((k, {"drive.offset": -0.1 * k}) for k in range(1, 6)),
@@ -144,7 +152,7 @@ def test_dask(tmp_path: Path) -> None:
     from distributed import LocalCluster
 
     over = {"drive.offset": [-2.0, 0.0], "drive.frequency": [15.0, 40.0]}
-    scene = load("ideal-current", SHORT)
+    scene = load("reference", ["circuit.model=ideal", *SHORT])
     here = sweep(scene, over, samples=12, seed=3, out=tmp_path / "here", workers=2)
     running: Any = LocalCluster(
         n_workers=2, threads_per_worker=2, dashboard_address="", host="127.0.0.1"
@@ -237,6 +245,6 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_no_point_could_be_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A failed simulation, exit code 3; the failures with their reasons are kept."""
     over = ["--over", "drive.phase_deg=0:90:2", "--set", "run.duration=0.1"]
-    assert main(["sweep", "paper", *over, "--workers", "1", "--out", str(tmp_path)]) == 3
+    assert main(["sweep", "reference", *over, "--workers", "1", "--out", str(tmp_path)]) == 3
     assert "No point could be run; the first one: --over: " in capsys.readouterr().err
     assert (tmp_path / "sweep.nc").exists()

@@ -15,13 +15,13 @@ from cosim.studies.accuracy.runs import FALSE_CYCLE, Run, measure, reference
 from cosim.studies.accuracy.solvers import Outcome, Solver
 from cosim.studies.tables import write_csv, write_page
 
-PAPER = CASES["paper"]
+REFERENCE = CASES["reference"]
 STEPS = [1e-3 / 2**k for k in range(6)]
 
 
 def solver(errors: dict[float, float | str]) -> Solver:
     """One whose error at each setting is given, as a share of the range; or its failure."""
-    true = reference("paper").signals
+    true = reference("reference").signals
 
     def run(scene: Scene, case: Case, setting: float) -> Outcome:
         error = errors[setting]
@@ -33,7 +33,7 @@ def solver(errors: dict[float, float | str]) -> Solver:
 
 
 def test_error_and_order_of_known_runs() -> None:
-    runs = measure(PAPER, [solver({h: 30.0 * h**1.5 for h in STEPS})], rounds=2)
+    runs = measure(REFERENCE, [solver({h: 30.0 * h**1.5 for h in STEPS})], rounds=2)
     assert [run.error for run in runs] == pytest.approx([30.0 * h**1.5 for h in STEPS], rel=1e-6)
     assert order(runs) == pytest.approx(1.5, abs=1e-6)
     assert not any(run.failure for run in runs)
@@ -42,7 +42,7 @@ def test_error_and_order_of_known_runs() -> None:
 
 def test_failures_are_marked() -> None:
     found = measure(
-        PAPER,
+        REFERENCE,
         [
             solver(
                 {
@@ -72,11 +72,11 @@ def test_failures_are_marked() -> None:
 
 def test_failures_are_left_out_of_what_is_fitted() -> None:
     """Beside runs of order 2 whose time is 1e-3/h: false ones that would be better and worse."""
-    true = [Run("paper", "a", "macro step [s]", h, h**2, 1e-3 / h, 7, "") for h in STEPS]
+    true = [Run("reference", "a", "macro step [s]", h, h**2, 1e-3 / h, 7, "") for h in STEPS]
     false = [
-        Run("paper", "a", "macro step [s]", 1e-6, 1e-12, 1e-6, 7, FALSE_CYCLE),
-        Run("paper", "a", "macro step [s]", 1e-6, 3.0, 1e3, 7, "diverged"),
-        Run("paper", "a", "macro step [s]", 1e-6, nan, 1e3, 7, "failed"),
+        Run("reference", "a", "macro step [s]", 1e-6, 1e-12, 1e-6, 7, FALSE_CYCLE),
+        Run("reference", "a", "macro step [s]", 1e-6, 3.0, 1e3, 7, "diverged"),
+        Run("reference", "a", "macro step [s]", 1e-6, nan, 1e3, 7, "failed"),
     ]
     runs = [*true, *false]
     assert order(runs) == pytest.approx(2.0)

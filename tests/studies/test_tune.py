@@ -30,7 +30,7 @@ def test_theory_s_optimum() -> None:
 
 
 def test_same_for_any_number_of_workers() -> None:
-    scene = load("ideal-current", ["run.duration=0.2", "run.settle=0.1"])
+    scene = load("reference", ["circuit.model=ideal", "run.duration=0.2", "run.settle=0.1"])
     over = {"drive.offset": (-2.0, 0.0), "mechanics.n_surfaces": (1.0, 3.0)}
     first, second = (
         tune(scene, minimise="v_average", over=over, budget=60, seed=4, workers=n) for n in (1, 2)
@@ -114,7 +114,7 @@ def test_scouts_without_ngspice() -> None:
     """They go ahead where the scene needs ngspice, are counted apart, and lead on."""
     quick = ["run.duration=0.3", "run.settle=0.1", "circuit.max_step=5e-5"]
     ahead: list[float | None] = []
-    scene = load("paper", quick)
+    scene = load("reference", quick)
     found = tune(
         scene,
         maximise="v_average",
@@ -130,15 +130,15 @@ def test_scouts_without_ngspice() -> None:
 
 
 GRID_BEST = 37.598e-3
-"""m/s: the fastest of `cosim sweep paper --set circuit.max_step=5e-5` over the three knobs, each at
-ten places from 0 to 1, at (8/9, 4/9, 3/9)."""
+"""m/s: the fastest of `cosim sweep reference --set circuit.max_step=5e-5` over the three knobs,
+each at ten places from 0 to 1, at (8/9, 4/9, 3/9)."""
 
 
 @pytest.mark.slow
 def test_beats_a_grid() -> None:
     """Over the three knobs: better than the best of 1,000 points, with a fifth of the runs."""
     knobs = {"pot_max": 8 / 9, "pot_frequency": 4 / 9, "pot_offset": 3 / 9}
-    scene = load("paper", ["circuit.max_step=5e-5"])
+    scene = load("reference", ["circuit.max_step=5e-5"])
     there = changed(scene, {f"drive.{knob}": place for knob, place in knobs.items()}, "test")
     whole = changed(there, periods_made_whole(there), "test")
     summary: Any = simulate(whole).summary

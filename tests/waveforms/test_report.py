@@ -27,7 +27,7 @@ SLOW = ["drive.quantised=true", "drive.loop_time=2.2e-5"]
     ],
 )
 def test_broken_periods_are_told(overrides: list[str], told: str | None) -> None:
-    scene = load("ideal-current", overrides)
+    scene = load("reference", ["circuit.model=ideal", *overrides])
     text = table(scene, simulate(scene).summary)
     assert ("periods" in text) == (told is not None)
     assert told is None or told in text
@@ -38,7 +38,7 @@ def test_a_cycle_is_one_of_the_real_command(more: list[str]) -> None:
     """As long as from one fall of V1 to the next: 66 ms where 50 ms are commanded."""
     duration = 0.002 if more else 0.198
     overrides = ["circuit.model=ideal", *SLOW, "run.output_step=2.2e-5", "run.settle=0", *more]
-    result = simulate(load("paper", [*overrides, f"run.duration={duration}"]))
+    result = simulate(load("reference", [*overrides, f"run.duration={duration}"]))
     if not more:
         time, command = result.columns["time"], result.columns["command"]
         falls = time[1:][np.diff(command) < -1.0]
@@ -53,7 +53,7 @@ def test_a_cycle_is_one_of_the_real_command(more: list[str]) -> None:
 
 
 def test_a_large_energy_residual_is_told() -> None:
-    scene = load("ideal-current", SHORT)
+    scene = load("reference", ["circuit.model=ideal", *SHORT])
     summary = dict(simulate(scene).summary)
     assert "too much" not in table(scene, summary)
     assert "too much" in table(scene, summary | {"energy_residual": 0.02})
@@ -69,7 +69,7 @@ def test_limits_that_a_netlist_does_not_tell_of_are_not_known(
     netlist = tmp_path / "silent.cir"
     netlist.write_text(told, encoding="utf-8")
     own = ["circuit.model=file", f"circuit.netlist={netlist}", *SHORT, "run.duration=0.06"]
-    scene = load("paper", own)
+    scene = load("reference", own)
     summary = simulate(scene).summary
     limits = {key for key in summary if key in ("saturated_fraction", *LIMITS)}
     assert limits == (set() if climit is None else {"current_limit_fraction"})
@@ -80,7 +80,7 @@ def test_limits_that_a_netlist_does_not_tell_of_are_not_known(
 
 
 def test_rigid_walls_have_no_peak_and_rest_no_sign() -> None:
-    rigid = load("ideal-current", [*SHORT, "mechanics.contact=rigid"])
+    rigid = load("reference", ["circuit.model=ideal", *SHORT, "mechanics.contact=rigid"])
     assert "without bound" in table(rigid, simulate(rigid).summary)
     held = load("held", SHORT)
     lines = table(held, simulate(held).summary).splitlines()

@@ -12,7 +12,7 @@ from cosim.scene import Scene
 
 @dataclass(frozen=True)
 class Case:
-    """A scene: what differs from ``paper``, how long it is studied and how often sampled, s."""
+    """What differs from the scene ``reference``, how long it is studied, how often sampled, s."""
 
     name: str
     title: str
@@ -78,7 +78,7 @@ CASES = {
             ("mechanics.contact=rigid", "friction.normal_force=20"),
             0.2,
         ),
-        Case("paper", "paper: compliant walls, stick and slip", (), 0.2),
+        Case("reference", "reference: compliant walls, stick and slip", (), 0.2),
     )
 }
 

@@ -29,7 +29,7 @@ members."""
 MEMBERS, DURATION, SETTLE = 12, 1.0, 0.5
 STATISTICS = ("v_average", "stick_fraction", "impacts", "stick_slip_events")
 SCENE = ("drive.pot_max=0.508", "drive.pot_frequency=0.5452", "drive.pot_offset=0.5565")
-"""What differs from ``paper``: three knobs of its signal generator."""
+"""What differs from the scene ``reference``: three knobs of its signal generator."""
 METHODS = {
     "step-locked, fine steps": ("circuit.reltol=1e-6", "circuit.max_step=2e-5"),
     "step-locked (default)": (),
@@ -55,10 +55,10 @@ def apart(one: Sequence[float], other: Sequence[float]) -> float:
 
 
 def solved(scene: Sequence[str], more: Sequence[str], change: float = 0.0) -> Result:
-    """A run of ``paper`` with overrides, its normal force greater by the share ``change``."""
-    force = load("paper", list(scene)).friction.normal_force * (1.0 + change)
+    """A run of ``reference`` with overrides, its normal force greater by the share ``change``."""
+    force = load("reference", list(scene)).friction.normal_force * (1.0 + change)
     short = [f"run.duration={DURATION!r}", f"run.settle={SETTLE!r}", "run.output_step=1e-3"]
-    return simulate(load("paper", [*scene, *short, f"friction.normal_force={force!r}", *more]))
+    return simulate(load("reference", [*scene, *short, f"friction.normal_force={force!r}", *more]))
 
 
 def growth(scene: Sequence[str], more: Sequence[str] = ()) -> float:
@@ -85,7 +85,8 @@ def run(out: Path) -> str:
     )
     notes = [
         f"{message}.",
-        f"The scene paper with {', '.join(SCENE)}. A change of the normal force by {NUDGE:g} of "
+        f"The scene reference with {', '.join(SCENE)}. "
+        f"A change of the normal force by {NUDGE:g} of "
         f"itself moves the path by {grown:.1e} times as much: chaotic (from {CHAOTIC:g}), so "
         f"statistics are compared and not paths. Means over {MEMBERS} runs of {DURATION:g} s whose "
         f"normal forces are apart by {APART:g}, ± their standard errors; in parentheses the "

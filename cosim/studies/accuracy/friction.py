@@ -1,9 +1,9 @@
 """Laws of friction side by side, on a part that a vibrating surface holds: creep and cost.
 
-A part of the scene ``paper`` begins to slip down at 20 mm/s, comes to rest on the surface, which
-moves up and down at 40 Hz with 15 m/s², and is then held at six tenths of what static friction can
-carry. Each law is solved as its users do, by SciPy's LSODA. Creep is what a held part still slips:
-by set-valued Coulomb friction, nothing.
+A part of the scene ``reference`` begins to slip down at 20 mm/s, comes to rest on the surface,
+which moves up and down at 40 Hz with 15 m/s², and is then held at six tenths of what static
+friction can carry. Each law is solved as its users do, by SciPy's LSODA. Creep is what a held part
+still slips: by set-valued Coulomb friction, nothing.
 
 ``tanh``    F = µ(u) F_n tanh(u/v0), with µ falling from µ_s to µ_k over 30 v0
 ``Karnopp`` within a band of velocity friction balances the load (Karnopp, "Computer simulation of
@@ -58,8 +58,8 @@ def run(out: Path) -> str:
     )
     notes = [
         f"{message}.",
-        "A held part: a part of the scene paper slips down at 20 mm/s at first, comes to rest on a "
-        "surface that vibrates at 40 Hz with 15 m/s², and is then held at six tenths of what "
+        "A held part: a part of the scene reference slips down at 20 mm/s at first, comes to rest "
+        "on a surface that vibrates at 40 Hz with 15 m/s², and is then held at six tenths of what "
         "static friction can carry. Creep is what it still slips. Smoothed laws are solved by "
         f"LSODA with a tolerance of {_RTOL:g}, set-valued friction in closed form.",
         "In the machine: the whole scene stick-slip as one ODE, solved by LSODA with a tolerance "
@@ -122,7 +122,7 @@ class _Smoothed(Machine):
 def in_the_machine() -> Iterator[Row]:
     """Of each law: error of the part's path on the scene ``stick-slip`` over its range, CPU s."""
     case = CASES["stick-slip"]
-    scene = load("paper", [*case.overrides, f"run.duration={case.duration!r}"])
+    scene = load("reference", [*case.overrides, f"run.duration={case.duration!r}"])
 
     def measured(make: Callable[[Scene, Command], Machine]) -> Row:
         seconds, path = run_machine(scene, case.times(), _RTOL_IN_THE_MACHINE, make)
@@ -142,8 +142,8 @@ def _width(name: str, width: float) -> str:
 
 def creep() -> Iterator[Row]:
     """Of each law: creep (µm/s), error in where the part comes to rest (µm), evaluations."""
-    paper = load("paper")
-    truth = _stops(paper)
+    rig = load("reference")
+    truth = _stops(rig)
 
     def row(name: str, width: str, creep: float, error: float, evaluations: int) -> Row:
         found = {CREEP: creep, "error of the stop [um]": error, "evaluations": evaluations}
@@ -152,7 +152,7 @@ def creep() -> Iterator[Row]:
     yield row(COULOMB, "", 0.0, 0.0, 0)
     for name, widths in LAWS.items():
         for width in widths:
-            settled, end, evaluations = _solved(law_of(name, width, paper), paper)
+            settled, end, evaluations = _solved(law_of(name, width, rig), rig)
             creep = 1e6 * (end - settled) / (DURATION - SETTLED)
             yield row(name, _width(name, width), creep, 1e6 * (settled - truth), evaluations)
 

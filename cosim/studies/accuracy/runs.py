@@ -70,7 +70,7 @@ def reference(name: str) -> Reference:
 
 def measure(case: Case, solvers: Sequence[Solver], rounds: int) -> list[Run]:
     """All settings of all solvers on a scene, interleaved; times are medians over the rounds."""
-    scene = load("paper", case.overrides)
+    scene = load("reference", case.overrides)
     plan = [(solver, value) for solver in solvers for value in solver.values(case)]
     seconds: list[list[float]] = [[] for _ in plan]
     outcomes: list[Outcome | str] = []

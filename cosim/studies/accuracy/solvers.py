@@ -166,7 +166,7 @@ def _solve_ivp(scene: Scene, case: Case, rtol: float) -> Outcome:
 
 def _over(case: Case, *overrides: str) -> Scene:
     """The case's scene as long as it is studied."""
-    return load("paper", [*case.overrides, f"run.duration={case.duration!r}", *overrides])
+    return load("reference", [*case.overrides, f"run.duration={case.duration!r}", *overrides])
 
 
 def _halvings(first: float, count: int) -> list[float]:
@@ -197,7 +197,7 @@ def _peer(
     name: str, setting: str, run: Callable[[Scene, Case, float], Outcome], values: list[float]
 ) -> Solver:
     limits = "knows compliant walls and the sawtooth only"
-    known = ("stick-slip", "paper")
+    known = ("stick-slip", "reference")
     return Solver(
         name, setting, run, lambda case: values if case.name in known else [], limits=limits
     )

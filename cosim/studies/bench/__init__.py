@@ -44,11 +44,11 @@ def run(out: Path, trials: Path | None, quick: bool) -> dict[str, Any]:
 def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
     """All the numbers; ratios as median, ``low`` and ``high``, with their bars."""
     rounds, host = 3 if quick else 11, machine()
-    circuits = {"amplifier": load("paper", BRIEF), "full": load("paper-full", BRIEF_FULL)}
+    circuits = {"amplifier": load("reference", BRIEF), "full": load("reference", BRIEF_FULL)}
     found = read_folder(trials) if trials is not None else [_made_up(k) for k in range(10)]
     seconds = solvers([Case(trial) for trial in found], 11 if quick else 51)
     offsets = _OFFSETS[:: 4 if quick else 1]
-    scene = load("ideal-current", ["run.duration=1"])
+    scene = load("reference", ["circuit.model=ideal", "run.duration=1"])
     numbers: dict[str, Any] = {
         "coupled_over_parts": {
             name: coupled_over_parts(scene, rounds) for name, scene in circuits.items()
@@ -72,7 +72,7 @@ def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
 
 
 def _made_up(number: int) -> Trial:
-    scene = load("ideal-current", ["run.duration=0.8", "run.settle=0.4"])
+    scene = load("reference", ["circuit.model=ideal", "run.duration=0.8", "run.settle=0.4"])
     frames = film(simulate(scene).columns, frame_times(0.4 + 0.003 * number, FRAMES), 0.0)
     nothing = np.full(FRAMES, np.nan)
     surface = Track(frames.z_surface, frames.v_surface, nothing, nothing)

@@ -1,6 +1,6 @@
 """Instructions that the FMU executes, counted by callgrind: a measure without noise.
 
-The mechanics of the scene `paper` get its command as a current, in fixed steps about as long as
+The mechanics of the scene `reference` get its command as a current, in fixed steps about as long as
 ngspice's.
 """
 
@@ -25,7 +25,7 @@ PERIODS, STEPS_PER_PERIOD = 4, 1600
 
 
 def per_period() -> int | None:
-    """Instructions of the FMU per period of `paper`; None without valgrind."""
+    """Instructions of the FMU per period of the scene `reference`; None without valgrind."""
     valgrind = shutil.which("valgrind")
     if valgrind is None:
         return None
@@ -56,7 +56,7 @@ def compiler_version() -> str:
 
 
 def _write(path: Path) -> None:
-    scene = load("paper")
+    scene = load("reference")
     drive, known = command(scene), references(3)
     reals, integers = parameters(scene)
     h = 1 / (scene.drive.frequency * STEPS_PER_PERIOD)

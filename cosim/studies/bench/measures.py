@@ -1,4 +1,4 @@
-"""What the bench measures with: CPU times, and errors of the part's path in the scene `paper`.
+"""What the bench measures with: CPU times, and errors of the part's path in the scene `reference`.
 
 Calls take turns, so that changes of the machine's speed cancel in ratios. Errors are those against
 the monolithic reference solution (``reference.json``).
@@ -19,10 +19,10 @@ from cosim.scene import Scene, load
 from cosim.simulation.simulate import simulate
 
 BRIEF = ("run.duration=0.2", "run.settle=0.1")
-"""Settings that make `paper` as short as the reference."""
+"""Settings that make the scene `reference` as short as the path known of it."""
 
-BRIEF_FULL = ("run.duration=0.1", "run.settle=0.05")
-"""Settings that shorten `paper-full`, which is thirty times as slow."""
+BRIEF_FULL = ("circuit.model=full", "run.duration=0.1", "run.settle=0.05")
+"""The same of the rung `full`, which is thirty times as slow."""
 
 
 def take_turns(calls: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
@@ -64,8 +64,8 @@ def times() -> list[float]:
 
 
 def brief(*overrides: str) -> Scene:
-    """The scene `paper` over the reference's time, with a row at each of its times."""
-    return load("paper", [*BRIEF, "run.output_step=1e-3", *overrides])
+    """The scene `reference` over the time of its known path, with a row at each of that's times."""
+    return load("reference", [*BRIEF, "run.output_step=1e-3", *overrides])
 
 
 def error(path: npt.NDArray[np.float64], circuit: str = "amplifier") -> float:

@@ -20,8 +20,8 @@ sys.exit(code)
 
 
 def growth(rounds: int, periods: tuple[int, int]) -> dict[str, Any] | None:
-    """Peak memory of ``cosim run paper`` of the second number of periods over that of the first;
-    None where the system does not tell. ``mebibytes`` are those of the last round.
+    """Peak memory of ``cosim run reference`` of the second number of periods over that of the
+    first; None where the system does not tell. ``mebibytes`` are those of the last round.
     """
     if not Path("/proc/self/status").exists():
         return None
@@ -31,11 +31,11 @@ def growth(rounds: int, periods: tuple[int, int]) -> dict[str, Any] | None:
 
 
 def peak(*overrides: str) -> float:
-    """Most memory (MiB) that a process had in RAM that ran `paper`, mapped files included."""
+    """Most memory (MiB) that a process had in RAM that ran `reference`, mapped files included."""
     settings = [word for override in overrides for word in ("--set", override)]
     with TemporaryDirectory() as folder:
         done = subprocess.run(
-            [sys.executable, "-c", _RUN, "run", "paper", *settings, "--out", folder],
+            [sys.executable, "-c", _RUN, "run", "reference", *settings, "--out", folder],
             capture_output=True,
             text=True,
             check=True,

@@ -1,4 +1,4 @@
-"""The time of what users would write, over ours, on `paper`.
+"""The time of what users would write, over ours, on the scene `reference`.
 
 Each peer runs at its coarsest setting whose error is no larger than ours.
 """

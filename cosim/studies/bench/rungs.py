@@ -27,12 +27,12 @@ def real_time(rounds: int) -> dict[str, Any]:
     the part alone with the closed form of its mean velocity.
     """
     cases: dict[str, tuple[Scene, Callable[[], float]]] = {
-        "full": (load("paper-full", BRIEF_FULL), _error_of_full),
-        "amplifier": (load("paper"), partial(own_error, "amplifier", "amplifier")),
-        "ideal": (load("paper", ["circuit.model=ideal"]), partial(own_error, "ideal", "ideal")),
+        "full": (load("reference", BRIEF_FULL), _error_of_full),
+        "amplifier": (load("reference"), partial(own_error, "amplifier", "amplifier")),
+        "ideal": (load("reference", ["circuit.model=ideal"]), partial(own_error, "ideal", "ideal")),
         "part": (load("optimal", _LONG_PART), _error_of_part),
         "limited": (
-            load("paper", ["circuit.model=limited"]),
+            load("reference", ["circuit.model=limited"]),
             partial(own_error, "limited", "amplifier"),
         ),
     }
@@ -46,8 +46,10 @@ def real_time(rounds: int) -> dict[str, Any]:
 
 
 def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
-    """Exponent with which the CPU time of `paper` grows with its duration, by least squares."""
-    calls = {str(n): partial(simulate, load("paper", [f"run.duration={n / 20}"])) for n in periods}
+    """Exponent with which the CPU time of `reference` grows with its duration, by least squares."""
+    calls = {
+        str(n): partial(simulate, load("reference", [f"run.duration={n / 20}"])) for n in periods
+    }
     taken = take_turns(calls, rounds)
     costs = np.log([taken[str(n)] for n in periods])
     exponents = np.polyfit(np.log(periods), costs, 1)[0]
@@ -56,8 +58,7 @@ def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
 
 def _error_of_full() -> float:
     path, finer = (
-        simulate(load("paper-full", [*BRIEF_FULL, *more])).columns["z_part"]
-        for more in ((), _FINER)
+        simulate(load("reference", [*BRIEF_FULL, *more])).columns["z_part"] for more in ((), _FINER)
     )
     return float(np.abs(path - finer).max() / np.ptp(finer))
 

@@ -21,7 +21,7 @@ from cosim.drive.command import command
 from cosim.scene import changed
 from cosim.studies.stability.machines import (
     DIRECT,
-    PAPER,
+    REFERENCE,
     SLOW,
     STRONG,
     Regime,
@@ -47,15 +47,15 @@ METHODS = methods.METHODS | {
 REGIMES = (
     Regime(DIRECT, "saturated"),
     Regime(SLOW, "saturated"),
-    Regime(PAPER, "saturated"),
-    Regime(PAPER, "saturated", slips=True),
+    Regime(REFERENCE, "saturated"),
+    Regime(REFERENCE, "saturated", slips=True),
     Regime(STRONG, "saturated"),
     Regime(STRONG, "saturated", slips=True),
-    Regime(PAPER, "regulated"),
+    Regime(REFERENCE, "regulated"),
     Regime(STRONG, "regulated"),
     Regime(DIRECT, "saturated", cut="coil in mechanics"),
-    Regime(PAPER, "saturated", cut="coil in mechanics"),
-    Regime(PAPER, "regulated", cut="coil in mechanics"),
+    Regime(REFERENCE, "saturated", cut="coil in mechanics"),
+    Regime(REFERENCE, "regulated", cut="coil in mechanics"),
 )
 
 

@@ -47,7 +47,7 @@ class Machine:
         return self.force_factor**2 / (self.mass(False) * self.loop)
 
 
-PAPER = Machine("paper", 0.6, 7.1, 1.2e-3)
+REFERENCE = Machine("reference", 0.6, 7.1, 1.2e-3)
 STRONG = Machine("Bl 3 N/A", 3.0, 7.1, 1.2e-3)
 DIRECT = Machine(
     "direct drive",
@@ -139,4 +139,4 @@ def scene_of(regime: Regime) -> Scene:
         else {"friction.mu_s": 1000.0, "friction.normal_force": 1e9}
     )
     settings["coil.force_factor"] = regime.machine.force_factor
-    return changed(load("paper"), settings, "stability")
+    return changed(load("reference"), settings, "stability")

@@ -55,7 +55,7 @@ def write(out: Path, found: Sequence[Limit], clamped: Sequence[Row]) -> str:
         "An amplifier's limits add what no linear map knows: where its clamped output makes an "
         "unstable coupling, the growing oscillation ends as soon as the output leaves the limit, "
         "and what remains is bounded but false (last table; steady, it would be 1.26 A). In the "
-        "paper's scene the output is clamped for less than a macro step after each fall of the "
+        "scene reference the output is clamped for less than a macro step after each fall of the "
         "command, so the limit of the clamped state is never met there.",
     ]
     tables: dict[str, Sequence[Row]] = {
