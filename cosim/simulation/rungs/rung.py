@@ -4,7 +4,7 @@
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import ClassVar
@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Block, Recorder
 from cosim.files.declared import modules
 from cosim.scene import Scene
@@ -31,8 +32,10 @@ class Driven:
     circuit_steps: int = 0
     circuit_rejected: int = 0
     versions: Mapping[str, str] = field(default_factory=dict)
-    second: Mapping[str, npt.NDArray[np.float64]] = field(default_factory=dict)
-    """Columns of the second surface's coil."""
+    waves: Callable[[], Mapping[str, Array]] = dict
+    """Makes the columns of the coils: a value for each row of the waveforms. In a row at a jump
+    stands what is before it, as in the mechanics' columns, whose state a row is: the first row is
+    the machine at rest, without command and current."""
 
 
 @dataclass(frozen=True)
