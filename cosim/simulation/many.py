@@ -15,7 +15,7 @@ from cosim.scene import Scene
 from cosim.simulation.numbers import motion, numbers
 from cosim.simulation.rungs.rung import Led, rungs
 
-AHEAD = 2
+AHEAD = 16
 """Runs at hand for each thread: the one that runs, and the next."""
 
 Summary = dict[str, Any]

@@ -28,7 +28,8 @@ EXPORT Threads *threads_start(int64_t threads);
 /* Have a job run, which must last until it was taken back or the threads have ended. */
 EXPORT void threads_give(Threads *t, Job *job);
 
-/* A job that has an outcome; NULL if there was none for `patience` seconds. */
+/* All jobs that have an outcome, one the `next` of the other; NULL if there are none. Waits until
+   few are left to be run, so that the caller seldom wakes, but at most for `patience` seconds. */
 EXPORT Job *threads_take(Threads *t, double patience);
 
 /* Stop what runs, at most a call of recorder_follow() later, and end the threads. */

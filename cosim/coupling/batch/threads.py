@@ -50,6 +50,7 @@ class Threads:
         self._count = count
         self._threads = None
         self._under_way: dict[int, tuple[Job, Recorder, Block]] = {}
+        self._back: int | None = None  # the first of the jobs that are back
 
     def __enter__(self) -> "Threads":
         self._threads = self._library.threads_start(self._count)
@@ -82,10 +83,11 @@ class Threads:
         """One of the recorders, whichever is done first, and why its block could not be finished:
         what its ``follow`` would raise."""
         while True:
-            place = self._library.threads_take(self._threads, _PATIENCE)
+            place = self._back or self._library.threads_take(self._threads, _PATIENCE)
             if place is None:
                 continue
             job, recorder, _ = self._under_way[place]
+            self._back = job.next
             recorder.at_once = job.at_once
             failure = recorder.failure() if job.outcome == FAILED else None
             if job.outcome == TO_JUDGE:

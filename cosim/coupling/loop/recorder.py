@@ -59,12 +59,12 @@ class Recorder:
         """Largest and smallest values after settling, in pairs: acceleration (m/s²), velocity (m/s)
         and height (m) of the surface, and current of the coil (A) where the mechanics have the
         source."""
-        self._fmu = Fmu(**mechanics.instance.addresses())
+        self._fmu = Fmu(**mechanics.instance.addresses)
         self._library.fmu_bind(ctypes.byref(self._fmu), mechanics.instance.version)
         grip = mechanics.normal_force
         corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
         self._agendas = agenda.agendas(
-            *(run.output_step, run.duration, run.settle, [*corners, run.duration], run.shutter)
+            *(run.output_step, run.duration, run.settle, (*corners, run.duration), run.shutter)
         )
         self._corners = np.array([grip.corners, grip.forces] if grip else [])
         schedule = None
@@ -175,8 +175,10 @@ class Recorder:
 
     def _take(self) -> None:
         state = self.state
-        self._rows.append(self._new_rows[: state.n_rows])
-        self._frames.append(self._new_frames[: state.n_frames])
+        if state.n_rows:
+            self._rows.append(self._new_rows[: state.n_rows])
+        if state.n_frames:
+            self._frames.append(self._new_frames[: state.n_frames])
         state.n_rows = state.n_frames = 0
 
     @property
