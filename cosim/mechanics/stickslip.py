@@ -52,6 +52,12 @@ SOURCE_TOTALS = (
 INTERNAL = ("internal_steps", "internal_rejected")
 COUNTERS = ("impacts", "stick_slip_events", *INTERNAL)
 
+_VARIABLES = [
+    (key.table, key.name, key.variable, key.kind is int) for key in keys() if key.variable
+]
+"""Table and name of each key that is a variable of the FMU, that variable, and whether it is a
+whole number."""
+
 CONTACT_LAWS = {"compliant": 1, "rigid": 2}
 
 
@@ -123,12 +129,19 @@ class Mechanics:
         names = (*self.total_names, *COUNTERS)
         return dict(zip(names, self._read("totals", "counters"), strict=True))
 
+    def internal_steps(self) -> int:
+        """Those taken and rejected so far."""
+        return sum(self._wholes("internal"))
+
     def _read(self, reals: str, wholes: str) -> list[float]:
         numbers = (c_double * len(self.places[reals]))()
-        counts = (c_int * len(self.places[wholes]))()
         self.instance.get_reals(self.places[reals], numbers)
-        self.instance.get_integers(self.places[wholes], counts)
-        return [*numbers, *counts]
+        return [*numbers, *self._wholes(wholes)]
+
+    def _wholes(self, role: str) -> list[int]:
+        counts = (c_int * len(self.places[role]))()
+        self.instance.get_integers(self.places[role], counts)
+        return list(counts)
 
     def inertial_gain(self, time: float) -> float:
         """d(back-EMF slope)/d(current) now, at ``time`` (s), V/(A s): Bl² over the mass that the
@@ -159,9 +172,9 @@ def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
         "independent": int(scene.drive.phase_deg is not None),
         "source": int(scene.rung.source_in_fmu),
     }
-    for key in keys():
-        if key.variable and (value := getattr(getattr(scene, key.table), key.name)) is not None:
-            (integers if key.kind is int else reals)[key.variable] = value
+    for table, name, variable, whole in _VARIABLES:
+        if (value := getattr(getattr(scene, table), name)) is not None:
+            (integers if whole else reals)[variable] = value
     if scene.rung.source_in_fmu:
         circuit = scene.circuit
         reals["output_high"] = circuit.supply - circuit.swing_loss_high

@@ -32,7 +32,7 @@ class Ideal(Led):
             yield edges[1:], start, end
             for k, coil in enumerate(coils):
                 coil.follow(edges, start[:, k], end[:, k])
-        motion = recorder.mechanics.totals()["energy_in"]
+        motion = recorder.at_end["energy_in"]
         electric = coils[0].electrics(motion)
         if len(drives) > 1:
             # The work that both coils did is in the first one's account.

@@ -41,7 +41,7 @@ def _waves(drives: Sequence[Command], recorder: Recorder) -> dict[str, Array]:
 def _electrics(scene: Scene, recorder: Recorder) -> Electrics:
     """From the mechanics' own current source, at the end of its run."""
     count, run = scene.coil.count, scene.run
-    totals, before = recorder.mechanics.totals(), recorder.at_settle
+    totals, before = recorder.at_end, recorder.at_settle
     share = {
         limit: (totals[name] - before[name]) / (run.duration - run.settle)
         for limit, name in (
