@@ -6,6 +6,9 @@ or, where the FMU has the current source too (circuit.model "limited"), the comm
 """
 
 from ctypes import c_double, c_int
+from dataclasses import dataclass
+from functools import cache
+from operator import attrgetter
 from typing import Any
 
 from cosim.errors import SimulationFailed
@@ -52,13 +55,50 @@ SOURCE_TOTALS = (
 INTERNAL = ("internal_steps", "internal_rejected")
 COUNTERS = ("impacts", "stick_slip_events", *INTERNAL)
 
+_KEYS = [[key for key in keys() if key.variable and key.kind is kind] for kind in (float, int)]
 _VARIABLES = [
-    (key.table, key.name, key.variable, key.kind is int) for key in keys() if key.variable
+    ([key.variable for key in group], attrgetter(*(key.full for key in group))) for group in _KEYS
 ]
-"""Table and name of each key that is a variable of the FMU, that variable, and whether it is a
-whole number."""
+"""The FMU's variables that are keys of a scene, real and whole ones, and what finds their values."""
 
 CONTACT_LAWS = {"compliant": 1, "rigid": 2}
+
+
+@dataclass(frozen=True)
+class _Names:
+    """Names of variables: ``by_role`` all of them."""
+
+    ports: tuple[str, ...]
+    columns: tuple[str, ...]
+    totals: tuple[str, ...]
+    by_role: dict[str, tuple[str, ...]]
+
+
+@cache
+def _names(has_source: bool, two_surfaces: bool, changing_force: bool) -> _Names:
+    given = "command" if has_source else "current"
+    step_outputs, sampled, totals = STEP_OUTPUTS, SAMPLE_OUTPUTS, TOTALS
+    if has_source:
+        step_outputs += SOURCE_STEP_OUTPUTS
+        sampled += SOURCE_SAMPLE_OUTPUTS
+        totals += SOURCE_TOTALS
+    wholes, ports = ("sticking",), (given,)
+    if two_surfaces:
+        sampled += tuple(f"{name}_2" for name in sampled if not name.endswith("_part"))
+        wholes += ("sticking_2",)
+        ports += (f"{given}_2",)
+        totals += ("stick_time_2",)
+    inputs = (*ports, "normal_force") if changing_force else ports
+    by_role = {
+        "inputs": tuple(part for name in inputs for part in (name, f"{name}_slope")),
+        "step_outputs": step_outputs,
+        "reals": sampled,
+        "wholes": wholes,
+        "totals": totals,
+        "counters": COUNTERS,
+        "internal": INTERNAL,
+    }
+    return _Names(ports, (*sampled, *wholes), totals, by_role)
 
 
 class Mechanics:
@@ -68,43 +108,24 @@ class Mechanics:
     """
 
     def __init__(self, scene: Scene, fmi_version: int = 3) -> None:
-        self.has_source = scene.rung.source_in_fmu
-        """Whether the input is the command of the FMU's own source, V, and not a current, A."""
-        given = "command" if self.has_source else "current"
-        step_outputs, sampled, self.total_names = STEP_OUTPUTS, SAMPLE_OUTPUTS, TOTALS
-        if self.has_source:
-            step_outputs += SOURCE_STEP_OUTPUTS
-            sampled += SOURCE_SAMPLE_OUTPUTS
-            self.total_names += SOURCE_TOTALS
-        wholes, self.ports = ("sticking",), (given,)
-        """Names of the inputs that are led from outside."""
-        if scene.drive.phase_deg is not None:
-            sampled += tuple(f"{name}_2" for name in sampled if not name.endswith("_part"))
-            wholes += ("sticking_2",)
-            self.ports += (f"{given}_2",)
-            self.total_names += ("stick_time_2",)
-        self.columns = (*sampled, *wholes)
-        """Names of what a row holds: reals, then whole numbers."""
         self.normal_force = normal_force(scene)
         """The normal force where it changes in time: an input that follows the time alone."""
-        inputs = (*self.ports, "normal_force") if self.normal_force else self.ports
+        self.has_source = scene.rung.source_in_fmu
+        """Whether the input is the command of the FMU's own source, V, and not a current, A."""
+        two, changing = scene.drive.phase_deg is not None, self.normal_force is not None
+        names = _names(self.has_source, two, changing)
+        self.ports, self.columns, self.total_names = names.ports, names.columns, names.totals
+        """Names of the inputs that are led from outside; of what a row holds: reals, then whole
+        numbers; and of the totals."""
         self.instance = borrow(fmi_version)
         places = self.instance.places
-        self.places: dict[str, Any] = {
-            "inputs": places(part for name in inputs for part in (name, f"{name}_slope")),
-            "step_outputs": places(step_outputs),
-            "reals": places(sampled),
-            "wholes": places(wholes),
-            "totals": places(self.total_names),
-            "counters": places(COUNTERS),
-            "internal": places(INTERNAL),
-        }
+        self.places: dict[str, Any] = {role: places(of) for role, of in names.by_role.items()}
         """Value references by role."""
-        self.inputs = (c_double * (2 * len(inputs)))()
+        self.inputs = (c_double * len(self.places["inputs"]))()
         """Value and slope of each input, as set last."""
-        self.step_outputs = (c_double * len(step_outputs))()
+        self.step_outputs = (c_double * len(self.places["step_outputs"]))()
         """Values of STEP_OUTPUTS, and SOURCE_STEP_OUTPUTS, after the last step."""
-        self._slope_place, self._current_place = places(["back_emf_slope"]), places(["current"])
+        self._slope_place, self._current_place = places(("back_emf_slope",)), places(("current",))
         self._gain = (c_double * 1)()
         reals, integers = parameters(scene)
         if self.normal_force is not None:
@@ -172,9 +193,9 @@ def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
         "independent": int(scene.drive.phase_deg is not None),
         "source": int(scene.rung.source_in_fmu),
     }
-    for table, name, variable, whole in _VARIABLES:
-        if (value := getattr(getattr(scene, table), name)) is not None:
-            (integers if whole else reals)[variable] = value
+    for group, (names, values) in zip((reals, integers), _VARIABLES, strict=True):
+        pairs = zip(names, values(scene), strict=True)
+        group.update([pair for pair in pairs if pair[1] is not None])
     if scene.rung.source_in_fmu:
         circuit = scene.circuit
         reals["output_high"] = circuit.supply - circuit.swing_loss_high

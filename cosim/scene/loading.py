@@ -22,6 +22,8 @@ from cosim.scene.tables import KNOBS, NORMAL_FORCES, TABLES
 PATHS = (("circuit", "netlist"), ("drive", "file"), ("friction", "normal_force_file"))
 """The keys that name files."""
 
+_FULL = frozenset(key.full for key in keys())
+
 _LIBRARY = Path(__file__).with_name("library")
 
 MAX_BYTES = 1 << 20
@@ -195,9 +197,10 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
     tables: dict[str, Any] = {}
     for full, value in values:
         table, dot, key = full.partition(".")
-        if not dot:
-            raise messages.bad(f"{origin}: {full} must be table.key{messages.full_name(full)}")
-        _check_names({table: {key: None}}, origin)
+        if full not in _FULL:
+            if not dot:
+                raise messages.bad(f"{origin}: {full} must be table.key{messages.full_name(full)}")
+            _check_names({table: {key: None}}, origin)
         if isinstance(value, os.PathLike):
             value = os.fspath(value)
         # numpy's numbers are no Python numbers

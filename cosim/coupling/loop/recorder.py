@@ -2,8 +2,8 @@
 
 import ctypes
 from collections.abc import Callable
-from ctypes import c_double, c_int32
 from contextlib import nullcontext
+from ctypes import c_double, c_int32
 from functools import cached_property, partial
 
 import numpy as np
