@@ -59,7 +59,7 @@ _KEYS = [[key for key in keys() if key.variable and key.kind is kind] for kind i
 _VARIABLES = [
     ([key.variable for key in group], attrgetter(*(key.full for key in group))) for group in _KEYS
 ]
-"""The FMU's variables that are keys of a scene, real and whole ones, and what finds their values."""
+"""The FMU's variables that are keys of a scene, real and whole ones; what finds their values."""
 
 CONTACT_LAWS = {"compliant": 1, "rigid": 2}
 
