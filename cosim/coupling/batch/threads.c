@@ -130,9 +130,9 @@ static Job *pop(Queue *q)
     return job;
 }
 
-/* One call of the recorder, between which the threads can be ended. */
-static int64_t go_on(Job *job)
+int64_t following_run(void *task)
 {
+    Following *job = task;
     Recorder *r = job->recorder;
     Fmu *f = r->fmu;
     const int64_t row = job->done * r->ports;
@@ -163,7 +163,7 @@ WORK work(void *threads)
         t->waiting--;
         unlock(&t->lock);
         do
-            job->outcome = go_on(job);
+            job->outcome = job->run(job->task);
         while (job->outcome == UNFINISHED && !t->ended);
         lock_up(&t->lock);
         append(&t->run, job);
@@ -221,7 +221,7 @@ void threads_end(Threads *t)
     free(t);
 }
 
-int64_t threads_size(void)
+int64_t threads_size(int which)
 {
-    return (int64_t)sizeof(Job);
+    return (int64_t)(which ? sizeof(Following) : sizeof(Job));
 }

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -80,13 +80,21 @@ class Led(Rung):
         """
 
     def drive(self, scene: Scene, recorder: Recorder) -> Driven:
-        leading = self.lead(scene, recorder)
-        while True:
-            try:
-                block = next(leading)
-            except StopIteration as end:
-                return end.value
-            recorder.follow(*block)
+        return ended(self.lead(scene, recorder), lambda block: recorder.follow(*block))
+
+
+_Task = TypeVar("_Task")
+_Found = TypeVar("_Found")
+
+
+def ended(leading: Generator[_Task, None, _Found], do: Callable[[_Task], object]) -> _Found:
+    """What a generator returns, each of its tasks having been done before the next is asked for."""
+    while True:
+        try:
+            task = next(leading)
+        except StopIteration as end:
+            return end.value
+        do(task)
 
 
 @cache
