@@ -84,10 +84,9 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
     """
     layer = _Layer(origin, _tables(values.items(), origin))
     # A table that stays the same is not checked again, but the scene as a whole is.
-    same = {name: getattr(scene, name) for name in ("name", "description", *TABLES)}
     below = {name: scene.table(name) for name in layer.tables}
     try:
-        return Scene.model_validate(same | _merge([_Layer("", below), layer]))
+        return Scene.model_validate(vars(scene) | _merge([_Layer("", below), layer]))
     except ValidationError:
         return _checked([_Layer(f"scene {scene.name}", scene.as_dict()), layer], origin)
 
