@@ -5,10 +5,11 @@ their value at its start and their slope are set before it. An input is the curr
 or, where the FMU has the current source too (circuit.model "limited"), the command (V).
 """
 
+from collections import deque
 from ctypes import c_double, c_int
 from dataclasses import dataclass
 from functools import cache
-from operator import attrgetter
+from operator import attrgetter, is_
 from typing import Any
 
 from cosim.errors import SimulationFailed
@@ -127,14 +128,13 @@ class Mechanics:
         """Values of STEP_OUTPUTS, and SOURCE_STEP_OUTPUTS, after the last step."""
         self._slope_place, self._current_place = places(("back_emf_slope",)), places(("current",))
         self._gain = (c_double * 1)()
-        reals, integers = parameters(scene)
-        if self.normal_force is not None:
-            reals["normal_force"] = self.normal_force.value(0.0)
+        reals, integers = _settings(scene)
         try:
-            self.instance.set_reals(places(reals), (c_double * len(reals))(*reals.values()))
-            self.instance.set_integers(
-                places(integers), (c_int * len(integers))(*integers.values())
-            )
+            self.instance.set_reals(places(reals[0]), reals[1])
+            self.instance.set_integers(places(integers[0]), integers[1])
+            if self.normal_force is not None:
+                force = (c_double * 1)(self.normal_force.value(0.0))
+                self.instance.set_reals(places(("normal_force",)), force)
             self.instance.initialise()
             self.instance.get_reals(self.places["step_outputs"], self.step_outputs)
         except Exception as error:
@@ -182,6 +182,28 @@ class Mechanics:
         FMU's words."""
         said = self.instance.messages[-1] if self.instance.messages else str(error)
         return SimulationFailed(f"The mechanics failed at t = {time:.6g} s: {said}")
+
+
+_Settings = tuple[tuple[tuple[str, ...], Any], tuple[tuple[str, ...], Any]]
+
+_last: deque[tuple[tuple[object, ...], _Settings]] = deque(maxlen=1)
+
+
+def _settings(scene: Scene) -> _Settings:
+    """:func:`parameters` as names and arrays. Those of the last scene are kept: what is swept is
+    often the drive alone, and then the other tables are the same objects."""
+    tables = (scene.circuit, scene.coil, scene.mechanics, scene.friction)
+    of = (*tables, scene.drive.phase_deg is None)
+    for known, settings in _last:
+        if all(map(is_, known, of)):
+            return settings
+    reals, integers = parameters(scene)
+    settings = (
+        (tuple(reals), (c_double * len(reals))(*reals.values())),
+        (tuple(integers), (c_int * len(integers))(*integers.values())),
+    )
+    _last.append((of, settings))
+    return settings
 
 
 def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
