@@ -109,6 +109,6 @@ def blocks(count: int) -> Iterator[slice]:
 
 def release() -> None:
     """Drop the pages of tapes on disk from this process's memory; they can be read again."""
-    if hasattr(mmap, "MADV_DONTNEED"):
+    if _mapped and hasattr(mmap, "MADV_DONTNEED"):
         for mapped in list(_mapped):
             mapped.madvise(mmap.MADV_DONTNEED)

@@ -6,7 +6,7 @@ Both go through fmpy's own functions, which check every return code.
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_uint, c_void_p, cast
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from typing import Any, ClassVar
 
 import fmpy
@@ -36,6 +36,12 @@ def references(version: int) -> dict[str, int]:
     """Value reference of each variable."""
     description = fmpy.read_model_description(str(unpacked(version)), validate=False)
     return {v.name: v.valueReference for v in description.modelVariables}
+
+
+@cache
+def _places(version: int, names: tuple[str, ...]) -> Any:
+    known = references(version)
+    return (c_uint * len(names))(*(known[name] for name in names))
 
 
 class Interface(ABC):
@@ -77,9 +83,7 @@ class Interface(ABC):
 
     def places(self, names: Iterable[str]) -> Any:
         """The value references of variables, as an array for the calls."""
-        known = references(self.version)
-        found = [known[name] for name in names]
-        return (c_uint * len(found))(*found)
+        return _places(self.version, tuple(names))
 
     def restart(self) -> None:
         """Back to the state after the making: parameters can be set again."""
@@ -121,6 +125,7 @@ class Interface(ABC):
         """Free the memory of a saved state."""
         self._call["free_state"](byref(handle))
 
+    @cached_property
     def addresses(self) -> dict[str, int]:
         """Where compiled code finds the instance and four functions, by their names here."""
         found = {name: getattr(self._fmu.dll, self._names[name]) for name in _COMPILED}

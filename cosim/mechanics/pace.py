@@ -43,8 +43,8 @@ class Pace:
         """
         if self._spent > BEGINNING:
             return
-        totals, duration = self._mechanics.totals(), self._scene.run.duration
-        self._spent = totals["internal_steps"] + totals["internal_rejected"] - steps
+        duration = self._scene.run.duration
+        self._spent = float(self._mechanics.internal_steps() - steps)
         if self._spent < ENOUGH or self._spent < ORDINARY * time:
             return
         expected = self._spent * duration / time

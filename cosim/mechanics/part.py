@@ -36,8 +36,10 @@ EPSILON, LARGEST = sys.float_info.epsilon, sys.float_info.max
 _POINTER, _LONG, _REAL = ctypes.c_void_p, ctypes.c_long, ctypes.c_double
 _SURFACE = (_LONG, _POINTER, _POINTER, _LONG, _POINTER, _REAL, _REAL)
 _RESULT = (_POINTER, _POINTER, _POINTER)
+_EXACT = (*_SURFACE, _REAL, _REAL, _LONG, _POINTER, *_RESULT, _POINTER)
 _ARGUMENTS = {
-    "part_exact": (*_SURFACE, _REAL, _REAL, _LONG, _POINTER, *_RESULT, _POINTER),
+    "exact_run": (_POINTER,),
+    "part_exact": _EXACT,
     "part_threshold": (*_SURFACE, _REAL, _REAL, _LONG, *_RESULT),
     "part_moreau": (*_SURFACE, _REAL, _LONG, *_RESULT),
     "part_errors": (
@@ -46,6 +48,12 @@ _ARGUMENTS = {
         *(_LONG, _POINTER, _POINTER, _POINTER, _POINTER),
     ),
 }
+
+
+class _Exact(ctypes.Structure):
+    """``Exact`` of ``part.c``."""
+
+    _fields_ = tuple((f"argument_{k}", kind) for k, kind in enumerate(_EXACT))
 
 
 @cache
@@ -151,28 +159,48 @@ def exact(
     return PartMotion(times, z, v, _shares(times, stuck), events)
 
 
-def account(
-    surface: Surface,
-    output: Real,
-    *,
-    mu_s: float,
-    mu_k: float,
-    force_per_mass: float,
-    gravity: float = 9.81,
-    mu_plate: float = 0.0,
-) -> Account:
-    """The exact motion on a surface at the times ``output``, and what passed between the two; the
-    part starts at the height 0 with the surface's velocity. See :class:`Case`."""
-    law = (mu_s, mu_k, force_per_mass, gravity, mu_plate)
-    case = _Case(surface.times, surface.velocities, *law, periods=surface.periods)
-    times = case.times(output)
-    z, v, stuck = np.empty((3, len(times)))
-    told = np.empty((len(times), len(_TOLD)))
-    part_library().part_exact(
-        *(*case.arguments(), surface.half, surface.turn, len(times), times.ctypes.data),
-        *(z.ctypes.data, v.ctypes.data, stuck.ctypes.data, told.ctypes.data),
-    )
-    return Account(times, z, v, stuck, **dict(zip(_TOLD, told.T, strict=True)))
+class Accounting:
+    """The call of compiled code that finds the exact motion on a surface at the times ``output``,
+    and what passed between the two; the part starts at the height 0 with the surface's velocity.
+    See :class:`Case`. Any thread may call ``run`` with ``arguments``, once.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        output: Real,
+        *,
+        mu_s: float,
+        mu_k: float,
+        force_per_mass: float,
+        gravity: float = 9.81,
+        mu_plate: float = 0.0,
+    ) -> None:
+        law = (mu_s, mu_k, force_per_mass, gravity, mu_plate)
+        case = _Case(surface.times, surface.velocities, *law, periods=surface.periods)
+        times = case.times(output)
+        self._results = np.empty((3, len(times))), np.empty((len(times), len(_TOLD)))
+        self._kept = case, times  # the arguments point to them
+        self.run = ctypes.cast(part_library().exact_run, _POINTER).value or 0
+        """Where the function lies."""
+        motion, told = self._results
+        self.arguments = _Exact(
+            *(*case.arguments(), surface.half, surface.turn, len(times), times.ctypes.data),
+            *(*(row.ctypes.data for row in motion), told.ctypes.data),
+        )
+
+    def make(self) -> None:
+        """Make the call in this thread."""
+        part_library().exact_run(ctypes.byref(self.arguments))
+
+    def goes_on(self, outcome: int) -> bool:
+        """It is called once, and never fails."""
+        return False
+
+    def account(self) -> Account:
+        """What the call has found."""
+        motion, told = self._results
+        return Account(self._kept[1], *motion, **dict(zip(_TOLD, told.T, strict=True)))
 
 
 def bounds(

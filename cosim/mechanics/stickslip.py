@@ -5,7 +5,11 @@ their value at its start and their slope are set before it. An input is the curr
 or, where the FMU has the current source too (circuit.model "limited"), the command (V).
 """
 
+from collections import deque
 from ctypes import c_double, c_int
+from dataclasses import dataclass
+from functools import cache
+from operator import attrgetter, is_
 from typing import Any
 
 from cosim.errors import SimulationFailed
@@ -52,7 +56,50 @@ SOURCE_TOTALS = (
 INTERNAL = ("internal_steps", "internal_rejected")
 COUNTERS = ("impacts", "stick_slip_events", *INTERNAL)
 
+_KEYS = [[key for key in keys() if key.variable and key.kind is kind] for kind in (float, int)]
+_VARIABLES = [
+    ([key.variable for key in group], attrgetter(*(key.full for key in group))) for group in _KEYS
+]
+"""The FMU's variables that are keys of a scene, real and whole ones; what finds their values."""
+
 CONTACT_LAWS = {"compliant": 1, "rigid": 2}
+
+
+@dataclass(frozen=True)
+class _Names:
+    """Names of variables: ``by_role`` all of them."""
+
+    ports: tuple[str, ...]
+    columns: tuple[str, ...]
+    totals: tuple[str, ...]
+    by_role: dict[str, tuple[str, ...]]
+
+
+@cache
+def _names(has_source: bool, two_surfaces: bool, changing_force: bool) -> _Names:
+    given = "command" if has_source else "current"
+    step_outputs, sampled, totals = STEP_OUTPUTS, SAMPLE_OUTPUTS, TOTALS
+    if has_source:
+        step_outputs += SOURCE_STEP_OUTPUTS
+        sampled += SOURCE_SAMPLE_OUTPUTS
+        totals += SOURCE_TOTALS
+    wholes, ports = ("sticking",), (given,)
+    if two_surfaces:
+        sampled += tuple(f"{name}_2" for name in sampled if not name.endswith("_part"))
+        wholes += ("sticking_2",)
+        ports += (f"{given}_2",)
+        totals += ("stick_time_2",)
+    inputs = (*ports, "normal_force") if changing_force else ports
+    by_role = {
+        "inputs": tuple(part for name in inputs for part in (name, f"{name}_slope")),
+        "step_outputs": step_outputs,
+        "reals": sampled,
+        "wholes": wholes,
+        "totals": totals,
+        "counters": COUNTERS,
+        "internal": INTERNAL,
+    }
+    return _Names(ports, (*sampled, *wholes), totals, by_role)
 
 
 class Mechanics:
@@ -62,52 +109,32 @@ class Mechanics:
     """
 
     def __init__(self, scene: Scene, fmi_version: int = 3) -> None:
-        self.has_source = scene.rung.source_in_fmu
-        """Whether the input is the command of the FMU's own source, V, and not a current, A."""
-        given = "command" if self.has_source else "current"
-        step_outputs, sampled, self.total_names = STEP_OUTPUTS, SAMPLE_OUTPUTS, TOTALS
-        if self.has_source:
-            step_outputs += SOURCE_STEP_OUTPUTS
-            sampled += SOURCE_SAMPLE_OUTPUTS
-            self.total_names += SOURCE_TOTALS
-        wholes, self.ports = ("sticking",), (given,)
-        """Names of the inputs that are led from outside."""
-        if scene.drive.phase_deg is not None:
-            sampled += tuple(f"{name}_2" for name in sampled if not name.endswith("_part"))
-            wholes += ("sticking_2",)
-            self.ports += (f"{given}_2",)
-            self.total_names += ("stick_time_2",)
-        self.columns = (*sampled, *wholes)
-        """Names of what a row holds: reals, then whole numbers."""
         self.normal_force = normal_force(scene)
         """The normal force where it changes in time: an input that follows the time alone."""
-        inputs = (*self.ports, "normal_force") if self.normal_force else self.ports
+        self.has_source = scene.rung.source_in_fmu
+        """Whether the input is the command of the FMU's own source, V, and not a current, A."""
+        two, changing = scene.drive.phase_deg is not None, self.normal_force is not None
+        names = _names(self.has_source, two, changing)
+        self.ports, self.columns, self.total_names = names.ports, names.columns, names.totals
+        """Names of the inputs that are led from outside; of what a row holds: reals, then whole
+        numbers; and of the totals."""
         self.instance = borrow(fmi_version)
         places = self.instance.places
-        self.places: dict[str, Any] = {
-            "inputs": places(part for name in inputs for part in (name, f"{name}_slope")),
-            "step_outputs": places(step_outputs),
-            "reals": places(sampled),
-            "wholes": places(wholes),
-            "totals": places(self.total_names),
-            "counters": places(COUNTERS),
-            "internal": places(INTERNAL),
-        }
+        self.places: dict[str, Any] = {role: places(of) for role, of in names.by_role.items()}
         """Value references by role."""
-        self.inputs = (c_double * (2 * len(inputs)))()
+        self.inputs = (c_double * len(self.places["inputs"]))()
         """Value and slope of each input, as set last."""
-        self.step_outputs = (c_double * len(step_outputs))()
+        self.step_outputs = (c_double * len(self.places["step_outputs"]))()
         """Values of STEP_OUTPUTS, and SOURCE_STEP_OUTPUTS, after the last step."""
-        self._slope_place, self._current_place = places(["back_emf_slope"]), places(["current"])
+        self._slope_place, self._current_place = places(("back_emf_slope",)), places(("current",))
         self._gain = (c_double * 1)()
-        reals, integers = parameters(scene)
-        if self.normal_force is not None:
-            reals["normal_force"] = self.normal_force.value(0.0)
+        reals, integers = _settings(scene)
         try:
-            self.instance.set_reals(places(reals), (c_double * len(reals))(*reals.values()))
-            self.instance.set_integers(
-                places(integers), (c_int * len(integers))(*integers.values())
-            )
+            self.instance.set_reals(places(reals[0]), reals[1])
+            self.instance.set_integers(places(integers[0]), integers[1])
+            if self.normal_force is not None:
+                force = (c_double * 1)(self.normal_force.value(0.0))
+                self.instance.set_reals(places(("normal_force",)), force)
             self.instance.initialise()
             self.instance.get_reals(self.places["step_outputs"], self.step_outputs)
         except Exception as error:
@@ -123,12 +150,19 @@ class Mechanics:
         names = (*self.total_names, *COUNTERS)
         return dict(zip(names, self._read("totals", "counters"), strict=True))
 
+    def internal_steps(self) -> int:
+        """Those taken and rejected so far."""
+        return sum(self._wholes("internal"))
+
     def _read(self, reals: str, wholes: str) -> list[float]:
         numbers = (c_double * len(self.places[reals]))()
-        counts = (c_int * len(self.places[wholes]))()
         self.instance.get_reals(self.places[reals], numbers)
-        self.instance.get_integers(self.places[wholes], counts)
-        return [*numbers, *counts]
+        return [*numbers, *self._wholes(wholes)]
+
+    def _wholes(self, role: str) -> list[int]:
+        counts = (c_int * len(self.places[role]))()
+        self.instance.get_integers(self.places[role], counts)
+        return list(counts)
 
     def inertial_gain(self, time: float) -> float:
         """d(back-EMF slope)/d(current) now, at ``time`` (s), V/(A s): Bl² over the mass that the
@@ -150,6 +184,28 @@ class Mechanics:
         return SimulationFailed(f"The mechanics failed at t = {time:.6g} s: {said}")
 
 
+_Settings = tuple[tuple[tuple[str, ...], Any], tuple[tuple[str, ...], Any]]
+
+_last: deque[tuple[tuple[object, ...], _Settings]] = deque(maxlen=1)
+
+
+def _settings(scene: Scene) -> _Settings:
+    """:func:`parameters` as names and arrays. Those of the last scene are kept: what is swept is
+    often the drive alone, and then the other tables are the same objects."""
+    tables = (scene.circuit, scene.coil, scene.mechanics, scene.friction)
+    of = (*tables, scene.drive.phase_deg is None)
+    for known, settings in _last:
+        if all(map(is_, known, of)):
+            return settings
+    reals, integers = parameters(scene)
+    settings = (
+        (tuple(reals), (c_double * len(reals))(*reals.values())),
+        (tuple(integers), (c_int * len(integers))(*integers.values())),
+    )
+    _last.append((of, settings))
+    return settings
+
+
 def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
     """Real and integer parameters of the FMU, with the scene's normal force."""
     reals: dict[str, float] = {}
@@ -159,9 +215,9 @@ def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
         "independent": int(scene.drive.phase_deg is not None),
         "source": int(scene.rung.source_in_fmu),
     }
-    for key in keys():
-        if key.variable and (value := getattr(getattr(scene, key.table), key.name)) is not None:
-            (integers if key.kind is int else reals)[key.variable] = value
+    for group, (names, values) in zip((reals, integers), _VARIABLES, strict=True):
+        pairs = zip(names, values(scene), strict=True)
+        group.update([pair for pair in pairs if pair[1] is not None])
     if scene.rung.source_in_fmu:
         circuit = scene.circuit
         reals["output_high"] = circuit.supply - circuit.swing_loss_high

@@ -22,6 +22,8 @@ from cosim.scene.tables import KNOBS, NORMAL_FORCES, TABLES
 PATHS = (("circuit", "netlist"), ("drive", "file"), ("friction", "normal_force_file"))
 """The keys that name files."""
 
+_FULL = frozenset(key.full for key in keys())
+
 _LIBRARY = Path(__file__).with_name("library")
 
 MAX_BYTES = 1 << 20
@@ -82,10 +84,9 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
     """
     layer = _Layer(origin, _tables(values.items(), origin))
     # A table that stays the same is not checked again, but the scene as a whole is.
-    same = {name: getattr(scene, name) for name in ("name", "description", *TABLES)}
     below = {name: scene.table(name) for name in layer.tables}
     try:
-        return Scene.model_validate(same | _merge([_Layer("", below), layer]))
+        return Scene.model_validate(vars(scene) | _merge([_Layer("", below), layer]))
     except ValidationError:
         return _checked([_Layer(f"scene {scene.name}", scene.as_dict()), layer], origin)
 
@@ -195,9 +196,10 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
     tables: dict[str, Any] = {}
     for full, value in values:
         table, dot, key = full.partition(".")
-        if not dot:
-            raise messages.bad(f"{origin}: {full} must be table.key{messages.full_name(full)}")
-        _check_names({table: {key: None}}, origin)
+        if full not in _FULL:
+            if not dot:
+                raise messages.bad(f"{origin}: {full} must be table.key{messages.full_name(full)}")
+            _check_names({table: {key: None}}, origin)
         if isinstance(value, os.PathLike):
             value = os.fspath(value)
         # numpy's numbers are no Python numbers

@@ -8,50 +8,70 @@ import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import Any
 
-from cosim.coupling.batch.threads import Threads
-from cosim.coupling.loop.recorder import Recorder
+from cosim.coupling.batch.following import Following
+from cosim.coupling.batch.threads import Task, Threads
+from cosim.coupling.loop.recorder import Block, Recorder
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
 from cosim.simulation.numbers import motion, numbers
-from cosim.simulation.rungs.rung import Led, rungs
+from cosim.simulation.rungs.given_surface import lead_part
+from cosim.simulation.rungs.rung import Driven, Led, rungs
 
-AHEAD = 2
+AHEAD = 16
 """Runs at hand for each thread: the one that runs, and the next."""
 
 Summary = dict[str, Any]
 
 
 def led(scene: Scene) -> bool:
-    """Whether :func:`summaries` can run a scene: ngspice has no part in it, and more moves than the
-    part alone."""
-    if scene.rung.automatic or scene.surface_is_given:
+    """Whether :func:`summaries` can run a scene: ngspice has no part in it."""
+    if scene.rung.automatic:
         return False
-    return isinstance(rungs()[scene.circuit.model], Led)
+    return scene.surface_is_given or isinstance(rungs()[scene.circuit.model], Led)
 
 
 class _Run:
     """A run at hand. Raises BadInput and SimulationFailed where it cannot begin."""
 
     def __init__(self, number: int, scene: Scene) -> None:
-        self.number, self.scene, self.began = number, scene, time.perf_counter()
+        self.number, self._scene, self._began = number, scene, time.perf_counter()
+        self._mechanics = None if scene.surface_is_given else Mechanics(scene)
+        self._leading = self._part() if self._mechanics is None else self._led(self._mechanics)
+
+    def _led(self, mechanics: Mechanics) -> Generator[Task, None, Summary]:
+        scene = self._scene
         rung = rungs()[scene.circuit.model]
         assert isinstance(rung, Led)
-        self.mechanics = Mechanics(scene)
-        try:
-            self.recorder = Recorder(scene, self.mechanics, lambda _: None)
-        except BaseException:
-            self.mechanics.close()
-            raise
-        self._leading = rung.lead(scene, self.recorder)
+        recorder = Recorder(scene, mechanics, lambda _: None)
+        driven = yield from _followed(recorder, rung.lead(scene, recorder))
+        return numbers(scene, motion(scene, recorder), driven, recorder.steps, self._began)
 
-    def go_on(self, threads: Threads) -> Summary | None:
-        """Have the next block run; the summary where there is none."""
+    def _part(self) -> Generator[Task, None, Summary]:
+        _, moved = yield from lead_part(self._scene)
+        return numbers(self._scene, moved, Driven(None, "exact"), 0, self._began)
+
+    def go_on(self) -> Task | Summary:
+        """What is to be done next; the summary where there is nothing."""
         try:
-            threads.give(self.recorder, next(self._leading))
+            return next(self._leading)
         except StopIteration as end:
-            moved, steps = motion(self.scene, self.recorder), self.recorder.steps
-            return numbers(self.scene, moved, end.value, steps, self.began)
-        return None
+            return end.value
+
+    def close(self) -> None:
+        """End the run, whose task is not under way any more."""
+        if self._mechanics is not None:
+            self._mechanics.close()
+
+
+def _followed(
+    recorder: Recorder, leading: Generator[Block, None, Driven]
+) -> Generator[Task, None, Driven]:
+    while True:
+        try:
+            block = next(leading)
+        except StopIteration as end:
+            return end.value
+        yield Following(recorder, block)
 
 
 def summaries(
@@ -62,7 +82,7 @@ def summaries(
 
     Scenes are drawn and made as threads become free; all are :func:`led`.
     """
-    waiting, runs = iter(scenes), dict[Recorder, _Run]()
+    waiting, runs = iter(scenes), dict[Task, _Run]()
     try:
         with Threads(count) as threads:
             while True:
@@ -73,28 +93,30 @@ def summaries(
                     except Exception as error:
                         yield number, error
                     else:
-                        runs[run.recorder] = run
                         yield from _gone_on(run, runs, threads)
                 if not runs:
                     return
-                recorder, failure = threads.take()
-                yield from _gone_on(runs[recorder], runs, threads, failure)
+                task, failure = threads.take()
+                yield from _gone_on(runs.pop(task), runs, threads, failure)
     finally:
         for run in runs.values():
-            run.mechanics.close()
+            run.close()
 
 
 def _gone_on(
-    run: _Run, runs: dict[Recorder, _Run], threads: Threads, failure: BaseException | None = None
+    run: _Run, runs: dict[Task, _Run], threads: Threads, failure: BaseException | None = None
 ) -> Iterator[tuple[int, Summary | Exception]]:
-    """What has become of a run, if it has ended."""
-    found: Summary | Exception | None
+    """What has become of a run, if it has ended; else it goes on."""
+    found: Task | Summary | Exception
     try:
         if failure is not None:
             raise failure
-        found = run.go_on(threads)
+        found = run.go_on()
     except Exception as error:
         found = error
-    if found is not None:
-        runs.pop(run.recorder).mechanics.close()
+    if isinstance(found, dict | Exception):
+        run.close()
         yield run.number, found
+        return
+    runs[found] = run
+    threads.give(found)

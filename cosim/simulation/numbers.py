@@ -13,8 +13,7 @@ from cosim.toolchain.versions import versions
 
 def motion(scene: Scene, recorder: Recorder) -> Motion:
     """What surface and part did, at the end of a run."""
-    totals = recorder.mechanics.totals()
-    return Motion(totals, recorder.at_settle, _extremes(scene, recorder), recorder.frames)
+    return Motion(recorder.at_end, recorder.at_settle, _extremes(scene, recorder), recorder.frames)
 
 
 def _extremes(scene: Scene, recorder: Recorder) -> dict[str, float]:

@@ -6,17 +6,16 @@ from functools import partial
 
 from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
-from cosim.drive.command import commands
 from cosim.files.spill import Tape, blocks
+from cosim.mechanics.part import Accounting
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, changed
 from cosim.simulation.choose_rung import choose
 from cosim.simulation.choose_steps import simulate_within_tolerance
 from cosim.simulation.guards import notes
 from cosim.simulation.numbers import motion, numbers
-from cosim.simulation.rungs.electrics import commanded
-from cosim.simulation.rungs.given_surface import simulate_part
-from cosim.simulation.rungs.rung import Driven, rungs
+from cosim.simulation.rungs.given_surface import lead_part
+from cosim.simulation.rungs.rung import Driven, ended, rungs
 from cosim.toolchain.processes import isolated
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.result import Result
@@ -68,7 +67,7 @@ def _needs_own_process(scene: Scene) -> bool:
 
 def _follow_surface(scene: Scene, progress: Progress) -> Result:
     began = time.perf_counter()
-    waveforms, moved = simulate_part(scene)
+    waveforms, moved = ended(lead_part(scene), Accounting.make)
     progress(scene.run.duration)
     summary = numbers(scene, moved, Driven(None, "exact"), 0, began)
     return Result(scene, waveforms, summary | {"notes": notes(scene, waveforms, summary)})
@@ -90,17 +89,10 @@ def _simulate(scene: Scene, progress: Progress, fmi_version: int) -> Result:
 
 
 def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Array]:
-    known = {"time": recorder.time, **driven.second}
-    electric = driven.electric
-    for command_2 in commands(scene)[1:]:
-        known["command_2"] = commanded(command_2, recorder.time)
-    if electric is not None:
-        known["command"] = electric.command
-        known["current"] = electric.current
-        known["coil_voltage"] = electric.coil_voltage
+    known = {"time": recorder.time, **driven.waves()}
     columns = recorder.mechanics.columns
     known |= {name: recorder.rows[:, k] for k, name in enumerate(columns) if name in COLUMNS}
-    if electric is None:
+    if driven.electric is None:
         del known["back_emf"]
     if scene.mechanics.actuator == "direct":
         del known["z_ram"], known["v_ram"]

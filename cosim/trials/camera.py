@@ -58,7 +58,8 @@ def instants(frames: Array, exposure: float) -> Array:
 
 def shown(heights: Array, exposure: float) -> Array:
     """What frames show of the heights at their instants: the mean of each exposure (s)."""
-    return heights.reshape(-1, instants_a_frame(exposure)).mean(axis=1)
+    n = instants_a_frame(exposure)
+    return heights.reshape(-1, n).mean(axis=1) if n > 1 else heights
 
 
 def heights(waveforms: Mapping[str, Array], body: str, frames: Array, exposure: float) -> Array:

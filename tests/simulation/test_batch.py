@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from cosim.coupling.batch.following import Intervals
 from cosim.coupling.batch.threads import Job, Threads, compiled
 from cosim.errors import CosimError, SimulationFailed
 from cosim.mechanics import pace
@@ -37,7 +38,8 @@ SHAPES: list[dict[str, Any]] = [
 
 
 def test_structures_are_those_of_c() -> None:
-    assert ctypes.sizeof(Job) == compiled().threads_size()
+    for which, structure in enumerate((Job, Intervals)):
+        assert ctypes.sizeof(structure) == compiled().threads_size(which)
 
 
 @pytest.mark.parametrize("model", ["limited", "ideal"])
@@ -50,6 +52,7 @@ def test_equal_to_single_runs(model: str, tmp_path: Path, monkeypatch: pytest.Mo
         knobs = {key: dice.uniform(*ends) for key, ends in KNOBS.items()}
         scenes.append(load("reference", {"circuit.model": model, **SHORT, **knobs, **shape}))
     scenes.append(load("direct-drive", {**SHORT, "circuit.model": "none"}))
+    scenes += [load("optimal", {**SHORT, "friction.mu_s": 0.8 + 0.02 * k}) for k in range(9)]
     check(scenes)
 
 

@@ -15,18 +15,16 @@ from tests.helpers import needs
 
 pytestmark = pytest.mark.reliability
 
-THREADS, PROCESSES = "ideal-current", "optimal"
-OVER = {
-    THREADS: [f"drive.{knob}=0.05:0.9" for knob in ("pot_max", "pot_frequency", "pot_offset")],
-    PROCESSES: ["drive.acceleration_max=50:150", "drive.frequency=50:90", "friction.mu_k=0.3:0.6"],
-}
-"""Scenes whose points run in threads and in processes, and what their sweeps go over."""
+THREADS, PROCESSES = "ideal-current", "paper"
+KNOBS = [f"drive.{knob}=0.05:0.9" for knob in ("pot_max", "pot_frequency", "pot_offset")]
+SHORT = {THREADS: 0.3, PROCESSES: 0.01}
+"""Scenes whose points run in threads and in processes, and for how long, s."""
 
 
 def arguments(points: int, out: Path, scene: str = THREADS) -> list[str]:
     """A sweep of short runs."""
-    over = (f"--over={axis}:{points}" for axis in OVER[scene])
-    short = ("--set=run.duration=0.02", "--set=run.settle=0.01")
+    over = (f"--over={axis}:{points}" for axis in KNOBS)
+    short = (f"--set=run.duration={SHORT[scene]}", f"--set=run.settle={0.5 * SHORT[scene]}")
     return [
         sys.executable, "-m", "cosim", "sweep", scene, *over, *short,
         "--workers=2", f"--out={out}",
@@ -46,7 +44,7 @@ def lines(out: Path) -> int:
     [
         (THREADS, 4, 3),
         (PROCESSES, 4, 1),
-        *(pytest.param(scene, 10, 6, marks=pytest.mark.slow) for scene in OVER),
+        *(pytest.param(scene, 10, 6, marks=pytest.mark.slow) for scene in SHORT),
     ],
 )
 def test_killed(scene: str, points: int, kills: int, tmp_path: Path) -> None:
@@ -83,7 +81,7 @@ def test_killed(scene: str, points: int, kills: int, tmp_path: Path) -> None:
 
 
 @needs.posix
-@pytest.mark.parametrize("scene", OVER)
+@pytest.mark.parametrize("scene", SHORT)
 def test_interrupted(scene: str, tmp_path: Path) -> None:
     """Ctrl-C reaches parent and workers; what was complete is kept."""
     process = subprocess.Popen(

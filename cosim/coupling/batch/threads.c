@@ -106,6 +106,7 @@ struct Threads {
     Lock lock;
     News given, back;
     Queue to_run, run;
+    int64_t waiting; /* of those to be run */
     atomic_int ended;
     int64_t threads;
     Thread thread[]; /* so many */
@@ -129,9 +130,9 @@ static Job *pop(Queue *q)
     return job;
 }
 
-/* One call of the recorder, between which the threads can be ended. */
-static int64_t go_on(Job *job)
+int64_t following_run(void *task)
 {
+    Following *job = task;
     Recorder *r = job->recorder;
     Fmu *f = r->fmu;
     const int64_t row = job->done * r->ports;
@@ -159,13 +160,15 @@ WORK work(void *threads)
             wait_for(&t->given, &t->lock);
             continue;
         }
+        t->waiting--;
         unlock(&t->lock);
         do
-            job->outcome = go_on(job);
+            job->outcome = job->run(job->task);
         while (job->outcome == UNFINISHED && !t->ended);
         lock_up(&t->lock);
         append(&t->run, job);
-        tell_one(&t->back);
+        if (t->waiting <= t->threads)
+            tell_one(&t->back);
     }
     unlock(&t->lock);
     return RESULT;
@@ -190,6 +193,7 @@ void threads_give(Threads *t, Job *job)
     job->outcome = UNFINISHED;
     lock_up(&t->lock);
     append(&t->to_run, job);
+    t->waiting++;
     tell_one(&t->given);
     unlock(&t->lock);
 }
@@ -197,11 +201,12 @@ void threads_give(Threads *t, Job *job)
 Job *threads_take(Threads *t, double patience)
 {
     lock_up(&t->lock);
-    if (!t->run.first)
+    if (!t->run.first || t->waiting > t->threads)
         wait_until(&t->back, &t->lock, patience);
-    Job *job = pop(&t->run);
+    Job *jobs = t->run.first;
+    t->run.first = NULL;
     unlock(&t->lock);
-    return job;
+    return jobs;
 }
 
 void threads_end(Threads *t)
@@ -216,7 +221,7 @@ void threads_end(Threads *t)
     free(t);
 }
 
-int64_t threads_size(void)
+int64_t threads_size(int which)
 {
-    return (int64_t)sizeof(Job);
+    return (int64_t)(which ? sizeof(Following) : sizeof(Job));
 }

@@ -1,29 +1,38 @@
-"""Many recorders led at once, each by a thread of ``threads.c``; Python prepares and takes back."""
+"""Many calls of compiled code at once, each in a thread of ``threads.c``; Python prepares them and
+takes them back."""
 
-from ctypes import Structure, addressof, byref, c_double, c_int64, c_void_p
+from ctypes import Structure, addressof, byref, c_double, c_int, c_int64, c_void_p
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
 
-import numpy as np
-
-from cosim.coupling.loop.recorder import STEPS, Block, Recorder
 from cosim.errors import SimulationFailed
 from cosim.toolchain.libraries import library
 
-_, FAILED, TO_JUDGE = range(3)
-"""Values of ``Job.outcome``."""
-
 _PATIENCE = 0.1  # s until Ctrl-C is seen
+
+
+class Task(Protocol):
+    """A call that one of the threads is to make."""
+
+    @property
+    def run(self) -> int:
+        """Where the function lies."""
+        ...
+
+    @property
+    def arguments(self) -> Structure:
+        """What its pointer points to."""
+        ...
+
+    def goes_on(self, outcome: int) -> bool:
+        """Whether the call is to be made again, after one that gave this. Raises what failed."""
+        ...
 
 
 class Job(Structure):
     """``Job`` of ``threads.h``, which says what it holds."""
 
-    _fields_ = (
-        *((name, c_void_p) for name in ("recorder", "edges", "start", "end")),
-        *((name, c_int64) for name in ("n", "done", "at_once", "most")),
-        *(("internal", c_void_p), ("enough", c_double), ("outcome", c_int64), ("next", c_void_p)),
-    )
+    _fields_ = (("run", c_void_p), ("task", c_void_p), ("outcome", c_int64), ("next", c_void_p))
 
 
 @cache
@@ -35,7 +44,7 @@ def compiled() -> Any:
         ("threads_give", None, (c_void_p, c_void_p)),
         ("threads_take", c_void_p, (c_void_p, c_double)),
         ("threads_end", None, (c_void_p,)),
-        ("threads_size", c_int64, ()),
+        ("threads_size", c_int64, (c_int,)),
     ):
         function = getattr(found, name)
         function.restype, function.argtypes = result, arguments
@@ -49,7 +58,8 @@ class Threads:
         self._library = compiled()
         self._count = count
         self._threads = None
-        self._under_way: dict[int, tuple[Job, Recorder, Block]] = {}
+        self._under_way: dict[int, tuple[Job, Task]] = {}
+        self._back: int | None = None  # the first of the jobs that are back
 
     def __enter__(self) -> "Threads":
         self._threads = self._library.threads_start(self._count)
@@ -62,40 +72,29 @@ class Threads:
         self._under_way.clear()
 
     def __len__(self) -> int:
-        """Recorders that are being led."""
+        """Tasks that are under way."""
         return len(self._under_way)
 
-    def give(self, recorder: Recorder, block: Block) -> None:
-        """Have a recorder led through a block, as its ``follow`` would."""
-        edges, start, end = (np.ascontiguousarray(values) for values in block)
-        job = Job(
-            recorder=addressof(recorder.state),
-            **{"edges": edges.ctypes.data, "start": start.ctypes.data, "end": end.ctypes.data},
-            **{"n": len(edges), "at_once": recorder.at_once, "most": STEPS},
-            internal=addressof(recorder.mechanics.places["internal"]),
-            enough=recorder.pace.enough,
-        )
-        self._under_way[addressof(job)] = job, recorder, (edges, start, end)
+    def give(self, task: Task) -> None:
+        """Have a task done."""
+        job = Job(run=task.run, task=addressof(task.arguments))
+        self._under_way[addressof(job)] = job, task
         self._library.threads_give(self._threads, byref(job))
 
-    def take(self) -> tuple[Recorder, BaseException | None]:
-        """One of the recorders, whichever is done first, and why its block could not be finished:
-        what its ``follow`` would raise."""
+    def take(self) -> tuple[Task, BaseException | None]:
+        """One of the tasks, whichever is done first, and why it could not be finished."""
         while True:
-            place = self._library.threads_take(self._threads, _PATIENCE)
+            place = self._back or self._library.threads_take(self._threads, _PATIENCE)
             if place is None:
                 continue
-            job, recorder, _ = self._under_way[place]
-            recorder.at_once = job.at_once
-            failure = recorder.failure() if job.outcome == FAILED else None
-            if job.outcome == TO_JUDGE:
-                try:
-                    recorder.tell()
-                except SimulationFailed as error:
-                    failure = error
-                job.enough = recorder.pace.enough
-                if failure is None and job.done < job.n:
+            job, task = self._under_way[place]
+            self._back = job.next
+            failure = None
+            try:
+                if task.goes_on(job.outcome):
                     self._library.threads_give(self._threads, place)
                     continue
+            except SimulationFailed as error:
+                failure = error
             del self._under_way[place]
-            return recorder, failure
+            return task, failure

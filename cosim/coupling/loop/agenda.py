@@ -1,6 +1,8 @@
 """When something is to be written down: rows, frames of the camera, the end of settling."""
 
 from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,14 +28,37 @@ def count(step: float, end: float) -> int:
     return int(end / step * (1 + 1e-12)) + 1
 
 
+Agenda = tuple[Array, npt.NDArray[np.int32]]
+
+
 def agendas(
-    row_step: float, duration: float, settle: float, stops: list[float], shutter: float
-) -> Iterator[tuple[Array, npt.NDArray[np.int32]]]:
+    row_step: float, duration: float, settle: float, stops: tuple[float, ...], shutter: float
+) -> Iterator[Agenda]:
     """Times (s) at which something is to be written down, and what, part after part; not more than
     ENTRIES rows and frames in one. The last time of all is endless.
 
     Of frames, which are exposed for a share ``shutter`` of their interval, the instants.
     """
+    first, more = _planned(row_step, duration, settle, stops, shutter)
+    yield first
+    if more:
+        further = _agendas(row_step, duration, settle, stops, shutter)
+        next(further)
+        yield from further
+
+
+@lru_cache(16)
+def _planned(*given: Any) -> tuple[Agenda, bool]:
+    """The first part, which is that of many runs, and whether others follow."""
+    first = next(_agendas(*given))
+    for array in first:
+        array.flags.writeable = False
+    return first, np.isfinite(first[0][-1])
+
+
+def _agendas(
+    row_step: float, duration: float, settle: float, stops: tuple[float, ...], shutter: float
+) -> Iterator[Agenda]:
     frame_step = 1.0 / FRAME_RATE
     extra, kinds = np.array([settle, *stops]), np.array([_SETTLED, *[0] * len(stops)], np.int32)
     # Whole numbers of SAME_TIME, so that no part ends between times that are one.

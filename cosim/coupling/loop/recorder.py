@@ -2,8 +2,9 @@
 
 import ctypes
 from collections.abc import Callable
+from contextlib import nullcontext
 from ctypes import c_double, c_int32
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -46,12 +47,11 @@ class Recorder:
         self._told = -1.0
         self._reached = 0.0
         self._fault: BaseException | None = None
-        width = len(mechanics.columns)
+        self._width = width = len(mechanics.columns)
         self._step_of_rows = run.output_step
         self._rows, self._frames, self._time = Tape(width), Tape(1), Tape(1)
         # What is not on the tapes yet. A frame's sample goes behind the last row.
-        self._new_rows = np.empty((agenda.ENTRIES + 1, width))
-        self._new_frames = np.empty(agenda.ENTRIES + 1)
+        self._new_rows, self._new_frames = np.empty((0, width)), np.empty(0)
         self._totals = (c_double * len(mechanics.total_names))()
         self._counters = (c_int32 * len(COUNTERS))()
         extremes = len(mechanics.step_outputs) - 4
@@ -59,12 +59,12 @@ class Recorder:
         """Largest and smallest values after settling, in pairs: acceleration (m/s²), velocity (m/s)
         and height (m) of the surface, and current of the coil (A) where the mechanics have the
         source."""
-        self._fmu = Fmu(**mechanics.instance.addresses())
+        self._fmu = Fmu(**mechanics.instance.addresses)
         self._library.fmu_bind(ctypes.byref(self._fmu), mechanics.instance.version)
         grip = mechanics.normal_force
         corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
         self._agendas = agenda.agendas(
-            *(run.output_step, run.duration, run.settle, [*corners, run.duration], run.shutter)
+            *(run.output_step, run.duration, run.settle, (*corners, run.duration), run.shutter)
         )
         self._corners = np.array([grip.corners, grip.forces] if grip else [])
         schedule = None
@@ -89,8 +89,6 @@ class Recorder:
             inputs=mechanics.inputs,
             outputs=mechanics.step_outputs,
             settle=run.settle,
-            rows=self._new_rows.ctypes.data,
-            frames=self._new_frames.ctypes.data,
             z_surface=mechanics.columns.index("z_surface"),
             totals_at_settle=self._totals,
             counters_at_settle=self._counters,
@@ -105,10 +103,11 @@ class Recorder:
         and then set the last argument, which the step need not have ended with; 0 where it failed:
         see ``failure``."""
         self._plan()
-        with caught_signals(self._stop):
+        # Python is called, and so a signal may come in between, only if more is to be planned.
+        with caught_signals(self._stop) if self.state.n_times == 1 else nullcontext():
             if not self._library.recorder_begin(self._state) or self._fault:
                 raise self.failure()
-        self.tell()
+        self._tell_time()
 
     def follow(self, edges: Array, start: Array, end: Array) -> None:
         """Advance through intervals that end at ``edges`` (s); in each the inputs (A or V, a column
@@ -143,6 +142,9 @@ class Recorder:
         Raises SimulationFailed where it goes too slowly to be worked off at all.
         """
         self.pace.judge(self._fmu.time, self.steps)
+        self._tell_time()
+
+    def _tell_time(self) -> None:
         done = self.state.next
         reached = float(self._agenda[0][done - 1]) if done else self._reached
         if reached > self._told:
@@ -170,13 +172,19 @@ class Recorder:
             self._reached = float(self._agenda[0][state.next - 1])
         self._agenda = next(self._agendas)
         times, what = self._agenda
+        if len(self._new_rows) <= len(times):
+            self._new_rows = np.empty((len(times) + 1, self._width))
+            self._new_frames = np.empty(len(times) + 1)
+            state.rows, state.frames = self._new_rows.ctypes.data, self._new_frames.ctypes.data
         state.times, state.what = times.ctypes.data, what.ctypes.data
         state.n_times, state.next = len(times), 0
 
     def _take(self) -> None:
         state = self.state
-        self._rows.append(self._new_rows[: state.n_rows])
-        self._frames.append(self._new_frames[: state.n_frames])
+        if state.n_rows:
+            self._rows.append(self._new_rows[: state.n_rows])
+        if state.n_frames:
+            self._frames.append(self._new_frames[: state.n_frames])
         state.n_rows = state.n_frames = 0
 
     @property
@@ -189,6 +197,11 @@ class Recorder:
         """Totals of the mechanics when settling ended."""
         names = (*self.mechanics.total_names, *COUNTERS)
         return dict(zip(names, (*self._totals, *self._counters), strict=True))
+
+    @cached_property
+    def at_end(self) -> dict[str, float]:
+        """The same when it is asked for first: at the end of the run."""
+        return self.mechanics.totals()
 
     @property
     def rows(self) -> Array:

@@ -1,4 +1,4 @@
-"""The voice coil's electrical side of a run: waveforms and energies.
+"""The voice coil's electrical side of a run: energies and the command.
 
 Energies are those of all ``coil.count`` coils, J; currents and voltages those of one coil.
 """
@@ -17,18 +17,8 @@ from cosim.scene import Scene
 
 @dataclass(frozen=True)
 class Electrics:
-    """What the electrical side did; arrays hold a value for each row of the waveforms.
+    """What the electrical side did, in numbers."""
 
-    In a row at a jump stands what is before it, as in the mechanics' columns, whose state a row
-    is: the first row is the machine at rest, without command and current.
-    """
-
-    command: Array
-    """V1, V."""
-    current: Array
-    """Current of one coil, A."""
-    coil_voltage: Array
-    """Voltage across the coils, V."""
     energy_in: float
     """Delivered to coils and sense resistor, J."""
     energy_copper: float

@@ -1,7 +1,8 @@
 """Rung ``ideal``: the coil's current is the command's, whatever voltage it takes."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -31,16 +32,26 @@ class Ideal(Led):
             yield edges[1:], start, end
             for k, coil in enumerate(coils):
                 coil.follow(edges, start[:, k], end[:, k])
-        motion = recorder.mechanics.totals()["energy_in"]
-        electric = coils[0].electrics(recorder, drives[0], "back_emf", motion)
-        if len(drives) == 1:
-            return Driven(electric)
-        # The work that both coils did is in the first one's account.
-        other = coils[1].electrics(recorder, drives[1], "back_emf_2", 0.0)
-        energies = ("energy_in", "energy_copper", "energy_magnetic")
-        sums = {name: getattr(electric, name) + getattr(other, name) for name in energies}
-        second = {"current_2": other.current, "coil_voltage_2": other.coil_voltage}
-        return Driven(replace(electric, **sums), second=second)
+        motion = recorder.at_end["energy_in"]
+        electric = coils[0].electrics(motion)
+        if len(drives) > 1:
+            # The work that both coils did is in the first one's account.
+            other = coils[1].electrics(0.0)
+            energies = ("energy_in", "energy_copper", "energy_magnetic")
+            sums = {name: getattr(electric, name) + getattr(other, name) for name in energies}
+            electric = replace(electric, **sums)
+        return Driven(electric, waves=partial(_waves, drives, coils, recorder))
+
+
+def _waves(
+    drives: Sequence[Command], coils: "Sequence[_Coil]", recorder: Recorder
+) -> dict[str, Array]:
+    found: dict[str, Array] = {}
+    for drive, coil, surface in zip(drives, coils, ("", "_2"), strict=False):
+        found[f"command{surface}"] = commanded(drive, recorder.time)
+        current, voltage = coil.waves(recorder.column(f"back_emf{surface}"))
+        found |= {f"current{surface}": current, f"coil_voltage{surface}": voltage}
+    return found
 
 
 class _Coil:
@@ -85,22 +96,22 @@ class _Coil:
                 voltage += eddy.resistance * (lag + rest * np.exp(-since / eddy.tau))
             self._waves.append(np.stack([current, voltage], axis=1))
 
-    def electrics(self, recorder: Recorder, command: Command, emf: str, motion: float) -> Electrics:
-        """At the end of the run; ``emf`` is the recorder's column of the back-EMF, ``motion`` the
-        work (J) that one coil did. The source gives whatever voltage the current takes, so what it
-        delivers is the sum of where it goes.
+    def waves(self, back_emf: Array) -> tuple[Array, Array]:
+        """Current (A) and voltage (V) in the rows, in which the back-EMF (V) is known."""
+        waves, voltage = self._waves.array(), Tape(1)
+        for few in blocks(len(waves)):
+            voltage.append(waves[few, 1] + back_emf[few])
+        return self._waves.column(0), voltage.column()
+
+    def electrics(self, motion: float) -> Electrics:
+        """At the end of the run; ``motion`` is the work (J) that one coil did. The source gives
+        whatever voltage the current takes, so what it delivers is the sum of where it goes.
         """
         scene, coil = self._scene, self._scene.coil
         heat = (coil.resistance + coil.count * scene.circuit.sense_resistance) * self._squares / 3.0
         copper = coil.count * (heat + self._eddy.heat)
         held = magnetic(scene, self._last, self._eddy.current)
-        waves, voltage, moved = self._waves.array(), Tape(1), recorder.column(emf)
-        for few in blocks(len(waves)):
-            voltage.append(waves[few, 1] + moved[few])
         return Electrics(
-            command=commanded(command, recorder.time),
-            current=self._waves.column(0),
-            coil_voltage=voltage.column(),
             energy_in=copper + held + coil.count * motion,
             energy_copper=copper,
             energy_magnetic=held,

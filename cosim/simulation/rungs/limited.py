@@ -3,8 +3,10 @@
 The source's command is an input of the FMU; there is no ngspice.
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
+from functools import partial
 
+from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Block, Recorder
 from cosim.drive.command import commands
 from cosim.drive.pieces import Command
@@ -23,17 +25,23 @@ class Limited(Led):
         drives = commands(scene)
         for edges, start, end in straights(drives, scene.run.duration):
             yield edges[1:], start, end
-        second = {}
-        if len(drives) > 1:
-            columns = {"current_2": "coil_current_2", "coil_voltage_2": "coil_voltage_2"}
-            second = {name: recorder.column(own) for name, own in columns.items()}
-        return Driven(_electrics(scene, drives[0], recorder), method="monolithic", second=second)
+        waves = partial(_waves, drives, recorder)
+        return Driven(_electrics(scene, recorder), method="monolithic", waves=waves)
 
 
-def _electrics(scene: Scene, command: Command, recorder: Recorder) -> Electrics:
+def _waves(drives: Sequence[Command], recorder: Recorder) -> dict[str, Array]:
+    found: dict[str, Array] = {}
+    for drive, surface in zip(drives, ("", "_2"), strict=False):
+        found[f"command{surface}"] = commanded(drive, recorder.time)
+        found[f"current{surface}"] = recorder.column(f"coil_current{surface}")
+        found[f"coil_voltage{surface}"] = recorder.column(f"coil_voltage{surface}")
+    return found
+
+
+def _electrics(scene: Scene, recorder: Recorder) -> Electrics:
     """From the mechanics' own current source, at the end of its run."""
     count, run = scene.coil.count, scene.run
-    totals, before = recorder.mechanics.totals(), recorder.at_settle
+    totals, before = recorder.at_end, recorder.at_settle
     share = {
         limit: (totals[name] - before[name]) / (run.duration - run.settle)
         for limit, name in (
@@ -43,9 +51,6 @@ def _electrics(scene: Scene, command: Command, recorder: Recorder) -> Electrics:
         )
     }
     return Electrics(
-        command=commanded(command, recorder.time),
-        current=recorder.column("coil_current"),
-        coil_voltage=recorder.column("coil_voltage"),
         energy_in=count * totals["energy_output"],
         energy_copper=count * totals["energy_copper"],
         energy_magnetic=count * totals["energy_magnetic"],

@@ -4,14 +4,15 @@
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Block, Recorder
 from cosim.files.declared import modules
 from cosim.scene import Scene
@@ -31,8 +32,10 @@ class Driven:
     circuit_steps: int = 0
     circuit_rejected: int = 0
     versions: Mapping[str, str] = field(default_factory=dict)
-    second: Mapping[str, npt.NDArray[np.float64]] = field(default_factory=dict)
-    """Columns of the second surface's coil."""
+    waves: Callable[[], Mapping[str, Array]] = dict
+    """Makes the columns of the coils: a value for each row of the waveforms. In a row at a jump
+    stands what is before it, as in the mechanics' columns, whose state a row is: the first row is
+    the machine at rest, without command and current."""
 
 
 @dataclass(frozen=True)
@@ -77,13 +80,21 @@ class Led(Rung):
         """
 
     def drive(self, scene: Scene, recorder: Recorder) -> Driven:
-        leading = self.lead(scene, recorder)
-        while True:
-            try:
-                block = next(leading)
-            except StopIteration as end:
-                return end.value
-            recorder.follow(*block)
+        return ended(self.lead(scene, recorder), lambda block: recorder.follow(*block))
+
+
+_Task = TypeVar("_Task")
+_Found = TypeVar("_Found")
+
+
+def ended(leading: Generator[_Task, None, _Found], do: Callable[[_Task], object]) -> _Found:
+    """What a generator returns, each of its tasks having been done before the next is asked for."""
+    while True:
+        try:
+            task = next(leading)
+        except StopIteration as end:
+            return end.value
+        do(task)
 
 
 @cache

@@ -37,13 +37,15 @@ class Spice(Rung):
         # Other methods may keep a part of the circuit's charge from the mechanics.
         locked = scene.coupling.method == "step-locked"
         error = own_error(scene, _points(log), version) if locked else None
+        electric, waves = _electrics(scene, command(scene), log, recorder.time)
         return Driven(
-            _electrics(scene, command(scene), log, recorder.time),
+            electric,
             method=scene.coupling.method,
             v_average_error=error,
             circuit_steps=lead.steps,
             circuit_rejected=lead.state.attempts - lead.steps,
             versions={"ngspice": lead.ngspice},
+            waves=lambda: waves,
         )
 
 
@@ -60,8 +62,10 @@ def _log_alone(scene: Scene, fmi_version: int) -> dict[str, Array]:
         mechanics.close()
 
 
-def _electrics(scene: Scene, command: Command, log: dict[str, Array], rows: Array) -> Electrics:
-    """From the vectors at the accepted points of the circuit.
+def _electrics(
+    scene: Scene, command: Command, log: dict[str, Array], rows: Array
+) -> tuple[Electrics, dict[str, Array]]:
+    """From the vectors at the accepted points of the circuit: the account, and the columns.
 
     Energies are sums of step times means over the step: for them the trapezoidal companion of an
     inductance, which ngspice integrates with, balances exactly.
@@ -93,10 +97,7 @@ def _electrics(scene: Scene, command: Command, log: dict[str, Array], rows: Arra
             at = rows[done:stop][here]
             waves.append(np.stack([np.interp(at, time, values) for values in known], axis=1))
         done = stop
-    return Electrics(
-        command=waves.column(2) if made else commanded(command, rows),
-        current=waves.column(0),
-        coil_voltage=waves.column(1),
+    electric = Electrics(
         energy_in=delivered,
         energy_copper=copper * squares + coil.count * eddy.heat,
         energy_magnetic=magnetic(scene, float(log["i(vemf)"][-1] / coil.count), eddy.current),
@@ -104,6 +105,11 @@ def _electrics(scene: Scene, command: Command, log: dict[str, Array], rows: Arra
         current_min=float(least),
         limited=_limited(scene, log),
     )
+    return electric, {
+        "command": waves.column(2) if made else commanded(command, rows),
+        "current": waves.column(0),
+        "coil_voltage": waves.column(1),
+    }
 
 
 def _limited(scene: Scene, log: dict[str, Array]) -> dict[str, float]:

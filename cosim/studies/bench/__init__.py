@@ -15,7 +15,7 @@ from cosim.studies.bench.memory import growth
 from cosim.studies.bench.parts import coupled_over_parts
 from cosim.studies.bench.peers import compare
 from cosim.studies.bench.rungs import cost_exponent, real_time
-from cosim.studies.bench.timings import solvers, throughput
+from cosim.studies.bench.timings import map_over_bare_calls, solvers, throughput
 from cosim.studies.fit.cases import Case
 from cosim.studies.tables import machine
 from cosim.trials.camera import film, frame_times
@@ -62,6 +62,9 @@ def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
         "instructions_per_period": per_period(),
         "part": {**seconds, "trials": len(found), "measured": trials is not None},
         "sweep_over_bare_loop": throughput(scene, offsets, 3 if quick else 7),
+        "map_over_bare_calls": map_over_bare_calls(
+            load("paper-limited", ["run.duration=1"]), _OFFSETS, 3 if quick else 7
+        ),
         "quick": quick,
         "machine": {
             **{name: host[name] for name in ("processor", "cores", "python")},

@@ -16,6 +16,7 @@ BARS = {
     "real_time.ideal": (60.0, inf),
     "real_time.part": (5000.0, inf),
     "cost_exponent": (0.97, 1.03),
+    "map_over_bare_calls": (-inf, 1.1),
 }
 """Least and greatest median."""
 
@@ -29,6 +30,7 @@ _TITLES = {
     "memory_growth": "Peak memory of a run ten times as long, over that of the shorter",
     "instructions_per_period": "Instructions of the FMU per period",
     "part": "The part on a given surface, exact over published solver",
+    "map_over_bare_calls": "CPU time of a sweep over that of bare calls of the compiled loop",
     "sweep_over_bare_loop": "Points a second of a sweep's worker over those of a bare loop",
 }
 

@@ -1,16 +1,27 @@
 """Times of the part's two solvers beside each other, and of a sweep beside a bare loop."""
 
 from collections.abc import Callable, Sequence
+from ctypes import addressof
+from pathlib import Path
 from statistics import median
-from time import perf_counter
+from tempfile import TemporaryDirectory
+from time import perf_counter, process_time
 
 import numpy as np
 
+from cosim.coupling.loop.recorder import Recorder
+from cosim.coupling.loop.structures import loop
 from cosim.mechanics import part
+from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
+from cosim.simulation.rungs.rung import Led, rungs
 from cosim.studies.bench.measures import ratios, take_turns
 from cosim.studies.fit.cases import Case, Solver
-from cosim.studies.sweep.point import evaluate
+from cosim.studies.sweep.batch import runner
+from cosim.studies.sweep.dataset import Numbers
+from cosim.studies.sweep.design import grid
+from cosim.studies.sweep.journal import Journal
+from cosim.studies.sweep.point import evaluate, point
 from cosim.studies.sweep.pool import Pool
 from cosim.trials import published
 
@@ -49,6 +60,44 @@ def throughput(scene: Scene, offsets: Sequence[float], rounds: int) -> dict[str,
             bare.append(perf_counter() - between)
             pooled.append(between - began)
     return ratios(bare[1:], pooled[1:])  # the first round warms up
+
+
+def map_over_bare_calls(scene: Scene, offsets: Sequence[float], rounds: int) -> dict[str, float]:
+    """CPU time of a sweep, from its points to their numbers in journal and memory, over that of
+    bare calls of the compiled loop, whose preparation does not count: median, ``low``, ``high``.
+
+    The points are ``scene`` with each of the ``offsets`` (V). Both take turns.
+    """
+    design = grid({"drive.offset": offsets})
+    points = [(number, design.point(number)) for number in range(len(design))]
+    bare, swept = [], []
+    for _ in range(rounds + 1):
+        bare.append(sum(_bare(point(scene, values, False)) for _, values in points))
+        with TemporaryDirectory() as folder, Journal(Path(folder) / "journal", "") as journal:
+            began = process_time()
+            with runner(scene, 1) as batch:
+                numbers = Numbers(len(design))
+                for number, outcome in batch.run(points):
+                    journal.add(number, outcome)
+                    numbers.add(number, outcome)
+            swept.append(process_time() - began)
+    return ratios(swept[1:], bare[1:])  # the first round warms up
+
+
+def _bare(scene: Scene) -> float:
+    """CPU seconds of the compiled loop alone for a scene whose inputs are known beforehand."""
+    mechanics, rung = Mechanics(scene), rungs()[scene.circuit.model]
+    assert isinstance(rung, Led)
+    recorder = Recorder(scene, mechanics, lambda _: None)
+    seconds = 0.0
+    for block in rung.lead(scene, recorder):
+        edges, start, end = (np.ascontiguousarray(values) for values in block)
+        inputs = (edges.ctypes.data, start.ctypes.data, end.ctypes.data)
+        began = process_time()
+        loop().recorder_follow(addressof(recorder.state), len(edges), *inputs, 1 << 40)
+        seconds += process_time() - began
+    mechanics.close()
+    return seconds
 
 
 def _call(case: Case, solver: Solver) -> Callable[[], int]:

@@ -16,7 +16,8 @@ class Batch:
     """Runs points of one scene in ``workers`` threads; to be used as :class:`Pool` is."""
 
     def __init__(self, base: Scene, workers: int, whole_periods: bool = False) -> None:
-        self._base, self._whole_periods = base, whole_periods
+        # What all points have in common is changed once.
+        self._base, self._whole_periods = point(base, {}, False), whole_periods
         self._count = workers
 
     def __enter__(self) -> "Batch":

@@ -23,24 +23,45 @@ POINT = "point"
 """The dimension of a sample."""
 
 
-def dataset(
-    scene: Scene, design: Design, outcomes: Iterable[tuple[int, Outcome]], versions: dict[str, str]
-) -> xr.Dataset:
+class Numbers:
+    """The numbers of ``count`` points, by name and number of the point, and why some failed."""
+
+    def __init__(self, count: int, outcomes: Iterable[tuple[int, Outcome]] = ()) -> None:
+        self._count = count
+        self._values: dict[str, Array] = {}
+        self._first: dict[tuple[str, ...], int] = {}  # points with these names
+        self.failures = np.full(count, "", dtype=object)
+        self.failed = 0
+        for index, outcome in outcomes:
+            self.add(index, outcome)
+
+    def add(self, index: int, outcome: Outcome) -> None:
+        """Take up a point that has been run."""
+        if outcome.failure:
+            self.failures[index] = outcome.failure
+            self.failed += 1
+        values, names = self._values, tuple(outcome.numbers)
+        if index <= self._first.get(names, index):
+            self._first[names] = index
+        for name, value in outcome.numbers.items():
+            if name not in values:
+                values[name] = np.full(self._count, np.nan)
+            values[name][index] = value
+
+    def by_name(self) -> dict[str, Array]:
+        """NaN where a point has none. The order is that of the points, in whichever they ran."""
+        order = sorted(self._first, key=lambda names: self._first[names])
+        return {name: self._values[name] for names in order for name in names}
+
+
+def dataset(scene: Scene, design: Design, found: Numbers, versions: dict[str, str]) -> xr.Dataset:
     """The numbers of each point's summary over the keys of the sweep, with their units.
 
     A key's coordinate (:func:`_names`) has its unit, its meaning and, as ``key``, its
     ``table.key``. Beside a knob stands what it stands for. NaN stands for a point that failed, is
     still to be run, or has no such number. SI units.
     """
-    numbers: dict[str, Array] = {}
-    count = len(design)
-    failures = np.full(count, "", dtype=object)
-    for index, outcome in sorted(outcomes, key=lambda pair: pair[0]):
-        failures[index] = outcome.failure
-        for name, value in outcome.numbers.items():
-            if name not in numbers:
-                numbers[name] = np.full(count, np.nan)
-            numbers[name][index] = value
+    numbers = found.by_name()
     axes = _names(design, {*numbers, FAILURE, POINT})
     dims = tuple(axes) if design.sample is None else (POINT,)
     columns = [list(axis.values) for axis in design.axes]
@@ -59,7 +80,7 @@ def dataset(
         for name, values in numbers.items()
     }
     about = {"long_name": "Why the point failed; empty where it did not"}
-    variables[FAILURE] = (dims, failures.astype(str).reshape(design.shape), about)
+    variables[FAILURE] = (dims, found.failures.astype(str).reshape(design.shape), about)
     attributes = {
         "title": f"Sweep of {scene.name}",
         "scene": to_toml(scene),

@@ -44,8 +44,8 @@ def evaluate(
 
 def point(base: Scene, values: Mapping[str, Number | str], whole_periods: bool) -> Scene:
     """The scene of a point. Raises BadInput."""
-    if not base.surface_is_given:  # whose peaks are those of the rows
-        few_rows = float(values.get("run.duration", base.run.duration)) / 2.0
+    few_rows = float(values.get("run.duration", base.run.duration)) / 2.0
+    if few_rows != base.run.output_step:
         values = {"run.output_step": few_rows, **values}
     scene = changed(base, values, "--over")
     return changed(scene, periods_made_whole(scene), "--over") if whole_periods else scene

@@ -94,18 +94,17 @@ def _sweep(
     with Journal(folder / JOURNAL, _identity(scene, design, made_by)) as journal:
 
         def refreshed() -> xr.Dataset:
-            data = dataset.dataset(scene, design, journal.read(), made_by)
+            data = dataset.dataset(scene, design, numbers, made_by)
             dataset.write(folder / RESULT, data)
             return data
 
-        total, done = len(design), len(journal.done)
-        failed = sum(1 for _, outcome in journal.read() if outcome.failure)
-        progress(done, failed, total)
+        numbers = dataset.Numbers(len(design), journal.read())
+        progress(len(journal.done), numbers.failed, len(design))
         due = time.monotonic() + _REFRESH
         for number, outcome in _run(scene, design, journal, workers, dask):
             journal.add(number, outcome)
-            done, failed = done + 1, failed + bool(outcome.failure)
-            progress(done, failed, total)
+            numbers.add(number, outcome)
+            progress(len(journal.done), numbers.failed, len(design))
             if time.monotonic() >= due:
                 began = time.monotonic()
                 refreshed()

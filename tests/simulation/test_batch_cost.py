@@ -1,0 +1,25 @@
+"""What a point of a map costs beside the compiled loop, counted: the same on every machine."""
+
+import cProfile
+import pstats
+from functools import partial
+
+from cosim.scene import load
+from cosim.simulation.many import summaries
+from cosim.studies.sweep.point import point
+
+
+def test_python_calls_few_functions_for_a_point() -> None:
+    """Some 0.2 ms; what a simulated second of `paper-limited` takes is ten times that."""
+    base = point(load("paper-limited", ["run.duration=0.05", "run.settle=0.02"]), {}, False)
+    knobs = [{"drive.amplitude": 5.0 + 0.02 * k, "drive.offset": -0.01 * k} for k in range(100)]
+
+    def run() -> None:
+        for _, found in summaries(enumerate(partial(point, base, at, False) for at in knobs), 1):
+            assert isinstance(found, dict)
+
+    run()  # what is kept from run to run is made
+    profile = cProfile.Profile()
+    profile.runcall(run)
+    calls = pstats.Stats(profile).total_calls / len(knobs)  # pyright: ignore[reportAttributeAccessIssue]
+    assert calls < 550, f"{calls:.0f} calls a point"
