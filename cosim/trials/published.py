@@ -12,6 +12,8 @@ GRAVITY = 9.81  # m/s²
 MU_S = 0.72  # measured, and kept in the fit
 MU_K_FITTED = 0.6234
 
+TRIALS = tuple(f"Trial #{n}" for n in range(1, 11))
+"""The names of their files."""
 FORCES_MEASURED = (11.089, 16.901, 5.278, 5.278, 5.278, 5.278, 5.278, 5.278, 5.278, 22.841)
 FORCES_FITTED = (
     *(10.6500, 13.0009, 9.9833, 6.7872, 6.0413),
@@ -21,4 +23,3 @@ FORCE_BOUNDS = (
     *((4.0, 16.0), (12.8, 19.2), (4.0, 16.0), (4.9, 7.3), (4.9, 7.3)),
     *((4.9, 7.3), (4.9, 7.3), (4.56, 6.84), (4.0, 8.0), (8.0, 24.0)),
 )
-OTHER_BOUNDS = (4.0, 24.0)  # for a trial that is not among the ten: the widest of theirs

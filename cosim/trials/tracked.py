@@ -38,10 +38,11 @@ class Trial:
     plate: Track | None
 
 
-def read_folder(folder: Path) -> list[Trial]:
+def read_folder(folder: Path, apart: Path | None = None) -> list[Trial]:
     """All trials of a folder, in the order of their numbers.
 
-    Where files have “trial” in their names only these are read, else all ``.csv`` and ``.txt``.
+    Where files have “trial” in their names only these are read, else all ``.csv`` and ``.txt`` but
+    the file ``apart``.
     """
     try:
         found = sorted(folder.iterdir())
@@ -49,6 +50,7 @@ def read_folder(folder: Path) -> list[Trial]:
         raise BadInput(f"{folder}: cannot be read ({error.strerror}).") from error
     files = [path for path in found if path.suffix.lower() in (".csv", ".txt")]
     files = [path for path in files if path.is_file() and not path.name.startswith(".")]
+    files = [path for path in files if apart is None or path.resolve() != apart.resolve()]
     files = [path for path in files if "trial" in path.name.lower()] or files
     if not files:
         raise BadInput(f"{folder}: there are no trials (.csv or .txt) in this folder.")

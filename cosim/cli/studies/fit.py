@@ -1,6 +1,6 @@
 """``cosim fit``."""
 
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 
 from cosim.cli.command import Command
@@ -12,29 +12,66 @@ def _options(parser: ArgumentParser) -> None:
         "trials", type=Path, metavar="TRIALS_DIR", help="folder of the trials' CSVs"
     )
     parser.add_argument(
-        "--evaluate", choices=["published"], help="take the paper's parameters instead of a fit"
+        "--forces",
+        metavar="FILE",
+        help="what is known of normal forces: a CSV with the columns trial, force, lower, upper, "
+        "mass, or a TOML with a table for each trial; or “published”",
+    )
+    parser.add_argument(
+        "--mu-s",
+        type=_number_or_free,
+        default=None,
+        metavar="MU_S",
+        help="static friction, or “free” to fit it within the bounds of the forces "
+        "(default: 0.72, as published)",
+    )
+    parser.add_argument(
+        "--plate",
+        action="store_true",
+        help="fit the friction of the springed plate too, which moves as tracked",
+    )
+    parser.add_argument(
+        "--mass-ratio",
+        type=float,
+        metavar="R",
+        help="mass of the part over that of the surface with what moves with it (default: fitted)",
+    )
+    parser.add_argument(
+        "--evaluate",
+        choices=["published"],
+        help="take the paper's parameters, by its procedure, instead of a fit",
     )
     parser.add_argument(
         "--solver",
         choices=["exact", "published"],
         default="exact",
-        help="exact events, or the authors' fixed-step scheme (default: exact)",
-    )
-    parser.add_argument(
-        "--plate", action="store_true", help="fit the friction of the springed plate too"
+        help="of the paper's parameters: exact, or the authors' fixed-step scheme (default: exact)",
     )
     add_out(parser, "results/fit")
+
+
+def _number_or_free(text: str) -> float | str:
+    if text == "free":
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        raise ArgumentTypeError(f"“{text}” is neither a number nor “free”") from None
 
 
 def _run(arguments: Namespace) -> None:
     import cosim
 
+    given = {} if arguments.mu_s is None else {"mu_s": arguments.mu_s}
     with writable(arguments.out):
         found = cosim.fit(
             arguments.trials,
+            forces=arguments.forces,
+            plate=arguments.plate,
+            mass_ratio=arguments.mass_ratio,
             evaluate=arguments.evaluate,
             solver=arguments.solver,
-            plate=arguments.plate,
+            **given,
         )
         found.save(arguments.out)
     print(found)

@@ -25,6 +25,7 @@ from cosim.studies.sweep.point import evaluate, point
 from cosim.studies.sweep.pool import Pool
 from cosim.trials import published
 
+OTHER_FORCE = 14.0  # weights of the part, on a trial that is not among the published
 SOLVERS: tuple[Solver, Solver] = ("exact", "published")
 
 
@@ -101,9 +102,8 @@ def _bare(scene: Scene) -> float:
 
 
 def _call(case: Case, solver: Solver) -> Callable[[], int]:
-    number = case.trial.number or 0
-    fitted = dict(enumerate(published.FORCES_FITTED, 1)).get(number, np.mean(case.bounds))
-    force = float(fitted) * published.GRAVITY
+    fitted = dict(zip(published.TRIALS, published.FORCES_FITTED, strict=True))
+    force = fitted.get(case.trial.name, OTHER_FORCE) * published.GRAVITY
     law = part.friction_law(published.MU_S, published.MU_K_FITTED, force, published.GRAVITY, 0.0)
     rows = np.empty((3, len(case.time) if solver == "exact" else len(case.grid)))
     motion: tuple[int | None, ...] = tuple(row.ctypes.data for row in rows)

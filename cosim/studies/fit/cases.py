@@ -1,26 +1,26 @@
-"""A tracked trial as a task for a simulation, and the error that a set of parameters makes in it.
+"""A tracked trial by its authors' procedure: the surface as tracked, the part simulated on it.
 
-Procedure and measure are the authors': of each trial's rows the first three and the last two are
-left out, times and heights count from the first that is kept, the part starts with its tracked
-velocity, and the error is the mean of |z measured − z simulated| every 0.1 ms, in mm and as a share
-of the trial's largest measured |z|. Source: see `cosim.trials.published`.
+Of each trial's rows the first three and the last two are left out, times and heights count from the
+first that is kept, the surface's tracked velocity is joined by straight lines, the part starts with
+its own tracked velocity, and the error is the mean of |z measured − z simulated| every 0.1 ms.
+Source: see `cosim.trials.published`. Added to it is a springed plate that moves as tracked.
 """
 
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from cosim.arrays import Array
 from cosim.mechanics import part
+from cosim.studies.fit.between.together import plate_velocity
+from cosim.studies.fit.results import STEP, Shown
 from cosim.trials import published
 from cosim.trials.tracked import Trial
 
 Solver = Literal["exact", "published"]
 
 FIRST_ROW, LAST_ROWS = 3, 2
-STEP = part.PUBLISHED_STEP
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,12 @@ class Parameters:
     mu_k: float
     force: float
     mu_s: float = published.MU_S
-    mu_plate: float = 0.0
 
 
 class Case:
-    """One trial, ready to be simulated; SI units."""
+    """One trial, ready to be simulated; SI units. ``plate_moves``: as tracked, if it was."""
 
-    def __init__(self, trial: Trial) -> None:
+    def __init__(self, trial: Trial, plate_moves: bool = False) -> None:
         rows = slice(FIRST_ROW, len(trial.time) - LAST_ROWS)
         self.trial = trial
         self.time: Array = np.ascontiguousarray(trial.time[rows] - trial.time[FIRST_ROW])
@@ -47,15 +46,10 @@ class Case:
         steps = int(np.floor(self.time[-1] / STEP + 1e-6))
         self.grid: Array = np.arange(steps + 1, dtype=np.float64) * STEP
         self.measured: Array = np.interp(self.grid, self.time, self.z_part)
-        self.largest = float(np.abs(self.z_part).max())
-        self._scratch = np.empty(3 * len(self.grid))
-        measured = dict(enumerate(published.FORCES_MEASURED, 1))
-        self.measured_force = measured.get(trial.number or 0)  # in weights of the part
-        bounds = dict(enumerate(published.FORCE_BOUNDS, 1))
-        self.bounds = bounds.get(trial.number or 0, published.OTHER_BOUNDS)
+        self._v_plate = plate_velocity(trial)[rows] if plate_moves else np.zeros(len(self.time))
 
     def motion(self, parameters: Parameters, solver: Solver) -> part.PartMotion:
-        """The part's simulated motion, every 0.1 ms."""
+        """The part's simulated motion, every 0.1 ms; the plate at rest."""
         solve = part.exact if solver == "exact" else part.published
         return solve(
             self.time,
@@ -64,28 +58,26 @@ class Case:
             mu_k=parameters.mu_k,
             force_per_mass=parameters.force * published.GRAVITY,
             gravity=published.GRAVITY,
-            mu_plate=parameters.mu_plate,
             v0=self.v0,
             output=self.grid,
         )
 
-    def errors(
-        self, forces: npt.ArrayLike, mu_k: float, mu_plate: float, mu_s: float, solver: Solver
-    ) -> Array:
-        """The mean errors [m] for several normal forces [weights of the part], in one call."""
-        weights = np.asarray(forces, dtype=np.float64) * published.GRAVITY
-        laws = np.full((len(weights), 4), published.GRAVITY)
-        laws[:, :3] = np.multiply.outer(weights, (mu_s, mu_k, mu_plate))
-        found = np.empty(len(weights))
-        part.part_library().part_errors(
-            *(len(self.time), self.time.ctypes.data, self.v_surface.ctypes.data, self.v0),
-            *(len(laws), laws.ctypes.data, STEP if solver == "published" else 0.0),
-            *(part.PUBLISHED_V_MIN, len(self.grid), self.grid.ctypes.data),
-            *(self.measured.ctypes.data, self._scratch.ctypes.data, found.ctypes.data),
-        )
-        return found
+    def heights(self, laws: Array) -> Array:
+        """The part's heights [m] every 0.1 ms, a row for each law (as in `part.heights`)."""
+        if not self._v_plate.any():
+            return part.heights(self.time, self.v_surface, laws, self.grid, self.v0)
+        steps = np.diff(self.time)
+        # Seen from the plate, and back.
+        v, v0 = self.v_surface - self._v_plate, self.v0 - float(self._v_plate[0])
+        pull = np.diff(self._v_plate) / steps
+        means = (self._v_plate[1:] + self._v_plate[:-1]) / 2
+        plate = np.interp(self.grid, self.time, np.append(0.0, np.cumsum(steps * means)))
+        return part.heights(self.time, v, laws, self.grid, v0, pull) + plate
 
-    def straight_line_error(self) -> float:
-        """The mean error [m] of the straight line that fits the measured heights best."""
-        line = np.polynomial.Polynomial.fit(self.grid, self.measured, 1)
-        return float(np.abs(line(self.grid) - self.measured).mean())
+    def errors(self, laws: Array) -> Array:
+        """The mean errors [m], one for each law."""
+        return np.abs(self.heights(laws) - self.measured).mean(axis=1)
+
+    def shown(self, z: Array) -> Shown:
+        """The trial with the part's simulated heights ``z`` [m] every 0.1 ms."""
+        return Shown(self.trial.name, self.time, self.z_surface, self.z_part, (self.grid, z))

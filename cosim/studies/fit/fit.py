@@ -1,7 +1,15 @@
-"""Fits the part's motion to tracked trials, or evaluates the published parameters on them."""
+"""Friction and normal forces from tracked trials, or what the published parameters make of them.
+
+A camera smears an impact over the frames about it, and what the part did on the surface meanwhile.
+So the motion between frames is reconstructed with its impacts (`cosim.studies.fit.between`), and
+the law is the one that makes the tracks likeliest (`cosim.studies.fit.search`). That presumes
+impacts that are short against the time between frames and a part that only slides. Where whole
+paths of the part follow better from the tracked velocities as they are, joined by straight lines,
+it does not hold, and the law is fitted to these paths (`cosim.studies.fit.paths`).
+"""
 
 import os
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,16 +19,23 @@ from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.files.atomic import write_json
 from cosim.files.picture import Picture
-from cosim.mechanics.part import PartMotion
+from cosim.studies.fit import paths, words
+from cosim.studies.fit.between.motion import Lasting
+from cosim.studies.fit.between.together import TYPICAL, Frames, Together, frames
 from cosim.studies.fit.cases import Case, Parameters, Solver
-from cosim.studies.fit.search import Fit, Solved, search
+from cosim.studies.fit.forces import Force, read_forces
+from cosim.studies.fit.intervals import FRICTIONS, Interval, Law, laws, own, shared
+from cosim.studies.fit.results import Shown, Solved
+from cosim.studies.fit.search import Fit, search
+from cosim.studies.fit.stretches import Stretches
 from cosim.studies.tables import write_csv
 from cosim.trials import published
-from cosim.trials.tracked import read_folder
+from cosim.trials.tracked import Trial, read_folder
 
-SENSITIVITY = 0.05  # relative change of a parameter
-RESAMPLES = 2000  # of the trials, for the interval of µ_k
-NEAR = 1.05  # over the best mean error: µ_k with less are reported as about as good
+FORCES: Interval = (1.0, 60.0)
+"""Bounds of a normal force of which nothing is known, in weights of the part."""
+
+_Found = tuple[Law, list[Shown], dict[str, Any]]
 
 
 class TrialResults(Solved):
@@ -38,171 +53,177 @@ class TrialResults(Solved):
 
         out = Path(folder)
         write_json(out / "fit.json", self.numbers)
-        rows = [
-            {name: f"{x:.10g}" if isinstance(x, float) else x for name, x in row.items()}
-            for row in self.numbers["trials"]
-        ]
-        write_csv(out / "fit.csv", rows)
+        write_csv(out / "fit.csv", [_cells(row) for row in self.numbers["trials"]])
         figures.draw_all(self, out)
 
     def __repr__(self) -> str:
-        result = self.numbers
-        lines = ["trial   force [m g]   measured   error [mm]   [%]   sticks"]
-        for row in result["trials"]:
-            measured = row["normal_force_measured_weights"]
-            lines.append(
-                f"{row['trial']!s:>5} {row['normal_force_weights']:>11.2f} "
-                f"{'–' if measured is None else format(measured, '.2f'):>12} "
-                f"{row['mean_error_mm']:>11.3f} {row['mean_error_percent']:>8.2f} "
-                f"{100 * row['stick_fraction']:>5.0f} %"
-            )
-        plate = f", mu_p {result['mu_plate']:.4g}" if result["mu_plate"] else ""
-        lines.append(
-            f"mu_k {result['mu_k']:.4g}{plate}: mean error {result['mean_error_mm']:.4f} mm, "
-            f"{result['mean_error_percent']:.2f} %"
-        )
-        if result["normal_force_change_mean_percent"] is not None:
-            lines.append(
-                f"normal force changed by {result['normal_force_change_mean_percent']:.2f} % mean, "
-                f"{result['normal_force_change_median_percent']:.2f} % median"
-            )
-        if "leave_one_out_mean_error_mm" in result:
-            lines.append(f"leave-one-out error {result['leave_one_out_mean_error_mm']:.4f} mm")
-        return "\n".join(lines)
+        return words.told(self.numbers)
 
 
 def fit(
     trials: str | os.PathLike[str],
     *,
+    forces: str | os.PathLike[str] | None = None,
+    mu_s: float | Literal["free"] = published.MU_S,
+    plate: bool = False,
+    mass_ratio: float | None = None,
     evaluate: Literal["published"] | None = None,
     solver: Solver = "exact",
-    plate: bool = False,
 ) -> TrialResults:
-    """Fit friction and normal forces to the tracked trials (CSVs) of a folder.
+    """Fit µ_k and the normal forces to the tracked trials (CSVs) of a folder.
 
-    ``evaluate="published"`` takes the paper's µ_k and normal forces instead of fitting them;
-    ``plate`` fits the friction of the springed plate too; ``solver`` is the exact solution or the
-    authors' scheme. The measure of the error is the authors' (:mod:`cosim.studies.fit.cases`), the
-    search separable (:mod:`cosim.studies.fit.search`). Raises BadInput.
+    ``forces`` is a file with what is known of normal forces (:mod:`cosim.studies.fit.forces`), or
+    “published”. ``mu_s`` is kept, or, “free”, fitted too, which needs bounds of forces; ``plate``
+    fits the friction of the springed plate, which moves as tracked, or rests where it was not;
+    ``mass_ratio`` is the part's mass over that of the surface with what moves with it, fitted where
+    it is not known.
+
+    ``evaluate="published"`` takes the paper's µ_k and forces instead, by the authors' procedure,
+    with the exact solution or with their scheme (``solver``). Raises BadInput.
     """
+    folder = Path(trials)
     if evaluate not in (None, "published"):
         raise BadInput(f"Only “published” parameters can be evaluated, not “{evaluate}”.")
     if solver not in ("exact", "published"):
         raise BadInput(f"The solver is exact or published, not “{solver}”.")
-    cases = [Case(trial) for trial in read_folder(Path(trials))]
-    found = None
     if evaluate:
-        if plate:
-            raise BadInput("The published parameters know no friction of the springed plate.")
-        parameters = _published(cases, Path(trials))
-    else:
-        found = search(cases, solver, plate)
-        parameters = [
-            Parameters(found.mu_k, float(force), mu_plate=found.mu_plate)
-            for force in found.forces[found.best]
-        ]
-    motions = [case.motion(p, solver) for case, p in zip(cases, parameters, strict=True)]
-    result = _result(cases, parameters, motions, solver, evaluate)
-    if found:
-        result |= _certainty(found)
-    result["sensitivity"] = _sensitivity(cases, parameters, solver)
-    return TrialResults(cases, parameters, motions, found, result)
+        forces = "published" if forces is None else forces
+    elif solver != "exact":
+        raise BadInput("A fit is solved exactly; the authors' scheme needs evaluate=“published”.")
+    found = read_folder(folder, None if forces is None else Path(forces))
+    names = [trial.name for trial in found]
+    if evaluate and names != list(published.TRIALS):
+        first, last = published.TRIALS[0], published.TRIALS[-1]
+        raise BadInput(
+            f"{folder}: the published parameters belong to the trials 1…10 exactly, as published, "
+            f"“{first}” to “{last}”."
+        )
+    read = {} if forces is None else read_forces(forces, names)
+    known = [read.get(name, Force()) for name in names]
+    if evaluate:
+        if (mu_s, plate, mass_ratio) != (published.MU_S, False, None):
+            raise BadInput(
+                "The published parameters know no friction of the springed plate, no other µ_s and "
+                "no ratio of masses."
+            )
+        return _evaluated(found, known, solver)
+    if mu_s != "free" and not (isinstance(mu_s, int | float) and 0 < mu_s <= 10):
+        raise BadInput(f"mu_s must be above 0 and at most 10, or “free”, and is {mu_s}.")
+    if mu_s == "free" and not any(force.lower or force.upper for force in known):
+        raise BadInput(
+            "µ_s can only be fitted where bounds of normal forces are known: name a file."
+        )
+    if mass_ratio is not None and not 0 <= mass_ratio <= 10:
+        raise BadInput(f"mass_ratio must lie between 0 and 10, and is {mass_ratio}.")
+    return _fitted(found, known, None if mu_s == "free" else float(mu_s), plate, mass_ratio)
 
 
-def _published(cases: list[Case], folder: Path) -> list[Parameters]:
-    numbers = [case.trial.number for case in cases]
-    if numbers != list(range(1, len(published.FORCES_FITTED) + 1)):
-        raise BadInput(f"{folder}: the published parameters belong to the trials 1…10 exactly.")
-    return [Parameters(published.MU_K_FITTED, force) for force in published.FORCES_FITTED]
-
-
-def _errors(cases: list[Case], parameters: list[Parameters], solver: Solver) -> Array:
-    """The mean error [m] in each trial."""
-    pairs = zip(cases, parameters, strict=True)
-    errors = (case.errors([p.force], p.mu_k, p.mu_plate, p.mu_s, solver) for case, p in pairs)
-    return np.concatenate(list(errors))
-
-
-def _result(
-    cases: list[Case],
-    parameters: list[Parameters],
-    motions: list[PartMotion],
-    solver: Solver,
-    evaluate: str | None,
-) -> dict[str, Any]:
-    errors = _errors(cases, parameters, solver).tolist()
-    trials = [*map(_trial, cases, parameters, motions, errors)]
-    changes = [row["normal_force_change_percent"] for row in trials]
-    changes = [change for change in changes if change is not None]
-
-    def mean(name: str) -> float:
-        return float(np.mean([row[name] for row in trials]))
-
-    return {
-        "parameters": "published" if evaluate else "fitted",
-        "solver": solver,
-        "mu_s": parameters[0].mu_s,
-        "mu_k": parameters[0].mu_k,
-        "mu_plate": parameters[0].mu_plate,
-        "normal_force_weights": [p.force for p in parameters],
-        "mean_error_mm": float(np.mean(errors) * 1e3),
-        "mean_error_percent": mean("mean_error_percent"),
-        "normal_force_change_mean_percent": float(np.mean(changes)) if changes else None,
-        "normal_force_change_median_percent": float(np.median(changes)) if changes else None,
-        "straight_line_mean_error_mm": mean("straight_line_error_mm"),
-        "trials": trials,
+def _fitted(
+    found: list[Trial],
+    known: list[Force],
+    mu_s: float | None,
+    plate: bool,
+    mass_ratio: float | None,
+) -> TrialResults:
+    normal = [(force.lower or FORCES[0], force.upper or FORCES[1]) for force in known]
+    # Of µ_s F_n.
+    limits = [(a * mu_s, b * mu_s) for a, b in normal] if mu_s else [FRICTIONS] * len(normal)
+    seen = [frames(trial, plate) for trial in found]
+    cases = [Case(trial, plate) for trial in found]
+    straight = paths.least_error([case.errors for case in cases], limits)
+    impacts = paths.least_error([_typical(one).errors for one in seen], limits)
+    result = None
+    if impacts <= straight:  # else the likeliest law need not be sought
+        result = _with_impacts(search(seen, limits, plate, mass_ratio), seen)
+        impacts = float(np.mean([one.error for one in result[1]]))
+    if result is None or impacts > straight:
+        result = _with_straight_lines(paths.search([c.errors for c in cases], limits, plate), cases)
+    law, shown, numbers = result
+    numbers |= {
+        "parameters": "fitted",
+        "paths_mean_error_mm": {"impacts": impacts * 1e3, "straight lines": straight * 1e3},
+        "mass_ratio_given": mass_ratio is not None,
+        **shared(law, normal, mu_s, plate),
     }
+    static = tuple(numbers.get("mu_s_95_percent", (mu_s, mu_s)))
+    each = [
+        own(law, i, limit, static, numbers["mu_s"], mu_s is not None)
+        for i, limit in enumerate(normal)
+    ]
+    return TrialResults(shown, known, numbers, each)
 
 
-def _trial(case: Case, p: Parameters, motion: PartMotion, error: float) -> dict[str, Any]:
-    measured, span = case.measured_force, float(case.grid[-1])
-    low, high = case.bounds
-    return {
-        "trial": case.trial.number if case.trial.number is not None else case.trial.name,
-        "normal_force_weights": p.force,
-        "normal_force_measured_weights": measured,
-        "normal_force_change_percent": measured and 100 * abs(p.force - measured) / measured,
-        "normal_force_at_bound": bool(np.isclose(p.force, (low, high), rtol=1e-6).any()),
-        "mean_error_mm": error * 1e3,
-        "mean_error_percent": 100 * error / case.largest if case.largest else 0.0,
-        "straight_line_error_mm": case.straight_line_error() * 1e3,
-        "velocity_mm_per_s": float(motion.z[-1]) / span * 1e3,
-        "velocity_measured_mm_per_s": float(case.measured[-1]) / span * 1e3,
-        "stick_fraction": motion.stick_fraction,
-        "stick_slip_events": motion.stick_slip_events,
+def _with_impacts(law: Fit, seen: list[Frames]) -> _Found:
+    """The law with each trial and what is told of the motion between frames."""
+    shown: list[Shown] = []
+    for i, (stretches, one) in enumerate(zip(law.stretches, seen, strict=True)):
+        # From the first frame at which the part sticks, in one run.
+        time, z = stretches.whole(_law(law, i))
+        first = stretches.starts[0]
+        begin, rows = one.time[first], slice(first, None)
+        z_surface, z_part = (track[rows] - track[first] for track in (one.z_surface, one.z_part))
+        shown.append(
+            Shown(one.name, one.time[rows] - begin, z_surface, z_part, (time - begin, z[0]))
+        )
+    numbers = {
+        "between_frames": "impacts",
+        "mass_ratio": law.mass_ratio,
+        "impact_duration_s": law.lasting.impact,
+        "force_step_duration_s": law.lasting.step,
+        "dispersion": law.dispersion,
     }
+    return law, shown, numbers
 
 
-def _certainty(fit: Fit) -> dict[str, Any]:
-    left_out, mu_k = fit.leave_one_out()
-    line, error = fit.profile()
-    near = line[error <= NEAR * error.min()]
-    # The trials drawn anew, with repetition: what µ_k other trials of the kind would have given.
-    count = fit.errors.shape[1]
-    draws = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), RESAMPLES)
-    found = fit.tried[(fit.errors @ draws.T).argmin(axis=0)]
-    return {
+def _with_straight_lines(law: paths.Paths, cases: list[Case]) -> _Found:
+    shown = [case.shown(case.heights(_law(law, i))[0]) for i, case in enumerate(cases)]
+    left_out, _ = law.leave_one_out()
+    numbers = {
+        "between_frames": "straight lines",
         "leave_one_out_mean_error_mm": float(left_out.mean() * 1e3),
-        "leave_one_out_mu_k": mu_k.tolist(),
-        "mu_k_within_5_percent_of_best": [float(near.min()), float(near.max())],
-        "mu_k_95_percent": np.quantile(found[:, 1], (0.025, 0.975)).tolist(),
-        "mu_plate_95_percent": np.quantile(found[:, 0], (0.025, 0.975)).tolist(),
-        "profile": {"mu_k": line.tolist(), "mean_error_mm": (error * 1e3).tolist()},
     }
+    return law, shown, numbers
 
 
-def _sensitivity(
-    cases: list[Case], parameters: list[Parameters], solver: Solver
-) -> dict[str, dict[str, float]]:
-    """The mean error [mm] with one parameter 5 % lower or higher and all others kept."""
+def _typical(seen: Frames) -> Stretches:
+    """With impacts between the frames, before anything is fitted."""
+    both = Together(seen, TYPICAL, False, None)
+    return Stretches(both, both.motion(), Lasting(2e-4, 0.0))
 
-    def mean(name: str, factor: float) -> float:
-        changed = [replace(p, **{name: getattr(p, name) * factor}) for p in parameters]
-        changed = [replace(p, mu_k=min(p.mu_k, p.mu_s)) for p in changed]
-        return float(np.mean(_errors(cases, changed, solver)) * 1e3)
 
-    names = {"mu_s": "mu_s", "mu_k": "mu_k", "normal_force": "force"}
-    return {
-        told: {f"{sign * SENSITIVITY:+.0%}": mean(name, 1 + sign * SENSITIVITY) for sign in (-1, 1)}
-        for told, name in names.items()
+def _law(law: Law, trial: int) -> Array:
+    """The best one of a trial, a row."""
+    return laws(law.frictions(trial)[[law.best]], *law.ratios[law.best])
+
+
+def _evaluated(found: list[Trial], known: Sequence[Force], solver: Solver) -> TrialResults:
+    shown: list[Shown] = []
+    rows: list[dict[str, Any]] = []
+    for trial, normal in zip(found, published.FORCES_FITTED, strict=True):
+        case = Case(trial)
+        motion = case.motion(Parameters(published.MU_K_FITTED, normal), solver)
+        shown.append(case.shown(motion.z))
+        rows.append(
+            {
+                "normal_force_weights": normal,
+                "stick_fraction": motion.stick_fraction,
+                "stick_slip_events": motion.stick_slip_events,
+            }
+        )
+    numbers = {
+        "parameters": "published",
+        "solver": solver,
+        "mu_s": published.MU_S,
+        "mu_k": published.MU_K_FITTED,
+        "mu_plate": 0.0,
     }
+    return TrialResults(shown, known, numbers, rows)
+
+
+def _cells(row: dict[str, Any]) -> dict[str, Any]:
+    """A row of the table, an interval in two cells."""
+    cells: dict[str, Any] = {}
+    for name, value in row.items():
+        ends = {f"{name}_from": value[0], f"{name}_to": value[1]} if isinstance(value, list) else {}
+        cells |= ends or {name: value}
+    return {name: f"{x:.10g}" if isinstance(x, float) else x for name, x in cells.items()}

@@ -1,0 +1,1 @@
+"""The motion of the surface between the frames of a camera."""
