@@ -49,7 +49,8 @@ class Recorder:
         self._fault: BaseException | None = None
         self._width = width = len(mechanics.columns)
         self._step_of_rows = run.output_step
-        self._rows, self._frames, self._time = Tape(width), Tape(1), Tape(1)
+        rows = agenda.count(run.output_step, run.duration)
+        self._rows, self._frames, self._time = Tape(width, rows), Tape(1), Tape(1, rows)
         # What is not on the tapes yet. A frame's sample goes behind the last row.
         self._new_rows, self._new_frames = np.empty((0, width)), np.empty(0)
         self._totals = (c_double * len(mechanics.total_names))()
@@ -131,7 +132,7 @@ class Recorder:
                 if taken < 0:
                     raise self.failure()
                 done += taken
-                self.at_once = min(2 * self.at_once, STEPS)
+                self.at_once = min(4 * self.at_once, STEPS)
                 self.tell()
                 if self._fault:
                     raise self._fault
