@@ -83,7 +83,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "contact_damping": 0.38,
         "n_surfaces": 1,
         "gravity": 9.81,
-        "tolerance": 1e-10,
+        "tolerance": 1e-9,
     },
     "friction": {
         "law": "coulomb",

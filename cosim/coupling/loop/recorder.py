@@ -55,6 +55,7 @@ class Recorder:
         self._new_rows, self._new_frames = np.empty((0, width)), np.empty(0)
         self._totals = (c_double * len(mechanics.total_names))()
         self._counters = (c_int32 * len(COUNTERS))()
+        self._inputs = (c_double * len(mechanics.places["held_inputs"]))()
         extremes = len(mechanics.step_outputs) - 4
         self.extremes = (c_double * extremes)(*[-np.inf, np.inf] * (extremes // 2))
         """Largest and smallest values after settling, in pairs: acceleration (m/s²), velocity (m/s)
@@ -74,7 +75,7 @@ class Recorder:
         places = mechanics.places
         self.state = RecorderState(
             fmu=ctypes.pointer(self._fmu),
-            input_places=places["inputs"],
+            input_places=places["held_inputs"],
             ports=len(mechanics.ports),
             schedule=schedule and ctypes.pointer(schedule),
             step_places=places["step_outputs"],
@@ -87,7 +88,7 @@ class Recorder:
             counter_places=places["counters"],
             totals=len(self._totals),
             counters=len(self._counters),
-            inputs=mechanics.inputs,
+            inputs=self._inputs,
             outputs=mechanics.step_outputs,
             settle=run.settle,
             z_surface=mechanics.columns.index("z_surface"),
