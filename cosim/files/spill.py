@@ -40,15 +40,17 @@ def on_disk_in(folder: Path) -> Iterator[None]:
 
 
 class Tape:
-    """Rows of ``columns`` numbers, written once and then read as an array.
+    """Rows of ``columns`` numbers, written once and then read as an array; about ``rows`` of them,
+    if that is known before.
 
     Raises BadInput where the disk is full.
     """
 
-    def __init__(self, columns: int) -> None:
+    def __init__(self, columns: int, rows: int = 0) -> None:
         self._columns = columns
         self._rows = 0
-        self._blocks: list[Array] = []
+        self._most = IN_MEMORY // (8 * columns)
+        self._kept = np.empty((min(rows, self._most), columns))
         self._file: IO[bytes] | None = None
         self._array: Array | None = None
 
@@ -57,30 +59,39 @@ class Tape:
 
     def append(self, rows: npt.ArrayLike) -> None:
         """Add rows, of which a copy is kept."""
-        block = np.array(rows, np.float64).reshape(-1, self._columns)
+        block = np.asarray(rows, np.float64).reshape(-1, self._columns)
         if not len(block):
             return
-        self._rows += len(block)
+        before, self._rows = self._rows, self._rows + len(block)
         self._array = None
-        self._blocks.append(block)
-        if self._file is not None or self._rows * self._columns * 8 > IN_MEMORY:
-            self._spill()
+        if self._file is not None or self._rows > self._most:
+            self._spill(before, block)
+            return
+        if self._rows > len(self._kept):
+            more = np.empty((min(max(2 * len(self._kept), self._rows), self._most), self._columns))
+            more[:before] = self._kept[:before]
+            self._kept = more
+        self._kept[before : self._rows] = block
 
-    def _spill(self) -> None:
+    def _spill(self, before: int, block: Array) -> None:
         folder = _folder.get()
         try:
             if self._file is None:
                 self._file = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115
-            for block in self._blocks:
-                left = block.data.cast("B")
-                while left:
-                    left = left[self._file.write(left) :]
+                self._write(self._kept[:before])
+                self._kept = np.empty((0, self._columns))
+            self._write(block)
         except OSError as error:
             where = folder or tempfile.gettempdir()
             raise BadInput(
                 f"{where}: cannot hold the waveforms while the scene runs ({error.strerror})."
             ) from error
-        self._blocks = []
+
+    def _write(self, rows: Array) -> None:
+        assert self._file is not None
+        left = np.ascontiguousarray(rows).data.cast("B") if len(rows) else b""
+        while left:
+            left = left[self._file.write(left) :]
 
     def array(self) -> Array:
         """All rows so far; the file itself, mapped, where they are on disk."""
@@ -91,8 +102,7 @@ class Tape:
                 _mapped.add(mapped)
                 self._array = np.frombuffer(mapped, np.float64).reshape(shape)
             else:
-                self._array = np.concatenate([np.empty((0, self._columns)), *self._blocks])
-                self._blocks = [self._array]
+                self._array = self._kept[: self._rows]
         return self._array
 
     def column(self, number: int = 0) -> Array:

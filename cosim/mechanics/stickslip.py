@@ -90,8 +90,10 @@ def _names(has_source: bool, two_surfaces: bool, changing_force: bool) -> _Names
         ports += (f"{given}_2",)
         totals += ("stick_time_2",)
     inputs = (*ports, "normal_force") if changing_force else ports
+    ramps = tuple(part for name in inputs for part in (name, f"{name}_slope"))
     by_role = {
-        "inputs": tuple(part for name in inputs for part in (name, f"{name}_slope")),
+        "inputs": ramps,
+        "held_inputs": (*ramps, "inputs_hold_for"),
         "step_outputs": step_outputs,
         "reals": sampled,
         "wholes": wholes,

@@ -289,6 +289,7 @@ class Mechanics(Table):
     contact_damping: float = _of_fmu("contact_damping")
     n_surfaces: int = _of_fmu("n_surfaces")
     gravity: float = _of_fmu("gravity")
+    tolerance: float = _of_fmu("tolerance")
 
 
 class Friction(Table):

@@ -221,14 +221,16 @@ static void simulate(int steps)
                                          PLACE(normal_force), PLACE(normal_force_slope),
                                          PLACE(command), PLACE(command_slope),
                                          PLACE(current_2), PLACE(current_2_slope),
-                                         PLACE(command_2), PLACE(command_2_slope)};
-    double time = 0.0;
+                                         PLACE(command_2), PLACE(command_2_slope),
+                                         PLACE(inputs_hold_for)};
+    double time = 0.0, held = 0.0; /* for so long the inputs are said to go on */
     for (int i = 0; i < steps; i++) {
-        const double h = pow(10.0, uniform(-6.0, -3.0));
+        const int renewed = held == 0.0 || uniform(0.0, 1.0) < 0.4;
+        const double h = renewed ? pow(10.0, uniform(-6.0, -3.0)) : held * uniform(0.1, 1.0);
         double values[] = {uniform(-1.5, 1.5), uniform(-1.0, 1.0) / h, uniform(0.1, 1.0),
-                           uniform(-0.1, 0.1) / h, uniform(-15.0, 15.0), uniform(-9.0, 9.0) / h,
+                           uniform(-0.01, 0.01) / h, uniform(-15.0, 15.0), uniform(-9.0, 9.0) / h,
                            uniform(-1.5, 1.5), uniform(-1.0, 1.0) / h, uniform(-15.0, 15.0),
-                           uniform(-9.0, 9.0) / h};
+                           uniform(-9.0, 9.0) / h, uniform(-2.0, 6.0) * h};
         double last;
         fmi3Boolean event, terminate, early;
         fmi2FMUstate before = NULL;
@@ -236,12 +238,18 @@ static void simulate(int steps)
         abuse(c2, 2);
         CHECK(fmi2SetFMUstate(c2, before) == fmi2OK);
         CHECK(fmi2FreeFMUstate(c2, &before) == fmi2OK);
-        CHECK(fmi2SetReal(c2, inputs, 10, values) == fmi2OK);
-        CHECK(fmi3SetFloat64(c3, inputs, 10, values, 10) == fmi3OK);
+        if (values[10] < 0.0)
+            values[10] = 0.0;
+        if (renewed) {
+            held = values[10];
+            CHECK(fmi2SetReal(c2, inputs, 11, values) == fmi2OK);
+            CHECK(fmi3SetFloat64(c3, inputs, 11, values, 11) == fmi3OK);
+        }
         CHECK(fmi2DoStep(c2, time, h, 1) == fmi2OK);
         CHECK(fmi3DoStep(c3, time, h, 1, &event, &terminate, &early, &last) == fmi3OK);
         CHECK(!event && !terminate && !early && last == time + h);
         time = last;
+        held = held > h ? held - h : 0.0;
         compare(c2, c3);
     }
     CHECK(fmi2Terminate(c2) == fmi2OK);

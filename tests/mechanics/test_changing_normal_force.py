@@ -31,7 +31,7 @@ def test_a_part_is_let_go_where_friction_no_longer_carries_it(tmp_path: Path):
     force = written(
         tmp_path, [(0.0, normal), (0.05, normal + rate * 0.05), (end, normal + rate * end)]
     )
-    run = ["run.duration=0.3", "run.settle=0", "run.output_step=1e-4"]
+    run = ["run.duration=0.3", "run.settle=0", "run.output_step=1e-4", "mechanics.tolerance=1e-12"]
     waves = simulate(load("held", [force, *run])).columns
     time = waves["time"]
     since = np.clip(time - release, 0.0, None)
@@ -56,7 +56,7 @@ def test_a_jump_of_the_force_lets_go_and_catches_at_its_time(tmp_path: Path):
     run = ["run.duration=0.2", "run.settle=0", "run.output_step=1e-3"]
     # a surface that hardly gives, so that it is at rest when the part stops against it
     still = ["mechanics.flexure_stiffness=1e9", "mechanics.flexure_damping=1e4"]
-    result = simulate(load("held", [force, *run, *still]))
+    result = simulate(load("held", [force, *run, *still, "mechanics.tolerance=1e-10"]))
     waves = result.columns
     brake = MU_K * caught / PART - G
     fall, stop = 0.02, G * 0.02 / brake

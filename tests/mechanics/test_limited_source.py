@@ -25,7 +25,7 @@ Array = npt.NDArray[np.float64]
 
 LOCKED = [
     "mechanics.ram_mass=1000", "mechanics.surface_mass=1000", "mechanics.gravity=0",
-    "coil.force_factor=1e-6",
+    "coil.force_factor=1e-6", "mechanics.tolerance=1e-13",
 ]  # fmt: skip
 FINE = ["run.duration=0.004", "run.settle=0.001", "run.output_step=2e-6"]
 R, R_SENSE, L, HIGH, LOW = 7.1, 4.0, 1.2e-3, 14.0, -14.0  # Ohm, Ohm, H, V, V

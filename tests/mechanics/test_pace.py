@@ -113,8 +113,8 @@ class Counted(Mechanics):
     def __init__(self) -> None:
         self.spent = 0.0
 
-    def totals(self) -> dict[str, float]:
-        return {"internal_steps": self.spent, "internal_rejected": 0.0}
+    def internal_steps(self) -> int:
+        return int(self.spent)
 
 
 def test_a_long_run_goes_on() -> None:

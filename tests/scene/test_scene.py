@@ -83,6 +83,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "contact_damping": 0.38,
         "n_surfaces": 1,
         "gravity": 9.81,
+        "tolerance": 1e-9,
     },
     "friction": {
         "law": "coulomb",
@@ -158,7 +159,6 @@ def test_parameters_of_the_fmu_that_are_no_keys(fmu_variables: dict[str, Any]) -
     parameters = {name for name, v in fmu_variables.items() if v.causality == "parameter"}
     assert parameters - {key.variable for key in keys()} == {
         "output_high", "output_low",  # from supply and swing losses
-        "tolerance",
         "contact", "ram_fixed", "independent", "prescribed", "source",
     }  # fmt: skip
 

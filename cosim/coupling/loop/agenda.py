@@ -13,6 +13,9 @@ from cosim.trials.camera import FRAME_RATE, instants, instants_a_frame
 ENTRIES = 1 << 14
 """Rows and frames of the camera that are planned, and taken, at a time."""
 
+KEPT = 1 << 17
+"""Rows of a run whose agenda is kept for others, such as those of a sweep: 2 MB."""
+
 SAME_TIME = 1e-12  # s; communication points closer than this are one
 _ROW, _FRAME, _SETTLED = 1, 2, 4
 _NEVER = 1 << 80  # multiples of SAME_TIME
@@ -39,21 +42,18 @@ def agendas(
 
     Of frames, which are exposed for a share ``shutter`` of their interval, the instants.
     """
-    first, more = _planned(row_step, duration, settle, stops, shutter)
-    yield first
-    if more:
-        further = _agendas(row_step, duration, settle, stops, shutter)
-        next(further)
-        yield from further
+    given = (row_step, duration, settle, stops, shutter)
+    return iter(_kept(*given)) if count(row_step, duration) <= KEPT else _agendas(*given)
 
 
-@lru_cache(16)
-def _planned(*given: Any) -> tuple[Agenda, bool]:
-    """The first part, which is that of many runs, and whether others follow."""
-    first = next(_agendas(*given))
-    for array in first:
-        array.flags.writeable = False
-    return first, np.isfinite(first[0][-1])
+@lru_cache(4)
+def _kept(*given: Any) -> tuple[Agenda, ...]:
+    """Those of a run, as many other runs have them."""
+    made = tuple(_agendas(*given))
+    for agenda in made:
+        for array in agenda:
+            array.flags.writeable = False
+    return made
 
 
 def _agendas(

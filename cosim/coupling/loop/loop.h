@@ -55,7 +55,7 @@ enum { ROW = 1, FRAME = 2, SETTLED = 4 }; /* what is to be written down at a tim
 typedef struct Recorder {
     Fmu *fmu;
     /* Variables by their roles; `places` are value references. */
-    const uint32_t *input_places; /* of each input: its value, its slope */
+    const uint32_t *input_places; /* of each input: its value, its slope; then inputs_hold_for */
     int64_t ports;                /* inputs that are led from outside, linear over an interval */
     const Schedule *schedule;     /* of one more input that follows the time alone; or NULL */
     const uint32_t *step_places;  /* as the enum above has them, then pairs of maximum and minimum */
@@ -77,6 +77,7 @@ typedef struct Recorder {
     int32_t *counters_at_settle;
     double *extremes;    /* pairs, as the step's outputs have them */
     double began;        /* of the interval under way */
+    double holds_until;  /* how long the inputs go on as they were set last; s */
     int64_t inside;      /* whether one is */
     void (*plan)(void);  /* Python takes rows and frames away, and gives the next times */
     int64_t stopped;     /* by Python: it failed there */

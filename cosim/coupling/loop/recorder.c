@@ -1,5 +1,6 @@
 /* Rows of the waveforms, frames of the camera and the end of settling are communication points of
-   their own: what stands in a row is a state of the mechanics, never an interpolation. */
+   their own. The mechanics are told how long their inputs hold beyond them, so that they need not
+   end a step of their integration there. */
 
 #include "loop.h"
 
@@ -32,22 +33,44 @@ static int64_t corners(const Schedule *s, double t, int with_it)
     return low;
 }
 
-/* Advance to `time`, with the inputs as they are set. */
-static int step(Recorder *r, double time)
+/* The inputs of the interval under way from the time reached on: they go linearly from `start`, or
+ * what the schedule has, until the interval's or the schedule's next corner. */
+static int set_inputs(Recorder *r, double edge, const double *start, const double *end)
 {
     Fmu *f = r->fmu;
-    int64_t inputs = r->ports;
-    if (r->schedule) {
-        /* No corner lies within the step: they are communication points. */
-        const Schedule *s = r->schedule;
-        const double value = between(s, corners(s, f->time + SAME_TIME, 1), f->time);
-        const double end = between(s, corners(s, time - SAME_TIME, 0), time);
-        r->inputs[2 * inputs] = value;
-        r->inputs[2 * inputs + 1] = (end - value) / (time - f->time);
-        inputs++;
+    const double reached = f->time - r->began;
+    double *input = r->inputs;
+    r->holds_until = edge;
+    for (int64_t k = 0; k < r->ports; k++) {
+        const double slope = (end[k] - start[k]) / (edge - r->began);
+        *input++ = start[k] + slope * reached;
+        *input++ = slope;
     }
-    if (!f->set(f, r->input_places, 2 * inputs, r->inputs) || !f->step(f, time - f->time) ||
-        !f->get(f, r->step_places, r->step_outputs, r->outputs))
+    if (r->schedule) {
+        const Schedule *s = r->schedule;
+        const int64_t after = corners(s, f->time + SAME_TIME, 1);
+        const double value = between(s, after, f->time);
+        if (after < s->n && s->times[after] < edge)
+            r->holds_until = s->times[after];
+        const double last = between(s, corners(s, r->holds_until - SAME_TIME, 0), r->holds_until);
+        *input++ = value;
+        *input++ = (last - value) / (r->holds_until - f->time);
+    }
+    *input++ = r->holds_until - f->time;
+    return f->set(f, r->input_places, input - r->inputs, r->inputs);
+}
+
+/* Advance to `time`, within an interval whose inputs go linearly from `start` to `end`. */
+static int step_within(Recorder *r, double time, double edge, const double *start,
+                       const double *end)
+{
+    Fmu *f = r->fmu;
+    if (f->time >= r->holds_until - SAME_TIME && !set_inputs(r, edge, start, end))
+        return 0;
+    /* Who leads looks at the interval's end alone. */
+    const int64_t first = time < edge ? EXTREMES : 0;
+    if (!f->step(f, time - f->time) ||
+        !f->get(f, r->step_places + first, r->step_outputs - first, r->outputs + first))
         return 0;
     f->time = time;
     f->steps++;
@@ -61,19 +84,6 @@ static int step(Recorder *r, double time)
         }
     }
     return 1;
-}
-
-/* The same within an interval, whose inputs go linearly from `start` to `end`. */
-static int step_within(Recorder *r, double time, double edge, const double *start,
-                       const double *end)
-{
-    const double reached = r->fmu->time - r->began;
-    for (int64_t k = 0; k < r->ports; k++) {
-        const double slope = (end[k] - start[k]) / (edge - r->began);
-        r->inputs[2 * k] = start[k] + slope * reached;
-        r->inputs[2 * k + 1] = slope;
-    }
-    return step(r, time);
 }
 
 /* Write down what the agenda has for this time. */

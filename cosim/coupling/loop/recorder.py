@@ -49,11 +49,13 @@ class Recorder:
         self._fault: BaseException | None = None
         self._width = width = len(mechanics.columns)
         self._step_of_rows = run.output_step
-        self._rows, self._frames, self._time = Tape(width), Tape(1), Tape(1)
+        rows = agenda.count(run.output_step, run.duration)
+        self._rows, self._frames, self._time = Tape(width, rows), Tape(1), Tape(1, rows)
         # What is not on the tapes yet. A frame's sample goes behind the last row.
         self._new_rows, self._new_frames = np.empty((0, width)), np.empty(0)
         self._totals = (c_double * len(mechanics.total_names))()
         self._counters = (c_int32 * len(COUNTERS))()
+        self._inputs = (c_double * len(mechanics.places["held_inputs"]))()
         extremes = len(mechanics.step_outputs) - 4
         self.extremes = (c_double * extremes)(*[-np.inf, np.inf] * (extremes // 2))
         """Largest and smallest values after settling, in pairs: acceleration (m/s²), velocity (m/s)
@@ -73,7 +75,7 @@ class Recorder:
         places = mechanics.places
         self.state = RecorderState(
             fmu=ctypes.pointer(self._fmu),
-            input_places=places["inputs"],
+            input_places=places["held_inputs"],
             ports=len(mechanics.ports),
             schedule=schedule and ctypes.pointer(schedule),
             step_places=places["step_outputs"],
@@ -86,7 +88,7 @@ class Recorder:
             counter_places=places["counters"],
             totals=len(self._totals),
             counters=len(self._counters),
-            inputs=mechanics.inputs,
+            inputs=self._inputs,
             outputs=mechanics.step_outputs,
             settle=run.settle,
             z_surface=mechanics.columns.index("z_surface"),
@@ -131,7 +133,7 @@ class Recorder:
                 if taken < 0:
                     raise self.failure()
                 done += taken
-                self.at_once = min(2 * self.at_once, STEPS)
+                self.at_once = min(4 * self.at_once, STEPS)
                 self.tell()
                 if self._fault:
                     raise self._fault

@@ -53,7 +53,9 @@ class RecorderState(Structure):
         *_of(c_void_p, "rows", "frames"),
         *_of(c_int64, "n_rows", "n_frames", "z_surface"),
         *(("totals_at_settle", _DOUBLES), ("counters_at_settle", _INTEGERS)),
-        *(("extremes", _DOUBLES), ("began", c_double), ("inside", c_int64)),
+        ("extremes", _DOUBLES),
+        *_of(c_double, "began", "holds_until"),
+        ("inside", c_int64),
         *(("plan", CALLBACK), ("stopped", c_int64)),
     )
 

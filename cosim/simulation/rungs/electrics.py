@@ -37,7 +37,7 @@ class Electrics:
 def commanded(command: Command, rows: Array) -> Array:
     """V1 (V) at the times of the rows (s), at a jump the value before it; 0 in the first row, where
     the command has not begun."""
-    made = Tape(1)
+    made = Tape(1, len(rows))
     for part in blocks(len(rows)):
         made.append(np.where(rows[part] > 0.0, command.values_before(rows[part]), 0.0))
     return made.column()

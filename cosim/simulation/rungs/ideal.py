@@ -62,7 +62,7 @@ class _Coil:
         self._squares, self._eddy = 0.0, Eddy(scene)
         self._most, self._least = -np.inf, np.inf
         self._last = 0.0
-        self._waves = Tape(2)
+        self._waves = Tape(2, count(scene.run.output_step, scene.run.duration))
         self._waves.append([0.0, 0.0])  # the first row: at rest
         self._rows = count(scene.run.output_step, scene.run.duration)
 
@@ -98,7 +98,7 @@ class _Coil:
 
     def waves(self, back_emf: Array) -> tuple[Array, Array]:
         """Current (A) and voltage (V) in the rows, in which the back-EMF (V) is known."""
-        waves, voltage = self._waves.array(), Tape(1)
+        waves, voltage = self._waves.array(), Tape(1, self._rows)
         for few in blocks(len(waves)):
             voltage.append(waves[few, 1] + back_emf[few])
         return self._waves.column(0), voltage.column()

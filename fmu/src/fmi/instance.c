@@ -178,13 +178,18 @@ int stickslip_step(Instance *inst, const char *function, double time, double h)
     if (s->has_stop_time && time + h > s->stop_time + slack + 1e-3 * h)
         return stickslip_refuse(inst, function, "a step to %.17g s goes past the stop time %.17g s",
                                 time + h, s->stop_time);
+    if (stickslip_model_step_within(&s->model, h)) {
+        s->time = time + h;
+        s->outputs_stale = 0;
+        return 1;
+    }
     Model before = s->model;
     if (stickslip_model_step(&s->model, h, message)) {
         s->model = before;
         return stickslip_refuse(inst, function, "%s", message);
     }
     s->time = time + h;
-    s->outputs_stale = 1;
+    s->outputs_stale = !s->model.ahead.active;
     if (inst->log_events)
         tell_events(inst, function, &before);
     return 1;

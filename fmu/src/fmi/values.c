@@ -23,6 +23,12 @@ static void about_to_set(State *s)
     s->outputs_stale = 1;
 }
 
+static int are_fresh(const Instance *inst)
+{
+    const State *s = &inst->state;
+    return !s->outputs_stale && s->model.initialised && s->phase != INSTANTIATED;
+}
+
 static int outputs_fresh(Instance *inst, const char *function)
 {
     State *s = &inst->state;
@@ -41,26 +47,40 @@ static int outputs_fresh(Instance *inst, const char *function)
     return 1;
 }
 
+/* One that is not simply there. */
+static int get_special(Instance *inst, const char *function, uint32_t vr, double *value)
+{
+    Model *model = &inst->state.model;
+    const size_t place = (size_t)vr - REFERENCE_REALS;
+    if (vr == REFERENCE_TIME) {
+        *value = inst->state.time;
+        return 1;
+    }
+    if (place >= N_REALS)
+        return stickslip_refuse(inst, function, "no real variable has the value reference %u",
+                                (unsigned)vr);
+    if (stickslip_real_info[place].kind == KIND_OUTPUT && !outputs_fresh(inst, function))
+        return 0;
+    if (place >= FIRST_ENERGY && model->energies_old)
+        stickslip_model_energies(model);
+    memcpy(value, (const char *)&model->r + place * sizeof(double), sizeof *value);
+    return 1;
+}
+
 int stickslip_get_reals(Instance *inst, const char *function, const uint32_t vr[], size_t n,
                         double values[])
 {
-    if (!stickslip_allowed(inst, function, ANY_PHASE) ||
+    if (!stickslip_allowed(inst, function, INITIALISING | STEPPING | INSTANTIATED | TERMINATED) ||
         !arrays_given(inst, function, n, vr, values))
         return 0;
-    const char *reals = (const char *)&inst->state.model.r;
-    for (size_t i = 0; i < n; i++) {
-        const size_t place = (size_t)vr[i] - REFERENCE_REALS;
-        if (vr[i] == REFERENCE_TIME) {
-            values[i] = inst->state.time;
-            continue;
-        }
-        if (place >= N_REALS)
-            return stickslip_refuse(inst, function, "no real variable has the value reference %u",
-                                    (unsigned)vr[i]);
-        if (stickslip_real_info[place].kind == KIND_OUTPUT && !outputs_fresh(inst, function))
+    const double *reals = (const double *)&inst->state.model.r;
+    size_t i = 0;
+    if (are_fresh(inst))
+        for (; i < n && (size_t)vr[i] - REFERENCE_REALS < FIRST_ENERGY; i++)
+            values[i] = reals[(size_t)vr[i] - REFERENCE_REALS];
+    for (; i < n; i++)
+        if (!get_special(inst, function, vr[i], &values[i]))
             return 0;
-        memcpy(&values[i], reals + place * sizeof(double), sizeof(double));
-    }
     return 1;
 }
 
@@ -71,13 +91,17 @@ int stickslip_get_integers(Instance *inst, const char *function, const uint32_t 
         !arrays_given(inst, function, n, vr, values))
         return 0;
     const char *integers = (const char *)&inst->state.model.n;
+    int fresh = are_fresh(inst);
     for (size_t i = 0; i < n; i++) {
         const size_t place = (size_t)vr[i] - REFERENCE_INTEGERS;
         if (place >= N_INTEGERS)
             return stickslip_refuse(
                 inst, function, "no integer variable has the value reference %u", (unsigned)vr[i]);
-        if (stickslip_integer_info[place].kind == KIND_OUTPUT && !outputs_fresh(inst, function))
-            return 0;
+        if (!fresh && stickslip_integer_info[place].kind == KIND_OUTPUT) {
+            if (!outputs_fresh(inst, function))
+                return 0;
+            fresh = 1;
+        }
         memcpy(&values[i], integers + place * sizeof(int), sizeof(int));
     }
     return 1;
@@ -97,15 +121,25 @@ int stickslip_set_reals(Instance *inst, const char *function, const uint32_t vr[
     if (!stickslip_allowed(inst, function, INSTANTIATED | INITIALISING | STEPPING) ||
         !arrays_given(inst, function, n, vr, values))
         return 0;
-    const State before = inst->state;
     State *s = &inst->state;
+    const int initialised = s->model.initialised, stale = s->outputs_stale;
     about_to_set(s);
     for (size_t i = 0; i < n; i++) {
-        const size_t place = (size_t)vr[i] - REFERENCE_REALS;
+        const char *why = NULL;
         if (vr[i] == REFERENCE_TIME)
-            return undo(inst, function, &before, "time cannot be set");
-        if (stickslip_model_set_real(&s->model, place, values[i], message))
-            return undo(inst, function, &before, message);
+            why = "time cannot be set";
+        else if (stickslip_model_check_real(&s->model, (size_t)vr[i] - REFERENCE_REALS, values[i],
+                                            message))
+            why = message;
+        if (!why)
+            continue;
+        s->model.initialised = initialised;
+        s->outputs_stale = stale;
+        return stickslip_refuse(inst, function, "%s", why);
+    }
+    for (size_t i = 0; i < n; i++) {
+        const size_t place = (size_t)vr[i] - REFERENCE_REALS;
+        stickslip_model_set_real(&s->model, place, values[i], message);
         if (place == PLACE(tolerance))
             s->tolerance_set = 1;
     }

@@ -1,146 +1,24 @@
 /* Integration from event to event. */
+#include "advance.h"
+
 #include <math.h>
 #include <stdio.h>
 
-#include "advance.h"
+#include "curve.h"
 #include "events.h"
+#include "extremes.h"
 #include "integrator.h"
 #include "mechanics.h"
 
-static const double STEP_MIN = 1e-14;          /* s; below this a step is an instant */
 static const int MAX_EVENTS_PER_STEP = 1000000; /* Zeno sequences end by themselves, far below */
 static const int MAX_TRIALS_PER_STEP = 2000000;
 
-typedef struct {
-    double tau, y[N_ALL], dy[N_ALL];
-    EventFunction functions[MAX_EVENT_FUNCTIONS];
-    int n;
-} Point;
+/* How much longer a step of order 8 is than one of order 5, about; and from how many of the latter
+ * on it is the cheaper one. */
+static const double LONGER = 6.0, WORTH = 3.0;
 
-static void evaluate(const Model *m, Point *point)
-{
-    stickslip_state_rates(m, m->mode, point->y, point->tau, point->dy);
-    point->n = stickslip_event_functions(m, point->y, point->tau, point->functions);
-}
-
-/* The point that one whole Runge-Kutta step of length h reaches from start. */
-static double try_step(const Model *m, const Point *start, double h, Point *end)
-{
-    double error = stickslip_trial_step(m, start->tau, h, start->y, start->dy, end->y, end->dy);
-    end->tau = start->tau + h;
-    return error;
-}
-
-static void try_with_functions(const Model *m, const Point *start, double h, Point *end)
-{
-    try_step(m, start, h, end);
-    end->n = stickslip_event_functions(m, end->y, end->tau, end->functions);
-}
-
-/* Root of function (or, with use_rate, zero of its rate) for step lengths in [low, high], whose
- * ends differ in sign: Newton where it stays inside and helps, else bisection. Each trial is a real
- * step from the start, so that the event lies on the solution and not on an interpolant. */
-static double locate(const Model *m, const Point *start, int index, int use_rate, double low,
-                     double high, double value_low)
-{
-    Point end;
-    double h = 0.5 * (low + high), before = high - low;
-    for (int i = 0; i < 200; i++) {
-        try_with_functions(m, start, h, &end);
-        const EventFunction *f = &end.functions[index];
-        double value = use_rate ? f->rate : f->value;
-        if ((value < 0.0) == (value_low < 0.0))
-            low = h;
-        else
-            high = h;
-        double width = high - low;
-        if (value == 0.0 || width <= 2e-16 * (start->tau + high))
-            break;
-        double next = 0.5 * (low + high);
-        if (!use_rate && f->rate != 0.0) {
-            double newton = h - value / f->rate;
-            if (newton > low && newton < high && fabs(newton - h) < 0.5 * before)
-                next = newton;
-            else if (fabs(value / f->rate) <= 1e-16 * (start->tau + high))
-                break;
-        }
-        before = fabs(next - h);
-        h = next;
-    }
-    return h;
-}
-
-/* The first event within the trial step from start to end: its step length, or a negative number if
- * there is none. 0 if it is at the very start. */
-static double first_event(const Model *m, const Point *start, const Point *end, int *which)
-{
-    double h = end->tau - start->tau, found = -1.0;
-    const Point *stop = end;
-    Point nearer;
-    for (int i = 0; i < start->n; i++) {
-        const EventFunction *a = &start->functions[i], *b = &stop->functions[i];
-        double high = -1.0;
-        if (b->value < -b->noise) {
-            high = h;
-        } else if (a->rate < 0.0 && b->rate > 0.0 && a->value > 0.0 &&
-                   (a->value + a->rate * h / 3.0 < 0.0 || b->value - b->rate * h / 3.0 < 0.0)) {
-            /* Both ends are clear, but the curve may dip below zero between them (grazing). */
-            Point dip;
-            double lowest = locate(m, start, i, 1, 0.0, h, a->rate);
-            try_with_functions(m, start, lowest, &dip);
-            if (dip.functions[i].value < -dip.functions[i].noise)
-                high = lowest;
-        }
-        if (high < 0.0)
-            continue;
-        if (h < STEP_MIN && a->value < 0.0 && a->rate > 0.0)
-            continue; /* on its way back, and another event is due within the same instant */
-        *which = i;
-        if (a->value <= 0.0) {
-            if (a->rate < 0.0)
-                return 0.0;
-            /* It begins on the boundary, leaves it and comes back: halve until it is outside. */
-            Point inside;
-            double low = high;
-            do {
-                low *= 0.5;
-                if (low < STEP_MIN)
-                    return 0.0;
-                try_with_functions(m, start, low, &inside);
-            } while (inside.functions[i].value <= 0.0);
-            found = locate(m, start, i, 0, low, high, 1.0);
-        } else {
-            found = locate(m, start, i, 0, 0.0, high, 1.0);
-        }
-        h = found;
-        try_with_functions(m, start, h, &nearer);
-        stop = &nearer;
-    }
-    return found;
-}
-
-/* Of the first surface. */
-static void note_extremes(Model *m, const Point *point)
-{
-    Reals *r = &m->r;
-    double a = point->dy[V], v = point->y[V], z = point->y[Z];
-    if (a > r->a_surface_max)
-        r->a_surface_max = a;
-    if (a < r->a_surface_min)
-        r->a_surface_min = a;
-    if (v > r->v_surface_max)
-        r->v_surface_max = v;
-    if (v < r->v_surface_min)
-        r->v_surface_min = v;
-    if (z > r->z_surface_max)
-        r->z_surface_max = z;
-    if (z < r->z_surface_min)
-        r->z_surface_min = z;
-    if (point->y[I_COIL] > r->coil_current_max)
-        r->coil_current_max = point->y[I_COIL];
-    if (point->y[I_COIL] < r->coil_current_min)
-        r->coil_current_min = point->y[I_COIL];
-}
+/* s; the first long step by a wall's clock, as long as none is known. */
+static const double FIRST_TOUCH = 1e-6;
 
 /* Times that are counted mode by mode; those of the source are the first one's. */
 static void note_time(Model *m, double taken)
@@ -161,15 +39,19 @@ static void note_time(Model *m, double taken)
 static void take_up(Model *m, const Point *point)
 {
     for (int j = 0; j < moving(m) * N_STATES; j++)
-        m->y[j] = point->y[j];
+        m->y[j] = point->knot.y[j];
 }
 
+/* The point at which the model is. */
 static void start_from(const Model *m, double tau, Point *point)
 {
+    Knot *knot = &point->knot;
     for (int j = 0; j < moving(m) * N_STATES; j++)
-        point->y[j] = m->y[j];
-    point->tau = tau;
-    evaluate(m, point);
+        knot->y[j] = m->y[j];
+    knot->tau = tau;
+    stickslip_state_rates(m, m->mode, knot->y, tau, knot->dy);
+    point->at = 0.0;
+    stickslip_find_functions(m, point);
 }
 
 /* The prescribed velocity may have jumped; the part keeps its own. */
@@ -181,79 +63,308 @@ static void set_surface(Model *m)
         m->y[W] -= jump;
 }
 
+static void note_point(Model *m, const Point *point)
+{
+    stickslip_note_extremes(m, point->knot.y, point->knot.dy[V]);
+}
+
+/* ---- a step under way, beyond the communication point ---- */
+
+/* The states at its point `at`, which the clock has reached. */
+static void go_on_to(Model *m, double at)
+{
+    Ahead *ahead = &m->ahead;
+    Knot knot;
+    note_time(m, at - ahead->at);
+    stickslip_note_inner_extremes(m, ahead->at, at);
+    stickslip_interpolate(m, &ahead->dense, stickslip_share_at(&ahead->dense, at), &knot);
+    for (int s = 0; s < moving(m); s++)
+        for (int j = s * N_STATES; j < s * N_STATES + N_ACTING; j++)
+            m->y[j] = knot.y[j];
+    ahead->at = at;
+    ahead->behind = 1;
+}
+
+int stickslip_advance_within(Model *m, double h)
+{
+    Ahead *ahead = &m->ahead;
+    if (!ahead->active || ahead->end - ahead->at <= h + STEP_MIN)
+        return 0;
+    stickslip_begin_extremes(m, m->y, ahead->acceleration);
+    go_on_to(m, ahead->at + h);
+    return 1;
+}
+
+void stickslip_reached(Model *m)
+{
+    m->ahead.acceleration = m->r.a_surface;
+    stickslip_note_extremes(m, m->y, m->r.a_surface);
+}
+
+void stickslip_catch_up(Model *m)
+{
+    Ahead *ahead = &m->ahead;
+    if (!ahead->behind)
+        return;
+    stickslip_interpolate_energies(m, &ahead->dense, stickslip_share_at(&ahead->dense, ahead->at),
+                                   m->y);
+    ahead->behind = 0;
+}
+
+void stickslip_turn_back(Model *m)
+{
+    stickslip_catch_up(m);
+    m->ahead.active = 0;
+}
+
+/* It ends within this step: from its end on. */
+static void finish_ahead(Model *m, double h, Point *now)
+{
+    Ahead *ahead = &m->ahead;
+    double tau = ahead->end - ahead->at;
+    if (fabs(tau - h) <= STEP_MIN)
+        tau = h;
+    stickslip_begin_extremes(m, m->y, ahead->acceleration);
+    note_time(m, ahead->end - ahead->at);
+    stickslip_note_inner_extremes(m, ahead->at, ahead->end);
+    ahead->active = ahead->behind = 0;
+    for (int j = 0; j < moving(m) * N_STATES; j++)
+        m->y[j] = ahead->last[j];
+    start_from(m, tau, now);
+    note_point(m, now);
+    if (ahead->ends_with < 0)
+        return;
+    stickslip_apply_event(m, ahead->surface, tau, (EventKind)ahead->ends_with);
+    start_from(m, tau, now);
+    note_point(m, now);
+}
+
+/* ---- one step ---- */
+
+/* What it ends with. */
+typedef struct {
+    double taken; /* s */
+    int which;    /* of the event functions; -1: none */
+} Ending;
+
+/* The length that the error control would take next; its place. */
+static double *step_of(Model *m)
+{
+    int touches = m->mode[0].wall == WALL_TOUCH;
+    if (moving(m) > 1)
+        touches |= m->mode[1].wall == WALL_TOUCH;
+    return &m->step[touches];
+}
+
+/* One step of order 5, at most to h. 0 where it was rejected, -1 where there are no numbers. */
+static int short_step(Model *m, Point *now, double h, Point *end, Ending *ending)
+{
+    double *const step = step_of(m);
+    const double left = h - now->knot.tau;
+    const int last = *step > 0.999 * left; /* rather stretch than leave a crumb */
+    const double wanted = last ? left : *step;
+    const Knot *from = &now->knot;
+    Knot *to = &end->knot;
+    const double error =
+        stickslip_trial_step(m, from->tau, wanted, from->y, from->dy, to->y, to->dy);
+    if (!(error <= 1.0) && wanted > STEP_MIN) {
+        *step = wanted * stickslip_step_factor(error);
+        return 0;
+    }
+    if (!(error < 1e30))
+        return -1;
+    to->tau = last ? h : from->tau + wanted;
+    now->at = 0.0;
+    end->at = wanted;
+    stickslip_find_functions(m, end);
+    const Curve curve = {.start = now, .dense = NULL, .wall = -1};
+    const double found = stickslip_first_event(m, &curve, end, &ending->which);
+    ending->taken = wanted;
+    if (found >= 0.0) {
+        ending->taken = found;
+        if (found > 0.0) {
+            stickslip_trial_step(m, from->tau, found, from->y, from->dy, to->y, to->dy);
+            to->tau = from->tau + found;
+        } else {
+            *end = *now;
+        }
+        return 1;
+    }
+    ending->which = -1;
+    const double next = wanted * stickslip_step_factor(error);
+    if (!last || next > *step)
+        *step = next;
+    return 1;
+}
+
+/* The next long step's length by a wall's clock. */
+static double touch_step(const Model *m, int wall, const Knot *from)
+{
+    if (m->touch_step > 0.0)
+        return m->touch_step;
+    const double speed = fabs(from->y[wall * N_STATES + U]);
+    return FIRST_TOUCH / (from->root + 0.5 * sqrt(speed * FIRST_TOUCH));
+}
+
+/* One step of order 8, at most to `hold`; m->ahead has what lies within it, if something or the time
+ * h does. As short_step. */
+static int long_step(Model *m, Point *now, int wall, double h, double hold, Point *end,
+                     Ending *ending)
+{
+    Stages stages;
+    double *const step = step_of(m);
+    Knot *from = &now->knot, *to = &end->knot;
+    Dense *dense = &m->ahead.dense;
+    const Curve curve = {.start = now, .dense = dense, .wall = wall};
+    const double left = hold - from->tau;
+    if (wall >= 0)
+        from->root = stickslip_root_of(m, wall, from->y);
+    const double own = wall >= 0 ? touch_step(m, wall, from) : LONGER * *step;
+    int last = wall < 0 && own > 0.999 * left;
+    double wanted = last ? left : own;
+    double error = stickslip_long_step(m, wall, wanted, from, to, &stages);
+    const int enough = error <= 1.0 || wanted <= STEP_MIN;
+    if (enough && wall >= 0 && to->tau > hold) {
+        stickslip_interpolant(m, wall, wanted, from, to, &stages, dense);
+        wanted *= stickslip_share_at(dense, left);
+        last = 1;
+        stickslip_long_step(m, wall, wanted, from, to, &stages);
+    }
+    int eventful = 0, uneven = 0, looked_into = 0;
+    if (enough) {
+        if (last)
+            to->tau = hold;
+        now->at = 0.0;
+        end->at = wanted;
+        stickslip_find_functions(m, end);
+        eventful = stickslip_may_have_event(m, &curve, end);
+        uneven = stickslip_may_have_extreme(m, wall, from, &stages);
+        looked_into = eventful || uneven || to->tau > h;
+        if (looked_into) {
+            stickslip_interpolant(m, wall, wanted, from, to, &stages, dense);
+            const double reading = stickslip_reading_error(m, dense);
+            error = error > reading ? error : reading;
+        }
+    }
+    const double next = wanted * stickslip_long_factor(error);
+    if (!(error <= 1.0) && wanted > STEP_MIN) {
+        if (wall >= 0)
+            m->touch_step = next;
+        else
+            *step = next / LONGER;
+        return 0;
+    }
+    if (!(error < 1e30))
+        return -1;
+    const double found = eventful ? stickslip_first_event(m, &curve, end, &ending->which) : -1.0;
+    ending->taken = to->tau - from->tau;
+    if (found > 0.0) {
+        ending->taken = stickslip_land(m, &curve, ending->which, found, end);
+    } else if (found == 0.0) {
+        ending->taken = 0.0;
+        *end = *now;
+    } else {
+        ending->which = -1;
+    }
+    if (wall >= 0) {
+        if (!last || next > m->touch_step)
+            m->touch_step = next;
+    } else if (ending->which < 0 && (!last || next / LONGER > *step)) {
+        *step = next / LONGER;
+    }
+    m->ahead.at = 0.0;
+    m->ahead.end = ending->taken;
+    m->ahead.n_extremes = 0;
+    if (uneven)
+        stickslip_find_extremes(m, from->tau);
+    return 1;
+}
+
+static int is_too_much(int events, int trials, double h, char *message)
+{
+    if (events > MAX_EVENTS_PER_STEP) {
+        snprintf(message, MODEL_MESSAGE_SIZE,
+                 "more than %d events within one step of %g s: the mechanics chatter",
+                 MAX_EVENTS_PER_STEP, h);
+        return 1;
+    }
+    if (trials > MAX_TRIALS_PER_STEP) {
+        snprintf(message, MODEL_MESSAGE_SIZE,
+                 "more than %d internal steps within one step of %g s: it is too long, or the "
+                 "mechanics are too fast",
+                 MAX_TRIALS_PER_STEP, h);
+        return 1;
+    }
+    return 0;
+}
+
 int stickslip_advance(Model *m, double h, char *message)
 {
-    Point now, end;
+    Point points[2], *now = &points[0], *end = &points[1];
+    /* Inputs that have gone on for a while are taken to go on for as long again. */
+    const double said = m->r.inputs_hold_for, seems = h + m->steady_for;
+    const double hold = said > seems ? said : seems;
+    Ahead *ahead = &m->ahead;
     int events = 0;
 
-    if (m->n.prescribed)
-        set_surface(m);
-    stickslip_settle_mode(m, 0.0);
-    start_from(m, 0.0, &now);
-    m->r.a_surface_max = m->r.a_surface_min = now.dy[V];
-    m->r.v_surface_max = m->r.v_surface_min = now.y[V];
-    m->r.z_surface_max = m->r.z_surface_min = now.y[Z];
-    m->r.coil_current_max = m->r.coil_current_min = now.y[I_COIL];
+    if (ahead->active) {
+        finish_ahead(m, h, now);
+    } else {
+        if (m->n.prescribed)
+            set_surface(m);
+        stickslip_settle_mode(m, 0.0);
+        start_from(m, 0.0, now);
+        stickslip_begin_extremes(m, now->knot.y, now->knot.dy[V]);
+    }
 
-    for (int trials = 0; now.tau < h; trials++) {
-        if (events > MAX_EVENTS_PER_STEP) {
-            snprintf(message, MODEL_MESSAGE_SIZE,
-                     "more than %d events within one step of %g s: the mechanics chatter",
-                     MAX_EVENTS_PER_STEP, h);
+    for (int trials = 0; now->knot.tau < h; trials++) {
+        if (is_too_much(events, trials, h, message))
             return -1;
-        }
-        if (trials > MAX_TRIALS_PER_STEP) {
-            snprintf(message, MODEL_MESSAGE_SIZE,
-                     "more than %d internal steps within one step of %g s: it is too long, or the "
-                     "mechanics are too fast",
-                     MAX_TRIALS_PER_STEP, h);
-            return -1;
-        }
-        const double left = h - now.tau;
-        const int last = m->step > 0.999 * left; /* rather stretch than leave a crumb */
-        const double wanted = last ? left : m->step;
-        double error = try_step(m, &now, wanted, &end);
-        if (!(error <= 1.0) && wanted > STEP_MIN) {
-            m->n.internal_rejected++;
-            m->step = wanted * stickslip_step_factor(error);
-            continue;
-        }
-        if (!(error < 1e30)) {
+        Ending ending;
+        const double *const step = step_of(m);
+        const int wall = stickslip_clock_of(m, now->knot.y);
+        /* At a wall without a clock no high order holds. */
+        const int is_long = hold - now->knot.tau > WORTH * *step && (wall >= 0 || step == m->step);
+        const int taken = is_long ? long_step(m, now, wall, h, hold, end, &ending)
+                                  : short_step(m, now, h, end, &ending);
+        if (taken < 0) {
             snprintf(message, MODEL_MESSAGE_SIZE,
                      "the mechanics left the range of numbers; the inputs or parameters are too "
                      "large");
             return -1;
         }
-        if (last)
-            end.tau = h;
-        end.n = stickslip_event_functions(m, end.y, end.tau, end.functions);
-
-        int which = -1;
-        double found = first_event(m, &now, &end, &which);
-        double taken = wanted;
-        if (found >= 0.0) {
-            taken = found;
-            if (found > 0.0)
-                try_step(m, &now, found, &end);
-            else
-                end = now;
-        } else {
-            double next = wanted * stickslip_step_factor(error);
-            if (!last || next > m->step)
-                m->step = next;
+        if (!taken) {
+            m->n.internal_rejected++;
+            continue;
         }
-        note_time(m, taken);
         m->n.internal_steps++;
-        note_extremes(m, &end);
-        take_up(m, &end);
-        if (found >= 0.0) {
+        const EventFunction *event = ending.which < 0 ? NULL : &now->functions[ending.which];
+        if (is_long) {
+            if (end->knot.tau > h + STEP_MIN) {
+                ahead->active = 1;
+                ahead->ends_with = event ? (int)event->kind : -1;
+                ahead->surface = event ? event->surface : 0;
+                for (int j = 0; j < moving(m) * N_STATES; j++)
+                    ahead->last[j] = end->knot.y[j];
+                go_on_to(m, h - now->knot.tau);
+                return 0;
+            }
+            if (end->knot.tau > h)
+                end->knot.tau = h;
+            stickslip_note_inner_extremes(m, 0.0, ahead->end);
+        }
+        note_time(m, ending.taken);
+        note_point(m, end);
+        take_up(m, end);
+        if (event) {
             events++;
-            stickslip_apply_event(m, now.functions[which].surface, end.tau,
-                                  now.functions[which].kind);
-            start_from(m, end.tau, &now);
-            note_extremes(m, &now);
+            stickslip_apply_event(m, event->surface, end->knot.tau, event->kind);
+            start_from(m, end->knot.tau, now);
+            note_point(m, now);
         } else {
-            now = end;
+            Point *reached = end;
+            end = now;
+            now = reached;
         }
     }
     return 0;

@@ -2,15 +2,25 @@
 
 #include <math.h>
 
+#include "law.h"
 #include "mechanics.h"
 
 /* Errors are relative to |y| plus these: what counts as large for this machine, m, m/s, A. */
 static const double POSITION_SCALE = 1e-3, VELOCITY_SCALE = 0.1, CURRENT_SCALE = 0.1;
 
-/* The first n states take part. With constant n the compiler makes vectors of the inner loops. */
-static inline double step_of(const int n, const Model *m, double tau, double h,
-                             const double y0[N_ALL], const double dy0[N_ALL], double y1[N_ALL],
-                             double dy1[N_ALL])
+double stickslip_allowed_error(const Model *m, int state, double value)
+{
+    const double scale = state >= I_COIL                                ? CURRENT_SCALE
+                         : state == V || state == U || state == W ? VELOCITY_SCALE
+                                                                        : POSITION_SCALE;
+    return m->r.tolerance * (scale + fabs(value));
+}
+
+/* The first n states take part; of those that act on the rates, `acting` for each surface. With
+ * constants the compiler makes vectors of the inner loops. */
+STICKSLIP_INLINE double step_of(const int n, const int acting, const int source, const Law *law,
+                                double tau, double h, const double y0[N_ALL],
+                                const double dy0[N_ALL], double y1[N_ALL], double dy1[N_ALL])
 {
     static const double A[6][6] = {
         {1.0 / 5.0},
@@ -22,54 +32,57 @@ static inline double step_of(const int n, const Model *m, double tau, double h,
     static const double C[6] = {1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0};
     static const double E[7] = {71.0 / 57600.0,     0.0,           -71.0 / 16695.0, 71.0 / 1920.0,
                                 -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0};
+    const Model *m = law->m;
     double k[7][N_ALL];
 
     for (int j = 0; j < n; j++)
         k[0][j] = dy0[j];
     for (int s = 0; s < 6; s++) {
+        const int taken = s == 5 ? n : acting; /* the others only follow */
         double sum[N_ALL] = {0.0};
         for (int l = 0; l <= s; l++) {
             const double a = A[s][l];
-            for (int j = 0; j < n; j++)
+            for (int j = 0; j < taken; j++)
                 sum[j] += a * k[l][j];
         }
-        for (int j = 0; j < n; j++)
+        for (int j = 0; j < taken; j++)
             y1[j] = y0[j] + h * sum[j];
-        stickslip_state_rates(m, m->mode, y1, tau + C[s] * h, k[s + 1]);
+        if (law->general)
+            stickslip_state_rates(m, m->mode, y1, tau + C[s] * h, k[s + 1]);
+        else
+            stickslip_law_rates(law, source, y1, law->touch ? stickslip_law_root(law, y1) : 0.0,
+                                tau + C[s] * h, k[s + 1]);
     }
     for (int j = 0; j < n; j++)
         dy1[j] = k[6][j];
 
-    double worst = 0.0;
-    for (int j = 0; j < n; j++) {
-        const int kind = j % N_STATES;
-        if ((kind >= E_IN && kind <= E_DAMPING) || kind > I_EDDY)
-            continue; /* they act on nothing */
-        double sum = 0.0;
-        for (int s = 0; s < 7; s++)
-            sum += E[s] * k[s][j];
-        double scale = kind >= I_COIL                            ? CURRENT_SCALE
-                       : (kind == V || kind == U || kind == W) ? VELOCITY_SCALE
-                                                               : POSITION_SCALE;
-        double error = fabs(h * sum) / (m->r.tolerance * (scale + fabs(y0[j])));
-        if (!(error <= worst))
+    double worst = 0.0, sum[N_ALL] = {0.0};
+    for (int s = 0; s < 7; s++)
+        for (int j = 0; j < acting; j++)
+            sum[j] += E[s] * k[s][j];
+    for (int j = 0; j < acting; j++) {
+        if (j % N_STATES >= N_ACTING)
+            continue;
+        const double error =
+            fabs(h * sum[j]) / stickslip_allowed_error(m, j % N_STATES, y0[j]);
+        if (error > worst || error != error)
             worst = error; /* so that a NaN stays */
     }
     return worst;
 }
 
-double stickslip_trial_step(const Model *m, double tau, double h, const double y0[N_ALL],
-                            const double dy0[N_ALL], double y1[N_ALL], double dy1[N_ALL])
+double stickslip_trial_step(const Model *m, double tau, double h,
+                                           const double y0[N_ALL], const double dy0[N_ALL],
+                                           double y1[N_ALL], double dy1[N_ALL])
 {
+    const Law law = stickslip_law(m);
     if (moving(m) > 1)
-        return step_of(N_ALL, m, tau, h, y0, dy0, y1, dy1);
+        return step_of(N_ALL, N_ALL, 0, &law, tau, h, y0, dy0, y1, dy1);
+    if (law.general)
+        return step_of(N_STATES, N_ACTING, 0, &law, tau, h, y0, dy0, y1, dy1);
     if (m->n.source)
-        return step_of(N_STATES, m, tau, h, y0, dy0, y1, dy1);
-    for (int j = I_COIL; j < N_STATES; j++) { /* at rest */
-        y1[j] = y0[j];
-        dy1[j] = 0.0;
-    }
-    return step_of(I_COIL, m, tau, h, y0, dy0, y1, dy1);
+        return step_of(N_STATES, N_ACTING, 1, &law, tau, h, y0, dy0, y1, dy1);
+    return step_of(N_STATES, I_COIL, 0, &law, tau, h, y0, dy0, y1, dy1);
 }
 
 double stickslip_step_factor(double error)

@@ -17,6 +17,9 @@ double stickslip_trial_step(const Model *m, double tau, double h, const double y
 /* The factor by which the next step may differ, for an error as trial_step returns it. */
 double stickslip_step_factor(double error);
 
+/* The error that the tolerance allows in a state, by its place among those of a surface. */
+double stickslip_allowed_error(const Model *m, int state, double value);
+
 STICKSLIP_INTERNAL_END
 
 #endif

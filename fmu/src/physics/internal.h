@@ -12,4 +12,11 @@
 #define STICKSLIP_INTERNAL_END
 #endif
 
+/* What only pays where the compiler unites it with its caller, whose constants it takes. */
+#ifdef __GNUC__
+#define STICKSLIP_INLINE static inline __attribute__((always_inline))
+#else
+#define STICKSLIP_INLINE static inline
+#endif
+
 #endif

@@ -136,8 +136,10 @@ static double lift_on(const Model *m, const Mode mode[N_MOVING], const double y[
     return l.load + l.body * m->r.gravity;
 }
 
-void stickslip_forces(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL], int s,
-                      double tau, Forces *f)
+static inline __attribute__((always_inline)) void forces_of(const Model *m,
+                                                            const Mode modes[N_MOVING],
+                                                            const double all[N_ALL], int s,
+                                                            double tau, Forces *f)
 {
     if (m->n.prescribed) {
         forces_on_part(m, modes, tau, m->r.surface_acceleration, f);
@@ -192,6 +194,12 @@ void stickslip_forces(const Model *m, const Mode modes[N_MOVING], const double a
     } else {
         f->a_q = (l.drive + l.suspension + l.wall) / p->ram_mass - p->gravity - f->a_surface;
     }
+}
+
+void stickslip_forces(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL], int s,
+                      double tau, Forces *f)
+{
+    forces_of(m, modes, all, s, tau, f);
 }
 
 /* Rate of the force on the ram without the wall's. */
@@ -291,7 +299,7 @@ void stickslip_state_rates(const Model *m, const Mode modes[N_MOVING], const dou
         const double *y = all + s * N_STATES;
         double *dy = rates + s * N_STATES;
         Forces f;
-        stickslip_forces(m, modes, all, s, tau, &f);
+        forces_of(m, modes, all, s, tau, &f);
         dy[Z] = y[V];
         dy[V] = f.a_surface;
         dy[Q] = y[U];

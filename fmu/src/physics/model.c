@@ -36,6 +36,9 @@ const VariableInfo stickslip_integer_info[N_INTEGERS] = {
 _Static_assert(sizeof(Reals) == N_REALS * sizeof(double), "reals must be contiguous");
 _Static_assert(sizeof(Integers) == N_INTEGERS * sizeof(int), "integers must be contiguous");
 
+/* Inputs that differ by less, of themselves or of their units, are the same. */
+static const double ROUNDING = 1e-13;
+
 static int say(char *message, const char *sentence)
 {
     snprintf(message, MODEL_MESSAGE_SIZE, "%s", sentence);
@@ -66,13 +69,28 @@ static int check(const Model *m, const VariableInfo *info, double value, char *m
     return 0;
 }
 
-int stickslip_model_set_real(Model *m, size_t place, double value, char *message)
+int stickslip_model_check_real(const Model *m, size_t place, double value, char *message)
 {
     if (place >= N_REALS)
         return say(message, "no real variable has this value reference");
-    if (check(m, &stickslip_real_info[place], value, message))
+    return check(m, &stickslip_real_info[place], value, message);
+}
+
+int stickslip_model_set_real(Model *m, size_t place, double value, char *message)
+{
+    if (stickslip_model_check_real(m, place, value, message))
         return -1;
-    ((double *)&m->r)[place] = value;
+    double *now = (double *)&m->r + place;
+    if (*now == value)
+        return 0;
+    /* An importer that leads an input along a straight has other roundings. */
+    const double off = fabs(value - *now);
+    if (off > ROUNDING * fabs(value) && off > ROUNDING &&
+        place != offsetof(Reals, inputs_hold_for) / sizeof(double)) {
+        stickslip_turn_back(m);
+        m->steady_for = 0.0;
+    }
+    *now = value;
     return 0;
 }
 
@@ -148,7 +166,9 @@ int stickslip_model_initialise(Model *m, char *message)
     memcpy(m->y + N_STATES, m->y, N_STATES * sizeof *m->y);
     if (!isfinite(m->y[Q]))
         return say(message, "the ram has no static equilibrium: the suspension is too weak");
-    m->step = 1e-6;
+    m->step[0] = m->step[1] = 1e-6;
+    m->touch_step = m->steady_for = 0.0;
+    memset(&m->ahead, 0, sizeof m->ahead);
     m->energy_at_start = stickslip_energy_stored(m, m->y);
     stickslip_settle_mode(m, 0.0);
     m->r.stick_time = m->r.stick_time_2 = 0.0;
@@ -163,33 +183,50 @@ int stickslip_model_initialise(Model *m, char *message)
     return 0;
 }
 
+/* The inputs after h, with the normal force given. */
+static void move_inputs(Model *m, double h, double normal)
+{
+    m->r.current += m->r.current_slope * h;
+    m->r.command += m->r.command_slope * h;
+    m->r.current_2 += m->r.current_2_slope * h;
+    m->r.command_2 += m->r.command_2_slope * h;
+    m->r.surface_velocity += m->r.surface_acceleration * h;
+    m->r.normal_force = normal > 0.0 ? normal : 0.0;
+    m->steady_for += h;
+    m->r.inputs_hold_for = m->r.inputs_hold_for > h ? m->r.inputs_hold_for - h : 0.0;
+}
+
+static void reach_within(Model *m)
+{
+    stickslip_model_outputs(m);
+    stickslip_reached(m);
+}
+
+int stickslip_model_step_within(Model *m, double h)
+{
+    if (!m->initialised || !(h > 0.0) || !stickslip_advance_within(m, h))
+        return 0;
+    move_inputs(m, h, m->r.normal_force + m->r.normal_force_slope * h);
+    reach_within(m);
+    return 1;
+}
+
 int stickslip_model_step(Model *m, double h, char *message)
 {
     if (!m->initialised)
         return say(message, "a step before initialisation");
     if (!(h > 0.0) || !isfinite(h))
         return say(message, "the step must be a positive number of seconds");
-    const double current = m->r.current + m->r.current_slope * h;
     const double normal = m->r.normal_force + m->r.normal_force_slope * h;
     if (normal < -1e-12 * m->r.normal_force)
         return say(message, "normal_force falls below 0 N within the step; its slope is too steep");
     if (stickslip_advance(m, h, message))
         return -1;
-    m->r.current = current;
-    m->r.command += m->r.command_slope * h;
-    m->r.current_2 += m->r.current_2_slope * h;
-    m->r.command_2 += m->r.command_2_slope * h;
-    m->r.surface_velocity += m->r.surface_acceleration * h;
-    m->r.normal_force = normal > 0.0 ? normal : 0.0;
+    move_inputs(m, h, normal);
+    if (m->ahead.active)
+        reach_within(m);
     return 0;
 }
-
-/* Sum of one of the energies over all surfaces that move. */
-static double sum_of(const Model *m, int state)
-{
-    return m->n.independent ? m->y[state] + m->y[N_STATES + state] : m->y[state];
-}
-
 
 static const double NO_IMPACT = 1e9; /* s; as variables.def has it */
 
@@ -208,9 +245,6 @@ static void outputs_of_second(Model *m)
     r->friction_force_2 = f.friction;
     r->coil_current_2 = y[I_COIL];
     r->coil_voltage_2 = m->n.source ? stickslip_coil_voltage(m, m->mode + 1, y, 1) : 0.0;
-    r->energy_magnetic += stickslip_magnetic_energy(m, y);
-    if (m->mode[1].wall == WALL_PARTING)
-        r->energy_impact -= stickslip_wall_energy(m, m->mode + 1, y);
     m->n.sticking_2 = m->mode[1].slip == 0;
 }
 
@@ -260,24 +294,42 @@ void stickslip_model_outputs(Model *m)
     r->friction_force = f.friction;
     r->plate_force = f.plate;
     r->wall_force = f.wall;
-    r->energy_in = sum_of(m, E_IN);
-    r->energy_friction = sum_of(m, E_FRICTION);
-    r->energy_impact = sum_of(m, E_IMPACT);
-    if (m->mode[0].wall == WALL_PARTING)
-        r->energy_impact -= stickslip_wall_energy(m, m->mode, y);
-    r->energy_damping = sum_of(m, E_DAMPING);
-    r->energy_stored = stickslip_energy_stored(m, y) - m->energy_at_start;
     r->coil_current = y[I_COIL];
     r->coil_voltage = m->n.source ? stickslip_coil_voltage(m, m->mode, y, 0) : 0.0;
-    r->energy_output = sum_of(m, E_OUTPUT);
-    r->energy_copper = sum_of(m, E_COPPER);
-    r->energy_magnetic = stickslip_magnetic_energy(m, y);
     m->n.output_clamped = m->mode[0].output;
     m->n.command_limited = m->mode[0].limited;
     m->n.sticking = m->mode[0].slip == 0;
+    m->energies_old = 1;
     m->n.wall_contact = m->mode[0].side;
     if (m->n.independent)
         outputs_of_second(m);
+}
+
+/* Sum of one of the energies over all surfaces that move. */
+static double sum_of(const Model *m, int state)
+{
+    return m->n.independent ? m->y[state] + m->y[N_STATES + state] : m->y[state];
+}
+
+void stickslip_model_energies(Model *m)
+{
+    Reals *r = &m->r;
+    stickslip_catch_up(m);
+    m->energies_old = 0;
+    r->energy_in = sum_of(m, E_IN);
+    r->energy_friction = sum_of(m, E_FRICTION);
+    r->energy_impact = sum_of(m, E_IMPACT);
+    r->energy_damping = sum_of(m, E_DAMPING);
+    r->energy_stored = stickslip_energy_stored(m, m->y) - m->energy_at_start;
+    r->energy_output = sum_of(m, E_OUTPUT);
+    r->energy_copper = sum_of(m, E_COPPER);
+    r->energy_magnetic = 0.0;
+    for (int s = 0; s < moving(m); s++) {
+        const double *y = m->y + s * N_STATES;
+        r->energy_magnetic += stickslip_magnetic_energy(m, y);
+        if (m->mode[s].wall == WALL_PARTING)
+            r->energy_impact -= stickslip_wall_energy(m, m->mode + s, y);
+    }
 }
 
 double stickslip_model_derivative(const Model *m, size_t output, size_t input)

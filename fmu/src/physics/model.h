@@ -26,9 +26,10 @@ extern const VariableInfo stickslip_integer_info[N_INTEGERS];
 
 void stickslip_model_defaults(Model *m);
 
-/* Set one variable by its place. 0, or -1 with a sentence in message: unknown place, an output, a
+/* Set one variable by its place, or only see whether it can be. 0, or -1 with a sentence in message: unknown place, an output, a
  * parameter after initialisation, not finite, out of range. */
 int stickslip_model_set_real(Model *m, size_t place, double value, char *message);
+int stickslip_model_check_real(const Model *m, size_t place, double value, char *message);
 int stickslip_model_set_integer(Model *m, size_t place, int value, char *message);
 
 /* Static equilibrium without current: the ram on its suspension, the surface on its flexures
@@ -39,8 +40,17 @@ int stickslip_model_initialise(Model *m, char *message);
  * message; the state is then to be discarded. */
 int stickslip_model_step(Model *m, double h, char *message);
 
+/* The same where an internal step under way reaches beyond h: the outputs are then those of its
+ * interpolant, fresh. 0 if none does; then nothing has changed. */
+int stickslip_model_step_within(Model *m, double h);
+
 /* Refresh the outputs from state and inputs, after a step or a change of an input. */
 void stickslip_model_outputs(Model *m);
+
+/* The outputs called energy_..., the last of all, are refreshed by themselves, since few look at
+ * them: m->energies_old tells that they have not been since the last of the above. */
+enum { FIRST_ENERGY = offsetof(Reals, energy_in) / sizeof(double) };
+void stickslip_model_energies(Model *m);
 
 /* d(output)/d(current, current_2, normal_force or surface_acceleration) in the present mode,
  * analytically exact: forces are affine in all four; and d(coil_voltage)/d(command_slope), of either source. 0 for every other pair. */

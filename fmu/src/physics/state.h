@@ -42,9 +42,12 @@ enum { N_REALS = sizeof(Reals) / sizeof(double), N_INTEGERS = sizeof(Integers) /
 /* Places in the state vector. The slip d = z_part - z_surface and its rate w are states of their
  * own: while the part sticks they do not change by a single bit. */
 enum {
-    Z, V, Q, U, D, W, E_IN, E_FRICTION, E_IMPACT, E_DAMPING,
-    I_COIL, I_EDDY, E_OUTPUT, E_COPPER, /* of the source, at rest without one */
-    N_STATES
+    Z, V, Q, U, D, W,
+    I_COIL, I_EDDY, /* of the source, at rest without one */
+    E_IN, E_FRICTION, E_IMPACT, E_DAMPING,
+    E_OUTPUT, E_COPPER, /* of the source */
+    N_STATES,
+    N_ACTING = E_IN /* what the rates depend on; the energies only follow */
 };
 
 /* Surfaces that can move by themselves. Their states lie one after the other, N_STATES each. */
@@ -67,14 +70,52 @@ typedef struct {
     int limited; /* 0 the target is the command; else the current limit of that sign */
 } Mode;
 
+/* The solution within one long step (see dense.h): a polynomial of each state in the share of the
+ * step that has gone by. */
+typedef struct {
+    double length; /* of the step, s or s/m^0.5 */
+    int wall;      /* the surface whose wall's clock it goes by; -1: the time */
+    double c[8][N_ALL], clock[8];
+} Dense;
+
+/* An extreme of the first surface, or of its coil's current, between the ends of a long step. */
+typedef enum { EXTREME_A, EXTREME_V, EXTREME_Z, EXTREME_CURRENT } ExtremeOf;
+typedef struct {
+    ExtremeOf of;
+    double at, value; /* time since the start of the step, s */
+} Extreme;
+enum { MAX_EXTREMES = 16 };
+
+/* A long step that goes on beyond the last communication point, since the inputs do. y and the
+ * mode are those at that point; what ends the step is still to come. */
+typedef struct {
+    int active;
+    int behind;     /* the energies in y are older than the other states */
+    int ends_with;  /* the kind of the event that the step ends with; -1: none */
+    int surface;    /* whose event that is */
+    int n_extremes;
+    double at, end;      /* of the communication point and of the step's end, since its start, s */
+    double acceleration; /* of the first surface now, m/s2 */
+    Extreme extremes[MAX_EXTREMES];
+    double last[N_ALL]; /* states at the end */
+    Dense dense;
+} Ahead;
+
 typedef struct {
     Reals r;
     Integers n;
     Mode mode[N_MOVING];
     double y[N_ALL];
-    double step;           /* the next internal step that the error control would take, s */
+    /* The next step of order 5 that the error control would take, s: where no compliant wall is
+     * touched, and where one is. */
+    double step[2];
+    double touch_step; /* the next long step by a wall's clock, s/m^0.5; 0: unknown */
+    double last_length, last_error; /* of the long step before; 0: there was an event since */
+    double steady_for; /* time since an input was changed, s */
     double energy_at_start;
     int initialised;
+    int energies_old; /* the outputs of that name */
+    Ahead ahead; /* the last: what is before it makes a state by itself */
 } Model;
 
 /* How many surfaces are solved for: 1, which stands for all that move alike, or 2. */

@@ -1,0 +1,112 @@
+/* The rates of the states as the integration takes them: what the mode and the inputs decide is
+ * decided once a step and not at each of its stages. The formulas are those of mechanics.c, which
+ * has all cases; here is the one that most steps are of. In a header, for speed. */
+#ifndef STICKSLIP_LAW_H
+#define STICKSLIP_LAW_H
+
+#include <math.h>
+
+#include "mechanics.h"
+#include "source.h"
+
+typedef struct {
+    const Model *m;
+    int general; /* only mechanics.c has this case; then nothing below is set */
+    int touch, rest, slips, eddy, clamped;
+    double side, slip;
+    double per_moving, per_ram, per_part; /* inverse masses, 1/kg */
+    double load;                          /* constant part of what moves the surface, N */
+    double kinetic;                       /* mu_k, against the slip */
+    double following_rate;                /* of the current while it follows its target, A/s */
+} Law;
+
+static inline Law stickslip_law(const Model *m)
+{
+    const Reals *p = &m->r;
+    const Mode *mode = m->mode;
+    Law l = {.m = m};
+    l.general = moving(m) > 1 || m->n.prescribed || m->n.ram_fixed || p->mu_plate > 0.0;
+    if (l.general)
+        return l;
+    const double part = stickslip_part_mass_per_surface(m);
+    const double body = p->surface_mass + (mode->wall == WALL_REST ? p->ram_mass : 0.0);
+    l.touch = mode->wall == WALL_TOUCH;
+    l.rest = mode->wall == WALL_REST;
+    l.slips = mode->slip != 0;
+    l.side = mode->side;
+    l.slip = mode->slip;
+    l.per_moving = 1.0 / (l.slips ? body : body + part);
+    l.per_ram = 1.0 / p->ram_mass;
+    l.per_part = 1.0 / part;
+    l.load = -(l.slips ? body : body + part) * p->gravity;
+    l.kinetic = -p->mu_k * mode->slip;
+    l.eddy = m->n.source && has_eddy(m);
+    l.clamped = m->n.source && mode->output;
+    if (m->n.source)
+        l.following_rate = target_rate(m, mode, 0);
+    return l;
+}
+
+static inline double stickslip_law_root(const Law *l, const double y[N_STATES])
+{
+    const double depth = l->side * y[Q] - l->m->r.travel;
+    return depth > 0.0 ? sqrt(depth) : 0.0;
+}
+
+/* Of one surface. `root` is that of the penetration; it counts while a compliant wall is touched. */
+STICKSLIP_INLINE void
+stickslip_law_rates(const Law *l, const int source, const double y[N_STATES], double root,
+                    double tau, double dy[N_STATES])
+{
+    const Model *m = l->m;
+    const Reals *p = &m->r;
+    const double q = y[Q], u = y[U], v = y[V], w = y[W];
+    const double bl = p->force_factor * (1.0 + q * (p->b1 + q * p->b2));
+    const double i = source ? y[I_COIL] : p->current + p->current_slope * tau;
+    const double drive = bl * i;
+    double on_ram = drive - q * (p->suspension_k1 + q * (p->suspension_k2 + q * p->suspension_k3)) -
+                    p->suspension_damping * u;
+    double lost = 0.0;
+    if (l->touch) {
+        const double spring = p->contact_stiffness * root * root * root, closing = l->side * u;
+        const double damped = spring * p->contact_damping * closing;
+        on_ram -= l->side * (spring + damped);
+        lost = damped * closing;
+    }
+    const double springs = -p->flexure_stiffness * y[Z] - p->flexure_damping * v + l->load;
+    double friction = 0.0;
+    if (l->slips) {
+        const double normal = p->normal_force + p->normal_force_slope * tau;
+        friction = normal > 0.0 ? l->kinetic * normal : 0.0;
+    }
+    const double a = (springs - (l->rest ? 0.0 : on_ram) - friction) * l->per_moving;
+    dy[Z] = v;
+    dy[V] = a;
+    dy[Q] = u;
+    dy[U] = l->rest ? 0.0 : on_ram * l->per_ram - p->gravity - a;
+    dy[D] = w;
+    dy[W] = l->slips ? friction * l->per_part - p->gravity - a : 0.0;
+    dy[E_IN] = drive * u;
+    dy[E_FRICTION] = -friction * w; /* of sticking, w is 0 */
+    dy[E_IMPACT] = lost;
+    dy[E_DAMPING] = p->flexure_damping * v * v + p->suspension_damping * u * u;
+    if (!source) {
+        dy[I_COIL] = dy[I_EDDY] = dy[E_OUTPUT] = dy[E_COPPER] = 0.0;
+        return;
+    }
+    const double eddy = l->eddy ? p->eddy_resistance * (i - y[I_EDDY]) : 0.0;
+    const double loop = loop_resistance(m), at_rest = loop * i + eddy + bl * u;
+    double output, rate = l->following_rate;
+    if (l->clamped) {
+        output = output_limit(m, m->mode[0].output);
+        rate = (output - at_rest) / p->inductance;
+    } else {
+        output = at_rest + p->inductance * rate;
+    }
+    dy[I_COIL] = rate;
+    dy[I_EDDY] = l->eddy ? eddy / p->eddy_inductance : 0.0;
+    dy[E_OUTPUT] = output * i;
+    dy[E_COPPER] = loop * i * i + (l->eddy ? eddy * (i - y[I_EDDY]) : 0.0);
+}
+
+#endif
