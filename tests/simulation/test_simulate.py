@@ -66,7 +66,7 @@ RUNS = {
         *("run.duration=0.3", "run.settle=0.1"),
     ),
     "ideal": ("reference", "circuit.model=ideal", "run.duration=0.4", "run.settle=0.1"),
-    "held": ("held", "run.duration=0.3", "run.settle=0.1", "mechanics.tolerance=1e-11"),
+    "held": ("held", "run.duration=0.3", "run.settle=0.1"),
     "rigid": ("reference", "run.duration=0.3", "run.settle=0.1", "mechanics.contact=rigid"),
 }
 
