@@ -255,7 +255,8 @@ def test_interrupt(scene: str, tmp_path: Path) -> None:
     running = []
     for number in range(4):
         out = tmp_path / str(number)
-        arguments = ["run", scene, "--set", "run.duration=100", "--out", str(out)]
+        long = ["--set", "run.duration=1000", "--set", "run.output_step=1e-3"]
+        arguments = ["run", scene, *long, "--out", str(out)]
         process = subprocess.Popen(
             [*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
             preexec_fn=heed_interrupts,
