@@ -113,4 +113,24 @@ def test_one_sweep_at_a_time(tmp_path: Path) -> None:
     finally:
         first.kill()
         first.wait()
-    assert second.returncode == 2 and "another process is writing this sweep" in second.stderr
+    assert second.returncode == 2 and "another process is writing it" in second.stderr
+
+
+@needs.posix
+def test_a_disk_full_in_mid_line(tmp_path: Path) -> None:
+    """What was whole stays; with room again only the rest is run."""
+    import resource
+
+    command = arguments(4, tmp_path)
+    full = subprocess.run(
+        command, capture_output=True, text=True, timeout=300,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_001, 20_001)),
+    )  # fmt: skip
+    journal = tmp_path / "sweep.journal"
+    written = journal.read_bytes()
+    # The dataset may find no room either, but each point was run, and it was told.
+    assert "cannot be written" in full.stderr and "Traceback" not in full.stderr
+    assert 5 < written.count(b"\n") < 65 and written.endswith(b"\n")
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+    assert journal.read_bytes().startswith(written) and lines(tmp_path) == 65
+    assert not done.stderr

@@ -21,6 +21,8 @@ class Outcome:
 
     numbers: dict[str, float]
     failure: str = ""
+    machine: bool = False
+    """The failure may have been the machine's, not the point's: it is worth another try."""
 
 
 def evaluate(
