@@ -20,6 +20,7 @@ from cosim.files.resources import circuits
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.toolchain import processes
+from tests.helpers import needs
 
 pytestmark = pytest.mark.reliability
 
@@ -104,10 +105,25 @@ def test_dying_process(harm: str) -> None:
         processes.isolated(_harmful, harm, lambda _: None)
 
 
-def test_hanging_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(processes, "PATIENCE", 2.0)
-    with pytest.raises(SimulationFailed, match="hangs"):
-        processes.isolated(_harmful, "time.sleep(60)", lambda _: None)
+@pytest.mark.parametrize(
+    ("limit", "harm"), [("PATIENCE", "while True: pass"), ("STALLED", "time.sleep(60)")]
+)
+def test_hanging_process(limit: str, harm: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processes, limit, 2.0)
+    with pytest.raises(SimulationFailed, match="hangs.* 2 s"):
+        processes.isolated(_harmful, harm, lambda _: None)
+
+
+@needs.posix
+def test_a_pause_is_no_hang(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process is stopped for longer than the patience with one that works."""
+    monkeypatch.setattr(processes, "PATIENCE", 1.0)
+    stop = (
+        "import subprocess\npid = os.getpid()\n"
+        "subprocess.Popen(['sh', '-c', f'kill -STOP {pid}; sleep 3; kill -CONT {pid}'])\n"
+        "time.sleep(0.3)"
+    )
+    assert processes.isolated(_harmful, stop, lambda _: None) is None
 
 
 def _harmful(harm: str, progress: object) -> None:
