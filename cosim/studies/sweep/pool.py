@@ -75,7 +75,7 @@ class Pool:
             ready = wait([worker.pipe for worker in busy], timeout=1.0)
             for worker in busy:
                 assert worker.point is not None
-                number, lost = worker.point[0], ""
+                number, lost, answer = worker.point[0], "", None
                 if worker.pipe in ready:
                     try:
                         kind, answer = worker.hear()
