@@ -6,13 +6,15 @@ Exit codes: 0 done; 2 bad input, told in one sentence; 3 the simulation failed; 
 import argparse
 import os
 import sys
+import time
 import warnings
 from io import TextIOWrapper
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from cosim.cli.command import add_commands
-from cosim.errors import BadInput, CosimError, Note
+from cosim.errors import BadInput, CosimError, Note, plain
 from cosim.files.declared import declared
+from cosim.files.door import watched
 from cosim.version import __version__
 
 INTERRUPTED = 130
@@ -45,7 +47,7 @@ def main(argv: list[str] | None = None) -> int:
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # prints ? for what the encoding lacks
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), watched(_Reading()):
             warnings.simplefilter("always", Note)
             warnings.showwarning = _note
             argv = sys.argv[1:] if argv is None else argv
@@ -68,6 +70,31 @@ def main(argv: list[str] | None = None) -> int:
         # signal although it is handled here; another exec() clears that flag.
         exec("")
         return _told("interrupted.", INTERRUPTED)
+
+
+class _Reading:
+    """A progress bar for a file that takes long to read."""
+
+    def __init__(self) -> None:
+        self._path, self._began = "", 0.0
+        self._bar: Any = None
+
+    def __call__(self, path: str, share: float) -> None:
+        if path != self._path or share >= 1.0:
+            if self._bar is not None:
+                self._bar.close()
+            self._path, self._began, self._bar = path, time.monotonic(), None
+        if self._bar is None and share < 1.0 and time.monotonic() - self._began > _LONG:
+            from cosim.cli.options import progress_bar
+
+            name = os.path.basename(path)
+            self._bar = progress_bar(f"reading {plain(name, 40)}", 1.0, "", bar_format=_BAR)
+        if self._bar is not None:
+            self._bar.update(share - self._bar.n)
+
+
+_LONG = 1.0  # s of reading before its progress is shown
+_BAR = "{desc} {percentage:3.0f}% |{bar}| {remaining} left"
 
 
 def _note(message: Warning | str, *_: object, **__: object) -> None:

@@ -9,10 +9,14 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.files.atomic import whole
+from cosim.files.door import opened
 from cosim.files.spill import blocks
 from cosim.waveforms.columns import COLUMNS
 
 _CSV_ROWS = 1024
+
+LARGEST = 1 << 33
+"""Bytes of a waveforms.nc that is read: an hour of rows, far more than is ever compared."""
 
 
 def write_csv(path: Path, waveforms: dict[str, Array], units: dict[str, str]) -> None:
@@ -33,21 +37,6 @@ def csv(file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str]) -> 
             table = np.column_stack([values[few] for values in columns])
             # Many rows in one go: several times as fast as numpy's savetxt.
             file.write((row * len(table) % tuple(table.ravel().tolist())).encode())
-
-
-def read_csv(path: Path) -> dict[str, Array]:
-    """The columns of a file that :func:`write_csv` wrote, by name, without their units."""
-    try:
-        with open(path, encoding="utf-8") as file:
-            names = [cell.partition(" [")[0] for cell in file.readline().strip().split(",")]
-            table = np.loadtxt(file, delimiter=",", ndmin=2)
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read ({error.strerror}).") from None
-    except ValueError as error:
-        raise BadInput(f"{path}: this is not a waveforms.csv ({error}).") from None
-    if table.shape[1] != len(names):
-        raise BadInput(f"{path}: the header has {len(names)} names for {table.shape[1]} columns.")
-    return dict(zip(names, table.T, strict=True))
 
 
 def write_netcdf(
@@ -117,7 +106,7 @@ def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str,
     from scipy.io import netcdf_file
 
     try:
-        with netcdf_file(path, mmap=False) as file:
+        with opened(path, LARGEST) as content, netcdf_file(content, mmap=False) as file:
             columns = {name: variable[:] for name, variable in file.variables.items()}
             units = {name: _text(variable.units) for name, variable in file.variables.items()}
             attributes = {name: _text(value) for name, value in file._attributes.items()}
@@ -128,8 +117,8 @@ def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str,
                 raise ValueError(f"{name!r} is not complete")
         if len(columns["time"]) < 2 or np.any(np.diff(columns["time"]) <= 0):
             raise ValueError("the time does not increase")
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read ({error.strerror}).") from None
+    except (BadInput, MemoryError):
+        raise
     except Exception as error:  # there is little that scipy does not raise on a damaged file
         raise BadInput(f"{path}: this is not a whole waveforms.nc ({error}).") from None
     return {name: np.array(v, dtype=np.float64) for name, v in columns.items()}, units, attributes

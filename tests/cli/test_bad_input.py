@@ -195,7 +195,7 @@ def test_the_layer_at_fault_is_named(tmp_path: Path) -> None:
         ("paper.toml", "did you mean the built-in scene paper?"),
         ("no/such/file.toml", "there is no such file"),
         ("../scenes/paper", "there is no such file; did you mean the built-in scene paper?"),
-        ("a\x00b", "not a possible file name"),
+        ("a\x00b", "it is no possible file name"),
         ("a\udcffb", "there is no"),
         ("x" * 5000, "cannot be read"),
         ("/dev/null/x", "cannot be read"),
@@ -208,7 +208,7 @@ def test_source(source: str, part: str, tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_directory(tmp_path: Path) -> None:
-    assert complaint(tmp_path) == f"{tmp_path}: this is a directory, not a scene file."
+    assert complaint(tmp_path) == f"{tmp_path}: cannot be read (it is a directory)."
 
 
 @needs.posix
@@ -223,7 +223,7 @@ def test_unreadable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     path = tmp_path / "secret.toml"
     path.touch()
-    monkeypatch.setattr("cosim.scene.loading.open", refuse, raising=False)
+    monkeypatch.setattr("cosim.files.door.open", refuse, raising=False)
     assert complaint(path) == f"{path}: cannot be read (Permission denied)."
 
 
@@ -240,7 +240,7 @@ def test_link_to_itself(tmp_path: Path) -> None:
         (b"[run]\n\xff", "line 2: this is not UTF-8 text"),
         ("[run]".encode("utf-16"), "this is not UTF-8 text"),
         (bytes(range(256)), "not"),
-        (b"#" * (1 << 20) + b"#", "larger than a scene file may be"),
+        (b"#" * (1 << 20) + b"#", "larger than 1.04858 MB"),
     ],
 )
 def test_bytes(raw: bytes, part: str, tmp_path: Path) -> None:
