@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from cosim.errors import BadInput, NoEffect, plain
 from cosim.files import door
-from cosim.scene import messages
+from cosim.scene import messages, toml
 from cosim.scene.describe import acts, keys
 from cosim.scene.methods import METHODS
 from cosim.scene.model import Scene
@@ -134,7 +134,7 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
         line = raw.count(b"\n", 0, error.start) + 1
         raise BadInput(f"{origin}, line {line}: this is not UTF-8 text.") from None
     try:
-        return tomllib.loads(text)
+        return toml.parse(text)
     except (ValueError, RecursionError) as error:
         raise BadInput(_syntax(error, text, origin)) from None
 
@@ -209,7 +209,7 @@ def _find_files(tables: dict[str, Any], folder: Path) -> None:
 def _value(text: str) -> Any:
     """The TOML value of ``text``; a string where it is none, such as a bare word."""
     try:
-        data = tomllib.loads(f"value = {text}")
+        data = toml.parse(f"value = {text}")
     except (ValueError, RecursionError):
         return text
     return data["value"] if data.keys() == {"value"} else text
