@@ -44,6 +44,7 @@ def _parser(arguments: list[str]) -> argparse.ArgumentParser:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
+    _open_standard_streams()
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # prints ? for what the encoding lacks
     try:
@@ -72,6 +73,18 @@ def main(argv: list[str] | None = None) -> int:
         return _told("interrupted.", INTERRUPTED)
 
 
+def _open_standard_streams() -> None:
+    """Let nothing be where the caller has closed a stream: the next file that is opened would take
+    its number, and be written to with what is printed."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "r+"))  # noqa: SIM115
+
+
 class _Reading:
     """A progress bar for a file that takes long to read."""
 
@@ -93,6 +106,7 @@ class _Reading:
             self._bar.update(share - self._bar.n)
 
 
+_LONGEST = 2000  # characters of a message
 _LONG = 1.0  # s of reading before its progress is shown
 _BAR = "{desc} {percentage:3.0f}% |{bar}| {remaining} left"
 
@@ -107,6 +121,8 @@ def _note(message: Warning | str, *_: object, **__: object) -> None:
 def _told(sentence: str, code: int) -> int:
     """Print the sentence on one line; returns the exit code."""
     words = " ".join(sentence.split())
+    if len(words) > _LONGEST:  # of what was given, not of what is said of it
+        words = f"{words[: _LONGEST // 2]} … {words[-_LONGEST // 2 :]}"
     print(f"cosim: {words}" + ("" if words.endswith((".", "?")) else "."), file=sys.stderr)
     return code
 

@@ -7,7 +7,7 @@ from typing import IO
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.files.atomic import whole
 from cosim.files.door import opened
 from cosim.files.spill import blocks
@@ -111,7 +111,9 @@ def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str,
             units = {name: _text(variable.units) for name, variable in file.variables.items()}
             attributes = {name: _text(value) for name, value in file._attributes.items()}
         for name, values in columns.items():
-            if not name.isidentifier() or values.dtype != ">f8" or values.ndim != 1:
+            if not (name.isidentifier() and (name + units[name]).isascii()):
+                raise ValueError(f"{name!r} in {units[name]!r} is not a name and a unit")
+            if values.dtype != ">f8" or values.ndim != 1:
                 raise ValueError(f"{name!r} is not a column")
             if len(values) != len(columns["time"]) or not np.isfinite(values).all():
                 raise ValueError(f"{name!r} is not complete")
@@ -120,11 +122,14 @@ def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str,
     except (BadInput, MemoryError):
         raise
     except Exception as error:  # there is little that scipy does not raise on a damaged file
-        raise BadInput(f"{path}: this is not a whole waveforms.nc ({error}).") from None
+        raise BadInput(f"{path}: this is not a whole waveforms.nc ({plain(str(error))}).") from None
     return {name: np.array(v, dtype=np.float64) for name, v in columns.items()}, units, attributes
 
 
 def _text(value: object) -> str:
     if not isinstance(value, bytes):
         raise ValueError(f"{value!r} is not text")
-    return value.decode()
+    text = value.decode()
+    if not all(char.isprintable() or char in "\n\t" for char in text):
+        raise ValueError("a text has control characters")
+    return text

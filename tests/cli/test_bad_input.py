@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.scene import Scene, keys, list_scenes, load
 from tests.helpers import needs
@@ -291,3 +292,29 @@ OPTION = st.one_of(
 @given(scene=st.sampled_from(list_scenes()), options=st.lists(OPTION, max_size=4))
 def test_any_override(scene: tuple[str, str], options: list[str]) -> None:
     loads_or_complains(scene[0], options)
+
+
+DIGITS = "9" * 5000
+LONG_NUMBERS = [
+    ["run", "held", f"--set=drive.frequency={DIGITS}"],
+    ["run", "held", f"--set=coil.count={DIGITS}"],
+    ["sweep", "held", f"--over=friction.mu_s=0.7:0.8:{DIGITS}"],
+    ["sweep", "held", f"--over=friction.mu_s={DIGITS}"],
+    ["sweep", "held", f"--over=mechanics.n_surfaces=1:{DIGITS}:3"],
+    ["sweep", "held", "--over=friction.mu_s=0.7:0.8:3", f"--samples={DIGITS}"],
+    ["sweep", "held", "--over=friction.mu_s=0.7:0.8:3", "--samples=3", f"--seed=-{DIGITS[:4000]}"],
+    ["sweep", "held", "--over=friction.mu_s=0.7:0.8:3", f"--workers={DIGITS[:4000]}"],
+    ["tune", "held", "--maximise=v_average", f"--budget={DIGITS[:4000]}"],
+    ["tune", "held", "--maximise=v_average", f"--over=friction.mu_s={DIGITS}:{DIGITS}"],
+    ["tune", "held", "--maximise=v_average", f"--seed=-{DIGITS[:4000]}"],
+]
+
+
+@pytest.mark.parametrize("words", LONG_NUMBERS, ids=lambda words: f"{words[0]} {words[-1][:20]}")
+def test_endless_numbers(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*words, f"--out={tmp_path}"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("cosim: ") and told.count("\n") == 1 and len(told) < 2500
+    assert not list(tmp_path.iterdir())

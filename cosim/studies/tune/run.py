@@ -16,7 +16,7 @@ from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.choose_rung import without_ngspice
 from cosim.studies.sweep.batch import Batch, runner
-from cosim.studies.sweep.design import FREQUENCIES, numeric_key
+from cosim.studies.sweep.design import FREQUENCIES, MOST_POINTS, numeric_key
 from cosim.studies.sweep.point import Number, Outcome, periods_made_whole
 from cosim.studies.sweep.pool import Pool, workers_asked
 from cosim.studies.tune import files
@@ -99,8 +99,11 @@ def tune(
     ranges = _checked(over or KNOBS)
     turned = len(TURNS) * len(ranges)
     least = FEWEST_RUNS + turned
-    if budget < least:
-        raise BadInput(f"--budget {budget}: must be a whole number from {least} for these keys.")
+    if not least <= budget <= MOST_POINTS:
+        raise BadInput(
+            f"--budget {budget}: must be a whole number from {least}, for these keys, to "
+            f"{MOST_POINTS}."
+        )
     whole_periods = any(key in FREQUENCIES for key in ranges)
     searched = min(round(SEARCHED * budget), budget - turned)
     scouts, hints = 0, None
