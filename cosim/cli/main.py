@@ -15,6 +15,7 @@ from cosim.cli.command import add_commands
 from cosim.errors import BadInput, CosimError, Note, plain
 from cosim.files.declared import declared
 from cosim.files.door import watched
+from cosim.toolchain.interrupts import ended_alike
 from cosim.version import __version__
 
 INTERRUPTED = 130
@@ -48,7 +49,7 @@ def main(argv: list[str] | None = None) -> int:
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # prints ? for what the encoding lacks
     try:
-        with warnings.catch_warnings(), watched(_Reading()):
+        with ended_alike(), warnings.catch_warnings(), watched(_Reading()):
             warnings.simplefilter("always", Note)
             warnings.showwarning = _note
             argv = sys.argv[1:] if argv is None else argv

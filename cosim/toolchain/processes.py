@@ -38,7 +38,9 @@ _MOST = 2.0  # s that count between two looks at a clock; whatever is more, one 
 
 _PROGRAM = """
 import signal, sys
-signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # they reach the whole group; the parent decides
+    if hasattr(signal, name):
+        signal.signal(getattr(signal, name), signal.SIG_IGN)
 from multiprocessing import connection
 pipe = getattr(connection, sys.argv[1])(int(sys.argv[2]))
 sys.path[:] = pipe.recv()
@@ -170,7 +172,7 @@ def _start(pipe: Connection) -> "subprocess.Popen[Any]":
         os.set_handle_inheritable(handle, True)
         about = subprocess.STARTUPINFO(lpAttributeList={"handle_list": [handle]})
         options = {"startupinfo": about}
-    command = [sys.executable, "-c", _PROGRAM, type(pipe).__name__, str(handle)]
+    command = [sys.executable, "-P", "-c", _PROGRAM, type(pipe).__name__, str(handle)]
     return subprocess.Popen(command, stdin=subprocess.PIPE, **options)
 
 

@@ -39,16 +39,6 @@ def csv(file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str]) -> 
             file.write((row * len(table) % tuple(table.ravel().tolist())).encode())
 
 
-def write_netcdf(
-    path: Path, waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
-) -> None:
-    """NetCDF (classic format) with the dimension ``time``; each variable has its ``units``, and a
-    column of a run its ``long_name``.
-    """
-    with whole(path) as temporary, open(temporary, "wb") as file:
-        netcdf(file, waveforms, units, attributes)
-
-
 _DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12
 _CHARACTERS, _DOUBLES = 2, 6
 
@@ -56,7 +46,8 @@ _CHARACTERS, _DOUBLES = 2, 6
 def netcdf(
     file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
 ) -> None:
-    """What :func:`write_netcdf` writes, into an open file, a block of all columns at a time.
+    """NetCDF (classic format) with the dimension ``time``; each variable has its ``units``, and a
+    column of a run its ``long_name``. It is written a block of all columns at a time.
 
     After NetCDF Classic Format Specification, Unidata, with 64-bit offsets; scipy's writer has the
     same bytes, but needs all columns in memory.
@@ -102,7 +93,7 @@ def _attributes(texts: dict[str, str]) -> bytes:
 
 
 def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str, str]]:
-    """Waveforms, their units, and the attributes of a file that :func:`write_netcdf` wrote."""
+    """Waveforms, their units, and the attributes of a file that :func:`netcdf` wrote."""
     from scipy.io import netcdf_file
 
     try:

@@ -114,7 +114,7 @@ def test_one_sweep_at_a_time(tmp_path: Path) -> None:
     finally:
         first.kill()
         first.wait()
-    assert second.returncode == 2 and "another process is writing it" in second.stderr
+    assert second.returncode == 2 and "another process is writing into" in second.stderr
 
 
 @needs.posix
