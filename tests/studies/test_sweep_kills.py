@@ -180,14 +180,14 @@ def test_failures_of_the_machine_are_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     over = {"friction.mu_k": [0.5, 0.8]}
-    short = {"run.duration": 0.01}
-    whole = sweep("optimal", over, short, out=tmp_path / "calm", workers=1)
+    short = {"run.duration": 0.01, "run.settle": 0.0}
+    whole = sweep("paper", over, short, out=tmp_path / "calm", workers=1)
     with monkeypatch.context() as patch:
         patch.setattr("cosim.studies.sweep.pool.STALLED", -1.0)
         patch.setattr("cosim.toolchain.processes.STALLED", -1.0)
-        lost = sweep("optimal", over, short, out=tmp_path / "wild", workers=1)
+        lost = sweep("paper", over, short, out=tmp_path / "wild", workers=1)
     assert (lost.failure != "").all() and "did nothing" in str(lost.failure.values[0])
-    again = sweep("optimal", over, short, out=tmp_path / "wild", workers=1)
+    again = sweep("paper", over, short, out=tmp_path / "wild", workers=1)
     assert again.identical(whole)
     assert "mu_k" in str(again.failure.values[1])  # the point's own
     assert lines(tmp_path / "wild") == 1 + 2 + 2

@@ -1,7 +1,5 @@
 """Runs a sweep: takes up what its journal holds, runs the rest, keeps the dataset up to date."""
 
-import hashlib
-import json
 import os
 import time
 import warnings
@@ -18,7 +16,7 @@ from cosim.scene.loading import Overrides
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.batch import runner
 from cosim.studies.sweep.design import Design, grid, sample
-from cosim.studies.sweep.journal import journal
+from cosim.studies.sweep.journal import hashed, journal
 from cosim.studies.sweep.point import Number, Outcome
 from cosim.studies.sweep.pool import Point, workers_asked
 from cosim.toolchain.versions import versions
@@ -142,5 +140,4 @@ def _run(
 def _identity(scene: Scene, design: Design, made_by: dict[str, str]) -> str:
     """A hash of all that the numbers follow from."""
     axes = [(axis.key.full, axis.values) for axis in design.axes]
-    said = json.dumps([scene.as_dict(), axes, design.sample, made_by], sort_keys=True)
-    return hashlib.sha256(said.encode()).hexdigest()
+    return hashed(scene.as_dict(), axes, design.sample, made_by)
