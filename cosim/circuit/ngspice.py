@@ -210,19 +210,22 @@ class Engine(Shared.NgSpiceShared):
 
 @contextmanager
 def _nowhere() -> Iterator[None]:
-    """In an empty folder that is also home: ngspice runs the .spiceinit that it finds in either."""
-    here, home = os.getcwd(), os.environ.get("HOME")
+    """In an empty folder that is also home, without ngspice's variables: it runs the .spiceinit
+    that it finds in either, and the spinit of the folders that SPICE_SCRIPTS and others name."""
+    here, before = os.getcwd(), dict(os.environ)
     with TemporaryDirectory() as empty:
         os.chdir(empty)
+        for name in before:
+            if name.startswith(("SPICE", "NGSPICE", "USERPROFILE")):
+                del os.environ[name]
         os.environ["HOME"] = empty
         try:
             yield
         finally:
             os.chdir(here)
-            if home is None:
-                del os.environ["HOME"]
-            else:
-                os.environ["HOME"] = home
+            for name in os.environ.keys() - before.keys():
+                del os.environ[name]
+            os.environ.update(before)
 
 
 def _vector(name: str) -> str:

@@ -4,7 +4,9 @@ Exit codes: 0 done; 2 bad input, told in one sentence; 3 the simulation failed; 
 """
 
 import argparse
+import errno
 import os
+import re
 import sys
 import time
 import warnings
@@ -12,13 +14,16 @@ from io import TextIOWrapper
 from typing import Any, NoReturn
 
 from cosim.cli.command import add_commands
-from cosim.errors import BadInput, CosimError, Note, plain
+from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain
 from cosim.files.declared import declared
 from cosim.files.door import watched
 from cosim.toolchain.interrupts import ended_alike
 from cosim.version import __version__
 
 INTERRUPTED = 130
+
+_NO_MEMORY = "The memory ran out: try fewer --workers, or a longer run.output_step"
+_NO_ROOM = re.compile("failed to map|cannot allocate|bad_alloc", re.IGNORECASE)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -46,6 +51,8 @@ def _parser(arguments: list[str]) -> argparse.ArgumentParser:
 def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     _open_standard_streams()
+    # Nothing here gains by BLAS's threads, and where one cannot be made it sends itself SIGINT.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # prints ? for what the encoding lacks
     try:
@@ -59,10 +66,17 @@ def main(argv: list[str] | None = None) -> int:
         return code
     except CosimError as error:
         return _told(str(error), error.exit_code)
+    except (MemoryError, ImportError) as error:
+        # A library that finds no room is not loaded.
+        if not isinstance(error, MemoryError) and not _NO_ROOM.search(str(error)):
+            raise
+        return _told(_NO_MEMORY, SimulationFailed.exit_code)
     except BrokenPipeError:  # the reader closed the pipe
         _discard_output()
         return 0
     except OSError as error:
+        if error.errno == errno.ENOMEM:
+            return _told(_NO_MEMORY, SimulationFailed.exit_code)
         if error.filename is None:
             _discard_output()
         where = f"{error.filename}: " if error.filename else "The output cannot be written: "

@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 
 from cosim.circuit.lint.deck import MAX_BYTES, read
 from cosim.errors import BadInput
+from cosim.scene import load
+from cosim.simulation.simulate import simulate
 from tests.helpers import needs
 from tests.helpers.examples import examples
 from tests.helpers.ngspice_alone import run
@@ -332,3 +334,28 @@ def spread(text: str, dice: random.Random) -> str:
         return text
     spaces = [" ", "\t ", "   ", "\n+ ", " ; hidden\n* hidden\n\n +"]
     return "".join(dice.choice(spaces) if c == " " else c for c in text)
+
+
+SECRETS = [
+    "secret-token\nsecret-password\n",
+    "root:secret:0:0\nnews:secret:9:9:/usr/sbin/secret\n",
+    "secret\n.secret\n",
+    ".control secret\n",
+    "secret\n.include secret\n",
+    "secret\n*ng_script secret\n.endl\n.ends secret",
+    "secret\n\x01secret",
+]
+
+
+@pytest.mark.parametrize("text", SECRETS)
+def test_a_file_that_is_no_netlist_is_not_echoed(tmp_path, text):
+    """A stranger's scene can name any file that the user may read."""
+    (tmp_path / "any").write_text(text)
+    assert "secret" not in refused(tmp_path / "any")
+    for scene in (
+        ["trial", f"drive.file={tmp_path / 'any'}"],
+        ["held", f"friction.normal_force_file={tmp_path / 'any'}"],
+    ):
+        with pytest.raises(BadInput) as caught:
+            simulate(load(scene[0], scene[1:]))
+        assert "secret" not in str(caught.value)

@@ -7,6 +7,8 @@ before.
 
 import itertools
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -228,6 +230,25 @@ def test_startup_file_in_the_working_folder_is_not_run(tmp_path: Path) -> None:
 
 def _run_scene(arguments: list, progress: object) -> None:
     simulate(load(arguments[0], arguments[1]))
+
+
+@pytest.mark.parametrize("variable", ["SPICE_SCRIPTS", "SPICE_LIB_DIR"])
+def test_startup_file_that_a_variable_names_is_not_run(variable: str, tmp_path: Path) -> None:
+    marker = tmp_path / "was-run"
+    for folder in (tmp_path, tmp_path / "scripts"):
+        folder.mkdir(exist_ok=True)
+        (folder / "spinit").write_text(f"shell touch {marker}\n", encoding="utf-8")
+    program = (
+        "from cosim.scene import load\nfrom cosim.simulation.simulate import simulate\n"
+        f"import os\nbefore = dict(os.environ)\nsimulate(load('paper', {SHORT}))\n"
+        "assert dict(os.environ) == before"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=os.environ | {variable: str(tmp_path)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert not marker.exists()
 
 
 def test_every_failure_is_one_of_ours() -> None:

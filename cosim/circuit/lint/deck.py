@@ -68,6 +68,7 @@ MOS_LEVELS = frozenset("123469")
 """The BSIM models write a log into the working folder."""
 
 _INLINED = (".include", ".inc", ".lib")
+_END = re.compile(r"^[ \t]*\.end\b(?![.\w])", re.IGNORECASE | re.MULTILINE)
 _TEXT = re.compile(r"[ -~]*")
 _UNSAFE = re.compile(r'["`\\]')
 _FILE_WORD = re.compile(r"\b(?:\w*_)?(?:file|filename|wavefile)\b", re.IGNORECASE)
@@ -109,6 +110,10 @@ class _Reader:
     def deck(self) -> list[Line]:
         name = shown(self.path.name)
         text = self._top()
+        if not _END.search(text):
+            # It may be any file, of which no message may tell a word.
+            last = Line("", name, text.rstrip().count("\n") + 1)
+            refuse(last, "the netlist does not end with .end, so it may be cut short")
         title, rest = text.split("\n", 1) if "\n" in text else (text, "")
         self.lines.append(Line(_title(Line(title, name, 1)), name, 1))
         ended = self._take(_logical(rest, name, 2), (self.path,))
