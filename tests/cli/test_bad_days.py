@@ -13,7 +13,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -73,6 +73,8 @@ IDENTIFY = "it is made of the sweep's workers, the reader of trials and the file
 COMPILER = "the C is compiled by pip, whose workings these are; see tests/toolchain/test_build_c.py"
 SHARED = "charts have files of their own names, each whole; two at once do each other no harm"
 NO_NGSPICE = "it does not load ngspice"
+POINTS = "what its runs take is a sweep's: such a point fails, and is tried again"
+LITTLE = "it takes as much as what it reads; that is limited, see tests/files"
 WAITS = "it waits for the same; `run` shows it"
 
 TABLE: dict[str, dict[str, str]] = {
@@ -128,8 +130,9 @@ TABLE: dict[str, dict[str, str]] = {
         "export": SLOW, "compare": SLOW, "fit": SLOW, "build": SLOW,
     },
     "no memory": {
-        "run": QUICK, "sweep": SLOW, "tune": SLOW, "chart": SLOW, "identify": IDENTIFY,
-        "export": SLOW, "compare": SLOW, "fit": SLOW, "build": COMPILER,
+        "run": QUICK, "sweep": "tests/studies/test_sweep_kills.py: the machine", "tune": POINTS,
+        "identify": IDENTIFY, "chart": POINTS, "export": LITTLE, "compare": LITTLE, "fit": LITTLE,
+        "build": COMPILER,
     },
     "no threads": {
         "run": SLOW, "sweep": SLOW, "tune": SLOW, "chart": SLOW, "identify": IDENTIFY,
@@ -170,6 +173,7 @@ def spawned(
     arguments: list[str],
     limits: Callable[[], object] | None = None,
     before: str = "pass",
+    first: Sequence[str] = (),
     **environment: str,
 ) -> "subprocess.Popen[str]":
     """The command as a process in a group of its own."""
@@ -181,7 +185,7 @@ def spawned(
 
     program = f"import sys; {before}; from cosim.cli.main import main; sys.exit(main(sys.argv[1:]))"
     return subprocess.Popen(
-        [sys.executable, "-c", program, *arguments],
+        [*first, sys.executable, "-c", program, *arguments],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
         preexec_fn=prepare, cwd=REPOSITORY,
         env=os.environ | {"PYTHONPATH": str(REPOSITORY)} | environment,
@@ -386,16 +390,41 @@ def comma_locale(phase: str, made: dict[str, str], out: Path) -> None:
             assert (out / name).read_bytes() == (calm / name).read_bytes(), name
 
 
+def no_memory(phase: str, made: dict[str, str], out: Path) -> None:
+    """Its waveforms outgrow what the process may have; what was there before stays."""
+    if sys.platform != "linux":
+        pytest.skip("only Linux keeps to a limit of memory")
+    does_its_work(phase, made, out)
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    room = (
+        "import os, resource, scipy.io, matplotlib.figure, cosim; cosim.run; "
+        "size = int(open('/proc/self/statm').read().split()[0]) * os.sysconf('SC_PAGE_SIZE'); "
+        "resource.setrlimit(resource.RLIMIT_AS, (size + (1 << 26), size + (1 << 26)))"
+    )
+    large = [*COMMANDS[phase], "--set=run.duration=1", "--set=run.output_step=1e-6"]
+    process = spawned(words(large, made, out), before=room)
+    _, said = process.communicate(timeout=300)
+    assert process.returncode == 3, said
+    told(said, "The memory ran out")
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
 def limited(kind: str, limit: int, phase: str, made: dict[str, str], out: Path) -> None:
     """It does its work all the same, or says in a sentence what ran out."""
 
-    limits = f"import os, resource; resource.setrlimit(resource.{kind}, ({limit}, {limit}))"
-    if kind == "RLIMIT_NPROC":  # root may start as many as it likes
-        limits += "; os.getuid() or os.setuid(65534)"
+    def limits() -> None:
+        resource.setrlimit(getattr(resource, kind), (limit, limit))
+
+    first: list[str] = []
+    if kind == "RLIMIT_NPROC" and os.getuid() == 0:  # root may start as many as it likes
+        setpriv = shutil.which("setpriv")
+        if setpriv is None:
+            pytest.skip("needs setpriv, or a user who is not root")
+        first = [setpriv, "--reuid=65534", "--clear-groups"]
     for folder in (out.parent, *out.parent.parents[:2], *Path(made["run"]).parents[:2]):
         folder.chmod(0o777)
     process = spawned(
-        words(COMMANDS[phase], made, out), before=limits, MPLCONFIGDIR=str(out.parent)
+        words(COMMANDS[phase], made, out), limits, first=first, MPLCONFIGDIR=str(out.parent)
     )
     _, said = process.communicate(timeout=300)
     assert process.returncode in (0, 2, 3), said
@@ -424,9 +453,7 @@ def inject(fault: str, phase: str, made: dict[str, str], out: Path, capsys) -> N
     if fault == "STOP and CONT":
         return paused(phase, made, out)
     limits = {
-        # Room for Python and numpy, and none for the rest.
-        "no memory": ("RLIMIT_AS", 150_000_000),
-        "no threads": ("RLIMIT_NPROC", 0),
+        "no threads": ("RLIMIT_NPROC", 1),
         "few open files": ("RLIMIT_NOFILE", 12),
     }
     if fault in limits:
@@ -434,6 +461,7 @@ def inject(fault: str, phase: str, made: dict[str, str], out: Path, capsys) -> N
     silent = {
         "closed stdout": closed_stdout,
         "comma locale": comma_locale,
+        "no memory": no_memory,
         "wrong library": wrong_library,
     }
     if fault in silent:
