@@ -43,9 +43,8 @@ def compiled(name: str) -> Path:
 def _check(folder: Path, name: str) -> None:
     """Check a file, or all in a folder, once in a process."""
     path = folder / name
-    if not path.exists():
-        raise BadInput(f"{path} is missing from this installation of cosim: {_AGAIN}.")
     try:
+        os.stat(path)
         known = json.loads((folder / "build.json").read_bytes())["files"]
         files = {file: known[file] for file in known if file == name or file.startswith(f"{name}/")}
         for file, (size, digest) in files.items():
@@ -53,6 +52,9 @@ def _check(folder: Path, name: str) -> None:
             content = path.read_bytes()
             if len(content) != size or hashlib.sha256(content).hexdigest() != digest:
                 raise BadInput(f"{path} is damaged, or of another build of cosim: {_AGAIN}.")
+    except FileNotFoundError as error:
+        path = error.filename
+        raise BadInput(f"{path} is missing from this installation of cosim: {_AGAIN}.") from None
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         files = {}
     if not files and name != "build.json":
