@@ -5,7 +5,8 @@
     loop.so, part.so   libraries of the package, loaded by cosim.toolchain.libraries
     fmi2/, fmi3/       the FMU of the mechanics for FMI 2.0 and 3.0, as its .fmu files hold it
     replay             the program in which `cosim bench` counts the FMU's instructions
-    build.json         a hash of all that this was made of, the compiler and its flags
+    build.json         a hash of all that this was made of, the compiler and its flags, and the size
+                       and hash of each file, by which a damaged one is told from a whole one
 
 The same sources, compiler and flags give the same bytes.
 """
@@ -19,7 +20,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
@@ -43,6 +46,10 @@ PLAIN_NAMES = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREF
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 
+PATIENCE = 300
+"""s that a compiler has for one file; a second is usual."""
+
+
 class BuildFailed(Exception):
     """Why nothing was made, in one sentence."""
 
@@ -61,7 +68,10 @@ def digest() -> str:
 def make(folder: Path) -> None:
     """Compile everything into `folder`, which is replaced as a whole or left as it is."""
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".compile-") as name:
+    with (
+        _alone(folder.parent),
+        tempfile.TemporaryDirectory(dir=folder.parent, prefix=".compile-") as name,
+    ):
         work, new = Path(name), Path(name) / "new"
         new.mkdir()
         for library, folders in LIBRARIES.items():
@@ -71,10 +81,38 @@ def make(folder: Path) -> None:
             link([REPLAY], new / "replay", "-ldl")
         _make_fmu(new, work)
         made = {"sources": digest(), "compiler": compiler_version(), "flags": FLAGS}
+        made["files"] = {
+            path.relative_to(new).as_posix(): [path.stat().st_size, _sum(path.read_bytes())]
+            for path in sorted(new.rglob("*"))
+            if path.is_file()
+        }
         (new / "build.json").write_text(json.dumps(made, indent=1) + "\n")
+        for path in new.rglob("*"):
+            if path.is_file():  # else, after a loss of power, names may be there and contents not
+                with open(path, "rb+") as file:
+                    os.fsync(file.fileno())
         if folder.exists():
             folder.rename(work / "old")
         new.rename(folder)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Wait until no other build works in `folder`, and remove what killed ones have left there."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        for left in folder.glob(".compile-*"):
+            shutil.rmtree(left, ignore_errors=True)
+        yield
+    finally:
+        os.close(handle)
 
 
 def compiler() -> list[str]:
@@ -114,7 +152,13 @@ def _objects(files: list[Path], work: Path, *flags: str) -> list[Path]:
 
 def _run(*command: str) -> bytes:
     try:
-        done = subprocess.run(command, capture_output=True, check=False)
+        done = subprocess.run(
+            command, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=PATIENCE
+        )
+    except subprocess.TimeoutExpired as error:
+        raise BuildFailed(
+            f"{command[0]} did not end within {PATIENCE} s: {command[-1]}."
+        ) from error
     except OSError as error:
         raise BuildFailed(f"{command[0]} cannot be run: {error.strerror}.") from error
     if done.returncode:
@@ -122,6 +166,10 @@ def _run(*command: str) -> bytes:
         first = next((line for line in lines if "error" in line), lines[0] if lines else "")
         raise BuildFailed(f"{command[0]} failed: {first}")
     return done.stdout
+
+
+def _sum(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
 
 
 def _hash(files: list[Path]) -> str:

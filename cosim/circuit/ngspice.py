@@ -21,7 +21,7 @@ from typing import Any, Protocol
 
 from PySpice.Spice.NgSpice import Shared
 
-from cosim.errors import BadInput, SimulationFailed
+from cosim.errors import BadInput, SimulationFailed, plain
 from cosim.toolchain.interrupts import caught_signals
 
 _ffi: Any = Shared.ffi
@@ -73,9 +73,15 @@ def engine(callbacks: Callbacks) -> "Engine":
     """The process's one ngspice, which calls back. Raises BadInput where the library is missing."""
     name = library_name()
     try:
+        if os.sep in name and not os.path.isfile(name):  # to open a pipe would wait for ever
+            raise OSError("there is no such file")
         return Engine(name, callbacks)
-    except OSError as error:
-        raise BadInput(f"{name}: this ngspice library cannot be loaded ({error}).") from error
+    except (OSError, AttributeError) as error:  # the latter where it lacks ngspice's functions
+        reason = str(error).partition("Additionally")[0].strip(" .")
+        raise BadInput(
+            f"{plain(name)}: this ngspice library cannot be loaded ({plain(reason)}); does "
+            "NGSPICE_LIBRARY_PATH name it rightly?"
+        ) from error
 
 
 def library_name() -> str:
@@ -204,19 +210,22 @@ class Engine(Shared.NgSpiceShared):
 
 @contextmanager
 def _nowhere() -> Iterator[None]:
-    """In an empty folder that is also home: ngspice runs the .spiceinit that it finds in either."""
-    here, home = os.getcwd(), os.environ.get("HOME")
+    """In an empty folder that is also home, without ngspice's variables: it runs the .spiceinit
+    that it finds in either, and the spinit of the folders that SPICE_SCRIPTS and others name."""
+    here, before = os.getcwd(), dict(os.environ)
     with TemporaryDirectory() as empty:
         os.chdir(empty)
+        for name in before:
+            if name.startswith(("SPICE", "NGSPICE", "USERPROFILE")):
+                del os.environ[name]
         os.environ["HOME"] = empty
         try:
             yield
         finally:
             os.chdir(here)
-            if home is None:
-                del os.environ["HOME"]
-            else:
-                os.environ["HOME"] = home
+            for name in os.environ.keys() - before.keys():
+                del os.environ[name]
+            os.environ.update(before)
 
 
 def _vector(name: str) -> str:

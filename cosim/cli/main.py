@@ -4,18 +4,26 @@ Exit codes: 0 done; 2 bad input, told in one sentence; 3 the simulation failed; 
 """
 
 import argparse
+import errno
 import os
+import re
 import sys
+import time
 import warnings
 from io import TextIOWrapper
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from cosim.cli.command import add_commands
-from cosim.errors import BadInput, CosimError, Note
+from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain
 from cosim.files.declared import declared
+from cosim.files.door import watched
+from cosim.toolchain.interrupts import ended_alike
 from cosim.version import __version__
 
 INTERRUPTED = 130
+
+_NO_MEMORY = "The memory ran out: try fewer --workers, or a longer run.output_step"
+_NO_ROOM = re.compile("failed to map|cannot allocate|bad_alloc", re.IGNORECASE)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -42,10 +50,13 @@ def _parser(arguments: list[str]) -> argparse.ArgumentParser:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
+    _open_standard_streams()
+    # Nothing here gains by BLAS's threads, and where one cannot be made it sends itself SIGINT.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # prints ? for what the encoding lacks
     try:
-        with warnings.catch_warnings():
+        with ended_alike(), warnings.catch_warnings(), watched(_Reading()):
             warnings.simplefilter("always", Note)
             warnings.showwarning = _note
             argv = sys.argv[1:] if argv is None else argv
@@ -55,10 +66,17 @@ def main(argv: list[str] | None = None) -> int:
         return code
     except CosimError as error:
         return _told(str(error), error.exit_code)
+    except (MemoryError, ImportError) as error:
+        # A library that finds no room is not loaded.
+        if not isinstance(error, MemoryError) and not _NO_ROOM.search(str(error)):
+            raise
+        return _told(_NO_MEMORY, SimulationFailed.exit_code)
     except BrokenPipeError:  # the reader closed the pipe
         _discard_output()
         return 0
     except OSError as error:
+        if error.errno == errno.ENOMEM:
+            return _told(_NO_MEMORY, SimulationFailed.exit_code)
         if error.filename is None:
             _discard_output()
         where = f"{error.filename}: " if error.filename else "The output cannot be written: "
@@ -68,6 +86,44 @@ def main(argv: list[str] | None = None) -> int:
         # signal although it is handled here; another exec() clears that flag.
         exec("")
         return _told("interrupted.", INTERRUPTED)
+
+
+def _open_standard_streams() -> None:
+    """Let nothing be where the caller has closed a stream: the next file that is opened would take
+    its number, and be written to with what is printed."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "r+"))  # noqa: SIM115
+
+
+class _Reading:
+    """A progress bar for a file that takes long to read."""
+
+    def __init__(self) -> None:
+        self._path, self._began = "", 0.0
+        self._bar: Any = None
+
+    def __call__(self, path: str, share: float) -> None:
+        if path != self._path or share >= 1.0:
+            if self._bar is not None:
+                self._bar.close()
+            self._path, self._began, self._bar = path, time.monotonic(), None
+        if self._bar is None and share < 1.0 and time.monotonic() - self._began > _LONG:
+            from cosim.cli.options import progress_bar
+
+            name = os.path.basename(path)
+            self._bar = progress_bar(f"reading {plain(name, 40)}", 1.0, "", bar_format=_BAR)
+        if self._bar is not None:
+            self._bar.update(share - self._bar.n)
+
+
+_LONGEST = 2000  # characters of a message
+_LONG = 1.0  # s of reading before its progress is shown
+_BAR = "{desc} {percentage:3.0f}% |{bar}| {remaining} left"
 
 
 def _note(message: Warning | str, *_: object, **__: object) -> None:
@@ -80,6 +136,8 @@ def _note(message: Warning | str, *_: object, **__: object) -> None:
 def _told(sentence: str, code: int) -> int:
     """Print the sentence on one line; returns the exit code."""
     words = " ".join(sentence.split())
+    if len(words) > _LONGEST:  # of what was given, not of what is said of it
+        words = f"{words[: _LONGEST // 2]} … {words[-_LONGEST // 2 :]}"
     print(f"cosim: {words}" + ("" if words.endswith((".", "?")) else "."), file=sys.stderr)
     return code
 

@@ -3,12 +3,13 @@
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from cosim.errors import BadInput, plain
+from cosim.files.atomic import alone
 
 if TYPE_CHECKING:
     from tqdm import tqdm
@@ -82,8 +83,9 @@ def add_out(parser: ArgumentParser, default: str, known: bool = True) -> None:
 
 
 @contextmanager
-def writable(folder: Path) -> Iterator[None]:
-    """Refuse a folder that cannot be written to before a long run, not after it.
+def writable(folder: Path, shared: bool = False) -> Iterator[None]:
+    """Refuse a folder that cannot be written to before a long run, not after it, and one into which
+    another command writes, unless what is written there has names of its own (``shared``).
 
     Folders that were made for a run that then fails go again, unless something is in them.
     """
@@ -99,7 +101,8 @@ def writable(folder: Path) -> Iterator[None]:
         except OSError as error:
             reason = error.strerror
             raise BadInput(f"{plain(str(folder))}: cannot be written to ({reason}).") from error
-        yield
+        with nullcontext() if shared else alone(folder):
+            yield
     except BaseException:
         for path in made:
             with suppress(OSError):

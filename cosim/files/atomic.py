@@ -2,29 +2,112 @@
 
 import json
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None
+
+_PREFIX = ".cosim-"
+"""Of what takes the place of a file later: a kill leaves it, and :func:`tidy` finds it."""
 
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
     """A temporary path beside ``path`` that takes its place when the block ends well."""
-    temporary = path.with_name(f".{uuid4().hex}{path.suffix}")
+    with together([path]) as (temporary,):
+        yield temporary
+
+
+@contextmanager
+def together(paths: Sequence[Path]) -> Iterator[list[Path]]:
+    """Temporary paths beside ``paths`` that take their places, one right after the other, when the
+    block ends well. Raises BadInput where one cannot be written."""
+    name = paths[0]
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.touch(exist_ok=False)
-        try:
-            yield temporary
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        with ExitStack() as stack:
+            pairs = []
+            for path in paths:
+                name = path
+                path.parent.mkdir(parents=True, exist_ok=True)
+                pairs.append((stack.enter_context(_temporary(path)), path))
+            name = paths[0] if len(paths) == 1 else paths[0].parent
+            yield [temporary for (_, temporary), _ in pairs]
+            for (handle, _), path in pairs:
+                name = path
+                # Else, after a loss of power, the name may be there and its content not.
+                os.fsync(handle)
+            for (_, temporary), path in pairs:
+                name = path
+                os.replace(temporary, path)
     except OSError as error:
-        raise BadInput(f"{path}: cannot be written ({error.strerror}).") from error
+        raise BadInput(f"{name}: cannot be written ({error.strerror}).") from error
+    except ValueError as error:
+        if "embedded null" not in str(error):
+            raise
+        raise BadInput(f"{plain(str(name))}: it is no possible file name.") from None
+
+
+@contextmanager
+def _temporary(path: Path) -> Iterator[tuple[int, Path]]:
+    """A new file beside ``path``, locked while this process has it at hand."""
+    temporary = path.with_name(f"{_PREFIX}{uuid4().hex}{path.suffix}")
+    handle = os.open(
+        temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666
+    )
+    try:
+        if fcntl is not None:
+            with suppress(OSError):  # a file system without locks
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield handle, temporary
+    finally:
+        os.close(handle)
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Let no other process write into ``folder`` that asks in the same way, and remove what killed
+    ones have left there. Raises BadInput where another one is at work."""
+    if fcntl is None:
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise BadInput(
+                f"{plain(str(folder))}: another process is writing into this folder; wait for it, "
+                "or choose another --out."
+            ) from None
+        except OSError:  # a file system without locks
+            pass
+        tidy(folder)
+        yield
+    finally:
+        os.close(handle)
+
+
+def tidy(folder: Path) -> None:
+    """Remove temporary files of processes that have ended."""
+    if fcntl is None:
+        return
+    for path in folder.glob(f"{_PREFIX}*"):
+        with suppress(OSError):
+            handle = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                path.unlink()
+            finally:
+                os.close(handle)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -35,4 +118,9 @@ def write_text(path: Path, text: str) -> None:
 
 def write_json(path: Path, content: Any) -> None:
     """Write what JSON can hold, indented; ValueError for a number that is not finite."""
-    write_text(path, json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    write_text(path, as_json(content))
+
+
+def as_json(content: Any) -> str:
+    """What :func:`write_json` writes."""
+    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"

@@ -1,13 +1,12 @@
-"""A quantity over time, read from two columns of a CSV file."""
+"""A quantity over time, read from two columns of a table."""
 
-import csv
-import math
 from pathlib import Path
 
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput, plain
+from cosim.errors import BadInput
+from cosim.files.cells import Cells, read_cells
 
 
 def read_timetable(path: Path, time: tuple[str, ...], value: tuple[str, ...]) -> Array | None:
@@ -17,36 +16,29 @@ def read_timetable(path: Path, time: tuple[str, ...], value: tuple[str, ...]) ->
     rows or more, finite, and the time does not fall: at a time given twice the value jumps. Raises
     BadInput.
     """
-    name = plain(str(path))
-    try:
-        with open(path, newline="", encoding="utf-8-sig", errors="replace") as file:
-            rows = csv.reader(file)
-            header = [cell.strip() for cell in next(rows, [])]
-            columns = [
-                next((header.index(known) for known in names if known in header), None)
-                for names in (time, value)
-            ]
-            if None in columns:
-                return None
-            table = [[_number(row, k, name, rows.line_num) for k in columns] for row in rows if row]
-    except OSError as error:
-        raise BadInput(f"{name}: cannot be read ({error.strerror}).") from None
-    except csv.Error as error:
-        raise BadInput(f"{name}: this is not CSV ({error}).") from None
-    if len(table) < 2:
-        raise BadInput(f"{name}: at least two rows of {time[-1]} and {value[-1]} are needed.")
-    result = np.array(table)
-    if np.any(np.diff(result[:, 0]) < 0):
-        row = int(np.argmax(np.diff(result[:, 0]) < 0)) + 3
-        raise BadInput(f"{name}, row {row}: the time must not fall.")
+    cells = read_cells(path)
+    columns = [_place(cells, names) for names in (time, value)]
+    if None in columns:
+        return None
+    cells.even(1)
+    if len(cells.rows) < 3:
+        raise BadInput(f"{cells.name}: at least two rows of {time[-1]} and {value[-1]} are needed.")
+    header = cells.rows[0][1]
+    result = np.column_stack(
+        [cells.numbers(1, place, header[place]) for place in columns if place is not None]
+    )
+    late = np.flatnonzero(np.diff(result[:, 0]) < 0)
+    if len(late):
+        row = cells.rows[late[0] + 2][0]
+        raise BadInput(f"{cells.name}: row {row}: the time must not fall.")
     return result
 
 
-def _number(row: list[str], column: int | None, name: str, line: int) -> float:
-    try:
-        value = float(row[column or 0])
-    except (ValueError, IndexError):
-        value = math.nan
-    if not math.isfinite(value):
-        raise BadInput(f"{name}, row {line}, column {(column or 0) + 1}: a number is needed.")
-    return value
+def _place(cells: Cells, names: tuple[str, ...]) -> int | None:
+    """Where the one column with one of these names stands."""
+    line, header = cells.rows[0]
+    found = [place for place, cell in enumerate(header) if cell in names]
+    if len(found) > 1:
+        same = " and ".join(header[place] for place in found)
+        raise BadInput(f"{cells.name}: row {line}: {same} are the same column.")
+    return found[0] if found else None

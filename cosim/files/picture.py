@@ -19,10 +19,10 @@ class Picture(Figure):
         super().__init__(figsize=(width, height), dpi=110, layout=layout)
         FigureCanvasAgg(self)
 
-    def write(self, path: Path) -> None:
-        """Write the figure as a PNG, whole or not at all. Raises BadInput."""
+    def write(self, path: Path, texts: dict[str, str] | None = None) -> None:
+        """Write the figure as a PNG with ``texts``, whole or not at all. Raises BadInput."""
         with whole(path) as temporary:
-            self.savefig(temporary, format="png")
+            self.savefig(temporary, format="png", metadata=texts)
 
     def png(self) -> bytes:
         """The figure as a PNG."""

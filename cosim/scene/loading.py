@@ -7,13 +7,13 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from stat import S_ISDIR, S_ISREG
 from typing import Any
 
 from pydantic import ValidationError
 
 from cosim.errors import BadInput, NoEffect, plain
-from cosim.scene import messages
+from cosim.files import door
+from cosim.scene import messages, toml
 from cosim.scene.describe import acts, keys
 from cosim.scene.methods import METHODS
 from cosim.scene.model import Scene
@@ -119,32 +119,22 @@ def _layers(source: str) -> list[_Layer]:
 def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
     """The content of a scene file."""
     try:
-        mode = os.stat(source).st_mode
-        if S_ISDIR(mode):
-            raise BadInput(f"{origin}: this is a directory, not a scene file.")
-        if not S_ISREG(mode):  # a pipe would wait for ever
-            raise BadInput(f"{origin}: this is not a regular file.")
-        with open(source, "rb") as file:
-            raw = file.read(MAX_BYTES + 1)
-    except FileNotFoundError:
+        raw = door.contents(source, MAX_BYTES)
+    except door.Refused as refused:
+        if not isinstance(refused.__cause__, FileNotFoundError):
+            raise BadInput(f"{origin}: cannot be read ({refused}).") from refused.__cause__
         hint = messages.suggestion(Path(source).stem, builtin, "the built-in scene ")
         if source.endswith(".toml") or os.sep in source:
             raise messages.bad(f"{origin}: there is no such file{hint}") from None
         hint = hint or f" (built-in: {', '.join(builtin)})"
         raise messages.bad(f'there is no built-in scene and no file "{origin}"{hint}') from None
-    except OSError as error:
-        raise BadInput(f"{origin}: cannot be read ({error.strerror}).") from None
-    except ValueError:  # a NUL or a lone surrogate in the path
-        raise BadInput(f"{origin}: this is not a possible file name.") from None
-    if len(raw) > MAX_BYTES:
-        raise BadInput(f"{origin}: this is larger than a scene file may be ({MAX_BYTES} bytes).")
     try:
         text = raw.decode("utf-8-sig")  # editors on Windows like to add the mark
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise BadInput(f"{origin}, line {line}: this is not UTF-8 text.") from None
     try:
-        return tomllib.loads(text)
+        return toml.parse(text)
     except (ValueError, RecursionError) as error:
         raise BadInput(_syntax(error, text, origin)) from None
 
@@ -219,7 +209,7 @@ def _find_files(tables: dict[str, Any], folder: Path) -> None:
 def _value(text: str) -> Any:
     """The TOML value of ``text``; a string where it is none, such as a bare word."""
     try:
-        data = tomllib.loads(f"value = {text}")
+        data = toml.parse(f"value = {text}")
     except (ValueError, RecursionError):
         return text
     return data["value"] if data.keys() == {"value"} else text

@@ -1,28 +1,62 @@
-"""Ctrl-C while compiled code runs that calls back into Python."""
+"""Ctrl-C, and what ends a command as it does: SIGTERM, and SIGHUP of a terminal that closes."""
 
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
+
+Handler = Any
+"""What the module signal takes and gives for one."""
+
+SIGNALS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
+
+
+@contextmanager
+def ended_alike() -> Iterator[None]:
+    """Within this context all of SIGNALS raise KeyboardInterrupt, but for those that whoever
+    started this process has had ignored, as nohup does."""
+    with _handled(lambda before: signal.default_int_handler if before is signal.SIG_DFL else None):
+        yield
 
 
 @contextmanager
 def caught_signals(fail: Callable[[BaseException], None]) -> Iterator[None]:
-    """Hand what Ctrl-C raises to ``fail``: raised outside a callback's try, C would swallow it."""
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
+    """Hand what a signal raises to ``fail`` while compiled code runs that calls back into Python:
+    raised outside a callback's try, C would swallow it."""
+
+    def caught(before: Handler) -> Handler | None:
+        if not callable(before):
+            return None
+
+        def interrupted(number: int, frame: FrameType | None) -> None:
+            try:
+                before(number, frame)
+            except BaseException as failure:
+                fail(failure)
+
+        return interrupted
+
+    with _handled(caught):
+        yield
+
+
+@contextmanager
+def _handled(choose: Callable[[Handler], Handler | None]) -> Iterator[None]:
+    """Have each signal handled as ``choose`` says, knowing how it is now; None leaves that."""
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
-
-    def interrupted(number: int, frame: FrameType | None) -> None:
-        try:
-            before(number, frame)
-        except BaseException as failure:
-            fail(failure)
-
-    signal.signal(signal.SIGINT, interrupted)
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    chosen = {number: choose(handler) for number, handler in before.items()}
+    changed = {number: handler for number, handler in chosen.items() if handler is not None}
+    for number, handler in changed.items():
+        signal.signal(number, handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number in changed:
+            signal.signal(number, before[number])

@@ -1,6 +1,13 @@
-"""What the C of the package was compiled to when the package was installed."""
+"""What the C of the package was compiled to when the package was installed.
+
+A library that is damaged, cut off or of another build would end the process, or compute something
+else, once it is loaded: each file is held against the size and hash that the build wrote down.
+"""
 
 import ctypes
+import hashlib
+import json
+import os
 import sys
 from functools import cache
 from pathlib import Path
@@ -10,10 +17,14 @@ from cosim.errors import BadInput
 FOLDER = Path(__file__).resolve().parents[1] / "_compiled"
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
+_AGAIN = "install it again (in a checkout, with `make setup`)"
+_OTHERS = 0o002
+"""The mode of a file or folder that every user may write."""
+
 
 @cache
 def library(name: str) -> ctypes.CDLL:
-    """The shared library ``name``; BadInput if it is missing or cannot be loaded."""
+    """The shared library ``name``; BadInput if it is missing, damaged or cannot be loaded."""
     path = compiled(name + SUFFIX)
     try:
         return ctypes.CDLL(str(path))
@@ -22,11 +33,46 @@ def library(name: str) -> ctypes.CDLL:
 
 
 def compiled(name: str) -> Path:
-    """The absolute path of one of the compiled files or folders; BadInput if it is missing."""
-    path = FOLDER / name
-    if not path.exists():
-        raise BadInput(
-            f"{path} is missing from this installation of cosim: install it again "
-            "(in a checkout, with `make setup`)."
-        )
-    return path
+    """The absolute path of one of the compiled files or folders; BadInput if it is missing, if what
+    is there is not what was built, or if it is open to others."""
+    _check(FOLDER, name)
+    return FOLDER / name
+
+
+@cache
+def _check(folder: Path, name: str) -> None:
+    """Check a file, or all in a folder, once in a process."""
+    path = folder / name
+    try:
+        os.stat(path)
+        known = json.loads((folder / "build.json").read_bytes())["files"]
+        files = {file: known[file] for file in known if file == name or file.startswith(f"{name}/")}
+        for file, (size, digest) in files.items():
+            path = folder / file
+            content = path.read_bytes()
+            if len(content) != size or hashlib.sha256(content).hexdigest() != digest:
+                raise BadInput(f"{path} is damaged, or of another build of cosim: {_AGAIN}.")
+    except FileNotFoundError as error:
+        path = error.filename
+        raise BadInput(f"{path} is missing from this installation of cosim: {_AGAIN}.") from None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        files = {}
+    if not files and name != "build.json":
+        raise BadInput(f"{path} is not what was built with this installation of cosim: {_AGAIN}.")
+    _check_writers(folder, [folder, *(folder / file for file in files)])
+
+
+def _check_writers(folder: Path, paths: list[Path]) -> None:
+    """Refuse what others may write to, unless they may write to this very code."""
+    if (
+        os.name != "posix"
+        or (Path(__file__).stat().st_mode | folder.parent.stat().st_mode) & _OTHERS
+    ):
+        return
+    between = {above for path in paths for above in path.parents if above.is_relative_to(folder)}
+    for path in sorted({*paths, *between}):
+        if path.stat().st_mode & _OTHERS:
+            raise BadInput(
+                f"{path} can be written by every user of this machine, so it is not loaded: take "
+                f"that right away, and {_AGAIN}."
+            )

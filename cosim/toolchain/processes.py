@@ -3,7 +3,8 @@
 A netlist can make ngspice, one library a process, loop for ever, end the process, or refuse all
 further work. multiprocessing and pebble run the caller's program again, which standard input and a
 script without a main guard do not survive; pebble limits a call's whole time; loky loses all calls
-with one process. Here a process knows its function by its module, and silence ends it.
+with one process. Here a process knows its function by its module, and work without progress ends
+it. No wall clock tells that: a machine that slept, or a process that was stopped, has lost nothing.
 """
 
 import os
@@ -22,13 +23,24 @@ from typing import Any
 from cosim.errors import SimulationFailed
 
 PATIENCE = 30.0
-"""s of wall time without any progress after which a simulation counts as hanging."""
+"""s of a process's own CPU time without any progress after which its simulation hangs."""
+
+STALLED = 300.0
+"""s in which this process was awake, and another one neither worked nor made progress, after which
+that one is given up. The machine may be the reason."""
+
+ENDING = 30.0
+"""s that a process has to end once its pipe is closed."""
 
 _REPORT_EVERY = 0.1  # s of wall time
+_BEAT = 1.0  # s between two reports of the CPU time used
+_MOST = 2.0  # s that count between two looks at a clock; whatever is more, one of them slept
 
 _PROGRAM = """
 import signal, sys
-signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # they reach the whole group; the parent decides
+    if hasattr(signal, name):
+        signal.signal(getattr(signal, name), signal.SIG_IGN)
 from multiprocessing import connection
 pipe = getattr(connection, sys.argv[1])(int(sys.argv[2]))
 sys.path[:] = pipe.recv()
@@ -58,20 +70,24 @@ class Worker:
             self._process = _start(there)
         self.began = False
         """It has said something, so what ends it later is not its start."""
-        self.reached = 0.0
-        """The latest progress of the call at hand, s of simulated time."""
-        self.heard = time.monotonic()
+        self._rest()
         self._send(sys.path)
         self._send(function)
 
     def give(self, argument: Any) -> None:
         """Have the function called; what comes of it is heard later."""
-        self.reached = 0.0
-        self.heard = time.monotonic()
+        self._rest()
         self._send(argument)
 
+    def _rest(self) -> None:
+        self.reached = 0.0
+        """The latest progress of the call at hand, s of simulated time."""
+        self._spent = self._waited = 0.0
+        """s of its CPU time, and s of this process awake, since then."""
+        self._looked = time.monotonic()
+
     def hear(self) -> tuple[str, Any]:
-        """The next message: ``("progress", t)``, ``("result", value)`` or ``("failure", error)``.
+        """The next message: ``("alive", None)``, ``("result", value)`` or ``("failure", error)``.
 
         Raises EOFError where the process has died.
         """
@@ -80,10 +96,26 @@ class Worker:
         except OSError as error:
             raise EOFError from error
         self.began = True
-        self.heard = time.monotonic()
         if kind == "progress":
+            self._rest()
             self.reached = value
-        return kind, value
+        elif kind == "spent":
+            self._spent = value
+        else:
+            return kind, value
+        return "alive", None
+
+    @property
+    def hangs(self) -> bool:
+        """It has worked for PATIENCE without progress."""
+        return self._spent >= PATIENCE
+
+    def stalls(self) -> bool:
+        """It has waited for STALLED without progress; to be asked every second or so."""
+        now = time.monotonic()
+        self._waited += min(now - self._looked, _MOST)
+        self._looked = now
+        return self._waited >= STALLED
 
     def end(self, patience: float = 0.0) -> str:
         """The signal or exit code that ended the process: SIGKILL, after ``patience`` s."""
@@ -109,7 +141,9 @@ def isolated(simulate: Callable[..., Any], scene: Any, progress: Progress, **opt
     worker = Worker(partial(simulate, **options))
     try:
         worker.give(scene)
-        while worker.pipe.poll(PATIENCE):
+        while not (worker.hangs or worker.stalls()):
+            if not worker.pipe.poll(_BEAT):
+                continue
             kind, value = worker.hear()
             if kind == "result":
                 return value
@@ -117,7 +151,7 @@ def isolated(simulate: Callable[..., Any], scene: Any, progress: Progress, **opt
                 raise value
             progress(worker.reached)
     except EOFError:
-        how = worker.end(PATIENCE)
+        how = worker.end(ENDING)
         raise SimulationFailed(
             f"The simulation's process died at t = {worker.reached:.6g} s ({how})."
         ) from None
@@ -125,7 +159,8 @@ def isolated(simulate: Callable[..., Any], scene: Any, progress: Progress, **opt
         worker.end()
     raise SimulationFailed(
         f"The simulation hangs at t = {worker.reached:.6g} s: no step was finished in "
-        f"{PATIENCE:g} s. A netlist without a solution can do this to ngspice."
+        f"{f'{PATIENCE:g} s of CPU time' if worker.hangs else f'{STALLED:g} s'}. A netlist without "
+        "a solution can do this to ngspice."
     )
 
 
@@ -137,38 +172,65 @@ def _start(pipe: Connection) -> "subprocess.Popen[Any]":
         os.set_handle_inheritable(handle, True)
         about = subprocess.STARTUPINFO(lpAttributeList={"handle_list": [handle]})
         options = {"startupinfo": about}
-    command = [sys.executable, "-c", _PROGRAM, type(pipe).__name__, str(handle)]
+    command = [sys.executable, "-P", "-c", _PROGRAM, type(pipe).__name__, str(handle)]
     return subprocess.Popen(command, stdin=subprocess.PIPE, **options)
 
 
 def serve(pipe: Connection) -> None:
     """What the process does until its parent ends: it calls the function, and tells."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    reports = _Reports(pipe)
     function = pipe.recv()
-    pipe.send(("progress", 0.0))
+    reports.send("progress", 0.0)
     while True:
         try:
             argument = pipe.recv()
         except (EOFError, OSError):
             return
+        reports.at_work.set()
         try:
-            answer = ("result", function(argument, _reporter(pipe)))
+            answer = ("result", function(argument, reports.progress))
         except Exception as failure:
             answer = ("failure", failure)
-        pipe.send(answer)
+        reports.at_work.clear()
+        reports.send(*answer)
 
 
-def _reporter(pipe: Connection) -> Progress:
-    told = time.monotonic()
+class _Reports:
+    """Tells the parent of progress, and of the CPU time that was used without any."""
 
-    def progress(reached: float) -> None:
-        nonlocal told
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
+        self._alone = threading.Lock()
+        self._told = time.monotonic()
+        self._steps = 0
+        self.at_work = threading.Event()
+        threading.Thread(target=self._beat, daemon=True).start()
+
+    def send(self, kind: str, value: Any) -> None:
+        with self._alone:
+            self._pipe.send((kind, value))
+
+    def progress(self, reached: float) -> None:
+        self._steps += 1
         now = time.monotonic()
-        if now - told >= _REPORT_EVERY:
-            told = now
-            pipe.send(("progress", reached))
+        if now - self._told >= _REPORT_EVERY:
+            self._told = now
+            self.send("progress", reached)
 
-    return progress
+    def _beat(self) -> None:
+        with suppress(OSError):  # the parent has ended
+            while self.at_work.wait():
+                steps, spent, before = self._steps, 0.0, time.process_time()
+                while self.at_work.is_set():
+                    time.sleep(_BEAT)
+                    now = time.process_time()
+                    spent += min(now - before, _MOST)
+                    before = now
+                    if steps != self._steps:
+                        steps, spent = self._steps, 0.0
+                    elif self.at_work.is_set():
+                        self.send("spent", spent)
 
 
 def _end_with_parent() -> None:

@@ -13,7 +13,6 @@ The last two are in s and mm where no unit is given. Empty cells, ``nan``, ``?``
 (Tracker's mark for a missing value, in an encoding that was lost) stand for no value.
 """
 
-import math
 import re
 from dataclasses import dataclass
 from itertools import zip_longest
@@ -23,10 +22,10 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
+from cosim.files.cells import Cells, read_cells
 
 MISSING = {"", "nan", "?"}  # once U+FFFD is gone
 FEWEST_ROWS = 8
-LARGEST_FILE = 50_000_000  # bytes
 
 WORDS = {
     "time": ("time",),
@@ -69,9 +68,6 @@ UNITS = {
 }
 MM = 1e-3  # m
 
-Rows = list[tuple[int, list[str]]]
-"""Rows of cells with their line numbers in the file."""
-
 
 @dataclass(frozen=True)
 class Column:
@@ -99,7 +95,7 @@ class Table:
         missing = np.flatnonzero(np.isnan(self.columns[name]))
         if len(missing):
             where = f"row {self.lines[missing[0]]}, column {self.headers[name]}"
-            raise BadInput(f"{self.path}: {where}: the value is missing.")
+            raise BadInput(f"{plain(str(self.path))}: {where}: the value is missing.")
         return self.columns[name]
 
 
@@ -108,55 +104,33 @@ def read_table(path: Path) -> Table:
 
     Raises BadInput, with file, row and column, for what is wrong with it.
     """
-    lines = [(n, line) for n, line in enumerate(_text(path).splitlines(), 1) if line.strip()]
-    tracker = any(line.startswith("#multi:") for _, line in lines)
-    lines = [(n, line) for n, line in lines if not line.startswith("#")]
-    if not lines:
-        raise BadInput(f"{path}: this file holds no table.")
-    separator = next((sign for sign in "\t;" if any(sign in line for _, line in lines[:2])), ",")
-    cells = [
-        (n, [cell.strip().strip('"').strip() for cell in line.split(separator)])
-        for n, line in lines
-    ]
-    known, rows, notes = _header(path, cells, tracker)
-    width = max(len(head) for _, head in cells[: len(cells) - len(rows)])
-    for line, row in rows:
-        if any(row[width:]):
-            raise BadInput(f"{path}: row {line}: it has {len(row)} cells, the header {width}.")
-    columns = {name: _values(path, rows, column, separator) for name, column in known.items()}
+    cells = read_cells(path)
+    tracker = any(line.startswith("#multi:") for line in cells.comments)
+    known, heads, notes = _header(cells, tracker)
+    cells.even(heads)
+    columns = {
+        name: cells.numbers(heads, column.place, column.header, MISSING) * column.factor
+        for name, column in known.items()
+    }
     headers = {name: column.header for name, column in known.items()}
-    table = Table(path, columns, headers, tuple(notes), tuple(line for line, _ in rows))
-    if len(rows) < FEWEST_ROWS:
-        raise BadInput(f"{path}: there are {len(rows)} rows, and {FEWEST_ROWS} are needed.")
+    lines = tuple(line for line, _ in cells.rows[heads:])
+    table = Table(path, columns, headers, tuple(notes), lines)
+    if len(lines) < FEWEST_ROWS:
+        raise BadInput(f"{cells.name}: there are {len(lines)} rows, and {FEWEST_ROWS} are needed.")
     if "time" in columns:
         late = np.flatnonzero(np.diff(table.complete("time")) <= 0)
         if len(late):
             where = f"row {table.lines[late[0] + 1]}, column {headers['time']}"
-            raise BadInput(f"{path}: {where}: the time does not increase.")
+            raise BadInput(f"{cells.name}: {where}: the time does not increase.")
     return table
 
 
-def _text(path: Path) -> str:
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise BadInput(f"{path}: this file is too large for a trial.")
-        data = path.read_bytes()
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read ({error.strerror}).") from error
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16", errors="replace")
-    return data.decode("utf-8-sig", errors="replace")  # what is no UTF-8 becomes U+FFFD: missing
-
-
-def _header(
-    path: Path, table: Rows, tracker: bool
-) -> tuple[dict[str, Column], Rows, tuple[str, ...]]:
-    """The known columns, the rows below the header, and notes on what was made of it."""
-    line, head = table[0]
-    below = table[1:]
+def _header(cells: Cells, tracker: bool) -> tuple[dict[str, Column], int, tuple[str, ...]]:
+    """The known columns, how many rows the header has, and notes on what was made of it."""
+    table, path = cells.rows, cells.name
+    (line, head), heads = table[0], 1
     if len(table) > 1 and table[1][1][0] == "t":
-        head = _tracker_names(path, line, head, table[1][1])
-        below = table[2:]
+        head, heads = _tracker_names(path, line, head, table[1][1]), 2
     elif tracker:
         raise BadInput(f"{path}: row {line}: a header t x y … of Tracker's is missing.")
     known: dict[str, Column] = {}
@@ -184,7 +158,10 @@ def _header(
         known[name] = Column(place, cell, factor)
     left_out = ", ".join(plain(cell, 40) for cell in unknown[:12])
     if not known:
-        found = left_out or "none"
+        # What is no table may be any file, of which nothing is to be told.
+        numeric = [cell for _, row in table[heads : heads + 2] for cell in row if cell]
+        table_like = numeric and all(re.match(r"[+-]?[.,]?\d", cell) for cell in numeric)
+        found = left_out if table_like and left_out else "none"
         raise BadInput(
             f"{path}: row {line}: no column is understood (found: {found}). "
             f"Understood are: {UNDERSTOOD}."
@@ -194,7 +171,7 @@ def _header(
         notes.append(f"No unit in the header, so it is taken for SI: {', '.join(without)}.")
     if unknown:
         notes.append(f"Left out, not understood: {left_out}. Understood are: {UNDERSTOOD}.")
-    return known, below, tuple(notes)
+    return known, heads, tuple(notes)
 
 
 def _bare(name: str) -> str:
@@ -223,7 +200,7 @@ def _factor(where: str, unit: str, kind: str) -> float:
     return factor
 
 
-def _tracker_names(path: Path, line: int, tracks: list[str], head: list[str]) -> list[str]:
+def _tracker_names(path: str, line: int, tracks: list[str], head: list[str]) -> list[str]:
     """Names as in the trials, from the line with the tracks and the line with t x y t x y."""
     track, found = "", []
     for cell, quantity in zip_longest(tracks[: len(head)], map(_bare, head), fillvalue=""):
@@ -241,25 +218,3 @@ def _tracker_names(path: Path, line: int, tracks: list[str], head: list[str]) ->
             f"(found: {named})."
         )
     return found
-
-
-def _values(path: Path, rows: Rows, column: Column, separator: str) -> Array:
-    values = np.full(len(rows), np.nan)
-    for i, (line, cells) in enumerate(rows):
-        if column.place >= len(cells):
-            where = f"{path}: row {line}, column {column.header}"
-            raise BadInput(f"{where}: the row ends before it, after {len(cells)} cells.")
-        text = cells[column.place]
-        if text.strip("\ufffd").lower() in MISSING:
-            continue
-        try:
-            if "_" in text:  # which Python would take
-                raise ValueError
-            values[i] = float(text if separator == "," else text.replace(",", "."))
-        except ValueError:
-            where = f"{path}: row {line}, column {column.header}"
-            raise BadInput(f"{where}: “{text[:40]}” is not a number.") from None
-        if not math.isfinite(values[i]):
-            where = f"{path}: row {line}, column {column.header}"
-            raise BadInput(f"{where}: “{text[:40]}” is not finite.")
-    return values * column.factor

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.arrays import Array
-from cosim.files.atomic import write_json, write_text
+from cosim.files.atomic import as_json, together
 from cosim.scene import Scene, to_toml
+from cosim.waveforms import identity
 from cosim.waveforms.columns import COLUMNS, UNITS
 from cosim.waveforms.report import table
-from cosim.waveforms.storage import write_csv, write_netcdf
+from cosim.waveforms.storage import csv, netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,14 +56,20 @@ class Result:
         """Write what ``cosim run`` writes: ``waveforms.csv``, ``waveforms.nc``, ``scene.toml``,
         ``summary.json`` and ``figure.png``, each whole or not at all.
 
+        Their old ones go only when all but the figure are written. The table's hash is in the
+        others, as :mod:`cosim.waveforms.identity` has it: those of different runs are told apart.
         Raises BadInput where the folder cannot be written to.
         """
-        out = Path(folder)
-        write_csv(out / "waveforms.csv", self.columns, UNITS)
-        write_netcdf(out / "waveforms.nc", self.columns, UNITS, self._attributes())
-        write_text(out / "scene.toml", to_toml(self.scene))
-        write_json(out / "summary.json", self.summary)
-        self.plot().write(out / "figure.png")
+        *data, figure = (Path(folder) / name for name in identity.FILES)
+        with together(data) as (table, waveforms, scene, summary):
+            with open(table, "wb") as file:
+                csv(file, self.columns, UNITS)
+            run = identity.of_table(table)
+            with open(waveforms, "wb") as file:
+                netcdf(file, self.columns, UNITS, self._attributes() | {"run": run})
+            scene.write_text(to_toml(self.scene), encoding="utf-8")
+            summary.write_text(as_json({"run": run, **self.summary}), encoding="utf-8")
+        self.plot().write(figure, identity.in_figure(run))
 
     def _attributes(self) -> dict[str, str]:
         return {"title": self.scene.description or self.scene.name, "scene": to_toml(self.scene)}

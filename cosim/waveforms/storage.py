@@ -7,12 +7,16 @@ from typing import IO
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.files.atomic import whole
+from cosim.files.door import opened
 from cosim.files.spill import blocks
 from cosim.waveforms.columns import COLUMNS
 
 _CSV_ROWS = 1024
+
+LARGEST = 1 << 33
+"""Bytes of a waveforms.nc that is read: an hour of rows, far more than is ever compared."""
 
 
 def write_csv(path: Path, waveforms: dict[str, Array], units: dict[str, str]) -> None:
@@ -35,31 +39,6 @@ def csv(file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str]) -> 
             file.write((row * len(table) % tuple(table.ravel().tolist())).encode())
 
 
-def read_csv(path: Path) -> dict[str, Array]:
-    """The columns of a file that :func:`write_csv` wrote, by name, without their units."""
-    try:
-        with open(path, encoding="utf-8") as file:
-            names = [cell.partition(" [")[0] for cell in file.readline().strip().split(",")]
-            table = np.loadtxt(file, delimiter=",", ndmin=2)
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read ({error.strerror}).") from None
-    except ValueError as error:
-        raise BadInput(f"{path}: this is not a waveforms.csv ({error}).") from None
-    if table.shape[1] != len(names):
-        raise BadInput(f"{path}: the header has {len(names)} names for {table.shape[1]} columns.")
-    return dict(zip(names, table.T, strict=True))
-
-
-def write_netcdf(
-    path: Path, waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
-) -> None:
-    """NetCDF (classic format) with the dimension ``time``; each variable has its ``units``, and a
-    column of a run its ``long_name``.
-    """
-    with whole(path) as temporary, open(temporary, "wb") as file:
-        netcdf(file, waveforms, units, attributes)
-
-
 _DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12
 _CHARACTERS, _DOUBLES = 2, 6
 
@@ -67,7 +46,8 @@ _CHARACTERS, _DOUBLES = 2, 6
 def netcdf(
     file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
 ) -> None:
-    """What :func:`write_netcdf` writes, into an open file, a block of all columns at a time.
+    """NetCDF (classic format) with the dimension ``time``; each variable has its ``units``, and a
+    column of a run its ``long_name``. It is written a block of all columns at a time.
 
     After NetCDF Classic Format Specification, Unidata, with 64-bit offsets; scipy's writer has the
     same bytes, but needs all columns in memory.
@@ -113,29 +93,34 @@ def _attributes(texts: dict[str, str]) -> bytes:
 
 
 def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str, str]]:
-    """Waveforms, their units, and the attributes of a file that :func:`write_netcdf` wrote."""
+    """Waveforms, their units, and the attributes of a file that :func:`netcdf` wrote."""
     from scipy.io import netcdf_file
 
     try:
-        with netcdf_file(path, mmap=False) as file:
+        with opened(path, LARGEST) as content, netcdf_file(content, mmap=False) as file:
             columns = {name: variable[:] for name, variable in file.variables.items()}
             units = {name: _text(variable.units) for name, variable in file.variables.items()}
             attributes = {name: _text(value) for name, value in file._attributes.items()}
         for name, values in columns.items():
-            if not name.isidentifier() or values.dtype != ">f8" or values.ndim != 1:
+            if not (name.isidentifier() and (name + units[name]).isascii()):
+                raise ValueError(f"{name!r} in {units[name]!r} is not a name and a unit")
+            if values.dtype != ">f8" or values.ndim != 1:
                 raise ValueError(f"{name!r} is not a column")
             if len(values) != len(columns["time"]) or not np.isfinite(values).all():
                 raise ValueError(f"{name!r} is not complete")
         if len(columns["time"]) < 2 or np.any(np.diff(columns["time"]) <= 0):
             raise ValueError("the time does not increase")
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read ({error.strerror}).") from None
+    except (BadInput, MemoryError):
+        raise
     except Exception as error:  # there is little that scipy does not raise on a damaged file
-        raise BadInput(f"{path}: this is not a whole waveforms.nc ({error}).") from None
+        raise BadInput(f"{path}: this is not a whole waveforms.nc ({plain(str(error))}).") from None
     return {name: np.array(v, dtype=np.float64) for name, v in columns.items()}, units, attributes
 
 
 def _text(value: object) -> str:
     if not isinstance(value, bytes):
         raise ValueError(f"{value!r} is not text")
-    return value.decode()
+    text = value.decode()
+    if not all(char.isprintable() or char in "\n\t" for char in text):
+        raise ValueError("a text has control characters")
+    return text

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import Line, read
 from cosim.circuit.lint.expressions import BEHAVIOURAL, PARAMETRIC
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.files.resources import circuits
 from tests.helpers import needs
 from tests.helpers.examples import examples
@@ -300,8 +300,8 @@ def test_mistakes_are_told(tmp_path, old, new, words):
         ("none.cir", "there is no such file."),
         ("none/my.cir", "there is no such file."),
         ("good.cir/my.cir", "there is no such file."),
-        ("folder", "cannot be read (no regular file)."),
-        ("a\0b", "cannot be read (no possible file name)."),
+        ("folder", "cannot be read (it is a directory)."),
+        ("a\0b", "cannot be read (it is no possible file name)."),
         ("x" * 300, "cannot be read (File name too long)."),
     ],
 )
@@ -310,7 +310,7 @@ def test_missing_netlist_is_told_with_its_whole_path(tmp_path, name, words):
     (tmp_path / "good.cir").write_text(GOOD)
     with pytest.raises(BadInput) as caught:
         read(tmp_path / name)
-    path = f"{tmp_path}/{name}".replace("\0", "\\x00")
+    path = plain(f"{tmp_path}/{name}")
     assert str(caught.value) == f"{path}: {words}"
 
 

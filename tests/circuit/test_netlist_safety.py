@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 
 from cosim.circuit.lint.deck import MAX_BYTES, read
 from cosim.errors import BadInput
+from cosim.scene import load
+from cosim.simulation.simulate import simulate
 from tests.helpers import needs
 from tests.helpers.examples import examples
 from tests.helpers.ngspice_alone import run
@@ -202,11 +204,10 @@ def test_every_form_is_refused(folder, name):
         b"t\nR1 a 0 " + b"1" * 10_000 + b"\n.end\n",
         b"t\nV1 a 0 PWL(" + b"1 " * 200_000 + b")\n.end\n",
         b"t\n" + b"R1 a 0 1\n" * 100_001 + b".end\n",
-        b"t\n" + b"*" * MAX_BYTES + b"\n.end\n",
         b"",
         b"t",
     ],
-    ids=["latin", "overlong", "utf-16", "word", "line", "lines", "size", "empty", "title"],
+    ids=["latin", "overlong", "utf-16", "word", "line", "lines", "empty", "title"],
 )
 def test_odd_and_huge_files_are_refused(tmp_path, data):
     refused(put(tmp_path, data))
@@ -234,7 +235,13 @@ def test_pipes_and_devices_are_refused(tmp_path):
     for path in (tmp_path / "pipe", Path("/dev/zero"), tmp_path):
         with pytest.raises(BadInput) as caught:
             read(path)
-        assert str(caught.value) == f"{path}: cannot be read (no regular file)."
+        kind = "a directory" if path == tmp_path else "not a regular file"
+        assert str(caught.value) == f"{path}: cannot be read (it is {kind})."
+    large = put(tmp_path, b"t\n" + b"*" * MAX_BYTES + b"\n.end\n")
+    with pytest.raises(BadInput, match="larger than 4 MB"):
+        read(large)
+    (tmp_path / "large.inc").write_bytes(b"*" * (MAX_BYTES - 10))
+    assert "larger than" in refused(put(tmp_path, "t\n.include large.inc\n.end\n"))
 
 
 def test_includes_that_grow_or_circle_are_refused(tmp_path):
@@ -327,3 +334,28 @@ def spread(text: str, dice: random.Random) -> str:
         return text
     spaces = [" ", "\t ", "   ", "\n+ ", " ; hidden\n* hidden\n\n +"]
     return "".join(dice.choice(spaces) if c == " " else c for c in text)
+
+
+SECRETS = [
+    "secret-token\nsecret-password\n",
+    "root:secret:0:0\nnews:secret:9:9:/usr/sbin/secret\n",
+    "secret\n.secret\n",
+    ".control secret\n",
+    "secret\n.include secret\n",
+    "secret\n*ng_script secret\n.endl\n.ends secret",
+    "secret\n\x01secret",
+]
+
+
+@pytest.mark.parametrize("text", SECRETS)
+def test_a_file_that_is_no_netlist_is_not_echoed(tmp_path, text):
+    """A stranger's scene can name any file that the user may read."""
+    (tmp_path / "any").write_text(text)
+    assert "secret" not in refused(tmp_path / "any")
+    for scene in (
+        ["trial", f"drive.file={tmp_path / 'any'}"],
+        ["held", f"friction.normal_force_file={tmp_path / 'any'}"],
+    ):
+        with pytest.raises(BadInput) as caught:
+            simulate(load(scene[0], scene[1:]))
+        assert "secret" not in str(caught.value)

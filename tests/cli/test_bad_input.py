@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.scene import Scene, keys, list_scenes, load
 from tests.helpers import needs
@@ -195,7 +196,7 @@ def test_the_layer_at_fault_is_named(tmp_path: Path) -> None:
         ("paper.toml", "did you mean the built-in scene paper?"),
         ("no/such/file.toml", "there is no such file"),
         ("../scenes/paper", "there is no such file; did you mean the built-in scene paper?"),
-        ("a\x00b", "not a possible file name"),
+        ("a\x00b", "it is no possible file name"),
         ("a\udcffb", "there is no"),
         ("x" * 5000, "cannot be read"),
         ("/dev/null/x", "cannot be read"),
@@ -208,7 +209,7 @@ def test_source(source: str, part: str, tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_directory(tmp_path: Path) -> None:
-    assert complaint(tmp_path) == f"{tmp_path}: this is a directory, not a scene file."
+    assert complaint(tmp_path) == f"{tmp_path}: cannot be read (it is a directory)."
 
 
 @needs.posix
@@ -223,7 +224,7 @@ def test_unreadable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     path = tmp_path / "secret.toml"
     path.touch()
-    monkeypatch.setattr("cosim.scene.loading.open", refuse, raising=False)
+    monkeypatch.setattr("cosim.files.door.open", refuse, raising=False)
     assert complaint(path) == f"{path}: cannot be read (Permission denied)."
 
 
@@ -240,7 +241,7 @@ def test_link_to_itself(tmp_path: Path) -> None:
         (b"[run]\n\xff", "line 2: this is not UTF-8 text"),
         ("[run]".encode("utf-16"), "this is not UTF-8 text"),
         (bytes(range(256)), "not"),
-        (b"#" * (1 << 20) + b"#", "larger than a scene file may be"),
+        (b"#" * (1 << 20) + b"#", "larger than 1.04858 MB"),
     ],
 )
 def test_bytes(raw: bytes, part: str, tmp_path: Path) -> None:
@@ -291,3 +292,29 @@ OPTION = st.one_of(
 @given(scene=st.sampled_from(list_scenes()), options=st.lists(OPTION, max_size=4))
 def test_any_override(scene: tuple[str, str], options: list[str]) -> None:
     loads_or_complains(scene[0], options)
+
+
+DIGITS = "9" * 5000
+LONG_NUMBERS = [
+    ["run", "held", f"--set=drive.frequency={DIGITS}"],
+    ["run", "held", f"--set=coil.count={DIGITS}"],
+    ["sweep", "held", f"--over=friction.mu_s=0.7:0.8:{DIGITS}"],
+    ["sweep", "held", f"--over=friction.mu_s={DIGITS}"],
+    ["sweep", "held", f"--over=mechanics.n_surfaces=1:{DIGITS}:3"],
+    ["sweep", "held", "--over=friction.mu_s=0.7:0.8:3", f"--samples={DIGITS}"],
+    ["sweep", "held", "--over=friction.mu_s=0.7:0.8:3", "--samples=3", f"--seed=-{DIGITS[:4000]}"],
+    ["sweep", "held", "--over=friction.mu_s=0.7:0.8:3", f"--workers={DIGITS[:4000]}"],
+    ["tune", "held", "--maximise=v_average", f"--budget={DIGITS[:4000]}"],
+    ["tune", "held", "--maximise=v_average", f"--over=friction.mu_s={DIGITS}:{DIGITS}"],
+    ["tune", "held", "--maximise=v_average", f"--seed=-{DIGITS[:4000]}"],
+]
+
+
+@pytest.mark.parametrize("words", LONG_NUMBERS, ids=lambda words: f"{words[0]} {words[-1][:20]}")
+def test_endless_numbers(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*words, f"--out={tmp_path}"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("cosim: ") and told.count("\n") == 1 and len(told) < 2500
+    assert not list(tmp_path.iterdir())

@@ -52,8 +52,9 @@ def harness(finds_leaks: bool, tmp_path_factory: pytest.TempPathFactory) -> Path
     return program
 
 
-@examples(2)
+@examples(2, at_least=150)  # 56 million calls in `make fuzz`
 @given(seed=st.integers(1, 2**64 - 1))
 def test_random_and_senseless_calls(harness: Path, finds_leaks: bool, seed: int) -> None:
     done = run(harness, finds_leaks, str(seed))
     assert done.returncode == 0, done.stderr[-4000:]
+    assert int(done.stdout.split()[-2]) >= 372_000

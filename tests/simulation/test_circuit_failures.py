@@ -7,6 +7,8 @@ before.
 
 import itertools
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,7 @@ from cosim.files.resources import circuits
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.toolchain import processes
+from tests.helpers import needs
 
 pytestmark = pytest.mark.reliability
 
@@ -104,10 +107,25 @@ def test_dying_process(harm: str) -> None:
         processes.isolated(_harmful, harm, lambda _: None)
 
 
-def test_hanging_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(processes, "PATIENCE", 2.0)
-    with pytest.raises(SimulationFailed, match="hangs"):
-        processes.isolated(_harmful, "time.sleep(60)", lambda _: None)
+@pytest.mark.parametrize(
+    ("limit", "harm"), [("PATIENCE", "while True: pass"), ("STALLED", "time.sleep(60)")]
+)
+def test_hanging_process(limit: str, harm: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processes, limit, 2.0)
+    with pytest.raises(SimulationFailed, match=r"hangs.* 2 s"):
+        processes.isolated(_harmful, harm, lambda _: None)
+
+
+@needs.posix
+def test_a_pause_is_no_hang(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process is stopped for longer than the patience with one that works."""
+    monkeypatch.setattr(processes, "PATIENCE", 1.0)
+    stop = (
+        "import subprocess\npid = os.getpid()\n"
+        "subprocess.Popen(['sh', '-c', f'kill -STOP {pid}; sleep 3; kill -CONT {pid}'])\n"
+        "time.sleep(0.3)"
+    )
+    assert processes.isolated(_harmful, stop, lambda _: None) is None
 
 
 def _harmful(harm: str, progress: object) -> None:
@@ -212,6 +230,25 @@ def test_startup_file_in_the_working_folder_is_not_run(tmp_path: Path) -> None:
 
 def _run_scene(arguments: list, progress: object) -> None:
     simulate(load(arguments[0], arguments[1]))
+
+
+@pytest.mark.parametrize("variable", ["SPICE_SCRIPTS", "SPICE_LIB_DIR"])
+def test_startup_file_that_a_variable_names_is_not_run(variable: str, tmp_path: Path) -> None:
+    marker = tmp_path / "was-run"
+    for folder in (tmp_path, tmp_path / "scripts"):
+        folder.mkdir(exist_ok=True)
+        (folder / "spinit").write_text(f"shell touch {marker}\n", encoding="utf-8")
+    program = (
+        "from cosim.scene import load\nfrom cosim.simulation.simulate import simulate\n"
+        f"import os\nbefore = dict(os.environ)\nsimulate(load('paper', {SHORT}))\n"
+        "assert dict(os.environ) == before"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=os.environ | {variable: str(tmp_path)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert not marker.exists()
 
 
 def test_every_failure_is_one_of_ours() -> None:

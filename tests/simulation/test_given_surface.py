@@ -204,7 +204,7 @@ def test_own_waveforms_move_the_part_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text, told",
     [
-        ("time,velocity\n0,0\n1e-3,x\n", "row 3, column 2: a number is needed"),
+        ("time,velocity\n0,0\n1e-3,x\n", "row 3, column velocity: “x” is not a number"),
         ("time,velocity\n0,0\n", "at least two rows"),
         ("time,velocity\n0,0\n2,1\n1,1\n", "row 4: the time must not fall"),
         ("time,velocity\n0,0\n0.01,1\n", "run.duration = 0.32 s must be at most 0.01 s"),

@@ -45,3 +45,20 @@ def test_mixed_runs(rounds: int) -> None:
     gc.collect()
     if before is not None:
         assert resident() - before < 20.0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize(
+    ("model", "runs"), [("limited", 10_000), ("ideal", 10_000), ("amplifier", 2_000)]
+)
+def test_a_run_leaks_less_than_1_kB(model: str, runs: int) -> None:
+    scene = load("reference", [f"circuit.model={model}", "run.duration=0.002", "run.settle=0"])
+    for _ in range(2000):  # caches and the allocator's arenas filled
+        simulate(scene)
+    gc.collect()
+    before = resident()
+    for _ in range(runs):
+        simulate(scene)
+    gc.collect()
+    assert (resident() - before) * 1024 / runs < 1.0, "kB a run"

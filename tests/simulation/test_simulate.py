@@ -47,7 +47,7 @@ LIMITS = {
         "slew_fraction",
     },
 }
-WORDS = ["method", "notes", "versions"]
+WORDS = ["method", "notes", "run", "versions"]
 
 RUNS = {
     "reference": ("reference", "run.duration=0.4", "run.settle=0.1"),

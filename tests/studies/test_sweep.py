@@ -175,11 +175,11 @@ def test_folder_of_another_sweep(tmp_path: Path) -> None:
     scene = load("held", ["run.duration=0.01"])
     sweep(scene, {"friction.mu_s": [0.7]}, out=tmp_path, workers=1)
     before = (tmp_path / "sweep.nc").read_bytes()
-    with pytest.raises(BadInput, match="another sweep"):
+    with pytest.raises(BadInput, match="other work"):
         sweep(scene, {"friction.mu_s": [0.8]}, out=tmp_path, workers=1)
     assert (tmp_path / "sweep.nc").read_bytes() == before
-    (tmp_path / "sweep.journal").write_bytes(b'{"sweep": "torn')
-    with pytest.raises(BadInput, match="another sweep"):
+    (tmp_path / "sweep.journal").write_bytes(b'{"journal": "torn')
+    with pytest.raises(BadInput, match="other work"):
         sweep(scene, {"friction.mu_s": [0.7]}, out=tmp_path, workers=1)
 
 

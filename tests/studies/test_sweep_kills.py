@@ -11,6 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from cosim.studies.sweep import sweep
 from tests.helpers import needs
 
 pytestmark = pytest.mark.reliability
@@ -113,4 +114,80 @@ def test_one_sweep_at_a_time(tmp_path: Path) -> None:
     finally:
         first.kill()
         first.wait()
-    assert second.returncode == 2 and "another process is writing this sweep" in second.stderr
+    assert second.returncode == 2 and "another process is writing into" in second.stderr
+
+
+@needs.posix
+def test_a_disk_full_in_mid_line(tmp_path: Path) -> None:
+    """What was whole stays; with room again only the rest is run."""
+    import resource
+
+    command = arguments(4, tmp_path)
+    full = subprocess.run(
+        command, capture_output=True, text=True, timeout=300,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_001, 20_001)),
+    )  # fmt: skip
+    journal = tmp_path / "sweep.journal"
+    written = journal.read_bytes()
+    # The dataset may find no room either, but each point was run, and it was told.
+    assert "cannot be written" in full.stderr and "Traceback" not in full.stderr
+    assert 5 < written.count(b"\n") < 65 and written.endswith(b"\n")
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+    assert journal.read_bytes().startswith(written) and lines(tmp_path) == 65
+    assert not done.stderr
+
+
+PATIENT = """
+import sys
+from cosim.cli.main import main
+from cosim.studies.sweep import pool
+from cosim.toolchain import processes
+pool.PATIENCE = processes.PATIENCE = 2.0
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@needs.posix
+@pytest.mark.parametrize(
+    "whole", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["all", "worker"]
+)
+def test_a_pause_spoils_no_point(whole: bool, tmp_path: Path) -> None:
+    """Stopped for longer than a point may work without progress, with and without the parent."""
+    command = [
+        "sweep", "paper", "--over=friction.mu_k=0.4,0.5", "--set=run.duration=4",
+        "--workers=2", f"--out={tmp_path}",
+    ]  # fmt: skip
+    process = subprocess.Popen(
+        [sys.executable, "-c", PATIENT, *command],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
+    )  # fmt: skip
+    workers: list[psutil.Process] = []
+    while not any(worker.cpu_times().user > 1.0 for worker in workers) and process.poll() is None:
+        time.sleep(0.02)
+        workers = psutil.Process(process.pid).children()
+    stopped = [psutil.Process(process.pid), *workers] if whole else workers
+    for one in stopped:
+        one.suspend()
+    time.sleep(4.0)
+    for one in reversed(stopped):
+        one.resume()
+    _, said = process.communicate(timeout=300)
+    assert process.returncode == 0, said
+    assert (tmp_path / "sweep.journal").read_bytes().count(b'"failure": ""') == 2
+
+
+def test_failures_of_the_machine_are_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    over = {"friction.mu_k": [0.5, 0.8]}
+    short = {"run.duration": 0.01, "run.settle": 0.0}
+    whole = sweep("paper", over, short, out=tmp_path / "calm", workers=1)
+    with monkeypatch.context() as patch:
+        patch.setattr("cosim.studies.sweep.pool.STALLED", -1.0)
+        patch.setattr("cosim.toolchain.processes.STALLED", -1.0)
+        lost = sweep("paper", over, short, out=tmp_path / "wild", workers=1)
+    assert (lost.failure != "").all() and "did nothing" in str(lost.failure.values[0])
+    again = sweep("paper", over, short, out=tmp_path / "wild", workers=1)
+    assert again.identical(whole)
+    assert "mu_k" in str(again.failure.values[1])  # the point's own
+    assert lines(tmp_path / "wild") == 1 + 2 + 2

@@ -9,7 +9,7 @@ import pytest
 from cosim.scene import load
 from cosim.studies.sweep.batch import runner
 from cosim.studies.sweep.design import grid
-from cosim.studies.sweep.journal import Journal
+from cosim.studies.sweep.journal import journal
 
 pytestmark = pytest.mark.reliability
 
@@ -21,12 +21,12 @@ def test_parent_stays_flat(name: str, tmp_path: Path) -> None:
     design = grid({"friction.mu_s": [0.6 + 1e-5 * k for k in range(6000)]})
     process = psutil.Process()
     sizes = []
-    with Journal(tmp_path / "journal", "test") as journal, runner(scene, 2) as pool:
+    with journal(tmp_path / "journal", "test", len(design)) as kept, runner(scene, 2) as pool:
         points = ((k, design.point(k)) for k in range(len(design)))
         for number, outcome in pool.run(points):
             assert not outcome.failure
-            journal.add(number, outcome)
-            if len(journal.done) % 1000 == 0:
+            kept.add(number, outcome)
+            if len(kept.done) % 1000 == 0:
                 gc.collect()
                 sizes.append(process.memory_info().rss / 1e6)
     # The numbers of the points that are done are remembered: 60 bytes each.

@@ -11,6 +11,7 @@ from cosim.cli.main import main
 from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
+from cosim.studies.sweep.batch import Batch
 from cosim.studies.sweep.point import periods_made_whole
 from cosim.studies.tune import tune
 
@@ -146,3 +147,37 @@ def test_beats_a_grid() -> None:
     found = tune(scene, maximise="v_average", budget=200, workers=2)
     assert len(found.runs) <= 200
     assert found.best.value is not None and found.best.value > GRID_BEST
+
+
+def test_a_search_that_was_interrupted_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It runs only what it has not heard, and ends with what one that was left alone finds."""
+    words = ["tune", "ideal-current", "--maximise=v_average", "--budget=40", "--workers=2"]
+    words += ["--over=drive.pot_frequency=0.6:0.9", "--set=run.duration=0.1"]
+    calm, wild = tmp_path / "calm", tmp_path / "wild"
+    assert main([*words, f"--out={calm}"]) == 0
+    ran: list[object] = []
+    plain = Batch.run
+
+    def counted(self: Batch, points: Any) -> Any:
+        for found in plain(self, points):
+            if len(ran) == 17:
+                raise KeyboardInterrupt
+            ran.append(found)
+            yield found
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Batch, "run", counted)
+        assert main([*words, f"--out={wild}"]) == 130
+        assert {path.name for path in wild.iterdir()} == {"tune.journal", "tune.csv"}
+    heard: list[object] = []
+    monkeypatch.setattr(
+        Batch, "run", lambda self, points: (heard.append(1) or one for one in plain(self, points))
+    )
+    assert main([*words, f"--out={wild}"]) == 0
+    with open(calm / "tune.csv", encoding="utf-8") as file:
+        assert len(heard) + 17 == len(file.readlines()) - 1
+    for name in ("tune.csv", "tune.json", "best.toml"):
+        assert (wild / name).read_bytes() == (calm / name).read_bytes()
+    assert not (wild / "tune.journal").exists()

@@ -98,3 +98,21 @@ def test_the_compiler_is_that_of_cc(copy: Path, tmp_path: Path) -> None:
     script.write_text('#!/bin/sh\necho "x.c:1: error: not today" >&2\nexit 1\n')
     script.chmod(script.stat().st_mode | stat.S_IXUSR)
     assert "not today" in make(copy, CC=f"'{script}' -m64").stderr
+
+
+@posix
+def test_a_compiler_that_hangs_is_told(copy: Path, tmp_path: Path) -> None:
+    """And what a build has left that was killed goes."""
+    (copy / "cosim/.compile-left").mkdir()
+    (copy / "cosim/.compile-left/part.o").touch()
+    script = tmp_path / "cc"
+    script.write_text("#!/bin/sh\nexec sleep 1000\n")
+    script.chmod(script.stat().st_mode | stat.S_IXUSR)
+    program = "import build_c; build_c.PATIENCE = 1; build_c.make(build_c.ROOT / 'cosim/_compiled')"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True, text=True, cwd=copy, env=os.environ | {"CC": str(script)}, timeout=100,
+        check=False,
+    )  # fmt: skip
+    assert f"{script} did not end within 1 s" in done.stderr
+    assert [path.name for path in (copy / "cosim").glob(".*")] == []

@@ -1,11 +1,13 @@
 """Reading tracked trials: every form that such a file takes, and every way in which it is wrong."""
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cosim.errors import BadInput
+from cosim.files.cells import LARGEST
 from cosim.trials.tracked import read, read_folder
 
 HEADER: str = "t,xp,zp,vxp,vzp,axp,azp,xo,zo,vxo,vzo,axo,azo,xs,zs,vxs,vzs,axs,azs"
@@ -133,7 +135,7 @@ def changed(row: int, column: str, value: str) -> str:
     [
         ("", "holds no table"),
         ("# only a comment\n", "holds no table"),
-        (b"\x00\x01\x02\x03", "row 1: no column is understood"),
+        (b"\x00\x01\x02\x03", "row 1: the control character U+0000"),
         ("a,b\n1,2\n", "row 1: no column is understood (found: a, b)"),
         ("t,zp\n" + "".join(f"{i},0\n" for i in range(9)), "no column zo (found: t, zp)"),
         ("t,zp,zo,zp\n0,0,0,0\n", "row 1: the column zp stands there twice"),
@@ -146,7 +148,7 @@ def changed(row: int, column: str, value: str) -> str:
         (changed(3, "t", ""), "row 4, column t: the value is missing"),
         (changed(3, "t", "0.001"), "row 4, column t: the time does not increase"),
         (text(table()[:8]), "there are 7 rows, and 8 are needed"),
-        (text(table()) + "\r\n0.5,1", "row 14, column zp: the row ends before it, after 2 cells"),
+        (text(table()) + "\r\n0.5,1", "row 14: it has 2 cells, the header 19"),
         (tracker(names="\tmass A\t\t\tmass B\t\t\t"), "(found: mass A, mass B)"),
         ("#multi:\n\tpart\n\nx\ty\n", "row 2: a header t x y … of Tracker's is missing"),
         ("#multi:\n\tplatform\n0\t1\n", "row 2: a header t x y … of Tracker's is missing"),
@@ -162,13 +164,14 @@ def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, content: str | byt
     assert "\n" not in told
 
 
-def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_files_that_cannot_be_read(tmp_path: Path):
     for path in (tmp_path / "none.csv", tmp_path):
         with pytest.raises(BadInput, match="cannot be read"):
             read(path)
-    monkeypatch.setattr("cosim.trials.table.LARGEST_FILE", 100)
-    with pytest.raises(BadInput, match="too large"):
-        read(write(tmp_path / "trial.csv", text(table())))
+    write(tmp_path / "trial.csv", text(table()))
+    os.truncate(tmp_path / "trial.csv", LARGEST + 1)
+    with pytest.raises(BadInput, match="larger than 50 MB"):
+        read(tmp_path / "trial.csv")
 
 
 def test_a_folder_in_the_order_of_its_numbers(tmp_path: Path):

@@ -7,15 +7,14 @@ a circuit needs pass. ngspice sees neither comments nor file names.
 """
 
 import re
-import stat
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from errno import EINVAL
 from pathlib import Path
 from typing import NoReturn
 from unicodedata import category
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
+from cosim.files import door
 
 
 @dataclass(frozen=True)
@@ -69,6 +68,7 @@ MOS_LEVELS = frozenset("123469")
 """The BSIM models write a log into the working folder."""
 
 _INLINED = (".include", ".inc", ".lib")
+_END = re.compile(r"^[ \t]*\.end\b(?![.\w])", re.IGNORECASE | re.MULTILINE)
 _TEXT = re.compile(r"[ -~]*")
 _UNSAFE = re.compile(r'["`\\]')
 _FILE_WORD = re.compile(r"\b(?:\w*_)?(?:file|filename|wavefile)\b", re.IGNORECASE)
@@ -110,6 +110,10 @@ class _Reader:
     def deck(self) -> list[Line]:
         name = shown(self.path.name)
         text = self._top()
+        if not _END.search(text):
+            # It may be any file, of which no message may tell a word.
+            last = Line("", name, text.rstrip().count("\n") + 1)
+            refuse(last, "the netlist does not end with .end, so it may be cut short")
         title, rest = text.split("\n", 1) if "\n" in text else (text, "")
         self.lines.append(Line(_title(Line(title, name, 1)), name, 1))
         ended = self._take(_logical(rest, name, 2), (self.path,))
@@ -120,15 +124,18 @@ class _Reader:
 
     def _top(self) -> str:
         """The text of the netlist itself."""
-        name = ascii(str(self.path))[1:-1]
+        name = plain(str(self.path))
         try:
             self.path = self.path.absolute()
+            text = self._opened(self.path)
             self.folder = self.path.parent.resolve(strict=True)
-            return self._opened(self.path, Line("", shown(self.path.name), 1))
-        except (FileNotFoundError, NotADirectoryError):
-            raise BadInput(f"{name}: there is no such file.") from None
-        except (OSError, ValueError, RuntimeError) as error:
-            raise BadInput(f"{name}: cannot be read ({_reason(error)}).") from None
+            return text
+        except door.Refused as refused:
+            missing = isinstance(refused.__cause__, FileNotFoundError | NotADirectoryError)
+            reason = "there is no such file" if missing else f"cannot be read ({refused})"
+            raise BadInput(f"{name}: {reason}.") from refused.__cause__
+        except OSError as error:
+            raise BadInput(f"{name}: cannot be read ({error.strerror}).") from error
 
     def _take(
         self, lines: Iterator[Line], opened: tuple[Path, ...], section: str | None = None
@@ -198,27 +205,14 @@ class _Reader:
     def _text(self, path: Path, line: Line) -> str:
         """The text of an included file."""
         try:
-            return self._opened(path, line)
-        except (OSError, ValueError) as error:
-            refuse(line, f"{shown(path.name)} cannot be read ({_reason(error)})")
+            return self._opened(path)
+        except door.Refused as refused:
+            refuse(line, f"{shown(path.name)} cannot be read ({refused})")
 
-    def _opened(self, path: Path, line: Line) -> str:
-        # A pipe or a device would block or never end.
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise OSError(EINVAL, "no regular file")
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES - self.bytes_read + 1)
+    def _opened(self, path: Path) -> str:
+        data = door.contents(path, MAX_BYTES - self.bytes_read)
         self.bytes_read += len(data)
-        if self.bytes_read > MAX_BYTES:
-            refuse(line, f"the netlist with its includes is larger than {MAX_BYTES // 10**6} MB")
         return _decoded(data, path.name)
-
-
-def _reason(error: Exception) -> str:
-    """Why a file cannot be read, as the end of a message."""
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
-    return "no possible file name"
 
 
 def _decoded(data: bytes, name: str) -> str:

@@ -9,7 +9,7 @@ from cosim.cli.options import add_study, writable
 def _run(arguments: Namespace) -> None:
     from cosim.studies.accuracy import accuracy
 
-    with writable(arguments.out):
+    with writable(arguments.out, shared=True):
         accuracy.run(arguments.out, arguments.quick)
 
 

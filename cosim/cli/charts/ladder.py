@@ -15,7 +15,7 @@ def _run(arguments: Namespace) -> None:
     from cosim.scene import load
 
     scenes = [load(source, arguments.overrides) for source in arguments.scenes or ["paper"]]
-    with writable(arguments.out):
+    with writable(arguments.out, shared=True):
         from cosim.studies.circuit import ladder, ladder_report
 
         with progress_bar("ladder", ladder.runs_in_all() * len(scenes), "run") as bar:

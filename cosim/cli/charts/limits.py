@@ -20,7 +20,7 @@ def _run(arguments: Namespace) -> None:
 
     asked = [(source, []) for source in arguments.scenes] or [("paper", own) for own in _SETTINGS]
     scenes = [load(source, [*own, *arguments.overrides]) for source, own in asked]
-    with writable(arguments.out):
+    with writable(arguments.out, shared=True):
         from cosim.studies.circuit import limits, limits_report
 
         turns = [number == 0 for number in range(len(scenes))]

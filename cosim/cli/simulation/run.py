@@ -1,5 +1,6 @@
 """``cosim run``."""
 
+import json
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,7 +50,9 @@ def _run(arguments: Namespace) -> None:
         result.save(folder)
         found = _spread(result.scene) if arguments.spread else None
         if found is not None:
-            write_json(folder / "summary.json", result.summary | {"spread": found.summary()})
+            path = folder / "summary.json"
+            saved = json.loads(path.read_text(encoding="utf-8"))
+            write_json(path, saved | {"spread": found.summary()})
     print(f"{scene.name}: {scene.description}" if scene.description else scene.name)
     print(table(result.scene, result.summary))
     if found is not None:

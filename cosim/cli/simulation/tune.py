@@ -62,6 +62,7 @@ def _run(arguments: Namespace) -> None:
                 over=ranges,
                 budget=arguments.budget,
                 seed=arguments.seed,
+                out=folder,
                 workers=arguments.workers,
                 progress=progress,
                 scouting=scouting,
@@ -69,7 +70,6 @@ def _run(arguments: Namespace) -> None:
         except KeyboardInterrupt:
             write_runs(folder / "tune.csv", runs, quantity)
             raise
-        found.save(folder)
     print(found)
     print(f"Written to {folder}: tune.json, tune.csv, best.toml")
     print(f"Figure: {folder / 'figure.png'}")

@@ -17,10 +17,11 @@ from cosim.studies.compare.compare import Found, measure
 from cosim.studies.compare.scores import LINES, Number
 from cosim.studies.tables import write_csv as write_rows
 from cosim.trials.recording import Recording, read_recording
+from cosim.waveforms import formats
 from cosim.waveforms.columns import UNITS
 from cosim.waveforms.formats.tracker import laid_over
 from cosim.waveforms.result import Result
-from cosim.waveforms.storage import read_csv, write_csv
+from cosim.waveforms.storage import write_csv
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +141,7 @@ def _run(
             raise BadInput(f"--set cannot change {plain(name)}, which is a finished run.")
         if isinstance(run, Result):
             return name, run.columns, run.scene
-        return name, read_csv(Path(name) / "waveforms.csv"), load(Path(name) / "scene.toml")
+        return name, formats.read(Path(name)).waveforms, load(Path(name) / "scene.toml")
     name = run.name if isinstance(run, Scene) else str(run)
     scene = load(run, overrides)
     _, period = laid_over(scene)

@@ -52,7 +52,8 @@ def run_on_cluster(
             else:
                 # Its worker died with it, again and again, or something that no scene explains.
                 words = " ".join(str(failure).split())
-                outcome = Outcome({}, f"The cluster gave it up: {type(failure).__name__}: {words}")
+                words = f"The cluster gave it up: {type(failure).__name__}: {words}"
+                outcome = Outcome({}, words, machine=True)
             following = next(waiting, None)
             if following is not None:
                 running.add(submit(following))

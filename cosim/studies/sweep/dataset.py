@@ -36,10 +36,9 @@ class Numbers:
             self.add(index, outcome)
 
     def add(self, index: int, outcome: Outcome) -> None:
-        """Take up a point that has been run."""
-        if outcome.failure:
-            self.failures[index] = outcome.failure
-            self.failed += 1
+        """Take up a point that has been run, or run again."""
+        self.failed += bool(outcome.failure) - bool(self.failures[index])
+        self.failures[index] = outcome.failure
         values, names = self._values, tuple(outcome.numbers)
         if index <= self._first.get(names, index):
             self._first[names] = index

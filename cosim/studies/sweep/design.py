@@ -80,6 +80,8 @@ def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: 
     axes = grid(over).axes
     if not 1 <= count <= MOST_POINTS:
         raise BadInput(f"--samples {count}: must be a whole number from 1 to {MOST_POINTS}.")
+    if seed < 0:
+        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
     for axis in axes:
         if len(set(axis.values)) < 2:
             raise BadInput(
@@ -155,9 +157,13 @@ def _axis(name: str, values: Sequence[Number]) -> Axis:
 
 def _range(text: str, right: str, key: Key) -> tuple[Number, ...]:
     parts = right.split(":")
-    if len(parts) != 3 or not parts[2].strip().isdecimal() or not 2 <= int(parts[2]) <= MOST_POINTS:
+    number = parts[-1].strip()
+    # Python refuses to make a number of thousands of digits.
+    whole = number.isdecimal() and len(number) <= len(str(MOST_POINTS))
+    if len(parts) != 3 or not whole or not 2 <= int(number) <= MOST_POINTS:
         raise BadInput(
-            f"--over {plain(text)}: must be {key.full}=start:stop:n with n a whole number from 2."
+            f"--over {plain(text)}: must be {key.full}=start:stop:n with n a whole number from 2 "
+            f"to {MOST_POINTS}."
         )
     start, stop, count = _number(text, parts[0]), _number(text, parts[1]), int(parts[2])
     if key.kind is int:

@@ -21,6 +21,8 @@ class Outcome:
 
     numbers: dict[str, float]
     failure: str = ""
+    machine: bool = False
+    """The failure may have been the machine's, not the point's: it is worth another try."""
 
 
 def evaluate(
@@ -65,7 +67,8 @@ def failed(error: Exception) -> Outcome:
     """Why a point has no numbers."""
     # What is no CosimError, no scene should meet: the other points go on.
     kind = "" if isinstance(error, CosimError) else f"{type(error).__name__}: "
-    return Outcome({}, " ".join(f"{kind}{error}".split()))
+    machine = any(isinstance(e, MemoryError | OSError) for e in (error, error.__cause__))
+    return Outcome({}, " ".join(f"{kind}{error}".split()), machine)
 
 
 def periods_made_whole(scene: Scene) -> dict[str, Number]:

@@ -4,7 +4,6 @@ ngspice leaks a little with every run, and can be spoilt for good. Workers are t
 after some points, after one that has spoilt the library, and after their death.
 """
 
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from multiprocessing.connection import wait
@@ -12,7 +11,7 @@ from multiprocessing.connection import wait
 from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import Scene
 from cosim.studies.sweep.point import Number, Outcome, evaluate, failed
-from cosim.toolchain.processes import PATIENCE, Worker, processors
+from cosim.toolchain.processes import ENDING, PATIENCE, STALLED, Worker, processors
 
 POINTS_A_WORKER = 250
 """Points after which a worker is replaced: what ngspice leaks stays below some MB."""
@@ -58,7 +57,7 @@ class Pool:
         """
         waiting = iter(points)
         again: list[Point] = []
-        deaths: dict[int, int] = {}
+        tries: dict[int, int] = {}
         while True:
             busy = [worker for worker in self._workers if worker.point is not None]
             while len(busy) < self._count:
@@ -76,32 +75,36 @@ class Pool:
             ready = wait([worker.pipe for worker in busy], timeout=1.0)
             for worker in busy:
                 assert worker.point is not None
-                number = worker.point[0]
+                number, lost, answer = worker.point[0], "", None
                 if worker.pipe in ready:
                     try:
                         kind, answer = worker.hear()
                     except EOFError:
-                        how = self._drop(worker, PATIENCE)
+                        how = self._drop(worker, ENDING)
                         if not worker.began:
                             words = f"The worker processes cannot start ({how})."
                             raise SimulationFailed(words) from None
-                        deaths[number] = deaths.get(number, 0) + 1
-                        if deaths[number] < TRIES:
-                            again.append(worker.point)
-                        else:
-                            yield number, Outcome({}, f"The worker process died ({how}).")
+                        kind, lost = "lost", f"The worker process died ({how})."
+                    if kind in ("result", "failure"):
+                        outcome, spoilt = answer if kind == "result" else (failed(answer), True)
+                        worker.point = None
+                        if spoilt or worker.given == POINTS_A_WORKER:
+                            self._drop(worker)
+                        yield number, outcome
                         continue
-                    if kind == "progress":
-                        continue
-                    outcome, spoilt = answer
-                    worker.point = None
-                    if spoilt or worker.given == POINTS_A_WORKER:
-                        self._drop(worker)
-                    yield number, outcome
-                elif time.monotonic() - worker.heard > PATIENCE:
+                if not lost and worker.hangs:
                     self._drop(worker)
-                    words = f"The simulation hangs: no step was finished in {PATIENCE:g} s."
-                    yield number, Outcome({}, words)
+                    words = f"no step was finished in {PATIENCE:g} s of CPU time"
+                    yield number, Outcome({}, f"The simulation hangs: {words}.")
+                elif not lost and worker.stalls():
+                    self._drop(worker)
+                    lost = f"The worker process did nothing for {STALLED:g} s."
+                if lost:
+                    tries[number] = tries.get(number, 0) + 1
+                    if tries[number] < TRIES:
+                        again.append(worker.point)
+                    else:
+                        yield number, Outcome({}, lost, machine=True)
 
     def _drop(self, worker: _Worker, patience: float = 0.0) -> str:
         """Replace the worker; how it ended."""

@@ -1,23 +1,22 @@
 """Runs a sweep: takes up what its journal holds, runs the rest, keeps the dataset up to date."""
 
-import hashlib
-import json
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import xarray as xr
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, Note
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.batch import runner
 from cosim.studies.sweep.design import Design, grid, sample
-from cosim.studies.sweep.journal import Journal
+from cosim.studies.sweep.journal import hashed, journal
 from cosim.studies.sweep.point import Number, Outcome
 from cosim.studies.sweep.pool import Point, workers_asked
 from cosim.toolchain.versions import versions
@@ -91,34 +90,40 @@ def _sweep(
     progress: Callable[[int, int, int], None],
 ) -> xr.Dataset:
     made_by = {**versions(), "fmu": fmu.token()}
-    with Journal(folder / JOURNAL, _identity(scene, design, made_by)) as journal:
+    total = len(design)
+    with journal(folder / JOURNAL, _identity(scene, design, made_by), total) as kept:
 
         def refreshed() -> xr.Dataset:
             data = dataset.dataset(scene, design, numbers, made_by)
             dataset.write(folder / RESULT, data)
             return data
 
-        numbers = dataset.Numbers(len(design), journal.read())
-        progress(len(journal.done), numbers.failed, len(design))
+        numbers = dataset.Numbers(total, kept.read())
+        done = len(kept.done)
+        progress(done, numbers.failed, total)
         due = time.monotonic() + _REFRESH
-        for number, outcome in _run(scene, design, journal, workers, dask):
-            journal.add(number, outcome)
+        for number, outcome in _run(scene, design, kept.done, workers, dask):
+            kept.add(number, outcome)
             numbers.add(number, outcome)
-            progress(len(journal.done), numbers.failed, len(design))
+            done += 1
+            progress(done, numbers.failed, total)
             if time.monotonic() >= due:
                 began = time.monotonic()
-                refreshed()
+                try:
+                    refreshed()
+                except BadInput as error:  # the disk may have room again at the end
+                    warnings.warn(f"{error} The sweep goes on.", Note, stacklevel=2)
                 ended = time.monotonic()
                 due = ended + max(_REFRESH, _RARELY * (ended - began))
         return refreshed()
 
 
 def _run(
-    scene: Scene, design: Design, journal: Journal, workers: int, dask: str | None
+    scene: Scene, design: Design, done: Set[int], workers: int, dask: str | None
 ) -> Iterator[tuple[int, Outcome]]:
-    if len(journal.done) == len(design):
+    if len(done) == len(design):
         return
-    before = frozenset(journal.done)
+    before = frozenset(done)
     points: Iterator[Point] = (
         (number, design.point(number)) for number in range(len(design)) if number not in before
     )
@@ -135,5 +140,4 @@ def _run(
 def _identity(scene: Scene, design: Design, made_by: dict[str, str]) -> str:
     """A hash of all that the numbers follow from."""
     axes = [(axis.key.full, axis.values) for axis in design.axes]
-    said = json.dumps([scene.as_dict(), axes, design.sample, made_by], sort_keys=True)
-    return hashlib.sha256(said.encode()).hexdigest()
+    return hashed(scene.as_dict(), axes, design.sample, made_by)

@@ -12,16 +12,19 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, SimulationFailed
 from cosim.files.picture import Picture
+from cosim.mechanics import package as fmu
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.choose_rung import without_ngspice
 from cosim.studies.sweep.batch import Batch, runner
-from cosim.studies.sweep.design import FREQUENCIES, numeric_key
+from cosim.studies.sweep.design import FREQUENCIES, MOST_POINTS, numeric_key
+from cosim.studies.sweep.journal import hashed
 from cosim.studies.sweep.point import Number, Outcome, periods_made_whole
 from cosim.studies.sweep.pool import Pool, workers_asked
-from cosim.studies.tune import files
+from cosim.studies.tune import files, memory
 from cosim.studies.tune.found import TURNS, Run, Search
 from cosim.studies.tune.search import apart, search
+from cosim.toolchain.versions import versions
 
 KNOBS: dict[str, tuple[float, float]] = {
     f"drive.{knob}": (0.0, 1.0) for knob in ("pot_max", "pot_frequency", "pot_offset")
@@ -68,6 +71,7 @@ def tune(
     over: Mapping[str, tuple[float, float]] | None = None,
     budget: int = 200,
     seed: int = 0,
+    out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     progress: Callable[[Run, Run | None], None] = lambda run, best: None,
     scouting: Callable[[Run, Run | None], None] = lambda run, best: None,
@@ -81,6 +85,9 @@ def tune(
     ``seed``, whatever the number of ``workers``. ``progress`` is told each run and the best so far,
     as they finish, ``scouting`` each one ahead. Where the frequency is tuned, each run lasts whole
     periods.
+
+    In the folder ``out`` it leaves what ``Tuning.save`` writes, and takes up what an interrupted
+    search has left there.
 
     Raises BadInput for keys, ranges and quantities that are none; SimulationFailed where every run
     failed.
@@ -99,20 +106,52 @@ def tune(
     ranges = _checked(over or KNOBS)
     turned = len(TURNS) * len(ranges)
     least = FEWEST_RUNS + turned
-    if budget < least:
-        raise BadInput(f"--budget {budget}: must be a whole number from {least} for these keys.")
+    if not least <= budget <= MOST_POINTS:
+        raise BadInput(
+            f"--budget {budget}: must be a whole number from {least}, for these keys, to "
+            f"{MOST_POINTS}."
+        )
+    path = None
+    if out is not None:
+        path = Path(out) / memory.NAME
+        Path(out).mkdir(parents=True, exist_ok=True)
     whole_periods = any(key in FREQUENCIES for key in ranges)
+    identity = hashed(scene.as_dict(), whole_periods, versions(), fmu.token())
+    count = workers_asked(workers)
+    with memory.Memory(path, identity) as known:
+        aim = quantity, largest, ranges, budget, seed, whole_periods
+        found = _tuned(scene, *aim, count, known, progress, scouting)
+        if out is not None:
+            found.save(out)
+            known.forget()
+    return found
+
+
+def _tuned(
+    scene: Scene,
+    quantity: str,
+    largest: bool,
+    ranges: dict[str, tuple[float, float]],
+    budget: int,
+    seed: int,
+    whole_periods: bool,
+    workers: int,
+    known: memory.Memory,
+    progress: Callable[[Run, Run | None], None],
+    scouting: Callable[[Run, Run | None], None],
+) -> Tuning:
+    turned = len(TURNS) * len(ranges)
     searched = min(round(SEARCHED * budget), budget - turned)
     scouts, hints = 0, None
     ahead = without_ngspice(scene)
     # Quantities that only the scene's own rung has find no scouts.
-    with suppress(BadInput), runner(ahead or scene, workers_asked(workers), whole_periods) as pool:
+    with suppress(BadInput), runner(ahead or scene, workers, whole_periods) as pool:
         if ahead is not None:
-            trial = _Trial(pool, quantity, largest, ranges, scouting)
+            trial = _Trial(known, pool, ahead, quantity, largest, ranges, scouting)
             search(trial.costs, len(ranges), SCOUTS * searched, seed)
             scouts, hints = len(trial.known), apart(trial.ranked(), HINTS_APART)[:HINTS]
-    with runner(scene, workers_asked(workers), whole_periods) as pool:
-        trial = _Trial(pool, quantity, largest, ranges, progress)
+    with runner(scene, workers, whole_periods) as pool:
+        trial = _Trial(known, pool, scene, quantity, largest, ranges, progress)
         search(trial.costs, len(ranges), searched, seed, hints)
         if trial.best is None:
             reason = next(iter(trial.known.values())).outcome.failure
@@ -142,7 +181,9 @@ def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, 
 class _Trial:
     """Runs settings, each once, and remembers them in the order in which they were asked for."""
 
+    memory: memory.Memory
     pool: Batch | Pool
+    scene: Scene
     quantity: str
     largest: bool
     ranges: dict[str, tuple[float, float]]
@@ -168,7 +209,7 @@ class _Trial:
         new = [place for place in dict.fromkeys(places) if place not in self.known]
         runs: dict[int, Run] = {}
         settings = [self.settings(place) for place in new]
-        for number, outcome in self.pool.run(enumerate(settings)):
+        for number, outcome in self.memory.run(self.pool, self.scene, settings):
             runs[number] = Run(settings[number], outcome, self._value(outcome))
             self.progress(runs[number], self.best)
         for number, place in enumerate(new):

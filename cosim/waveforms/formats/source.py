@@ -8,6 +8,7 @@ from pathlib import Path
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
+from cosim.waveforms.identity import tell_strangers
 from cosim.waveforms.storage import read_netcdf
 
 
@@ -19,7 +20,7 @@ class Run:
     waveforms: dict[str, Array]
     units: dict[str, str]
     attributes: dict[str, str]
-    """Its ``title``, and as ``scene`` the text of its scene.toml."""
+    """Its ``title``, as ``scene`` the text of its scene.toml, and as ``run`` which run it is."""
     written: datetime
 
     @property
@@ -52,6 +53,9 @@ def read(folder: Path) -> Run:
     if not path.exists():
         raise BadInput(f"{name}: there is no run in this folder (waveforms.nc is missing).")
     waveforms, units, attributes = read_netcdf(path)
-    about = {name: attributes.get(name, "") for name in ("title", "scene")}
+    tell_strangers(folder, attributes)
+    about = {"title": "", "scene": ""} | {
+        name: text for name, text in attributes.items() if name in ("title", "scene", "run")
+    }
     written = datetime.fromtimestamp(path.stat().st_mtime, UTC)
     return Run(folder, waveforms, units, about, written)

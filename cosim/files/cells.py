@@ -1,0 +1,171 @@
+"""The one reader of tables: cells between commas, semicolons or tabs, and strict numbers.
+
+Nothing is guessed that could turn one number into another: a decimal comma is one only where commas
+do not part the cells, and not beside decimal points; a row has as many cells as its header; a
+quotation mark encloses a whole cell, in one line.
+"""
+
+import re
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.errors import BadInput, plain
+from cosim.files import door
+
+LARGEST = 50_000_000
+"""Bytes of a table."""
+MOST_ROWS = 2_000_000
+MOST_CELLS = 10_000
+"""In a row."""
+
+_TOLD = 10_000  # rows between two words on how far it is
+
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029]")
+_DIGITS = r"[+-]?(?:[0-9]++{0}?[0-9]*+|{0}[0-9]++)(?:[eE][+-]?[0-9]++)?"
+_NUMBER = {sign: re.compile(_DIGITS.format(re.escape(sign))) for sign in ".,"}
+_NUMBERS = re.compile(f"(?:{_DIGITS.format(re.escape('.'))}\n)*+")
+_QUOTED = re.compile(r' *"((?:[^"]|"")*+)" *')
+
+
+@dataclass
+class Cells:
+    """The rows of a table, each with the number of its line; ``plain`` is the file's name."""
+
+    path: Path
+    separator: str
+    rows: list[tuple[int, list[str]]]
+    comments: list[str]
+    """Lines that begin with #."""
+    _signs: dict[str, tuple[int, str]] = field(default_factory=dict)
+    """Where each decimal sign was met first: row and column."""
+
+    @property
+    def name(self) -> str:
+        """The file, as messages name it."""
+        return plain(str(self.path))
+
+    def even(self, heads: int) -> None:
+        """Check that the rows are as wide as the widest of the first ``heads`` ones, which are the
+        header. Empty cells at the end do not count. Raises BadInput."""
+        width = max(_width(head) for _, head in self.rows[:heads])
+        for line, row in self.rows[heads:]:
+            if len(row) < width or (len(row) > width and any(row[width:])):
+                hint = ""
+                if self.separator == "," and len(row) > width:
+                    hint = "; numbers here have a decimal point, not a comma"
+                raise BadInput(
+                    f"{self.name}: row {line}: it has {len(row)} cells, the header {width}{hint}."
+                )
+
+    def numbers(self, heads: int, place: int, column: str, missing: Collection[str] = ()) -> Array:
+        """The numbers of a column, below ``heads`` rows of header; NaN for a word of ``missing``.
+
+        Raises BadInput, with row and ``column``, for what is no finite number.
+        """
+        texts = [row[place] for _, row in self.rows[heads:]]
+        if _NUMBERS.fullmatch("".join(f"{text}\n" for text in texts)):
+            if self.separator != ",":
+                for (line, _), text in zip(self.rows[heads:], texts, strict=True):
+                    if "." in text:
+                        self._signed(".", line, column)
+                        break
+            values = np.array([float(text) for text in texts])
+        else:
+            values = np.full(len(texts), np.nan)
+            for k, text in enumerate(texts):
+                if text.strip("\ufffd").lower() not in missing:
+                    values[k] = self._number(text, self.rows[heads + k][0], column)
+        if np.isinf(values).any():
+            k = int(np.isinf(values).argmax())
+            self._refuse(self.rows[heads + k][0], column, texts[k], "is not finite")
+        return values
+
+    def _number(self, text: str, line: int, column: str) -> float:
+        sign = "," if "," in text and self.separator != "," else "."
+        if _NUMBER[sign].fullmatch(text):
+            if sign in text and self.separator != ",":
+                self._signed(sign, line, column)
+            return float(text.replace(",", "."))
+        words = "is not a number"
+        if text.lstrip("+-").lower() in ("inf", "infinity", "nan"):
+            words = "is not finite"
+        self._refuse(line, column, text, words)
+        raise AssertionError
+
+    def _signed(self, sign: str, line: int, column: str) -> None:
+        """Note a decimal sign: a file has only one."""
+        self._signs.setdefault(sign, (line, column))
+        if len(self._signs) == 2:
+            (one, first), (other, second) = (self._signs[sign] for sign in ".,")
+            raise BadInput(
+                f"{self.name}: row {one}, column {plain(first, 40)} has a decimal point, and row "
+                f"{other}, column {plain(second, 40)} a decimal comma."
+            )
+
+    def _refuse(self, line: int, column: str, text: str, words: str) -> None:
+        shown = plain(text, 40)
+        raise BadInput(f"{self.name}: row {line}, column {plain(column, 40)}: “{shown}” {words}.")
+
+
+def read_cells(path: Path, most: int = LARGEST) -> Cells:
+    """The cells of a text file. Raises BadInput, with the row, for what is no table."""
+    text = _decoded(door.read(path, most))
+    name = plain(str(path))
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    if odd := _CONTROL.search(text):
+        row = len(re.split("\r\n|\r|\n", text[: odd.start()]))
+        raise BadInput(
+            f"{name}: row {row}: the control character U+{ord(odd[0]):04X} cannot stand in a table."
+        )
+    numbered = [(n, line) for n, line in enumerate(lines, 1) if line and not line.isspace()]
+    comments = [line for _, line in numbered if line.startswith("#")]
+    kept = [(n, line) for n, line in numbered if not line.startswith("#")]
+    if not kept:
+        raise BadInput(f"{name}: this file holds no table.")
+    separator = next((sign for sign in "\t;" if any(sign in line for _, line in kept[:2])), ",")
+    if len(kept) > MOST_ROWS:
+        raise BadInput(f"{name}: it has more than {MOST_ROWS} rows.")
+    rows = []
+    for n, line in kept:
+        if line.count(separator) >= MOST_CELLS:
+            raise BadInput(f"{name}: row {n}: it has more than {MOST_CELLS} cells.")
+        rows.append((n, [*_cells(line, separator, name, n)]))
+        if len(rows) % _TOLD == 0:
+            door.tell(path, 0.5 + 0.5 * len(rows) / len(kept))
+    door.tell(path, 1.0)
+    return Cells(path, separator, rows, comments)
+
+
+def _decoded(data: bytes) -> str:
+    """The text; what is no UTF-8 becomes U+FFFD, which is no number."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return data.decode("utf-16", errors="replace")
+    return data.decode("utf-8-sig", errors="replace")
+
+
+def _cells(line: str, separator: str, name: str, row: int) -> Iterator[str]:
+    if '"' not in line:
+        yield from (cell.strip() for cell in line.split(separator))
+        return
+    place, last = 0, line.rfind('"')
+    while place <= len(line):
+        quoted = _QUOTED.match(line, place) if place <= last else None
+        if quoted and line[quoted.end() : quoted.end() + 1] in ("", separator):
+            yield quoted[1].replace('""', '"').strip()
+            place = quoted.end() + 1
+            continue
+        end = line.find(separator, place)
+        cell = line[place:] if end < 0 else line[place:end]
+        if '"' in cell:
+            raise BadInput(f"{name}: row {row}: a quotation mark does not enclose a whole cell.")
+        yield cell.strip()
+        place = len(line) + 1 if end < 0 else end + 1
+
+
+def _width(row: list[str]) -> int:
+    """Its cells, without empty ones at the end."""
+    return max((place for place, cell in enumerate(row, 1) if cell), default=0)

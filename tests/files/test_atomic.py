@@ -1,0 +1,81 @@
+"""Files appear whole, and what a kill leaves of them goes."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cosim.errors import BadInput
+from cosim.files.atomic import alone, together, whole
+from tests.helpers import needs
+
+pytestmark = [pytest.mark.reliability, needs.posix]
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from cosim.files.atomic import alone, whole
+with alone(Path(sys.argv[1])), whole(Path(sys.argv[1]) / "it.csv") as temporary:
+    temporary.write_bytes(b"half")
+    {deed}
+"""
+
+
+def test_what_a_kill_left_goes_with_the_next_run(tmp_path: Path) -> None:
+    kill = KILLED.format(deed="os.kill(os.getpid(), 9)")
+    done = subprocess.run([sys.executable, "-c", kill, str(tmp_path)], check=False)
+    assert done.returncode == -9
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"half"]
+    (tmp_path / ".mine").touch()
+    with whole(tmp_path / "other.csv") as mine, alone(tmp_path):  # mine is at work
+        assert {*tmp_path.iterdir()} == {mine, tmp_path / ".mine"}
+    assert {*tmp_path.iterdir()} == {tmp_path / "other.csv", tmp_path / ".mine"}
+
+
+def test_two_at_once_are_told(tmp_path: Path) -> None:
+    wait = KILLED.format(deed="print(flush=True); sys.stdin.read()")
+    with subprocess.Popen(
+        [sys.executable, "-c", wait, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as first:
+        assert first.stdout is not None
+        first.stdout.readline()
+        with pytest.raises(BadInput, match="another process is writing into"), alone(tmp_path):
+            pass
+        first.communicate()
+    with alone(tmp_path):
+        assert (tmp_path / "it.csv").read_bytes() == b"half"
+
+
+def test_all_or_none(tmp_path: Path) -> None:
+    paths = [tmp_path / name for name in "abc"]
+    for path in paths:
+        path.write_text("old")
+    with pytest.raises(ZeroDivisionError), together(paths) as new:
+        for path in new:
+            path.write_text("new")
+        raise ZeroDivisionError
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["old"] * 3
+    with together(paths) as new:
+        for path in new:
+            path.write_text("new")
+            assert all(path.read_text() == "old" for path in paths)
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["new"] * 3
+
+
+def test_content_is_on_disk_before_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+    fsync, replace = os.fsync, os.replace
+    monkeypatch.setattr(os, "fsync", lambda handle: (done.append("sync"), fsync(handle)))
+    monkeypatch.setattr(os, "replace", lambda a, b: (done.append("name"), replace(a, b)))
+    with together([tmp_path / "a", tmp_path / "b"]):
+        pass
+    assert done == ["sync", "sync", "name", "name"]
+
+
+def test_a_name_that_cannot_be(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="no possible file name"), whole(tmp_path / "a\0b"):
+        pass

@@ -1,0 +1,56 @@
+"""Files of different runs in one folder are told apart."""
+
+import shutil
+import warnings
+from pathlib import Path
+
+import pytest
+
+import cosim
+from cosim.errors import Note
+from cosim.waveforms import formats
+from cosim.waveforms.identity import FILES
+
+pytestmark = pytest.mark.reliability
+
+SHORT = {"run.duration": 0.02, "run.settle": 0.0}
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folders = tmp_path_factory.mktemp("one"), tmp_path_factory.mktemp("other")
+    for folder, force in zip(folders, (0.5, 0.6), strict=True):
+        cosim.run("ideal-current", {**SHORT, "friction.normal_force": force}).save(folder)
+    return folders
+
+
+@pytest.mark.parametrize("stale", FILES)
+def test_a_file_of_an_older_run_is_told(stale: str, two: tuple[Path, Path], tmp_path: Path) -> None:
+    for name in FILES:
+        shutil.copy(two[name == stale] / name, tmp_path / name)
+    with pytest.warns(Note) as told:
+        formats.read(tmp_path)
+    others = [name for name in FILES if name != stale]
+    said = str(told[0].message)
+    assert len(told) == 1
+    expected = [stale] if stale != "waveforms.nc" else [n for n in others if n != "waveforms.nc"]
+    assert all(name in said for name in expected)
+    assert "run it again" in said
+
+
+def test_a_whole_run_is_quiet(two: tuple[Path, Path], tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", Note)
+        for folder in two:
+            formats.read(folder)
+        for name in FILES[:2]:  # others may be gone
+            shutil.copy(two[0] / name, tmp_path / name)
+        formats.read(tmp_path)
+
+
+def test_equal_runs_are_one(two: tuple[Path, Path], tmp_path: Path) -> None:
+    cosim.run("ideal-current", {**SHORT, "friction.normal_force": 0.5}).save(tmp_path)
+    shutil.copy(two[0] / "summary.json", tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", Note)
+        formats.read(tmp_path)
