@@ -29,9 +29,9 @@ RIG = (
 )
 """Numbers that all trials of a rig share, SI; ``stepper.h`` has them in this order."""
 
-OWN = ("amplitude", "offset", "phase", "start", "lift", "normal_force")
+OWN = ("amplitude", "offset", "phase", "start", "lift", "normal_force", "frequency")
 """Numbers of one trial: V, V, share of a period at time 0, s, share of what the plate's friction
-holds, N."""
+holds, N, Hz."""
 
 OUTPUTS = ("z_surface", "v_surface", "z_part", "v_part", "z_plate")
 """What is simulated, m and m/s."""
@@ -39,7 +39,7 @@ OUTPUTS = ("z_surface", "v_surface", "z_part", "v_part", "z_plate")
 
 class _Schedule(Structure):
     _fields_ = (
-        *(("frequency", c_double), ("steps", c_int64)),
+        ("steps", c_int64),
         *((name, c_void_p) for name in ("edges", "sample", "current")),
     )
 
@@ -83,7 +83,6 @@ class Target:
     """
 
     time: Array
-    frequency: float
     signals: Mapping[str, Array]
     weights: Mapping[str, float]
     differenced: frozenset[str]
@@ -106,7 +105,7 @@ class Target:
         rate[1:-1] = 1.0 / (self.time[2:] - self.time[:-2])
         self._kept = [edges, sample, rate]
         state = _Trial(samples=len(self.time), rate=rate.ctypes.data)
-        state.schedule.frequency, state.schedule.steps = self.frequency, len(edges) - 1
+        state.schedule.steps = len(edges) - 1
         state.schedule.edges, state.schedule.sample = edges.ctypes.data, sample.ctypes.data
         if self.current is not None:
             current = np.interp(edges, self.time, self.current)

@@ -59,7 +59,7 @@ INLINE Wide of_surface(const Contact *c, Wide bound, Wide *plate)
 /* One step of all lanes, whose plate is moving or stands on the ground. It ends at `edge`, or where
  * the command jumps, if that lies between `low` and `high`. i0 and i1 give the current at both ends
  * where it is measured. */
-INLINE void step(const Wide p[N_ALL], State *m, double frequency, double low, double edge,
+INLINE void step(const Wide p[N_ALL], State *m, double low, double edge,
                  double high, int moving, int measured, double i0, double i1)
 {
     const Wide zero = {0}, one = zero + 1.0;
@@ -78,7 +78,7 @@ INLINE void step(const Wide p[N_ALL], State *m, double frequency, double low, do
     } else {
         const Mask on = t + half > start;
         const Wide gain = 1.0 / p[SENSE_RESISTANCE], limit = p[CURRENT_LIMIT];
-        const Wide slope = p[AMPLITUDE] * frequency;
+        const Wide slope = p[AMPLITUDE] * p[FREQUENCY];
         const Wide v1 = p[OFFSET] + 0.5 * p[AMPLITUDE] - slope * (jump - t);
         const Wide target0 = choose(on, within(gain * v1, limit), zero);
         const Wide target1 = choose(on, within(gain * (v1 + slope * h), limit), zero);
@@ -161,7 +161,7 @@ INLINE void step(const Wide p[N_ALL], State *m, double frequency, double low, do
     m->i = now;
     m->slip = choose(sticks, zero, choose(slipping > 0.0, -one, one));
     m->t = end;
-    m->jump = choose(drops, jump + 1.0 / frequency, jump);
+    m->jump = choose(drops, jump + 1.0 / p[FREQUENCY], jump);
 }
 
 RUN(const Schedule *c, const Parameters all, const Rest *rest, int from, double *out)
@@ -186,13 +186,13 @@ RUN(const Schedule *c, const Parameters all, const Rest *rest, int from, double 
             const double i1 = c->current ? c->current[k < 0 ? 0 : k] : 0.0;
             const double i0 = c->current ? c->current[k < 1 ? 0 : k - 1] : 0.0;
             if (!c->current && !moving)
-                step(p, &m, c->frequency, low, edge, high, 0, 0, i0, i1);
+                step(p, &m, low, edge, high, 0, 0, i0, i1);
             else if (!c->current)
-                step(p, &m, c->frequency, low, edge, high, 1, 0, i0, i1);
+                step(p, &m, low, edge, high, 1, 0, i0, i1);
             else if (!moving)
-                step(p, &m, c->frequency, low, edge, high, 0, 1, i0, i1);
+                step(p, &m, low, edge, high, 0, 1, i0, i1);
             else
-                step(p, &m, c->frequency, low, edge, high, 1, 1, i0, i1);
+                step(p, &m, low, edge, high, 1, 1, i0, i1);
         }
         if (k < 0 || c->sample[k] < 0)
             continue;

@@ -49,8 +49,8 @@ void chain_run(const Schedule *c, const Parameters p, double *out)
         rest.plate[l] = p[PLATE_MASS][l] > 0.0 ? -held / p[PLATE_STIFFNESS][l] : 0.0;
         /* Drops before the middle of the first step are over. */
         const double middle = (0.5 - (double)rest.steps) * c->edges[1];
-        const double cycle = floor(c->frequency * middle + p[PHASE][l]) + 1.0;
-        rest.jump[l] = (cycle - p[PHASE][l]) / c->frequency;
+        const double cycle = floor(p[FREQUENCY][l] * middle + p[PHASE][l]) + 1.0;
+        rest.jump[l] = (cycle - p[PHASE][l]) / p[FREQUENCY][l];
     }
     int width = 2;
     ChainLanes *lanes = chain_lanes_2;

@@ -22,6 +22,7 @@ enum {
     START,             /* s, when the drive is switched on; rest before */
     LIFT,              /* height at rest, above equilibrium, as a share of what the plate's friction holds */
     NORMAL_FORCE,      /* N */
+    FREQUENCY,         /* Hz, of the drive */
     N_ALL,
     N_OWN = N_ALL - N_RIG
 };
@@ -31,7 +32,6 @@ enum { Z_SURFACE, V_SURFACE, Z_PART, V_PART, Z_PLATE, N_OUTPUTS };
 
 /* The times at which a trial was sampled, and the steps between them. */
 typedef struct {
-    double frequency;      /* Hz, of the drive */
     int64_t steps;         /* from the first sample to the last */
     const double *edges;   /* s; steps + 1, the first is 0 */
     const int32_t *sample; /* steps + 1: which sample an edge is, or -1 */
