@@ -7,6 +7,7 @@ numbers of ``chain.RIG``, a scene by its keys.
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,6 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.scene import keys
-from cosim.scene.tables import is_number
 from cosim.studies.identify.chain.chain import OWN, RIG
 
 SHIPPED = Path(__file__).parent / "bounds.toml"
@@ -174,7 +174,7 @@ def _entry(path: Path, table: str, key: str, entry: Any) -> Entry:
         raise BadInput(f"{where}: {wrong or 'this'} is none of {', '.join(sorted(_PART_OF_ENTRY))}.")
     numbers = {name: entry[name] for name in ("value", "low", "high", "prior", "sigma") if name in entry}
     for name, value in numbers.items():
-        if not is_number(value):
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise BadInput(f"{where}: {name} = {plain(str(value))} must be a number.")
     if ("value" in entry) == ("low" in entry and "high" in entry) or "value" in entry and len(numbers) > 1:
         raise BadInput(f"{where}: it needs either a value, or low and high.")

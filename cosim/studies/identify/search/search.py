@@ -1,0 +1,184 @@
+"""The search for one rig that explains several trials.
+
+CMA-ES goes over the rig. Each of its candidates gets the trials' own numbers that the best candidate
+so far had, moved along as the rig differs (`sensitivity`), and one round of Gauss–Newton on each
+trial: so the search over the rig sees a cost from which the own numbers are nearly eliminated. Since
+a trial's cost has many minima over its own numbers, they are drawn anew from time to time (`screen`).
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from cmaes import CMA
+
+from cosim.arrays import Array
+from cosim.studies.identify.chain.chain import LANES, OWN, Target, costs, refine, simulate
+from cosim.studies.identify.problem.space import Space
+from cosim.studies.identify.problem.targets import draws
+
+TURN = 2e-3
+"""Of a bound's range, for derivatives: below it impacts make the cost rough."""
+SOFT = 0.03
+"""Damping of the sensitivities, relative to the diagonal of the normal matrix."""
+POPULATION = 16
+REFRESH, RESCREEN = 4, 30
+"""Generations after which sensitivities are found anew, and own numbers drawn anew."""
+BETTER = 0.97
+"""Of a trial's cost, which other own numbers must reach to take the place of the present ones."""
+NARROW = 1e-3
+"""Step of CMA-ES, of the bounds' ranges, at which it ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A rig and the trials' numbers on it: ``place`` (free), ``own`` (trials × OWN), ``costs`` (one
+    for each trial) and ``total``, their mean and what the priors add."""
+
+    place: Array
+    own: Array
+    costs: Array
+    total: float
+
+
+Progress = Callable[[str, float], None]
+"""What is being done, and the best cost so far."""
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """The trials that a rig is sought for, and with how many threads."""
+
+    space: Space
+    targets: Sequence[Target]
+    workers: int
+
+    def made(self, place: Array, own: Array, found: Array) -> Found:
+        """A solution whose costs are known."""
+        total = float(found.mean() + self.space.prior(place[None])[0])
+        return Found(place.copy(), own.copy(), found.copy(), total)
+
+    def refined(self, place: Array, own: Array, rounds: int) -> Found:
+        """The trials' numbers fitted on a given rig from ``own`` on."""
+        rigs = np.repeat(self.space.rigs(place[None]), len(self.targets), axis=0)
+        return self.made(place, *refine(self.targets, rigs, own, rounds, self.workers))
+
+    def screen(
+        self, places: Array, rng: np.random.Generator, count: int, kept: int, rounds: int
+    ) -> list[Found]:
+        """For each rig the best of ``count`` random own numbers, ``kept`` of which are refined."""
+        rigs = self.space.rigs(places)
+        each = [target for _ in places for target in self.targets]
+        wide = np.repeat(rigs, len(self.targets), axis=0)
+        drawn = np.stack([draws(target, count, rng) for target in each])
+        order = np.argsort(costs(each, wide, drawn, self.workers), axis=1)[:, :kept]
+        chosen = np.take_along_axis(drawn, order[:, :, None], axis=1).reshape(-1, len(OWN))
+        several = [target for target in each for _ in range(kept)]
+        own, cost = refine(several, np.repeat(wide, kept, axis=0), chosen, rounds, self.workers)
+        cost = cost.reshape(len(each), kept)
+        rows, best = np.arange(len(each)), cost.argmin(axis=1)
+        own = own.reshape(len(each), kept, len(OWN))[rows, best]
+        shape = (len(places), len(self.targets))
+        return [
+            self.made(*one)
+            for one in zip(
+                *(places, own.reshape(*shape, len(OWN)), cost[rows, best].reshape(shape)), strict=True
+            )
+        ]
+
+    def rescreened(
+        self, found: Found, rng: np.random.Generator, count: int = 64, kept: int = 8, rounds: int = 3
+    ) -> Found:
+        """With other own numbers where random ones led to clearly less."""
+        (other,) = self.screen(found.place[None], rng, count, kept, rounds)
+        same = self.refined(found.place, found.own, rounds)
+        take = other.costs < BETTER * same.costs
+        own = np.where(take[:, None], other.own, same.own)
+        return self.made(found.place, own, np.where(take, other.costs, same.costs))
+
+    def slopes(self, place: Array, own: Array, k: int, turn: float = TURN) -> tuple[Array, Array]:
+        """Residuals of trial ``k``, and their slopes by the rig's place and the fitted own numbers
+        in units of their scales (rows)."""
+        target = self.targets[k]
+        free = np.flatnonzero(target.scale > 0.0)
+        turns = np.where(place + turn <= 1.0, turn, -turn)
+        rigs = self.space.rigs(np.concatenate([place[None], place + np.diag(turns)]))
+        rigs = np.concatenate([rigs, np.repeat(rigs[:1], len(free), axis=0)])
+        own_turns = np.where(own[k] + turn * target.scale <= target.high, turn, -turn)[free]
+        numbers = np.repeat(own[k][None], len(rigs), axis=0)
+        rows = 1 + len(place) + np.arange(len(free))
+        numbers[rows, free] += own_turns * target.scale[free]
+        residuals = simulate(target, rigs, numbers)[1]
+        steps = np.concatenate([turns, own_turns])[:, None]
+        return residuals[0], (residuals[1:] - residuals[0]) / steps
+
+    def sensitivity(self, place: Array, own: Array) -> Array:
+        """How the own numbers follow the rig's place: trials × OWN × free."""
+
+        def one(k: int) -> Array:
+            _, slopes = self.slopes(place, own, k)
+            normal, d = slopes @ slopes.T, len(place)
+            inner = normal[d:, d:] + SOFT * np.diag(np.diag(normal)[d:] + 1e-9)
+            found = np.zeros((len(OWN), d))
+            free = np.flatnonzero(self.targets[k].scale > 0.0)
+            if len(free):
+                scale = self.targets[k].scale[free]
+                found[free] = -np.linalg.solve(inner, normal[d:, :d]) * scale[:, None]
+            return found
+
+        with ThreadPoolExecutor(self.workers) as pool:
+            return np.array([*pool.map(one, range(len(self.targets)))])
+
+    def nested(
+        self,
+        start: Found,
+        rng: np.random.Generator,
+        generations: int,
+        sigma: float,
+        progress: Progress,
+        population: int = POPULATION,
+        fixed: int | None = None,
+    ) -> Found:
+        """CMA-ES over the rig from ``start`` on; ``fixed`` keeps one place where it is."""
+        space, trials = self.space, len(self.targets)
+        moving = [k for k in range(len(start.place)) if k != fixed]
+        search = CMA(
+            mean=np.clip(start.place[moving], 1e-3, 1 - 1e-3),
+            sigma=sigma,
+            bounds=np.tile([0.0, 1.0], (len(moving), 1)),
+            population_size=population,
+            seed=int(rng.integers(2**31)),
+        )
+        low, high = (np.array([getattr(t, end) for t in self.targets]) for end in ("low", "high"))
+        best = here = self.refined(start.place, start.own, 2)
+        follow = self.sensitivity(here.place, here.own)
+        for generation in range(1, generations + 1):
+            asked = [search.ask() for _ in range(population)]
+            places = np.repeat(start.place[None], population, axis=0)
+            places[:, moving] = asked
+            moved = here.own + np.einsum("tkd,nd->ntk", follow, places - here.place)
+            own, found = refine(
+                [*self.targets] * population,
+                np.repeat(space.rigs(places), trials, axis=0),
+                np.clip(moved, low, high).reshape(-1, len(OWN)),
+                *(1, self.workers),
+            )
+            found = found.reshape(population, trials)
+            totals = found.mean(axis=1) + space.prior(places)
+            search.tell([*zip(asked, totals.tolist(), strict=True)])
+            k = int(totals.argmin())
+            here = self.made(places[k], own.reshape(population, trials, -1)[k], found[k])
+            if generation % RESCREEN == 0:
+                here = self.rescreened(here, rng)
+            best = min(best, here, key=lambda one: one.total)
+            if generation % REFRESH == 0:
+                follow = self.sensitivity(here.place, here.own)
+            progress(f"generation {generation}", best.total)
+            if search._sigma < NARROW:
+                break
+        return best
+
+    def part(self, rows: Sequence[int]) -> "Search":
+        """The same with some of the trials."""
+        return replace(self, targets=[self.targets[k] for k in rows])
