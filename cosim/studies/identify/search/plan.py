@@ -112,7 +112,7 @@ class Plan:
         """The best own numbers of trials on a rig, of many starts."""
         return self.journal.stage(name, lambda rng: targets.screen(place[None], rng, *CAREFUL))[0]
 
-    def profile(self, best: Found, key: int, place: float, start: Found) -> Found:
+    def profile(self, key: int, place: float, start: Found) -> Found:
         """The best solution with one key at a place, from a neighbour on."""
         name = f"profile {self.coarse.space.names[key]} {place:.4f}"
         moved = start.place.copy()
