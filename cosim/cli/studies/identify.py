@@ -25,7 +25,9 @@ def _options(parser: ArgumentParser) -> None:
         metavar="TRIAL",
         help="a trial that is reported but not fitted; repeatable (always: those that do not repeat)",
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the search (default: 0)")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of the search (default: 0)"
+    )
     parser.add_argument(
         "--workers", type=int, metavar="N", help="threads (default: one for each processor)"
     )

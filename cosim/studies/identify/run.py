@@ -115,7 +115,9 @@ def identify(
     labels = [trial.label for trial in everything]
     for label in apart:
         if label not in labels:
-            raise BadInput(f"There is no trial {plain(label)} to set apart; there are {', '.join(labels)}.")
+            raise BadInput(
+                f"There is no trial {plain(label)} to set apart; there are {', '.join(labels)}."
+            )
     steady = [trial for trial in everything if trial.label not in apart and _steady(trial)]
     others = [trial for trial in everything if trial not in steady]
     if not steady:
@@ -151,9 +153,17 @@ def _steady(trial: Measured) -> bool:
 
 def _asked(space: Space, trials: Sequence[Measured], effort: object) -> Any:
     """All that decides what a stage finds, beside the seed."""
-    entries = [repr(entry) for entry in (*space.rig_entries.values(), *space.trial_entries.values())]
+    entries = [
+        repr(entry) for entry in (*space.rig_entries.values(), *space.trial_entries.values())
+    ]
     sums = [
-        [trial.label, *(float(np.nansum(v * np.arange(1, len(v) + 1))) for v in trial.target.signals.values())]
+        [
+            trial.label,
+            *(
+                float(np.nansum(v * np.arange(1, len(v) + 1)))
+                for v in trial.target.signals.values()
+            ),
+        ]
         for trial in trials
     ]
     return [entries, sums, repr(effort)]
@@ -218,13 +228,17 @@ def _numbers(found: Identification, seed: int, quick: bool) -> dict[str, Any]:
     rig = space.rigs(best.place[None])[0]
     rows, checks, spectra = [], [], []
     for trial, own, cost in zip(found.trials, best.own, best.costs.tolist(), strict=True):
-        rows.append(errors(trial, rig, own) | repeatability(trial) | {"cost": cost} | own_numbers(own))
+        rows.append(
+            errors(trial, rig, own) | repeatability(trial) | {"cost": cost} | own_numbers(own)
+        )
         spectra += bands(trial, rig, own)
         if trial.target.current is None and trial.has_part:
             settings, first = trial_settings(space, best.place, trial, own)
             here = rows[-1]["v_average_mm_per_s"]
             both = space.settings(best.place) | settings
-            checks.append({"trial": trial.label, "steps": here} | exact(both, first, trial.fine.time))
+            checks.append(
+                {"trial": trial.label, "steps": here} | exact(both, first, trial.fine.time)
+            )
     aside = [
         errors(trial, rig, own) | repeatability(trial) | own_numbers(own)
         for trial, own in zip(found.apart, found.apart_own, strict=True)
@@ -239,7 +253,9 @@ def _numbers(found: Identification, seed: int, quick: bool) -> dict[str, Any]:
             | {"surface_and_part": both | own_numbers(one.both)}
         )
     there = space.rigs(found.made_up.place[None])[0]
-    made_up = [errors(t, there, own) for t, own in zip(found.trials, found.made_up.own, strict=True)]
+    made_up = [
+        errors(t, there, own) for t, own in zip(found.trials, found.made_up.own, strict=True)
+    ]
     return {
         "seed": seed,
         "quick": quick,
@@ -251,7 +267,8 @@ def _numbers(found: Identification, seed: int, quick: bool) -> dict[str, Any]:
         "apart": aside,
         "held_out": held_out,
         "held_out_overall": {
-            kind: overall([one[kind] for one in held_out]) for kind in ("surface", "surface_and_part")
+            kind: overall([one[kind] for one in held_out])
+            for kind in ("surface", "surface_and_part")
         }
         if held_out
         else None,
@@ -259,12 +276,16 @@ def _numbers(found: Identification, seed: int, quick: bool) -> dict[str, Any]:
         "exact_rungs_v_average_mm_per_s": checks,
         "bands": spectra,
         "ensemble": [
-            {"cost": one.total} | dict(zip(space.names, space.values(one.place).tolist(), strict=True))
+            {"cost": one.total}
+            | dict(zip(space.names, space.values(one.place).tolist(), strict=True))
             for one in found.ensemble
         ],
         "folds": [
-            {"cost": one.total} | dict(zip(space.names, space.values(one.place).tolist(), strict=True))
+            {"cost": one.total}
+            | dict(zip(space.names, space.values(one.place).tolist(), strict=True))
             for one in found.fold_rigs
         ],
-        "profiles": {name: [list(point) for point in points] for name, points in found.profiles.items()},
+        "profiles": {
+            name: [list(point) for point in points] for name, points in found.profiles.items()
+        },
     }

@@ -110,15 +110,20 @@ def _verdict(
     elif tied:
         kind, words = "product", f"only as its {tied}; alone {numbers}"
     elif open_low and open_high:
-        kind, words = "not", f"not identified: anything from {least:.3g} to {most:.3g} does nearly as well"
+        kind, words = (
+            "not",
+            f"not identified: anything from {least:.3g} to {most:.3g} does nearly as well",
+        )
     elif open_low or open_high:
         end = f"at most {top:.3g}" if open_low else f"at least {bottom:.3g}"
         kind, words = "bounded", f"bounded on one side only: {end}"
     else:
         kind = "bounded"
-        words = f"known roughly: {numbers}, in the folds {folds.min():.3g} to {folds.max():.3g}" if len(
-            folds
-        ) else f"known roughly: {numbers}"
+        words = (
+            f"known roughly: {numbers}, in the folds {folds.min():.3g} to {folds.max():.3g}"
+            if len(folds)
+            else f"known roughly: {numbers}"
+        )
     return Verdict(
         *(key, value, bottom, top, open_low, open_high),
         (float(ensemble.min()), float(ensemble.max())),

@@ -145,8 +145,14 @@ def refine(
     return own, cost
 
 
-def costs(targets: Sequence[Target], rigs: Array, own: Array, workers: int) -> Array:
-    """Costs (n × m) of m sets of own numbers (n × m × OWN) for each target and rig (n × RIG)."""
+def look_around(
+    targets: Sequence[Target], rigs: Array, own: Array, workers: int
+) -> tuple[Array, Array]:
+    """Costs (n × m) of m sets of own numbers (n × m × OWN) for each target and rig (n × RIG).
+
+    The phases are first moved to where the surface moves as it was measured. Returns the own
+    numbers with these, and the costs.
+    """
     n, m, _ = own.shape
     blocks = -(-m // LANES)
     padded = np.concatenate([own, np.repeat(own[:, :1], blocks * LANES - m, axis=1)], axis=1)
@@ -154,7 +160,7 @@ def costs(targets: Sequence[Target], rigs: Array, own: Array, workers: int) -> A
     found = np.empty((n * blocks, LANES))
     wide = np.ascontiguousarray(np.repeat(rigs, blocks, axis=0))
     _work([t for t in targets for _ in range(blocks)], wide, padded, found, 0, workers)
-    return found.reshape(n, blocks * LANES)[:, :m]
+    return padded.reshape(n, -1, len(OWN))[:, :m], found.reshape(n, -1)[:, :m]
 
 
 def _work(

@@ -188,16 +188,63 @@ static void one_round(const Trial *t, Bench *b, double own[N_OWN], double *best)
         }
 }
 
+/* Share of a period by which the drive of lane l must be further, so that the surface moves as it was
+ * measured: as if the motion were periodic, and to a sample. */
+static double lag(const Trial *t, const double *out, int l, double frequency)
+{
+    const double *measured = t->measured[V_SURFACE];
+    const double each = t->schedule.edges[t->schedule.steps] / (double)(t->samples - 1);
+    const int64_t half = (int64_t)(0.5 / (frequency * each));
+    double least = INFINITY;
+    int64_t best = 0;
+    for (int64_t shift = -half; shift <= half && 2 * half < t->samples; shift++) {
+        const int64_t from = shift < 0 ? -shift : 0, to = t->samples - (shift > 0 ? shift : 0);
+        double sum = 0.0, n = 0.0;
+        for (int64_t j = from; j < to; j++) {
+            const double apart =
+                out[((j + shift) * N_OUTPUTS + V_SURFACE) * LANES + l] - measured[j];
+            if (apart == apart) {
+                sum += apart * apart;
+                n += 1.0;
+            }
+        }
+        if (sum < least * n) {
+            least = sum / n;
+            best = shift;
+        }
+    }
+    return (double)best * each * frequency;
+}
+
+/* Costs of LANES sets of own numbers, their phases first moved to where the motion fits best. */
+static void look_around(const Trial *t, Bench *b, double *own, double cost[LANES])
+{
+    double tried[LANES];
+    for (int l = 0; l < LANES; l++)
+        set_own(b, l, own + l * N_OWN);
+    look(t, b, cost);
+    if (!t->measured[V_SURFACE] || t->scale[PHASE - N_RIG] == 0.0)
+        return;
+    for (int l = 0; l < LANES; l++) {
+        double phase = b->parameters[PHASE][l] + lag(t, b->out, l, b->parameters[FREQUENCY][l]);
+        b->parameters[PHASE][l] = tried[l] = phase - floor(phase);
+    }
+    double moved[LANES];
+    look(t, b, moved);
+    for (int l = 0; l < LANES; l++)
+        if (moved[l] < cost[l]) {
+            cost[l] = moved[l];
+            own[l * N_OWN + PHASE - N_RIG] = tried[l];
+        }
+}
+
 static void do_job(const Job *job, Bench *b)
 {
     for (int k = 0; k < N_RIG; k++)
         for (int l = 0; l < LANES; l++)
             b->parameters[k][l] = job->rig[k];
-    if (job->rounds == 0) {
-        for (int l = 0; l < LANES; l++)
-            set_own(b, l, job->own + l * N_OWN);
-        look(job->trial, b, job->cost);
-    }
+    if (job->rounds == 0)
+        look_around(job->trial, b, job->own, job->cost);
     for (int64_t i = 0; i < job->rounds; i++)
         one_round(job->trial, b, job->own, job->cost);
 }

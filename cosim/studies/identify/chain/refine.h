@@ -30,7 +30,8 @@ typedef struct {
 typedef struct {
     const Trial *trial;
     const double *rig; /* N_RIG */
-    double *own;       /* N_OWN, replaced by what was found; with 0 rounds LANES times N_OWN */
+    double *own;       /* N_OWN, replaced by what was found; with 0 rounds LANES times N_OWN, of
+                          which the phases are replaced by better ones */
     double *cost;      /* 1, or LANES */
     int64_t rounds;    /* of Gauss-Newton */
 } Job;

@@ -150,7 +150,9 @@ def read_space(own: Path | None = None) -> Space:
         if rig[key].free:
             raise BadInput(f'{path}: [rig."{key}"]: this key needs a value; it is not searched.')
     if not any(entry.free for entry in rig.values()):
-        raise BadInput(f"{path}: no key of the rig has a low and a high: there is nothing to search.")
+        raise BadInput(
+            f"{path}: no key of the rig has a low and a high: there is nothing to search."
+        )
     return Space(rig, trial, path)
 
 
@@ -170,13 +172,23 @@ def _tables(path: Path) -> dict[str, dict[str, Any]]:
 def _entry(path: Path, table: str, key: str, entry: Any) -> Entry:
     where = f'{path}: [{table}."{key}"]'
     if not isinstance(entry, dict) or set(entry) - _PART_OF_ENTRY:
-        wrong = ", ".join(map(plain, set(entry) - _PART_OF_ENTRY)) if isinstance(entry, dict) else ""
-        raise BadInput(f"{where}: {wrong or 'this'} is none of {', '.join(sorted(_PART_OF_ENTRY))}.")
-    numbers = {name: entry[name] for name in ("value", "low", "high", "prior", "sigma") if name in entry}
+        wrong = (
+            ", ".join(map(plain, set(entry) - _PART_OF_ENTRY)) if isinstance(entry, dict) else ""
+        )
+        raise BadInput(
+            f"{where}: {wrong or 'this'} is none of {', '.join(sorted(_PART_OF_ENTRY))}."
+        )
+    numbers = {
+        name: entry[name] for name in ("value", "low", "high", "prior", "sigma") if name in entry
+    }
     for name, value in numbers.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise BadInput(f"{where}: {name} = {plain(str(value))} must be a number.")
-    if ("value" in entry) == ("low" in entry and "high" in entry) or "value" in entry and len(numbers) > 1:
+    if (
+        ("value" in entry) == ("low" in entry and "high" in entry)
+        or "value" in entry
+        and len(numbers) > 1
+    ):
         raise BadInput(f"{where}: it needs either a value, or low and high.")
     low = float(entry.get("value", entry.get("low")))
     high = float(entry.get("value", entry.get("high")))

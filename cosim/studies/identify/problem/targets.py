@@ -101,7 +101,11 @@ def measured(recording: Recording, path: Path, space: Space) -> Measured:
         )
 
     return Measured(
-        *(str(number) if (number := number_of(path)) is not None else path.stem, recording, frequency),
+        *(
+            str(number) if (number := number_of(path)) is not None else path.stem,
+            recording,
+            frequency,
+        ),
         *(target(SEARCH_STEP, list(WEIGHTS)), target(FINE_STEP, list(WEIGHTS))),
         target(FINE_STEP, ["z_surface", "v_surface"]),
     )

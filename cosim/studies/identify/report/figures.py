@@ -34,18 +34,26 @@ def overlays(found: "Identification") -> Picture:
                 continue
             measured, time = trial.fine.signals[name], trial.fine.time * 1e3
             axis.plot(time, measured * scale, color=MEASURED, lw=1.3, label="measured")
-            axis.plot(time, simulated[name] * scale, color=SIMULATED, lw=0.9, label="identified rig")
+            axis.plot(
+                time, simulated[name] * scale, color=SIMULATED, lw=0.9, label="identified rig"
+            )
             body = "Part" if name.endswith("part") else "Surface"
-            said = f"error {row['part_error_mm']:.3f} mm" if body == "Part" else (
-                f"NRMSE {row[f'nrmse_{name}']:.2f}"
+            said = (
+                f"error {row['part_error_mm']:.3f} mm"
+                if body == "Part"
+                else (f"NRMSE {row[f'nrmse_{name}']:.2f}")
             )
             apart = " (not fitted)" if trial in found.apart else ""
-            axis.set_title(f"Trial {trial.label}{apart}: {body.lower()}, {said}", loc="left", fontsize=9)
+            axis.set_title(
+                f"Trial {trial.label}{apart}: {body.lower()}, {said}", loc="left", fontsize=9
+            )
             axis.set_ylabel(unit)
             axis.grid(alpha=0.25)
     for axis in axes[-1]:
         axis.set_xlabel("time [ms]")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2, frameon=False)
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2, frameon=False
+    )
     return figure
 
 
@@ -75,7 +83,10 @@ def errors(found: "Identification") -> Picture:
             axis.bar(at + (k + 0.5) * width - 0.4, values, width, color=color, label=label)
         beside = {"nrmse_v_surface": "floor_late", "part_error_mm": "straight_line_error_mm"}
         beside["v_average_mm_per_s"] = "v_average_measured_mm_per_s"
-        words = {"floor_late": "the measured cycles among themselves", "straight_line_error_mm": "straight line"}
+        words = {
+            "floor_late": "the measured cycles among themselves",
+            "straight_line_error_mm": "straight line",
+        }
         if name in beside:
             values = [row.get(beside[name]) or np.nan for row in rows]
             label = words.get(beside[name], "measured")
@@ -98,8 +109,13 @@ def profiles(found: "Identification") -> Picture:
     top = 1.6 * found.best.total
     for k, (axis, name) in enumerate(zip(axes.flat, names, strict=False)):
         values, costs = zip(*found.profiles[name], strict=True)
-        axis.plot(values, np.minimum(costs, top), color=SIMULATED, marker="o", ms=3, label="profile")
-        for solutions, color, label in ((found.ensemble, OTHER, "ensemble"), (found.fold_rigs, FLOOR, "folds")):
+        axis.plot(
+            values, np.minimum(costs, top), color=SIMULATED, marker="o", ms=3, label="profile"
+        )
+        for solutions, color, label in (
+            (found.ensemble, OTHER, "ensemble"),
+            (found.fold_rigs, FLOOR, "folds"),
+        ):
             there = [float(found.space.values(one.place)[k]) for one in solutions]
             totals = [min(one.total, top) for one in solutions]
             axis.plot(there, totals, color=color, ls="", marker="x", ms=5, label=label)
@@ -113,7 +129,9 @@ def profiles(found: "Identification") -> Picture:
         axis.set_visible(False)
     for axis in axes[:, 0]:
         axis.set_ylabel("cost")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=3, frameon=False)
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=3, frameon=False
+    )
     return figure
 
 
@@ -128,14 +146,18 @@ def spectrum(found: "Identification") -> Picture:
         axis.set_title(f"Trial {name}", loc="left", fontsize=9.5)
     for axis in [*axes.flat][len(names) :]:
         axis.set_visible(False)
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2, frameon=False)
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2, frameon=False
+    )
     figure.supylabel("share of the measured velocity's power", fontsize=10)
     return figure
 
 
 def _bands(axis: Axes, rows: list[dict[str, float]]) -> None:
     at = np.arange(len(rows))
-    axis.bar(at - 0.2, [row["measured"] for row in rows], 0.4, color=MEASURED, label="measured velocity")
+    axis.bar(
+        at - 0.2, [row["measured"] for row in rows], 0.4, color=MEASURED, label="measured velocity"
+    )
     axis.bar(at + 0.2, [row["residual"] for row in rows], 0.4, color=SIMULATED, label="residual")
     axis.set_xticks(at, [f"{row['from_hz']:.0f}–{row['to_hz']:.0f} Hz" for row in rows], fontsize=7)
     axis.set_yscale("log")

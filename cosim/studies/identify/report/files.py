@@ -60,14 +60,18 @@ def write(folder: Path, found: "Identification") -> None:
 def summary(found: "Identification") -> str:
     """The rig with its verdicts, and the errors trial by trial."""
     numbers = found.numbers
-    lines = [f"{verdict.key:<32}{verdict.value:>10.4g}  {verdict.words}" for verdict in found.verdicts]
+    lines = [
+        f"{verdict.key:<32}{verdict.value:>10.4g}  {verdict.words}" for verdict in found.verdicts
+    ]
     lines += ["", "trial   velocity   height   floor   part [mm]   v_average [mm/s]   measured"]
     for row in numbers["trials"]:
         lines.append(_line(row))
     lines += [f"{_line(row)}   (not fitted)" for row in numbers["apart"]]
-    lines += [f"mean    {_brief(numbers['overall'], 'nrmse_v_surface')}"
-              f"      {_brief(numbers['overall'], 'nrmse_z_surface')}   worst velocity "
-              f"{_brief(numbers['overall'], 'nrmse_v_surface_worst')}, cost {numbers['cost']:.4f}"]
+    lines += [
+        f"mean    {_brief(numbers['overall'], 'nrmse_v_surface')}"
+        f"      {_brief(numbers['overall'], 'nrmse_z_surface')}   worst velocity "
+        f"{_brief(numbers['overall'], 'nrmse_v_surface_worst')}, cost {numbers['cost']:.4f}"
+    ]
     held = numbers["held_out_overall"]
     if held:
         lines.append(
@@ -99,12 +103,15 @@ def _aligned(rows: list[Row]) -> list[Row]:
 def _tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
     tables = {
         "The rig": [
-            {"key": v["key"], "value": v["value"], "verdict": v["words"]} for v in numbers["verdicts"]
+            {"key": v["key"], "value": v["value"], "verdict": v["words"]}
+            for v in numbers["verdicts"]
         ],
         "The trials": [_told(row, floors=True) for row in numbers["trials"]],
     }
     if numbers["apart"]:
-        tables["Trials that were not fitted"] = [_told(row, floors=True) for row in numbers["apart"]]
+        tables["Trials that were not fitted"] = [
+            _told(row, floors=True) for row in numbers["apart"]
+        ]
     for kind, words in (("surface", "surface alone"), ("surface_and_part", "surface and part")):
         rows = [one[kind] for one in numbers["held_out"]]
         if rows:

@@ -26,7 +26,9 @@ Row = dict[str, Any]
 
 def shown(trial: Measured, rig: Array, own: Array) -> dict[str, Array]:
     """The simulated signals of a trial as its instruments show them, heights with the measured mean."""
-    out = {name: values[0] for name, values in simulate(trial.fine, rig[None], own[None])[0].items()}
+    out = {
+        name: values[0] for name, values in simulate(trial.fine, rig[None], own[None])[0].items()
+    }
     found = {}
     for name, measured in trial.fine.signals.items():
         if name in trial.fine.differenced:
@@ -70,7 +72,10 @@ def repeatability(trial: Measured) -> Row:
     if not np.isfinite(period):
         return {"floor": None, "floor_late": None}
     late = time >= period if (time[-1] - time[0]) / period >= LATE else np.full(len(time), True)
-    return {"floor": _spread(time, v, period, late | True), "floor_late": _spread(time, v, period, late)}
+    return {
+        "floor": _spread(time, v, period, late | True),
+        "floor_late": _spread(time, v, period, late),
+    }
 
 
 def _spread(time: Array, v: Array, period: float, rows: Array) -> float | None:

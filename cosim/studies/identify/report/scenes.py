@@ -19,7 +19,9 @@ def rig_settings(space: Space, place: Array) -> Settings:
     return {key: _rounded(value) for key, value in space.settings(place).items()}
 
 
-def trial_settings(space: Space, place: Array, trial: Measured, own: Array) -> tuple[Settings, float]:
+def trial_settings(
+    space: Space, place: Array, trial: Measured, own: Array
+) -> tuple[Settings, float]:
     """A trial by the keys of a scene, and when in its run (s) the record's first row is.
 
     The run begins at rest, with the record or with the drive, whichever is earlier.
@@ -33,7 +35,9 @@ def trial_settings(space: Space, place: Array, trial: Measured, own: Array) -> t
     }
     if trial.target.current is None:
         begun = numbers["phase"] + numbers["frequency"] * numbers["start"]
-        found |= {f"drive.{name}": numbers[name] for name in DRIVE if name in ("amplitude", "offset")}
+        found |= {
+            f"drive.{name}": numbers[name] for name in DRIVE if name in ("amplitude", "offset")
+        }
         found |= {"drive.frequency": numbers["frequency"], "drive.start_phase": float(begun % 1.0)}
         found |= {"drive.start_time": max(0.0, numbers["start"])}
     lasts = float(trial.recording.time[-1])

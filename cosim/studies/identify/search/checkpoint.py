@@ -38,7 +38,9 @@ class Journal:
             raise BadInput(f"{path}: is no journal of an identification; delete it.") from error
         return done if same and isinstance(done, dict) else {}
 
-    def stage(self, name: str, work: Callable[[np.random.Generator], Sequence[Found]]) -> list[Found]:
+    def stage(
+        self, name: str, work: Callable[[np.random.Generator], Sequence[Found]]
+    ) -> list[Found]:
         """The solutions of a stage: those of the file, or of ``work``, which are added to it."""
         if name not in self._done:
             found = work(np.random.default_rng([self._seed, crc32(name.encode())]))

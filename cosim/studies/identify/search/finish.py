@@ -33,7 +33,9 @@ def finish(search: Search, found: Found, steps: int) -> Found:
         place, own = apart(x)
         rig = search.space.rigs(place[None])
         with ThreadPoolExecutor(search.workers) as pool:
-            rows = pool.map(lambda k: simulate(targets[k], rig, own[k][None])[1][0], range(len(own)))
+            rows = pool.map(
+                lambda k: simulate(targets[k], rig, own[k][None])[1][0], range(len(own))
+            )
             return np.concatenate([*rows])
 
     def slopes(x: Array) -> Array:
@@ -48,10 +50,15 @@ def finish(search: Search, found: Found, steps: int) -> Found:
             whole[starts[k] : starts[k + 1], columns] = part[d:]
         return whole.T
 
-    x = [found.place] + [own[one] / scale for own, one, scale in zip(found.own, free, scales, strict=True)]
+    x = [found.place] + [
+        own[one] / scale for own, one, scale in zip(found.own, free, scales, strict=True)
+    ]
     low, high = (
         np.concatenate(
-            [np.full(d, end), *(getattr(t, name)[f] / s for t, f, s in zip(targets, free, scales, strict=True))]
+            [
+                np.full(d, end),
+                *(getattr(t, name)[f] / s for t, f, s in zip(targets, free, scales, strict=True)),
+            ]
         )
         for name, end in (("low", 0.0), ("high", 1.0))
     )

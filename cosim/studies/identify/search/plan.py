@@ -38,7 +38,7 @@ FULL = Effort(
 )  # fmt: skip
 QUICK = Effort(1, 25, ((3, 30, 0.12), (1, 60, 0.06)), ((1, 30, 0.1),), 1, 8)
 
-SCREENED, KEPT, SCREEN_ROUNDS = 96, 6, 3
+SCREENED, KEPT, SCREEN_ROUNDS = 128, 8, 4
 """Own numbers that are drawn for a new rig, those that are refined, and the rounds for them."""
 CAREFUL = 512, 24, 5
 """The same where a trial's own numbers must be the best there are."""
@@ -59,7 +59,9 @@ class Plan:
         found = []
         for k in range(len(self.coarse.targets)):
             for n in range(self.effort.singles):
-                found += self.journal.stage(f"single {k + 1}-{n + 1}", lambda rng, k=k: [self._single(k, rng)])
+                found += self.journal.stage(
+                    f"single {k + 1}-{n + 1}", lambda rng, k=k: [self._single(k, rng)]
+                )
         return found
 
     def _single(self, k: int, rng: np.random.Generator) -> Found:
@@ -89,7 +91,9 @@ class Plan:
             for k, start in enumerate(several, 1):
                 title = f"{name}: round {number}, {k} of {len(several)}"
 
-                def further(rng: np.random.Generator, start: Found = start, title: str = title) -> list[Found]:
+                def further(
+                    rng: np.random.Generator, start: Found = start, title: str = title
+                ) -> list[Found]:
                     told = self._telling(title)
                     return [search.nested(start, rng, generations, sigma, told)]
 

@@ -14,7 +14,7 @@ import numpy as np
 from cmaes import CMA
 
 from cosim.arrays import Array
-from cosim.studies.identify.chain.chain import LANES, OWN, Target, costs, refine, simulate
+from cosim.studies.identify.chain.chain import OWN, Target, look_around, refine, simulate
 from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import draws
 
@@ -25,6 +25,8 @@ SOFT = 0.03
 POPULATION = 16
 REFRESH, RESCREEN = 4, 30
 """Generations after which sensitivities are found anew, and own numbers drawn anew."""
+STARTS = 15
+"""Moments of the drive's start that are tried."""
 BETTER = 0.97
 """Of a trial's cost, which other own numbers must reach to take the place of the present ones."""
 NARROW = 1e-3
@@ -44,6 +46,16 @@ class Found:
 
 Progress = Callable[[str, float], None]
 """What is being done, and the best cost so far."""
+
+
+def _started(targets: Sequence[Target], own: Array) -> Array:
+    """Own numbers (n × m × OWN), each as it is and with the drive switched on at other times."""
+    k = OWN.index("start")
+    found = np.repeat(own[:, :, None], 1 + STARTS, axis=2)
+    for rows, target in zip(found, targets, strict=True):
+        if target.scale[k] > 0.0:
+            rows[:, 1:, k] = target.low[k] + (np.arange(STARTS) + 0.5) / STARTS * target.scale[k]
+    return found.reshape(len(own), -1, len(OWN))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,34 +80,50 @@ class Search:
         self, places: Array, rng: np.random.Generator, count: int, kept: int, rounds: int
     ) -> list[Found]:
         """For each rig the best of ``count`` random own numbers, ``kept`` of which are refined."""
-        rigs = self.space.rigs(places)
-        each = [target for _ in places for target in self.targets]
-        wide = np.repeat(rigs, len(self.targets), axis=0)
+        trials = len(self.targets)
+        rigs = np.repeat(self.space.rigs(places), trials, axis=0)
+        each = [*self.targets] * len(places)
         drawn = np.stack([draws(target, count, rng) for target in each])
-        order = np.argsort(costs(each, wide, drawn, self.workers), axis=1)[:, :kept]
-        chosen = np.take_along_axis(drawn, order[:, :, None], axis=1).reshape(-1, len(OWN))
-        several = [target for target in each for _ in range(kept)]
-        own, cost = refine(several, np.repeat(wide, kept, axis=0), chosen, rounds, self.workers)
-        cost = cost.reshape(len(each), kept)
-        rows, best = np.arange(len(each)), cost.argmin(axis=1)
-        own = own.reshape(len(each), kept, len(OWN))[rows, best]
-        shape = (len(places), len(self.targets))
-        return [
-            self.made(*one)
-            for one in zip(
-                *(places, own.reshape(*shape, len(OWN)), cost[rows, best].reshape(shape)), strict=True
-            )
-        ]
+        own, cost = self._best(*look_around(each, rigs, drawn, self.workers), kept)
+        own, cost = self._refined_each(each, rigs, own, 1)
+        # The cost is rugged over the moment of the start: all of them are tried.
+        own, cost = self._best(*look_around(each, rigs, _started(each, own), self.workers), kept)
+        own, cost = self._refined_each(each, rigs, own, rounds)
+        own, cost = self._best(own, cost, 1)
+        shape = (len(places), trials)
+        solutions = zip(places, own.reshape(*shape, len(OWN)), cost.reshape(shape), strict=True)
+        return [self.made(*one) for one in solutions]
+
+    @staticmethod
+    def _best(own: Array, cost: Array, kept: int) -> tuple[Array, Array]:
+        """The best of several own numbers (n × m × OWN) with costs (n × m)."""
+        order = np.argsort(cost, axis=1)[:, :kept]
+        return np.take_along_axis(own, order[:, :, None], axis=1), np.take_along_axis(cost, order, 1)
+
+    def _refined_each(
+        self, targets: Sequence[Target], rigs: Array, own: Array, rounds: int
+    ) -> tuple[Array, Array]:
+        """Several own numbers (n × m × OWN) of each target and rig, fitted, and their costs."""
+        n, m, _ = own.shape
+        each = [target for target in targets for _ in range(m)]
+        wide = np.repeat(rigs, m, axis=0)
+        found, cost = refine(each, wide, own.reshape(n * m, -1), rounds, self.workers)
+        return found.reshape(own.shape), cost.reshape(n, m)
 
     def rescreened(
-        self, found: Found, rng: np.random.Generator, count: int = 64, kept: int = 8, rounds: int = 3
+        self,
+        found: Found,
+        rng: np.random.Generator,
+        count: int = 64,
+        kept: int = 8,
+        rounds: int = 3,
     ) -> Found:
         """With other own numbers where random ones led to clearly less."""
         (other,) = self.screen(found.place[None], rng, count, kept, rounds)
         same = self.refined(found.place, found.own, rounds)
         take = other.costs < BETTER * same.costs
         own = np.where(take[:, None], other.own, same.own)
-        return self.made(found.place, own, np.where(take, other.costs, same.costs))
+        return self.made(found.place, own, np.where(take, other. same.costs))
 
     def slopes(self, place: Array, own: Array, k: int, turn: float = TURN) -> tuple[Array, Array]:
         """Residuals of trial ``k``, and their slopes by the rig's place and the fitted own numbers
@@ -153,11 +181,15 @@ class Search:
         low, high = (np.array([getattr(t, end) for t in self.targets]) for end in ("low", "high"))
         best = here = self.refined(start.place, start.own, 2)
         follow = self.sensitivity(here.place, here.own)
+        parents, theirs = here.place[None], here.own[None]
         for generation in range(1, generations + 1):
             asked = [search.ask() for _ in range(population)]
             places = np.repeat(start.place[None], population, axis=0)
             places[:, moving] = asked
-            moved = here.own + np.einsum("tkd,nd->ntk", follow, places - here.place)
+            spread = parents.std(axis=0) + 1e-6
+            apart = ((places[:, None] - parents) / spread) ** 2
+            nearest = apart.sum(axis=2).argmin(axis=1)
+            moved = theirs[nearest] + np.einsum("tkd,nd->ntk", follow, places - parents[nearest])
             own, found = refine(
                 [*self.targets] * population,
                 np.repeat(space.rigs(places), trials, axis=0),
@@ -168,9 +200,13 @@ class Search:
             totals = found.mean(axis=1) + space.prior(places)
             search.tell([*zip(asked, totals.tolist(), strict=True)])
             k = int(totals.argmin())
-            here = self.made(places[k], own.reshape(population, trials, -1)[k], found[k])
+            own = own.reshape(population, trials, -1)
+            here = self.made(places[k], own[k], found[k])
+            good = np.argsort(totals)[: population // 2]
+            parents, theirs = places[good], own[good]
             if generation % RESCREEN == 0:
                 here = self.rescreened(here, rng)
+                parents, theirs = here.place[None], here.own[None]
             best = min(best, here, key=lambda one: one.total)
             if generation % REFRESH == 0:
                 follow = self.sensitivity(here.place, here.own)
