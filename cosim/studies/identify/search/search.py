@@ -123,7 +123,7 @@ class Search:
         same = self.refined(found.place, found.own, rounds)
         take = other.costs < BETTER * same.costs
         own = np.where(take[:, None], other.own, same.own)
-        return self.made(found.place, own, np.where(take, other. same.costs))
+        return self.made(found.place, own, np.where(take, other.costs, same.costs))
 
     def slopes(self, place: Array, own: Array, k: int, turn: float = TURN) -> tuple[Array, Array]:
         """Residuals of trial ``k``, and their slopes by the rig's place and the fitted own numbers
