@@ -1,5 +1,5 @@
-"""The identification of a rig: its steps against the bench's exact rung, its search against rigs that
-are known, since the bench made their records."""
+"""The identification of a rig: its steps against the bench's exact rung, its search against a rig
+that is known, since the bench made its records."""
 
 import csv
 import json
@@ -17,7 +17,7 @@ from cosim.studies.identify.chain import chain
 from cosim.studies.identify.problem.space import read_space
 from cosim.studies.identify.problem.targets import FINE_STEP, SEARCH_STEP, read_trials
 from cosim.studies.identify.report.measures import nrmse
-from cosim.studies.identify.report.scenes import scene, trial_settings
+from cosim.studies.identify.report.scenes import Settings, scene, trial_settings
 from cosim.studies.identify.run import identify
 from cosim.studies.identify.search.checkpoint import Journal
 from cosim.studies.identify.search.finish import finish
@@ -78,7 +78,9 @@ def _trial(time: Array) -> Any:
 
     motion = np.sin(2 * np.pi * 20.0 * time) * 1e-3
     signals = {"z_surface": motion, "v_surface": np.gradient(motion, time)}
-    return measured(Recording("any", time, signals, time * np.nan, ()), Path("any.csv"), read_space())
+    return measured(
+        Recording("any", time, signals, time * np.nan, ()), Path("any.csv"), read_space()
+    )
 
 
 def write(folder: Path, label: str, columns: dict[str, Array]) -> None:
@@ -141,7 +143,9 @@ def test_each_lane_has_its_own_machine() -> None:
     zeros = np.zeros(len(chain.OWN))
     target = chain.Target(time, {}, {}, frozenset(), zeros, zeros, zeros, SEARCH_STEP)
     rigs = space.rigs(rng.random((11, len(space.free))))
-    own = np.array([OWN[label] for label in ["1", "4", "5", "4", "1", "5", "5", "4", "1", "4", "5"]])
+    own = np.array(
+        [OWN[label] for label in ["1", "4", "5", "4", "1", "5", "5", "4", "1", "4", "5"]]
+    )
     own[:, 3] = 0.0  # the steps before the record are counted from the earliest start in a batch
     together = chain.simulate(target, rigs, own)[0]["z_part"]
     alone = [chain.simulate(target, rigs[[k]], own[[k]])[0]["z_part"][0] for k in range(11)]
@@ -151,7 +155,8 @@ def test_each_lane_has_its_own_machine() -> None:
 @pytest.mark.physics
 def test_a_measured_current_replaces_the_drive(tmp_path: Path) -> None:
     """The current of a run, told to the chain, moves it as the run did."""
-    settings = read_space().settings(place()) | {"drive.frequency": 20.0, "run.duration": 0.2}
+    settings: Settings = {**read_space().settings(place()), "drive.frequency": 20.0}
+    settings["run.duration"] = 0.2
     waves = cosim.run(scene(settings | {"run.output_step": 2.5e-4}, "limited")).waveforms
     columns = {name: waves[name].values for name in ("time", "current", "z_surface", "z_part")}
     write(tmp_path, "1", columns)
@@ -203,7 +208,9 @@ def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"identify.json", "identify.csv", "identify.md", "rig.toml", "trial-04.toml"} <= names
     loaded = cosim.load(tmp_path / "out" / "trial-04.toml")
-    assert loaded.mechanics.surface_mass == pytest.approx(whole.rig["mechanics.surface_mass"], rel=1e-5)
+    assert loaded.mechanics.surface_mass == pytest.approx(
+        whole.rig["mechanics.surface_mass"], rel=1e-5
+    )
 
 
 def test_a_journal_of_other_trials_is_not_taken(tmp_path: Path) -> None:
@@ -228,7 +235,10 @@ def test_verdicts() -> None:
         own[:, 0] *= space.values(best.place)[0] / space.values(moved)[0]  # the amplitude
         ensemble.append(Found(moved, own, best.costs, 0.105))
     middle = space.values(best.place)
-    profiles = {key: [(0.9 * x, 0.2), (x, 0.1), (1.1 * x, 0.2)] for key, x in zip(space.names, middle, strict=True)}
+    profiles = {
+        key: [(0.9 * x, 0.2), (x, 0.1), (1.1 * x, 0.2)]
+        for key, x in zip(space.names, middle, strict=True)
+    }
     flat = "mechanics.suspension_k1"
     k = space.names.index(flat)
     profiles[flat] = [(0.1 * middle[k], 0.101), (middle[k], 0.1), (9 * middle[k], 0.102)]
@@ -236,7 +246,9 @@ def test_verdicts() -> None:
     found = {one.key: one for one in judge(space, best, ensemble, [], profiles)}
     mass = found["mechanics.surface_mass"]
     assert mass.kind == "identified"
-    assert mass.value * 0.98 > mass.low > mass.value * 0.98**2  # where the line crosses 1.1 times 0.1
+    assert (
+        mass.value * 0.98 > mass.low > mass.value * 0.98**2
+    )  # where the line crosses 1.1 times 0.1
     assert found[flat].kind == "not"
     assert "amplitudes" in found["coil.force_factor"].words
     assert found["coil.force_factor"].kind == "product"

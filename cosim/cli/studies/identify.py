@@ -23,7 +23,7 @@ def _options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="TRIAL",
-        help="a trial that is reported but not fitted; repeatable (always: those that do not repeat)",
+        help="a trial that is reported, not fitted; repeatable (always: those that do not repeat)",
     )
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="of the search (default: 0)"

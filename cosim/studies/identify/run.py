@@ -24,7 +24,7 @@ from cosim.studies.identify.verdicts import Profile, Verdict, ensemble_of, judge
 from cosim.studies.sweep.pool import workers_asked
 
 UNSTEADY = 0.5
-"""Repeatability of a velocity (NRMSE of its cycles) beyond which a steady drive cannot be told of it."""
+"""Repeatability of a velocity (NRMSE of its cycles) beyond which no steady drive explains it."""
 
 PROFILE_STEPS = (0.02, 0.06, 0.15)
 """Distances from the best value of a key at which it is held, of its bounds' range."""
@@ -75,8 +75,8 @@ class Identification:
         return figures.overlays(self)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write ``identify.json``, ``.csv``, ``.md``, the figures ``identify-*.png``, the rig's scene
-        ``rig.toml`` and one for each trial."""
+        """Write ``identify.json``, ``.csv``, ``.md``, the figures ``identify-*.png``, the rig's
+        scene ``rig.toml`` and one for each trial."""
         from cosim.studies.identify.report import files
 
         files.write(Path(folder), self)
@@ -204,7 +204,8 @@ def _profiles(plan: Plan, best: Found) -> dict[str, Profile]:
 
 def _made_up(plan: Plan) -> Found:
     """The rig of the scene keys' defaults, as far as the bounds reach it."""
-    space, defaults = plan.fine.space, {key.full: key.default for key in keys()}
+    space: Space = plan.fine.space
+    defaults: dict[str, Any] = {key.full: key.default for key in keys()}
     values = [np.clip(defaults[entry.key], entry.low, entry.high) for entry in space.free]
     return plan.drives("made-up rig", space.place(np.array(values)), plan.fine)
 

@@ -1,8 +1,8 @@
 """What the trials say of each key of a rig: a value and how far to trust it, or that they do not.
 
-A local covariance would be far too small: the cost has many minima, and a search ends in any of them.
-So a key is judged by the values of all solutions that are nearly as good (the ensemble), of the folds,
-and by its profile: the best cost with that key held elsewhere.
+A local covariance would be far too small: the cost has many minima, and a search ends in any of
+them. So a key is judged by the values of all solutions that are nearly as good (the ensemble), of
+the folds, and by its profile: the best cost with that key held elsewhere.
 """
 
 from collections.abc import Mapping, Sequence
@@ -133,7 +133,7 @@ def _verdict(
 
 
 def _end(profile: Profile, value: float, cost: float, side: int) -> float | None:
-    """Where the profile leaves what is as good, from the best value to one side; None: it does not."""
+    """Where the profile leaves what is as good, to one side of the best value; None: it does not."""
     points = sorted(profile, key=lambda point: side * point[0])
     beyond = [(value, cost), *(point for point in points if side * (point[0] - value) > 0.0)]
     limit = AS_GOOD * cost
@@ -149,7 +149,7 @@ def _half_range(values: Array) -> float:
 
 
 def _tie(key: str, partners: Mapping[str, Array]) -> str:
-    """The product or ratio in which the ensemble agrees although the key alone scatters; or nothing."""
+    """The product or ratio in which the ensemble agrees although the key scatters; or nothing."""
     if key not in partners or len(partners[key]) < FEWEST:
         return ""
     alone = partners[key]

@@ -1,5 +1,5 @@
-"""The compiled chain: what the machine does with given numbers, how far that is from measured trials,
-and the fit of each trial's own numbers. See ``stepper.h`` and ``refine.h``.
+"""The compiled chain: what the machine does with given numbers, how far that is from measured
+trials, and the fit of each trial's own numbers. See ``stepper.h`` and ``refine.h``.
 """
 
 import ctypes
@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim.arrays import Array
 from cosim.errors import SimulationFailed
@@ -92,7 +93,7 @@ class Target:
     step: float
     current: Array | None = None
     _state: _Trial = field(init=False)
-    _kept: list[Array] = field(init=False)
+    _kept: list[npt.NDArray[Any]] = field(init=False)
 
     def __post_init__(self) -> None:
         gaps = np.diff(self.time)

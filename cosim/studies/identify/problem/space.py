@@ -1,7 +1,7 @@
 """What is searched within which bounds: a file in the form of ``bounds.toml``, read and checked.
 
-The search knows a rig by its place, a number from 0 to 1 for each free key; the chain knows it by the
-numbers of ``chain.RIG``, a scene by its keys.
+The search knows a rig by its place, a number from 0 to 1 for each free key; the chain knows it by
+the numbers of ``chain.RIG``, a scene by its keys.
 """
 
 import tomllib
@@ -40,8 +40,8 @@ OWN_KEYS = {
     "friction.normal_force": "normal_force",
     "drive.frequency": "frequency",
 }
-"""Keys of a trial. Here phase and time are those at the record's first row, the lift is a share of what
-the plate's friction can hold, and the frequency one of that at which the record repeats."""
+"""Keys of a trial. Here phase and time are those at the record's first row, the lift is a share of
+what the plate's friction can hold, and the frequency one of that at which the record repeats."""
 
 _PART_OF_ENTRY = {"value", "low", "high", "scale", "prior", "sigma", "source"}
 
@@ -184,14 +184,10 @@ def _entry(path: Path, table: str, key: str, entry: Any) -> Entry:
     for name, value in numbers.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise BadInput(f"{where}: {name} = {plain(str(value))} must be a number.")
-    if (
-        ("value" in entry) == ("low" in entry and "high" in entry)
-        or "value" in entry
-        and len(numbers) > 1
-    ):
+    given = "value" in entry
+    if len(numbers) > 1 if given else not {"low", "high"} <= set(entry):
         raise BadInput(f"{where}: it needs either a value, or low and high.")
-    low = float(entry.get("value", entry.get("low")))
-    high = float(entry.get("value", entry.get("high")))
+    low, high = (float(numbers["value" if given else end]) for end in ("low", "high"))
     if "value" not in entry and not low < high:
         raise BadInput(f"{where}: low = {low:g} must be below high = {high:g}.")
     log = entry.get("scale", "linear") == "log"

@@ -1,8 +1,9 @@
 """Measured trials as what a search is held against.
 
-A record is taken as it is, from its first row on: a start from rest, seen by a camera, whose zero of
-height is its own. Velocities are differences of heights on both sides, or what was measured directly.
-The cost of a trial is the weighted sum of its signals' squared NRMSE (rms error over standard deviation).
+A record is taken as it is, from its first row on: a start from rest, seen by a camera, whose zero
+of height is its own. Velocities are differences of heights on both sides, or what was measured
+directly. The cost of a trial is the weighted sum of its signals' squared NRMSE (rms error over
+standard deviation).
 """
 
 from collections.abc import Sequence

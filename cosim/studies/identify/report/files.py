@@ -26,9 +26,10 @@ COLUMNS = {
 NOTES = (
     "One rig for all trials; amplitude, offset, phase, start, frequency, height at rest and normal "
     "force are each trial's own. Errors of velocities and heights are NRMSE: rms error over the "
-    "standard deviation of what was measured; 'floor' is that of the measured cycles among themselves, "
-    "'late' without the first. The part's error is the mean distance of its heights, means removed; "
-    "'straight line' is that of the best straight line. v_average is the slope of that line.",
+    "standard deviation of what was measured; 'floor' is that of the measured cycles among "
+    "themselves, 'late' without the first. The part's error is the mean distance of its heights, "
+    "means removed; 'straight line' is that of the best straight line. v_average is the slope of "
+    "that line.",
     "The volts follow from the force factor, which is known only as the verdict says: they are not "
     "measured volts.",
 )

@@ -1,10 +1,11 @@
-"""What is told of a solution, trial by trial: its errors beside the measurement's own repeatability.
+"""What is told of a solution, trial by trial: its errors beside the measurement's repeatability.
 
-NRMSE is the rms error over the standard deviation of what was measured; heights without their means,
-since the camera's zero is its own. The mean velocity of the part is the slope of the straight line
-through its height.
+NRMSE is the rms error over the standard deviation of what was measured; heights without their
+means, since the camera's zero is its own. The mean velocity of the part is the slope of the straight
+line through its height.
 """
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ Row = dict[str, Any]
 
 
 def shown(trial: Measured, rig: Array, own: Array) -> dict[str, Array]:
-    """The simulated signals of a trial as its instruments show them, heights with the measured mean."""
+    """The simulated signals of a trial as its instruments show them, heights at the measured mean."""
     out = {
         name: values[0] for name, values in simulate(trial.fine, rig[None], own[None])[0].items()
     }
@@ -71,20 +72,18 @@ def repeatability(trial: Measured) -> Row:
     period = 1.0 / trial.frequency
     if not np.isfinite(period):
         return {"floor": None, "floor_late": None}
-    late = time >= period if (time[-1] - time[0]) / period >= LATE else np.full(len(time), True)
-    return {
-        "floor": _spread(time, v, period, late | True),
-        "floor_late": _spread(time, v, period, late),
-    }
+    begins = period if (time[-1] - time[0]) / period >= LATE else 0.0
+    return {"floor": _spread(time, v, period, 0.0), "floor_late": _spread(time, v, period, begins)}
 
 
-def _spread(time: Array, v: Array, period: float, rows: Array) -> float | None:
+def _spread(time: Array, v: Array, period: float, begins: float) -> float | None:
     """A forecast errs by the spread of two cycles: √2 that of one."""
-    ago = one_period_later(time[rows], v[rows], period)
-    known = np.isfinite(ago) & np.isfinite(v[rows])
+    late = time >= begins
+    ago = one_period_later(time[late], v[late], period)
+    known = np.isfinite(ago) & np.isfinite(v[late])
     if known.sum() < 2:
         return None
-    apart = (v[rows] - ago)[known]
+    apart = (v[late] - ago)[known]
     return float(np.sqrt(np.mean(apart**2) / 2.0) / np.nanstd(v))
 
 
@@ -110,7 +109,7 @@ def bands(trial: Measured, rig: Array, own: Array) -> list[Row]:
     powers = [np.abs(np.fft.rfft(values[known] * window)) ** 2 for values in (v, residual)]
     whole = powers[0].sum()
     rows = []
-    for low, high in zip(BANDS, BANDS[1:], strict=False):
+    for low, high in pairwise(BANDS):
         chosen = (f >= low) & (f < high)
         rows.append(
             {"trial": trial.label, "from_hz": low, "to_hz": high}

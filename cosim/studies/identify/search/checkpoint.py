@@ -1,7 +1,7 @@
 """What of an identification is done, in a file: an interrupted one goes on there.
 
-A stage draws random numbers of its own, made of the seed and its name, so that it comes out the same
-whether or not those before it were read from the file.
+A stage draws random numbers of its own, made of the seed and its name, so that it comes out the
+same whether or not those before it were read from the file.
 """
 
 import hashlib
@@ -56,5 +56,5 @@ def _plain(found: Found) -> dict[str, Any]:
 
 
 def _found(plain: Mapping[str, Any]) -> Found:
-    arrays = (np.array(plain[name], dtype=np.float64) for name in ("place", "own", "costs"))
-    return Found(*arrays, plain["total"])
+    place, own, costs = (np.array(plain[name], np.float64) for name in ("place", "own", "costs"))
+    return Found(place, own, costs, plain["total"])

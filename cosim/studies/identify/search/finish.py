@@ -1,6 +1,7 @@
 """The last of a search: least squares over the rig and all trials' own numbers together."""
 
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -14,7 +15,7 @@ ENDS_AT = 1e-5
 
 
 def finish(search: Search, found: Found, steps: int) -> Found:
-    """The solution after at most ``steps`` steps; the priors are kept to, since the rig hardly moves.
+    """The solution after at most ``steps`` steps, if it is better; priors, too, are in that.
 
     The unknowns are the place and the fitted own numbers in units of their scales.
     """
@@ -63,8 +64,9 @@ def finish(search: Search, found: Found, steps: int) -> Found:
         for name, end in (("low", 0.0), ("high", 1.0))
     )
     inside = np.clip(np.concatenate(x), low + 1e-9, high - 1e-9)
+    jacobian: Any = slopes  # a callable, which scipy's annotations do not know
     fitted = least_squares(
-        residuals, inside, slopes, (low, high), ftol=ENDS_AT, xtol=1e-8, max_nfev=steps
+        residuals, inside, jacobian, (low, high), ftol=ENDS_AT, xtol=1e-8, max_nfev=steps
     )
     place, own = apart(fitted.x)
     return min(found, search.refined(place, own, 2), key=lambda one: one.total)

@@ -1,7 +1,8 @@
-"""The stages of an identification, from fits of single trials to the rig, its folds and its profiles.
+"""The stages of an identification, from fits of single trials to the rig, its folds and profiles.
 
-Starts are rigs that fit one trial each. They are tried on all trials, and the better ones of them are
-searched further, fewer and fewer for longer and longer; all that end near the best are its ensemble.
+Starts are rigs that fit one trial each. They are tried on all trials, and the better ones of them
+are searched further, fewer and fewer for longer and longer; all that end near the best are its
+ensemble.
 """
 
 from collections.abc import Sequence
@@ -19,8 +20,8 @@ FOLDS = 3
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is searched. ``rounds`` are those of the rig for all trials, ``fold_rounds`` those of
-    a fold: how many solutions, for how many generations, with which first step of CMA-ES."""
+    """How much is searched. ``rounds`` are those of the rig for all trials, ``fold_rounds`` those
+    of a fold: how many solutions, for how many generations, with which first step of CMA-ES."""
 
     singles: int
     """Fits of each single trial."""
@@ -74,8 +75,8 @@ class Plan:
     def ensemble(
         self, name: str, rows: Sequence[int], rounds: Sequence[tuple[int, int, float]]
     ) -> list[Found]:
-        """Solutions for the trials ``rows``, from the rigs of these trials alone on, the best first;
-        each has ended its search, most of them early."""
+        """Solutions for the trials ``rows``, from the rigs of these trials alone on, the best
+        first; each has ended its search, most of them early."""
         search, each = self.coarse.part(rows), self.effort.singles
         places = [one.place for i, one in enumerate(self.singles()) if i // each in rows]
         several = self.journal.stage(
@@ -90,16 +91,17 @@ class Plan:
             new = []
             for k, start in enumerate(several, 1):
                 title = f"{name}: round {number}, {k} of {len(several)}"
-
-                def further(
-                    rng: np.random.Generator, start: Found = start, title: str = title
-                ) -> list[Found]:
-                    told = self._telling(title)
-                    return [search.nested(start, rng, generations, sigma, told)]
-
-                new += self.journal.stage(title, further)
+                new += self._further(title, search, start, generations, sigma)
             several = new
         return sorted([*several, *ended], key=lambda one: one.total)
+
+    def _further(
+        self, title: str, search: Search, start: Found, generations: int, sigma: float
+    ) -> list[Found]:
+        told = self._telling(title)
+        return self.journal.stage(
+            title, lambda rng: [search.nested(start, rng, generations, sigma, told)]
+        )
 
     def finished(self, name: str, rows: Sequence[int], found: Found) -> Found:
         """The solution at the finish's step, and by least squares."""

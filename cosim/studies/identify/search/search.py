@@ -1,9 +1,10 @@
 """The search for one rig that explains several trials.
 
-CMA-ES goes over the rig. Each of its candidates gets the trials' own numbers that the best candidate
-so far had, moved along as the rig differs (`sensitivity`), and one round of Gauss–Newton on each
-trial: so the search over the rig sees a cost from which the own numbers are nearly eliminated. Since
-a trial's cost has many minima over its own numbers, they are drawn anew from time to time (`screen`).
+CMA-ES goes over the rig. Each of its candidates gets the trials' own numbers that the nearest good
+candidate of the last generation had, moved along as the rig differs (`sensitivity`), and one round
+of Gauss–Newton on each trial: so the search over the rig sees a cost from which the own numbers are
+nearly eliminated. Since a trial's cost has many minima over its own numbers, they are drawn anew
+from time to time (`screen`).
 """
 
 from collections.abc import Callable, Sequence
@@ -98,7 +99,9 @@ class Search:
     def _best(own: Array, cost: Array, kept: int) -> tuple[Array, Array]:
         """The best of several own numbers (n × m × OWN) with costs (n × m)."""
         order = np.argsort(cost, axis=1)[:, :kept]
-        return np.take_along_axis(own, order[:, :, None], axis=1), np.take_along_axis(cost, order, 1)
+        return np.take_along_axis(own, order[:, :, None], axis=1), np.take_along_axis(
+            cost, order, 1
+        )
 
     def _refined_each(
         self, targets: Sequence[Target], rigs: Array, own: Array, rounds: int
