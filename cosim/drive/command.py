@@ -50,7 +50,9 @@ class Switched(Command):
         self.v_offset, self.period = command.v_offset, command.period
 
     def piece(self, t: float) -> Piece:
-        return self._command.piece(t) if t >= self._start else level(self._start, 0.0, self.v_offset)
+        if t < self._start:
+            return level(self._start, 0.0, self.v_offset)
+        return self._command.piece(t)
 
 
 def period(scene: Scene) -> float:

@@ -18,11 +18,11 @@ from cosim.studies.identify.problem.space import read_space
 from cosim.studies.identify.problem.targets import FINE_STEP, SEARCH_STEP, read_trials
 from cosim.studies.identify.report.measures import nrmse
 from cosim.studies.identify.report.scenes import Settings, scene, trial_settings
+from cosim.studies.identify.report.verdicts import judge
 from cosim.studies.identify.run import identify
 from cosim.studies.identify.search.checkpoint import Journal
 from cosim.studies.identify.search.finish import finish
 from cosim.studies.identify.search.search import Found, Search
-from cosim.studies.identify.verdicts import judge
 from cosim.trials.camera import FRAME_RATE, hermite
 from cosim.trials.recording import Recording
 

@@ -2,13 +2,12 @@
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.files.picture import Picture
 from cosim.scene import keys
@@ -17,10 +16,11 @@ from cosim.studies.identify.problem.targets import Measured, read_trials
 from cosim.studies.identify.report.exact import exact
 from cosim.studies.identify.report.measures import Row, bands, errors, own_numbers, repeatability
 from cosim.studies.identify.report.scenes import trial_settings
+from cosim.studies.identify.report.solved import HeldOut, Solved
+from cosim.studies.identify.report.verdicts import Profile, ensemble_of, judge
 from cosim.studies.identify.search.checkpoint import Journal
 from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds
 from cosim.studies.identify.search.search import Found, Progress, Search
-from cosim.studies.identify.verdicts import Profile, Verdict, ensemble_of, judge
 from cosim.studies.sweep.pool import workers_asked
 
 UNSTEADY = 0.5
@@ -32,41 +32,8 @@ PROFILE_STEPS = (0.02, 0.06, 0.15)
 JOURNAL = "identify-journal.json"
 
 
-@dataclass(frozen=True, eq=False)
-class HeldOut:
-    """A trial on a rig that was found without it: its own numbers fitted to its surface alone, and
-    to surface and part."""
-
-    trial: Measured
-    fold: int
-    place: Array
-    surface: Array
-    both: Array
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Identification:
-    """What was found. ``numbers`` is what ``identify.json`` holds."""
-
-    space: Space
-    trials: list[Measured]
-    apart: list[Measured]
-    """Trials that were not fitted."""
-    best: Found
-    apart_own: Array
-    ensemble: list[Found]
-    fold_rigs: list[Found]
-    held_out: list[HeldOut]
-    verdicts: list[Verdict]
-    profiles: dict[str, Profile]
-    made_up: Found
-    """The rig of the scene keys' defaults, with its best drives."""
-    numbers: dict[str, Any]
-
-    @property
-    def rig(self) -> dict[str, float]:
-        """The identified rig by the keys of a scene, SI."""
-        return self.space.settings(self.best.place)
+class Identification(Solved):
+    """A finished identification."""
 
     def plot(self) -> Picture:
         """Every trial: surface and part, measured and simulated."""

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,14 +9,12 @@ from matplotlib.axes import Axes
 from cosim.files.picture import Picture
 from cosim.scene import keys
 from cosim.studies.identify.report.measures import shown
-
-if TYPE_CHECKING:
-    from cosim.studies.identify.run import Identification
+from cosim.studies.identify.report.solved import Solved
 
 MEASURED, SIMULATED, OTHER, FLOOR = "0.15", "#d1495b", "#1f6fb2", "#2a9d8f"
 
 
-def overlays(found: "Identification") -> Picture:
+def overlays(found: Solved) -> Picture:
     """A row for each trial: velocity and height of the surface, height of the part."""
     trials = [*found.trials, *found.apart]
     owns = [*found.best.own, *found.apart_own]
@@ -57,7 +54,7 @@ def overlays(found: "Identification") -> Picture:
     return figure
 
 
-def errors(found: "Identification") -> Picture:
+def errors(found: Solved) -> Picture:
     """Errors of each trial beside the floor of its own repeatability and beside other rigs."""
     numbers = found.numbers
     rows = numbers["trials"]
@@ -99,7 +96,7 @@ def errors(found: "Identification") -> Picture:
     return figure
 
 
-def profiles(found: "Identification") -> Picture:
+def profiles(found: Solved) -> Picture:
     """The best cost with each key held at a value, and the values of ensemble and folds."""
     names = found.space.names
     units = {key.full: key.unit for key in keys()}
@@ -135,7 +132,7 @@ def profiles(found: "Identification") -> Picture:
     return figure
 
 
-def spectrum(found: "Identification") -> Picture:
+def spectrum(found: Solved) -> Picture:
     """Where in frequency the measured velocity and the residual have their power."""
     names = [trial.label for trial in found.trials]
     figure = Picture(13.0, 1.0 + 2.4 * math.ceil(len(names) / 3), "constrained")
@@ -165,7 +162,7 @@ def _bands(axis: Axes, rows: list[dict[str, float]]) -> None:
     axis.grid(axis="y", alpha=0.25)
 
 
-FIGURES: dict[str, Callable[["Identification"], Picture]] = {
+FIGURES: dict[str, Callable[[Solved], Picture]] = {
     "trials": overlays,
     "errors": errors,
     "profiles": profiles,

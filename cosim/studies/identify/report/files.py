@@ -1,16 +1,14 @@
 """The files of an identification, and its words."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from cosim.files.atomic import write_json, write_text
 from cosim.studies.identify.report import figures
 from cosim.studies.identify.report.measures import Row
 from cosim.studies.identify.report.scenes import rig_settings, toml, trial_settings
+from cosim.studies.identify.report.solved import Solved
 from cosim.studies.tables import write_csv, write_page
-
-if TYPE_CHECKING:
-    from cosim.studies.identify.run import Identification
 
 COLUMNS = {
     "nrmse_v_surface": "velocity",
@@ -22,6 +20,9 @@ COLUMNS = {
     "v_average_measured_mm_per_s": "measured [mm/s]",
 }
 """Of the tables, by the names in ``identify.json``."""
+
+WORST = "nrmse_v_surface_worst"
+WIDTH = 17
 
 NOTES = (
     "One rig for all trials; amplitude, offset, phase, start, frequency, height at rest and normal "
@@ -35,7 +36,7 @@ NOTES = (
 )
 
 
-def write(folder: Path, found: "Identification") -> None:
+def write(folder: Path, found: Solved) -> None:
     """Everything that :meth:`Identification.save` names."""
     numbers = found.numbers
     write_json(folder / "identify.json", numbers)
@@ -58,36 +59,27 @@ def write(folder: Path, found: "Identification") -> None:
             write_text(folder / f"trial-{label}.toml", toml(told, rig | settings))
 
 
-def summary(found: "Identification") -> str:
+def summary(found: Solved) -> str:
     """The rig with its verdicts, and the errors trial by trial."""
     numbers = found.numbers
-    lines = [
-        f"{verdict.key:<32}{verdict.value:>10.4g}  {verdict.words}" for verdict in found.verdicts
-    ]
-    lines += ["", "trial   velocity   height   floor   part [mm]   v_average [mm/s]   measured"]
-    for row in numbers["trials"]:
-        lines.append(_line(row))
+    lines = [f"{one.key:<32}{one.value:>10.4g}  {one.words}" for one in found.verdicts]
+    heads = ("trial", "velocity", "height", "floor", "part [mm]", "v_average [mm/s]", "measured")
+    lines += ["", "".join(f"{head:>{WIDTH}}" for head in heads)]
+    lines += [_line(row) for row in numbers["trials"]]
     lines += [f"{_line(row)}   (not fitted)" for row in numbers["apart"]]
-    lines += [
-        f"mean    {_brief(numbers['overall'], 'nrmse_v_surface')}"
-        f"      {_brief(numbers['overall'], 'nrmse_z_surface')}   worst velocity "
-        f"{_brief(numbers['overall'], 'nrmse_v_surface_worst')}, cost {numbers['cost']:.4f}"
-    ]
-    held = numbers["held_out_overall"]
-    if held:
-        lines.append(
-            f"held out, rig from the other folds: velocity {_brief(held['surface'], 'nrmse_v_surface')}, "
-            f"worst {_brief(held['surface'], 'nrmse_v_surface_worst')}"
-        )
-    return "\n".join(lines)  # fmt: skip
+    lines += [_line(numbers["overall"] | {"trial": "mean"})]
+    lines += [f"worst velocity {_brief(numbers['overall'], WORST)}, cost {numbers['cost']:.4f}"]
+    if held := numbers["held_out_overall"]:
+        mean, worst = (_brief(held["surface"], name) for name in ("nrmse_v_surface", WORST))
+        lines += [f"held out, with the rig of the other folds: velocity {mean}, worst {worst}"]
+    return "\n".join(lines)
 
 
 def _line(row: Row) -> str:
-    return (
-        f"{row['trial']:>5}   {_brief(row, 'nrmse_v_surface'):>8}   {_brief(row, 'nrmse_z_surface'):>6}"
-        f"   {_brief(row, 'floor_late'):>5}   {_brief(row, 'part_error_mm'):>9}"
-        f"   {_brief(row, 'v_average_mm_per_s'):>16}   {_brief(row, 'v_average_measured_mm_per_s'):>8}"
-    )
+    names = ("nrmse_v_surface", "nrmse_z_surface", "floor_late", "part_error_mm")
+    names += ("v_average_mm_per_s", "v_average_measured_mm_per_s")
+    cells = [row["trial"], *(_brief(row, name) for name in names)]
+    return "".join(f"{cell:>{WIDTH}}" for cell in cells)
 
 
 def _brief(row: Row, name: str) -> str:

@@ -1,8 +1,8 @@
 """What is told of a solution, trial by trial: its errors beside the measurement's repeatability.
 
 NRMSE is the rms error over the standard deviation of what was measured; heights without their
-means, since the camera's zero is its own. The mean velocity of the part is the slope of the straight
-line through its height.
+means, since the camera's zero is its own. The mean velocity of the part is the slope of the
+straight line through its height.
 """
 
 from itertools import pairwise
@@ -26,7 +26,7 @@ Row = dict[str, Any]
 
 
 def shown(trial: Measured, rig: Array, own: Array) -> dict[str, Array]:
-    """The simulated signals of a trial as its instruments show them, heights at the measured mean."""
+    """The simulated signals as the trial's instruments show them, heights at the measured mean."""
     out = {
         name: values[0] for name, values in simulate(trial.fine, rig[None], own[None])[0].items()
     }

@@ -133,7 +133,7 @@ def _verdict(
 
 
 def _end(profile: Profile, value: float, cost: float, side: int) -> float | None:
-    """Where the profile leaves what is as good, to one side of the best value; None: it does not."""
+    """Where the profile leaves what is as good, to one side of the best; None: it does not."""
     points = sorted(profile, key=lambda point: side * point[0])
     beyond = [(value, cost), *(point for point in points if side * (point[0] - value) > 0.0)]
     limit = AS_GOOD * cost
