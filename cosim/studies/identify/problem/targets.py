@@ -14,10 +14,10 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput
-from cosim.studies.compare.periods import period_of
 from cosim.studies.identify.chain.chain import OWN, Target
 from cosim.studies.identify.problem.space import Space, own_bounds
 from cosim.trials.camera import velocities
+from cosim.trials.periods import period_of
 from cosim.trials.recording import Recording, read_recording
 from cosim.trials.tracked import number_of, trial_files
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.studies.compare.periods import one_period_later
 from cosim.studies.identify.chain.chain import OWN, simulate
 from cosim.studies.identify.problem.targets import Measured
 from cosim.trials.camera import velocities
+from cosim.trials.periods import one_period_later
 
 LATE = 5
 """Whole cycles from which on the first ones, of the start, are left out of the repeatability."""
