@@ -99,7 +99,8 @@ def identify(
     )
     rows = [*range(len(steady))]
     found = plan.ensemble("all trials", rows, effort.rounds)
-    best, ensemble = plan.finished("all trials", rows, found[0]), ensemble_of(found)
+    ends = [plan.finished(f"all trials {k}", rows, one) for k, one in enumerate(found[:2], 1)]
+    best, ensemble = min(ends, key=lambda one: one.total), ensemble_of(found)
     fold_rigs, held_out = _folds(plan, steady) if len(steady) >= 3 else ([], [])
     profiles = _profiles(plan, found[0])
     verdicts = judge(space, found[0], ensemble, fold_rigs, profiles)

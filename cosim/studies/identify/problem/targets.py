@@ -24,7 +24,7 @@ from cosim.trials.tracked import number_of, trial_files
 WEIGHTS = {"v_surface": 0.5, "z_surface": 0.25, "v_part": 0.15, "z_part": 0.1}
 """Of the squared NRMSE; those of the signals that a trial has are scaled to a sum of 1."""
 
-SEARCH_STEP, FINE_STEP = 1.0 / 960 / 14, 1.0 / 960 / 40
+SEARCH_STEP, FINE_STEP = 1.0 / 960 / 14, 1.0 / 960 / 80
 """Longest steps (s) of the search, and of its finish and all that is reported."""
 
 DRIVE = ("amplitude", "offset", "phase", "start", "frequency")

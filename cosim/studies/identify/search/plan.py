@@ -34,13 +34,15 @@ class Effort:
 
 
 FULL = Effort(
-    4, 60, ((16, 90, 0.12), (8, 150, 0.08), (4, 250, 0.05), (2, 300, 0.04)),
+    4, 60, ((14, 90, 0.12), (7, 150, 0.08), (4, 250, 0.05), (2, 300, 0.03)),
     ((8, 90, 0.12), (4, 150, 0.08), (2, 250, 0.05)), 3, 30,
 )  # fmt: skip
 QUICK = Effort(1, 25, ((3, 30, 0.12), (1, 60, 0.06)), ((1, 30, 0.1),), 1, 8)
 
 SCREENED, KEPT, SCREEN_ROUNDS = 128, 8, 4
 """Own numbers that are drawn for a new rig, those that are refined, and the rounds for them."""
+AGAIN = 256, 16, 4
+"""The same before a solution is searched further."""
 CAREFUL = 512, 24, 5
 """The same where a trial's own numbers must be the best there are."""
 
@@ -100,7 +102,10 @@ class Plan:
     ) -> list[Found]:
         told = self._telling(title)
         return self.journal.stage(
-            title, lambda rng: [search.nested(start, rng, generations, sigma, told)]
+            title,
+            lambda rng: [
+                search.nested(search.rescreened(start, rng, *AGAIN), rng, generations, sigma, told)
+            ],
         )
 
     def finished(self, name: str, rows: Sequence[int], found: Found) -> Found:

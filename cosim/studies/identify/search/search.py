@@ -117,7 +117,7 @@ class Search:
         self,
         found: Found,
         rng: np.random.Generator,
-        count: int = 64,
+        count: int = 128,
         kept: int = 8,
         rounds: int = 3,
     ) -> Found:
@@ -149,7 +149,8 @@ class Search:
 
         def one(k: int) -> Array:
             _, slopes = self.slopes(place, own, k)
-            normal, d = slopes @ slopes.T, len(place)
+            d = len(place)
+            normal = np.einsum("ij,kj->ik", slopes, slopes)  # on any number of threads the same
             inner = normal[d:, d:] + SOFT * np.diag(np.diag(normal)[d:] + 1e-9)
             found = np.zeros((len(OWN), d))
             free = np.flatnonzero(self.targets[k].scale > 0.0)
