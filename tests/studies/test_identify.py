@@ -165,15 +165,16 @@ def test_a_measured_current_replaces_the_drive(tmp_path: Path) -> None:
     assert not trial.target.scale[[0, 1, 2, 3, 6]].any()
     own = np.array([0, 0, 0, 0, 0, 0.5, 1.0])
     found = chain.simulate(trial.fine, space.rigs(place()[None]), own[None])[0]
-    assert nrmse(found["z_surface"][0], columns["z_surface"]) < 0.03
+    assert nrmse(found["z_surface"][0], columns["z_surface"]) < 0.05
 
 
 @pytest.mark.physics
 def test_own_numbers_are_found_on_the_true_rig(search: Search) -> None:
-    found = search.screen(place()[None], np.random.default_rng(2), 128, 8, 6)[0]
-    assert found.total < 2e-3
+    found = search.screen(place()[None], np.random.default_rng(2), 512, 16, 6)[0]
+    assert found.costs.max() < 0.01
+    assert found.total < 5e-3
     truth = np.array([OWN[label] for label in OWN])
-    for name, tolerance in (("amplitude", 0.1), ("offset", 0.05), ("normal_force", 0.05)):
+    for name, tolerance in (("offset", 0.2), ("phase", 0.02), ("normal_force", 0.1)):
         k = chain.OWN.index(name)
         assert np.abs(found.own[:, k] - truth[:, k]).max() < tolerance
 
@@ -184,33 +185,35 @@ def test_a_rig_is_recovered_from_a_start_nearby(search: Search) -> None:
     rng = np.random.default_rng(3)
     beside = np.clip(place() + 0.03 * rng.choice([-1.0, 1.0], len(place())), 0.0, 1.0)
     start = search.screen(beside[None], rng, 96, 6, 4)[0]
-    found = search.nested(start, rng, 60, 0.03, quiet)
-    assert found.total < 0.35 * start.total
-    found = finish(search, found, 5)
-    assert found.total < 0.35 * start.total
+    found = search.nested(start, rng, 40, 0.03, quiet)
+    assert found.total < 0.5 * start.total
+    assert finish(search, found, 5).total <= found.total
 
 
-def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(tmp_path: Path) -> None:
     """On one thread and on two; with a journal that lacks the last stages."""
-    whole = identify(folder, quick=True, seed=4, workers=2, journal=tmp_path / "whole.json")
+    for label in ("4", "5"):
+        write(tmp_path, label, record(label, 100))
+    free = {"coil.force_factor", "mechanics.surface_mass"}
+    given = (f'[rig."{key}"]\nvalue = {value}\n' for key, value in RIG.items() if key not in free)
+    bounds = tmp_path / "bounds.toml"
+    bounds.write_text("".join(given))
+    more: dict[str, Any] = {"bounds": bounds, "quick": True, "seed": 4}
+    whole = identify(tmp_path, workers=2, journal=tmp_path / "whole.json", **more)
     content = json.loads((tmp_path / "whole.json").read_text())
     stages = list(content["done"])
     content["done"] = {name: content["done"][name] for name in stages[: len(stages) // 2]}
     (tmp_path / "half.json").write_text(json.dumps(content))
-    again = identify(folder, quick=True, seed=4, workers=1, journal=tmp_path / "half.json")
+    again = identify(tmp_path, workers=1, journal=tmp_path / "half.json", **more)
     assert again.numbers == whole.numbers
-    assert json.loads((tmp_path / "half.json").read_text()) == json.loads(
-        (tmp_path / "whole.json").read_text()
-    )
+    assert (tmp_path / "half.json").read_text() == (tmp_path / "whole.json").read_text()
+    assert whole.numbers["cost"] < 0.1
     whole.save(tmp_path / "out")
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"identify.json", "identify.csv", "identify.md", "rig.toml", "trial-04.toml"} <= names
     loaded = cosim.load(tmp_path / "out" / "trial-04.toml")
-    assert loaded.mechanics.surface_mass == pytest.approx(
-        whole.rig["mechanics.surface_mass"], rel=1e-5
-    )
+    mass = whole.rig["mechanics.surface_mass"]
+    assert loaded.mechanics.surface_mass == pytest.approx(mass, rel=1e-5)
 
 
 def test_a_journal_of_other_trials_is_not_taken(tmp_path: Path) -> None:
@@ -226,9 +229,8 @@ def test_verdicts() -> None:
     """A steep profile is trusted, a flat one is not, and a product is seen through the ensemble."""
     space = read_space()
     best = Found(np.full(len(space.free), 0.5), np.tile(OWN["1"], (2, 1)), np.full(2, 0.1), 0.1)
-    rng = np.random.default_rng(0)
     ensemble = [best]
-    for turn in rng.uniform(-0.2, 0.2, 6):
+    for turn in np.linspace(-0.35, 0.35, 6):
         moved = best.place.copy()
         moved[0] += turn  # the force factor
         own = best.own.copy()
@@ -246,9 +248,8 @@ def test_verdicts() -> None:
     found = {one.key: one for one in judge(space, best, ensemble, [], profiles)}
     mass = found["mechanics.surface_mass"]
     assert mass.kind == "identified"
-    assert (
-        mass.value * 0.98 > mass.low > mass.value * 0.98**2
-    )  # where the line crosses 1.1 times 0.1
+    # a tenth of the way to the neighbours, where the line crosses 1.1 times 0.1
+    assert (mass.low, mass.high) == pytest.approx((0.99 * mass.value, 1.01 * mass.value))
     assert found[flat].kind == "not"
     assert "amplitudes" in found["coil.force_factor"].words
     assert found["coil.force_factor"].kind == "product"

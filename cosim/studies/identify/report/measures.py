@@ -14,7 +14,6 @@ from cosim.arrays import Array
 from cosim.studies.identify.chain.chain import OWN, simulate
 from cosim.studies.identify.problem.targets import Measured
 from cosim.trials.camera import velocities
-from cosim.trials.periods import one_period_later
 
 LATE = 5
 """Whole cycles from which on the first ones, of the start, are left out of the repeatability."""
@@ -66,25 +65,25 @@ def own_numbers(own: Array) -> Row:
 
 
 def repeatability(trial: Measured) -> Row:
-    """How well the measured velocity forecasts itself, as NRMSE: the spread of its cycles, over all
-    of them and without the first."""
-    v, time = trial.fine.signals["v_surface"], trial.fine.time
-    period = 1.0 / trial.frequency
-    if not np.isfinite(period):
+    """How far the measured velocity's cycles are from their mean, as NRMSE: no periodic motion
+    comes closer. Over the whole cycles, and without the first, in which the machine starts."""
+    if not np.isfinite(trial.frequency):
         return {"floor": None, "floor_late": None}
-    begins = period if (time[-1] - time[0]) / period >= LATE else 0.0
-    return {"floor": _spread(time, v, period, 0.0), "floor_late": _spread(time, v, period, begins)}
+    v, time = trial.fine.signals["v_surface"], trial.fine.time
+    known = np.isfinite(v)
+    period = 1.0 / trial.frequency
+    count = int((time[known][-1] - time[known][0]) / period)
+    within = np.arange(0.0, period, float(np.median(np.diff(time))))
+    at = time[known][0] + np.add.outer(period * np.arange(count), within)
+    cycles = np.interp(at, time[known], v[known])
+    late = cycles[1:] if count >= LATE else cycles
+    return {name: _spread(some, v) for name, some in (("floor", cycles), ("floor_late", late))}
 
 
-def _spread(time: Array, v: Array, period: float, begins: float) -> float | None:
-    """A forecast errs by the spread of two cycles: √2 that of one."""
-    late = time >= begins
-    ago = one_period_later(time[late], v[late], period)
-    known = np.isfinite(ago) & np.isfinite(v[late])
-    if known.sum() < 2:
+def _spread(cycles: Array, v: Array) -> float | None:
+    if len(cycles) < 2:
         return None
-    apart = (v[late] - ago)[known]
-    return float(np.sqrt(np.mean(apart**2) / 2.0) / np.nanstd(v))
+    return float(np.sqrt(cycles.var(axis=0, ddof=1).mean()) / np.nanstd(v))
 
 
 def nrmse(simulated: Array, measured: Array) -> float:

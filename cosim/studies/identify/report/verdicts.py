@@ -24,8 +24,8 @@ TRUSTED = 0.35
 """Half of the range of possible values over their middle, up to which a key is identified."""
 TIED = 0.4
 """Spread of a product over that of the key alone, up to which only the product is identified."""
-FEWEST = 4
-"""Solutions, for a word on products."""
+SCATTER, FEWEST = 0.05, 4
+"""Spread of a key's logarithm and number of solutions, from which on products are looked at."""
 
 Profile = list[tuple[float, float]]
 """Values of a key, rising, and the best cost with each."""
@@ -153,6 +153,8 @@ def _tie(key: str, partners: Mapping[str, Array]) -> str:
     if key not in partners or len(partners[key]) < FEWEST:
         return ""
     alone = partners[key]
+    if np.std(alone) < SCATTER:
+        return ""
     found = [
         (float(np.std(alone + sign * other)), f"{word} {name}")
         for name, other in partners.items()
