@@ -191,9 +191,10 @@ def test_a_rig_is_recovered_from_a_start_nearby(search: Search) -> None:
 
 
 def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(tmp_path: Path) -> None:
-    """On one thread and on two; with a journal that lacks the last stages."""
-    for label in ("4", "5"):
-        write(tmp_path, label, record(label, 100))
+    """On one thread and on two; with a journal that lacks the last stages, and a trial whose part
+    was not measured."""
+    write(tmp_path, "4", record("4", 100))
+    write(tmp_path, "5", {k: z for k, z in record("5", 100).items() if k != "z_part"})
     free = {"coil.force_factor", "mechanics.surface_mass"}
     given = (f'[rig."{key}"]\nvalue = {value}\n' for key, value in RIG.items() if key not in free)
     bounds = tmp_path / "bounds.toml"
