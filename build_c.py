@@ -2,7 +2,7 @@
 
 `make(folder)` writes:
 
-    loop.so, part.so   libraries of the package, loaded by cosim.toolchain.libraries
+    loop.so and other  libraries of the package, loaded by cosim.toolchain.libraries
     fmi2/, fmi3/       the FMU of the mechanics for FMI 2.0 and 3.0, as its .fmu files hold it
     replay             the program in which `cosim bench` counts the FMU's instructions
     build.json         a hash of all that this was made of, the compiler and its flags, and the size
@@ -31,6 +31,7 @@ MODEL = "stickslip"
 LIBRARIES = {
     "loop": (ROOT / "cosim/coupling/loop", ROOT / "cosim/coupling/batch", ROOT / "cosim/drive"),
     "part": (ROOT / "cosim/mechanics",),
+    "chain": (ROOT / "cosim/studies/identify/chain",),
 }
 """The package's libraries; each is made of all C files of its folders."""
 REPLAY = ROOT / "cosim/studies/bench/replay.c"
@@ -41,6 +42,8 @@ FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-Wall", "-Wextra")
 # Older systems have threads in a library of their own.
 THREADS = () if sys.platform == "win32" else ("-pthread",)
 LIBRARY_FLAGS = ("-fPIC", "-fvisibility=hidden")
+# Lets roots and choices be vector code; the numbers stay the same.
+LANE_FLAGS = {"chain": ("-fno-math-errno", "-fno-trapping-math")}
 # A shared library has FMI's functions by their plain names; source code has them with a prefix.
 PLAIN_NAMES = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
@@ -75,7 +78,7 @@ def make(folder: Path) -> None:
         work, new = Path(name), Path(name) / "new"
         new.mkdir()
         for library, folders in LIBRARIES.items():
-            objects = _objects(_code(folders, "*.c"), work)
+            objects = _objects(_code(folders, "*.c"), work, *LANE_FLAGS.get(library, ()))
             link(objects, new / (library + SUFFIX), "-shared", *THREADS)
         if sys.platform != "win32":
             link([REPLAY], new / "replay", "-ldl")
@@ -173,7 +176,7 @@ def _sum(data: bytes) -> str:
 
 
 def _hash(files: list[Path]) -> str:
-    digest = hashlib.sha256(repr((FLAGS, LIBRARY_FLAGS)).encode())
+    digest = hashlib.sha256(repr((FLAGS, LIBRARY_FLAGS, LANE_FLAGS)).encode())
     for file in files:
         data = file.read_bytes()
         digest.update(f"{file.relative_to(ROOT).as_posix()} {len(data)}\n".encode() + data)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from cosim.simulation.run import run
     from cosim.studies.compare.run import compare
     from cosim.studies.fit.fit import fit
+    from cosim.studies.identify.run import identify
     from cosim.studies.paper.theory import theory
     from cosim.studies.spread import spread
     from cosim.studies.sweep import sweep
@@ -29,6 +30,7 @@ __all__ = [
     "__version__",
     "compare",
     "fit",
+    "identify",
     "load",
     "run",
     "spread",
@@ -46,6 +48,7 @@ _HOMES = {
     "tune": "cosim.studies.tune",
     "compare": "cosim.studies.compare.run",
     "fit": "cosim.studies.fit.fit",
+    "identify": "cosim.studies.identify.run",
     "theory": "cosim.studies.paper.theory",
 }
 """Loaded on first use: `import cosim` and light commands need none of them."""

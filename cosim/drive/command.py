@@ -8,7 +8,7 @@ where the highest command needs V_DAC = 0. In truth it is a PWM, of which ``v_of
 from math import inf, nextafter
 
 from cosim.drive.periodic import Constant, Sawtooth, Sine, Square
-from cosim.drive.pieces import Command, Piece
+from cosim.drive.pieces import Command, Piece, level
 from cosim.drive.staircase import Staircase, WithPwm
 from cosim.scene import Scene
 from cosim.scene.firmware import GAIN, nearest_code, offset_pin, passes, staircase, volts
@@ -40,6 +40,21 @@ class Lagging(Command):
         return min(own, nextafter(corner, -inf)) if t < edge else max(own, nextafter(corner, inf))
 
 
+class Switched(Command):
+    """Another command from ``start`` (s) on, where a share ``phase`` of its period has gone by; 0 V
+    before."""
+
+    def __init__(self, command: Command, start: float, phase: float) -> None:
+        self._command = Lagging(command, start - phase * command.period)
+        self._start = start
+        self.v_offset, self.period = command.v_offset, command.period
+
+    def piece(self, t: float) -> Piece:
+        if t < self._start:
+            return level(self._start, 0.0, self.v_offset)
+        return self._command.piece(t)
+
+
 def period(scene: Scene) -> float:
     """Period of what drives a scene, s; infinite where nothing does. That of the firmware's
     staircase differs from 1 / ``drive.frequency``, and a surface moved by a file has none: inf.
@@ -61,8 +76,10 @@ def command(scene: Scene) -> Command:
     """The command of a scene; 0 V for ever where nothing drives the coil."""
     if not scene.rung.driven:
         return Constant()
-    made = _shape(scene)
-    return WithPwm(made) if scene.drive.pwm_ripple else made
+    made, drive = _shape(scene), scene.drive
+    if drive.start_time or drive.start_phase:
+        made = Switched(made, drive.start_time, drive.start_phase)
+    return WithPwm(made) if drive.pwm_ripple else made
 
 
 def _shape(scene: Scene) -> Command:

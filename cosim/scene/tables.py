@@ -99,6 +99,12 @@ class Drive(Table):
     reset_time: float = _number(
         0.0, "s", 0.0, 100.0, "Length of the sawtooth's linear fall, at the end of the period"
     )
+    start_time: float = _number(
+        0.0, "s", 0.0, 1e5, "When the drive is switched on; the command is 0 V before"
+    )
+    start_phase: float = _number(
+        0.0, "1", 0.0, 1.0, "Share of the period that has gone by when the drive is switched on"
+    )
     phase_deg: float | None = _number(
         None, "deg", 0.0, 360.0, "Lag of the second of two surfaces, each with its own source"
     )
@@ -290,6 +296,7 @@ class Mechanics(Table):
     n_surfaces: int = _of_fmu("n_surfaces")
     gravity: float = _of_fmu("gravity")
     tolerance: float = _of_fmu("tolerance")
+    initial_lift: float = _of_fmu("initial_lift")
 
 
 class Friction(Table):

@@ -39,9 +39,20 @@ class Trial:
 
 
 def read_folder(folder: Path, apart: Path | None = None) -> list[Trial]:
-    """All trials of a folder, in the order of their numbers.
+    """All trials of a folder but the file ``apart``, in the order of their numbers."""
+    return [read(path) for path in trial_files(folder, apart)]
 
-    Where files have “trial” in their names only these are read, else all ``.csv`` and ``.txt`` but
+
+def number_of(path: Path) -> int | None:
+    """The last whole number in a file's name."""
+    numbers = re.findall(r"\d+", path.stem)
+    return int(numbers[-1]) if numbers else None
+
+
+def trial_files(folder: Path, apart: Path | None = None) -> list[Path]:
+    """The trials' files in the order of their numbers; BadInput where there are none.
+
+    Where files have “trial” in their names only these count, else all ``.csv`` and ``.txt`` but
     the file ``apart``.
     """
     try:
@@ -54,7 +65,7 @@ def read_folder(folder: Path, apart: Path | None = None) -> list[Trial]:
     files = [path for path in files if "trial" in path.name.lower()] or files
     if not files:
         raise BadInput(f"{folder}: there are no trials (.csv or .txt) in this folder.")
-    return sorted(map(read, files), key=lambda t: (t.number is None, t.number or 0, t.name))
+    return sorted(files, key=lambda p: (number_of(p) is None, number_of(p) or 0, p.stem))
 
 
 def read(path: Path) -> Trial:
@@ -66,10 +77,9 @@ def read(path: Path) -> Trial:
             raise BadInput(f"{path}: there is no column {letters} (found: {found}).")
     for name in ("z_surface", "z_part"):
         table.complete(name)
-    numbers = re.findall(r"\d+", path.stem)
     tracks = {body: track(table, body) for body in BODIES.values()}
     return Trial(
-        *(path.stem, int(numbers[-1]) if numbers else None, table.columns["time"]),
+        *(path.stem, number_of(path), table.columns["time"]),
         *(tracks["surface"], tracks["part"]),
         tracks["plate"] if "z_plate" in table.columns else None,
     )

@@ -495,3 +495,22 @@ def test_no_drift_after_many_periods(frequency: float) -> None:
         assert t == n / frequency
     late = float(Fraction(100_000) / Fraction(frequency) + Fraction(1, 4) / Fraction(frequency))
     assert drive.value(late) == pytest.approx(-3.2, abs=1e-6)
+
+
+@given(start=st.floats(0.0, 0.2), phase=st.floats(0.0, 1.0), t=st.floats(0.0, 0.4))
+@example(start=0.1, phase=0.0, t=0.1)
+@example(start=0.0, phase=0.25, t=0.0)
+def test_a_drive_that_is_switched_on(start: float, phase: float, t: float) -> None:
+    """0 V before; from then on the sawtooth, with a share of its period gone by."""
+    drive = made(f"drive.start_time={start!r}", f"drive.start_phase={phase!r}")
+    if t < start:
+        assert drive.value(t) == 0.0
+        assert t < drive.next_jump(t) <= start
+        return
+    cycles = (t - start) * 20.0 + phase
+    if abs(cycles - round(cycles)) > 1e-9:
+        assert drive.value(t) == pytest.approx(-1.2 + 8.0 * (cycles % 1.0 - 0.5), abs=1e-9)
+    following = (floor(cycles) + 1.0 - phase) / 20.0 + start
+    if abs(cycles - round(cycles)) > 1e-9:
+        assert drive.next_jump(t) == pytest.approx(following, abs=1e-12)
+    assert v_dac(drive, t) == pytest.approx(drive.v_offset - drive.value(t) / GAIN, abs=1e-9)

@@ -721,3 +721,28 @@ AT_THE_LIMIT = {
 @given(rig=RIGS, amperes=AMPERES, pieces=PIECES)
 def test_energy_account(rig, amperes, pieces):
     check_energy(rig, amperes, pieces)
+
+
+def test_a_lifted_surface_swings_about_its_equilibrium() -> None:
+    """Let go, with the part sticking to it, and a ram that is ground."""
+    parameters = {"suspension_k1": 0.0, "suspension_k3": 0.0, "suspension_damping": 0.0}
+    parameters |= {"flexure_damping": 0.0, "travel": 0.1, "ram_fixed": 1, "tolerance": 1e-13}
+    lift, body = 2e-4, 0.0145 + 0.009
+    with Bench(initial_lift=lift, normal_force=5.0, **parameters) as bench:
+        rest = -body * 9.81 / 560.0
+        assert bench["z_surface"] == pytest.approx(rest + lift, rel=1e-14)
+        for time in (0.01, 0.037):
+            bench.run_to(time)
+            swung = lift * np.cos(np.sqrt(560.0 / body) * time)
+            assert bench["z_surface"] - rest == pytest.approx(swung, abs=1e-12)
+            assert bench["z_part"] == pytest.approx(bench["z_surface"], abs=1e-14)
+
+
+@pytest.mark.parametrize(("share", "stays"), [(0.99, True), (-0.99, True), (1.01, False)])
+def test_the_springed_plate_holds_a_lifted_surface(share: float, stays: bool) -> None:
+    """As long as the flexure pulls with no more than the plate's friction."""
+    held = 0.18 * 1.0 / 560.0
+    with Bench(initial_lift=share * held, mu_plate=0.18, normal_force=1.0) as bench:
+        before = bench["z_surface"]
+        bench.run_to(0.05)
+        assert (bench["z_surface"] == pytest.approx(before, abs=1e-9)) == stays

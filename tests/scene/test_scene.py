@@ -26,6 +26,8 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "amplitude": 8.0,
         "offset": -1.2,
         "reset_time": 0,
+        "start_time": 0.0,
+        "start_phase": 0.0,
         "phase_deg": None,
         "acceleration_max": 98.1,
         "optimum": "up",
@@ -84,6 +86,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "n_surfaces": 1,
         "gravity": 9.81,
         "tolerance": 1e-9,
+        "initial_lift": 0.0,
     },
     "friction": {
         "law": "coulomb",

@@ -10,9 +10,9 @@ import pytest
 
 import cosim
 from cosim.cli.main import main
-from cosim.studies.compare.periods import drift, one_period_later, period_of
 from cosim.studies.compare.scores import explained
 from cosim.trials.camera import FRAME_RATE, film, frame_times, hermite, velocities
+from cosim.trials.periods import drift, one_period_later, period_of
 
 Array = npt.NDArray[np.float64]
 MM = 1e3

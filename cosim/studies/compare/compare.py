@@ -13,7 +13,6 @@ from scipy.optimize import minimize_scalar
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
-from cosim.studies.compare.periods import period_of
 from cosim.studies.compare.scores import (
     Number,
     Score,
@@ -24,6 +23,7 @@ from cosim.studies.compare.scores import (
     scores,
 )
 from cosim.trials.camera import heights, velocities
+from cosim.trials.periods import period_of
 from cosim.trials.recording import Recording
 from cosim.waveforms.columns import COLUMNS
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.studies.compare.periods import drift, one_period_later, whole_periods
 from cosim.trials.camera import FRAME_RATE
+from cosim.trials.periods import drift, one_period_later, whole_periods
 from cosim.trials.recording import Recording
 
 STICKS = 0.01

@@ -160,7 +160,9 @@ int stickslip_model_initialise(Model *m, char *message)
     } else {
         if (!m->n.ram_fixed)
             hang_ram(m);
-        m->y[Z] = stickslip_rest_height(m);
+        else
+            m->y[Q] = -m->r.initial_lift; /* the ram stands on the ground */
+        m->y[Z] = stickslip_rest_height(m) + m->r.initial_lift;
     }
     m->mode[1] = m->mode[0];
     memcpy(m->y + N_STATES, m->y, N_STATES * sizeof *m->y);

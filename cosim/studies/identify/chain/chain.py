@@ -1,0 +1,218 @@
+"""The compiled chain: what the machine does with given numbers, how far that is from measured
+trials, and the fit of each trial's own numbers. See ``stepper.h`` and ``refine.h``.
+"""
+
+import ctypes
+import threading
+from collections.abc import Mapping, Sequence
+from ctypes import POINTER, Structure, addressof, byref, c_double, c_int64, c_longlong, c_void_p
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.arrays import Array
+from cosim.errors import SimulationFailed
+from cosim.toolchain.libraries import library
+
+LANES = 8
+
+RIG = (
+    *("force_factor", "surface_mass", "flexure_stiffness", "flexure_damping"),
+    *("suspension_k1", "suspension_k2", "suspension_k3", "suspension_damping"),
+    *("travel_up", "travel_down", "wall_up", "wall_down", "wall_damping"),
+    *("mu_plate", "mu_k", "mu_s", "ram_mass", "part_mass"),
+    *("plate_mass", "plate_stiffness", "plate_damping"),
+    *("resistance", "inductance", "sense_resistance"),
+    *("output_high", "output_low", "current_limit", "gravity"),
+)
+"""Numbers that all trials of a rig share, SI; ``stepper.h`` has them in this order."""
+
+OWN = ("amplitude", "offset", "phase", "start", "lift", "normal_force", "frequency")
+"""Numbers of one trial: V, V, share of a period at time 0, s, share of what the plate's friction
+holds, N, Hz."""
+
+OUTPUTS = ("z_surface", "v_surface", "z_part", "v_part", "z_plate")
+"""What is simulated, m and m/s."""
+
+
+class _Schedule(Structure):
+    _fields_ = (
+        ("steps", c_int64),
+        *((name, c_void_p) for name in ("edges", "sample", "current")),
+    )
+
+
+class _Trial(Structure):
+    _fields_ = (
+        *(("schedule", _Schedule), ("samples", c_int64)),
+        *(("measured", c_void_p * len(OUTPUTS)), ("weight", c_double * len(OUTPUTS))),
+        *(("differenced", c_int64 * len(OUTPUTS)), ("rate", c_void_p)),
+        *((name, c_double * len(OWN)) for name in ("low", "high", "scale")),
+    )
+
+
+class _Job(Structure):
+    _fields_ = (
+        *((name, c_void_p) for name in ("trial", "rig", "own", "cost")),
+        ("rounds", c_int64),
+    )
+
+
+@cache
+def compiled() -> Any:
+    """The functions of ``refine.c``."""
+    found = library("chain")
+    found.chain_work.restype = found.chain_look.restype = found.chain_sizes.restype = c_int64
+    found.chain_work.argtypes = (c_void_p, c_int64, POINTER(c_longlong))
+    found.chain_look.argtypes = (c_void_p, c_void_p, c_void_p, c_void_p)
+    found.chain_sizes.argtypes = (c_int64,)
+    return found
+
+
+@dataclass(eq=False)
+class Target:
+    """What was measured in one trial, as the compiled code takes it.
+
+    ``signals`` hold the measured values by the names of ``OUTPUTS`` at ``time`` (s, from 0 on), NaN
+    where nothing is known, and ``weights`` what a squared residual counts, 1/m² or 1/(m/s)²;
+    ``differenced`` names the velocities that are made of heights. ``low``, ``high`` and ``scale``
+    are of ``OWN``; a number whose scale is 0 is not fitted. ``step`` (s) is the longest of the
+    simulation; ``current`` (A, at the times) replaces the drive.
+    """
+
+    time: Array
+    signals: Mapping[str, Array]
+    weights: Mapping[str, float]
+    differenced: frozenset[str]
+    low: Array
+    high: Array
+    scale: Array
+    step: float
+    current: Array | None = None
+    _state: _Trial = field(init=False)
+    _kept: list[npt.NDArray[Any]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        gaps = np.diff(self.time)
+        parts = np.maximum(1, np.ceil(gaps / self.step - 1e-9).astype(np.int64))
+        at = np.concatenate([[0], np.cumsum(parts)])
+        edges = np.interp(np.arange(at[-1] + 1), at, self.time)
+        sample = np.full(len(edges), -1, dtype=np.int32)
+        sample[at] = np.arange(len(self.time))
+        rate = np.full(len(self.time), np.nan)
+        rate[1:-1] = 1.0 / (self.time[2:] - self.time[:-2])
+        self._kept = [edges, sample, rate]
+        state = _Trial(samples=len(self.time), rate=rate.ctypes.data)
+        state.schedule.steps = len(edges) - 1
+        state.schedule.edges, state.schedule.sample = edges.ctypes.data, sample.ctypes.data
+        if self.current is not None:
+            current = np.interp(edges, self.time, self.current)
+            self._kept.append(current)
+            state.schedule.current = current.ctypes.data
+        for k, name in enumerate(OUTPUTS):
+            if name not in self.signals:
+                continue
+            values = np.ascontiguousarray(self.signals[name], dtype=np.float64)
+            if name in self.differenced:
+                values = np.where(np.isnan(rate), np.nan, values)
+            self._kept.append(values)
+            state.measured[k] = values.ctypes.data
+            state.weight[k] = self.weights.get(name, 0.0)
+            state.differenced[k] = int(name in self.differenced)
+        for name in ("low", "high", "scale"):
+            setattr(state, name, (c_double * len(OWN))(*getattr(self, name)))
+        self._state = state
+
+    @property
+    def place(self) -> int:
+        """The address of the compiled code's structure."""
+        return addressof(self._state)
+
+
+def refine(
+    targets: Sequence[Target], rigs: Array, own: Array, rounds: int, workers: int
+) -> tuple[Array, Array]:
+    """Fit own numbers, by ``rounds`` of Gauss–Newton from ``own`` on.
+
+    ``targets`` (n), ``rigs`` (n × RIG) and ``own`` (n × OWN) belong to each other row by row.
+    Returns the numbers found (n × OWN) and their costs (n).
+    """
+    rigs, own = np.ascontiguousarray(rigs), np.array(own, dtype=np.float64, order="C")
+    cost = np.empty(len(targets))
+    _work(targets, rigs, own, cost, rounds, workers)
+    return own, cost
+
+
+def look_around(
+    targets: Sequence[Target], rigs: Array, own: Array, workers: int
+) -> tuple[Array, Array]:
+    """Costs (n × m) of m sets of own numbers (n × m × OWN) for each target and rig (n × RIG).
+
+    The phases are first moved to where the surface moves as it was measured. Returns the own
+    numbers with these, and the costs.
+    """
+    n, m, _ = own.shape
+    blocks = -(-m // LANES)
+    padded = np.concatenate([own, np.repeat(own[:, :1], blocks * LANES - m, axis=1)], axis=1)
+    padded = np.ascontiguousarray(padded).reshape(n * blocks, LANES, len(OWN))
+    found = np.empty((n * blocks, LANES))
+    wide = np.ascontiguousarray(np.repeat(rigs, blocks, axis=0))
+    _work([t for t in targets for _ in range(blocks)], wide, padded, found, 0, workers)
+    return padded.reshape(n, -1, len(OWN))[:, :m], found.reshape(n, -1)[:, :m]
+
+
+def _work(
+    targets: Sequence[Target], rigs: Array, own: Array, cost: Array, rounds: int, workers: int
+) -> None:
+    n = len(targets)
+    jobs = (_Job * n)()
+    for i, target in enumerate(targets):
+        jobs[i].trial, jobs[i].rounds = target.place, rounds
+        jobs[i].rig, jobs[i].own = rigs[i].ctypes.data, own[i].ctypes.data
+        jobs[i].cost = cost.ctypes.data + i * cost.strides[0]
+    done, functions = c_longlong(0), compiled()
+    failed: list[int] = []
+
+    def work() -> None:
+        failed.append(functions.chain_work(byref(jobs), n, byref(done)))
+
+    threads = [threading.Thread(target=work) for _ in range(min(workers, n) - 1)]
+    for thread in threads:
+        thread.start()
+    work()
+    for thread in threads:
+        thread.join()
+    if any(failed):
+        raise SimulationFailed("There is no memory for the simulation of the trials.")
+
+
+def simulate(target: Target, rigs: Array, own: Array) -> tuple[dict[str, Array], Array]:
+    """What each of n machines (n × RIG, n × OWN) does in a trial.
+
+    Returns the ``OUTPUTS`` (n × samples, m and m/s; velocities are those at the samples) and the
+    residuals (n × values), whose squares add up to the cost.
+    """
+    n, samples = len(rigs), len(target.time)
+    found = np.empty((n, len(OUTPUTS), samples))
+    signals = [name for name in OUTPUTS if name in target.signals and target.weights.get(name)]
+    residuals = np.empty((n, len(signals) * samples))
+    out, apart = (np.empty((samples * len(OUTPUTS), LANES)) for _ in range(2))
+    for start in range(0, n, LANES):
+        rows = np.minimum(np.arange(start, start + LANES), n - 1)
+        both = np.ascontiguousarray(np.concatenate([rigs[rows], own[rows]], axis=1).T)
+        pointers = (both.ctypes.data, out.ctypes.data, apart.ctypes.data)
+        count = compiled().chain_look(target.place, *pointers)
+        used = slice(start, min(start + LANES, n))
+        k = used.stop - used.start
+        found[used] = out.reshape(samples, len(OUTPUTS), LANES).transpose(2, 1, 0)[:k]
+        residuals[used] = apart[:count].T[:k]
+    return {name: found[:, k] for k, name in enumerate(OUTPUTS)}, residuals
+
+
+def sizes() -> tuple[tuple[int, int], tuple[int, int]]:
+    """Bytes of the two structures, here and in the compiled code."""
+    there = compiled().chain_sizes
+    return (ctypes.sizeof(_Trial), there(0)), (ctypes.sizeof(_Job), there(1))

@@ -1,0 +1,6 @@
+/* Two lanes at once, which every processor of 64 bits can. */
+
+#define WIDTH 2
+#define INLINE static inline __attribute__((always_inline))
+#define RUN void chain_lanes_2
+#include "lanes.h"

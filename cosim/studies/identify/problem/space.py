@@ -1,0 +1,226 @@
+"""What is searched within which bounds: a file in the form of ``bounds.toml``, read and checked.
+
+The search knows a rig by its place, a number from 0 to 1 for each free key; the chain knows it by
+the numbers of ``chain.RIG``, a scene by its keys.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.errors import BadInput, plain
+from cosim.scene import keys
+from cosim.studies.identify.chain.chain import OWN, RIG
+
+SHIPPED = Path(__file__).parent / "bounds.toml"
+
+WEAK = 1e-3
+"""Of a prior: what a deviation by its sigma adds to the cost."""
+
+_ALIASES = {
+    "mechanics.travel": ("travel_up", "travel_down"),
+    "mechanics.contact_stiffness": ("wall_up", "wall_down"),
+    "mechanics.contact_damping": ("wall_damping",),
+}
+_SUPPLY = ("circuit.supply", "circuit.swing_loss_high", "circuit.swing_loss_low")
+"""Keys that together make ``output_high`` and ``output_low``; given, not searched."""
+
+OWN_KEYS = {
+    "drive.amplitude": "amplitude",
+    "drive.offset": "offset",
+    "drive.start_phase": "phase",
+    "drive.start_time": "start",
+    "mechanics.initial_lift": "lift",
+    "friction.normal_force": "normal_force",
+    "drive.frequency": "frequency",
+}
+"""Keys of a trial. Here phase and time are those at the record's first row, the lift is a share of
+what the plate's friction can hold, and the frequency one of that at which the record repeats."""
+
+_PART_OF_ENTRY = {"value", "low", "high", "scale", "prior", "sigma", "source"}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One key of the file; ``low`` and ``high`` are the same for a given value."""
+
+    key: str
+    low: float
+    high: float
+    log: bool
+    prior: float | None
+    sigma: float | None
+
+    @property
+    def free(self) -> bool:
+        return self.low < self.high
+
+
+def _names(key: str) -> tuple[str, ...]:
+    """The chain's numbers that a key of the rig is."""
+    return _ALIASES.get(key, (key.partition(".")[2],))
+
+
+class Space:
+    """The free keys of a rig, and what is given of it."""
+
+    def __init__(self, rig: Mapping[str, Entry], trial: Mapping[str, Entry], path: Path) -> None:
+        self.path = path
+        self.rig_entries, self.trial_entries = dict(rig), dict(trial)
+        self.free = [entry for entry in rig.values() if entry.free]
+        self.log = np.array([entry.log for entry in self.free], dtype=bool)
+        ends = [[entry.low, entry.high] for entry in self.free]
+        self._ends = _coordinates(np.array(ends).T, self.log)
+        supply = {key: rig[key].low for key in _SUPPLY}
+        given = {name: entry.low for key, entry in rig.items() for name in _names(key)}
+        given["output_high"] = supply["circuit.supply"] - supply["circuit.swing_loss_high"]
+        given["output_low"] = supply["circuit.swing_loss_low"] - supply["circuit.supply"]
+        self._given = np.array([given.get(name, 0.0) for name in RIG])
+        self._places = [[RIG.index(name) for name in _names(entry.key)] for entry in self.free]
+        self._mu = RIG.index("mu_k"), RIG.index("mu_s")
+
+    @property
+    def names(self) -> list[str]:
+        """The free keys."""
+        return [entry.key for entry in self.free]
+
+    def values(self, places: Array) -> Array:
+        """Values of the free keys, SI, at places (… × free)."""
+        low, high = self._ends
+        found = low + np.clip(places, 0.0, 1.0) * (high - low)
+        return np.where(self.log, np.exp(np.where(self.log, found, 0.0)), found)
+
+    def place(self, values: Array) -> Array:
+        """The place of values of the free keys."""
+        low, high = self._ends
+        return np.clip((_coordinates(np.asarray(values), self.log) - low) / (high - low), 0.0, 1.0)
+
+    def rigs(self, places: Array) -> Array:
+        """The chain's numbers (n × RIG) of rigs at places (n × free); µ_k is at most µ_s."""
+        values = self.values(places)
+        found = np.repeat(self._given[None], len(values), axis=0)
+        for column, spots in zip(values.T, self._places, strict=True):
+            found[:, spots] = column[:, None]
+        kinetic, static = self._mu
+        found[:, kinetic] = np.minimum(found[:, kinetic], found[:, static])
+        return found
+
+    def prior(self, places: Array) -> Array:
+        """What the priors add to the costs of rigs at places (n × free)."""
+        values, total = _coordinates(self.values(places), self.log), np.zeros(len(places))
+        for column, entry in zip(values.T, self.free, strict=True):
+            if entry.prior is not None and entry.sigma:
+                middle = np.log(entry.prior) if entry.log else entry.prior
+                total += WEAK * ((column - middle) / entry.sigma) ** 2
+        return total
+
+    def settings(self, place: Array) -> dict[str, float]:
+        """All keys of the rig at a place, as overrides of a scene."""
+        found = {key: entry.low for key, entry in self.rig_entries.items()}
+        found |= dict(zip(self.names, self.values(place).tolist(), strict=True))
+        found["friction.mu_k"] = min(found["friction.mu_k"], found["friction.mu_s"])
+        return found
+
+
+def _coordinates(values: Array, log: Array) -> Array:
+    return np.where(log, np.log(np.where(log, values, 1.0)), values)
+
+
+def read_space(own: Path | None = None) -> Space:
+    """The shipped bounds, and those of a file of one's own in their place. Raises BadInput."""
+    shipped = _tables(SHIPPED)
+    tables = {name: dict(table) for name, table in shipped.items()}
+    if own is not None:
+        for name, table in _tables(own).items():
+            for key, entry in table.items():
+                if key not in tables[name]:
+                    known = ", ".join(tables[name])
+                    raise BadInput(f'{own}: [{name}."{plain(key)}"]: this key is none of {known}.')
+                tables[name][key] = entry
+    path = own or SHIPPED
+    rig = {key: _entry(path, "rig", key, entry) for key, entry in tables["rig"].items()}
+    trial = {key: _entry(path, "trial", key, entry) for key, entry in tables["trial"].items()}
+    for key in _SUPPLY:
+        if rig[key].free:
+            raise BadInput(f'{path}: [rig."{key}"]: this key needs a value; it is not searched.')
+    if not any(entry.free for entry in rig.values()):
+        raise BadInput(
+            f"{path}: no key of the rig has a low and a high: there is nothing to search."
+        )
+    return Space(rig, trial, path)
+
+
+def _tables(path: Path) -> dict[str, dict[str, Any]]:
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be read ({error.strerror}).") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BadInput(f"{path}: is no valid TOML: {error}.") from error
+    for name, table in content.items():
+        if name not in ("rig", "trial") or not isinstance(table, dict):
+            raise BadInput(f"{path}: {plain(name)}: there are the tables rig and trial only.")
+    return content
+
+
+def _entry(path: Path, table: str, key: str, entry: Any) -> Entry:
+    where = f'{path}: [{table}."{key}"]'
+    if not isinstance(entry, dict) or set(entry) - _PART_OF_ENTRY:
+        wrong = (
+            ", ".join(map(plain, set(entry) - _PART_OF_ENTRY)) if isinstance(entry, dict) else ""
+        )
+        raise BadInput(
+            f"{where}: {wrong or 'this'} is none of {', '.join(sorted(_PART_OF_ENTRY))}."
+        )
+    numbers = {
+        name: entry[name] for name in ("value", "low", "high", "prior", "sigma") if name in entry
+    }
+    for name, value in numbers.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+            raise BadInput(f"{where}: {name} = {plain(str(value))} must be a number.")
+    given = "value" in entry
+    if len(numbers) > 1 if given else not {"low", "high"} <= set(entry):
+        raise BadInput(f"{where}: it needs either a value, or low and high.")
+    low, high = (float(numbers["value" if given else end]) for end in ("low", "high"))
+    if "value" not in entry and not low < high:
+        raise BadInput(f"{where}: low = {low:g} must be below high = {high:g}.")
+    log = entry.get("scale", "linear") == "log"
+    if entry.get("scale", "linear") not in ("log", "linear") or (log and low <= 0.0):
+        raise BadInput(f'{where}: scale must be "linear", or "log" with low above 0.')
+    if ("prior" in entry) != ("sigma" in entry) or not entry.get("sigma", 1.0) > 0.0:
+        raise BadInput(f"{where}: a prior needs a sigma above 0 beside it.")
+    if log and not entry.get("prior", 1.0) > 0.0:
+        raise BadInput(f'{where}: prior = {entry["prior"]:g} must be above 0 with scale "log".')
+    if table == "rig":
+        _within_scene(where, key, low, high)
+    return Entry(key, low, high, log, entry.get("prior"), entry.get("sigma"))
+
+
+def _within_scene(where: str, key: str, low: float, high: float) -> None:
+    known = next(one for one in keys() if one.full == key)
+    assert known.low is not None and known.high is not None
+    for name, value in (("low", low), ("high", high)):
+        if not known.low <= value <= known.high:
+            raise BadInput(f"{where}: {name} = {value:g} must be {known.allowed}.")
+
+
+def own_bounds(space: Space, frequency: float) -> tuple[Array, Array, Array]:
+    """Low and high end of a trial's own numbers, in ``OWN``'s order, and their scales for a fit.
+
+    The phase is not bounded: it is the same again after a period.
+    """
+    entries = {OWN_KEYS[key]: entry for key, entry in space.trial_entries.items()}
+    low = np.array([entries[name].low for name in OWN])
+    high = np.array([entries[name].high for name in OWN])
+    cycle, rate = OWN.index("phase"), OWN.index("frequency")
+    low[rate], high[rate] = low[rate] * frequency, high[rate] * frequency
+    scale = high - low
+    if scale[cycle] > 0.0:
+        low[cycle], high[cycle] = -np.inf, np.inf
+    return low, high, scale

@@ -1,0 +1,126 @@
+"""Measured trials as what a search is held against.
+
+A record is taken as it is, from its first row on: a start from rest, seen by a camera, whose zero
+of height is its own. Velocities are differences of heights on both sides, or what was measured
+directly. The cost of a trial is the weighted sum of its signals' squared NRMSE (rms error over
+standard deviation).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.errors import BadInput
+from cosim.studies.identify.chain.chain import OWN, Target
+from cosim.studies.identify.problem.space import Space, own_bounds
+from cosim.trials.camera import velocities
+from cosim.trials.periods import period_of
+from cosim.trials.recording import Recording, read_recording
+from cosim.trials.tracked import number_of, trial_files
+
+WEIGHTS = {"v_surface": 0.5, "z_surface": 0.25, "v_part": 0.15, "z_part": 0.1}
+"""Of the squared NRMSE; those of the signals that a trial has are scaled to a sum of 1."""
+
+SEARCH_STEP, FINE_STEP = 1.0 / 960 / 14, 1.0 / 960 / 80
+"""Longest steps (s) of the search, and of its finish and all that is reported."""
+
+DRIVE = ("amplitude", "offset", "phase", "start", "frequency")
+"""Numbers of a trial that a measured current makes superfluous."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A trial: what was measured, and what its search is held against."""
+
+    label: str
+    """The last whole number in the file's name, or the name."""
+    recording: Recording
+    frequency: float
+    """At which it repeats, Hz."""
+    target: Target
+    """For the search."""
+    fine: Target
+    """The same at the finish's step."""
+    surface: Target
+    """The finish's, held against the surface alone."""
+
+    @property
+    def has_part(self) -> bool:
+        return "z_part" in self.target.signals
+
+
+def read_trials(folder: Path, space: Space) -> list[Measured]:
+    """The trials of a folder, in the order of their numbers. Raises BadInput."""
+    found = [measured(read_recording(path), path, space) for path in trial_files(folder)]
+    labels = [one.label for one in found]
+    for label in labels:
+        if labels.count(label) > 1:
+            raise BadInput(f"{folder}: two trials are called {label}; number their files.")
+    return found
+
+
+def measured(recording: Recording, path: Path, space: Space) -> Measured:
+    """One trial. Raises BadInput where it has no moving surface or does not repeat."""
+    signals = {name: recording.signals[name] for name in WEIGHTS if name in recording.signals}
+    if not {"z_surface", "v_surface"} & set(signals):
+        raise BadInput(f"{path}: there is no height or velocity of the surface.")
+    differenced = set()
+    for body in ("surface", "part"):
+        if f"z_{body}" in signals:
+            heights = signals[f"z_{body}"] - signals[f"z_{body}"][0]
+            signals |= {f"z_{body}": heights, f"v_{body}": velocities(recording.time, heights)}
+            differenced.add(f"v_{body}")
+    for name, values in signals.items():
+        if not np.nanvar(values) > 0.0:
+            raise BadInput(f"{path}: {name} does not change: there is nothing to identify.")
+    current = recording.signals.get("current")
+    if current is not None and not np.isfinite(current).all():
+        raise BadInput(f"{path}: the current has gaps; it is what drives the simulation.")
+    frequency = 1.0 / (period_of(recording.time, signals["v_surface"]) or np.nan)
+    if current is None and not np.isfinite(frequency):
+        raise BadInput(f"{path}: the surface's motion does not repeat, so its drive is not known.")
+    low, high, scale = own_bounds(space, frequency)
+    if current is not None:
+        for name in DRIVE:
+            k = OWN.index(name)
+            low[k] = high[k] = 1.0 if name == "frequency" else 0.0
+            scale[k] = 0.0
+
+    def target(step: float, names: Sequence[str]) -> Target:
+        chosen = {name: signals[name] for name in names if name in signals}
+        whole = sum(WEIGHTS[name] for name in chosen)
+        weights = {
+            name: WEIGHTS[name] / whole / np.isfinite(values).sum() / np.nanvar(values)
+            for name, values in chosen.items()
+        }
+        return Target(
+            *(recording.time, chosen, weights, frozenset(differenced)),
+            *(low, high, scale, step, current),
+        )
+
+    return Measured(
+        *(
+            str(number) if (number := number_of(path)) is not None else path.stem,
+            recording,
+            frequency,
+        ),
+        *(target(SEARCH_STEP, list(WEIGHTS)), target(FINE_STEP, list(WEIGHTS))),
+        target(FINE_STEP, ["z_surface", "v_surface"]),
+    )
+
+
+def draws(target: Target, count: int, rng: np.random.Generator) -> Array:
+    """Random own numbers (count × OWN) within the bounds; the lift near the middle, where most
+    trials rest, and the frequency as it was measured."""
+    low, high = target.low.copy(), target.high.copy()
+    cycle, lift, rate = (OWN.index(name) for name in ("phase", "lift", "frequency"))
+    if not np.isfinite(low[cycle]):
+        low[cycle], high[cycle] = 0.0, 1.0
+    low[rate] = high[rate] = 0.5 * (low[rate] + high[rate])
+    found = low + rng.random((count, len(OWN))) * (high - low)
+    middle = 0.5 * (low[lift] + high[lift])
+    found[:, lift] = middle + 0.5 * (found[:, lift] - middle)
+    return found

@@ -1,0 +1,171 @@
+"""The figures of an identification."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from cosim.files.picture import Picture
+from cosim.scene import keys
+from cosim.studies.identify.report.measures import shown
+from cosim.studies.identify.report.solved import Solved
+
+MEASURED, SIMULATED, OTHER, FLOOR = "0.15", "#d1495b", "#1f6fb2", "#2a9d8f"
+
+
+def overlays(found: Solved) -> Picture:
+    """A row for each trial: velocity and height of the surface, height of the part."""
+    trials = [*found.trials, *found.apart]
+    owns = [*found.best.own, *found.apart_own]
+    rig = found.space.rigs(found.best.place[None])[0]
+    rows = {row["trial"]: row for row in [*found.numbers["trials"], *found.numbers["apart"]]}
+    figure = Picture(15.0, 0.8 + 2.1 * len(trials), "constrained")
+    axes = figure.subplots(len(trials), 3, squeeze=False)
+    panels = (("v_surface", "m/s", 1.0), ("z_surface", "mm", 1e3), ("z_part", "mm", 1e3))
+    for trial, own, line in zip(trials, owns, axes, strict=True):
+        simulated, row = shown(trial, rig, own), rows[trial.label]
+        for axis, (name, unit, scale) in zip(line, panels, strict=True):
+            if name not in simulated:
+                axis.set_visible(False)
+                continue
+            measured, time = trial.fine.signals[name], trial.fine.time * 1e3
+            axis.plot(time, measured * scale, color=MEASURED, lw=1.3, label="measured")
+            axis.plot(
+                time, simulated[name] * scale, color=SIMULATED, lw=0.9, label="identified rig"
+            )
+            body = "Part" if name.endswith("part") else "Surface"
+            said = (
+                f"error {row['part_error_mm']:.3f} mm"
+                if body == "Part"
+                else (f"NRMSE {row[f'nrmse_{name}']:.2f}")
+            )
+            apart = " (not fitted)" if trial in found.apart else ""
+            axis.set_title(
+                f"Trial {trial.label}{apart}: {body.lower()}, {said}", loc="left", fontsize=9
+            )
+            axis.set_ylabel(unit)
+            axis.grid(alpha=0.25)
+    for axis in axes[-1]:
+        axis.set_xlabel("time [ms]")
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2, frameon=False
+    )
+    return figure
+
+
+def errors(found: Solved) -> Picture:
+    """Errors of each trial beside the floor of its own repeatability and beside other rigs."""
+    numbers = found.numbers
+    rows = numbers["trials"]
+    at, names = np.arange(len(rows)), [row["trial"] for row in rows]
+    figure = Picture(13.0, 7.5, "constrained")
+    axes = figure.subplots(2, 2)
+    held = {one["trial"]: one for one in numbers["held_out"]}
+    for axis, name, title in (
+        (axes[0, 0], "nrmse_v_surface", "Velocity of the surface, NRMSE"),
+        (axes[0, 1], "nrmse_z_surface", "Height of the surface, NRMSE"),
+        (axes[1, 0], "part_error_mm", "Height of the part, mean error [mm]"),
+        (axes[1, 1], "v_average_mm_per_s", "Mean velocity of the part [mm/s]"),
+    ):
+        series = [("rig of the defaults, best drives", "0.75", numbers["made_up_rig"]["trials"])]
+        series.append(("identified rig", SIMULATED, rows))
+        if held:
+            series.append(("held out, surface alone", OTHER, [held[n]["surface"] for n in names]))
+            both = [held[n]["surface_and_part"] for n in names]
+            series.append(("held out, surface and part", "#8fb8da", both))
+        width = 0.8 / len(series)
+        for k, (label, color, source) in enumerate(series):
+            values = [row.get(name, np.nan) for row in source]
+            axis.bar(at + (k + 0.5) * width - 0.4, values, width, color=color, label=label)
+        beside = {"nrmse_v_surface": "floor_late", "part_error_mm": "straight_line_error_mm"}
+        beside["v_average_mm_per_s"] = "v_average_measured_mm_per_s"
+        words = {
+            "floor_late": "the measured cycles among themselves",
+            "straight_line_error_mm": "straight line",
+        }
+        if name in beside:
+            values = [row.get(beside[name]) or np.nan for row in rows]
+            label = words.get(beside[name], "measured")
+            axis.plot(at, values, color="k", ls="", marker="_", ms=22, mew=2, label=label)
+        axis.set_xticks(at, names)
+        axis.set_title(title, loc="left", fontsize=10.5)
+        axis.grid(axis="y", alpha=0.25)
+        axis.set_xlabel("trial")
+        axis.legend(fontsize=7.5)
+    return figure
+
+
+def profiles(found: Solved) -> Picture:
+    """The best cost with each key held at a value, and the values of ensemble and folds."""
+    names = found.space.names
+    units = {key.full: key.unit for key in keys()}
+    columns = min(5, len(names))
+    figure = Picture(3.2 * columns, 2.8 * math.ceil(len(names) / columns) + 0.6, "constrained")
+    axes = figure.subplots(math.ceil(len(names) / columns), columns, squeeze=False)
+    top = 1.6 * found.best.total
+    for k, (axis, name) in enumerate(zip(axes.flat, names, strict=False)):
+        values, costs = zip(*found.profiles[name], strict=True)
+        axis.plot(
+            values, np.minimum(costs, top), color=SIMULATED, marker="o", ms=3, label="profile"
+        )
+        for solutions, color, label in (
+            (found.ensemble, OTHER, "ensemble"),
+            (found.fold_rigs, FLOOR, "folds"),
+        ):
+            there = [float(found.space.values(one.place)[k]) for one in solutions]
+            totals = [min(one.total, top) for one in solutions]
+            axis.plot(there, totals, color=color, ls="", marker="x", ms=5, label=label)
+        if found.space.log[k]:
+            axis.set_xscale("log")
+        unit = "" if units[name] in ("1", "") else f" [{units[name]}]"
+        axis.set_title(f"{name.partition('.')[2]}{unit}", loc="left", fontsize=9)
+        axis.grid(alpha=0.25)
+        axis.tick_params(labelsize=7)
+    for axis in [*axes.flat][len(names) :]:
+        axis.set_visible(False)
+    for axis in axes[:, 0]:
+        axis.set_ylabel("cost")
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=3, frameon=False
+    )
+    return figure
+
+
+def spectrum(found: Solved) -> Picture:
+    """Where in frequency the measured velocity and the residual have their power."""
+    names = [trial.label for trial in found.trials]
+    figure = Picture(13.0, 1.0 + 2.4 * math.ceil(len(names) / 3), "constrained")
+    axes = figure.subplots(math.ceil(len(names) / 3), min(3, len(names)), squeeze=False)
+    for axis, name in zip(axes.flat, names, strict=False):
+        rows = [row for row in found.numbers["bands"] if row["trial"] == name]
+        _bands(axis, rows)
+        axis.set_title(f"Trial {name}", loc="left", fontsize=9.5)
+    for axis in [*axes.flat][len(names) :]:
+        axis.set_visible(False)
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2, frameon=False
+    )
+    figure.supylabel("share of the measured velocity's power", fontsize=10)
+    return figure
+
+
+def _bands(axis: Axes, rows: list[dict[str, float]]) -> None:
+    at = np.arange(len(rows))
+    axis.bar(
+        at - 0.2, [row["measured"] for row in rows], 0.4, color=MEASURED, label="measured velocity"
+    )
+    axis.bar(at + 0.2, [row["residual"] for row in rows], 0.4, color=SIMULATED, label="residual")
+    axis.set_xticks(at, [f"{row['from_hz']:.0f}–{row['to_hz']:.0f} Hz" for row in rows], fontsize=7)
+    axis.set_yscale("log")
+    axis.set_ylim(1e-4, 1.5)
+    axis.grid(axis="y", alpha=0.25)
+
+
+FIGURES: dict[str, Callable[[Solved], Picture]] = {
+    "trials": overlays,
+    "errors": errors,
+    "profiles": profiles,
+    "bands": spectrum,
+}
+"""By the end of their files' names."""

@@ -1,0 +1,118 @@
+"""What is told of a solution, trial by trial: its errors beside the measurement's repeatability.
+
+NRMSE is the rms error over the standard deviation of what was measured; heights without their
+means, since the camera's zero is its own. The mean velocity of the part is the slope of the
+straight line through its height.
+"""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.studies.identify.chain.chain import OWN, simulate
+from cosim.studies.identify.problem.targets import Measured
+from cosim.trials.camera import velocities
+
+LATE = 5
+"""Whole cycles from which on the first ones, of the start, are left out of the repeatability."""
+
+BANDS = (0.0, 15.0, 30.0, 80.0, 150.0, 300.0, 480.0)
+"""Ends of the frequency bands, Hz."""
+
+Row = dict[str, Any]
+
+
+def shown(trial: Measured, rig: Array, own: Array) -> dict[str, Array]:
+    """The simulated signals as the trial's instruments show them, heights at the measured mean."""
+    out = {
+        name: values[0] for name, values in simulate(trial.fine, rig[None], own[None])[0].items()
+    }
+    found = {}
+    for name, measured in trial.fine.signals.items():
+        if name in trial.fine.differenced:
+            found[name] = velocities(trial.fine.time, out[f"z{name[1:]}"])
+        else:
+            found[name] = out[name]
+        if name.startswith("z"):
+            found[name] = found[name] + np.nanmean(measured - found[name])
+    return found
+
+
+def errors(trial: Measured, rig: Array, own: Array) -> Row:
+    """NRMSE of each signal, the part's errors (mm) and mean velocities (mm/s)."""
+    simulated, signals, time = shown(trial, rig, own), trial.fine.signals, trial.fine.time
+    row: Row = {"trial": trial.label}
+    row |= {f"nrmse_{name}": nrmse(simulated[name], signals[name]) for name in signals}
+    if trial.has_part:
+        apart = (simulated["z_part"] - signals["z_part"]) * 1e3
+        line = np.polynomial.Polynomial.fit(time, signals["z_part"] * 1e3, 1)
+        row["part_error_mm"] = float(np.abs(apart).mean())
+        row["part_error_from_start_mm"] = float(np.abs(apart - apart[0]).mean())
+        row["straight_line_error_mm"] = float(np.abs(line(time) - signals["z_part"] * 1e3).mean())
+        row["v_average_mm_per_s"] = slope(time, simulated["z_part"]) * 1e3
+        row["v_average_measured_mm_per_s"] = slope(time, signals["z_part"]) * 1e3
+        row["v_average_error_mm_per_s"] = abs(
+            row["v_average_mm_per_s"] - row["v_average_measured_mm_per_s"]
+        )
+    return row
+
+
+def own_numbers(own: Array) -> Row:
+    """A trial's own numbers by name, SI."""
+    return dict(zip(OWN, own.tolist(), strict=True))
+
+
+def repeatability(trial: Measured) -> Row:
+    """How far the measured velocity's cycles are from their mean, as NRMSE: no periodic motion
+    comes closer. Over the whole cycles, and without the first, in which the machine starts."""
+    if not np.isfinite(trial.frequency):
+        return {"floor": None, "floor_late": None}
+    v, time = trial.fine.signals["v_surface"], trial.fine.time
+    known = np.isfinite(v)
+    period = 1.0 / trial.frequency
+    count = int((time[known][-1] - time[known][0]) / period)
+    within = np.arange(0.0, period, float(np.median(np.diff(time))))
+    at = time[known][0] + np.add.outer(period * np.arange(count), within)
+    cycles = np.interp(at, time[known], v[known])
+    late = cycles[1:] if count >= LATE else cycles
+    return {name: _spread(some, v) for name, some in (("floor", cycles), ("floor_late", late))}
+
+
+def _spread(cycles: Array, v: Array) -> float | None:
+    if len(cycles) < 2:
+        return None
+    return float(np.sqrt(cycles.var(axis=0, ddof=1).mean()) / np.nanstd(v))
+
+
+def nrmse(simulated: Array, measured: Array) -> float:
+    """Rms difference over the standard deviation of what was measured, where both are known."""
+    apart = simulated - measured
+    return float(np.sqrt(np.nanmean(apart**2)) / np.nanstd(measured))
+
+
+def slope(time: Array, heights: Array) -> float:
+    """Of the straight line through heights, m/s."""
+    return float(np.polynomial.Polynomial.fit(time, heights, 1).convert().coef[1])
+
+
+def bands(trial: Measured, rig: Array, own: Array) -> list[Row]:
+    """Share of the measured velocity's power in each band, and the residual's beside it."""
+    v, time = trial.fine.signals["v_surface"], trial.fine.time
+    residual = v - shown(trial, rig, own)["v_surface"]
+    known = np.isfinite(v) & np.isfinite(residual)
+    step = float(np.median(np.diff(time)))
+    window = np.hanning(int(known.sum()))
+    f = np.fft.rfftfreq(len(window), step)
+    powers = [np.abs(np.fft.rfft(values[known] * window)) ** 2 for values in (v, residual)]
+    whole = powers[0].sum()
+    rows = []
+    for low, high in pairwise(BANDS):
+        chosen = (f >= low) & (f < high)
+        rows.append(
+            {"trial": trial.label, "from_hz": low, "to_hz": high}
+            | {"measured": float(powers[0][chosen].sum() / whole)}
+            | {"residual": float(powers[1][chosen].sum() / whole)}
+        )
+    return rows

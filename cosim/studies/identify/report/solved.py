@@ -1,0 +1,47 @@
+"""What an identification has found."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from cosim.arrays import Array
+from cosim.studies.identify.problem.space import Space
+from cosim.studies.identify.problem.targets import Measured
+from cosim.studies.identify.report.verdicts import Profile, Verdict
+from cosim.studies.identify.search.search import Found
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """A trial on a rig that was found without it: its own numbers fitted to its surface alone, and
+    to surface and part."""
+
+    trial: Measured
+    fold: int
+    place: Array
+    surface: Array
+    both: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solved:
+    """``numbers`` is what ``identify.json`` holds."""
+
+    space: Space
+    trials: list[Measured]
+    apart: list[Measured]
+    """Trials that were not fitted."""
+    best: Found
+    apart_own: Array
+    ensemble: list[Found]
+    fold_rigs: list[Found]
+    held_out: list[HeldOut]
+    verdicts: list[Verdict]
+    profiles: dict[str, Profile]
+    made_up: Found
+    """The rig of the scene keys' defaults, with its best drives."""
+    numbers: dict[str, Any]
+
+    @property
+    def rig(self) -> dict[str, float]:
+        """The identified rig by the keys of a scene, SI."""
+        return self.space.settings(self.best.place)

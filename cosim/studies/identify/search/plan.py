@@ -1,0 +1,150 @@
+"""The stages of an identification, from fits of single trials to the rig, its folds and profiles.
+
+Starts are rigs that fit one trial each. They are tried on all trials, and the better ones of them
+are searched further, fewer and fewer for longer and longer; all that end near the best are its
+ensemble.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.studies.identify.search.checkpoint import Journal
+from cosim.studies.identify.search.finish import finish
+from cosim.studies.identify.search.search import Found, Progress, Search
+
+FOLDS = 3
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is searched. ``rounds`` are those of the rig for all trials, ``fold_rounds`` those
+    of a fold: how many solutions, for how many generations, with which first step of CMA-ES."""
+
+    singles: int
+    """Fits of each single trial."""
+    single_generations: int
+    rounds: tuple[tuple[int, int, float], ...]
+    fold_rounds: tuple[tuple[int, int, float], ...]
+    profile_points: int
+    """On each side of the best value of a key."""
+    profile_generations: int
+
+
+FULL = Effort(
+    4, 60, ((10, 90, 0.12), (5, 150, 0.08), (3, 250, 0.05), (2, 300, 0.03)),
+    ((6, 90, 0.12), (3, 150, 0.08), (1, 300, 0.05)), 3, 20,
+)  # fmt: skip
+QUICK = Effort(1, 25, ((3, 30, 0.12), (1, 60, 0.06)), ((1, 30, 0.1),), 1, 8)
+
+SCREENED, KEPT, SCREEN_ROUNDS = 128, 8, 4
+"""Own numbers that are drawn for a new rig, those that are refined, and the rounds for them."""
+AGAIN = 256, 16, 4
+"""The same before a solution is searched further."""
+CAREFUL = 512, 24, 5
+"""The same where a trial's own numbers must be the best there are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Carries out the stages; ``fine`` is the same search at the finish's step."""
+
+    coarse: Search
+    fine: Search
+    effort: Effort
+    journal: Journal
+    progress: Progress
+
+    def singles(self) -> list[Found]:
+        """Rigs that fit one trial each, ``effort.singles`` of each."""
+        found = []
+        for k in range(len(self.coarse.targets)):
+            for n in range(self.effort.singles):
+                found += self.journal.stage(
+                    f"single {k + 1}-{n + 1}", lambda rng, k=k: [self._single(k, rng)]
+                )
+        return found
+
+    def _single(self, k: int, rng: np.random.Generator) -> Found:
+        alone = self.coarse.part([k])
+        places = rng.random((24, len(self.coarse.space.free)))
+        start = min(alone.screen(places, rng, 64, 4, 2), key=lambda one: one.total)
+        told = self._telling(f"trial {k + 1} alone")
+        return alone.nested(start, rng, self.effort.single_generations, 0.15, told, 12)
+
+    def ensemble(
+        self, name: str, rows: Sequence[int], rounds: Sequence[tuple[int, int, float]]
+    ) -> list[Found]:
+        """Solutions for the trials ``rows``, from the rigs of these trials alone on, the best
+        first; each has ended its search, most of them early."""
+        search, each = self.coarse.part(rows), self.effort.singles
+        places = [one.place for i, one in enumerate(self.singles()) if i // each in rows]
+        several = self.journal.stage(
+            f"{name}: starts",
+            lambda rng: search.screen(np.array(places), rng, SCREENED, KEPT, SCREEN_ROUNDS),
+        )
+        ended: list[Found] = []
+        for number, (count, generations, sigma) in enumerate(rounds, 1):
+            several = sorted(several, key=lambda one: one.total)
+            several, left = several[:count], several[count:]
+            ended += left if number > 1 else []
+            new = []
+            for k, start in enumerate(several, 1):
+                title = f"{name}: round {number}, {k} of {len(several)}"
+                new += self._further(title, search, start, generations, sigma)
+            several = new
+        return sorted([*several, *ended], key=lambda one: one.total)
+
+    def _further(
+        self, title: str, search: Search, start: Found, generations: int, sigma: float
+    ) -> list[Found]:
+        told = self._telling(title)
+        return self.journal.stage(
+            title,
+            lambda rng: [
+                search.nested(search.rescreened(start, rng, *AGAIN), rng, generations, sigma, told)
+            ],
+        )
+
+    def finished(self, name: str, rows: Sequence[int], found: Found) -> Found:
+        """The solution at the finish's step, and by least squares."""
+        fine = self.fine.part(rows)
+
+        def work(rng: np.random.Generator) -> list[Found]:
+            start = fine.rescreened(fine.refined(found.place, found.own, 4), rng, *CAREFUL)
+            nested = fine.nested(start, rng, 40, 0.01, self._telling(f"{name}: finish"))
+            return [finish(fine, min(start, nested, key=lambda one: one.total), 12)]
+
+        return self.journal.stage(f"{name}: finish", work)[0]
+
+    def drives(self, name: str, place: Array, targets: Search) -> Found:
+        """The best own numbers of trials on a rig, of many starts."""
+        return self.journal.stage(name, lambda rng: targets.screen(place[None], rng, *CAREFUL))[0]
+
+    def profile(self, key: int, place: float, start: Found) -> Found:
+        """The best solution with one key at a place, from a neighbour on."""
+        name = f"profile {self.coarse.space.names[key]} {place:.4f}"
+        moved = start.place.copy()
+        moved[key] = place
+
+        def work(rng: np.random.Generator) -> list[Found]:
+            there = self.coarse.refined(moved, start.own, 3)
+            n = self.effort.profile_generations
+            return [self.coarse.nested(there, rng, n, 0.03, self._telling(name), fixed=key)]
+
+        return self.journal.stage(name, work)[0]
+
+    def _telling(self, title: str) -> Progress:
+        return lambda what, best: self.progress(f"{title}, {what}", best)
+
+
+def folds(count: int) -> list[list[int]]:
+    """The trials' numbers (from 0) of each fold: every third."""
+    return [[*range(k, count, FOLDS)] for k in range(min(FOLDS, count))]
+
+
+def with_targets(search: Search, targets: Sequence[object]) -> Search:
+    """The same search for other targets."""
+    return replace(search, targets=targets)

@@ -1,0 +1,310 @@
+"""The identification of a rig: its steps against the bench's exact rung, its search against a rig
+that is known, since the bench made its records."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cosim
+from cosim.arrays import Array
+from cosim.cli.main import main
+from cosim.errors import BadInput
+from cosim.studies.identify.chain import chain
+from cosim.studies.identify.problem.space import read_space
+from cosim.studies.identify.problem.targets import FINE_STEP, SEARCH_STEP, read_trials
+from cosim.studies.identify.report.measures import nrmse
+from cosim.studies.identify.report.scenes import Settings, scene, trial_settings
+from cosim.studies.identify.report.verdicts import judge
+from cosim.studies.identify.run import identify
+from cosim.studies.identify.search.checkpoint import Journal
+from cosim.studies.identify.search.finish import finish
+from cosim.studies.identify.search.search import Found, Search
+from cosim.trials.camera import FRAME_RATE, hermite
+from cosim.trials.recording import Recording
+
+RIG = {
+    "coil.force_factor": 1.35,
+    "mechanics.surface_mass": 0.0165,
+    "mechanics.flexure_stiffness": 310.0,
+    "mechanics.flexure_damping": 0.2,
+    "mechanics.suspension_k1": 130.0,
+    "mechanics.suspension_k2": -4.2e5,
+    "mechanics.suspension_k3": 2.0e8,
+    "mechanics.suspension_damping": 0.04,
+    "mechanics.travel": 2.05e-3,
+    "mechanics.contact_stiffness": 3e6,
+    "mechanics.contact_damping": 5.0,
+    "friction.mu_plate": 0.18,
+    "friction.mu_k": 0.62,
+}
+OWN = {  # amplitude, offset, phase, start, lift, normal force, frequency
+    "1": (7.4, -0.5, 0.37, -0.02, 0.2, 1.0, 9.8),
+    "4": (8.1, -0.7, 0.45, 0.03, -0.4, 1.2, 20.2),
+    "5": (7.6, -0.9, 0.71, -0.04, 0.5, 0.9, 50.8),
+}
+NOISE = 2e-6  # m
+
+
+def place() -> Array:
+    space = read_space()
+    return space.place(np.array([RIG[key] for key in space.names]))
+
+
+def record(label: str, frames: int, seed: int | None = 0) -> dict[str, Array]:
+    """Heights of a trial as the bench's exact rung makes them, at the camera's frames."""
+    time = np.arange(frames) / FRAME_RATE
+    own = np.array(OWN[label])
+    trial = _trial(time)
+    settings, first = trial_settings(read_space(), place(), trial, own)
+    settings = read_space().settings(place()) | settings
+    settings |= {"run.duration": first + float(time[-1]) + 1e-3, "run.output_step": 1e-4}
+    waves = cosim.run(scene(settings, "limited")).waveforms
+    found = {"time": time}
+    noise = np.random.default_rng(seed)
+    for body in ("surface", "part"):
+        knots = (waves[name].values for name in ("time", f"z_{body}", f"v_{body}"))
+        found[f"z_{body}"] = hermite(time + first, *knots)
+        if seed is not None:
+            found[f"z_{body}"] = found[f"z_{body}"] + NOISE * noise.standard_normal(frames)
+    return found
+
+
+def _trial(time: Array) -> Any:
+    from cosim.studies.identify.problem.targets import measured
+
+    motion = np.sin(2 * np.pi * 20.0 * time) * 1e-3
+    signals = {"z_surface": motion, "v_surface": np.gradient(motion, time)}
+    return measured(
+        Recording("any", time, signals, time * np.nan, ()), Path("any.csv"), read_space()
+    )
+
+
+def write(folder: Path, label: str, columns: dict[str, Array]) -> None:
+    with (folder / f"Trial {label}.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        units = {"time": "s", "z_surface": "m", "z_part": "m", "current": "A"}
+        writer.writerow([f"{name} [{units[name]}]" for name in columns])
+        writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Records of three trials of a known rig."""
+    made = tmp_path_factory.mktemp("trials")
+    for label in OWN:
+        write(made, label, record(label, 200))
+    return made
+
+
+@pytest.fixture(scope="module")
+def search(folder: Path) -> Search:
+    space = read_space()
+    return Search(space, [trial.target for trial in read_trials(folder, space)], 2)
+
+
+def quiet(what: str, best: float) -> None:
+    pass
+
+
+def test_structures_agree_with_the_compiled_code() -> None:
+    assert all(here == there for here, there in chain.sizes())
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("label", OWN)
+def test_steps_agree_with_the_exact_rung(label: str) -> None:
+    """Start from rest off equilibrium, switch-on, stick, slip, walls, limits of the source."""
+    exact = record(label, 300, None)
+    space, own = read_space(), np.array(OWN[label])
+    apart = {}
+    for step in (SEARCH_STEP, FINE_STEP):
+        zeros = np.zeros(len(chain.OWN))
+        target = chain.Target(exact["time"], {}, {}, frozenset(), zeros, zeros, zeros, step)
+        found = chain.simulate(target, space.rigs(place()[None]), own[None])[0]
+        apart[step] = [
+            nrmse(found[f"z_{body}"][0] - found[f"z_{body}"][0][0], z - z[0])
+            for body in ("surface", "part")
+            for z in [exact[f"z_{body}"]]
+        ]
+        assert found["z_surface"][0][0] == pytest.approx(exact["z_surface"][0], abs=1e-5)
+    assert max(apart[FINE_STEP]) < 0.012
+    assert max(apart[SEARCH_STEP]) < 0.04
+    assert sum(apart[FINE_STEP]) < 0.6 * sum(apart[SEARCH_STEP])
+
+
+def test_each_lane_has_its_own_machine() -> None:
+    """Whatever stands in the other lanes, and in whichever lane."""
+    rng = np.random.default_rng(1)
+    space, time = read_space(), np.arange(60) / FRAME_RATE
+    zeros = np.zeros(len(chain.OWN))
+    target = chain.Target(time, {}, {}, frozenset(), zeros, zeros, zeros, SEARCH_STEP)
+    rigs = space.rigs(rng.random((11, len(space.free))))
+    own = np.array(
+        [OWN[label] for label in ["1", "4", "5", "4", "1", "5", "5", "4", "1", "4", "5"]]
+    )
+    own[:, 3] = 0.0  # the steps before the record are counted from the earliest start in a batch
+    together = chain.simulate(target, rigs, own)[0]["z_part"]
+    alone = [chain.simulate(target, rigs[[k]], own[[k]])[0]["z_part"][0] for k in range(11)]
+    assert np.array_equal(together, alone)
+
+
+@pytest.mark.physics
+def test_a_measured_current_replaces_the_drive(tmp_path: Path) -> None:
+    """The current of a run, told to the chain, moves it as the run did."""
+    settings: Settings = {**read_space().settings(place()), "drive.frequency": 20.0}
+    settings["run.duration"] = 0.2
+    waves = cosim.run(scene(settings | {"run.output_step": 2.5e-4}, "limited")).waveforms
+    columns = {name: waves[name].values for name in ("time", "current", "z_surface", "z_part")}
+    write(tmp_path, "1", columns)
+    space = read_space()
+    (trial,) = read_trials(tmp_path, space)
+    assert not trial.target.scale[[0, 1, 2, 3, 6]].any()
+    own = np.array([0, 0, 0, 0, 0, 0.5, 1.0])
+    found = chain.simulate(trial.fine, space.rigs(place()[None]), own[None])[0]
+    assert nrmse(found["z_surface"][0], columns["z_surface"]) < 0.05
+
+
+@pytest.mark.physics
+def test_own_numbers_are_found_on_the_true_rig(search: Search) -> None:
+    found = search.screen(place()[None], np.random.default_rng(2), 512, 16, 6)[0]
+    assert found.costs.max() < 0.01
+    assert found.total < 5e-3
+    truth = np.array([OWN[label] for label in OWN])
+    for name, tolerance in (("offset", 0.2), ("phase", 0.02), ("normal_force", 0.1)):
+        k = chain.OWN.index(name)
+        assert np.abs(found.own[:, k] - truth[:, k]).max() < tolerance
+
+
+@pytest.mark.physics
+def test_a_rig_is_recovered_from_a_start_nearby(search: Search) -> None:
+    """By far less than the full search, so that it only must come closer."""
+    rng = np.random.default_rng(3)
+    beside = np.clip(place() + 0.03 * rng.choice([-1.0, 1.0], len(place())), 0.0, 1.0)
+    start = search.screen(beside[None], rng, 96, 6, 4)[0]
+    found = search.nested(start, rng, 40, 0.03, quiet)
+    assert found.total < 0.5 * start.total
+    assert finish(search, found, 5).total <= found.total
+
+
+def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(tmp_path: Path) -> None:
+    """On one thread and on two; with a journal that lacks the last stages, and a trial whose part
+    was not measured."""
+    write(tmp_path, "4", record("4", 100))
+    write(tmp_path, "5", {k: z for k, z in record("5", 100).items() if k != "z_part"})
+    free = {"coil.force_factor", "mechanics.surface_mass"}
+    given = (f'[rig."{key}"]\nvalue = {value}\n' for key, value in RIG.items() if key not in free)
+    bounds = tmp_path / "bounds.toml"
+    bounds.write_text("".join(given))
+    more: dict[str, Any] = {"bounds": bounds, "quick": True, "seed": 4}
+    whole = identify(tmp_path, workers=2, journal=tmp_path / "whole.json", **more)
+    content = json.loads((tmp_path / "whole.json").read_text())
+    stages = list(content["done"])
+    content["done"] = {name: content["done"][name] for name in stages[: len(stages) // 2]}
+    (tmp_path / "half.json").write_text(json.dumps(content))
+    again = identify(tmp_path, workers=1, journal=tmp_path / "half.json", **more)
+    assert again.numbers == whole.numbers
+    assert (tmp_path / "half.json").read_text() == (tmp_path / "whole.json").read_text()
+    assert whole.numbers["cost"] < 0.1
+    whole.save(tmp_path / "out")
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"identify.json", "identify.csv", "identify.md", "rig.toml", "trial-04.toml"} <= names
+    loaded = cosim.load(tmp_path / "out" / "trial-04.toml")
+    mass = whole.rig["mechanics.surface_mass"]
+    assert loaded.mechanics.surface_mass == pytest.approx(mass, rel=1e-5)
+
+
+def test_a_journal_of_other_trials_is_not_taken(tmp_path: Path) -> None:
+    path = tmp_path / "journal.json"
+    one = Found(np.zeros(2), np.zeros((1, 7)), np.ones(1), 1.0)
+    Journal(path, 0, "these").stage("a", lambda rng: [one])
+    assert Journal(path, 0, "these").resumed == 1
+    assert Journal(path, 0, "others").resumed == 0
+    assert Journal(path, 1, "these").resumed == 0
+
+
+def test_verdicts() -> None:
+    """A steep profile is trusted, a flat one is not, and a product is seen through the ensemble."""
+    space = read_space()
+    best = Found(np.full(len(space.free), 0.5), np.tile(OWN["1"], (2, 1)), np.full(2, 0.1), 0.1)
+    ensemble = [best]
+    for turn in np.linspace(-0.35, 0.35, 6):
+        moved = best.place.copy()
+        moved[0] += turn  # the force factor
+        own = best.own.copy()
+        own[:, 0] *= space.values(best.place)[0] / space.values(moved)[0]  # the amplitude
+        ensemble.append(Found(moved, own, best.costs, 0.105))
+    middle = space.values(best.place)
+    profiles = {
+        key: [(0.9 * x, 0.2), (x, 0.1), (1.1 * x, 0.2)]
+        for key, x in zip(space.names, middle, strict=True)
+    }
+    flat = "mechanics.suspension_k1"
+    k = space.names.index(flat)
+    profiles[flat] = [(0.1 * middle[k], 0.101), (middle[k], 0.1), (9 * middle[k], 0.102)]
+    profiles["mechanics.suspension_k2"] = [(-2e5, 0.3), (0.0, 0.1), (2e5, 0.3)]
+    found = {one.key: one for one in judge(space, best, ensemble, [], profiles)}
+    mass = found["mechanics.surface_mass"]
+    assert mass.kind == "identified"
+    # a tenth of the way to the neighbours, where the line crosses 1.1 times 0.1
+    assert (mass.low, mass.high) == pytest.approx((0.99 * mass.value, 1.01 * mass.value))
+    assert found[flat].kind == "not"
+    assert "amplitudes" in found["coil.force_factor"].words
+    assert found["coil.force_factor"].kind == "product"
+
+
+@pytest.mark.reliability
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[rig]\n", None),
+        ('[rig."coil.force"]\nvalue = 1.0\n', '[rig."coil.force"]: this key is none of'),
+        ('[rig."friction.mu_k"]\nlow = 0.5\n', "needs either a value, or low and high"),
+        ('[rig."friction.mu_k"]\nlow = 0.5\nhigh = 0.4\n', "low = 0.5 must be below high = 0.4"),
+        ('[rig."friction.mu_k"]\nlow = "a"\nhigh = 0.4\n', "low = a must be a number"),
+        ('[rig."mechanics.travel"]\nlow = -1.0\nhigh = 1.0\n', "low = -1 must be a number from"),
+        ('[rig."mechanics.travel"]\nvalue = 1e-3\nprior = 1e-3\n', "needs either a value, or"),
+        ('[rig."circuit.supply"]\nlow = 12.0\nhigh = 18.0\n', "it is not searched"),
+        ('[trial."drive.offset"]\nmost = 1.0\n', "most is none of"),
+        ("[ring]\n", "ring: there are the tables rig and trial only"),
+        ("[rig\n", "is no valid TOML"),
+    ],
+)
+def test_bounds_are_refused_in_a_sentence(text: str, told: str | None, tmp_path: Path) -> None:
+    path = tmp_path / "bounds.toml"
+    path.write_text(text)
+    if told is None:
+        assert read_space(path).names == read_space().names
+        return
+    with pytest.raises(BadInput) as error:
+        read_space(path)
+    assert told in str(error.value)
+    assert str(path) in str(error.value)
+
+
+@pytest.mark.reliability
+def test_trials_are_refused_in_a_sentence(
+    tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    time = np.arange(200) / FRAME_RATE
+    (tmp_path / "still").mkdir()
+    write(tmp_path / "still", "1", {"time": time, "z_surface": time * 0.0})
+    (tmp_path / "drift").mkdir()
+    write(tmp_path / "drift", "1", {"time": time, "z_surface": time**2})
+    (tmp_path / "part").mkdir()
+    write(tmp_path / "part", "1", {"time": time, "z_part": np.sin(100 * time)})
+    out = ["--out", str(tmp_path / "out")]
+    for arguments, told in (
+        ([str(tmp_path / "nothing")], "cannot be read"),
+        ([str(tmp_path / "still")], "does not change"),
+        ([str(tmp_path / "drift")], "does not repeat"),
+        ([str(tmp_path / "part")], "no height or velocity of the surface"),
+        ([str(folder), "--apart", "7"], "There is no trial 7"),
+        ([str(folder), "--seed", "-1"], "seed = -1 must be"),
+    ):
+        assert main(["identify", *arguments, *out]) == 2
+        assert told in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
