@@ -47,7 +47,7 @@ def trial_settings(
 
 def scene(settings: Settings, circuit: str) -> Scene:
     """The checked scene of all keys of a rig and a trial, with a circuit."""
-    return load("paper", settings | {"circuit.model": circuit})
+    return load("reference", settings | {"circuit.model": circuit})
 
 
 def toml(description: str, settings: Settings) -> str:
