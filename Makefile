@@ -87,7 +87,7 @@ charts: setup
 	@$(VENV)/bin/cosim chart stability
 	@$(VENV)/bin/cosim chart accuracy
 	@$(VENV)/bin/cosim chart limits
-	@$(VENV)/bin/cosim chart ladder paper regime-10 gripper
+	@$(VENV)/bin/cosim chart ladder paper trial-10 gripper
 
 bench: setup
 	@$(VENV)/bin/cosim bench $(ARGS)

@@ -16,6 +16,7 @@ from cosim.files.picture import Picture
 from cosim.files.spill import release
 from cosim.scene import Scene
 from cosim.trials.camera import FRAME_RATE, accelerations, film
+from cosim.trials.measured import measured
 
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
 GRIP, SECOND = "#7a5195", "#6fb7e9"
@@ -40,9 +41,11 @@ def draw(scene: Scene, waves: dict[str, Array], numbers: dict[str, Any]) -> Pict
     height = 5.8 if given else 8.2
     figure = Picture(13.0, height)
     axes = figure.subplots(2 if given else 3, 2)
+    title, beside = _title(scene, numbers), _measured(scene)
     # Room that was measured once: a layout engine would double the time of a short run.
+    top = 1 - (0.85 if beside else 0.62) / height
     figure.subplots_adjust(
-        left=0.06, right=0.985, bottom=0.5 / height, top=1 - 0.62 / height, wspace=0.29, hspace=0.4
+        left=0.06, right=0.985, bottom=0.5 / height, top=top, wspace=0.29, hspace=0.4
     )
     shown = _last_periods(scene, waves["time"])
     time = waves["time"][shown] * 1e3
@@ -58,7 +61,8 @@ def draw(scene: Scene, waves: dict[str, Array], numbers: dict[str, Any]) -> Pict
         axis.set(xlim=(time[0], time[-1]), xlabel="time [ms]")
     for axis in axes.flat:
         axis.grid(alpha=0.25)
-    figure.suptitle(_title(scene, numbers), fontsize=12, y=1 - 0.08 / height, va="top")
+    figure.suptitle(title, fontsize=12, y=1 - 0.08 / height, va="top")
+    figure.text(0.5, 1 - 0.33 / height, beside, fontsize=10, ha="center", va="top")
     return figure
 
 
@@ -106,6 +110,22 @@ def _title(scene: Scene, numbers: dict[str, Any]) -> str:
         f"{words}; {drive.waveform} {rate}, {drive.amplitude:.3g} V "
         f"peak-to-peak, offset {drive.offset:+.3g} V{late}, circuit “{scene.circuit.model}”"
     )
+
+
+def _measured(scene: Scene) -> str:
+    """A line with what the trial that the scene repeats showed."""
+    found = measured(scene)
+    if found is None:
+        return ""
+    number, trial = found
+    low, high = (trial[f"v_surface_{end}"] * 1e3 for end in ("min", "max"))
+    words = [f"part {trial['v_average'] * 1e3:+.2f} mm/s"]
+    if "z_surface_pp" in trial:
+        words.append(f"surface {trial['z_surface_pp'] * 1e3:.2f} mm peak-to-peak")
+    words.append(f"surface {low:+.0f} … {high:+.0f} mm/s")
+    low, high = trial["a_camera_min"], trial["a_camera_max"]
+    words.append(f"read by the camera {low:+.0f} … {high:+.0f} m/s²")
+    return f"measured in trial {number}: {', '.join(words)}"
 
 
 def _whole_run(axis: Axes, scene: Scene, waves: dict[str, Array]) -> None:

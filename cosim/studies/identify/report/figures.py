@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from cosim.files.picture import Picture
 from cosim.scene import keys
@@ -92,7 +93,8 @@ def errors(found: Solved) -> Picture:
         axis.set_title(title, loc="left", fontsize=10.5)
         axis.grid(axis="y", alpha=0.25)
         axis.set_xlabel("trial")
-        axis.legend(fontsize=7.5)
+        axis.margins(y=0.36)  # room for the legend
+        axis.legend(fontsize=7.5, loc="upper left", ncols=2)
     return figure
 
 
@@ -118,6 +120,15 @@ def profiles(found: Solved) -> Picture:
             axis.plot(there, totals, color=color, ls="", marker="x", ms=5, label=label)
         if found.space.log[k]:
             axis.set_xscale("log")
+            low, high = axis.get_xlim()
+            many = high > 5.0 * low
+            axis.xaxis.set_major_locator(
+                LogLocator(subs=(1.0, 2.0, 5.0)) if many else MaxNLocator(4)
+            )
+            axis.xaxis.set_major_formatter("{x:.3g}")
+            axis.xaxis.set_minor_formatter(NullFormatter())
+        else:
+            axis.locator_params(axis="x", nbins=4)
         unit = "" if units[name] in ("1", "") else f" [{units[name]}]"
         axis.set_title(f"{name.partition('.')[2]}{unit}", loc="left", fontsize=9)
         axis.grid(alpha=0.25)
@@ -147,6 +158,7 @@ def spectrum(found: Solved) -> Picture:
         *axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2, frameon=False
     )
     figure.supylabel("share of the measured velocity's power", fontsize=10)
+    figure.supxlabel("frequency [Hz]", fontsize=10)
     return figure
 
 
@@ -156,7 +168,7 @@ def _bands(axis: Axes, rows: list[dict[str, float]]) -> None:
         at - 0.2, [row["measured"] for row in rows], 0.4, color=MEASURED, label="measured velocity"
     )
     axis.bar(at + 0.2, [row["residual"] for row in rows], 0.4, color=SIMULATED, label="residual")
-    axis.set_xticks(at, [f"{row['from_hz']:.0f}–{row['to_hz']:.0f} Hz" for row in rows], fontsize=7)
+    axis.set_xticks(at, [f"{row['from_hz']:.0f}–{row['to_hz']:.0f}" for row in rows], fontsize=7)
     axis.set_yscale("log")
     axis.set_ylim(1e-4, 1.5)
     axis.grid(axis="y", alpha=0.25)

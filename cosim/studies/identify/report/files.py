@@ -62,7 +62,8 @@ def write(folder: Path, found: Solved) -> None:
 def summary(found: Solved) -> str:
     """The rig with its verdicts, and the errors trial by trial."""
     numbers = found.numbers
-    lines = [f"{one.key:<32}{one.value:>10.4g}  {one.words}" for one in found.verdicts]
+    rig = numbers["rig"]
+    lines = [f"{one.key:<32}{rig[one.key]:>10.4g}  {one.words}" for one in found.verdicts]
     heads = ("trial", "velocity", "height", "floor", "part [mm]", "v_average [mm/s]", "measured")
     lines += ["", "".join(f"{head:>{WIDTH}}" for head in heads)]
     lines += [_line(row) for row in numbers["trials"]]
@@ -96,7 +97,7 @@ def _aligned(rows: list[Row]) -> list[Row]:
 def _tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
     tables = {
         "The rig": [
-            {"key": v["key"], "value": v["value"], "verdict": v["words"]}
+            {"key": v["key"], "value": numbers["rig"][v["key"]], "verdict": v["words"]}
             for v in numbers["verdicts"]
         ],
         "The trials": [_told(row, floors=True) for row in numbers["trials"]],
