@@ -13,7 +13,14 @@ from cosim.toolchain.versions import versions
 
 def motion(scene: Scene, recorder: Recorder) -> Motion:
     """What surface and part did, at the end of a run."""
-    return Motion(recorder.at_end, recorder.at_settle, _extremes(scene, recorder), recorder.frames)
+    ram = None
+    if scene.mechanics.actuator == "ram":
+        z_ram, z_surface = (recorder.mechanics.columns.index(f"z_{body}") for body in ("ram", "surface"))
+        last = recorder.rows[-1]
+        ram = float(last[z_ram] - last[z_surface])
+    return Motion(
+        recorder.at_end, recorder.at_settle, _extremes(scene, recorder), recorder.frames, ram
+    )
 
 
 def _extremes(scene: Scene, recorder: Recorder) -> dict[str, float]:

@@ -1,0 +1,152 @@
+"""Finds the best settings of the knobs for several quantities at once, from the same runs.
+
+The heights are ragged and lie on narrow ridges, so nothing here trusts a slope: a design that fills
+the space, then clouds that shrink about the best few settings of each quantity, which are apart
+from each other, so that each quantity is climbed from several starts.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.studies.limits.knobs import KNOB_COUNT, TURN, corners, faces, rounded
+from cosim.studies.tune.search import apart
+
+STARTS, APART = 3, 0.1
+"""Starts of each quantity, and how far apart, as a share of a knob's turn."""
+
+SPREADS = (0.08, 0.05, 0.03, 0.02, 0.01, 0.006, 0.003)
+"""Standard deviations of the clouds."""
+
+SAMPLES = 4
+"""Of a cloud; every other one lies along the best settings near by."""
+
+ELITE, NEAR, INFLATION = 6, 0.1, 2.0
+"""Those settings: how many, from how far, and by how much their covariance is blown up."""
+
+STEADY, STEADY_APART = 5, 0.015
+"""Settings of each quantity whose surroundings are looked at, and how far apart."""
+
+CLOSE, FEWEST = 1.5 * TURN, 5
+"""What is known of a setting's surroundings: how far they reach, and from how many runs."""
+
+MOST = 400
+"""Best places among which some are picked that are apart."""
+
+Ask = Callable[[Array], Array]
+"""Scores (a row each, a column a quantity) of places (rows) in the cube."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A place in the cube for one quantity, SI: the score there, and over the turns of the knobs.
+
+    The worst is not above 0 where a turn leads to what is not achievable.
+    """
+
+    place: tuple[float, ...]
+    value: float
+    median: float
+    worst: float
+
+
+@dataclass(frozen=True)
+class Best:
+    """The best setting of a quantity, and the best of those that may be turned a little."""
+
+    best: Setting | None
+    robust: Setting | None
+
+
+class Search:
+    """All places of a machine that have been asked for, with their scores."""
+
+    def __init__(self, ask: Ask, seed: int | tuple[int, ...]) -> None:
+        self._ask, self._random = ask, np.random.default_rng(seed)
+        self._known: dict[tuple[float, ...], Array] = {}
+
+    def scores(self, places: Array) -> Array:
+        """The scores of places (rows), each asked for once."""
+        rows = [tuple(row.tolist()) for row in places]
+        new = [row for row in dict.fromkeys(rows) if row not in self._known]
+        if new:
+            self._known.update(zip(new, self._ask(np.array(new)), strict=True))
+        return np.array([self._known[row] for row in rows])
+
+    def explore(self, design: int, hints: Array) -> None:
+        """Ask for ``hints`` (rows) and for ``design`` places that fill the cube."""
+        from scipy.stats import qmc
+
+        sobol = qmc.Sobol(KNOB_COUNT, rng=self._random).random(design)
+        self.scores(rounded(np.vstack([hints.reshape(-1, KNOB_COUNT), sobol])))
+
+    def climb(self) -> None:
+        """Shrink clouds about the best of each quantity, and about the best that seems steady."""
+        quantities = len(next(iter(self._known.values())))
+        for spread in SPREADS:
+            clouds = [np.empty((0, KNOB_COUNT))]
+            for quantity in range(quantities):
+                starts = self.ranked(quantity, APART)[:STARTS]
+                clouds += [self._cloud(start, quantity, spread) for start in starts]
+                clouds += [self._cloud(p, quantity, spread) for p in self._steady(quantity)[:1]]
+            self.scores(np.vstack(clouds))
+
+    def _cloud(self, start: Array, quantity: int, spread: float) -> Array:
+        """Samples about a place, half of them along the ridge that it lies on."""
+        places, column = self._column(quantity)
+        near = np.abs(places - start).max(axis=1) <= NEAR
+        order = np.argsort(-column[near], kind="stable")[:ELITE]
+        round_ = spread**2 * np.eye(KNOB_COUNT)
+        ridge = round_ / 16.0
+        if len(order) > KNOB_COUNT:
+            ridge += INFLATION * np.cov(places[near][order].T)
+        half = SAMPLES // 2
+        steps = [
+            self._random.multivariate_normal(np.zeros(KNOB_COUNT), spread_, half)
+            for spread_ in (round_, ridge)
+        ]
+        return rounded(start + np.vstack(steps))
+
+    def ranked(self, quantity: int, distance: float) -> Array:
+        """The places with a score, the best first, each ``distance`` from those before it."""
+        places, column = self._column(quantity)
+        order = np.argsort(-column, kind="stable")
+        order = order[np.isfinite(column[order])]
+        return apart(places[order[:MOST]], distance)
+
+    def found(self, quantity: int) -> Best:
+        """The best settings of a quantity."""
+        top = self.ranked(quantity, STEADY_APART)[:1]
+        candidates = [self.around(place, quantity) for place in self._steady(quantity)]
+        firm = [one for one in candidates if one.worst > 0.0]
+        best = [self.around(place, quantity) for place in top]
+        return Best(
+            next((one for one in best if one.value > 0.0), None),
+            max(firm, key=lambda one: one.median, default=None),
+        )
+
+    def around(self, place: Array, quantity: int) -> Setting:
+        """A place with all its turns."""
+        every = self.scores(np.vstack([place, faces(place), corners(place)]))[:, quantity]
+        return Setting(
+            tuple(place.tolist()), float(every[0]), float(np.median(every)), float(every.min())
+        )
+
+    def _steady(self, quantity: int) -> Array:
+        """Places whose surroundings, as far as they are known, are good, the best first."""
+        places, column = self._column(quantity)
+        order = np.argsort(-column, kind="stable")[:MOST]
+        close = np.abs(places[order, None] - places[None]).max(axis=2) <= CLOSE
+        quarter = [
+            np.quantile(column[row], 0.25, method="lower") if row.sum() >= FEWEST else -np.inf
+            for row in close
+        ]
+        best = order[np.argsort(-np.array(quarter), kind="stable")]
+        best = best[column[best] > 0.0]
+        return apart(places[best], STEADY_APART)[:STEADY]
+
+    def _column(self, quantity: int) -> tuple[Array, Array]:
+        every = np.array(list(self._known.values()))
+        return np.array(list(self._known)), every[:, quantity]
