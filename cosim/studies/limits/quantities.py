@@ -49,7 +49,10 @@ QUANTITIES = (
         lambda numbers: -numbers["a_surface_min"], falls=True,
     ),
     Quantity("v_up", "mean velocity upwards", "mm/s", 1e3, lambda numbers: numbers["v_average"]),
-    Quantity("v_down", "mean velocity downwards", "mm/s", 1e3, lambda numbers: -numbers["v_average"]),
+    Quantity(
+        "v_down", "mean velocity downwards", "mm/s", 1e3,
+        lambda numbers: -numbers["v_average"],
+    ),
     Quantity(
         "cycle_up", "transport per cycle, upwards", "mm", 1e3,
         lambda numbers: numbers["transport_per_cycle"],

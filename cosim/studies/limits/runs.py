@@ -1,4 +1,4 @@
-"""Runs settings of machines, each once, and keeps them in a journal from which a kill is survived."""
+"""Runs settings of machines, each once, and keeps them in a journal: a killed study goes on."""
 
 import hashlib
 import json
@@ -9,6 +9,7 @@ from math import ceil, inf
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cosim.arrays import Array
 from cosim.scene import Scene, changed, firmware
@@ -44,18 +45,24 @@ class Case:
         there = {**self.rig, **self.machine.settings, **turned, "circuit.model": self.rung}
         period = 1.0 / turned["drive.frequency"]
         if there.get("drive.quantised"):
-            period = len(firmware.staircase(1, turned["drive.frequency"])) / firmware.STEPS_PER_SECOND
+            period = (
+                len(firmware.staircase(1, turned["drive.frequency"])) / firmware.STEPS_PER_SECOND
+            )
         settle, span = (max(1, ceil(t / period - 1e-9)) for t in (SETTLE, SPAN))
         times = {"run.settle": settle * period, "run.duration": (settle + span) * period}
         return {**there, **times}
 
 
 class Bench:
-    """Runs settings on top of ``scene``; to be used in a ``with`` block."""
+    """Runs settings on top of ``scene``; to be used in a ``with`` block.
+
+    ``asked`` are the words after ``cosim run`` that stand for the scene.
+    """
 
     def __init__(
         self,
         scene: Scene,
+        asked: str,
         journal: Path,
         workers: int,
         progress: Callable[[], object] = lambda: None,
@@ -66,7 +73,7 @@ class Bench:
         }  # fmt: skip
         self.scene = changed(scene, own, f"scene {scene.name}")
         self._workers, self._progress = workers, progress
-        self._path = journal
+        self._asked, self._path = asked, journal
         self._stack = ExitStack()
         self._done: dict[int, Outcome] = {}
 
@@ -102,22 +109,29 @@ class Bench:
                 self._progress()
         return [self._done[number] for number in numbers]
 
-    def scores(self, case: Case, places: Array) -> Array:
-        """The scores of places (rows); -inf where a run fails or costs more than the coil or the
-        power amplifier bears.
-        """
+    def scores(self, case: Case, places: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """The scores of places (rows), -inf where a run fails, and which of them are bearable."""
         every = [case.settings(place) for place in places]
         found = np.full((len(every), len(QUANTITIES)), -inf)
+        borne = np.zeros(len(every), bool)
         for row, (settings, outcome) in enumerate(zip(every, self.outcomes(every), strict=True)):
-            if not outcome.failure and self.bearable(case, settings, outcome.numbers):
+            if not outcome.failure:
                 found[row] = scores(outcome.numbers)
-        return found
+                borne[row] = self.bearable(case, settings, outcome.numbers)
+        return found, borne
 
     def bearable(self, case: Case, settings: Settings, numbers: Numbers) -> bool:
         """Whether a run keeps within what the coil and the power amplifier bear."""
         peak = max(numbers["current_max"], -numbers["current_min"]) * case.machine.coil_scale
         within = peak * self.scene.coil.count <= OPA548_CURRENT
         return within and self.heat(case, settings, numbers) <= case.machine.heat
+
+    def amperes(self, case: Case) -> float:
+        """The knobs' range, A."""
+        own = self.scene.circuit.sense_resistance
+        changes = {**case.rig, **case.machine.settings}
+        sense = changes.get("circuit.sense_resistance", own)
+        return case.machine.coil_scale * case.machine.reach * knobs.RANGE / float(sense)
 
     def heat(self, case: Case, settings: Settings, numbers: Numbers) -> float:
         """Mean heat of a coil, W."""
@@ -131,7 +145,7 @@ class Bench:
         """The one command that repeats a run."""
         every = {**settings, "run.output_step": float(settings["run.duration"]) / 2.0}
         words = (f"--set {key}={_typed(value)}" for key, value in every.items())
-        return f"cosim run {self.scene.name} {' '.join(words)}"
+        return f"cosim run {self._asked} {' '.join(words)}"
 
 
 def _number(settings: Settings) -> int:

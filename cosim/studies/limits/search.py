@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cosim.arrays import Array
 from cosim.studies.limits.knobs import KNOB_COUNT, TURN, corners, faces, rounded
@@ -16,12 +17,6 @@ from cosim.studies.tune.search import apart
 
 STARTS, APART = 3, 0.1
 """Starts of each quantity, and how far apart, as a share of a knob's turn."""
-
-SPREADS = (0.08, 0.05, 0.03, 0.02, 0.01, 0.006, 0.003)
-"""Standard deviations of the clouds."""
-
-SAMPLES = 4
-"""Of a cloud; every other one lies along the best settings near by."""
 
 ELITE, NEAR, INFLATION = 6, 0.1, 2.0
 """Those settings: how many, from how far, and by how much their covariance is blown up."""
@@ -35,15 +30,28 @@ CLOSE, FEWEST = 1.5 * TURN, 5
 MOST = 400
 """Best places among which some are picked that are apart."""
 
-Ask = Callable[[Array], Array]
-"""Scores (a row each, a column a quantity) of places (rows) in the cube."""
+Ask = Callable[[Array], tuple[Array, NDArray[np.bool_]]]
+"""Scores (a row each, a column a quantity) of places (rows) in the cube, and which of these the
+coil and the power amplifier bear."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much a search may cost."""
+
+    design: int
+    """Places that fill the cube; a power of two."""
+    spreads: tuple[float, ...]
+    """Standard deviations of the clouds."""
+    samples: int
+    """Of a cloud; even, since every other one lies along the best settings near by."""
 
 
 @dataclass(frozen=True)
 class Setting:
     """A place in the cube for one quantity, SI: the score there, and over the turns of the knobs.
 
-    The worst is not above 0 where a turn leads to what is not achievable.
+    The turns are judged by their motion, not by their heat: a hand that is off turns back.
     """
 
     place: tuple[float, ...]
@@ -63,37 +71,35 @@ class Best:
 class Search:
     """All places of a machine that have been asked for, with their scores."""
 
-    def __init__(self, ask: Ask, seed: int | tuple[int, ...]) -> None:
+    def __init__(self, ask: Ask, seed: tuple[int, ...]) -> None:
         self._ask, self._random = ask, np.random.default_rng(seed)
         self._known: dict[tuple[float, ...], Array] = {}
+        self._borne: dict[tuple[float, ...], bool] = {}
 
     def scores(self, places: Array) -> Array:
         """The scores of places (rows), each asked for once."""
         rows = [tuple(row.tolist()) for row in places]
         new = [row for row in dict.fromkeys(rows) if row not in self._known]
         if new:
-            self._known.update(zip(new, self._ask(np.array(new)), strict=True))
+            found, borne = self._ask(np.array(new))
+            self._known.update(zip(new, found, strict=True))
+            self._borne.update(zip(new, borne.tolist(), strict=True))
         return np.array([self._known[row] for row in rows])
 
-    def explore(self, design: int, hints: Array) -> None:
-        """Ask for ``hints`` (rows) and for ``design`` places that fill the cube."""
+    def run(self, effort: Effort, hints: Array) -> None:
+        """Ask for ``hints`` (rows), for places that fill the cube, and climb from the best."""
         from scipy.stats import qmc
 
-        sobol = qmc.Sobol(KNOB_COUNT, rng=self._random).random(design)
-        self.scores(rounded(np.vstack([hints.reshape(-1, KNOB_COUNT), sobol])))
-
-    def climb(self) -> None:
-        """Shrink clouds about the best of each quantity, and about the best that seems steady."""
-        quantities = len(next(iter(self._known.values())))
-        for spread in SPREADS:
+        sobol = qmc.Sobol(KNOB_COUNT, rng=self._random).random(effort.design)
+        found = self.scores(rounded(np.vstack([hints.reshape(-1, KNOB_COUNT), sobol])))
+        for spread in effort.spreads:
             clouds = [np.empty((0, KNOB_COUNT))]
-            for quantity in range(quantities):
-                starts = self.ranked(quantity, APART)[:STARTS]
-                clouds += [self._cloud(start, quantity, spread) for start in starts]
-                clouds += [self._cloud(p, quantity, spread) for p in self._steady(quantity)[:1]]
+            for quantity in range(found.shape[1]):
+                starts = [*self.ranked(quantity, APART)[:STARTS], *self._steady(quantity)[:1]]
+                clouds += [self._cloud(p, quantity, spread, effort.samples // 2) for p in starts]
             self.scores(np.vstack(clouds))
 
-    def _cloud(self, start: Array, quantity: int, spread: float) -> Array:
+    def _cloud(self, start: Array, quantity: int, spread: float, half: int) -> Array:
         """Samples about a place, half of them along the ridge that it lies on."""
         places, column = self._column(quantity)
         near = np.abs(places - start).max(axis=1) <= NEAR
@@ -102,7 +108,6 @@ class Search:
         ridge = round_ / 16.0
         if len(order) > KNOB_COUNT:
             ridge += INFLATION * np.cov(places[near][order].T)
-        half = SAMPLES // 2
         steps = [
             self._random.multivariate_normal(np.zeros(KNOB_COUNT), spread_, half)
             for spread_ in (round_, ridge)
@@ -148,5 +153,6 @@ class Search:
         return apart(places[best], STEADY_APART)[:STEADY]
 
     def _column(self, quantity: int) -> tuple[Array, Array]:
-        every = np.array(list(self._known.values()))
-        return np.array(list(self._known)), every[:, quantity]
+        every = np.array(list(self._known.values()))[:, quantity]
+        borne = np.array(list(self._borne.values()))
+        return np.array(list(self._known)), np.where(borne, every, -np.inf)

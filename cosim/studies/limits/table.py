@@ -51,7 +51,7 @@ class Limit:
 
 def _value(scene: Scene, key: str) -> float | None:
     table, name = key.split(".")
-    value: float | None = getattr(scene.table(table), name)
+    value: float | None = scene.table(table).get(name)
     return value
 
 
