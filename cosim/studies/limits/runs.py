@@ -134,12 +134,17 @@ class Bench:
         return case.machine.coil_scale * case.machine.reach * knobs.RANGE / float(sense)
 
     def heat(self, case: Case, settings: Settings, numbers: Numbers) -> float:
-        """Mean heat of a coil, W."""
+        """Mean heat, W, of the coil that a case stands for."""
+        return self.mean_heat(settings, numbers) * case.machine.coil_scale
+
+    def mean_heat(self, settings: Settings, numbers: Numbers) -> float:
+        """Mean heat of a coil of a run, W."""
         coil, keys = self.scene.coil, ("coil.resistance", "circuit.sense_resistance")
         own = (coil.resistance, self.scene.circuit.sense_resistance)
         copper, sense = (float(settings.get(k, value)) for k, value in zip(keys, own, strict=True))
-        each, lasted = numbers["energy_copper"] / coil.count, float(settings["run.duration"])
-        return coil_heat(each, lasted, copper, coil.count * sense) * case.machine.coil_scale
+        lasted = float(settings.get("run.duration", self.scene.run.duration))
+        each = numbers["energy_copper"] / coil.count
+        return coil_heat(each, lasted, copper, coil.count * sense)
 
     def command(self, settings: Settings) -> str:
         """The one command that repeats a run."""

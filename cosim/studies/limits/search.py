@@ -21,8 +21,11 @@ STARTS, APART = 3, 0.1
 ELITE, NEAR, INFLATION = 6, 0.1, 2.0
 """Those settings: how many, from how far, and by how much their covariance is blown up."""
 
-STEADY, STEADY_APART = 5, 0.015
+STEADY, STEADY_APART = 3, 0.015
 """Settings of each quantity whose surroundings are looked at, and how far apart."""
+
+TOP = 2
+"""Best settings of each quantity that are kept, so that others stand in for one that is refuted."""
 
 CLOSE, FEWEST = 1.5 * TURN, 5
 """What is known of a setting's surroundings: how far they reach, and from how many runs."""
@@ -59,13 +62,23 @@ class Setting:
     median: float
     worst: float
 
+    @property
+    def firm(self) -> bool:
+        """Whether all turns lead to what is achievable, too."""
+        return self.worst > 0.0
+
 
 @dataclass(frozen=True)
 class Best:
-    """The best setting of a quantity, and the best of those that may be turned a little."""
+    """Settings for a quantity, those of the greatest value first."""
 
-    best: Setting | None
-    robust: Setting | None
+    settings: tuple[Setting, ...]
+
+    @property
+    def robust(self) -> tuple[Setting, ...]:
+        """Those that may be turned, the greatest median first."""
+        firm = (one for one in self.settings if one.firm)
+        return tuple(sorted(firm, key=lambda one: -one.median))
 
 
 class Search:
@@ -122,15 +135,12 @@ class Search:
         return apart(places[order[:MOST]], distance)
 
     def found(self, quantity: int) -> Best:
-        """The best settings of a quantity."""
-        top = self.ranked(quantity, STEADY_APART)[:1]
-        candidates = [self.around(place, quantity) for place in self._steady(quantity)]
-        firm = [one for one in candidates if one.worst > 0.0]
-        best = [self.around(place, quantity) for place in top]
-        return Best(
-            next((one for one in best if one.value > 0.0), None),
-            max(firm, key=lambda one: one.median, default=None),
-        )
+        """The best settings of a quantity, and those whose surroundings seem the best."""
+        places = [*self.ranked(quantity, STEADY_APART)[:TOP], *self._steady(quantity)]
+        every = dict.fromkeys(tuple(place.tolist()) for place in places)
+        settings = [self.around(np.array(place), quantity) for place in every]
+        achievable = (one for one in settings if one.value > 0.0)
+        return Best(tuple(sorted(achievable, key=lambda one: -one.value)))
 
     def around(self, place: Array, quantity: int) -> Setting:
         """A place with all its turns."""

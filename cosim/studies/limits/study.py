@@ -25,10 +25,10 @@ from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
 FIRST = Effort(512, (0.08, 0.05, 0.03, 0.02, 0.01, 0.006, 0.003), 4)
 """Of a rig's own circuit, and of the ideal current."""
 
-NEXT = Effort(64, (0.05, 0.03, 0.015, 0.008, 0.004), 4)
+NEXT = Effort(32, (0.04, 0.015, 0.005), 4)
 """Of a circuit that knows what was found for those before it."""
 
-OTHERS = Effort(64, (0.06, 0.03, 0.015, 0.006), 2)
+OTHERS = Effort(32, (0.04, 0.015, 0.005), 2)
 """Of the other rigs of an ensemble."""
 
 QUICK = Effort(32, (0.05, 0.02), 2)
@@ -116,7 +116,8 @@ def _search(
             rig.cases[limit.name, value] = Case(rig.settings, limit.machine(scene, value))
     searches: dict[Name, Search] = {}
     for number, (name, case) in enumerate(rig.cases.items()):
-        hints = [_as_hints(bench, found, rig.cases[n], case) for n, found in rig.found.items()]
+        kin = [n for n in rig.found if n in (OWN, IDEAL) or n[0] == name[0]]
+        hints = [_as_hints(bench, rig.found[n], rig.cases[n], case) for n in kin]
         effort = others if name not in (OWN, IDEAL) else first
         searches[name] = _searched(bench, case, (*seed, number), effort, hints)
         rig.found[name] = _best(searches[name])
@@ -142,7 +143,7 @@ def _best(search: Search) -> Bests:
 
 def _as_hints(bench: Bench, found: Bests, there: Case, here: Case) -> Array:
     """The settings found for one machine as places of another, with the same currents."""
-    both = [one for best in found for one in (best.best, best.robust) if one is not None]
+    both = [one for best in found for one in (*best.settings[:1], *best.robust[:1])]
     places = np.array([one.place for one in both]).reshape(-1, KNOB_COUNT)
     ratio = bench.amperes(there) / bench.amperes(here)
     places = np.unique(rounded(places * [ratio, 1.0, ratio]), axis=0)
