@@ -15,9 +15,8 @@ def motion(scene: Scene, recorder: Recorder) -> Motion:
     """What surface and part did, at the end of a run."""
     ram = None
     if scene.mechanics.actuator == "ram":
-        z_ram, z_surface = (recorder.mechanics.columns.index(f"z_{body}") for body in ("ram", "surface"))
-        last = recorder.rows[-1]
-        ram = float(last[z_ram] - last[z_surface])
+        last = dict(zip(recorder.mechanics.columns, recorder.rows[-1].tolist(), strict=True))
+        ram = last["z_ram"] - last["z_surface"]
     return Motion(
         recorder.at_end, recorder.at_settle, _extremes(scene, recorder), recorder.frames, ram
     )

@@ -72,6 +72,12 @@ class Bench:
             "run.settle": SETTLE, "run.duration": SETTLE + SPAN,
         }  # fmt: skip
         self.scene = changed(scene, own, f"scene {scene.name}")
+        tables = scene.as_dict()
+        self._unlike: Settings = {
+            key: value
+            for key, value in own.items()
+            if isinstance(value, bool) and tables["drive"][key.split(".")[1]] != value
+        }
         self._workers, self._progress = workers, progress
         self._asked, self._path = asked, journal
         self._stack = ExitStack()
@@ -148,7 +154,8 @@ class Bench:
 
     def command(self, settings: Settings) -> str:
         """The one command that repeats a run."""
-        every = {**settings, "run.output_step": float(settings["run.duration"]) / 2.0}
+        rows = {"run.output_step": float(settings["run.duration"]) / 2.0}
+        every = {**self._unlike, **settings, **rows}
         words = (f"--set {key}={_typed(value)}" for key, value in every.items())
         return f"cosim run {self._asked} {' '.join(words)}"
 

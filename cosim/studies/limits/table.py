@@ -43,6 +43,8 @@ class Limit:
     rung: str = "limited"
     more_is_better: bool = True
     """Whether lifting it means more of it."""
+    real: bool = True
+    """Whether its values can be had by changing a component of the device."""
 
     def factor(self, scene: Scene, value: float) -> float:
         """Times the scene's own value."""
@@ -131,11 +133,11 @@ LIMITS = (
     ),
     Limit(
         "back-EMF", "times", 1.0, lambda _: 1.0, (2.0, 0.5), 0.02,
-        _back_emf, more_is_better=False,
+        _back_emf, more_is_better=False, real=False,
     ),
     Limit(
         "coil heat", "W", 1.0, lambda _: CARLTON_HEAT, (0.9, 1.8, 7.0), inf,
-        lambda _, value: Machine(heat=value),
+        lambda _, value: Machine(heat=value), real=False,
     ),
     Limit(
         "gain-bandwidth", "kHz", 1e-3, _own("circuit.gain_bandwidth"), (1e5, 3e5), 1e7,
