@@ -49,7 +49,7 @@ def _run(arguments: Namespace) -> None:
     from cosim.errors import BadInput
     from cosim.scene import load
     from cosim.studies.limits.run import run
-    from cosim.studies.limits.study import checked, ensemble
+    from cosim.studies.limits.study import FULL, QUICK, checked, ensemble
 
     if arguments.seed < 0:
         raise BadInput(f"--seed {arguments.seed}: must be a whole number from 0.")
@@ -72,7 +72,7 @@ def _run(arguments: Namespace) -> None:
             rigs,
             there,
             seed=arguments.seed,
-            quick=arguments.quick,
+            efforts=QUICK if arguments.quick else FULL,
             workers=arguments.workers,
             told=told,
             progress=bar.refresh,

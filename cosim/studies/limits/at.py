@@ -1,12 +1,12 @@
 """What each limit costs at given settings: scenes with knobs of their own, such as the trials."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from cosim.scene import Scene, changed
 from cosim.scene.tables import KNOBS
 from cosim.studies.limits.runs import Bench
-from cosim.studies.limits.table import LIMITS, Limit, Settings
+from cosim.studies.limits.table import Limit, Settings
 from cosim.studies.sweep.point import Outcome
 
 WITHOUT = ("knobs' range", "coil heat")
@@ -26,12 +26,17 @@ class There:
     lifted: dict[str, Outcome] = field(default_factory=dict[str, Outcome])
 
 
-def at(bench: Bench, scenes: Sequence[Scene], told: Callable[[str], object]) -> list[There]:
+def at(
+    bench: Bench,
+    scenes: Sequence[Scene],
+    limits: Sequence[Limit],
+    told: Callable[[str], object],
+) -> list[There]:
     """Lift each limit at each scene's own setting, on the amplifier where it has the limit."""
     runs: dict[tuple[int, str, bool], Settings] = {}
     for number, scene in enumerate(scenes):
         own = _apart(scene, bench.scene)
-        for limit in judged():
+        for limit in judged(limits):
             rung = _rung(limit)
             runs[number, limit.name, False] = own | {"circuit.model": rung}
             machine = limit.machine(scene, limit.gone)
@@ -49,7 +54,7 @@ def at(bench: Bench, scenes: Sequence[Scene], told: Callable[[str], object]) -> 
         settings = runs[number, "supply voltage", False]
         heat = bench.mean_heat(settings, own.numbers) if own.numbers else float("nan")
         there = There(scene, own, heat)
-        for limit in judged():
+        for limit in judged(limits):
             there.against[limit.name] = outcomes[number, limit.name, False]
             there.lifted[limit.name] = outcomes[number, limit.name, True]
         found.append(there)
@@ -57,9 +62,9 @@ def at(bench: Bench, scenes: Sequence[Scene], told: Callable[[str], object]) -> 
     return found
 
 
-def judged() -> list[Limit]:
-    """The limits that act at a given setting."""
-    return [limit for limit in LIMITS if limit.name not in WITHOUT]
+def judged(limits: Iterable[Limit]) -> list[Limit]:
+    """Those of the limits that act at a given setting."""
+    return [limit for limit in limits if limit.name not in WITHOUT]
 
 
 def _rung(limit: Limit) -> str:

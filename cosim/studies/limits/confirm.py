@@ -15,7 +15,7 @@ from cosim.studies.limits.quantities import QUANTITIES, scores
 from cosim.studies.limits.runs import Bench, Case
 from cosim.studies.limits.search import Setting
 from cosim.studies.limits.study import IDEAL, OWN, Bests, Name, Study
-from cosim.studies.limits.table import LIMITS, Machine, Settings
+from cosim.studies.limits.table import Machine, Settings
 
 WITHIN = 0.02
 """Relative difference of a confirmed value."""
@@ -148,7 +148,7 @@ def judged(bench: Bench, study: Study, points: Points, told: Callable[[str], obj
     found: Points = {}
     here = changed(bench.scene, rig.settings, rig.name)
     asked: dict[Name, Machine] = {}
-    for limit in LIMITS:
+    for limit in study.limits:
         if limit.rung == "amplifier":
             asked[limit.name, limit.own(here)] = Machine()
             for value in (*limit.values, limit.gone):

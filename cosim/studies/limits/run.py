@@ -8,8 +8,8 @@ from cosim.studies.limits.at import at
 from cosim.studies.limits.confirm import confirmed, judged
 from cosim.studies.limits.report import page
 from cosim.studies.limits.runs import Bench
-from cosim.studies.limits.study import machines, study
-from cosim.studies.limits.table import Settings
+from cosim.studies.limits.study import FULL, Efforts, machines, study
+from cosim.studies.limits.table import LIMITS, Limit, Settings
 from cosim.studies.sweep.pool import workers_asked
 
 JOURNAL = "limits.journal"
@@ -23,7 +23,8 @@ def run(
     there: Sequence[Scene] = (),
     *,
     seed: int = 0,
-    quick: bool = False,
+    efforts: Efforts = FULL,
+    limits: Sequence[Limit] = LIMITS,
     workers: int | None = None,
     told: Callable[[int, str], object] = lambda steps, name: None,
     progress: Callable[[], object] = lambda: None,
@@ -34,16 +35,16 @@ def run(
     ``asked`` are the words after ``cosim run`` that stand for the scene; ``told`` hears of each
     step, and how many there are, ``progress`` of each run. Raises BadInput.
     """
-    steps = machines(True) + len(rigs) * machines(False) + 3 + len(there)
+    steps = machines(limits, True) + len(rigs) * machines(limits, False) + 3 + len(there)
     journal = folder / JOURNAL
 
     def done(name: str) -> None:
         told(steps, name)
 
     with Bench(scene, asked, journal, workers_asked(workers), progress) as bench:
-        found = study(bench, rigs, seed, quick, done)
+        found = study(bench, rigs, limits, seed, efforts, done)
         points = confirmed(bench, found, done)
         points |= judged(bench, found, points, done)
-        words = page.write(folder, bench, found, points, at(bench, there, done))
+        words = page.write(folder, bench, found, points, at(bench, there, limits, done))
     journal.unlink()
     return words

@@ -22,16 +22,26 @@ from cosim.studies.limits.runs import Bench, Case
 from cosim.studies.limits.search import Best, Effort, Search
 from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
 
-FIRST = Effort(512, (0.08, 0.05, 0.03, 0.02, 0.01, 0.006, 0.003), 4)
-"""Of a rig's own circuit, and of the ideal current."""
 
-NEXT = Effort(32, (0.04, 0.015, 0.005), 4)
-"""Of a circuit that knows what was found for those before it."""
+@dataclass(frozen=True)
+class Efforts:
+    """What the searches may cost."""
 
-OTHERS = Effort(32, (0.04, 0.015, 0.005), 2)
-"""Of the other rigs of an ensemble."""
+    first: Effort
+    """Of the scene's own circuit, and of the ideal current."""
+    next: Effort
+    """Of a circuit that knows what was found for those before it."""
+    others: Effort
+    """Of the other rigs of an ensemble."""
 
-QUICK = Effort(32, (0.05, 0.02), 2)
+
+FULL = Efforts(
+    Effort(512, (0.08, 0.05, 0.03, 0.02, 0.01, 0.006, 0.003), 4),
+    Effort(32, (0.04, 0.015, 0.005), 4),
+    Effort(32, (0.04, 0.015, 0.005), 2),
+)
+_COARSE = Effort(32, (0.05, 0.02), 2)
+QUICK = Efforts(Effort(128, (0.05, 0.02), 2), _COARSE, _COARSE)
 
 MOST_RIGS = 4
 """Of an ensemble, spread over its order, which is that of their cost."""
@@ -63,26 +73,27 @@ class Study:
     """
 
     scene: Scene
-    seed: int
+    limits: Sequence[Limit]
     rigs: list[Rig]
     again: Bests
 
 
-def searched(limits: Iterable[Limit] = LIMITS) -> list[Limit]:
+def searched(limits: Iterable[Limit]) -> list[Limit]:
     """The limits that the cheapest circuit has, so that a search can be made for each value."""
     return [limit for limit in limits if limit.rung == "limited"]
 
 
-def machines(all_values: bool) -> int:
+def machines(limits: Iterable[Limit], all_values: bool) -> int:
     """How many machines are searched on a rig."""
-    return 2 + sum(1 + all_values * len(limit.values) for limit in searched())
+    return 2 + sum(1 + all_values * len(limit.values) for limit in searched(limits))
 
 
 def study(
     bench: Bench,
     rigs: Sequence[Settings],
+    limits: Sequence[Limit] = LIMITS,
     seed: int = 0,
-    quick: bool = False,
+    efforts: Efforts = FULL,
     told: Callable[[str], object] = lambda name: None,
 ) -> Study:
     """Search the machines of the bench's scene, and those of ``rigs`` with each limit lifted.
@@ -91,14 +102,27 @@ def study(
     """
     found = []
     for number, settings in enumerate([{}, *rigs]):
-        first, others = (QUICK, QUICK) if quick else (FIRST, OTHERS if number else NEXT)
         rig = Rig("its own rig" if number == 0 else f"rig {number}", settings)
-        _search(bench, rig, (seed, number), first if number == 0 else others, others, told)
+        scene = changed(bench.scene, rig.settings, rig.name)
+        rig.cases = _cases(scene, settings, limits, all_values=number == 0)
+        first, others = efforts.first, efforts.next
+        if number:
+            first = others = efforts.others
+        _search(bench, rig, (seed, number), first, others, told)
         found.append(rig)
-    own = found[0].cases[OWN]
-    anew = _searched(bench, own, (seed + 1, 0, 0), QUICK if quick else FIRST, [])
+    anew = _searched(bench, found[0].cases[OWN], (seed + 1, 0, 0), efforts.first, [])
     told("own, another seed")
-    return Study(bench.scene, seed, found, _best(anew))
+    return Study(bench.scene, limits, found, _best(anew))
+
+
+def _cases(
+    scene: Scene, rig: Settings, limits: Iterable[Limit], all_values: bool
+) -> dict[Name, Case]:
+    cases = {OWN: Case(rig, Machine()), IDEAL: Case(rig, Machine(), "ideal")}
+    for limit in searched(limits):
+        for value in (*limit.values, limit.gone) if all_values else (limit.gone,):
+            cases[limit.name, value] = Case(rig, limit.machine(scene, value))
+    return cases
 
 
 def _search(
@@ -109,11 +133,6 @@ def _search(
     others: Effort,
     told: Callable[[str], object],
 ) -> None:
-    scene = changed(bench.scene, rig.settings, rig.name)
-    rig.cases = {OWN: Case(rig.settings, Machine()), IDEAL: Case(rig.settings, Machine(), "ideal")}
-    for limit in searched():
-        for value in (*limit.values, limit.gone) if seed[1] == 0 else (limit.gone,):
-            rig.cases[limit.name, value] = Case(rig.settings, limit.machine(scene, value))
     searches: dict[Name, Search] = {}
     for number, (name, case) in enumerate(rig.cases.items()):
         kin = [n for n in rig.found if n in (OWN, IDEAL) or n[0] == name[0]]

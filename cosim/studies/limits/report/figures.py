@@ -13,12 +13,10 @@ from cosim.studies.limits.confirm import Point, Points
 from cosim.studies.limits.quantities import QUANTITIES
 from cosim.studies.limits.report.ranking import BINDS, NOTHING, Change, height, largest, name_of
 from cosim.studies.limits.report.words import NUMBER, listed
-from cosim.studies.limits.study import IDEAL, OWN, Study
-from cosim.studies.limits.table import LIMITS, Limit, needed_acceleration
+from cosim.studies.limits.study import IDEAL, OWN, Study, searched
+from cosim.studies.limits.table import Limit, needed_acceleration
 from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, panels
 from cosim.studies.tables import brief
-
-BY_NAME = {limit.name: limit for limit in LIMITS}
 
 ANSWER = ("a_camera", "a_free", "v_up")
 """What the first figure shows."""
@@ -40,13 +38,14 @@ def draw(
     frontier(folder / names[2], study, points, transport, False)
     if there:
         names.append("limits-settings.png")
-        costs(folder / names[-1], there)
+        costs(folder / names[-1], there, judged(study.limits))
     return names
 
 
 def answer(path: Path, study: Study, points: Points, found: Sequence[Change]) -> None:
     """What is achievable with each limit at each value: a row a limit, a panel a quantity."""
     order = list(largest(found))
+    by_name = {limit.name: limit for limit in study.limits}
     note = (
         "Filled: best setting of the knobs, found anew for each value; open: robust (median over "
         "turns of ±2 %). Black line: the device as it is; blue: with the limit eased or lifted; "
@@ -56,7 +55,7 @@ def answer(path: Path, study: Study, points: Points, found: Sequence[Change]) ->
     for axis, name in zip(axes, ANSWER, strict=True):
         quantity, number = QUANTITIES[NUMBER[name]], NUMBER[name]
         for place, limit_name in enumerate(reversed(order)):
-            _row(axis, place, study, points, BY_NAME[limit_name], number)
+            _row(axis, place, study, points, by_name[limit_name], number)
         for kind, style in (("best", "-"), ("robust", ":")):
             own = height(points.get((OWN, number, kind))) * quantity.scale
             if isfinite(own):
@@ -153,7 +152,7 @@ def frontier(
     falls: bool,
 ) -> None:
     """A panel a limit: what is achievable over its value, from the tightest to none."""
-    limits = [limit for limit in LIMITS if limit.rung == "limited"]
+    limits = searched(study.limits)
     what = "acceleration" if falls else "transport"
     note = (
         "Line and dots: best setting of the knobs; band: the robust setting, from the worst to the "
@@ -162,8 +161,11 @@ def frontier(
         + "Short grey lines: other rigs, from their own to the lifted limit."
     )
     words = f"Achievable {what} over the value of each limit, from the tightest to none"
-    figure, axes = panels(words, note, (13.0, 9.6), 3, 3, sharey=True)
-    for axis, limit in zip(axes, limits, strict=True):
+    rows = -(-len(limits) // 3)
+    figure, axes = panels(words, note, (13.0, 2.9 * rows + 0.9), rows, 3, sharey=True)
+    for axis in axes[len(limits) :]:
+        axis.remove()
+    for axis, limit in zip(axes, limits, strict=False):
         own = limit.own(study.scene)
         values = sorted({own, *limit.values, limit.gone}, reverse=not limit.more_is_better)
         for name, (label, color) in lines.items():
@@ -215,9 +217,8 @@ def _other_rigs(
             axis.plot(ends, heights, color="0.6", lw=0.8, marker=".", ms=3, zorder=1)
 
 
-def costs(path: Path, there: Sequence[There]) -> None:
+def costs(path: Path, there: Sequence[There], limits: Sequence[Limit]) -> None:
     """At given settings: the change of v_average without each limit."""
-    limits = judged()
     table = np.array(
         [
             [

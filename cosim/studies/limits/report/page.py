@@ -11,10 +11,8 @@ from cosim.studies.limits.report import figures, words
 from cosim.studies.limits.report.ranking import Change, changes, height
 from cosim.studies.limits.runs import Bench
 from cosim.studies.limits.study import IDEAL, OWN, Study
-from cosim.studies.limits.table import LIMITS, Limit, needed_acceleration
+from cosim.studies.limits.table import Limit, needed_acceleration
 from cosim.studies.tables import Row, write_csv, write_page
-
-BY_NAME = {limit.name: limit for limit in LIMITS}
 
 
 def write(folder: Path, bench: Bench, study: Study, points: Points, there: Sequence[There]) -> str:
@@ -33,7 +31,7 @@ def write(folder: Path, bench: Bench, study: Study, points: Points, there: Seque
     }
     if there:
         tables["What each limit costs at given settings: change of v_average without it, mm/s"] = [
-            at_row(one) for one in there
+            at_row(one, study.limits) for one in there
         ]
     commands = [
         {
@@ -53,7 +51,7 @@ def write(folder: Path, bench: Bench, study: Study, points: Points, there: Seque
 def row(bench: Bench, study: Study, point: Point) -> Row:
     """A point of a frontier, as a row of the table."""
     quantity, setting = QUANTITIES[point.quantity], point.setting
-    limit = BY_NAME.get(point.name[0])
+    limit = next((limit for limit in study.limits if limit.name == point.name[0]), None)
     scale = quantity.scale
     return {
         "limit": point.name[0],
@@ -125,11 +123,11 @@ def lifted(found: Sequence[Change]) -> list[Row]:
     return rows
 
 
-def at_row(there: There) -> Row:
+def at_row(there: There, limits: Sequence[Limit]) -> Row:
     """A scene's own setting and what it would do without each limit."""
     own = there.own.numbers.get("v_average", nan) * 1e3
     row: Row = {"scene": there.scene.name, "v_average [mm/s]": own, "coil's heat [W]": there.heat}
-    for limit in judged():
+    for limit in judged(limits):
         row[limit.name] = cost(there, limit) * 1e3
     return row
 

@@ -9,7 +9,7 @@ from cosim.studies.limits.confirm import KINDS, Point, Points
 from cosim.studies.limits.quantities import QUANTITIES
 from cosim.studies.limits.search import Best
 from cosim.studies.limits.study import OWN, Name, Study
-from cosim.studies.limits.table import LIMITS, Limit
+from cosim.studies.limits.table import Limit
 
 LEAST = 0.02
 """Relative change that matters."""
@@ -82,7 +82,7 @@ def name_of(scene: Scene, limit: Limit, value: float) -> Name:
 def changes(study: Study, points: Points) -> list[Change]:
     """What lifting each limit does to each quantity."""
     found = []
-    for limit in LIMITS:
+    for limit in study.limits:
         for quantity in range(len(QUANTITIES)):
             best, robust = (
                 [
@@ -164,7 +164,7 @@ def steps(study: Study, points: Points, quantity: int, kind: str) -> list[Step]:
     """Real changes for the better of a quantity, the largest gain first."""
     own = height(points.get((OWN, quantity, kind)))
     found = []
-    for limit in (limit for limit in LIMITS if limit.real):
+    for limit in (limit for limit in study.limits if limit.real):
         for value in limit.values:
             better = (value > limit.own(study.scene)) is limit.more_is_better
             there = height(points.get(((limit.name, value), quantity, kind)))
