@@ -72,7 +72,7 @@ def test_sense_resistor_leaves_the_current(tmp_path: Path) -> None:
         every = [Case({}, machine, "ideal").settings(place) for machine in machines]
         own, less = made.outcomes(every)
     for name in ("v_average", "current_max"):
-        assert less.numbers[name] == pytest.approx(own.numbers[name], rel=1e-6)
+        assert less.numbers[name] == pytest.approx(own.numbers[name], rel=1e-5)
 
 
 def test_needed_acceleration() -> None:
@@ -180,20 +180,17 @@ def ridge(places: Array) -> tuple[Array, Any]:
     first = np.exp(-((across / 0.05) ** 2) - (along / 0.5) ** 2 - (up / 0.1) ** 2)
     first *= 1.0 + 0.05 * np.cos(80.0 * along)
     second = np.exp(-((places - 0.3) ** 2).sum(axis=1) / 0.02)
-    return np.stack([first, second], axis=1), places[:, 0] > 0.25
+    return np.stack([first, second], axis=1), places[:, 0] > 0.35
 
 
 def test_search_climbs_ridges_and_keeps_out_of_what_is_forbidden() -> None:
-    axis = np.linspace(0.0, 1.0, 101)
-    grid = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
-    scores, borne = ridge(grid)
-    best = np.where(borne[:, None], scores, -np.inf).max(axis=0)
+    best = 1.05, np.exp(-(0.05**2) / 0.02)  # in the middle; where what is allowed begins
     for seed in range(3):
         search = Search(ridge, (seed,))
-        search.run(Effort(256, (0.08, 0.04, 0.02, 0.01), 4), np.empty((0, 3)))
+        search.run(study.FULL.first, np.empty((0, 3)))
         for number in range(2):
             top = search.found(number).settings[0]
-            assert top.place[0] > 0.25 and top.value >= 0.97 * best[number]
+            assert top.place[0] > 0.35 and 0.95 * best[number] <= top.value <= best[number]
 
 
 @pytest.mark.usefixtures("brief")

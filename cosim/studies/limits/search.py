@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from cosim.arrays import Array
 from cosim.studies.limits.knobs import KNOB_COUNT, TURN, corners, faces, rounded
-from cosim.studies.tune.search import apart
 
 STARTS, APART = 3, 0.1
-"""Starts of each quantity, and how far apart, as a share of a knob's turn."""
+"""Starts of each quantity, and how far apart, as a share of a knob's turn; half-way through, the
+best of them is left."""
 
 ELITE, NEAR, INFLATION = 6, 0.1, 2.0
 """Those settings: how many, from how far, and by how much their covariance is blown up."""
@@ -88,12 +88,14 @@ class Search:
         self._ask, self._random = ask, np.random.default_rng(seed)
         self._known: dict[tuple[float, ...], Array] = {}
         self._borne: dict[tuple[float, ...], bool] = {}
+        self._arrays: tuple[Array, Array] | None = None
 
     def scores(self, places: Array) -> Array:
         """The scores of places (rows), each asked for once."""
         rows = [tuple(row.tolist()) for row in places]
         new = [row for row in dict.fromkeys(rows) if row not in self._known]
         if new:
+            self._arrays = None
             found, borne = self._ask(np.array(new))
             self._known.update(zip(new, found, strict=True))
             self._borne.update(zip(new, borne.tolist(), strict=True))
@@ -105,11 +107,13 @@ class Search:
 
         sobol = qmc.Sobol(KNOB_COUNT, rng=self._random).random(effort.design)
         found = self.scores(rounded(np.vstack([hints.reshape(-1, KNOB_COUNT), sobol])))
-        for spread in effort.spreads:
+        for number, spread in enumerate(effort.spreads):
+            wide = 2 * number < len(effort.spreads)
+            starts, half = (STARTS, effort.samples // 2) if wide else (1, effort.samples)
             clouds = [np.empty((0, KNOB_COUNT))]
             for quantity in range(found.shape[1]):
-                starts = [*self.ranked(quantity, APART)[:STARTS], *self._steady(quantity)[:1]]
-                clouds += [self._cloud(p, quantity, spread, effort.samples // 2) for p in starts]
+                places = [*self.ranked(quantity, APART, starts), *self._steady(quantity)[:1]]
+                clouds += [self._cloud(p, quantity, spread, half) for p in places]
             self.scores(np.vstack(clouds))
 
     def _cloud(self, start: Array, quantity: int, spread: float, half: int) -> Array:
@@ -127,16 +131,16 @@ class Search:
         ]
         return rounded(start + np.vstack(steps))
 
-    def ranked(self, quantity: int, distance: float) -> Array:
-        """The places with a score, the best first, each ``distance`` from those before it."""
+    def ranked(self, quantity: int, distance: float, count: int) -> Array:
+        """Places with a score, the best first, each ``distance`` from those before it."""
         places, column = self._column(quantity)
         order = np.argsort(-column, kind="stable")
         order = order[np.isfinite(column[order])]
-        return apart(places[order[:MOST]], distance)
+        return _apart(places[order[:MOST]], distance, count)
 
     def found(self, quantity: int) -> Best:
         """The best settings of a quantity, and those whose surroundings seem the best."""
-        places = [*self.ranked(quantity, STEADY_APART)[:TOP], *self._steady(quantity)]
+        places = [*self.ranked(quantity, STEADY_APART, TOP), *self._steady(quantity)]
         every = dict.fromkeys(tuple(place.tolist()) for place in places)
         settings = [self.around(np.array(place), quantity) for place in every]
         achievable = (one for one in settings if one.value > 0.0)
@@ -160,9 +164,24 @@ class Search:
         ]
         best = order[np.argsort(-np.array(quarter), kind="stable")]
         best = best[column[best] > 0.0]
-        return apart(places[best], STEADY_APART)[:STEADY]
+        return _apart(places[best], STEADY_APART, STEADY)
 
     def _column(self, quantity: int) -> tuple[Array, Array]:
-        every = np.array(list(self._known.values()))[:, quantity]
-        borne = np.array(list(self._borne.values()))
-        return np.array(list(self._known)), np.where(borne, every, -np.inf)
+        """All places, and their scores of a quantity; -inf where they are not bearable."""
+        if self._arrays is None:
+            every = np.array(list(self._known.values()))
+            every[~np.array(list(self._borne.values()))] = -np.inf
+            self._arrays = np.array(list(self._known)), every
+        places, every = self._arrays
+        return places, every[:, quantity]
+
+
+def _apart(places: Array, distance: float, count: int) -> Array:
+    """The first of ``places`` (rows), and those after it that are ``distance`` from all kept."""
+    kept: list[Array] = []
+    for place in places:
+        if len(kept) == count:
+            break
+        if not kept or np.abs(np.array(kept) - place).max(axis=1).min() >= distance:
+            kept.append(place)
+    return np.array(kept).reshape(-1, KNOB_COUNT)

@@ -48,9 +48,9 @@ class Change:
             for changes, noise in zip((self.best, self.robust), self.noise, strict=True)
             if (known := [change for change in changes if isfinite(change)])
         ]
-        if any(low > noise for low, _, noise in sure) and all(h > -n for _, h, n in sure):
+        if any(low > noise for low, _, noise in sure) and all(low > -n for low, _, n in sure):
             return BINDS
-        if any(high < -noise for _, high, noise in sure) and all(a < n for a, _, n in sure):
+        if any(high < -noise for _, high, noise in sure) and all(high < n for _, high, n in sure):
             return HELPS
         return UNTOLD
 
