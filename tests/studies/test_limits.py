@@ -149,7 +149,7 @@ def test_search_finds_what_an_exhaustive_grid_finds(tmp_path: Path) -> None:
         found = [search.found(number) for number in range(len(QUANTITIES))]
         again = Search(lambda places: made.scores(case, places), (0,))
         again.run(Effort(64, (0.08, 0.03, 0.01), 4), np.empty((0, 3)))
-        assert again.found(NUMBER["v_up"]) == found[NUMBER["v_up"]]
+        assert [again.found(number) for number in range(len(QUANTITIES))] == found
         for number, one in enumerate(found):
             if best[number] > 0.0:
                 assert one.settings[0].value >= 0.98 * best[number], QUANTITIES[number].name
@@ -190,7 +190,7 @@ def test_search_climbs_ridges_and_keeps_out_of_what_is_forbidden() -> None:
         search.run(study.FULL.first, np.empty((0, 3)))
         for number in range(2):
             top = search.found(number).settings[0]
-            assert top.place[0] > 0.35 and 0.95 * best[number] <= top.value <= best[number]
+            assert top.place[0] > 0.35 and 0.93 * best[number] <= top.value <= best[number]
 
 
 @pytest.mark.usefixtures("brief")
