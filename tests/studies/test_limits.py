@@ -18,13 +18,13 @@ from cosim.errors import BadInput
 from cosim.files.picture import Picture
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.limits import knobs, runs, study
-from cosim.studies.limits.quantities import QUANTITIES
+from cosim.studies.limits.find import knobs, runs, study
+from cosim.studies.limits.find.quantities import QUANTITIES
+from cosim.studies.limits.find.runs import Bench, Case
+from cosim.studies.limits.find.search import Effort, Search
+from cosim.studies.limits.find.table import LIMITS, Machine, needed_acceleration
 from cosim.studies.limits.report.ranking import BINDS, NOTHING, UNTOLD, Change
 from cosim.studies.limits.run import JOURNAL, run
-from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import Effort, Search
-from cosim.studies.limits.table import LIMITS, Machine, needed_acceleration
 from tests.studies.test_figures import assert_legible
 
 BY_NAME = {limit.name: limit for limit in LIMITS}

@@ -4,12 +4,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from cosim.scene import Scene
-from cosim.studies.limits.at import at
-from cosim.studies.limits.confirm import confirmed, judged
+from cosim.studies.limits.find.at import at
+from cosim.studies.limits.find.confirm import confirmed, judged
+from cosim.studies.limits.find.runs import Bench
+from cosim.studies.limits.find.study import FULL, Efforts, machines, study
+from cosim.studies.limits.find.table import LIMITS, Limit, Settings
 from cosim.studies.limits.report import page
-from cosim.studies.limits.runs import Bench
-from cosim.studies.limits.study import FULL, Efforts, machines, study
-from cosim.studies.limits.table import LIMITS, Limit, Settings
 from cosim.studies.sweep.pool import workers_asked
 
 JOURNAL = "limits.journal"

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.studies.limits.at import There, judged
-from cosim.studies.limits.confirm import Point, Points
-from cosim.studies.limits.quantities import QUANTITIES
+from cosim.studies.limits.find.at import There, judged
+from cosim.studies.limits.find.confirm import Point, Points
+from cosim.studies.limits.find.quantities import QUANTITIES
+from cosim.studies.limits.find.study import IDEAL, OWN, Study, searched
+from cosim.studies.limits.find.table import Limit, needed_acceleration
 from cosim.studies.limits.report.ranking import BINDS, NOTHING, Change, height, largest, name_of
 from cosim.studies.limits.report.words import NUMBER, listed
-from cosim.studies.limits.study import IDEAL, OWN, Study, searched
-from cosim.studies.limits.table import Limit, needed_acceleration
 from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, panels
 from cosim.studies.tables import brief
 

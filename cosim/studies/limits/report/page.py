@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from math import nan
 from pathlib import Path
 
-from cosim.studies.limits.at import There, judged
-from cosim.studies.limits.confirm import Point, Points
-from cosim.studies.limits.quantities import QUANTITIES
+from cosim.studies.limits.find.at import There, judged
+from cosim.studies.limits.find.confirm import Point, Points
+from cosim.studies.limits.find.quantities import QUANTITIES
+from cosim.studies.limits.find.runs import Bench
+from cosim.studies.limits.find.study import IDEAL, OWN, Study
+from cosim.studies.limits.find.table import Limit, needed_acceleration
 from cosim.studies.limits.report import figures, words
 from cosim.studies.limits.report.ranking import Change, changes, height
-from cosim.studies.limits.runs import Bench
-from cosim.studies.limits.study import IDEAL, OWN, Study
-from cosim.studies.limits.table import Limit, needed_acceleration
 from cosim.studies.tables import Row, write_csv, write_page
 
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from math import isfinite, nan
 
 from cosim.scene import Scene
-from cosim.studies.limits.confirm import KINDS, Point, Points
-from cosim.studies.limits.quantities import QUANTITIES
-from cosim.studies.limits.search import Best
-from cosim.studies.limits.study import OWN, Name, Study
-from cosim.studies.limits.table import Limit
+from cosim.studies.limits.find.confirm import KINDS, Point, Points
+from cosim.studies.limits.find.quantities import QUANTITIES
+from cosim.studies.limits.find.search import Best
+from cosim.studies.limits.find.study import OWN, Name, Study
+from cosim.studies.limits.find.table import Limit
 
 LEAST = 0.02
 """Relative change that matters."""

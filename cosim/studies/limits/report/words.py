@@ -4,8 +4,10 @@ from collections.abc import Sequence
 from math import isfinite
 
 from cosim.simulation.guards import LM348_SUPPLY, OPA548_SUPPLY
-from cosim.studies.limits.confirm import Point, Points
-from cosim.studies.limits.quantities import QUANTITIES
+from cosim.studies.limits.find.confirm import Point, Points
+from cosim.studies.limits.find.quantities import QUANTITIES
+from cosim.studies.limits.find.study import IDEAL, OWN, Study
+from cosim.studies.limits.find.table import Limit, needed_acceleration
 from cosim.studies.limits.report.ranking import (
     BINDS,
     HELPS,
@@ -17,8 +19,6 @@ from cosim.studies.limits.report.ranking import (
     largest,
     steps,
 )
-from cosim.studies.limits.study import IDEAL, OWN, Study
-from cosim.studies.limits.table import Limit, needed_acceleration
 from cosim.studies.tables import brief
 
 ASKED = ("a_camera", "a_free", "v_up", "v_down")

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 from cosim.scene import Scene, changed
 from cosim.scene.tables import KNOBS
-from cosim.studies.limits.runs import Bench
-from cosim.studies.limits.table import Limit, Settings
+from cosim.studies.limits.find.runs import Bench
+from cosim.studies.limits.find.table import Limit, Settings
 from cosim.studies.sweep.point import Outcome
 
 WITHOUT = ("knobs' range", "coil heat")

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from cosim.arrays import Array
 from cosim.scene import Scene, changed, firmware
 from cosim.simulation.guards import coil_heat
-from cosim.studies.limits import knobs
-from cosim.studies.limits.quantities import NEEDED, QUANTITIES, Numbers, scores
-from cosim.studies.limits.table import Machine, Settings
+from cosim.studies.limits.find import knobs
+from cosim.studies.limits.find.quantities import NEEDED, QUANTITIES, Numbers, scores
+from cosim.studies.limits.find.table import Machine, Settings
 from cosim.studies.sweep.batch import runner
 from cosim.studies.sweep.journal import Journal
 from cosim.studies.sweep.point import Number, Outcome

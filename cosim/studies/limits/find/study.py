@@ -16,11 +16,11 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.scene import Scene, changed
-from cosim.studies.limits.knobs import KNOB_COUNT, rounded
-from cosim.studies.limits.quantities import QUANTITIES
-from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import Best, Effort, Search
-from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
+from cosim.studies.limits.find.knobs import KNOB_COUNT, rounded
+from cosim.studies.limits.find.quantities import QUANTITIES
+from cosim.studies.limits.find.runs import Bench, Case
+from cosim.studies.limits.find.search import Best, Effort, Search
+from cosim.studies.limits.find.table import LIMITS, Limit, Machine, Settings
 
 
 @dataclass(frozen=True)
