@@ -24,7 +24,7 @@ from cosim.studies.limits.find.runs import Bench, Case
 from cosim.studies.limits.find.search import Effort, Search
 from cosim.studies.limits.find.table import LIMITS, Machine, needed_acceleration
 from cosim.studies.limits.report.ranking import BINDS, NOTHING, UNTOLD, Change
-from cosim.studies.limits.run import JOURNAL, run
+from cosim.studies.limits.report.run import JOURNAL, run
 from tests.studies.test_figures import assert_legible
 
 BY_NAME = {limit.name: limit for limit in LIMITS}
