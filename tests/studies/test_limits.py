@@ -18,13 +18,13 @@ from cosim.errors import BadInput
 from cosim.files.picture import Picture
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.limits.find import knobs, runs, study
-from cosim.studies.limits.find.quantities import QUANTITIES
-from cosim.studies.limits.find.runs import Bench, Case
-from cosim.studies.limits.find.search import Effort, Search
-from cosim.studies.limits.find.table import LIMITS, Machine, needed_acceleration
-from cosim.studies.limits.report.ranking import BINDS, NOTHING, UNTOLD, Change
-from cosim.studies.limits.report.run import JOURNAL, run
+from cosim.studies.limits import aims, runs, study
+from cosim.studies.limits.aims import QUANTITIES
+from cosim.studies.limits.answer import BINDS, NOTHING, UNTOLD, Change
+from cosim.studies.limits.report import JOURNAL, run
+from cosim.studies.limits.runs import Bench, Case
+from cosim.studies.limits.search import Effort, Search
+from cosim.studies.limits.table import LIMITS, Machine, needed_acceleration
 from tests.studies.test_figures import assert_legible
 
 BY_NAME = {limit.name: limit for limit in LIMITS}
@@ -87,7 +87,7 @@ def test_the_cube_is_the_range_of_the_potentiometers() -> None:
         pots = dict(zip(("pot_max", "pot_frequency", "pot_offset"), place, strict=True))
         drive = load("reference", {f"drive.{name}": x for name, x in pots.items()}).drive
         # A potentiometer is read in 1024 steps.
-        for key, value in knobs.settings(np.array(place)).items():
+        for key, value in aims.settings(np.array(place)).items():
             step = 0.1 if key == "drive.frequency" else 0.016
             assert value == pytest.approx(getattr(drive, key.split(".")[1]), abs=step)
 
@@ -142,7 +142,7 @@ def test_search_finds_what_an_exhaustive_grid_finds(tmp_path: Path) -> None:
     grid = np.stack(np.meshgrid(*[np.linspace(0.04, 0.96, 7)] * 3), axis=-1).reshape(-1, 3)
     case = Case({}, Machine())
     with bench(tmp_path) as made:
-        scores, borne = made.scores(case, knobs.rounded(grid))
+        scores, borne = made.scores(case, aims.rounded(grid))
         search = Search(lambda places: made.scores(case, places), (0,))
         search.run(Effort(64, (0.08, 0.03, 0.01), 4), np.empty((0, 3)))
         best = np.where(borne[:, None], scores, -np.inf).max(axis=0)
@@ -195,7 +195,7 @@ def test_search_climbs_ridges_and_keeps_out_of_what_is_forbidden() -> None:
 
 @pytest.mark.usefixtures("brief")
 def test_a_killed_study_goes_on(tmp_path: Path) -> None:
-    places = knobs.rounded(np.random.default_rng(0).random((12, 3)))
+    places = aims.rounded(np.random.default_rng(0).random((12, 3)))
     case, count = Case({}, Machine()), [0]
 
     def tick() -> None:

@@ -48,8 +48,8 @@ def _options(parser: ArgumentParser) -> None:
 def _run(arguments: Namespace) -> None:
     from cosim.errors import BadInput
     from cosim.scene import load
-    from cosim.studies.limits.find.study import FULL, QUICK, checked, ensemble
-    from cosim.studies.limits.report.run import run
+    from cosim.studies.limits.report import run
+    from cosim.studies.limits.study import FULL, QUICK, checked, ensemble
 
     if arguments.seed < 0:
         raise BadInput(f"--seed {arguments.seed}: must be a whole number from 0.")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.arrays import Array
-from cosim.studies.limits.find.knobs import KNOB_COUNT, TURN, corners, faces, rounded
+from cosim.studies.limits.aims import KNOB_COUNT, TURN, corners, faces, rounded
 
 STARTS, APART = 3, 0.1
 """Starts of each quantity, and how far apart, as a share of a knob's turn; half-way through, the

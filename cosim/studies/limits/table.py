@@ -6,7 +6,7 @@ from math import inf
 
 from cosim.scene import Scene
 from cosim.simulation.guards import CARLTON_HEAT
-from cosim.studies.limits.find.knobs import RANGE
+from cosim.studies.limits.aims import RANGE
 
 Settings = dict[str, float | int | str]
 """Values of keys, ``table.key``, SI."""

@@ -11,11 +11,11 @@ from math import nan
 import numpy as np
 
 from cosim.scene import changed
-from cosim.studies.limits.find.quantities import QUANTITIES, scores
-from cosim.studies.limits.find.runs import Bench, Case
-from cosim.studies.limits.find.search import Setting
-from cosim.studies.limits.find.study import IDEAL, OWN, Bests, Name, Study
-from cosim.studies.limits.find.table import Machine, Settings
+from cosim.studies.limits.aims import QUANTITIES, scores
+from cosim.studies.limits.runs import Bench, Case
+from cosim.studies.limits.search import Setting
+from cosim.studies.limits.study import IDEAL, OWN, Bests, Name, Study
+from cosim.studies.limits.table import Machine, Settings
 
 WITHIN = 0.02
 """Relative difference of a confirmed value."""

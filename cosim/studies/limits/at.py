@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 from cosim.scene import Scene, changed
 from cosim.scene.tables import KNOBS
-from cosim.studies.limits.find.runs import Bench
-from cosim.studies.limits.find.table import Limit, Settings
+from cosim.studies.limits.runs import Bench
+from cosim.studies.limits.table import Limit, Settings
 from cosim.studies.sweep.point import Outcome
 
 WITHOUT = ("knobs' range", "coil heat")
@@ -36,7 +36,7 @@ def at(
     runs: dict[tuple[int, str, bool], Settings] = {}
     for number, scene in enumerate(scenes):
         own = _apart(scene, bench.scene)
-        for limit in judged(limits):
+        for limit in acting(limits):
             rung = _rung(limit)
             runs[number, limit.name, False] = own | {"circuit.model": rung}
             machine = limit.machine(scene, limit.gone)
@@ -54,7 +54,7 @@ def at(
         settings = runs[number, "supply voltage", False]
         heat = bench.mean_heat(settings, own.numbers) if own.numbers else float("nan")
         there = There(scene, own, heat)
-        for limit in judged(limits):
+        for limit in acting(limits):
             there.against[limit.name] = outcomes[number, limit.name, False]
             there.lifted[limit.name] = outcomes[number, limit.name, True]
         found.append(there)
@@ -62,7 +62,7 @@ def at(
     return found
 
 
-def judged(limits: Iterable[Limit]) -> list[Limit]:
+def acting(limits: Iterable[Limit]) -> list[Limit]:
     """Those of the limits that act at a given setting."""
     return [limit for limit in limits if limit.name not in WITHOUT]
 

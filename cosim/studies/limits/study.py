@@ -16,11 +16,10 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.scene import Scene, changed
-from cosim.studies.limits.find.knobs import KNOB_COUNT, rounded
-from cosim.studies.limits.find.quantities import QUANTITIES
-from cosim.studies.limits.find.runs import Bench, Case
-from cosim.studies.limits.find.search import Best, Effort, Search
-from cosim.studies.limits.find.table import LIMITS, Limit, Machine, Settings
+from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, rounded
+from cosim.studies.limits.runs import Bench, Case
+from cosim.studies.limits.search import Best, Effort, Search
+from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
 
 
 @dataclass(frozen=True)
@@ -135,17 +134,27 @@ def _search(
 ) -> None:
     searches: dict[Name, Search] = {}
     for number, (name, case) in enumerate(rig.cases.items()):
-        kin = [n for n in rig.found if n in (OWN, IDEAL) or n[0] == name[0]]
-        hints = [_as_hints(bench, rig.found[n], rig.cases[n], case) for n in kin]
-        effort = others if name not in (OWN, IDEAL) else first
-        searches[name] = _searched(bench, case, (*seed, number), effort, hints)
+        effort = first if name in (OWN, IDEAL) else others
+        searches[name] = _searched(
+            bench, case, (*seed, number), effort, _hints(bench, rig, name, _kin(rig, name))
+        )
         rig.found[name] = _best(searches[name])
         told(f"{rig.name}: {name[0]} {name[1]:.3g}")
-    before = dict(rig.found)
-    for name, case in rig.cases.items():
-        hints = [_as_hints(bench, found, rig.cases[n], case) for n, found in before.items()]
-        searches[name].scores(np.vstack(hints))
+    for name in rig.cases:
+        # The first ones hear of all that was found; so do the others then, through these.
+        known = list(rig.found) if name in (OWN, IDEAL) else _kin(rig, name)
+        searches[name].scores(np.vstack(_hints(bench, rig, name, known)))
         rig.found[name] = _best(searches[name])
+
+
+def _kin(rig: Rig, name: Name) -> list[Name]:
+    """Of the machines that were searched those that are most like one."""
+    return [other for other in rig.found if other in (OWN, IDEAL) or other[0] == name[0]]
+
+
+def _hints(bench: Bench, rig: Rig, name: Name, others: Iterable[Name]) -> list[Array]:
+    here, cases = rig.cases[name], rig.cases
+    return [_as_hints(bench, rig.found[other], cases[other], here) for other in others]
 
 
 def _searched(

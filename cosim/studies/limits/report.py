@@ -1,25 +1,27 @@
-"""limits.csv, limits.md and the figures."""
+"""The whole study, and limits.csv, limits.md and the figures that it leaves."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import nan
 from pathlib import Path
 
-from cosim.studies.limits.find.at import There, judged
-from cosim.studies.limits.find.confirm import Point, Points
-from cosim.studies.limits.find.quantities import QUANTITIES
-from cosim.studies.limits.find.runs import Bench
-from cosim.studies.limits.find.study import IDEAL, OWN, Study
-from cosim.studies.limits.find.table import Limit, needed_acceleration
-from cosim.studies.limits.report import figures, words
-from cosim.studies.limits.report.ranking import Change, changes, height
+from cosim.scene import Scene
+from cosim.studies.limits import answer, figures
+from cosim.studies.limits.aims import QUANTITIES
+from cosim.studies.limits.answer import Change, changes, height
+from cosim.studies.limits.at import There, acting, at
+from cosim.studies.limits.confirm import Point, Points, confirmed, judged
+from cosim.studies.limits.runs import Bench
+from cosim.studies.limits.study import FULL, IDEAL, OWN, Efforts, Study, machines, study
+from cosim.studies.limits.table import LIMITS, Limit, Settings, needed_acceleration
+from cosim.studies.sweep.pool import workers_asked
 from cosim.studies.tables import Row, write_csv, write_page
 
 
 def write(folder: Path, bench: Bench, study: Study, points: Points, there: Sequence[There]) -> str:
     """Write the tables and figures into ``folder``; gives what is printed."""
     found = changes(study, points)
-    said = [text for text in words.paragraphs(study, points, found) if text]
-    if not_held := words.refuted(points):
+    said = [text for text in answer.paragraphs(study, points, found) if text]
+    if not_held := answer.refuted(points):
         said.append(
             f"{len(not_held)} of {len(points)} points are not confirmed within 2 % by the more "
             "complete circuit; limits.csv has both values."
@@ -58,7 +60,7 @@ def row(bench: Bench, study: Study, point: Point) -> Row:
         "value": point.name[1] * limit.scale if limit else nan,
         "unit": limit.unit if limit else "",
         "lifted": bool(limit and point.name[1] == limit.gone),
-        "ratings": words.rated(limit, point.name[1]).strip(" ()") if limit else "",
+        "ratings": answer.rated(limit, point.name[1]).strip(" ()") if limit else "",
         "quantity": quantity.name,
         "setting": point.kind,
         "found": setting.value * scale,
@@ -113,11 +115,11 @@ def achieved(study: Study, points: Points) -> list[Row]:
 def lifted(found: Sequence[Change]) -> list[Row]:
     """A row for each limit: its verdict and interval for each quantity."""
     rows = []
-    for name in words.largest(found):
+    for name in answer.largest(found):
         row: Row = {"limit": name}
         for change in (change for change in found if change.limit.name == name):
             title = QUANTITIES[change.quantity].name
-            told = f"{change.verdict}: {words.interval(change)}" if change.every else "-"
+            told = f"{change.verdict}: {answer.interval(change)}" if change.every else "-"
             row[title] = told
         rows.append(row)
     return rows
@@ -127,7 +129,7 @@ def at_row(there: There, limits: Sequence[Limit]) -> Row:
     """A scene's own setting and what it would do without each limit."""
     own = there.own.numbers.get("v_average", nan) * 1e3
     row: Row = {"scene": there.scene.name, "v_average [mm/s]": own, "coil's heat [W]": there.heat}
-    for limit in judged(limits):
+    for limit in acting(limits):
         row[limit.name] = cost(there, limit) * 1e3
     return row
 
@@ -139,3 +141,41 @@ def cost(there: There, limit: Limit) -> float:
         for outcomes in (there.lifted, there.against)
     )
     return after - before
+
+
+JOURNAL = "limits.journal"
+
+
+def run(
+    folder: Path,
+    scene: Scene,
+    asked: str,
+    rigs: Sequence[Settings] = (),
+    there: Sequence[Scene] = (),
+    *,
+    seed: int = 0,
+    efforts: Efforts = FULL,
+    limits: Sequence[Limit] = LIMITS,
+    workers: int | None = None,
+    told: Callable[[int, str], object] = lambda steps, name: None,
+    progress: Callable[[], object] = lambda: None,
+) -> str:
+    """Search, confirm, lift at the scenes ``there``, and write ``limits.*`` into ``folder``; gives
+    what is printed. The journal beside them, from which a killed study goes on, is gone at the end.
+
+    ``asked`` are the words after ``cosim run`` that stand for the scene; ``told`` hears of each
+    step, and how many there are, ``progress`` of each run. Raises BadInput.
+    """
+    steps = machines(limits, True) + len(rigs) * machines(limits, False) + 3 + len(there)
+    journal = folder / JOURNAL
+
+    def done(name: str) -> None:
+        told(steps, name)
+
+    with Bench(scene, asked, journal, workers_asked(workers), progress) as bench:
+        found = study(bench, rigs, limits, seed, efforts, done)
+        points = confirmed(bench, found, done)
+        points |= judged(bench, found, points, done)
+        words = write(folder, bench, found, points, at(bench, there, limits, done))
+    journal.unlink()
+    return words

@@ -8,13 +8,21 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.studies.limits.find.at import There, judged
-from cosim.studies.limits.find.confirm import Point, Points
-from cosim.studies.limits.find.quantities import QUANTITIES
-from cosim.studies.limits.find.study import IDEAL, OWN, Study, searched
-from cosim.studies.limits.find.table import Limit, needed_acceleration
-from cosim.studies.limits.report.ranking import BINDS, NOTHING, Change, height, largest, name_of
-from cosim.studies.limits.report.words import NUMBER, listed
+from cosim.studies.limits.aims import QUANTITIES
+from cosim.studies.limits.answer import (
+    BINDS,
+    NOTHING,
+    NUMBER,
+    Change,
+    height,
+    largest,
+    listed,
+    name_of,
+)
+from cosim.studies.limits.at import There, acting
+from cosim.studies.limits.confirm import Point, Points
+from cosim.studies.limits.study import IDEAL, OWN, Study, searched
+from cosim.studies.limits.table import Limit, needed_acceleration
 from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, panels
 from cosim.studies.tables import brief
 
@@ -38,7 +46,7 @@ def draw(
     frontier(folder / names[2], study, points, transport, False)
     if there:
         names.append("limits-settings.png")
-        costs(folder / names[-1], there, judged(study.limits))
+        costs(folder / names[-1], there, acting(study.limits))
     return names
 
 

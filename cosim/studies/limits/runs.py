@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from cosim.arrays import Array
 from cosim.scene import Scene, changed, firmware
 from cosim.simulation.guards import coil_heat
-from cosim.studies.limits.find import knobs
-from cosim.studies.limits.find.quantities import NEEDED, QUANTITIES, Numbers, scores
-from cosim.studies.limits.find.table import Machine, Settings
+from cosim.studies.limits import aims
+from cosim.studies.limits.aims import NEEDED, QUANTITIES, Numbers, scores
+from cosim.studies.limits.table import Machine, Settings
 from cosim.studies.sweep.batch import runner
 from cosim.studies.sweep.journal import Journal
 from cosim.studies.sweep.point import Number, Outcome
@@ -41,7 +41,7 @@ class Case:
 
     def settings(self, place: Array) -> Settings:
         """All that differs from the scene at a place in the knobs' cube; whole periods are run."""
-        turned = knobs.settings(place, self.machine.reach)
+        turned = aims.settings(place, self.machine.reach)
         there = {**self.rig, **self.machine.settings, **turned, "circuit.model": self.rung}
         period = 1.0 / turned["drive.frequency"]
         if there.get("drive.quantised"):
@@ -67,7 +67,7 @@ class Bench:
         workers: int,
         progress: Callable[[], object] = lambda: None,
     ) -> None:
-        own = knobs.FREE | {
+        own = aims.FREE | {
             "circuit.model": "limited", "drive.pwm_ripple": False, "drive.quantised": False,
             "run.settle": SETTLE, "run.duration": SETTLE + SPAN,
         }  # fmt: skip
@@ -137,7 +137,7 @@ class Bench:
         own = self.scene.circuit.sense_resistance
         changes = {**case.rig, **case.machine.settings}
         sense = changes.get("circuit.sense_resistance", own)
-        return case.machine.coil_scale * case.machine.reach * knobs.RANGE / float(sense)
+        return case.machine.coil_scale * case.machine.reach * aims.RANGE / float(sense)
 
     def heat(self, case: Case, settings: Settings, numbers: Numbers) -> float:
         """Mean heat, W, of the coil that a case stands for."""

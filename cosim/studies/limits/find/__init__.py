@@ -1,1 +1,0 @@
-"""The best settings of the knobs for each limit at each value, found and confirmed."""
