@@ -290,6 +290,7 @@ def first(study: Study, points: Points) -> str:
                 f"changes the {kind} {QUANTITIES[NUMBER[name]].title} by {top.gain:+.0%}"
             )
             said.append(words)
+            break
     return f"What to change first: {'; '.join(said)}." if said else ""
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from cosim.studies.limits.table import Limit, needed_acceleration
 from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, panels
 from cosim.studies.tables import brief
 
-ANSWER = ("a_camera", "a_free", "v_up")
+ANSWER = ("a_camera", "a_walls", "v_up")
 """What the first figure shows."""
 
 
@@ -59,7 +60,9 @@ def answer(path: Path, study: Study, points: Points, found: Sequence[Change]) ->
         "turns of ±2 %). Black line: the device as it is; blue: with the limit eased or lifted; "
         "orange: tightened. Names in red bind, in grey do not matter."
     )
-    figure, axes = panels(title(study, points, found), note, (14.0, 6.6), 1, 3, sharey=True)
+    figure, axes = panels(
+        title(study, points, found), fill(note, 165), (14.0, 6.8), 1, 3, sharey=True
+    )
     for axis, name in zip(axes, ANSWER, strict=True):
         quantity, number = QUANTITIES[NUMBER[name]], NUMBER[name]
         for place, limit_name in enumerate(reversed(order)):
@@ -69,7 +72,7 @@ def answer(path: Path, study: Study, points: Points, found: Sequence[Change]) ->
             if isfinite(own):
                 axis.axvline(own, color="0.15", lw=1.0, ls=style)
         axis.set_xlabel(f"{quantity.title} [{quantity.unit}]", fontsize=9)
-        axis.set_xlim(left=0.0)
+        axis.set_xlim(0.0, 1.12 * axis.get_xlim()[1])
         if quantity.falls:
             needed = needed_acceleration(study.scene)
             axis.axvline(needed, color=VERMILION, lw=1.4, ls="--")
@@ -99,7 +102,7 @@ def title(study: Study, points: Points, found: Sequence[Change]) -> str:
     what = "; ".join(
         f"{words}: {listed(list(dict.fromkeys(binds[name])))}"
         for name, words in zip(
-            ANSWER, ("camera's acceleration", "without walls", "transport upwards"), strict=True
+            ANSWER, ("camera's reading", "true peak", "transport upwards"), strict=True
         )
         if binds[name]
     )
@@ -113,7 +116,7 @@ def _row(axis: Axes, place: int, study: Study, points: Points, limit: Limit, qua
         known = []
         for value in (own, *limit.values, limit.gone):
             at = height(points.get((name_of(study.scene, limit, value), quantity, kind))) * scale
-            if isfinite(at):
+            if at > 0.0:
                 known.append((value, at))
         if not known:
             continue
@@ -123,7 +126,9 @@ def _row(axis: Axes, place: int, study: Study, points: Points, limit: Limit, qua
             color = "0.15" if value == own else BLUE if _eased(limit, value, own) else ORANGE
             look: dict[str, Any] = {"color": color, "mfc": color if filled else "white"}
             marker = "D" if value == limit.gone else "o"
-            axis.plot(at, place + shift, marker, ms=6 if filled else 5, zorder=3, **look)
+            axis.plot(
+                at, place + shift, marker, ms=6 if filled else 5, zorder=3 + (value == own), **look
+            )
         if filled:
             _name_ends(axis, place + shift, limit, known, own)
 
@@ -170,7 +175,8 @@ def frontier(
     )
     words = f"Achievable {what} over the value of each limit, from the tightest to none"
     rows = -(-len(limits) // 3)
-    figure, axes = panels(words, note, (13.0, 2.9 * rows + 0.9), rows, 3, sharey=True)
+    size = (13.0, 2.9 * rows + 1.1)
+    figure, axes = panels(words, fill(note, 150), size, rows, 3, sharey=True)
     for axis in axes[len(limits) :]:
         axis.remove()
     for axis, limit in zip(axes, limits, strict=False):
