@@ -99,7 +99,7 @@ def changes(study: Study, points: Points) -> list[Change]:
 
 
 def _nominal(study: Study, points: Points, limit: Limit, quantity: int, kind: str) -> float:
-    own = name_of(study.scene, limit, limit.own(study.scene))
+    own = name_of(study.scene, limit, limit.at_work(study.scene))
     before, after = (
         height(points.get((name, quantity, kind))) for name in (own, (limit.name, limit.gone))
     )

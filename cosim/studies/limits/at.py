@@ -38,7 +38,8 @@ def at(
         own = _apart(scene, bench.scene)
         for limit in acting(limits):
             rung = _rung(limit)
-            runs[number, limit.name, False] = own | {"circuit.model": rung}
+            here = limit.machine(scene, limit.at_work(scene)).settings
+            runs[number, limit.name, False] = own | here | {"circuit.model": rung}
             machine = limit.machine(scene, limit.gone)
             volts = {
                 f"drive.{key}": machine.reach * getattr(scene.drive, key)

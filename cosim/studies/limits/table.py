@@ -46,9 +46,10 @@ class Limit:
     real: bool = True
     """Whether its values can be had by changing a component of the device."""
 
-    def factor(self, scene: Scene, value: float) -> float:
-        """Times the scene's own value."""
-        return value / self.own(scene)
+    def at_work(self, scene: Scene) -> float:
+        """The scene's own value; where it has not got the limit, the device's, which comes first."""
+        own = self.own(scene)
+        return self.values[0] if own == self.gone and self.values else own
 
 
 def _value(scene: Scene, key: str) -> float | None:
