@@ -72,7 +72,9 @@ def answer(path: Path, study: Study, points: Points, found: Sequence[Change]) ->
             if isfinite(own):
                 axis.axvline(own, color="0.15", lw=1.0, ls=style)
         axis.set_xlabel(f"{quantity.title} [{quantity.unit}]", fontsize=9)
-        axis.set_xlim(0.0, 1.12 * axis.get_xlim()[1])
+        right = 1.12 * axis.get_xlim()[1]
+        axis.set_xticks([tick for tick in axis.get_xticks() if 0.0 <= tick <= right])
+        axis.set_xlim(0.0, right)
         if quantity.falls:
             needed = needed_acceleration(study.scene)
             axis.axvline(needed, color=VERMILION, lw=1.4, ls="--")

@@ -47,7 +47,7 @@ class Limit:
     """Whether its values can be had by changing a component of the device."""
 
     def at_work(self, scene: Scene) -> float:
-        """The scene's own value; where it has not got the limit, the device's, which comes first."""
+        """The scene's own value; where that lifts the limit, the device's, which comes first."""
         own = self.own(scene)
         return self.values[0] if own == self.gone and self.values else own
 
