@@ -81,9 +81,9 @@ charts: setup
 	@cp results/paper/figure.png results/paper.png
 	@$(VENV)/bin/cosim theory
 	@cp results/theory/knife_edge.png results/knife_edge.png
-	@$(VENV)/bin/cosim sweep ideal-current --over drive.pot_max=0:1:10 \
-		--over drive.pot_frequency=0.1:0.95:10 --over drive.pot_offset=0:1:10
-	@cp results/ideal-current-sweep/figure.png results/sweep.png
+	@$(VENV)/bin/cosim sweep paper-limited --over drive.pot_max=0.4:1:4 \
+		--over drive.pot_frequency=0.1:0.95:18 --over drive.pot_offset=0:0.7:15
+	@cp results/paper-limited-sweep/figure.png results/sweep.png
 	@$(VENV)/bin/cosim chart stability
 	@$(VENV)/bin/cosim chart accuracy
 	@$(VENV)/bin/cosim chart limits

@@ -87,15 +87,23 @@ def _supply(scene: Scene) -> Iterator[str]:
         )
 
 
+def coil_heat(
+    energy_copper: float, duration: float, coil_resistance: float, sense_resistance: float
+) -> float:
+    """The mean heat of one coil, W, in a run of ``duration`` (s) that lost ``energy_copper`` (J) in
+    it and in its share of the sense resistor (Ohm).
+    """
+    return energy_copper / duration * coil_resistance / (coil_resistance + sense_resistance)
+
+
 def _coil(scene: Scene, summary: Mapping[str, Any]) -> Iterator[str]:
-    coil = scene.coil
     if scene.mechanics.actuator != "ram" or scene.run.duration < period(scene):
         return
+    coil = scene.coil
     # energy_copper has the sense resistor's share, unless that is the affair of a user's netlist.
     sense = 0.0 if scene.rung.own_netlist else coil.count * scene.circuit.sense_resistance
-    coils = coil.count * len(commands(scene))
-    heat = summary["energy_copper"] / coils / scene.run.duration
-    heat *= coil.resistance / (coil.resistance + sense)
+    each = summary["energy_copper"] / (coil.count * len(commands(scene)))
+    heat = coil_heat(each, scene.run.duration, coil.resistance, sense)
     if heat > CARLTON_HEAT:
         yield (
             f"the heat of {heat:.3g} W in a coil, on average over the run, is above the "

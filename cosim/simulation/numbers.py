@@ -13,7 +13,13 @@ from cosim.toolchain.versions import versions
 
 def motion(scene: Scene, recorder: Recorder) -> Motion:
     """What surface and part did, at the end of a run."""
-    return Motion(recorder.at_end, recorder.at_settle, _extremes(scene, recorder), recorder.frames)
+    ram = None
+    if scene.mechanics.actuator == "ram":
+        last = dict(zip(recorder.mechanics.columns, recorder.rows[-1].tolist(), strict=True))
+        ram = last["z_ram"] - last["z_surface"]
+    return Motion(
+        recorder.at_end, recorder.at_settle, _extremes(scene, recorder), recorder.frames, ram
+    )
 
 
 def _extremes(scene: Scene, recorder: Recorder) -> dict[str, float]:

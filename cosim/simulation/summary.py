@@ -39,7 +39,8 @@ def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[
 
     Where the surface's velocity jumps, by a rigid impact or as it is given, ``a_surface_max`` and
     ``a_surface_min`` are None. The camera's reading is of the true surface while each frame is
-    exposed, through Tracker's five-point differences.
+    exposed, through Tracker's five-point differences. ``at_wall`` is 1 where the ram touches a wall
+    in the last row: with no ``impacts`` besides, it tells a ram that rests there from a free one.
     """
     run, totals, before, extremes = scene.run, motion.totals, motion.at_settle, motion.extremes
     span = run.duration - run.settle
@@ -69,6 +70,9 @@ def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[
         result["stick_fraction_2"] = (totals["stick_time_2"] - before["stick_time_2"]) / span
     for counter in ("impacts", "stick_slip_events"):
         result[counter] = round(totals[counter] - before[counter])
+    if motion.ram is not None:
+        # A rigid wall holds the ram within rounding.
+        result["at_wall"] = int(abs(motion.ram) >= scene.mechanics.travel * (1.0 - 1e-12))
     return result | _energies(scene, totals, electric)
 
 

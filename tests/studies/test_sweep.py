@@ -9,12 +9,13 @@ from typing import Any
 import netCDF4
 import numpy as np
 import pytest
+from matplotlib.colors import Normalize
 
 from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.sweep import sweep
+from cosim.studies.sweep import figure, sweep
 from cosim.studies.sweep.dataset import read
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.studies.sweep.point import Outcome, evaluate
@@ -248,3 +249,25 @@ def test_no_point_could_be_run(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main(["sweep", "reference", *over, "--workers", "1", "--out", str(tmp_path)]) == 3
     assert "No point could be run; the first one: --over: " in capsys.readouterr().err
     assert (tmp_path / "sweep.nc").exists()
+
+
+def test_maps_leave_out_still_slices() -> None:
+    """Without amplitude nothing moves; no panel is wasted on it."""
+    over = {
+        "drive.amplitude": [0.0, 8.0, 9.0],
+        "drive.frequency": [20.0, 25.0, 30.0],
+        "drive.offset": [-2.0, -1.0, 0.0],
+    }
+    data = sweep("ideal-current", over, {"run.duration": 0.2, "run.settle": 0.1})
+    titles = [axis.get_title("left") for axis in figure.draw(data, "test").axes]
+    shown = [title for title in titles if title.startswith("at drive.amplitude")]
+    assert len(shown) == 2 and not any("= 0" in title for title in shown)
+
+
+def test_rugged_ground_is_told_from_a_slope() -> None:
+    slope = np.add.outer(np.arange(6.0), 2.0 * np.arange(7.0))
+    ground = slope.copy()
+    ground[2, 3] += 5.0
+    norm = Normalize(0.0, 20.0)
+    assert not figure._rugged(slope, norm)[1:-1, 1:-1].any()
+    assert np.argwhere(figure._rugged(ground, norm)[1:-1, 1:-1]).tolist() == [[1, 2]]

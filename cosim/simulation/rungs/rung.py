@@ -53,6 +53,8 @@ class Motion:
     where there is none."""
     frames: npt.NDArray[np.float64]
     """The surface's height at each instant of the camera's frames after settling."""
+    ram: float | None = None
+    """Where the ram is in its actuator in the last row, m; None where there is no ram."""
 
 
 class Rung(ABC):

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator
+from numpy.typing import NDArray
 
 from cosim.arrays import Array
 from cosim.files.picture import Picture
@@ -21,6 +22,10 @@ STAYS = 0.05e-3
 """m/s; a part that moves more slowly than this counts as not transported."""
 
 MOST_SLICES = 4
+
+RUGGED = 0.1
+"""Of the span of the velocities: a point that is further off the median of those beside it stands
+on ground too rugged for the grid; nothing can be read in between."""
 
 FAILED: dict[str, Any] = {"color": "#d1495b", "ls": "", "marker": "x", "ms": 6}
 
@@ -59,6 +64,8 @@ def draw(data: xr.Dataset, title: str) -> Picture:
     words = f"{data[FAILURE].size} points" + (f", {failed} failed (×)" if failed else "")
     if len(data.squeeze().dims) > 1:
         words += f"; hatched: the part stays (below {STAYS * 1e3:g} mm/s)"
+        if POINT not in data.dims:
+            words += "; dots: rugged, neighbours tell nothing of it"
     figure.suptitle(f"{title}: {words}", fontsize=12)
     return figure
 
@@ -98,9 +105,10 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
     slices = [data]
     here = data
     if third:
-        count = min(MOST_SLICES, data.sizes[third])
-        places = np.unique(np.linspace(0, data.sizes[third] - 1, count).round().astype(int))
-        slices = [data.isel({third: int(k)}) for k in places]
+        moving = _moving(data, third)
+        count = min(MOST_SLICES, len(moving))
+        places = np.unique(np.linspace(0, len(moving) - 1, count).round().astype(int))
+        slices = [data.isel({third: moving[k]}) for k in places.tolist()]
         here = data.isel({third: int(best[third])})
         rows = figure.subfigures(2, 1)
         top, others = _row(rows, 0, len(slices)), _row(rows, 1, len(OTHERS))
@@ -111,7 +119,8 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
     norm = _two_sided(np.concatenate([_values(part, V_AVERAGE).values.ravel() for part in slices]))
     for k, (axis, part) in enumerate(panels):
         head = f"at {_setting(part, third)}" if third else V_AVERAGE.title
-        shown = _map(axis, part, V_AVERAGE, x, y, "RdBu", norm)
+        rugged = _rugged(_values(part, V_AVERAGE).transpose(y, x).values, norm)
+        shown = _map(axis, part, V_AVERAGE, x, y, "RdBu", norm, rugged)
         _boundary(axis, part, x, y)
         axis.set_title(head, loc="left", fontsize=10.5)
         if k == len(panels) - 1:
@@ -170,14 +179,26 @@ def _over_key(axis: Axes, data: xr.Dataset, name: str) -> None:
 
 
 def _map(
-    axis: Axes, data: xr.Dataset, quantity: Quantity, x: str, y: str, colors: str, norm: Normalize
+    axis: Axes,
+    data: xr.Dataset,
+    quantity: Quantity,
+    x: str,
+    y: str,
+    colors: str,
+    norm: Normalize,
+    rugged: NDArray[np.bool_] | None = None,
 ) -> Any:
     values = _values(data, quantity).transpose(y, x).values
     xs, ys = data[x].values, data[y].values
     shown = axis.pcolormesh(xs, ys, values, cmap=colors, norm=norm, shading="nearest")
     levels = _levels(norm)
-    if min(values.shape) > 1 and np.isfinite(values).sum() > 3 and levels:
-        lines = axis.contour(xs, ys, values, levels=levels, colors="0.15", linewidths=0.7)
+    smooth = values
+    if rugged is not None:
+        smooth = np.where(rugged, np.nan, values)
+        rows, columns = np.nonzero(rugged)
+        axis.plot(xs[columns], ys[rows], ".", color="k", ms=4)
+    if min(values.shape) > 1 and np.isfinite(smooth).sum() > 3 and levels:
+        lines = axis.contour(xs, ys, smooth, levels=levels, colors="0.15", linewidths=0.7)
         axis.clabel(lines, fontsize=7.5, fmt=lambda level: f"{level:.4g}")
     rows, columns = np.nonzero(data[FAILURE].transpose(y, x).values != "")
     axis.plot(xs[columns], ys[rows], **FAILED)
@@ -192,6 +213,24 @@ def _boundary(axis: Axes, data: xr.Dataset, x: str, y: str) -> None:
         over = data[x].values, data[y].values, speeds
         axis.contourf(*over, levels=[0.0, STAYS], colors="none", hatches=["////"])
         axis.contour(*over, levels=[STAYS], colors="k", linewidths=1.4)
+
+
+def _moving(data: xr.Dataset, third: str) -> list[int]:
+    """The slices in which the part moves anywhere; all where it moves in none."""
+    speeds = np.abs(_values(data, V_AVERAGE).transpose(third, ...).values) / V_AVERAGE.scale
+    every = range(data.sizes[third])
+    found = [k for k in every if np.nan_to_num(speeds[k]).max() >= STAYS]
+    return found or list(every)
+
+
+def _rugged(values: Array, norm: Normalize) -> NDArray[np.bool_]:
+    """Which points of a map are further off the median of those beside them than RUGGED."""
+    around = np.pad(values, 1, constant_values=np.nan)
+    beside = np.array([around[1:-1, :-2], around[1:-1, 2:], around[:-2, 1:-1], around[2:, 1:-1]])
+    known = np.isfinite(beside).sum(axis=0) >= 2
+    middle = np.nanmedian(np.where(known, beside, 0.0), axis=0)
+    span = float(norm.vmax or 0.0) - float(norm.vmin or 0.0)
+    return known & (np.abs(values - middle) > RUGGED * span)
 
 
 def _two_sided(values: Array) -> Normalize:

@@ -1,0 +1,1 @@
+"""What is achievable, and which limit of the circuit binds."""

@@ -1,0 +1,129 @@
+"""What an operator turns, and what for: the three knobs as a unit cube, and the quantities that are
+wanted large.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import product
+from math import inf
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.scene import firmware
+from cosim.scene.tables import KNOBS
+
+RANGE = firmware.GAIN * firmware.volts(firmware.COUNTS - 1)
+"""V: the most that either knob of volts sets at V1."""
+
+KNOB_COUNT = len(KNOBS)
+
+TURN = 0.02
+"""Of a knob's whole turn: how well a hand finds a setting again."""
+
+DIGITS = 6
+"""Of a knob's whole turn, so that a setting can be typed."""
+
+FREE = {f"drive.{knob}": None for knob in KNOBS}
+"""Lets amplitude, frequency and offset stand for themselves."""
+
+
+def settings(place: Array, reach: float = 1.0) -> dict[str, float]:
+    """Amplitude (V), frequency (Hz) and offset (V) of a place in the cube, as the firmware maps its
+    potentiometers but without their steps; ``reach`` multiplies both volts.
+
+    The third knob sets where the ramp ends, so the mean moves with the amplitude.
+    """
+    amplitude, top = reach * RANGE * place[0], reach * RANGE * place[2]
+    return {
+        "drive.amplitude": _typed(amplitude),
+        "drive.frequency": _typed(firmware.knob_frequency(0.0) - 99.0 * place[1]),
+        "drive.offset": _typed(top - amplitude / 2.0),
+    }
+
+
+def rounded(places: Array) -> Array:
+    """Places (rows) that can be typed, inside the cube."""
+    return np.round(np.clip(places, 0.0, 1.0), DIGITS)
+
+
+def faces(place: Array) -> Array:
+    """Each knob turned by TURN either way, by itself."""
+    return rounded(place + TURN * np.vstack([np.eye(KNOB_COUNT), -np.eye(KNOB_COUNT)]))
+
+
+def corners(place: Array) -> Array:
+    """All knobs turned by TURN together, in every combination."""
+    return rounded(place + TURN * np.array(list(product((-1.0, 1.0), repeat=KNOB_COUNT))))
+
+
+def _typed(value: float) -> float:
+    return round(float(value), DIGITS)
+
+
+Numbers = Mapping[str, float]
+"""Of a run's summary, SI."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number that is wanted large."""
+
+    name: str
+    title: str
+    unit: str
+    """That of tables and figures."""
+    scale: float
+    """From SI to it."""
+    of: Callable[[Numbers], float]
+    falls: bool = False
+    """Whether it is an acceleration that the paper's requirement can be held against."""
+
+
+def _without_wall(numbers: Numbers) -> float:
+    """The surface's peak downward acceleration, m/s², where the ram touches no wall; where it does,
+    below zero, the more so the more often, so that a search is led away from there.
+    """
+    touches = numbers["impacts"] + numbers["at_wall"]
+    return -touches if touches else -numbers["a_surface_min"]
+
+
+QUANTITIES = (
+    Quantity(
+        "a_camera", "downward acceleration, as a camera reads it", "m/s²", 1.0,
+        lambda numbers: -numbers["a_camera_min"], falls=True,
+    ),
+    Quantity(
+        "a_free", "downward acceleration, true peak, no wall touched", "m/s²", 1.0,
+        _without_wall, falls=True,
+    ),
+    Quantity(
+        "a_walls", "downward acceleration, true peak, of the walls' contact law", "m/s²", 1.0,
+        lambda numbers: -numbers["a_surface_min"], falls=True,
+    ),
+    Quantity("v_up", "mean velocity upwards", "mm/s", 1e3, lambda numbers: numbers["v_average"]),
+    Quantity(
+        "v_down", "mean velocity downwards", "mm/s", 1e3,
+        lambda numbers: -numbers["v_average"],
+    ),
+    Quantity(
+        "cycle_up", "transport per cycle, upwards", "mm", 1e3,
+        lambda numbers: numbers["transport_per_cycle"],
+    ),
+    Quantity(
+        "cycle_down", "transport per cycle, downwards", "mm", 1e3,
+        lambda numbers: -numbers["transport_per_cycle"],
+    ),
+)  # fmt: skip
+
+NEEDED = (
+    *("v_average", "transport_per_cycle", "a_camera_min", "a_surface_min", "impacts", "at_wall"),
+    *("current_max", "current_min", "energy_copper", "saturated_fraction"),
+)
+"""The numbers that anything here is made of."""
+
+
+def scores(numbers: Numbers) -> Array:
+    """Each of QUANTITIES, SI; -inf where there is none."""
+    found = np.array([quantity.of(numbers) for quantity in QUANTITIES])
+    return np.where(np.isnan(found), -inf, found)

@@ -1,0 +1,180 @@
+"""Judges what the cheapest circuit has found by circuits with more in them.
+
+A setting that the amplifier refutes gives way to the next one. The limits that the cheapest circuit
+does not have are turned here, at the settings found for the scene's own circuit.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import nan
+
+import numpy as np
+
+from cosim.scene import changed
+from cosim.studies.limits.aims import QUANTITIES, scores
+from cosim.studies.limits.runs import Bench, Case
+from cosim.studies.limits.search import Setting
+from cosim.studies.limits.study import IDEAL, OWN, Bests, Name, Study
+from cosim.studies.limits.table import Machine, Settings
+
+WITHIN = 0.02
+"""Relative difference of a confirmed value."""
+
+KINDS = ("best", "robust")
+
+CORNERS = (OWN, ("supply voltage", 10.0), ("supply voltage", 30.0))
+"""Machines whose points are run on the whole schematic."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of a frontier, SI: on the circuit that was searched, ``confirmed`` on ``rung``, and
+    in ``full`` on the whole schematic; NaN where it was not run there.
+    """
+
+    name: Name
+    quantity: int
+    kind: str
+    setting: Setting
+    heat: float
+    """W."""
+    settings: Settings
+    """Of the run that has the setting's value."""
+    rung: str
+    confirmed: float
+    full: float = nan
+    refuted: int = 0
+    """Settings that seemed better and were not confirmed."""
+
+    @property
+    def off(self) -> float:
+        """Relative difference of the confirmed value."""
+        return abs(self.confirmed / self.setting.value - 1.0)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the more complete circuit confirms it."""
+        return self.off <= WITHIN
+
+
+Key = tuple[Name, int, str]
+"""A machine, the number of a quantity, and one of KINDS."""
+
+Points = dict[Key, Point]
+
+
+def confirmed(bench: Bench, study: Study, told: Callable[[str], object]) -> Points:
+    """The points of the scene's own rig: of those settings that the amplifier confirms the best;
+    where it confirms none the best of all.
+    """
+    rig = study.rigs[0]
+    waiting: dict[Key, list[Setting]] = {}
+    for name, bests in rig.found.items():
+        for quantity, best in enumerate(bests):
+            for kind, settings in zip(KINDS, (best.settings, best.robust), strict=True):
+                if settings:
+                    waiting[name, quantity, kind] = list(settings)
+    points: Points = {}
+    first: Points = {}
+    while waiting:
+        rows = list(waiting)
+        found = _points(bench, rig.cases, {key: waiting[key][0] for key in rows})
+        for key, point in found.items():
+            first.setdefault(key, point)
+            refuted = len(_choices(rig.found[key[0]], key)) - len(waiting[key])
+            waiting[key].pop(0)
+            if point.holds:
+                points[key] = replace(point, refuted=refuted)
+            elif not waiting[key]:
+                points[key] = replace(first[key], refuted=refuted + 1)
+            else:
+                continue
+            del waiting[key]
+    told("confirmed")
+    return _on_full(bench, rig.cases, points)
+
+
+def _choices(bests: Bests, key: Key) -> tuple[Setting, ...]:
+    """The settings that stand for a point, the first choice first."""
+    _, quantity, kind = key
+    return bests[quantity].settings if kind == "best" else bests[quantity].robust
+
+
+def _points(bench: Bench, cases: dict[Name, Case], chosen: dict[Key, Setting]) -> Points:
+    """Each setting on its own circuit, of which the run is known, and on a more complete one."""
+    plain = [cases[key[0]].settings(np.array(one.place)) for key, one in chosen.items()]
+    rungs = [_more_complete(key[0]) for key in chosen]
+    more = [s | {"circuit.model": rung} for s, rung in zip(plain, rungs, strict=True)]
+    outcomes, judges = bench.outcomes(plain), bench.outcomes(more)
+    found: Points = {}
+    for n, (key, setting) in enumerate(chosen.items()):
+        name, quantity, kind = key
+        there = judges[n]
+        value = nan if there.failure else float(scores(there.numbers)[quantity])
+        heat = bench.heat(cases[name], plain[n], outcomes[n].numbers)
+        found[key] = Point(name, quantity, kind, setting, heat, plain[n], rungs[n], value)
+    return found
+
+
+def _more_complete(name: Name) -> str:
+    """The circuit to confirm a machine's points on; of an ideal current there is none."""
+    if name == IDEAL:
+        return "ideal"
+    return "full" if name[0] == "current limit" else "amplifier"
+
+
+def _on_full(bench: Bench, cases: dict[Name, Case], points: Points) -> Points:
+    corners = [key for key in points if key[0] in CORNERS]
+    runs = [points[key].settings | {"circuit.model": "full"} for key in corners]
+    found = dict(points)
+    for key, outcome in zip(corners, bench.outcomes(runs), strict=True):
+        if not outcome.failure:
+            value = float(scores(outcome.numbers)[key[1]])
+            found[key] = replace(points[key], full=value)
+    return found
+
+
+def judged(bench: Bench, study: Study, points: Points, told: Callable[[str], object]) -> Points:
+    """The limits that only the amplifier has: for each value the best among the settings that were
+    found for the scene's own circuit, and the robust one. The own circuit's points stand among
+    them, on the amplifier, too.
+    """
+    rig = study.rigs[0]
+    places = {
+        setting.place: setting
+        for best in rig.found[OWN]
+        for setting in (*best.settings[:2], *best.robust[:2])
+    }
+    found: Points = {}
+    here = changed(bench.scene, rig.settings, rig.name)
+    asked: dict[Name, Machine] = {}
+    for limit in study.limits:
+        if limit.rung == "amplifier":
+            asked[limit.name, limit.own(here)] = Machine()
+            for value in (*limit.values, limit.gone):
+                asked[limit.name, value] = limit.machine(here, value)
+    for name, machine in asked.items():
+        case = Case(rig.settings, machine, "amplifier")
+        every = [case.settings(np.array(place)) for place in places]
+        outcomes = bench.outcomes(every)
+        for quantity in range(len(QUANTITIES)):
+            values = {
+                place: (float(scores(outcome.numbers)[quantity]), settings, outcome)
+                for place, settings, outcome in zip(places, every, outcomes, strict=True)
+                if not outcome.failure and bench.bearable(case, settings, outcome.numbers)
+            }
+            if not values:
+                continue
+            top = max(values, key=lambda place: values[place][0])
+            chosen = {"best": top}
+            robust = points.get((OWN, quantity, "robust"))
+            if robust is not None and robust.setting.place in values:
+                chosen["robust"] = robust.setting.place
+            for kind, place in chosen.items():
+                value, settings, outcome = values[place]
+                heat = bench.heat(case, settings, outcome.numbers)
+                setting = Setting(place, value, nan, nan)
+                key = (name, quantity, kind)
+                found[key] = Point(*key, setting, heat, settings, "amplifier", value)
+    told("judged on the amplifier")
+    return found

@@ -1,0 +1,169 @@
+"""Runs settings of machines, each once, and keeps them in a journal: a killed study goes on."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from math import ceil, inf
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.arrays import Array
+from cosim.scene import Scene, changed, firmware
+from cosim.simulation.guards import coil_heat
+from cosim.studies.limits import aims
+from cosim.studies.limits.aims import NEEDED, QUANTITIES, Numbers, scores
+from cosim.studies.limits.table import Machine, Settings
+from cosim.studies.sweep.batch import runner
+from cosim.studies.sweep.journal import Journal
+from cosim.studies.sweep.point import Number, Outcome
+
+SETTLE, SPAN = 0.4, 0.6
+"""s, left out of averages and averaged over, at least; made whole periods."""
+
+OPA548_CURRENT = 5.0
+"""A: the OPA548's peak current (data sheet SBOS070D)."""
+
+THREADED = ("ideal", "limited")
+"""Circuits without ngspice."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A machine on a rig, on a circuit; ``rig`` are the changes of the scene that make it."""
+
+    rig: Settings
+    machine: Machine
+    rung: str = "limited"
+
+    def settings(self, place: Array) -> Settings:
+        """All that differs from the scene at a place in the knobs' cube; whole periods are run."""
+        turned = aims.settings(place, self.machine.reach)
+        there = {**self.rig, **self.machine.settings, **turned, "circuit.model": self.rung}
+        period = 1.0 / turned["drive.frequency"]
+        if there.get("drive.quantised"):
+            period = (
+                len(firmware.staircase(1, turned["drive.frequency"])) / firmware.STEPS_PER_SECOND
+            )
+        settle, span = (max(1, ceil(t / period - 1e-9)) for t in (SETTLE, SPAN))
+        times = {"run.settle": settle * period, "run.duration": (settle + span) * period}
+        return {**there, **times}
+
+
+class Bench:
+    """Runs settings on top of ``scene``; to be used in a ``with`` block.
+
+    ``asked`` are the words after ``cosim run`` that stand for the scene.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        asked: str,
+        journal: Path,
+        workers: int,
+        progress: Callable[[], object] = lambda: None,
+    ) -> None:
+        own = aims.FREE | {
+            "circuit.model": "limited", "drive.pwm_ripple": False, "drive.quantised": False,
+            "run.settle": SETTLE, "run.duration": SETTLE + SPAN,
+        }  # fmt: skip
+        self.scene = changed(scene, own, f"scene {scene.name}")
+        tables = scene.as_dict()
+        self._unlike: Settings = {
+            key: value
+            for key, value in own.items()
+            if isinstance(value, bool) and tables["drive"][key.split(".")[1]] != value
+        }
+        self._workers, self._progress = workers, progress
+        self._asked, self._path = asked, journal
+        self._stack = ExitStack()
+        self._done: dict[int, Outcome] = {}
+
+    def __enter__(self) -> "Bench":
+        from cosim.mechanics import package
+        from cosim.toolchain.versions import versions
+
+        said = [self.scene.as_dict(), versions(), package.token()]
+        identity = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+        self._journal = self._stack.enter_context(Journal(self._path, identity))
+        self._done = dict(self._journal.read())
+        spice = changed(self.scene, {"circuit.model": "amplifier"}, "amplifier")
+        enter = self._stack.enter_context
+        self._threads = enter(runner(self.scene, self._workers, whole_periods=False))
+        self._processes = enter(runner(spice, self._workers, whole_periods=False))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def outcomes(self, every: Sequence[Settings]) -> list[Outcome]:
+        """What becomes of each settings, on the circuit that they name."""
+        numbers = [_number(settings) for settings in every]
+        new = {n: s for n, s in zip(numbers, every, strict=True) if n not in self._done}
+        for pool, threaded in ((self._threads, True), (self._processes, False)):
+            points: list[tuple[int, Mapping[str, Number | str]]] = [
+                (n, s) for n, s in new.items() if (s["circuit.model"] in THREADED) is threaded
+            ]
+            for number, outcome in pool.run(points) if points else ():
+                kept = {name: outcome.numbers[name] for name in NEEDED if name in outcome.numbers}
+                self._done[number] = Outcome(kept, outcome.failure)
+                self._journal.add(number, self._done[number])
+                self._progress()
+        return [self._done[number] for number in numbers]
+
+    def scores(self, case: Case, places: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """The scores of places (rows), -inf where a run fails, and which of them are bearable."""
+        every = [case.settings(place) for place in places]
+        found = np.full((len(every), len(QUANTITIES)), -inf)
+        borne = np.zeros(len(every), bool)
+        for row, (settings, outcome) in enumerate(zip(every, self.outcomes(every), strict=True)):
+            if not outcome.failure:
+                found[row] = scores(outcome.numbers)
+                borne[row] = self.bearable(case, settings, outcome.numbers)
+        return found, borne
+
+    def bearable(self, case: Case, settings: Settings, numbers: Numbers) -> bool:
+        """Whether a run keeps within what the coil and the power amplifier bear."""
+        peak = max(numbers["current_max"], -numbers["current_min"]) * case.machine.coil_scale
+        within = peak * self.scene.coil.count <= OPA548_CURRENT
+        return within and self.heat(case, settings, numbers) <= case.machine.heat
+
+    def amperes(self, case: Case) -> float:
+        """The knobs' range, A."""
+        own = self.scene.circuit.sense_resistance
+        changes = {**case.rig, **case.machine.settings}
+        sense = changes.get("circuit.sense_resistance", own)
+        return case.machine.coil_scale * case.machine.reach * aims.RANGE / float(sense)
+
+    def heat(self, case: Case, settings: Settings, numbers: Numbers) -> float:
+        """Mean heat, W, of the coil that a case stands for."""
+        return self.mean_heat(settings, numbers) * case.machine.coil_scale
+
+    def mean_heat(self, settings: Settings, numbers: Numbers) -> float:
+        """Mean heat of a coil of a run, W."""
+        coil, keys = self.scene.coil, ("coil.resistance", "circuit.sense_resistance")
+        own = (coil.resistance, self.scene.circuit.sense_resistance)
+        copper, sense = (float(settings.get(k, value)) for k, value in zip(keys, own, strict=True))
+        lasted = float(settings.get("run.duration", self.scene.run.duration))
+        each = numbers["energy_copper"] / coil.count
+        return coil_heat(each, lasted, copper, coil.count * sense)
+
+    def command(self, settings: Settings) -> str:
+        """The one command that repeats a run."""
+        rows = {"run.output_step": float(settings["run.duration"]) / 2.0}
+        every = {**self._unlike, **settings, **rows}
+        words = (f"--set {key}={_typed(value)}" for key, value in every.items())
+        return f"cosim run {self._asked} {' '.join(words)}"
+
+
+def _number(settings: Settings) -> int:
+    said = json.dumps(settings, sort_keys=True).encode()
+    return int.from_bytes(hashlib.sha256(said).digest()[:7], "big")
+
+
+def _typed(value: float | int | str) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value}"

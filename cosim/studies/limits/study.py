@@ -1,0 +1,214 @@
+"""The study: each limit at each value, on each rig, with the best settings of the knobs found anew.
+
+What is found for one machine is tried on the others of its rig, so that a difference between two
+machines is not the luck of two searches.
+"""
+
+import json
+import tomllib
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.errors import BadInput, plain
+from cosim.scene import Scene, changed
+from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, rounded
+from cosim.studies.limits.runs import Bench, Case
+from cosim.studies.limits.search import Best, Effort, Search
+from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
+
+
+@dataclass(frozen=True)
+class Efforts:
+    """What the searches may cost."""
+
+    first: Effort
+    """Of the scene's own circuit, and of the ideal current."""
+    next: Effort
+    """Of a circuit that knows what was found for those before it."""
+    others: Effort
+    """Of the other rigs of an ensemble."""
+
+
+FULL = Efforts(
+    Effort(512, (0.08, 0.05, 0.04, 0.03, 0.025, 0.02, 0.01, 0.005), 4),
+    Effort(32, (0.04, 0.02, 0.01, 0.005), 4),
+    Effort(32, (0.04, 0.02, 0.01, 0.005), 2),
+)
+_COARSE = Effort(32, (0.05, 0.02), 2)
+QUICK = Efforts(Effort(128, (0.05, 0.02), 2), _COARSE, _COARSE)
+
+MOST_RIGS = 4
+"""Of an ensemble, spread over its order, which is that of their cost."""
+
+Name = tuple[str, float]
+"""A limit and its value; OWN and IDEAL besides."""
+
+OWN, IDEAL = ("own", 0.0), ("ideal current", 0.0)
+
+Bests = tuple[Best, ...]
+"""For each of QUANTITIES."""
+
+
+@dataclass
+class Rig:
+    """What was found on one rig."""
+
+    name: str
+    settings: Settings
+    cases: dict[Name, Case] = field(default_factory=dict[Name, Case])
+    found: dict[Name, Bests] = field(default_factory=dict[Name, Bests])
+
+
+@dataclass
+class Study:
+    """What was found: the scene's own rig first, then those of the ensemble.
+
+    ``again`` is the own circuit of the first rig, searched anew with another seed.
+    """
+
+    scene: Scene
+    limits: Sequence[Limit]
+    rigs: list[Rig]
+    again: Bests
+
+
+def searched(limits: Iterable[Limit]) -> list[Limit]:
+    """The limits that the cheapest circuit has, so that a search can be made for each value."""
+    return [limit for limit in limits if limit.rung == "limited"]
+
+
+def machines(limits: Iterable[Limit], all_values: bool) -> int:
+    """How many machines are searched on a rig."""
+    return 2 + sum(1 + all_values * len(limit.values) for limit in searched(limits))
+
+
+def study(
+    bench: Bench,
+    rigs: Sequence[Settings],
+    limits: Sequence[Limit] = LIMITS,
+    seed: int = 0,
+    efforts: Efforts = FULL,
+    told: Callable[[str], object] = lambda name: None,
+) -> Study:
+    """Search the machines of the bench's scene, and those of ``rigs`` with each limit lifted.
+
+    ``told`` hears of each machine when it is done. The same for the same seed.
+    """
+    found = []
+    for number, settings in enumerate([{}, *rigs]):
+        rig = Rig("its own rig" if number == 0 else f"rig {number}", settings)
+        scene = changed(bench.scene, rig.settings, rig.name)
+        rig.cases = _cases(scene, settings, limits, all_values=number == 0)
+        first, others = efforts.first, efforts.next
+        if number:
+            first = others = efforts.others
+        _search(bench, rig, (seed, number), first, others, told)
+        found.append(rig)
+    anew = _searched(bench, found[0].cases[OWN], (seed + 1, 0, 0), efforts.first, [])
+    told("own, another seed")
+    return Study(bench.scene, limits, found, _best(anew))
+
+
+def _cases(
+    scene: Scene, rig: Settings, limits: Iterable[Limit], all_values: bool
+) -> dict[Name, Case]:
+    cases = {OWN: Case(rig, Machine()), IDEAL: Case(rig, Machine(), "ideal")}
+    for limit in searched(limits):
+        for value in (*limit.values, limit.gone) if all_values else (limit.gone,):
+            cases[limit.name, value] = Case(rig, limit.machine(scene, value))
+    return cases
+
+
+def _search(
+    bench: Bench,
+    rig: Rig,
+    seed: tuple[int, int],
+    first: Effort,
+    others: Effort,
+    told: Callable[[str], object],
+) -> None:
+    searches: dict[Name, Search] = {}
+    for number, (name, case) in enumerate(rig.cases.items()):
+        effort = first if name in (OWN, IDEAL) else others
+        searches[name] = _searched(
+            bench, case, (*seed, number), effort, _hints(bench, rig, name, _kin(rig, name))
+        )
+        rig.found[name] = _best(searches[name])
+        told(f"{rig.name}: {name[0]} {name[1]:.3g}")
+    for name in rig.cases:
+        # The first ones hear of all that was found; so do the others then, through these.
+        known = list(rig.found) if name in (OWN, IDEAL) else _kin(rig, name)
+        searches[name].scores(np.vstack(_hints(bench, rig, name, known)))
+        rig.found[name] = _best(searches[name])
+
+
+def _kin(rig: Rig, name: Name) -> list[Name]:
+    """Of the machines that were searched those that are most like one."""
+    return [other for other in rig.found if other in (OWN, IDEAL) or other[0] == name[0]]
+
+
+def _hints(bench: Bench, rig: Rig, name: Name, others: Iterable[Name]) -> list[Array]:
+    here, cases = rig.cases[name], rig.cases
+    return [_as_hints(bench, rig.found[other], cases[other], here) for other in others]
+
+
+def _searched(
+    bench: Bench, case: Case, seed: tuple[int, ...], effort: Effort, hints: Sequence[Array]
+) -> Search:
+    search = Search(partial(bench.scores, case), seed)
+    search.run(effort, np.vstack([np.empty((0, KNOB_COUNT)), *hints]))
+    return search
+
+
+def _best(search: Search) -> Bests:
+    return tuple(search.found(quantity) for quantity in range(len(QUANTITIES)))
+
+
+def _as_hints(bench: Bench, found: Bests, there: Case, here: Case) -> Array:
+    """The settings found for one machine as places of another, with the same currents."""
+    both = [one for best in found for one in (*best.settings[:1], *best.robust[:1])]
+    places = np.array([one.place for one in both]).reshape(-1, KNOB_COUNT)
+    ratio = bench.amperes(there) / bench.amperes(here)
+    places = np.unique(rounded(places * [ratio, 1.0, ratio]), axis=0)
+    return places
+
+
+def ensemble(path: Path) -> list[Settings]:
+    """The rigs of a file: the tables of its list ``ensemble``, each of keys ("table.key") and
+    values, SI; entries without a dot are passed over. At most MOST_RIGS, spread over the list.
+
+    Raises BadInput.
+    """
+    name = plain(str(path))
+    try:
+        text = path.read_text(encoding="utf-8")
+        said = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
+    except OSError as error:
+        raise BadInput(f"{name}: cannot be read ({error.strerror}).") from error
+    except ValueError as error:
+        raise BadInput(f"{name}: is neither JSON nor, named .toml, TOML ({error}).") from error
+    rigs = said.get("ensemble") if isinstance(said, dict) else None
+    if not isinstance(rigs, list) or not rigs or not all(isinstance(rig, dict) for rig in rigs):
+        raise BadInput(f'{name}: has no list "ensemble" of tables of keys and values.')
+    kept = np.unique(np.linspace(0, len(rigs) - 1, min(MOST_RIGS, len(rigs))).round().astype(int))
+    return [{key: value for key, value in rigs[k].items() if "." in key} for k in kept.tolist()]
+
+
+def checked(scene: Scene, rigs: Sequence[Settings], path: Path) -> None:
+    """Refuse a scene or a rig that cannot be studied. Raises BadInput."""
+    if not scene.rung.on_ladder:
+        raise BadInput(
+            f'scene {scene.name}: circuit.model = "{scene.circuit.model}" has no limits to lift; '
+            'it must be "full", "amplifier", "limited", "ideal" or "auto".'
+        )
+    if scene.drive.waveform != "sawtooth":
+        raise BadInput(
+            f'scene {scene.name}: drive.waveform = "{scene.drive.waveform}" has no knobs to search.'
+        )
+    for number, rig in enumerate(rigs):
+        changed(scene, rig, f"{plain(str(path))}, ensemble {number}")

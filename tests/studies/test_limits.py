@@ -1,0 +1,306 @@
+"""What is achievable: against closed forms, a grid, an independent solver, and itself."""
+
+import csv
+import json
+import shlex
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from scipy.linalg import expm
+
+from cosim.arrays import Array
+from cosim.cli.main import main
+from cosim.errors import BadInput
+from cosim.files.picture import Picture
+from cosim.scene import changed, load
+from cosim.simulation.simulate import simulate
+from cosim.studies.limits import aims, runs, search, study
+from cosim.studies.limits.aims import QUANTITIES
+from cosim.studies.limits.answer import BINDS, NOTHING, UNTOLD, Change
+from cosim.studies.limits.report import JOURNAL, run
+from cosim.studies.limits.runs import Bench, Case
+from cosim.studies.limits.search import Effort, Search
+from cosim.studies.limits.table import LIMITS, Machine, needed_acceleration
+from tests.studies.test_figures import assert_legible
+
+BY_NAME = {limit.name: limit for limit in LIMITS}
+NUMBER = {quantity.name: number for number, quantity in enumerate(QUANTITIES)}
+SMALL = Effort(16, (0.05, 0.02), 2)
+
+
+@pytest.fixture
+def brief(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Short runs."""
+    monkeypatch.setattr(runs, "SETTLE", 0.05)
+    monkeypatch.setattr(runs, "SPAN", 0.1)
+    yield
+
+
+def bench(folder: Path, scene: Any = "reference", **more: Any) -> Bench:
+    return Bench(load(scene), str(scene), folder / JOURNAL, 2, **more)
+
+
+def test_back_emf_is_turned_alone() -> None:
+    """Within the limits: the same motion, and a voltage less by what is gone of the back-EMF."""
+    base = load(
+        "reference",
+        [
+            *("run.duration=0.2", "run.settle=0.1", "circuit.model=limited"),
+            *("drive.waveform=sine", "circuit.supply=100", "coil.count=2"),
+        ],
+    )
+    machine = BY_NAME["back-EMF"].machine(base, 0.25)
+    own, less = simulate(base), simulate(changed(base, machine.settings, "test"))
+    np.testing.assert_allclose(less.columns["z_ram"], own.columns["z_ram"], rtol=0, atol=1e-12)
+    gone = own.columns["coil_voltage"] - less.columns["coil_voltage"]
+    np.testing.assert_allclose(gone, 0.75 * own.columns["back_emf"], rtol=0, atol=1e-8)
+    # The coil that it stands for carries the same current and makes the same heat.
+    current = less.columns["current"] * machine.coil_scale
+    np.testing.assert_allclose(current, own.columns["current"], rtol=1e-9, atol=1e-12)
+    heat = less.summary["energy_copper"] * machine.coil_scale
+    assert heat == pytest.approx(own.summary["energy_copper"], rel=1e-6)
+
+
+def test_sense_resistor_leaves_the_current(tmp_path: Path) -> None:
+    place = np.array([0.6, 0.8, 0.2])
+    with bench(tmp_path) as made:
+        machines = Machine(), BY_NAME["sense resistor"].machine(made.scene, 0.1)
+        every = [Case({}, machine, "ideal").settings(place) for machine in machines]
+        own, less = made.outcomes(every)
+    for name in ("v_average", "current_max"):
+        assert less.numbers[name] == pytest.approx(own.numbers[name], rel=1e-5)
+
+
+def test_needed_acceleration() -> None:
+    """0.72 x 0.5 N / 9 g + g; two surfaces of a gripper hold twice."""
+    assert needed_acceleration(load("reference")) == pytest.approx(49.81)
+    both = load("reference", ["mechanics.n_surfaces=2"])
+    assert needed_acceleration(both) == pytest.approx(89.81)
+
+
+def test_the_cube_is_the_range_of_the_potentiometers() -> None:
+    for place in ([0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.3, 0.7, 0.9]):
+        pots = dict(zip(("pot_max", "pot_frequency", "pot_offset"), place, strict=True))
+        drive = load("reference", {f"drive.{name}": x for name, x in pots.items()}).drive
+        # A potentiometer is read in 1024 steps.
+        for key, value in aims.settings(np.array(place)).items():
+            step = 0.1 if key == "drive.frequency" else 0.016
+            assert value == pytest.approx(getattr(drive, key.split(".")[1]), abs=step)
+
+
+LINEAR = {
+    "mechanics.travel": 10.0, "mechanics.suspension_k1": 200.0, "mechanics.suspension_k3": 0.0,
+    "mechanics.suspension_damping": 0.3, "mechanics.flexure_damping": 3.0,
+    "friction.normal_force": 100.0,
+}  # fmt: skip
+
+
+def test_ideal_current_without_walls_is_the_linear_surface(tmp_path: Path) -> None:
+    """Two masses on springs under a sawtooth, by matrix exponentials; the part sticks."""
+    place = np.array([0.4, 0.5, 0.3])
+    with bench(tmp_path) as made:
+        case = Case(dict(LINEAR), Machine(), "ideal")
+        there = case.settings(place)
+        found, _ = made.scores(case, place[None])
+        scene = changed(made.scene, there, "test")
+    mechanics, drive, period = scene.mechanics, scene.drive, 1.0 / scene.drive.frequency
+    ram, body = mechanics.ram_mass, mechanics.surface_mass + mechanics.part_mass
+    force = scene.coil.force_factor / scene.circuit.sense_resistance
+    k, c = mechanics.suspension_k1, mechanics.suspension_damping
+    spring, damper = mechanics.flexure_stiffness, mechanics.flexure_damping
+    # z_s, v_s, z_r, v_r about their equilibrium, and the command with its slope
+    a = np.zeros((6, 6))
+    a[0, 1] = a[2, 3] = a[4, 5] = 1.0
+    a[1] = np.array([-k - spring, -c - damper, k, c, -force, 0.0]) / body
+    a[3] = np.array([k, c, -k, -c, force, 0.0]) / ram
+    count = 2000
+    step = expm(a * period / count)
+    state, falls = np.zeros(6), []
+    for cycle in range(round(scene.run.duration / period)):
+        state[4:] = drive.offset - drive.amplitude / 2.0, drive.amplitude / period
+        for _ in range(count):
+            if cycle * period >= scene.run.settle - 1e-9:
+                falls.append(-a[1] @ state)
+            state = step @ state
+    assert found[0, NUMBER["a_free"]] == pytest.approx(max(falls), rel=1e-4)
+    assert found[0, NUMBER["a_free"]] == found[0, NUMBER["a_walls"]]
+
+
+def test_a_ram_at_a_wall_is_told(tmp_path: Path) -> None:
+    """One that rests there makes no impacts either, and its surface hardly moves."""
+    with bench(tmp_path) as made:
+        found, _ = made.scores(Case({}, Machine()), np.array([[0.0, 0.8, 0.9], [0.9, 0.8, 0.4]]))
+    assert (found[:, NUMBER["a_free"]] < 0.0).all()
+
+
+@pytest.mark.usefixtures("brief")
+def test_search_finds_what_an_exhaustive_grid_finds(tmp_path: Path) -> None:
+    grid = np.stack(np.meshgrid(*[np.linspace(0.04, 0.96, 7)] * 3), axis=-1).reshape(-1, 3)
+    case = Case({}, Machine())
+    with bench(tmp_path) as made:
+        scores, borne = made.scores(case, aims.rounded(grid))
+        one = Search(lambda places: made.scores(case, places), (0,))
+        one.run(Effort(256, (0.08, 0.05, 0.03, 0.02, 0.01), 4), np.empty((0, 3)))
+        best = np.where(borne[:, None], scores, -np.inf).max(axis=0)
+        found = [one.found(number) for number in range(len(QUANTITIES))]
+        again = Search(lambda places: made.scores(case, places), (0,))
+        again.run(Effort(256, (0.08, 0.05, 0.03, 0.02, 0.01), 4), np.empty((0, 3)))
+        assert [again.found(number) for number in range(len(QUANTITIES))] == found
+        for number, top in enumerate(found):
+            if best[number] > 0.0:
+                assert top.settings[0].value >= 0.95 * best[number], QUANTITIES[number].name
+        steady = found[NUMBER["v_up"]].robust[0]
+        assert 0.0 < steady.worst <= steady.median <= found[NUMBER["v_up"]].settings[0].value
+        every = [case.settings(np.array(top.settings[0].place)) for top in found[3:]]
+        for settings, outcome in zip(every, made.outcomes(every), strict=True):
+            assert made.heat(case, settings, outcome.numbers) <= case.machine.heat
+        independent(case.settings(np.array(steady.place)), steady.value)
+
+
+def independent(settings: dict[str, Any], v_average: float) -> None:
+    """A found point by the monolithic reference."""
+    monolithic = pytest.importorskip("tests.reference.monolithic")
+    values = {key.split(".")[1]: value for key, value in settings.items()}
+    duration, settle = values.pop("duration"), values.pop("settle")
+    found = monolithic.simulate(
+        values, duration, settle, contact="compliant", circuit=values.pop("model")
+    )
+    assert v_average == pytest.approx(found.v_average, rel=2e-3)
+
+
+def ridge(places: Array) -> tuple[Array, Any]:
+    """A narrow ridge aslant to the knobs with ripples, and a second one that is forbidden."""
+    x, y, z = (places - 0.5).T
+    along, across, up = x + y, x - y, z - 0.3 * x
+    first = np.exp(-((across / 0.05) ** 2) - (along / 0.5) ** 2 - (up / 0.1) ** 2)
+    first *= 1.0 + 0.05 * np.cos(80.0 * along)
+    second = np.exp(-((places - 0.3) ** 2).sum(axis=1) / 0.02)
+    return np.stack([first, second], axis=1), places[:, 0] > 0.35
+
+
+def test_search_climbs_ridges_and_keeps_out_of_what_is_forbidden() -> None:
+    best = 1.05, np.exp(-(0.05**2) / 0.02)  # in the middle; where what is allowed begins
+    for seed in range(3):
+        one = Search(ridge, (seed,))
+        one.run(study.FULL.first, np.empty((0, 3)))
+        for number in range(2):
+            top = one.found(number).settings[0]
+            assert top.place[0] > 0.35 and 0.93 * best[number] <= top.value <= best[number]
+
+
+@pytest.mark.usefixtures("brief")
+def test_a_killed_study_goes_on(tmp_path: Path) -> None:
+    places = aims.rounded(np.random.default_rng(0).random((12, 3)))
+    case, count = Case({}, Machine()), [0]
+
+    def tick() -> None:
+        count[0] += 1
+        if count[0] == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), bench(tmp_path, progress=tick) as made:
+        made.scores(case, places)
+    with bench(tmp_path, progress=tick) as made:
+        found, _ = made.scores(case, places)
+    assert count[0] == 12
+    with Bench(load("reference"), "", tmp_path / "other", 1) as made:
+        np.testing.assert_array_equal(made.scores(case, places)[0], found)
+
+
+def test_verdicts() -> None:
+    """What binds changes a frontier by more than its interval; what does not, by 2 % at most."""
+
+    def verdict(best: tuple[float, ...], robust: tuple[float, ...], noise: float = 0.03) -> str:
+        return Change(LIMITS[0], 0, best, robust, (noise, noise)).verdict
+
+    assert verdict((0.2, 0.1), (0.15, 0.05)) == BINDS
+    assert verdict((0.2, 0.1), (0.15, -0.05)) == UNTOLD
+    assert verdict((0.02, -0.01), (0.0, 0.015)) == NOTHING
+    assert verdict((0.025, 0.025), (0.01, 0.01)) == UNTOLD
+    assert verdict((float("nan"),), (float("nan"),)) == UNTOLD
+
+
+def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tables and figures of a small one; each row's command gives the row's value."""
+    drawn: list[Figure] = []
+    monkeypatch.setattr(Picture, "write", lambda figure, path: drawn.append(figure))
+    monkeypatch.setattr(runs, "SETTLE", 0.02)
+    monkeypatch.setattr(runs, "SPAN", 0.05)
+    monkeypatch.setattr(search, "STEADY", 1)
+    monkeypatch.setattr(search, "TOP", 1)
+    values: dict[str, tuple[float, ...]] = {
+        "supply voltage": (24.0,),
+        "coil heat": (),
+        "slew rate": (),
+    }
+    limits = [replace(BY_NAME[name], values=few) for name, few in values.items()]
+    efforts = study.Efforts(SMALL, Effort(8, (), 2), Effort(8, (), 2))
+    scene = load("reference", {"run.duration": 0.2})
+    rigs: list[Any] = [{"mechanics.surface_mass": 0.02}]
+    there = [load("trial-05", {"run.duration": 0.15, "run.settle": 0.05})]
+    said = run(tmp_path, scene, "reference", rigs, there, efforts=efforts, limits=limits, workers=2)
+    assert "The part slips down from 50 m/s² on" in said and not (tmp_path / JOURNAL).exists()
+    with open(tmp_path / "limits.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["limit"] for row in rows} == {"own", "ideal current", *(x.name for x in limits)}
+    for row in (rows[0], rows[-1]):
+        repeats(row, tmp_path)
+    assert all(float(row["heat of a coil [W]"]) < 3.53 for row in rows if row["limit"] == "own")
+    page = (tmp_path / "limits.md").read_text(encoding="utf-8")
+    assert all(f"| {limit.name} |" in page for limit in limits) and "| trial-05 |" in page
+    assert len(drawn) == 4 + 2  # and those of the two commands
+    for figure in drawn[:4]:
+        assert_legible(figure)
+
+
+def repeats(row: dict[str, str], folder: Path) -> None:
+    """Run a row's command and compare its summary with the row."""
+    words = shlex.split(row["command"])[1:]
+    assert main([*words, "--out", str(folder / "again")]) == 0
+    summary = json.loads((folder / "again" / "summary.json").read_text())
+    quantity = QUANTITIES[NUMBER[row["quantity"]]]
+    value = quantity.of(summary) * quantity.scale
+    assert value == pytest.approx(float(row["found"]), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["held"], 'scene held: circuit.model = "none" has no limits to lift'),
+        (["square"], 'scene square: drive.waveform = "square" has no knobs'),
+        (["paper", "--rigs", "rigs.json"], "rigs.json: cannot be read"),
+        (["paper", "--seed", "-1"], "--seed -1: must be a whole number from 0"),
+    ],
+)
+def test_bad_input(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["chart", "limits", *arguments, "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1
+    assert not out.exists()
+
+
+def test_ensemble(tmp_path: Path) -> None:
+    path = tmp_path / "rigs.json"
+    rigs = [{"cost": n, "mechanics.surface_mass": 0.01 + 0.001 * n} for n in range(7)]
+    path.write_text(json.dumps({"ensemble": rigs, "seed": 0}))
+    found = study.ensemble(path)
+    assert [round(1e3 * float(rig["mechanics.surface_mass"])) for rig in found] == [10, 12, 14, 16]
+    scene = load("paper")
+    study.checked(scene, found, path)
+    with pytest.raises(BadInput, match=r"rigs\.json, ensemble 0: .*surface_mass"):
+        study.checked(scene, [{"mechanics.surface_mass": -1.0}], path)
+    for text in ("[]", "{}", '{"ensemble": [1]}'):
+        path.write_text(text)
+        with pytest.raises(BadInput, match="has no list"):
+            study.ensemble(path)
+    path.write_text("{")
+    with pytest.raises(BadInput, match="neither JSON"):
+        study.ensemble(path)
