@@ -18,7 +18,7 @@ from cosim.studies.limits import aims
 from cosim.studies.limits.aims import NEEDED, QUANTITIES, Numbers, scores
 from cosim.studies.limits.table import Machine, Settings
 from cosim.studies.sweep.batch import runner
-from cosim.studies.sweep.journal import Journal
+from cosim.studies.sweep.journal import hashed, journal
 from cosim.studies.sweep.point import Number, Outcome
 
 SETTLE, SPAN = 0.4, 0.6
@@ -26,6 +26,9 @@ SETTLE, SPAN = 0.4, 0.6
 
 OPA548_CURRENT = 5.0
 """A: the OPA548's peak current (data sheet SBOS070D)."""
+
+NUMBERS = 1 << 56
+"""How many settings can be told apart."""
 
 THREADED = ("ideal", "limited")
 """Circuits without ngspice."""
@@ -63,7 +66,7 @@ class Bench:
         self,
         scene: Scene,
         asked: str,
-        journal: Path,
+        path: Path,
         workers: int,
         progress: Callable[[], object] = lambda: None,
     ) -> None:
@@ -79,7 +82,7 @@ class Bench:
             if isinstance(value, bool) and tables["drive"][key.split(".")[1]] != value
         }
         self._workers, self._progress = workers, progress
-        self._asked, self._path = asked, journal
+        self._asked, self._path = asked, path
         self._stack = ExitStack()
         self._done: dict[int, Outcome] = {}
 
@@ -87,9 +90,8 @@ class Bench:
         from cosim.mechanics import package
         from cosim.toolchain.versions import versions
 
-        said = [self.scene.as_dict(), versions(), package.token()]
-        identity = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
-        self._journal = self._stack.enter_context(Journal(self._path, identity))
+        identity = hashed(self.scene.as_dict(), versions(), package.token())
+        self._journal = self._stack.enter_context(journal(self._path, identity, NUMBERS))
         self._done = dict(self._journal.read())
         spice = changed(self.scene, {"circuit.model": "amplifier"}, "amplifier")
         enter = self._stack.enter_context
@@ -110,7 +112,7 @@ class Bench:
             ]
             for number, outcome in pool.run(points) if points else ():
                 kept = {name: outcome.numbers[name] for name in NEEDED if name in outcome.numbers}
-                self._done[number] = Outcome(kept, outcome.failure)
+                self._done[number] = Outcome(kept, outcome.failure, outcome.machine)
                 self._journal.add(number, self._done[number])
                 self._progress()
         return [self._done[number] for number in numbers]
@@ -162,7 +164,7 @@ class Bench:
 
 def _number(settings: Settings) -> int:
     said = json.dumps(settings, sort_keys=True).encode()
-    return int.from_bytes(hashlib.sha256(said).digest()[:7], "big")
+    return int.from_bytes(hashlib.sha256(said).digest()[:7], "big")  # below NUMBERS
 
 
 def _typed(value: float | int | str) -> str:
