@@ -406,10 +406,10 @@ def test_keys_of_use_are_not_told(tmp_path: Path, scene: str, changes: list[str]
 
 
 def test_swing_losses_bound_the_supply_only_where_they_act() -> None:
-    assert load("paper-full", ["circuit.supply=3"]).circuit.supply == 3
-    for scene in ("paper", "paper-limited"):
+    assert load("reference", ["circuit.model=full", "circuit.supply=3"]).circuit.supply == 3
+    for model in ("amplifier", "limited"):
         with pytest.raises(BadInput, match=r"swing_loss_high = 4 V must be below"):
-            load(scene, ["circuit.supply=3"])
+            load("reference", [f"circuit.model={model}", "circuit.supply=3"])
 
 
 @pytest.mark.parametrize(
