@@ -22,7 +22,7 @@ _OF_THE_REFERENCE = {
 
 def reference_parameters(scene: Scene) -> dict[str, Any]:
     """A scene's numbers by the names of the reference solution's parameters, SI."""
-    flat = scene.mechanics.model_dump(exclude={"contact", "tolerance"})
+    flat = scene.mechanics.model_dump(exclude={"contact", "initial_lift", "tolerance"})
     for table, names in _OF_THE_REFERENCE.items():
         flat |= getattr(scene, table).model_dump(include=set(names))
     return flat
