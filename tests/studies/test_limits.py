@@ -138,6 +138,7 @@ def test_a_ram_at_a_wall_is_told(tmp_path: Path) -> None:
     assert (found[:, NUMBER["a_free"]] < 0.0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("brief")
 def test_search_finds_what_an_exhaustive_grid_finds(tmp_path: Path) -> None:
     grid = np.stack(np.meshgrid(*[np.linspace(0.04, 0.96, 7)] * 3), axis=-1).reshape(-1, 3)
