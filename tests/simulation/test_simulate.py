@@ -33,7 +33,9 @@ NUMBERS = [
     "energy_in", "energy_copper", "energy_friction", "energy_impact", "energy_damping",
     "energy_stored", "energy_residual", "wall_time",
 ]  # fmt: skip
-COUNTS = ["impacts", "stick_slip_events", "circuit_steps", "circuit_rejected", "fmu_steps"]
+COUNTS = [
+    "impacts", "stick_slip_events", "at_wall", "circuit_steps", "circuit_rejected", "fmu_steps",
+]  # fmt: skip
 ACCELERATIONS = ["a_surface_max", "a_surface_min"]
 CAMERA = ["a_camera_max", "a_camera_min"]
 DRIVEN = ["transport_per_cycle", "current_max", "current_min", "saturated_fraction"]

@@ -229,7 +229,7 @@ def test_verdicts() -> None:
 def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The tables and figures of a small one; each row's command gives the row's value."""
     drawn: list[Figure] = []
-    monkeypatch.setattr(Picture, "write", lambda figure, path: drawn.append(figure))
+    monkeypatch.setattr(Picture, "write", lambda figure, *where: drawn.append(figure))
     monkeypatch.setattr(runs, "SETTLE", 0.02)
     monkeypatch.setattr(runs, "SPAN", 0.05)
     monkeypatch.setattr(search, "STEADY", 1)
