@@ -75,7 +75,8 @@ def test_killed(scene: str, points: int, kills: int, tmp_path: Path) -> None:
         resumed_at.append(lines(wild))
         _, alive = psutil.wait_procs(workers, timeout=120)
         assert not alive, "workers outlive their parent"
-    assert resumed_at == sorted(resumed_at) and 0 < resumed_at[0] <= resumed_at[-1] < total + 1
+    # The last kill may strike when all points stand in the journal and only the dataset lacks.
+    assert resumed_at == sorted(resumed_at) and 0 < resumed_at[0] < total + 1 >= resumed_at[-1]
     subprocess.run(arguments(points, wild, scene), check=True, capture_output=True, timeout=300)
     assert (wild / "sweep.nc").read_bytes() == (calm / "sweep.nc").read_bytes()
     assert lines(wild) == total + 1, "a point was repeated or lost"
