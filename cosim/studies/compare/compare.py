@@ -58,12 +58,14 @@ def measure(
     earliest: float,
     period: float | None,
     shutter: float = 0.0,
+    aligned: bool = False,
 ) -> Found:
     """Scores and numbers, and both sides at the recording's times.
 
     ``earliest`` is the first time of the run that may be laid over the recording's first row, s;
     ``period`` that of the drive, s, within which it is shifted for the best agreement, or None
     where there is nothing to shift; ``shutter`` the exposure as a share of the time between rows.
+    A run that is ``aligned`` is not shifted.
     """
     recording, notes = _comparable(recording, waveforms)
     exposure = shutter * float(np.median(np.diff(recording.time)))
@@ -79,7 +81,7 @@ def measure(
             f"{plain(recording.name)}: run.duration must be at least {needed:.4g} s."
         )
     start = earliest
-    if period is not None and not own:
+    if period is not None and not own and not aligned:
         latest = max(earliest, min(end - span, earliest + period))
         start = _laid_over(waveforms, recording, earliest, latest, exposure)
     simulated = observe(waveforms, recording, start, exposure)

@@ -112,6 +112,8 @@ def compare(
     run: Result | Scene | str | os.PathLike[str],
     trial: str | os.PathLike[str],
     overrides: Overrides | None = None,
+    *,
+    aligned: bool = False,
 ) -> Comparison:
     """Compare a run with a recording (a CSV): a tracked trial, or what any instrument measured of
     surface, part, current or voltage (:mod:`cosim.trials.table` has the columns and units).
@@ -119,14 +121,15 @@ def compare(
     ``run`` is a result, a folder that ``Result.save`` wrote, or a scene, which is then run, with
     ``overrides`` for its keys, long enough to cover the recording. Where in its period the run
     meets the first row is chosen so that the surfaces' velocities agree best, or the currents,
-    voltages, or parts' velocities where no surface was measured.
+    voltages, or parts' velocities where no surface was measured; a run that is ``aligned`` meets it
+    at ``run.settle``, as the scenes of the trials do, which begin as the records do.
 
     Raises BadInput for files that cannot be read, and for a run that is too short.
     """
     measured = read_recording(Path(trial))
     name, waveforms, scene = _run(run, overrides, measured)
     start, period = laid_over(scene)
-    found = measure(waveforms, measured, start, period, scene.run.shutter)
+    found = measure(waveforms, measured, start, period, scene.run.shutter, aligned)
     return Comparison(name, measured.name, found)
 
 

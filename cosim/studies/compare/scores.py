@@ -53,6 +53,12 @@ def mean_distance(found: Array, wanted: Array) -> float:
     return float(np.nanmean(np.abs(found - wanted)))
 
 
+def centred_distance(found: Array, wanted: Array) -> float:
+    """Mean of the distances from the mean difference, where both are known."""
+    apart = found - wanted
+    return float(np.nanmean(np.abs(apart - np.nanmean(apart))))
+
+
 SHARE = "share of the variance of the measured {} that the run explains"
 R2 = {
     "v_surface": ("velocity_r2", "velocity of the surface"),
@@ -79,6 +85,10 @@ def scores(recording: Recording, simulated: Signals, period: float | None) -> li
         ):
             scaled = tuple(value and value * scale for value in values)
             found.append(Score(name, unit, words, scaled))
+        values = _lines(time, moved, run - run[0], period, gained, centred_distance)
+        words = "the same, both from their means: what the first frame is does not count"
+        in_mm = tuple(value and value * 1e3 for value in values)
+        found.append(Score("centred_error_mm", "mm", words, in_mm))
     for signal, (name, words) in R2.items():
         if signal in simulated:
             values = _lines(

@@ -1,0 +1,146 @@
+"""The trials of a folder, each against the built-in scene with its number: how far the whole chain,
+from the command to the part, can be trusted.
+"""
+
+from collections.abc import Callable, Sequence
+from math import nan
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+
+from cosim.errors import BadInput, plain
+from cosim.scene import Scene, load
+from cosim.scene.loading import Overrides, list_scenes
+from cosim.studies.compare.run import Comparison, compare
+from cosim.studies.plots import BLUE, VERMILION, panels
+from cosim.studies.tables import Row, write_csv, write_page
+from cosim.trials.tracked import number_of, trial_files
+
+
+def pairs(folder: Path, overrides: Overrides | None = None) -> list[tuple[Scene, Path]]:
+    """The files of a folder's trials, each with its scene. Raises BadInput."""
+    known = {name for name, _ in list_scenes()}
+    found = []
+    for path in trial_files(folder):
+        name = f"trial-{number_of(path) or 0:02d}"
+        if name not in known:
+            raise BadInput(
+                f"{plain(str(path))}: there is no built-in scene {name}; the last number in the "
+                "file's name must be that of one of the scenes trial-01 to trial-10."
+            )
+        found.append((load(name, overrides), path))
+    return found
+
+
+def each(
+    trials: Sequence[tuple[Scene, Path]], told: Callable[[], object] = lambda: None
+) -> list[Comparison]:
+    """The comparisons; ``told`` hears of each."""
+    found = []
+    for scene, path in trials:
+        found.append(compare(scene, path, aligned=True))
+        told()
+    return found
+
+
+COLUMNS: dict[str, tuple[str, float]] = {
+    "surface's velocity: R²": ("velocity_r2", 1.0),
+    "its ceiling": ("velocity_r2_ceiling", 1.0),
+    "part's velocity: R²": ("part_velocity_r2", 1.0),
+    "ceiling of this": ("part_velocity_r2_ceiling", 1.0),
+    "part's height: mean error [mm]": ("centred_error_mm", 1.0),
+    "of a straight line [mm]": ("centred_error_mm_straight_line", 1.0),
+    "from the first frame [mm]": ("mean_error_mm", 1.0),
+    "drift [mm/s]": ("drift_simulated", 1e3),
+    "measured drift [mm/s]": ("drift_measured", 1e3),
+    "kick [mm/s]": ("kick_simulated", 1e3),
+    "measured kick [mm/s]": ("kick_measured", 1e3),
+}
+"""What is told of each trial: names of ``Comparison.numbers``, and the factor from their units."""
+
+
+def row(found: Comparison) -> Row:
+    """A trial's row of the table."""
+    numbers = found.numbers
+    told = ((title, numbers.get(name), scale) for title, (name, scale) in COLUMNS.items())
+    return {
+        "scene": found.run,
+        **{title: nan if value is None else value * scale for title, value, scale in told},
+    }
+
+
+def write(folder: Path, found: Sequence[Comparison]) -> str:
+    """Write trials.csv, .md and .png into ``folder``; gives what is printed."""
+    rows = [row(one) for one in found]
+    write_csv(folder / "trials.csv", rows)
+    said = [message(rows), *NOTES]
+    write_page(folder / "trials.md", "The whole chain against the trials", said, {"Trials": rows})
+    draw(rows, folder / "trials.png")
+    return "\n\n".join([said[0], f"Written to {folder}: trials.csv, trials.md, trials.png"])
+
+
+NOTES = (
+    "Each scene has the identified rig and the trial's own drive; nothing measured goes in beside "
+    "these. Simulated motion is read as the camera reads it, from the moment on at which the "
+    "identification put the record's first frame. A ceiling is what the measured motion explains "
+    "of itself one period later. Errors of the part's height are mean distances, means removed, "
+    "and from the first frame on, as the paper has them. Drift is the part's mean velocity over "
+    "whole periods, a kick the largest change of the surface's velocity between frames.",
+    "The drives and the rig were fitted to these trials, trial 6 apart: this tells how well one "
+    "machine can repeat them. What it predicts of trials that it has not seen is in "
+    "[identify.md](identify.md), under what was held out.",
+    "Measured: the trials of Yako, Nowak, Yuan and Salisbury.",
+)
+
+
+def message(rows: Sequence[Row]) -> str:
+    """What the table shows, in a sentence."""
+    shares = [one["surface's velocity: R²"] for one in rows]
+    closer = sum(
+        one["part's height: mean error [mm]"] < one["of a straight line [mm]"] for one in rows
+    )
+    apart = [abs(one["drift [mm/s]"] - one["measured drift [mm/s]"]) for one in rows]
+    return (
+        f"Over {len(rows)} trials the chain explains {min(shares):.2f} to {max(shares):.2f} of the "
+        f"variance of the surface's velocity, is closer to the part's path than the best straight "
+        f"line in {closer}, and misses the part's drift by {sum(apart) / len(apart):.2g} mm/s on "
+        f"average and {max(apart):.2g} mm/s at most."
+    )
+
+
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """Draw the explained shares, the part's errors and its drifts, a bar a trial."""
+    figure, (shares, errors, drifts) = panels(
+        message(rows),
+        "Bars: simulated by the whole chain. Marks: what the measurements give for comparison.",
+        (12.0, 4.6),
+        columns=3,
+    )
+    names = [one["scene"].removeprefix("trial-").lstrip("0") for one in rows]
+    first, *_ = COLUMNS
+    for axis, bars, marks, title, label in (
+        (shares, first, "its ceiling", "Surface's velocity: R²", "its own, a period later"),
+        (
+            *(errors, "part's height: mean error [mm]", "of a straight line [mm]"),
+            *("Part's height: mean error [mm]", "best straight line"),
+        ),
+        (
+            *(drifts, "drift [mm/s]", "measured drift [mm/s]"),
+            *("Part's mean velocity [mm/s]", "measured"),
+        ),
+    ):
+        _panel(axis, names, [one[bars] for one in rows], [one[marks] for one in rows], label)
+        axis.set_title(title, loc="left", fontsize=10.5)
+    shares.set_ylim(min(0.0, *(one[first] for one in rows)), 1.25)
+    figure.write(path)
+
+
+def _panel(axis: Axes, names: list[str], bars: list[Any], marks: list[Any], label: str) -> None:
+    at = range(len(names))
+    axis.bar(at, bars, 0.6, color=BLUE, label="simulated")
+    axis.plot(at, marks, color=VERMILION, ls="", marker="_", ms=18, mew=2.5, label=label)
+    axis.set_xticks(at, names)
+    axis.set_xlabel("trial")
+    axis.margins(y=0.25)
+    axis.legend(fontsize=8, ncols=2, loc="upper left")
