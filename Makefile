@@ -32,7 +32,7 @@ VENV_READY := $(shell test -x $(PY) && test "$$(cat $(VENV)/.created 2>/dev/null
 
 # What is compiled, and what compiles it.
 SOURCES := $(sort $(shell find fmu/src fmu/include cosim -path cosim/_compiled -prune -o \
-	-type f \( -name '*.[ch]' -o -name '*.def' \) -print)) build_c.py setup.py pyproject.toml LICENSE
+	-type f \( -name '*.[ch]' -o -name '*.def' \) -print)) build_c.py setup.py pyproject.toml fmu/LICENSE
 COMPILED := cosim/_compiled/build.json
 
 .PHONY: help run test test-all fuzz setup charts bench check lock clean FORCE
