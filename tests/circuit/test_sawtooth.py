@@ -17,6 +17,7 @@ from tests.helpers.spice import Result, netlist, run_all
 pytestmark = [pytest.mark.physics, needs.ngspice_library]
 
 STEP = 50e-6
+NAMES: tuple[str, ...] = ("pot_max", "pot_frequency", "pot_offset")
 KNOBS = [(1.0, 0.5, 0.5), (0.3, 0.05, 0.9), (0.05, 0.6, 0.0), (0.9, 0.3, 1.0)]
 Voltage = Callable[[Command, float], float]
 
@@ -41,7 +42,7 @@ def points(drive: Command, start: float, at: Voltage, before: Voltage, end: floa
 
 @pytest.mark.parametrize("pots", KNOBS)
 def test_it_gives_the_voltage_of_the_scenes_source(pots: tuple[float, ...], tmp_path: Path) -> None:
-    knobs = dict(zip(("pot_max", "pot_frequency", "pot_offset"), pots, strict=True))
+    knobs: dict[str, float] = dict(zip(NAMES, pots, strict=True))
     plain, drive = scene_source(knobs)
     end = 1.05 * plain.period  # the fall, too
     tran = f".tran 10u {end!r} 0 20u"
