@@ -17,7 +17,10 @@ pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="the environment is laid out otherwise"),
 ]
 SCENES = (("optimal",), ("paper", "--set", "run.duration=0.2"), ("paper-limited",))
-FILES = ["fmu/src/fmi/fmi3.c", "circuits/full.cir", "tests/conftest.py", "Makefile", ".ci/run"]
+FILES = [
+    *("fmu/src/fmi/fmi3.c", "fmu/LICENSE", "circuits/full.cir", "tests/conftest.py", "Makefile"),
+    *(".ci/run", "CHANGELOG.md", "CITATION.cff", "results/paper.png"),
+]
 
 
 def run(*command: object, cwd: Path, **environment: str) -> str:
