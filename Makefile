@@ -9,6 +9,7 @@
 #                    `make test` writes results/datasheet.*
 #   make bench       remakes results/bench.json, some minutes (ARGS='--trials DIR')
 #   make check       ruff and pyright
+#   make dist        wheel and source distribution in dist/, each built in an empty environment
 #   make lock        remakes requirements.lock with uv  (ARGS=--upgrade for newer versions)
 #   make clean       removes .venv and everything built
 #
@@ -32,10 +33,10 @@ VENV_READY := $(shell test -x $(PY) && test "$$(cat $(VENV)/.created 2>/dev/null
 
 # What is compiled, and what compiles it.
 SOURCES := $(sort $(shell find fmu/src fmu/include cosim -path cosim/_compiled -prune -o \
-	-type f \( -name '*.[ch]' -o -name '*.def' \) -print)) build_c.py setup.py pyproject.toml LICENSE
+	-type f \( -name '*.[ch]' -o -name '*.def' \) -print)) build_c.py setup.py pyproject.toml fmu/LICENSE
 COMPILED := cosim/_compiled/build.json
 
-.PHONY: help run test test-all fuzz setup charts bench check lock clean FORCE
+.PHONY: help run test test-all fuzz setup charts bench check dist lock clean FORCE
 
 help:
 	@sed -n 's/^#  \( .*\)/\1/p' Makefile
@@ -97,6 +98,13 @@ check: setup
 	@$(VENV)/bin/ruff check
 	@$(VENV)/bin/ruff format --check
 	@$(VENV)/bin/pyright
+
+# The wheel is built of the source distribution, so that neither takes anything that lies about.
+dist: $(VENV)/.installed
+	@rm -rf dist cosim.egg-info
+	@$(PY) -m build -q --outdir dist || \
+		{ echo "cosim: the distributions could not be built (see above)." >&2; exit 1; }
+	@ls -s --block-size=K dist
 
 lock:
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: install it (pip install uv) or name it with UV=/path/to/uv." >&2; exit 1; }

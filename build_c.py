@@ -36,6 +36,7 @@ LIBRARIES = {
 """The package's libraries; each is made of all C files of its folders."""
 REPLAY = ROOT / "cosim/studies/bench/replay.c"
 DESCRIBE = FMU / "src/fmi/describe.c"
+FMU_LICENSE = FMU / "LICENSE"
 
 # Without contraction every platform computes the same bits.
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-Wall", "-Wextra")
@@ -60,7 +61,7 @@ class BuildFailed(Exception):
 def sources() -> list[Path]:
     """All files that the products depend on."""
     code = [path for folders in LIBRARIES.values() for path in _code(folders, "*.[ch]")]
-    return sorted([*code, REPLAY, *_fmu_files(), DESCRIBE, ROOT / "LICENSE", Path(__file__)])
+    return sorted([*code, REPLAY, *_fmu_files(), DESCRIBE, FMU_LICENSE, Path(__file__)])
 
 
 def digest() -> str:
@@ -221,7 +222,7 @@ def _make_fmu(target: Path, work: Path) -> None:
         contents = {
             "modelDescription.xml": described(version, *names),
             f"binaries/{binaries}/{library.name}": library.read_bytes(),
-            "documentation/licenses/license.txt": (ROOT / "LICENSE").read_bytes(),
+            "documentation/licenses/license.txt": FMU_LICENSE.read_bytes(),
             **{f"sources/{_place(file)}": file.read_bytes() for file in own},
             "sources/fmi/token.h": f"#define FMU_TOKEN {token}\n".encode(),
             "sources/buildDescription.xml": described("build", version, *names),

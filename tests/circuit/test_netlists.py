@@ -626,7 +626,7 @@ def test_contract_of_the_netlists(name):
         assert (CIRCUITS / included).is_file() and "/" not in included
 
 
-@pytest.mark.parametrize("name", ["amplifier", "full"])
+@pytest.mark.parametrize("name", ["amplifier", "full", "sawtooth"])
 @needs.ngspice_program
 def test_netlist_runs_as_it_is_in_plain_ngspice(tmp_path, name):
     raw = tmp_path / "out.raw"

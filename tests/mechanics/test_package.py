@@ -119,7 +119,7 @@ def test_contents(built: dict[int, Path], version: int) -> None:
         names = set(archive.namelist())
         sources = {name.removeprefix("sources/") for name in names if name.startswith("sources/")}
         text = archive.read("documentation/licenses/license.txt")
-    assert text == (REPOSITORY / "LICENSE").read_bytes()
+    assert text == (REPOSITORY / "fmu/LICENSE").read_bytes()
     assert {f"fmi/fmi{version}.c", f"fmi/fmi{version}Functions.h", "fmi/token.h"} <= sources
     assert not any(name.startswith(f"fmi/fmi{5 - version}") for name in sources)
     assert {"physics/model.c", "physics/variables.def"} <= sources
@@ -183,3 +183,20 @@ def test_the_physics_know_nothing_of_fmi() -> None:
     included = set(re.findall(r'#include "(.*)"', text))
     assert len(included) > 5
     assert included <= {path.name for path in folder.iterdir()}
+
+
+def test_the_fmu_stands_under_a_licence_of_its_own(built: dict[int, Path], version: int) -> None:
+    # What is BSD must not take anything from outside its folder, where all is GPL.
+    files = [path for path in (REPOSITORY / "fmu/src").rglob("*") if path.is_file()]
+    assert len(files) > 20
+    for path in files:
+        text = path.read_text("utf-8")
+        assert text.startswith("/* SPDX-License-Identifier: BSD-2-Clause */\n"), path
+        for name in re.findall(r'^#\s*include "(.+)"', text, re.MULTILINE):
+            places = [path.parent / name, REPOSITORY / "fmu/include" / name]
+            found = [place.resolve() for place in places if place.is_file()]
+            assert name == "token.h" or found, f"{path} includes {name}"
+            assert all(place.is_relative_to(REPOSITORY / "fmu") for place in found)
+    assert description_xml(built[version]).get("license") == "BSD-2-Clause"
+    for path in (REPOSITORY / "fmu/include").iterdir():
+        assert "2-Clause BSD License" in path.read_text("utf-8"), path

@@ -6,18 +6,23 @@ import subprocess
 import sys
 import sysconfig
 import venv
+import zipfile
 from pathlib import Path
 
 import pytest
 
 import build_c
+from cosim.toolchain.libraries import FOLDER
 
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(os.name != "posix", reason="the environment is laid out otherwise"),
 ]
 SCENES = (("optimal",), ("paper", "--set", "run.duration=0.2"), ("paper-limited",))
-FILES = ["fmu/src/fmi/fmi3.c", "circuits/full.cir", "tests/conftest.py", "Makefile", ".ci/run"]
+FILES = [
+    *("fmu/src/fmi/fmi3.c", "fmu/LICENSE", "circuits/full.cir", "tests/conftest.py", "Makefile"),
+    *(".ci/run", "CHANGELOG.md", "CITATION.cff", "results/paper.png"),
+]
 
 
 def run(*command: object, cwd: Path, **environment: str) -> str:
@@ -62,24 +67,67 @@ def test_the_wheel_is_for_this_platform_and_any_python(wheel: Path) -> None:
     assert f"-py3-none-{platform}" in wheel.name
 
 
+def test_the_wheel_holds_what_a_run_needs_and_nothing_of_the_checkout(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        (licences,) = (
+            [line for line in archive.read(name).decode().splitlines() if "License" in line]
+            for name in names
+            if name.endswith("METADATA")
+        )
+    folder = build_c.ROOT / "circuits"
+    circuits = [path.relative_to(folder) for path in folder.rglob("*") if path.is_file()]
+    compiled = json.loads((FOLDER / "build.json").read_text())["files"]
+    scenes = (build_c.ROOT / "cosim/scene/library").glob("*.*")
+    wanted = {
+        "cosim/py.typed",
+        "cosim/trials/measured.csv",
+        "cosim/_fmu/src/physics/variables.def",
+        *(f"cosim/_circuits/{path.as_posix()}" for path in circuits),
+        *(f"cosim/_compiled/{file}" for file in compiled),
+        *(path.relative_to(build_c.ROOT).as_posix() for path in scenes),
+    }
+    assert len(compiled) > 50 and wanted - names == set()
+    assert {name.split("/")[0].split("-")[0] for name in names} == {"cosim"}
+    assert licences == [
+        "License-Expression: GPL-3.0-or-later AND BSD-2-Clause",
+        "License-File: LICENSE",
+        "License-File: fmu/LICENSE",
+    ]
+
+
 def test_it_runs_without_a_compiler(wheel: Path, tmp_path: Path) -> None:
     environment, here, there, empty = (tmp_path / n for n in ("venv", "here", "there", "empty"))
     for folder in (here, there, empty):
         folder.mkdir()
+    installed = {"PATH": str(empty), "CC": "", "PYTHONPATH": ""}
     venv.create(environment, with_pip=False)
     python = environment / "bin" / "python"
     site = run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=here)
     Path(site.strip(), "dependencies.pth").write_text(sysconfig.get_path("purelib"))
     pip = (sys.executable, "-m", "pip", "--python", python, "install", "--no-index", "--no-deps")
-    run(*pip, wheel, cwd=here)
-    found = run(python, "-c", "import cosim; print(cosim.__file__)", cwd=there)
+    run(*pip, wheel, cwd=here, PYTHONPATH="")
+    found = run(python, "-c", "import cosim; print(cosim.__file__)", cwd=there, **installed)
     assert Path(found).is_relative_to(environment)
     for scene, *options in SCENES:
         arguments = ("run", scene, *options)
         run(sys.executable, "-m", "cosim", *arguments, cwd=here)
-        run(environment / "bin" / "cosim", *arguments, cwd=there, PATH=str(empty), CC="")
+        run(environment / "bin" / "cosim", *arguments, cwd=there, **installed)
         results = [folder / "results" / scene for folder in (here, there)]
         one, other = ((folder / "waveforms.csv").read_bytes() for folder in results)
         assert one == other
         one, other = (json.loads((folder / "summary.json").read_text()) for folder in results)
         assert one | {"wall_time": 0} == other | {"wall_time": 0}
+
+    # what lies beside a run, and on the rungs without ngspice also without that
+    bare = installed | {"NGSPICE_LIBRARY_PATH": str(empty / "none.so")}
+    grid = ("--over", "drive.amplitude=6:8:2", "--set", "run.duration=0.2")
+    for arguments in (
+        ("sweep", "paper-limited", *grid, "--workers", "1"),
+        ("export", "results/paper-limited", "--as", "raw,wav"),
+        ("fmu", "build"),
+        ("fmu", "check"),
+    ):
+        run(environment / "bin" / "cosim", *arguments, cwd=there, **bare)
+    for name in ("paper-limited-sweep/sweep.nc", "fmu/stickslip-fmi3.fmu"):
+        assert (there / "results" / name).stat().st_size > 1000

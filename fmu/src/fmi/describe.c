@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Prints the XML files of the FMU from the table of variables. Runs at build time; not a part of
  * the FMU.
  *
@@ -303,7 +304,7 @@ static void model_description(int version, char **sources, int n_sources)
            version == 2 ? "2.0" : "3.0", version == 2 ? "guid" : "instantiationToken", TOKEN_TEXT);
     attribute("description", "A part on a vibrating surface: ram, surface and part, with walls and "
                              "set-valued friction");
-    attribute("license", "GPL-3.0-or-later");
+    attribute("license", "BSD-2-Clause");
     attribute("variableNamingConvention", "flat");
     if (version == 2) {
         puts(">\n  <CoSimulation modelIdentifier=\"stickslip\" " ABILITIES "\n"

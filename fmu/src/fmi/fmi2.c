@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* FMI 2.0 Co-Simulation. */
 /* The standard gives source code names with this prefix; FMI2_OVERRIDE_FUNCTION_PREFIX, or a header
  * of the importer's own, takes it off for a shared library. */

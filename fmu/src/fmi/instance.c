@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Life of an instance: creation, call order, time, messages. */
 #include "instance.h"
 

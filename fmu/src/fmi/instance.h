@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* What the FMI 2.0 and FMI 3.0 layers share: one instance, its call order, its time, its messages.
  *
  * Functions that return int give 1 when the call was carried out and 0 when it was refused; a

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Value references, the same in both standards: 0 is time, then the reals and the integers of
  * variables.def in their order. */
 #ifndef STICKSLIP_REFERENCES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* FMU states: plain copies with a header that tells them from anything else. */
 #include <stdlib.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Variables by value reference, and derivatives of outputs. */
 #include <math.h>
 #include <string.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 #ifndef STICKSLIP_ADVANCE_H
 #define STICKSLIP_ADVANCE_H
 

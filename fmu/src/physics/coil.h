@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* The coil in its magnet: force factor and back-EMF of one surface, of its own states. In a header,
  * since they are called in every evaluation of the rates. */
 #ifndef STICKSLIP_COIL_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* The solution between two points: where something happens on it. */
 #ifndef STICKSLIP_CURVE_H
 #define STICKSLIP_CURVE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* One step of order 8 with an interpolant of order 7, after Dormand and Prince: Hairer, Norsett,
  * Wanner: Solving Ordinary Differential Equations I, 2nd edition, II.5 and II.6 (DOP853).
  *

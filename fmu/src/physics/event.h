@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* An event: what changes a mode. */
 #ifndef STICKSLIP_EVENT_H
 #define STICKSLIP_EVENT_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Finding events and applying them. */
 #ifndef STICKSLIP_EVENTS_H
 #define STICKSLIP_EVENTS_H

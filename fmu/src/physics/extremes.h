@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Largest and smallest values of the first surface's motion, and of its coil's current. */
 #ifndef STICKSLIP_EXTREMES_H
 #define STICKSLIP_EXTREMES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* One step of the Runge-Kutta pair of Dormand and Prince, 5(4).
  * Dormand, Prince: A family of embedded Runge-Kutta formulae, J. Comput. Appl. Math. 6 (1980). */
 #ifndef STICKSLIP_INTEGRATOR_H

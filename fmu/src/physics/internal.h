@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* What the FMU's files share among themselves is declared between these two: it stays out of the
  * library's interface, whatever the compiler options are. An exported name can be taken for one of
  * the host's: glibc, too, has an advance. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* The rates of the states as the integration takes them: what the mode and the inputs decide is
  * decided once a step and not at each of its stages. The formulas are those of mechanics.c, which
  * has all cases; here is the one that most steps are of. In a header, for speed. */

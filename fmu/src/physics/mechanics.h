@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Forces, accelerations and their rates in a given mode. No time stepping, no events. */
 #ifndef STICKSLIP_MECHANICS_H
 #define STICKSLIP_MECHANICS_H

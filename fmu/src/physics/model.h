@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* The mechanics of a vibrating surface: ram, surface and part, with walls and set-valued friction.
  *
  * Free of FMI. SI units; up is positive. Only + - * / and sqrt are used, so that every IEEE-754

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* The current source that drives the coils, reduced to its limits.
  *
  * The coils' total current follows command / sense_resistance, at most current_limit, as long as the

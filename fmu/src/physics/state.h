@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* What the model consists of: its variables, its modes and its states, all in one plain structure
  * without pointers, so that a copy of it is the whole state. SI units; up is positive. */
 #ifndef STICKSLIP_STATE_H
