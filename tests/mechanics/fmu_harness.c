@@ -8,6 +8,7 @@
 
 #include "fmi2Functions.h"
 #include "fmi3Functions.h"
+#include "fmi/instance.h"
 #include "fmi/references.h"
 #include "physics/model.h"
 
@@ -143,6 +144,98 @@ static int restore_damaged(fmi2Component c)
     return fmi2DeSerializeFMUstate(c, bytes, draw() % 4 ? size : draw() % size, &again) == fmi2OK;
 }
 
+/* FNV-1a, as fmi/state.c has it. */
+static uint64_t sum_of(const fmi2Byte *bytes, size_t n)
+{
+    uint64_t sum = 0xcbf29ce484222325;
+    for (size_t i = 0; i < n; i++)
+        sum = (sum ^ (unsigned char)bytes[i]) * 0x100000001b3;
+    return sum;
+}
+
+static double wild(void)
+{
+    const double sign = draw() % 2 ? 1.0 : -1.0;
+    uint64_t bits = draw();
+    double any;
+    memcpy(&any, &bits, sizeof any);
+    switch (draw() % 4) {
+    case 0:
+        return senseless();
+    case 1:
+        return any;
+    default:
+        return sign * pow(10.0, uniform(-20.0, 20.0));
+    }
+}
+
+/* Where the parts of a state lie that decide how it goes on. */
+#define PART(part) {offsetof(State, part), sizeof(((State *)0)->part)}
+static const struct {
+    size_t at, size;
+} PARTS[] = {PART(model.r),     PART(model.n),    PART(model.mode), PART(model.y),
+             PART(model.step),  PART(model.touch_step), PART(model.steady_for),
+             PART(model.ahead), PART(model.ahead.dense), PART(model),
+             {offsetof(State, time), sizeof(State) - offsetof(State, time)}};
+
+static int wild_states, taken_states;
+
+/* A state with wild values and a right checksum is refused, or goes on and comes back: the steps
+ * end, and after a reset the instance is as good as new. */
+static void restore_wild(fmi2Component other, fmi2Component c)
+{
+    static fmi2Byte bytes[4096];
+    const size_t sum_at = 2 * sizeof(uint64_t);
+    fmi2FMUstate state = NULL, again = NULL;
+    size_t size;
+    CHECK(fmi2GetFMUstate(other, &state) == fmi2OK);
+    CHECK(fmi2SerializedFMUstateSize(other, state, &size) == fmi2OK && size <= sizeof bytes);
+    CHECK(fmi2SerializeFMUstate(other, state, bytes, size) == fmi2OK);
+    CHECK(fmi2FreeFMUstate(other, &state) == fmi2OK);
+    fmi2Byte *const own = bytes + size - sizeof(State);
+    for (int n = 1 + (int)(draw() % 3); n > 0; n--) {
+        const size_t part = draw() % (sizeof PARTS / sizeof *PARTS);
+        fmi2Byte *const at = own + PARTS[part].at;
+        const int whole = (int)(draw() % 9) - 4;
+        const double value = wild();
+        if (draw() % 2)
+            memcpy(at + draw() % (PARTS[part].size / sizeof whole) * sizeof whole, &whole,
+                   sizeof whole);
+        else
+            memcpy(at + draw() % (PARTS[part].size / sizeof value) * sizeof value, &value,
+                   sizeof value);
+    }
+    const uint64_t sum = sum_of(own, sizeof(State));
+    memcpy(bytes + sum_at, &sum, sizeof sum);
+    wild_states++;
+    calls += 4;
+    if (fmi2DeSerializeFMUstate(c, bytes, size, &again) == fmi2OK) {
+        taken_states++;
+        CHECK(fmi2SetFMUstate(c, again) == fmi2OK);
+        CHECK(fmi2FreeFMUstate(c, &again) == fmi2OK);
+        for (int i = 0; i < 3; i++) {
+            const fmi2ValueReference time_vr = REFERENCE_TIME;
+            fmi2ValueReference vr = (unsigned)(draw() % (N_REALS + 2));
+            double time, value;
+            CHECK(fmi2GetReal(c, &time_vr, 1, &time) == fmi2OK);
+            fmi2DoStep(c, time, pow(10.0, uniform(-6.0, -3.0)), 1);
+            fmi2GetReal(c, &vr, 1, &value);
+            calls += 3;
+        }
+    }
+    double value = 0.0;
+    const fmi2ValueReference vr = PLACE(z_part);
+    CHECK(fmi2Reset(c) == fmi2OK);
+    CHECK(fmi2SetupExperiment(c, 0, 0.0, 0.0, 0, 0.0) == fmi2OK);
+    CHECK(fmi2EnterInitializationMode(c) == fmi2OK);
+    CHECK(fmi2ExitInitializationMode(c) == fmi2OK);
+    CHECK(fmi2DoStep(c, 0.0, 1e-4, 1) == fmi2OK && fmi2GetReal(c, &vr, 1, &value) == fmi2OK);
+    static double known;
+    CHECK(known == 0.0 || value == known);
+    known = value;
+    calls += 6;
+}
+
 static int call_out_of_turn(fmi2Component c)
 {
     const double h = senseless(), endless = 1e300;
@@ -209,7 +302,8 @@ static void simulate(int steps)
 {
     fmi2Component c2 = new2(TOKEN_TEXT);
     fmi3Instance c3 = new3(TOKEN_TEXT);
-    CHECK(c2 && c3);
+    fmi2Component target = new2(TOKEN_TEXT); /* of wild states */
+    CHECK(c2 && c3 && target);
     abuse(c2, 200);
     CHECK(fmi2Reset(c2) == fmi2OK);
     choose_parameters(c3, c2);
@@ -250,12 +344,15 @@ static void simulate(int steps)
         CHECK(fmi2DoStep(c2, time, h, 1) == fmi2OK);
         CHECK(fmi3DoStep(c3, time, h, 1, &event, &terminate, &early, &last) == fmi3OK);
         CHECK(!event && !terminate && !early && last == time + h);
+        if (i % 8 == 0)
+            restore_wild(c2, target);
         time = last;
         held = held > h ? held - h : 0.0;
         compare(c2, c3);
     }
     CHECK(fmi2Terminate(c2) == fmi2OK);
     abuse(c2, 20);
+    fmi2FreeInstance(target);
     fmi2FreeInstance(c2);
     fmi3FreeInstance(c3);
 }
@@ -279,7 +376,7 @@ int main(int count, char **arguments)
     fmi3FreeInstance(NULL);
     for (int i = 0; i < 20; i++)
         simulate(100);
-    CHECK(refusals > 1000);
+    CHECK(refusals > 1000 && taken_states > 50 && wild_states > taken_states + 50);
     printf("%d refusals of more than %ld calls\n", refusals, calls);
     return 0;
 }

@@ -3,6 +3,7 @@
 import ctypes
 import math
 import re
+import struct
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -539,6 +540,53 @@ def test_foreign_states_are_refused(version: int, fault: str) -> None:
             it.fmu.deserializeFMUState(bytes(bad))
         assert "state" in it.messages[-1]
         assert it.save() == good
+
+
+NAN, MANY, FAR = (struct.pack("d", value) for value in (math.nan, 1e300, -1e9))
+# The end of the state: time and stop time, then whether there is one, whether the tolerance was set,
+# whether outputs are stale, and the phase. The parameter is found by its value.
+WILD = {
+    "no phase": (-4, struct.pack("i", 3)),
+    "phase of another": (-4, struct.pack("i", 1)),
+    "no flag": (-8, struct.pack("i", 7)),
+    "time": (-32, NAN),
+    "endless time": (-32, struct.pack("d", -math.inf)),
+    "parameter": ("ram_mass", NAN),
+    "parameter too large": ("ram_mass", MANY),
+    "parameter below 0": ("ram_mass", FAR),
+    "input": ("normal_force", FAR),
+    "slope": ("normal_force_slope", NAN),
+}
+
+
+def sum_of(state: bytes) -> int:
+    """FNV-1a."""
+    found = 0xCBF29CE484222325
+    for byte in state:
+        found = (found ^ byte) * 0x100000001B3 % 2**64
+    return found
+
+
+@pytest.mark.parametrize("fault", WILD)
+def test_a_wild_state_with_a_right_checksum_is_refused(version: int, fault: str) -> None:
+    place, value = WILD[fault]
+    with rig(version) as it:
+        known = {"ram_mass": 0.0041234, "normal_force": 0.512345, "normal_force_slope": 0.0012345}
+        it.begin({"ram_mass": known["ram_mass"]})
+        it.set(**{name: known[name] for name in ("normal_force", "normal_force_slope")})
+        good = it.save()
+        head, state = good[:88], bytearray(good[88:])
+        assert struct.unpack("Q", head[16:24])[0] == sum_of(state)
+        at = len(state) + place if isinstance(place, int) else -1
+        if isinstance(place, str):
+            at = state.index(struct.pack("d", known[place]))
+        state[at : at + len(value)] = value
+        bad = head[:16] + struct.pack("Q", sum_of(state)) + head[24:] + bytes(state)
+        with pytest.raises(FMICallException):
+            it.fmu.deserializeFMUState(bad)
+        assert "not a state of the FMU: its " in it.messages[-1]
+        assert it.save() == good
+        it.step()
 
 
 # ---- refusals ----

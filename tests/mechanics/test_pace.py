@@ -1,13 +1,19 @@
 """Mechanics too fast to be solved are refused, and not by a run that never ends."""
 
+import contextlib
+import re
 import subprocess
 import sys
+from ctypes import c_double, c_void_p
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 
 import cosim
+from cosim.coupling.loop.recorder import Recorder
 from cosim.errors import BadInput, SimulationFailed
+from cosim.mechanics.fmi import borrow, give_back
 from cosim.mechanics.pace import BEGINNING, BUDGET, Pace
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene.model import FASTEST
@@ -136,3 +142,39 @@ def test_a_long_run_goes_on() -> None:
     with pytest.raises(SimulationFailed, match=r"would take about 3\.6e\+11"):
         mechanics.spent = 1e7
         Pace(scene, mechanics).judge(1.0, 0)
+
+
+def test_slow_steps_come_back_to_be_interrupted() -> None:
+    """Compiled code goes on for 4096 steps without Python: an hour where each takes a second."""
+    scene = cosim.load("reference", ENDLESS | {"circuit.model": "ideal", "run.output_step": 5e-3})
+    with contextlib.closing(Mechanics(scene)) as mechanics:
+        recorder = Recorder(scene, mechanics, lambda time: None)
+        edges = 5e-3 * np.arange(1, 501)
+        current = np.full_like(edges, 1.5)
+        places = [values.ctypes.data for values in (edges, current, current)]
+        done = recorder._library.recorder_follow(recorder._state, 500, *places, 4096)
+        assert 0 < done < 500
+        recorder.follow(edges[done : done + 1], current[:1], current[:1])
+        assert recorder.steps == done + 1
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_one_step_of_the_fmu_is_bounded_and_says_what_to_do(version: int) -> None:
+    """Far above what a step that is asked for takes; before, a step went on for 52 s."""
+    fmu = borrow(version)
+    fmu.set_reals(fmu.places(["contact_damping"]), (c_double * 1)(1e6))
+    fmu.initialise()
+    fmu.set_reals(fmu.places(["current"]), (c_double * 1)(1.5))
+    state = c_void_p()
+    fmu.get_state(state)
+    with pytest.raises(FMICallException):
+        fmu.do_step(0.0, 10.0)
+    found = re.search(r"after (\d+) internal steps, (\S+) s into a step of 10 s", fmu.messages[-1])
+    assert found and int(found[1]) < 1e6
+    assert "take shorter steps" in fmu.messages[-1]
+    reached = float(found[2])
+    fmu.set_state(state)
+    fmu.do_step(0.0, 0.5 * reached)  # as the sentence advises
+    fmu.do_step(0.5 * reached, 0.5 * reached)
+    fmu.free_state(state)
+    give_back(fmu)

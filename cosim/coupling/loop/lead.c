@@ -42,6 +42,7 @@ typedef struct {
 static const int64_t ATTEND_EVERY = 4096; /* attempted steps; some ten milliseconds */
 
 static Lead *run; /* the one under way, or NULL */
+static int64_t late; /* ms; when Python is to be called again, at the latest */
 
 static int going(const Lead *c)
 {
@@ -239,6 +240,7 @@ static void attend(Lead *c)
 {
     c->quiet = 0;
     c->attend();
+    late = loop_milliseconds() + LOOP_PATIENCE;
 }
 
 /* --- what ngspice calls --- */
@@ -292,7 +294,7 @@ EXPORT int lead_step(double time, double *delta, double old_delta, int redo, int
         c->quiet++;
     }
     /* Only before a step's values are sent, or after they were used. */
-    if (c->n_log == c->log_rows || c->quiet >= ATTEND_EVERY)
+    if (c->n_log == c->log_rows || c->quiet >= ATTEND_EVERY || loop_milliseconds() >= late)
         attend(c);
     return 0;
 }
@@ -306,6 +308,7 @@ void lead_begin(Lead *c)
     c->answer_step = c->time_constant / 20.0;
     c->limited_step = c->time_constant / 5.0;
     c->answered = c->time_constant * log(1.0 / SETTLED_SHARE); /* V1 leaves 0 at once */
+    late = loop_milliseconds() + LOOP_PATIENCE;
     run = c;
 }
 

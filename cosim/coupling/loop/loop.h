@@ -41,6 +41,11 @@ EXPORT void fmu_bind(Fmu *f, int version);
 
 /* --- recorder.c: moves the mechanics and writes down what they do --- */
 
+/* ms; so long at most, and one step of the FMU, goes by until Python can look for Ctrl-C, however
+   slow the steps are. */
+enum { LOOP_PATIENCE = 100 };
+int64_t loop_milliseconds(void); /* of a clock that goes on evenly */
+
 /* A quantity over time: linear between its corners, where it may jump, and constant outside. */
 typedef struct {
     const double *times, *values;
@@ -88,7 +93,8 @@ EXPORT int recorder_begin(Recorder *r);
 
 /* Advance through `n` intervals that end at `edges`; in each, every port's input goes linearly from
    `start` to `end` (a row of `ports` values for each interval). Not further once `most` steps were
-   made, perhaps within an interval, and then to be called again with the rest. Gives how many
+   made or LOOP_PATIENCE is over, perhaps within an interval, and then to be called again with the
+   rest. Gives how many
    intervals were finished, or -1 if something failed. */
 EXPORT int64_t recorder_follow(Recorder *r, int64_t n, const double *edges, const double *start,
                                const double *end, int64_t most);

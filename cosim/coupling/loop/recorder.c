@@ -2,11 +2,25 @@
    their own. The mechanics are told how long their inputs hold beyond them, so that they need not
    end a step of their integration there. */
 
+#define _POSIX_C_SOURCE 199309L /* the clock's */
+
 #include "loop.h"
 
 #include <stdint.h>
+#include <time.h>
 
 static const double SAME_TIME = 1e-12; /* s; communication points closer than this are one */
+
+int64_t loop_milliseconds(void)
+{
+    struct timespec now = {0};
+#ifdef CLOCK_MONOTONIC_COARSE /* in a few nanoseconds; steps are a thousand */
+    clock_gettime(CLOCK_MONOTONIC_COARSE, &now);
+#else
+    timespec_get(&now, TIME_UTC);
+#endif
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
 
 /* The value at `t` on the straight that ends at the corner with the index `after`. */
 static double between(const Schedule *s, int64_t after, double t)
@@ -120,17 +134,17 @@ int recorder_begin(Recorder *r)
     return visit(r);
 }
 
-int64_t recorder_follow(Recorder *r, int64_t n, const double *edges, const double *start,
-                        const double *end, int64_t most)
+/* As recorder_follow(); until `stop` steps of the FMU, or `late` (ms). */
+static int64_t follow(Recorder *r, int64_t n, const double *edges, const double *start,
+                      const double *end, int64_t stop, int64_t late)
 {
     Fmu *f = r->fmu;
-    const int64_t stop = f->steps + most;
     for (int64_t k = 0; k < n; k++, start += r->ports, end += r->ports) {
         if (!r->inside)
             r->began = f->time;
         r->inside = 1;
         while (r->times[r->next] < edges[k] - SAME_TIME) {
-            if (f->steps >= stop)
+            if (f->steps >= stop || loop_milliseconds() >= late)
                 return k;
             if (!step_within(r, r->times[r->next], edges[k], start, end) || !visit(r))
                 return -1;
@@ -140,15 +154,22 @@ int64_t recorder_follow(Recorder *r, int64_t n, const double *edges, const doubl
         r->inside = 0;
         if (r->times[r->next] <= edges[k] + SAME_TIME && !visit(r))
             return -1;
-        if (f->steps >= stop)
+        if (f->steps >= stop || loop_milliseconds() >= late)
             return k + 1;
     }
     return n;
 }
 
+int64_t recorder_follow(Recorder *r, int64_t n, const double *edges, const double *start,
+                        const double *end, int64_t most)
+{
+    return follow(r, n, edges, start, end, r->fmu->steps + most,
+                  loop_milliseconds() + LOOP_PATIENCE);
+}
+
 int recorder_advance(Recorder *r, double time, double start, double end)
 {
-    return recorder_follow(r, 1, &time, &start, &end, INT64_MAX / 2) == 1;
+    return follow(r, 1, &time, &start, &end, INT64_MAX, INT64_MAX) == 1;
 }
 
 int recorder_exchange(Recorder *r, double time, double start, double end, double value)

@@ -151,12 +151,14 @@ int stickslip_exit_initialisation(Instance *inst, const char *function)
 static void tell_events(const Instance *inst, const char *function, const Model *before)
 {
     const Model *now = &inst->state.model;
-    const int impacts = now->n.impacts - before->n.impacts;
-    const int changes = now->n.stick_slip_events - before->n.stick_slip_events;
+    /* The counters may have gone round. */
+    const unsigned impacts = (unsigned)now->n.impacts - (unsigned)before->n.impacts;
+    const unsigned changes =
+        (unsigned)now->n.stick_slip_events - (unsigned)before->n.stick_slip_events;
     if (!inst->callback || impacts + changes == 0)
         return;
     char message[MESSAGE_SIZE];
-    snprintf(message, sizeof message, "%s: %d impacts and %d stick-slip changes until %.9g s",
+    snprintf(message, sizeof message, "%s: %u impacts and %u stick-slip changes until %.9g s",
              function, impacts, changes, inst->state.time);
     inst->send(inst, SEVERITY_OK, "logEvents", message);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-2-Clause */
 /* FMU states: plain copies with a header that tells them from anything else. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -32,6 +33,26 @@ static int is_own(const Instance *inst, const char *function, const Snapshot *sn
         memcmp(snapshot->token, TOKEN, sizeof TOKEN) == 0)
         return 1;
     return stickslip_refuse(inst, function, "this is not a state of this build of the FMU");
+}
+
+/* Serialised bytes can come from anywhere, and a right checksum costs nothing. */
+static int is_sound(const Instance *inst, const char *function, const State *s)
+{
+    char message[MODEL_MESSAGE_SIZE];
+    const char *wrong = NULL;
+    if (s->phase != INSTANTIATED && s->phase != INITIALISING && s->phase != STEPPING &&
+        s->phase != TERMINATED)
+        wrong = "its phase is none";
+    else if (!isfinite(s->time) || isnan(s->stop_time))
+        wrong = "its time is no number";
+    else if ((s->has_stop_time | s->tolerance_set | s->outputs_stale) & ~1)
+        wrong = "its flags are none";
+    else if (stickslip_model_check(&s->model, message))
+        wrong = message;
+    else if (s->phase != INITIALISING &&
+             s->model.initialised != (s->phase == STEPPING || s->phase == TERMINATED))
+        wrong = "its phase is none";
+    return !wrong || stickslip_refuse(inst, function, "this is not a state of the FMU: %s", wrong);
 }
 
 static Snapshot *room_for(const Instance *inst, const char *function, void **state)
@@ -119,6 +140,8 @@ int stickslip_deserialise(Instance *inst, const char *function, const void *byte
         return 0;
     if (read.checksum != checksum(&read.state))
         return stickslip_refuse(inst, function, "the serialised state is damaged");
+    if (!is_sound(inst, function, &read.state))
+        return 0;
     Snapshot *snapshot = room_for(inst, function, state);
     if (!snapshot)
         return 0;

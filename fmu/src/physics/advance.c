@@ -11,8 +11,10 @@
 #include "integrator.h"
 #include "mechanics.h"
 
-static const int MAX_EVENTS_PER_STEP = 1000000; /* Zeno sequences end by themselves, far below */
-static const int MAX_TRIALS_PER_STEP = 2000000;
+/* So much one step may do, that it comes back within seconds: whoever called it cannot stop it. What
+ * an importer steps through takes a thousandth of that. An event costs as much as some trials: it is
+ * searched for. Zeno sequences end by themselves, far below. */
+static const int MAX_TRIALS_PER_STEP = 400000, MAX_EVENTS_PER_STEP = 100000;
 
 /* How much longer a step of order 8 is than one of order 5, about; and from how many of the latter
  * on it is the cheaper one. */
@@ -281,22 +283,17 @@ static int long_step(Model *m, Point *now, int wall, double h, double hold, Poin
     return 1;
 }
 
-static int is_too_much(int events, int trials, double h, char *message)
+static int is_too_much(int events, int trials, double tau, double h, char *message)
 {
-    if (events > MAX_EVENTS_PER_STEP) {
-        snprintf(message, MODEL_MESSAGE_SIZE,
-                 "more than %d events within one step of %g s: the mechanics chatter",
-                 MAX_EVENTS_PER_STEP, h);
-        return 1;
-    }
-    if (trials > MAX_TRIALS_PER_STEP) {
-        snprintf(message, MODEL_MESSAGE_SIZE,
-                 "more than %d internal steps within one step of %g s: it is too long, or the "
-                 "mechanics are too fast",
-                 MAX_TRIALS_PER_STEP, h);
-        return 1;
-    }
-    return 0;
+    if (events <= MAX_EVENTS_PER_STEP && trials <= MAX_TRIALS_PER_STEP)
+        return 0;
+    const int many_events = events > MAX_EVENTS_PER_STEP;
+    snprintf(message, MODEL_MESSAGE_SIZE,
+             "given up after %d %s, %.3g s into a step of %g s: take shorter steps, a larger tolerance "
+             "or slower mechanics (softer walls and springs, less damping, larger masses and "
+             "inductances)",
+             many_events ? events : trials, many_events ? "events" : "internal steps", tau, h);
+    return 1;
 }
 
 int stickslip_advance(Model *m, double h, char *message)
@@ -319,7 +316,7 @@ int stickslip_advance(Model *m, double h, char *message)
     }
 
     for (int trials = 0; now->knot.tau < h; trials++) {
-        if (is_too_much(events, trials, h, message))
+        if (is_too_much(events, trials, now->knot.tau, h, message))
             return -1;
         Ending ending;
         const double *const step = step_of(m);
@@ -335,10 +332,10 @@ int stickslip_advance(Model *m, double h, char *message)
             return -1;
         }
         if (!taken) {
-            m->n.internal_rejected++;
+            stickslip_count(&m->n.internal_rejected);
             continue;
         }
-        m->n.internal_steps++;
+        stickslip_count(&m->n.internal_steps);
         const EventFunction *event = ending.which < 0 ? NULL : &now->functions[ending.which];
         if (is_long) {
             if (end->knot.tau > h + STEP_MIN) {

@@ -181,7 +181,7 @@ static void set_wall(Model *m, int s, WallMode wall, int side)
 static void set_friction(Model *m, int s, int slip, int plate)
 {
     if ((m->mode[s].slip == 0) != (slip == 0))
-        m->n.stick_slip_events++;
+        stickslip_count(&m->n.stick_slip_events);
     m->mode[s].slip = slip;
     m->mode[s].plate = plate;
 }
@@ -190,7 +190,7 @@ static void impact(Model *m, int s, double tau, int side)
 {
     double *y = m->y + s * N_STATES;
     y[Q] = side * m->r.travel;
-    m->n.impacts++;
+    stickslip_count(&m->n.impacts);
     if (m->n.contact == 1) {
         set_wall(m, s, WALL_TOUCH, side);
         return;

@@ -141,7 +141,7 @@ static void hang_ram(Model *m)
     m->y[Q] = fabs(ram_balance(m, low)) < fabs(ram_balance(m, high)) ? low : high;
 }
 
-int stickslip_model_initialise(Model *m, char *message)
+int stickslip_model_contradiction(const Model *m, char *message)
 {
     if (m->r.mu_k > m->r.mu_s) {
         snprintf(message, MODEL_MESSAGE_SIZE, "mu_k = %g is larger than mu_s = %g", m->r.mu_k,
@@ -154,6 +154,13 @@ int stickslip_model_initialise(Model *m, char *message)
         (m->n.n_surfaces != 2 || m->n.prescribed || m->n.ram_fixed || m->r.mu_plate > 0.0))
         return say(message, "independent = 1 needs n_surfaces = 2, and prescribed, ram_fixed and "
                             "mu_plate to be 0");
+    return 0;
+}
+
+int stickslip_model_initialise(Model *m, char *message)
+{
+    if (stickslip_model_contradiction(m, message))
+        return -1;
     memset(m->y, 0, sizeof m->y);
     memset(m->mode, 0, sizeof m->mode); /* the walls free, the part sticking */
     if (m->n.prescribed) {

@@ -33,6 +33,13 @@ int stickslip_model_set_real(Model *m, size_t place, double value, char *message
 int stickslip_model_check_real(const Model *m, size_t place, double value, char *message);
 int stickslip_model_set_integer(Model *m, size_t place, int value, char *message);
 
+/* Parameters that each are in range, but not together. 0, or -1 with a sentence in message. */
+int stickslip_model_contradiction(const Model *m, char *message);
+
+/* Could a model whose bytes come from elsewhere have been left by the functions below? 0, or -1 with
+ * what is wrong in message. */
+int stickslip_model_check(const Model *m, char *message);
+
 /* Static equilibrium without current: the ram on its suspension, the surface on its flexures
  * carrying all three bodies (a fixed ram apart), the part sticking. 0, or -1 with a sentence in message. */
 int stickslip_model_initialise(Model *m, char *message);

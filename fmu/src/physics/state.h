@@ -119,6 +119,12 @@ typedef struct {
     Ahead ahead; /* the last: what is before it makes a state by itself */
 } Model;
 
+/* One more; beyond the largest number from the smallest on, as days of stepping may come to. */
+static inline void stickslip_count(int *counter)
+{
+    *counter = (int)((unsigned)*counter + 1u);
+}
+
 /* How many surfaces are solved for: 1, which stands for all that move alike, or 2. */
 static inline int moving(const Model *m)
 {
