@@ -14,22 +14,6 @@ from cosim.simulation.rungs.electrics import Electrics
 from cosim.simulation.rungs.rung import Motion
 from cosim.trials.camera import FRAME_RATE, accelerations, instants_a_frame, shown
 
-UNITS = {
-    "v_average": "m/s",
-    "v_average_error": "m/s",
-    "transport_per_cycle": "m",
-    "stick_fraction": "1",
-    **dict.fromkeys(("a_surface_max", "a_surface_min", "a_camera_max", "a_camera_min"), "m/s2"),
-    **dict.fromkeys(("v_surface_max", "v_surface_min"), "m/s"),
-    "z_surface_pp": "m",
-    **dict.fromkeys(("current_max", "current_min"), "A"),
-    **dict.fromkeys(
-        (f"energy_{k}" for k in ("in", "copper", "friction", "impact", "damping", "stored")), "J"
-    ),
-    "wall_time": "s",
-}
-"""Units of the numbers that have one; the others are counts, shares of time or ratios."""
-
 
 def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[str, Any]:
     """Averages, extremes and counts after ``run.settle``; energies over the whole run. SI.

@@ -39,7 +39,9 @@ def _options(parser: ArgumentParser) -> None:
         default=_AT,
         help="scenes at whose own settings each limit is lifted (default: trial-01 … trial-10)",
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="(default: 0)")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of the search (default: 0)"
+    )
     add_workers(parser)
     add_quick(parser, "a coarse search, in a fraction of the time")
     add_out(parser, "results")

@@ -12,9 +12,9 @@ import xarray as xr
 from cosim.arrays import Array
 from cosim.files.atomic import whole
 from cosim.scene import Scene, firmware, keys, to_toml
-from cosim.simulation.summary import UNITS
 from cosim.studies.sweep.design import Design
 from cosim.studies.sweep.point import Outcome
+from cosim.waveforms.quantities import meaning
 
 FAILURE = "failure"
 """The variable that says why a point failed; empty where it did not."""
@@ -75,7 +75,7 @@ def dataset(scene: Scene, design: Design, found: Numbers, versions: dict[str, st
         for name, column, axis in zip(axes, columns, design.axes, strict=True)
     }
     variables = {
-        name: (dims, values.reshape(design.shape), {"units": UNITS.get(name, "1")})
+        name: (dims, values.reshape(design.shape), meaning(name))
         for name, values in numbers.items()
     }
     about = {"long_name": "Why the point failed; empty where it did not"}

@@ -5,8 +5,8 @@ from collections import Counter
 import numpy as np
 import xarray as xr
 
-from cosim.simulation.summary import UNITS
 from cosim.studies.sweep.dataset import FAILURE, swept
+from cosim.waveforms.quantities import unit as unit_of
 
 MOST_REASONS = 5
 
@@ -54,5 +54,5 @@ def label(name: str, unit: str) -> str:
 
 def bench_unit(quantity: str) -> tuple[str, float]:
     """The unit in which a number of the summary is shown, and how many of it are one in SI."""
-    unit = UNITS.get(quantity, "1")
+    unit = unit_of(quantity)
     return ("mm/s", 1e3) if unit == "m/s" else (unit, 1.0)

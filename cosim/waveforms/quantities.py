@@ -1,0 +1,79 @@
+"""The numbers of a run: where each entry of ``summary.json`` is named and described."""
+
+from typing import NamedTuple
+
+
+class Quantity(NamedTuple):
+    """What an entry of the summary is: its SI unit, ``""`` for words and lists, and its meaning."""
+
+    unit: str
+    text: str
+
+
+SUMMARY: dict[str, Quantity] = {
+    "run": Quantity("", "which run it is: the files of one run bear the same mark"),
+    "v_average": Quantity("m/s", "mean velocity of the part after run.settle, up positive"),
+    "v_average_error": Quantity(
+        "m/s", "estimate of what ngspice's steps did to v_average; only where ngspice runs"
+    ),
+    "transport_per_cycle": Quantity("m", "v_average times the period of the drive"),
+    "stick_fraction": Quantity("1", "share of the time in which the part sticks to the surface"),
+    "stick_fraction_2": Quantity("1", "the same for the second of two surfaces"),
+    "a_surface_max": Quantity(
+        "m/s2", "largest acceleration of the surface; null with rigid walls or velocity jumps"
+    ),
+    "a_surface_min": Quantity("m/s2", "smallest acceleration of the surface; null likewise"),
+    "a_camera_max": Quantity(
+        "m/s2", "largest acceleration that a camera with 960 frames/s reads, as Tracker computes it"
+    ),
+    "a_camera_min": Quantity("m/s2", "smallest acceleration that such a camera reads"),
+    "v_surface_max": Quantity("m/s", "largest velocity of the surface"),
+    "v_surface_min": Quantity("m/s", "smallest velocity of the surface"),
+    "z_surface_pp": Quantity("m", "height of the surface, peak-to-peak"),
+    "current_max": Quantity("A", "largest current of one coil"),
+    "current_min": Quantity("A", "smallest current of one coil"),
+    "swing_high_fraction": Quantity("1", "share of the time at the output's upper voltage limit"),
+    "swing_low_fraction": Quantity("1", "share of the time at the output's lower voltage limit"),
+    "current_limit_fraction": Quantity("1", "share of the time at the amplifier's current limit"),
+    "slew_fraction": Quantity("1", "share of the time at the amplifier's slew rate alone"),
+    "saturated_fraction": Quantity("1", "share of the time at a voltage or current limit"),
+    "impacts": Quantity("1", "number of impacts of the ram on a wall"),
+    "stick_slip_events": Quantity("1", "number of changes between sticking and slipping"),
+    "at_wall": Quantity("1", "1 where the ram touches a wall in the last row, else 0"),
+    "energy_in": Quantity("J", "energy that the amplifier's output delivers, over the whole run"),
+    "energy_copper": Quantity("J", "heat in coils (copper, eddy currents) and sense resistor"),
+    "energy_friction": Quantity("J", "heat of friction on the part"),
+    "energy_impact": Quantity("J", "energy lost in the walls"),
+    "energy_damping": Quantity("J", "energy lost in the damping of flexures and suspension"),
+    "energy_stored": Quantity("J", "energy in motion, springs, height and coils; end less start"),
+    "energy_residual": Quantity(
+        "1", "what the account of energies misses, relative: a check of the run, no bound"
+    ),
+    "circuit_steps": Quantity("1", "steps that ngspice accepted; 0 without it"),
+    "circuit_rejected": Quantity("1", "steps that ngspice tried and rejected"),
+    "fmu_steps": Quantity("1", "steps that the FMU was asked for"),
+    "wall_time": Quantity("s", "time that the run took"),
+    "method": Quantity("", "coupling method; on the rungs without ngspice how they are solved"),
+    "versions": Quantity("", "versions of the programs that took part"),
+    "circuit_model": Quantity("", 'rung that circuit.model = "auto" took'),
+    "circuit_model_why": Quantity("", "why it took that rung"),
+    "circuit_model_errors": Quantity("", "estimated relative error of v_average on each rung"),
+    "coupling_taken": Quantity("", 'method and steps that coupling.method = "auto" took'),
+    "error_estimate": Quantity(
+        "1", "with these, the error of the part's height, relative to its range"
+    ),
+    "spread": Quantity("", "what --spread found with each knob turned by 1 %"),
+    "notes": Quantity("", "sentences on where the run leaves the model or a data sheet"),
+}
+"""Every entry by its name. Absent participants have none of theirs."""
+
+
+def unit(name: str) -> str:
+    """The SI unit of an entry of the summary; ``"1"`` for shares, counts and ratios."""
+    return SUMMARY[name].unit
+
+
+def meaning(name: str) -> dict[str, str]:
+    """The attributes ``units`` and ``long_name`` of an entry in a dataset."""
+    found = SUMMARY[name]
+    return {"units": found.unit, "long_name": found.text}
