@@ -236,7 +236,7 @@ class Circuit(Table):
         1e-4, "1", 1e-9, 1e-2, "Relative tolerance of ngspice; 1e-05 by default with file"
     )
     max_step: float = _number(
-        1e-4, "s", 1e-9, 1e-2, "Largest step of ngspice; 2e-05 by default with file"
+        2e-4, "s", 1e-9, 1e-2, "Largest step of ngspice; 2e-05 by default with file"
     )
 
     @model_validator(mode="after")

@@ -55,7 +55,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "snubber_resistance": None,
         "snubber_capacitance": None,
         "reltol": 1e-4,
-        "max_step": 1e-4,
+        "max_step": 2e-4,
     },
     "coil": {
         "resistance": 7.1,

@@ -23,6 +23,13 @@ static const double CARRIED = 0.2;
 
 static const double AT_LIMIT = 0.5; /* V; |v(swing)| from which on the output is at its limit */
 
+static const double REACH = 0.25;
+/* Of the range between its limits: so near to one, the output may reach it where its way is not
+   straight. */
+
+static const double STEPS_OF_SINE = 200.0;
+/* A period's least number: the mechanics take the current as straight within a step. */
+
 static const double SMALL_JUMP = 0.1;
 /* In units of the command's range: the first step after a jump grows as that is smaller, till here. */
 
@@ -176,17 +183,41 @@ static void pass_jump(Lead *c)
     c->jump = p->jump;
 }
 
+/* What is left of the answer to a jump falls by e in a time constant; ngspice's rule is of second order,
+   so that steps which grow by the cube root of that err alike. */
+static double step_of_answer(const Lead *c)
+{
+    const double gone = log(1.0 / SETTLED_SHARE) - (c->answered - c->time) / c->time_constant;
+    return c->answer_step / 1.5 * exp(gone / 3.0);
+}
+
+/* Whether the output, which goes on as in the last step, of the length h (s), may reach a limit within
+   the longest step. */
+static int is_near_limit(Lead *c, double output, double h)
+{
+    const double rate = h > 0.0 ? (output - c->output) / h : 0.0;
+    const double reach = REACH * (c->output_high - c->output_low);
+    const double ahead = output + rate * c->max_step;
+    c->output = output;
+    return fmax(output, ahead) > c->output_high - reach || fmin(output, ahead) < c->output_low + reach;
+}
+
 /* The longest next step for what lies behind. ngspice judges its steps by their truncation errors
    alone, which are small where the current is wrong for long. */
-static double longest_step(const Lead *c, const double *values)
+static double longest_step(Lead *c, const double *values, double h)
 {
     double step = INFINITY;
+    if (is_near_limit(c, values[OUTPUT], h))
+        step = c->near_step;
+    const Piece *p = &c->pieces[c->piece];
+    if (p->kind == SINE)
+        step = fmin(step, 1.0 / (STEPS_OF_SINE * p->rate));
     if (c->at_jump)
-        step = c->restart_step;
+        step = fmin(step, c->restart_step);
     if (c->time >= c->impact - ON_TIME)
         step = fmin(step, c->after_jump);
     if (c->time < c->answered)
-        step = fmin(step, c->answer_step);
+        step = fmin(step, step_of_answer(c));
     if (c->swing >= 0 && fabs(values[c->swing]) >= AT_LIMIT)
         step = fmin(step, c->limited_step);
     return step;
@@ -219,7 +250,7 @@ static double accepted(Lead *c, double time, double next_step)
     c->at_jump = time >= c->jump - ON_TIME;
     if (c->at_jump)
         pass_jump(c);
-    next_step = fmin(next_step, longest_step(c, values));
+    next_step = fmin(next_step, longest_step(c, values, h));
     if (time >= c->segment.end - ON_TIME) {
         c->macro_point(c);
         if (!going(c))
@@ -307,6 +338,7 @@ void lead_begin(Lead *c)
     c->impact = INFINITY;
     c->answer_step = c->time_constant / 20.0;
     c->limited_step = c->time_constant / 5.0;
+    c->near_step = c->time_constant;
     c->answered = c->time_constant * log(1.0 / SETTLED_SHARE); /* V1 leaves 0 at once */
     late = loop_milliseconds() + LOOP_PATIENCE;
     run = c;

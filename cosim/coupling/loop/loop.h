@@ -120,6 +120,9 @@ typedef struct {
 /* Places in a row of the log; the saved values follow them. */
 enum { LOG_TIME, LOG_EMF, LOG_OWED, LOG_SAVED };
 
+/* Places among the saved values: REQUIRED in cosim/circuit/netlist.py. */
+enum { CURRENT, OUTPUT };
+
 typedef struct Lead {
     Recorder *recorder;
     void (*macro_point)(struct Lead *); /* see above; Python's takes no notice of the argument */
@@ -134,7 +137,11 @@ typedef struct Lead {
     double range;                 /* V; from the least to the largest command */
     double answer_step;           /* s; longest step while the current answers a jump */
     double limited_step;          /* s; longest step while the output is at its limit */
+    double near_step;             /* s; longest step while the output may come to a limit */
     double restart_step;          /* s; longest step after the last jump */
+    double max_step;              /* s; circuit.max_step */
+    double output_high, output_low; /* V; limits of the output without current */
+    double output;                /* V; at the last accepted point */
     double emf_change;            /* V; most that the back-EMF may change in a step */
     double answered;              /* s; when it has done so */
     double time, current, carried; /* at the last accepted point: s; A of one coil; V carried */
