@@ -1,12 +1,13 @@
 """The pieces of a long study, each done once: a killed one goes on from its journal."""
 
+import hashlib
+import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 from cosim.files.journal import Journal
-from cosim.studies.sweep.journal import hashed
 
 T = TypeVar("T")
 
@@ -38,8 +39,8 @@ def pieces(path: Path, *asked: Any) -> Iterator[Pieces]:
     from cosim.mechanics import package
     from cosim.toolchain.versions import versions
 
-    identity = hashed(asked, versions(), package.token())
-    with Journal(path, identity, _encoded, _decoded) as journal:
+    said = json.dumps([asked, versions(), package.token()], sort_keys=True).encode()
+    with Journal(path, hashlib.sha256(said).hexdigest(), _encoded, _decoded) as journal:
         try:
             yield Pieces(journal)
         except BaseException:
