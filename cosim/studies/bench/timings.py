@@ -74,15 +74,17 @@ def map_over_bare_calls(scene: Scene, offsets: Sequence[float], rounds: int) -> 
     bare, swept = [], []
     for _ in range(rounds + 1):
         bare.append(sum(_bare(point(scene, values, False)) for _, values in points))
-        with TemporaryDirectory() as folder:
-            with journal(Path(folder) / "journal", "", len(design)) as written:
-                began = process_time()
-                with runner(scene, 1) as batch:
-                    numbers = Numbers(len(design))
-                    for number, outcome in batch.run(points):
-                        written.add(number, outcome)
-                        numbers.add(number, outcome)
-                swept.append(process_time() - began)
+        with (
+            TemporaryDirectory() as folder,
+            journal(Path(folder) / "journal", "", len(design)) as written,
+        ):
+            began = process_time()
+            with runner(scene, 1) as batch:
+                numbers = Numbers(len(design))
+                for number, outcome in batch.run(points):
+                    written.add(number, outcome)
+                    numbers.add(number, outcome)
+            swept.append(process_time() - began)
     return ratios(swept[1:], bare[1:])  # the first round warms up
 
 
