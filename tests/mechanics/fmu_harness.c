@@ -344,7 +344,7 @@ static void simulate(int steps)
         CHECK(fmi2DoStep(c2, time, h, 1) == fmi2OK);
         CHECK(fmi3DoStep(c3, time, h, 1, &event, &terminate, &early, &last) == fmi3OK);
         CHECK(!event && !terminate && !early && last == time + h);
-        if (i % 8 == 0)
+        if (i % 25 == 0)
             restore_wild(c2, target);
         time = last;
         held = held > h ? held - h : 0.0;
@@ -376,7 +376,7 @@ int main(int count, char **arguments)
     fmi3FreeInstance(NULL);
     for (int i = 0; i < 20; i++)
         simulate(100);
-    CHECK(refusals > 1000 && taken_states > 50 && wild_states > taken_states + 50);
+    CHECK(refusals > 1000 && taken_states > 5 && wild_states > taken_states + 5);
     printf("%d refusals of more than %ld calls\n", refusals, calls);
     return 0;
 }

@@ -543,7 +543,7 @@ def test_foreign_states_are_refused(version: int, fault: str) -> None:
 
 
 NAN, MANY, FAR = (struct.pack("d", value) for value in (math.nan, 1e300, -1e9))
-# The end of the state: time and stop time, then whether there is one, whether the tolerance was set,
+# The state ends with time, stop time and whether there is one, whether the tolerance was set,
 # whether outputs are stale, and the phase. The parameter is found by its value.
 WILD = {
     "no phase": (-4, struct.pack("i", 3)),
@@ -576,12 +576,12 @@ def test_a_wild_state_with_a_right_checksum_is_refused(version: int, fault: str)
         it.set(**{name: known[name] for name in ("normal_force", "normal_force_slope")})
         good = it.save()
         head, state = good[:88], bytearray(good[88:])
-        assert struct.unpack("Q", head[16:24])[0] == sum_of(state)
+        assert struct.unpack("Q", head[16:24])[0] == sum_of(bytes(state))
         at = len(state) + place if isinstance(place, int) else -1
         if isinstance(place, str):
             at = state.index(struct.pack("d", known[place]))
         state[at : at + len(value)] = value
-        bad = head[:16] + struct.pack("Q", sum_of(state)) + head[24:] + bytes(state)
+        bad = head[:16] + struct.pack("Q", sum_of(bytes(state))) + head[24:] + bytes(state)
         with pytest.raises(FMICallException):
             it.fmu.deserializeFMUState(bad)
         assert "not a state of the FMU: its " in it.messages[-1]

@@ -149,7 +149,7 @@ def test_slow_steps_come_back_to_be_interrupted() -> None:
     scene = cosim.load("reference", ENDLESS | {"circuit.model": "ideal", "run.output_step": 5e-3})
     with contextlib.closing(Mechanics(scene)) as mechanics:
         recorder = Recorder(scene, mechanics, lambda time: None)
-        edges = 5e-3 * np.arange(1, 501)
+        edges = np.linspace(5e-3, 2.5, 500)
         current = np.full_like(edges, 1.5)
         places = [values.ctypes.data for values in (edges, current, current)]
         done = recorder._library.recorder_follow(recorder._state, 500, *places, 4096)

@@ -17,10 +17,15 @@ def _run(arguments: Namespace) -> None:
     scenes = [load(source, arguments.overrides) for source in arguments.scenes or ["paper"]]
     with writable(arguments.out, shared=True):
         from cosim.studies.circuit import ladder, ladder_report
+        from cosim.studies.pieces import pieces
 
-        with progress_bar("ladder", ladder.runs_in_all() * len(scenes), "run") as bar:
-            found = [(scene, ladder.ladder(scene, bar.update)) for scene in scenes]
-        print(ladder_report.write(arguments.out, found))
+        asked = [scene.as_dict() for scene in scenes]
+        with (
+            pieces(arguments.out / "ladder.journal", "ladder", asked) as piece,
+            progress_bar("ladder", ladder.runs_in_all() * len(scenes), "run") as bar,
+        ):
+            found = [(scene, ladder.ladder(scene, piece, bar.update)) for scene in scenes]
+            print(ladder_report.write(arguments.out, found))
 
 
 COMMAND = Command(

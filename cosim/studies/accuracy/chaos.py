@@ -18,6 +18,7 @@ import numpy as np
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.accuracy.figures import draw_chaos
+from cosim.studies.pieces import Pieces
 from cosim.studies.tables import Row, write_csv, write_page
 from cosim.waveforms.result import Result
 
@@ -67,16 +68,21 @@ def growth(scene: Sequence[str], more: Sequence[str] = ()) -> float:
     return float(np.abs(nudged - path).max() / np.ptp(path)) / NUDGE
 
 
-def ensemble(scene: Sequence[str], more: Sequence[str], members: int) -> Ensemble:
+def ensemble(scene: Sequence[str], more: Sequence[str], members: int, piece: Pieces) -> Ensemble:
     """The statistics of runs with normal forces apart by :data:`APART`."""
-    found: Any = [solved(scene, more, APART * k).summary for k in range(members)]
-    return {name: [float(summary[name]) for summary in found] for name in STATISTICS}
+
+    def member(k: int) -> dict[str, float]:
+        summary: Any = solved(scene, more, APART * k).summary
+        return {name: float(summary[name]) for name in STATISTICS}
+
+    found = [piece(f"chaos, {[*scene, *more]}, {k}", lambda k=k: member(k)) for k in range(members)]
+    return {name: [one[name] for one in found] for name in STATISTICS}
 
 
-def run(out: Path) -> str:
+def run(out: Path, piece: Pieces) -> str:
     """Write ``chaos`` as png, csv and md into ``out``; gives what it shows."""
-    grown = growth(SCENE)
-    ensembles = {name: ensemble(SCENE, more, MEMBERS) for name, more in METHODS.items()}
+    grown = piece("chaos, growth", lambda: growth(SCENE))
+    ensembles = {name: ensemble(SCENE, more, MEMBERS, piece) for name, more in METHODS.items()}
     first = next(iter(ensembles.values()))
     most = max(apart(first[name], one[name]) for one in ensembles.values() for name in STATISTICS)
     message = (

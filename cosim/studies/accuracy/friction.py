@@ -27,6 +27,7 @@ from cosim.simulation.peers.lsoda import run as run_machine
 from cosim.studies.accuracy.cases import CASES
 from cosim.studies.accuracy.figures import CREEP, ERROR, draw_friction
 from cosim.studies.accuracy.runs import reference
+from cosim.studies.pieces import Pieces
 from cosim.studies.tables import Row, span, write_csv, write_page
 
 FREQUENCY, ACCELERATION, SLIP = 40.0, 15.0, 0.02
@@ -45,9 +46,9 @@ COULOMB = "set-valued Coulomb"
 _RTOL_IN_THE_MACHINE = 1e-6
 
 
-def run(out: Path) -> str:
+def run(out: Path, piece: Pieces) -> str:
     """Write ``friction`` as png, csv and md into ``out``; gives what it shows."""
-    moved = {(row["law"], row["width"]): row for row in in_the_machine()}
+    moved = {(row["law"], row["width"]): row for row in in_the_machine(piece)}
     nothing = {ERROR: nan, "CPU time [s]": nan}
     rows = [row | moved.get((row["law"], row["width"]), nothing) for row in creep()]
     exact, *smoothed = rows
@@ -119,7 +120,7 @@ class _Smoothed(Machine):
         return 1.0
 
 
-def in_the_machine() -> Iterator[Row]:
+def in_the_machine(piece: Pieces) -> Iterator[Row]:
     """Of each law: error of the part's path on the scene ``stick-slip`` over its range, CPU s."""
     case = CASES["stick-slip"]
     scene = load("reference", [*case.overrides, f"run.duration={case.duration!r}"])
@@ -128,11 +129,14 @@ def in_the_machine() -> Iterator[Row]:
         seconds, path = run_machine(scene, case.times(), _RTOL_IN_THE_MACHINE, make)
         return {ERROR: reference(case.name).error(path[np.newaxis]), "CPU time [s]": seconds}
 
-    yield {"law": COULOMB, "width": ""} | measured(Machine)
+    yield {"law": COULOMB, "width": ""} | piece(COULOMB, lambda: measured(Machine))
     for name in ("tanh", "LuGre"):
         for width in LAWS[name]:
             law = law_of(name, width, scene)
-            found = measured(lambda s, d, law=law: _Smoothed(s, d, law))
+            found = piece(
+                f"{name}, {width:g}",
+                lambda law=law: measured(lambda s, d: _Smoothed(s, d, law)),
+            )
             yield {"law": name, "width": _width(name, width)} | found
 
 

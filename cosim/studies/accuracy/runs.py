@@ -17,7 +17,8 @@ import numpy as np
 from cosim.errors import SimulationFailed
 from cosim.scene import load
 from cosim.studies.accuracy.cases import Case
-from cosim.studies.accuracy.solvers import Outcome, Solver
+from cosim.studies.accuracy.solvers import Solver
+from cosim.studies.pieces import Pieces
 
 _WORSE = 1.5
 """An error this many times that of the next coarser setting marks a run as not monotone."""
@@ -68,34 +69,37 @@ def reference(name: str) -> Reference:
     return Reference(signals, entry["other_method"], entry["growth"])
 
 
-def measure(case: Case, solvers: Sequence[Solver], rounds: int) -> list[Run]:
+def measure(case: Case, solvers: Sequence[Solver], rounds: int, piece: Pieces) -> list[Run]:
     """All settings of all solvers on a scene, interleaved; times are medians over the rounds."""
     scene = load("reference", case.overrides)
     plan = [(solver, value) for solver in solvers for value in solver.values(case)]
+
+    def once(solver: Solver, value: float) -> tuple[float, float, int, str]:
+        """CPU time (s), error, steps and failure of a run."""
+        began = process_time()
+        try:
+            outcome = solver.run(scene, case, value)
+        except SimulationFailed as failed:
+            failure = FALSE_CYCLE if "limit cycle" in str(failed) else "failed"
+            return process_time() - began, nan, 0, failure
+        leaky = case.smooth and solver.netlist
+        judge = reference(f"{case.name}, netlist" if leaky else case.name)
+        return outcome.seconds, judge.error(outcome.signals), outcome.steps, ""
+
+    done: list[tuple[float, float, int, str]] = []
     seconds: list[list[float]] = [[] for _ in plan]
-    outcomes: list[Outcome | str] = []
     for turn in range(rounds):
         for k, (solver, value) in enumerate(plan):
-            if turn and (isinstance(outcomes[k], str) or seconds[k][0] > 1.0):
+            if turn and (done[k][3] or seconds[k][0] > 1.0):
                 continue
-            began = process_time()
-            try:
-                outcome = solver.run(scene, case, value)
-                seconds[k].append(outcome.seconds)
-            except SimulationFailed as error:
-                outcome = FALSE_CYCLE if "limit cycle" in str(error) else "failed"
-                seconds[k].append(process_time() - began)
+            name = f"{case.name}, {solver.name}, {value!r}, {turn}"
+            found = piece(name, lambda solver=solver, value=value: once(solver, value))
+            seconds[k].append(found[0])
             if not turn:
-                outcomes.append(outcome)
+                done.append(found)
     runs: list[Run] = []
-    for (solver, value), outcome, spent in zip(plan, outcomes, seconds, strict=True):
-        error, steps, failure = nan, 0, ""
-        if isinstance(outcome, str):
-            failure = outcome
-        else:
-            leaky = case.smooth and solver.netlist
-            judge = reference(f"{case.name}, netlist" if leaky else case.name)
-            error, steps = judge.error(outcome.signals), outcome.steps
+    for (solver, value), (_, error, steps, failure), spent in zip(plan, done, seconds, strict=True):
+        if not failure:
             before = runs[-1] if runs and runs[-1].method == solver.name else None
             if error > _DIVERGED:
                 failure = "diverged"

@@ -20,7 +20,7 @@ from cosim.studies.fit.cases import Case, Solver
 from cosim.studies.sweep.batch import runner
 from cosim.studies.sweep.dataset import Numbers
 from cosim.studies.sweep.design import grid
-from cosim.studies.sweep.journal import Journal
+from cosim.studies.sweep.journal import journal
 from cosim.studies.sweep.point import evaluate, point
 from cosim.studies.sweep.pool import Pool
 from cosim.trials import published
@@ -74,12 +74,15 @@ def map_over_bare_calls(scene: Scene, offsets: Sequence[float], rounds: int) -> 
     bare, swept = [], []
     for _ in range(rounds + 1):
         bare.append(sum(_bare(point(scene, values, False)) for _, values in points))
-        with TemporaryDirectory() as folder, Journal(Path(folder) / "journal", "") as journal:
+        with (
+            TemporaryDirectory() as folder,
+            journal(Path(folder) / "journal", "", len(design)) as written,
+        ):
             began = process_time()
             with runner(scene, 1) as batch:
                 numbers = Numbers(len(design))
                 for number, outcome in batch.run(points):
-                    journal.add(number, outcome)
+                    written.add(number, outcome)
                     numbers.add(number, outcome)
             swept.append(process_time() - began)
     return ratios(swept[1:], bare[1:])  # the first round warms up

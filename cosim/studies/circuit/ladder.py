@@ -11,6 +11,8 @@ from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import Scene, changed
 from cosim.simulation.choose_rung import relative_error
 from cosim.simulation.simulate import simulate
+from cosim.studies.pieces import Pieces
+from cosim.studies.sweep.journal import hashed
 from cosim.studies.sweep.point import periods_made_whole
 
 RUNGS = ("ideal", "limited", "amplifier", "full")
@@ -39,7 +41,9 @@ def runs_in_all() -> int:
     return sum(REPEATS.get(model, MOST) for model in RUNGS)
 
 
-def ladder(scene: Scene, progress: Callable[[], object] = lambda: None) -> list[Rung]:
+def ladder(
+    scene: Scene, piece: Pieces, progress: Callable[[], object] = lambda: None
+) -> list[Rung]:
     """Run a scene on each rung in turn, and again for the cost. Raises BadInput, SimulationFailed.
 
     Averages are over whole periods; few rows are written, so that the cost is the rung's own.
@@ -47,15 +51,24 @@ def ladder(scene: Scene, progress: Callable[[], object] = lambda: None) -> list[
     runs = {model: _on(scene, model) for model in RUNGS}
     spent: dict[str, list[float]] = {model: [] for model in RUNGS}
     numbers: dict[str, dict[str, Any]] = {}
+    own = hashed(scene.as_dict())
     simulate(runs["limited"])  # loads and builds what the first run would wait for
+
+    def once(model: str) -> tuple[float, dict[str, Any]]:
+        """Seconds, and what is needed of the summary."""
+        began = time.perf_counter()
+        try:
+            summary = simulate(runs[model]).summary
+        except SimulationFailed as error:
+            raise SimulationFailed(f'With circuit.model = "{model}": {error}') from error
+        seconds = time.perf_counter() - began
+        return seconds, {name: summary[name] for name in ("v_average", "a_surface_min")}
+
     for repeat in range(MOST):
         for model in (model for model in RUNGS if repeat < REPEATS.get(model, MOST)):
-            began = time.perf_counter()
-            try:
-                numbers[model] = simulate(runs[model]).summary
-            except SimulationFailed as error:
-                raise SimulationFailed(f'With circuit.model = "{model}": {error}') from error
-            spent[model].append((time.perf_counter() - began) / runs[model].run.duration)
+            name = f"{own}, {model}, {repeat}"
+            seconds, numbers[model] = piece(name, lambda model=model: once(model))
+            spent[model].append(seconds / runs[model].run.duration)
             progress()
     averages = {model: found["v_average"] for model, found in numbers.items()}
     return [

@@ -19,6 +19,7 @@ from cosim.coupling.rewind.joint import Joint
 from cosim.coupling.rewind.stability import largest_stable_step, observed_limit
 from cosim.drive.command import command
 from cosim.scene import changed
+from cosim.studies.pieces import Pieces
 from cosim.studies.stability.machines import (
     DIRECT,
     REFERENCE,
@@ -108,14 +109,18 @@ def observed(method: str, regime: Regime, expected: float) -> float:
         return observed_limit(fresh, low, high, steps=steps, leap=1.05)
 
 
-def limits(regimes: Sequence[Regime]) -> Iterator[Limit]:
+def limits(regimes: Sequence[Regime], piece: Pieces) -> Iterator[Limit]:
     """Each method in each regime."""
     for regime in regimes:
         m, part = regime.machine, "slips" if regime.slips else "sticks"
         given = (m.name, m.strength, regime.output, part, regime.cut)
         for method in METHODS:
-            expected = predicted(method, regime)
-            yield Limit(*given, method, expected, observed(method, regime, expected))
+
+            def found(method: str = method, regime: Regime = regime) -> list[float]:
+                expected = predicted(method, regime)
+                return [expected, observed(method, regime, expected)]
+
+            yield Limit(*given, method, *piece(f"{method}, {given}", found))
 
 
 def with_limits(steps: Sequence[float]) -> Iterator[Row]:

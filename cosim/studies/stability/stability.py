@@ -5,6 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from cosim.coupling.rewind.methods import ORDERS
+from cosim.studies.pieces import pieces
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, End, label_ends, panels
 from cosim.studies.stability.limits import (
     LONGEST,
@@ -25,7 +26,12 @@ _COLORS = {1: ORANGE, 2: BLUE, 3: GREEN}
 def run(out: Path, quick: bool) -> None:
     """Write ``stability`` as png, csv and md into ``out``, and print what it shows."""
     regimes = [*(REGIMES[:1] if quick else REGIMES), *over_strength(3 if quick else 9)]
-    found = list(limits(regimes))
+    with pieces(out / "stability.journal", "stability", quick) as piece:
+        found = list(limits(regimes, piece))
+        _report(out, found)
+
+
+def _report(out: Path, found: Sequence[Limit]) -> None:
     write_csv(out / "stability.csv", [asdict(limit) for limit in found])
     print(write(out, found, list(with_limits((4e-3, 5e-3, 6e-3)))))
     print(f"Written to {out}: stability.{{csv,md,png}}")
