@@ -75,12 +75,16 @@ class _Charges:
 
 class _Loop:
     """Coil and sense resistor at a given output voltage V, whose current is i: x' = A x + b (V - e)
-    with x = i or, with an eddy branch, x = (i, i_2); in modes that do not know of each other."""
+    with x = i or, with an eddy branch, x = (i, i_2); in modes that do not know of each other. In a
+    netlist of the user's own it is the coil alone, at the voltage between its ends.
+    """
 
     def __init__(self, scene: Scene) -> None:
         coil = scene.coil
         self._eddy = Eddy(scene)
-        matrix = [[-(coil.resistance + coil.count * scene.circuit.sense_resistance)]]
+        self._coil_alone = scene.circuit.netlist is not None
+        sense = 0.0 if self._coil_alone else scene.circuit.sense_resistance
+        matrix = [[-(coil.resistance + coil.count * sense)]]
         inductances = [[coil.inductance]]
         if coil.eddy_inductance:
             branch = self._eddy.resistance
@@ -97,7 +101,8 @@ class _Loop:
         branch = self._eddy.follow(h, current[:-1], current[1:])
         states = [current] if branch is None else [current, np.append(branch, self._eddy.current)]
         modes = self._modes @ np.stack(states)
-        volts = [0.5 * (part[name][1:] + part[name][:-1]) for name in ("v(out)", "emf")]
+        output = part["v(out)"] - (part["v(sense)"] if self._coil_alone else 0.0)
+        volts = [0.5 * (values[1:] + values[:-1]) for values in (output, part["emf"])]
         forced = volts[0] - volts[1] - np.diff(part["owed"]) / h
         decay = np.exp(np.outer(self._rates, h))
         exact = decay * modes[:, :-1] + np.outer(self._drive / self._rates, forced) * (decay - 1.0)
