@@ -26,7 +26,7 @@ from cosim.studies.sweep.pool import workers_asked
 UNSTEADY = 0.5
 """Repeatability of a velocity (NRMSE of its cycles) beyond which no steady drive explains it."""
 
-PROFILE_STEPS = (0.02, 0.06, 0.15)
+PROFILE_STEPS = (0.04, 0.12, 0.25)
 """Distances from the best value of a key at which it is held, of its bounds' range."""
 
 JOURNAL = "identify-journal.json"
@@ -102,7 +102,7 @@ def identify(
     ends = [plan.finished(f"all trials {k}", rows, one) for k, one in enumerate(found[:2], 1)]
     best, ensemble = min(ends, key=lambda one: one.total), ensemble_of(found)
     fold_rigs, held_out = _folds(plan, steady) if len(steady) >= 3 else ([], [])
-    profiles = _profiles(plan, found[0])
+    profiles = _profiles(plan, ensemble)
     verdicts = judge(space, found[0], ensemble, fold_rigs, profiles)
     aside = Search(space, [trial.fine for trial in others], count)
     apart_own = plan.drives("trials apart", best.place, aside).own if others else np.empty((0, 0))
@@ -152,8 +152,8 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[He
     return rigs, sorted(held_out, key=lambda one: trials.index(one.trial))
 
 
-def _profiles(plan: Plan, best: Found) -> dict[str, Profile]:
-    found = {}
+def _profiles(plan: Plan, ensemble: Sequence[Found]) -> dict[str, Profile]:
+    found, best = {}, ensemble[0]
     for key, name in enumerate(plan.coarse.space.names):
         points = [(best.place[key], best.total)]
         for side in (-1.0, 1.0):
@@ -161,7 +161,7 @@ def _profiles(plan: Plan, best: Found) -> dict[str, Profile]:
             for distance in PROFILE_STEPS[: plan.effort.profile_points]:
                 place = float(best.place[key] + side * distance)
                 if 0.0 <= place <= 1.0:
-                    start = plan.profile(key, place, start)
+                    start = plan.profile(key, place, start, ensemble)
                     points.append((place, start.total))
         places = np.repeat(best.place[None], len(points), axis=0)
         places[:, key] = [place for place, _ in points]

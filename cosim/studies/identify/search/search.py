@@ -144,6 +144,26 @@ class Search:
         steps = np.concatenate([turns, own_turns])[:, None]
         return residuals[0], (residuals[1:] - residuals[0]) / steps
 
+    def valley(self, place: Array, own: Array, key: int) -> Array:
+        """How the other places follow that of one key, the own numbers being fitted throughout: by
+        the normal equations of all trials. One for the key itself."""
+
+        def one(k: int) -> Array:
+            slopes, d = self.slopes(place, own, k)[1], len(place)
+            normal = np.einsum("ij,kj->ik", slopes, slopes)
+            if len(slopes) == d:
+                return normal
+            inner = normal[d:, d:] + SOFT * np.diag(np.diag(normal)[d:] + 1e-9)
+            return normal[:d, :d] - normal[:d, d:] @ np.linalg.solve(inner, normal[d:, :d])
+
+        with ThreadPoolExecutor(self.workers) as pool:
+            whole = np.sum([*pool.map(one, range(len(self.targets)))], axis=0)
+        rest = [k for k in range(len(place)) if k != key]
+        inner = whole[np.ix_(rest, rest)] + SOFT * np.diag(np.diag(whole)[rest] + 1e-9)
+        found = np.ones(len(place))
+        found[rest] = -np.linalg.solve(inner, whole[rest, key])
+        return found
+
     def sensitivity(self, place: Array, own: Array) -> Array:
         """How the own numbers follow the rig's place: trials × OWN × free."""
 
