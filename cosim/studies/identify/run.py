@@ -11,6 +11,7 @@ import numpy as np
 from cosim.errors import BadInput, plain
 from cosim.files.picture import Picture
 from cosim.scene import keys
+from cosim.studies.identify.chain.chain import OWN
 from cosim.studies.identify.problem.space import Space, read_space
 from cosim.studies.identify.problem.targets import Measured, read_trials
 from cosim.studies.identify.report.exact import exact
@@ -185,7 +186,8 @@ def _mean(rows: Sequence[Row], name: str, how: Callable[[Any], Any] = np.mean) -
 
 def overall(rows: Sequence[Row]) -> Row:
     """Means over trials of what ``errors`` says of each, and the worst velocity."""
-    names = [name for name in rows[0] if name != "trial" and isinstance(rows[0][name], float)]
+    every = dict.fromkeys(name for row in rows for name in row if name not in ("trial", *OWN))
+    names = [name for name in every if _mean(rows, name) is not None]
     found: Row = {name: _mean(rows, name) for name in names}
     found["nrmse_v_surface_worst"] = _mean(rows, "nrmse_v_surface", max)
     found["v_average_error_mm_per_s_median"] = _mean(rows, "v_average_error_mm_per_s", np.median)
