@@ -100,11 +100,13 @@ def identify(
     )
     rows = [*range(len(steady))]
     found = plan.ensemble("all trials", rows, effort.rounds)
-    ends = [plan.finished(f"all trials {k}", rows, one) for k, one in enumerate(found[:2], 1)]
-    best, ensemble = min(ends, key=lambda one: one.total), ensemble_of(found)
+    ensemble = ensemble_of(found)
+    profiles, beside = _profiles(plan, ensemble)
+    firsts = sorted([*found[:2], *beside], key=lambda one: one.total)[:2]
+    ends = [plan.finished(f"all trials {k}", rows, one) for k, one in enumerate(firsts, 1)]
+    best = min(ends, key=lambda one: one.total)
     fold_rigs, held_out = _folds(plan, steady) if len(steady) >= 3 else ([], [])
-    profiles = _profiles(plan, ensemble)
-    verdicts = judge(space, found[0], ensemble, fold_rigs, profiles)
+    verdicts = judge(space, best, ensemble, fold_rigs, profiles)
     aside = Search(space, [trial.fine for trial in others], count)
     apart_own = plan.drives("trials apart", best.place, aside).own if others else np.empty((0, 0))
     made_up = _made_up(plan)
@@ -153,8 +155,10 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[He
     return rigs, sorted(held_out, key=lambda one: trials.index(one.trial))
 
 
-def _profiles(plan: Plan, ensemble: Sequence[Found]) -> dict[str, Profile]:
-    found, best = {}, ensemble[0]
+def _profiles(plan: Plan, ensemble: Sequence[Found]) -> tuple[dict[str, Profile], list[Found]]:
+    """The profile of each key about the best solution, and the solutions that make it."""
+    found: dict[str, Profile] = {}
+    best, solutions = ensemble[0], list[Found]()
     for key, name in enumerate(plan.coarse.space.names):
         points = [(best.place[key], best.total)]
         for side in (-1.0, 1.0):
@@ -164,11 +168,12 @@ def _profiles(plan: Plan, ensemble: Sequence[Found]) -> dict[str, Profile]:
                 if 0.0 <= place <= 1.0:
                     start = plan.profile(key, place, start, ensemble)
                     points.append((place, start.total))
+                    solutions.append(start)
         places = np.repeat(best.place[None], len(points), axis=0)
         places[:, key] = [place for place, _ in points]
         values = plan.coarse.space.values(places)[:, key]
         found[name] = sorted(zip(values.tolist(), (total for _, total in points), strict=True))
-    return found
+    return found, solutions
 
 
 def _made_up(plan: Plan) -> Found:
