@@ -61,8 +61,8 @@ def judge(
     folds: Sequence[Found],
     profiles: Mapping[str, Profile],
 ) -> list[Verdict]:
-    """A verdict for each free key. ``best`` is the solution that is reported; profiles and ensemble,
-    the best first, have costs at the search's step."""
+    """A verdict for each free key. ``best`` is the solution that is reported; profiles and
+    ensemble, the best first, have costs at the step of the search."""
     cost = min(ensemble[0].total, *(low for points in profiles.values() for _, low in points))
     near = [one for one in ensemble if one.total <= AS_GOOD * cost] or [best]
     values = {key: _column(space, ensemble, k) for k, key in enumerate(space.names)}

@@ -34,7 +34,7 @@ class Effort:
 
 
 FULL = Effort(
-    4, 60, ((10, 90, 0.12), (5, 150, 0.08), (3, 250, 0.05), (2, 300, 0.03)),
+    4, 60, ((16, 90, 0.12), (8, 150, 0.08), (3, 250, 0.05), (1, 300, 0.03)),
     ((6, 90, 0.12), (3, 150, 0.08), (1, 300, 0.05)), 3, 60,
 )  # fmt: skip
 QUICK = Effort(1, 25, ((3, 30, 0.12), (1, 60, 0.06)), ((1, 30, 0.1),), 1, 8)
@@ -93,20 +93,26 @@ class Plan:
             new = []
             for k, start in enumerate(several, 1):
                 title = f"{name}: round {number}, {k} of {len(several)}"
-                new += self._further(title, search, start, generations, sigma)
+                new += self._further(title, search, start, several, generations, sigma)
             several = new
         return sorted([*several, *ended], key=lambda one: one.total)
 
     def _further(
-        self, title: str, search: Search, start: Found, generations: int, sigma: float
+        self,
+        title: str,
+        search: Search,
+        start: Found,
+        others: Sequence[Found],
+        generations: int,
+        sigma: float,
     ) -> list[Found]:
         told = self._telling(title)
-        return self.journal.stage(
-            title,
-            lambda rng: [
-                search.nested(search.rescreened(start, rng, *AGAIN), rng, generations, sigma, told)
-            ],
-        )
+
+        def work(rng: np.random.Generator) -> list[Found]:
+            begun = search.rescreened(search.borrowed(start, others), rng, *AGAIN)
+            return [search.nested(begun, rng, generations, sigma, told)]
+
+        return self.journal.stage(title, work)
 
     def finished(self, name: str, rows: Sequence[int], found: Found) -> Found:
         """The solution at the finish's step, and by least squares."""
