@@ -27,6 +27,9 @@ from cosim.studies.sweep.pool import workers_asked
 UNSTEADY = 0.5
 """Repeatability of a velocity (NRMSE of its cycles) beyond which no steady drive explains it."""
 
+FIRSTS = 3
+"""Solutions of the ensemble, the best first, that are finished."""
+
 PROFILE_STEPS = (0.04, 0.12, 0.25)
 """Distances from the best value of a key at which it is held, of its bounds' range."""
 
@@ -101,9 +104,13 @@ def identify(
     rows = [*range(len(steady))]
     found = plan.ensemble("all trials", rows, effort.rounds)
     ensemble = ensemble_of(found)
-    profiles, beside = _profiles(plan, ensemble)
-    firsts = sorted([*found[:2], *beside], key=lambda one: one.total)[:2]
-    ends = [plan.finished(f"all trials {k}", rows, one) for k, one in enumerate(firsts, 1)]
+    # The step of the search does not order solutions that are as good: the finish does.
+    ends = [plan.finished(f"all trials {k}", rows, one) for k, one in enumerate(found[:FIRSTS], 1)]
+    first = found[min(range(len(ends)), key=lambda k: ends[k].total)]
+    profiles, beside = _profiles(plan, first, ensemble)
+    lower = min(beside, key=lambda one: one.total)
+    if lower.total < first.total:
+        ends.append(plan.finished("all trials, from a profile", rows, lower))
     best = min(ends, key=lambda one: one.total)
     fold_rigs, held_out = _folds(plan, steady) if len(steady) >= 3 else ([], [])
     verdicts = judge(space, best, ensemble, fold_rigs, profiles)
@@ -155,10 +162,12 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[He
     return rigs, sorted(held_out, key=lambda one: trials.index(one.trial))
 
 
-def _profiles(plan: Plan, ensemble: Sequence[Found]) -> tuple[dict[str, Profile], list[Found]]:
-    """The profile of each key about the best solution, and the solutions that make it."""
+def _profiles(
+    plan: Plan, best: Found, ensemble: Sequence[Found]
+) -> tuple[dict[str, Profile], list[Found]]:
+    """The profile of each key about a solution, and the solutions that make it."""
     found: dict[str, Profile] = {}
-    best, solutions = ensemble[0], list[Found]()
+    solutions: list[Found] = []
     for key, name in enumerate(plan.coarse.space.names):
         points = [(best.place[key], best.total)]
         for side in (-1.0, 1.0):
