@@ -11,6 +11,7 @@ import numpy as np
 from cosim.errors import BadInput, plain
 from cosim.files.picture import Picture
 from cosim.scene import keys
+from cosim.studies.identify.chain.chain import OWN
 from cosim.studies.identify.problem.space import Space, read_space
 from cosim.studies.identify.problem.targets import Measured, read_trials
 from cosim.studies.identify.report.exact import exact
@@ -26,7 +27,10 @@ from cosim.studies.sweep.pool import workers_asked
 UNSTEADY = 0.5
 """Repeatability of a velocity (NRMSE of its cycles) beyond which no steady drive explains it."""
 
-PROFILE_STEPS = (0.02, 0.06, 0.15)
+FIRSTS = 3
+"""Solutions of the ensemble, the best first, that are finished."""
+
+PROFILE_STEPS = (0.04, 0.12, 0.25)
 """Distances from the best value of a key at which it is held, of its bounds' range."""
 
 JOURNAL = "identify-journal.json"
@@ -99,11 +103,17 @@ def identify(
     )
     rows = [*range(len(steady))]
     found = plan.ensemble("all trials", rows, effort.rounds)
-    ends = [plan.finished(f"all trials {k}", rows, one) for k, one in enumerate(found[:2], 1)]
-    best, ensemble = min(ends, key=lambda one: one.total), ensemble_of(found)
+    ensemble = ensemble_of(found)
+    # The step of the search does not order solutions that are as good: the finish does.
+    ends = [plan.finished(f"all trials {k}", rows, one) for k, one in enumerate(found[:FIRSTS], 1)]
+    first = found[min(range(len(ends)), key=lambda k: ends[k].total)]
+    profiles, beside = _profiles(plan, first, ensemble)
+    lower = min(beside, key=lambda one: one.total)
+    if lower.total < first.total:
+        ends.append(plan.finished("all trials, from a profile", rows, lower))
+    best = min(ends, key=lambda one: one.total)
     fold_rigs, held_out = _folds(plan, steady) if len(steady) >= 3 else ([], [])
-    profiles = _profiles(plan, found[0])
-    verdicts = judge(space, found[0], ensemble, fold_rigs, profiles)
+    verdicts = judge(space, best, ensemble, fold_rigs, profiles)
     aside = Search(space, [trial.fine for trial in others], count)
     apart_own = plan.drives("trials apart", best.place, aside).own if others else np.empty((0, 0))
     made_up = _made_up(plan)
@@ -152,8 +162,12 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[He
     return rigs, sorted(held_out, key=lambda one: trials.index(one.trial))
 
 
-def _profiles(plan: Plan, best: Found) -> dict[str, Profile]:
-    found = {}
+def _profiles(
+    plan: Plan, best: Found, ensemble: Sequence[Found]
+) -> tuple[dict[str, Profile], list[Found]]:
+    """The profile of each key about a solution, and the solutions that make it."""
+    found: dict[str, Profile] = {}
+    solutions: list[Found] = []
     for key, name in enumerate(plan.coarse.space.names):
         points = [(best.place[key], best.total)]
         for side in (-1.0, 1.0):
@@ -161,13 +175,14 @@ def _profiles(plan: Plan, best: Found) -> dict[str, Profile]:
             for distance in PROFILE_STEPS[: plan.effort.profile_points]:
                 place = float(best.place[key] + side * distance)
                 if 0.0 <= place <= 1.0:
-                    start = plan.profile(key, place, start)
+                    start = plan.profile(key, place, start, ensemble)
                     points.append((place, start.total))
+                    solutions.append(start)
         places = np.repeat(best.place[None], len(points), axis=0)
         places[:, key] = [place for place, _ in points]
         values = plan.coarse.space.values(places)[:, key]
         found[name] = sorted(zip(values.tolist(), (total for _, total in points), strict=True))
-    return found
+    return found, solutions
 
 
 def _made_up(plan: Plan) -> Found:
@@ -185,7 +200,8 @@ def _mean(rows: Sequence[Row], name: str, how: Callable[[Any], Any] = np.mean) -
 
 def overall(rows: Sequence[Row]) -> Row:
     """Means over trials of what ``errors`` says of each, and the worst velocity."""
-    names = [name for name in rows[0] if name != "trial" and isinstance(rows[0][name], float)]
+    every = dict.fromkeys(name for row in rows for name in row if name not in ("trial", *OWN))
+    names = [name for name in every if _mean(rows, name) is not None]
     found: Row = {name: _mean(rows, name) for name in names}
     found["nrmse_v_surface_worst"] = _mean(rows, "nrmse_v_surface", max)
     found["v_average_error_mm_per_s_median"] = _mean(rows, "v_average_error_mm_per_s", np.median)

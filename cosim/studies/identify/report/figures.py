@@ -14,6 +14,17 @@ from cosim.studies.identify.report.solved import Solved
 
 MEASURED, SIMULATED, OTHER, FLOOR = "0.15", "#d1495b", "#1f6fb2", "#2a9d8f"
 
+COMPARED = (
+    ("nrmse_v_surface", "floor_late", "Velocity, NRMSE (black: its own cycles among themselves)"),
+    ("nrmse_z_surface", "", "Height of the surface, NRMSE"),
+    ("part_error_mm", "straight_line_error_mm", "Part, mean error [mm] (black: straight line)"),
+    (
+        *("v_average_mm_per_s", "v_average_measured_mm_per_s"),
+        "Mean velocity of the part [mm/s] (black: measured)",
+    ),
+)
+"""What the bars of a panel are, and what its black marks, by their names in ``identify.json``."""
+
 
 def overlays(found: Solved) -> Picture:
     """A row for each trial: velocity and height of the surface, height of the part."""
@@ -60,41 +71,28 @@ def errors(found: Solved) -> Picture:
     numbers = found.numbers
     rows = numbers["trials"]
     at, names = np.arange(len(rows)), [row["trial"] for row in rows]
-    figure = Picture(13.0, 7.5, "constrained")
-    axes = figure.subplots(2, 2)
+    series = [("rig of the defaults, best drives", "0.75", numbers["made_up_rig"]["trials"])]
+    series.append(("identified rig", SIMULATED, rows))
     held = {one["trial"]: one for one in numbers["held_out"]}
-    for axis, name, title in (
-        (axes[0, 0], "nrmse_v_surface", "Velocity of the surface, NRMSE"),
-        (axes[0, 1], "nrmse_z_surface", "Height of the surface, NRMSE"),
-        (axes[1, 0], "part_error_mm", "Height of the part, mean error [mm]"),
-        (axes[1, 1], "v_average_mm_per_s", "Mean velocity of the part [mm/s]"),
-    ):
-        series = [("rig of the defaults, best drives", "0.75", numbers["made_up_rig"]["trials"])]
-        series.append(("identified rig", SIMULATED, rows))
+    for kind, color in (("surface", OTHER), ("surface_and_part", "#8fb8da")):
+        words = f"held out, drive from {kind.replace('_', ' ')}"
         if held:
-            series.append(("held out, surface alone", OTHER, [held[n]["surface"] for n in names]))
-            both = [held[n]["surface_and_part"] for n in names]
-            series.append(("held out, surface and part", "#8fb8da", both))
+            series.append((words, color, [held[name][kind] for name in names]))
+    figure = Picture(13.0, 8.0, "constrained")
+    axes = figure.subplots(2, 2)
+    for axis, (name, beside, title) in zip(axes.flat, COMPARED, strict=True):
         width = 0.8 / len(series)
         for k, (label, color, source) in enumerate(series):
             values = [row.get(name, np.nan) for row in source]
             axis.bar(at + (k + 0.5) * width - 0.4, values, width, color=color, label=label)
-        beside = {"nrmse_v_surface": "floor_late", "part_error_mm": "straight_line_error_mm"}
-        beside["v_average_mm_per_s"] = "v_average_measured_mm_per_s"
-        words = {
-            "floor_late": "the measured cycles among themselves",
-            "straight_line_error_mm": "straight line",
-        }
-        if name in beside:
-            values = [row.get(beside[name]) or np.nan for row in rows]
-            label = words.get(beside[name], "measured")
-            axis.plot(at, values, color="k", ls="", marker="_", ms=22, mew=2, label=label)
+        values = [row.get(beside) or np.nan for row in rows]
+        axis.plot(at, values, color="k", ls="", marker="_", ms=22, mew=2)
         axis.set_xticks(at, names)
         axis.set_title(title, loc="left", fontsize=10.5)
         axis.grid(axis="y", alpha=0.25)
         axis.set_xlabel("trial")
-        axis.margins(y=0.36)  # room for the legend
-        axis.legend(fontsize=7.5, loc="upper left", ncols=2)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False)
     return figure
 
 

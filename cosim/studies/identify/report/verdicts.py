@@ -7,7 +7,6 @@ the folds, and by its profile: the best cost with that key held elsewhere.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -62,8 +61,10 @@ def judge(
     folds: Sequence[Found],
     profiles: Mapping[str, Profile],
 ) -> list[Verdict]:
-    """A verdict for each free key."""
-    near = [one for one in ensemble if one.total <= AS_GOOD * best.total] or [best]
+    """A verdict for each free key. ``best`` is the solution that is reported; profiles and
+    ensemble, the best first, have costs at the step of the search."""
+    cost = min(ensemble[0].total, *(low for points in profiles.values() for _, low in points))
+    near = [one for one in ensemble if one.total <= AS_GOOD * cost] or [best]
     values = {key: _column(space, ensemble, k) for k, key in enumerate(space.names)}
     near_values = {key: _column(space, near, k) for k, key in enumerate(space.names)}
     fold_values = {key: _column(space, folds, k) for k, key in enumerate(space.names)}
@@ -75,7 +76,7 @@ def judge(
     return [
         _verdict(
             *(key, float(space.values(best.place)[k]), space.free[k].low, space.free[k].high),
-            *(profiles[key], near_values[key], values[key], fold_values[key], partners, best.total),
+            *(profiles[key], near_values[key], values[key], fold_values[key], partners, cost),
         )
         for k, key in enumerate(space.names)
     ]
@@ -97,7 +98,7 @@ def _verdict(
     partners: Mapping[str, Array],
     cost: float,
 ) -> Verdict:
-    low, high = (_end(profile, value, cost, side) for side in (-1, 1))
+    low, high = (_end(profile, cost, side) for side in (-1, 1))
     open_low, open_high = low is None, high is None
     bottom = least if low is None else min(low, float(near.min()))
     top = most if high is None else max(high, float(near.max()))
@@ -132,15 +133,15 @@ def _verdict(
     )
 
 
-def _end(profile: Profile, value: float, cost: float, side: int) -> float | None:
-    """Where the profile leaves what is as good, to one side of the best; None: it does not."""
+def _end(profile: Profile, cost: float, side: int) -> float | None:
+    """Where the profile leaves what is as good, to one side; None: it does not."""
     points = sorted(profile, key=lambda point: side * point[0])
-    beyond = [(value, cost), *(point for point in points if side * (point[0] - value) > 0.0)]
     limit = AS_GOOD * cost
-    for (x0, y0), (x1, y1) in pairwise(beyond):
-        if y1 > limit:
-            return x0 + (x1 - x0) * max(limit - y0, 0.0) / (y1 - y0)
-    return None
+    good = [k for k, (_, there) in enumerate(points) if there <= limit]
+    if not good or good[-1] + 1 == len(points):
+        return None
+    (x0, y0), (x1, y1) = points[good[-1]], points[good[-1] + 1]
+    return x0 + (x1 - x0) * (limit - y0) / (y1 - y0)
 
 
 def _half_range(values: Array) -> float:

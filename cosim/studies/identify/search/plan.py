@@ -34,8 +34,8 @@ class Effort:
 
 
 FULL = Effort(
-    4, 60, ((10, 90, 0.12), (5, 150, 0.08), (3, 250, 0.05), (2, 300, 0.03)),
-    ((6, 90, 0.12), (3, 150, 0.08), (1, 300, 0.05)), 3, 20,
+    4, 60, ((16, 90, 0.12), (8, 150, 0.08), (3, 250, 0.05), (2, 300, 0.03)),
+    ((6, 90, 0.12), (3, 150, 0.08), (1, 300, 0.05)), 3, 40,
 )  # fmt: skip
 QUICK = Effort(1, 25, ((3, 30, 0.12), (1, 60, 0.06)), ((1, 30, 0.1),), 1, 8)
 
@@ -93,20 +93,26 @@ class Plan:
             new = []
             for k, start in enumerate(several, 1):
                 title = f"{name}: round {number}, {k} of {len(several)}"
-                new += self._further(title, search, start, generations, sigma)
+                new += self._further(title, search, start, several, generations, sigma)
             several = new
         return sorted([*several, *ended], key=lambda one: one.total)
 
     def _further(
-        self, title: str, search: Search, start: Found, generations: int, sigma: float
+        self,
+        title: str,
+        search: Search,
+        start: Found,
+        others: Sequence[Found],
+        generations: int,
+        sigma: float,
     ) -> list[Found]:
         told = self._telling(title)
-        return self.journal.stage(
-            title,
-            lambda rng: [
-                search.nested(search.rescreened(start, rng, *AGAIN), rng, generations, sigma, told)
-            ],
-        )
+
+        def work(rng: np.random.Generator) -> list[Found]:
+            begun = search.rescreened(search.borrowed(start, others), rng, *AGAIN)
+            return [search.nested(begun, rng, generations, sigma, told)]
+
+        return self.journal.stage(title, work)
 
     def finished(self, name: str, rows: Sequence[int], found: Found) -> Found:
         """The solution at the finish's step, and by least squares."""
@@ -123,18 +129,37 @@ class Plan:
         """The best own numbers of trials on a rig, of many starts."""
         return self.journal.stage(name, lambda rng: targets.screen(place[None], rng, *CAREFUL))[0]
 
-    def profile(self, key: int, place: float, start: Found) -> Found:
-        """The best solution with one key at a place, from a neighbour on."""
+    def profile(self, key: int, place: float, start: Found, others: Sequence[Found]) -> Found:
+        """The best solution with one key at a place: from a neighbour on, or from that of
+        ``others`` whose key is nearest to the place, whichever is the better start.
+
+        Both are moved along the valley of the cost, half of the way or not at all.
+        """
         name = f"profile {self.coarse.space.names[key]} {place:.4f}"
-        moved = start.place.copy()
-        moved[key] = place
+        near = min(others, key=lambda one: abs(one.place[key] - place))
 
         def work(rng: np.random.Generator) -> list[Found]:
-            there = self.coarse.refined(moved, start.own, 3)
+            starts = [one for from_ in (start, near) for one in self._moved(from_, key, place)]
+            there = min(starts, key=lambda one: one.total)
             n = self.effort.profile_generations
-            return [self.coarse.nested(there, rng, n, 0.03, self._telling(name), fixed=key)]
+            return [self.coarse.nested(there, rng, n, 0.04, self._telling(name), fixed=key)]
 
         return self.journal.stage(name, work)[0]
+
+    def _moved(self, start: Found, key: int, place: float) -> list[Found]:
+        """A solution with one key moved to a place."""
+        search = self.coarse
+        follow = search.sensitivity(start.place, start.own)
+        along = search.valley(start.place, start.own, key)
+        low, high = ([getattr(t, end) for t in search.targets] for end in ("low", "high"))
+        found = []
+        for share in (0.0, 0.5, 1.0):
+            moved = start.place + share * (place - start.place[key]) * along
+            moved = np.clip(moved, 0.0, 1.0)
+            moved[key] = place
+            own = np.clip(start.own + follow @ (moved - start.place), low, high)
+            found.append(search.refined(moved, own, 4))
+        return found
 
     def _telling(self, title: str) -> Progress:
         return lambda what, best: self.progress(f"{title}, {what}", best)

@@ -15,7 +15,7 @@ import numpy as np
 from cmaes import CMA
 
 from cosim.arrays import Array
-from cosim.studies.identify.chain.chain import OWN, Target, look_around, refine, simulate
+from cosim.studies.identify.chain.chain import OWN, RIG, Target, look_around, refine, simulate
 from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import draws
 
@@ -26,6 +26,7 @@ SOFT = 0.03
 POPULATION = 16
 REFRESH, RESCREEN = 4, 30
 """Generations after which sensitivities are found anew, and own numbers drawn anew."""
+FORCE = RIG.index("force_factor")
 STARTS = 15
 """Moments of the drive's start that are tried."""
 BETTER = 0.97
@@ -128,6 +129,21 @@ class Search:
         own = np.where(take[:, None], other.own, same.own)
         return self.made(found.place, own, np.where(take, other.costs, same.costs))
 
+    def borrowed(self, found: Found, others: Sequence[Found]) -> Found:
+        """With the own numbers of other rigs' trials where they fit this one better, the drives
+        scaled to the same force."""
+        force = self.space.rigs(np.array([one.place for one in [found, *others]]))[:, FORCE]
+        drives = [OWN.index(name) for name in ("amplitude", "offset")]
+        tried = np.array([found.own, *(one.own for one in others)])
+        tried[:, :, drives] *= (force / force[0])[:, None, None]
+        low, high = ([getattr(t, end) for t in self.targets] for end in ("low", "high"))
+        rigs = np.repeat(self.space.rigs(found.place[None]), len(self.targets), axis=0)
+        own, cost = self._refined_each(
+            self.targets, rigs, np.clip(tried, low, high).transpose(1, 0, 2), 3
+        )
+        own, cost = self._best(own, cost, 1)
+        return self.made(found.place, own[:, 0], cost[:, 0])
+
     def slopes(self, place: Array, own: Array, k: int, turn: float = TURN) -> tuple[Array, Array]:
         """Residuals of trial ``k``, and their slopes by the rig's place and the fitted own numbers
         in units of their scales (rows)."""
@@ -143,6 +159,26 @@ class Search:
         residuals = simulate(target, rigs, numbers)[1]
         steps = np.concatenate([turns, own_turns])[:, None]
         return residuals[0], (residuals[1:] - residuals[0]) / steps
+
+    def valley(self, place: Array, own: Array, key: int) -> Array:
+        """How the other places follow that of one key, the own numbers being fitted throughout: by
+        the normal equations of all trials. One for the key itself."""
+
+        def one(k: int) -> Array:
+            slopes, d = self.slopes(place, own, k)[1], len(place)
+            normal = np.einsum("ij,kj->ik", slopes, slopes)
+            if len(slopes) == d:
+                return normal
+            inner = normal[d:, d:] + SOFT * np.diag(np.diag(normal)[d:] + 1e-9)
+            return normal[:d, :d] - normal[:d, d:] @ np.linalg.solve(inner, normal[d:, :d])
+
+        with ThreadPoolExecutor(self.workers) as pool:
+            whole = np.sum([*pool.map(one, range(len(self.targets)))], axis=0)
+        rest = [k for k in range(len(place)) if k != key]
+        inner = whole[np.ix_(rest, rest)] + SOFT * np.diag(np.diag(whole)[rest] + 1e-9)
+        found = np.ones(len(place))
+        found[rest] = -np.linalg.solve(inner, whole[rest, key])
+        return found
 
     def sensitivity(self, place: Array, own: Array) -> Array:
         """How the own numbers follow the rig's place: trials × OWN × free."""
