@@ -127,7 +127,7 @@ TABLE: dict[str, dict[str, str]] = {
         "export": QUICK, "compare": SLOW, "fit": SLOW, "build": QUICK,
     },
     "same folder twice": {
-        "run": QUICK, "sweep": QUICK, "tune": QUICK, "chart": QUICK, "identify": QUICK,
+        "run": QUICK, "sweep": QUICK, "tune": QUICK, "chart": QUICK, "identify": SLOW,
         "export": QUICK, "compare": QUICK, "fit": QUICK, "build": QUICK,
     },
     "damaged files of its own": {
@@ -384,7 +384,12 @@ def devices(phase: str, made: dict[str, str], out: Path, capsys) -> None:
     for path in (pipe, Path("/dev/zero")):
         (folder / "waveforms.nc").unlink(missing_ok=True)
         (folder / "waveforms.nc").symlink_to(path)
-        given = {"run": str(folder), "trial": str(path), "trials": str(path), "many": str(path)}
+        given = made | {
+            "run": str(folder),
+            "trial": str(path),
+            "trials": str(path),
+            "many": str(path),
+        }
         command = COMMANDS[phase]
         if phase in ("run", "sweep", "tune", "chart"):
             command = [
