@@ -23,7 +23,9 @@ from cosim.version import __version__
 INTERRUPTED = 130
 
 _NO_MEMORY = "The memory ran out: try fewer --workers, or a longer run.output_step"
-_NO_ROOM = re.compile("failed to map|cannot allocate|bad_alloc", re.IGNORECASE)
+_NO_ROOM = re.compile(
+    "failed to map|cannot allocate|bad_alloc|without setting an exception", re.IGNORECASE
+)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -66,8 +68,8 @@ def main(argv: list[str] | None = None) -> int:
         return code
     except CosimError as error:
         return _told(str(error), error.exit_code)
-    except (MemoryError, ImportError) as error:
-        # A library that finds no room is not loaded.
+    except (MemoryError, ImportError, SystemError) as error:
+        # A library that finds no room is not loaded, and Python may lose the reason.
         if not isinstance(error, MemoryError) and not _NO_ROOM.search(str(error)):
             raise
         return _told(_NO_MEMORY, SimulationFailed.exit_code)

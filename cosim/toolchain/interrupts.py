@@ -15,12 +15,34 @@ SIGNALS = [
 ]
 
 
+GRACE = 30
+"""s; a command that has not ended so long after a signal is ended by the system."""
+
+
 @contextmanager
 def ended_alike() -> Iterator[None]:
     """Within this context all of SIGNALS raise KeyboardInterrupt, but for those that whoever
-    started this process has had ignored, as nohup does."""
-    with _handled(lambda before: signal.default_int_handler if before is signal.SIG_DFL else None):
-        yield
+    started this process has had ignored, as nohup does.
+
+    Where memory has run out Python may lose an exception, and what tidies up may hang: GRACE later
+    the system ends the process.
+    """
+    alarm = getattr(signal, "alarm", lambda seconds: None)
+    armed = False
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        nonlocal armed
+        armed = True
+        alarm(GRACE)
+        raise KeyboardInterrupt
+
+    known = (signal.SIG_DFL, signal.default_int_handler)
+    try:
+        with _handled(lambda before: interrupt if before in known else None):
+            yield
+    finally:
+        if armed:
+            alarm(0)
 
 
 @contextmanager

@@ -15,7 +15,11 @@ import numpy as np
 
 from cosim.errors import BadInput
 from cosim.files.atomic import write_json
+from cosim.files.door import Refused, contents
 from cosim.studies.identify.search.search import Found
+
+LARGEST = 1 << 28
+"""Bytes; far above what all stages take."""
 
 
 class Journal:
@@ -32,9 +36,9 @@ class Journal:
 
     def _read(self, path: Path) -> dict[str, Any]:
         try:
-            content = json.loads(path.read_text(encoding="utf-8"))
+            content = json.loads(contents(path, LARGEST))
             same, done = content["asked"] == self._key, content["done"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (Refused, ValueError, KeyError, TypeError, RecursionError) as error:
             raise BadInput(f"{path}: is no journal of an identification; delete it.") from error
         return done if same and isinstance(done, dict) else {}
 

@@ -1,0 +1,59 @@
+"""A signal ends a command, whatever swallows what it raises."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.helpers import needs
+
+pytestmark = [pytest.mark.reliability, needs.posix]
+
+DEAF = """
+import sys, time
+from cosim.toolchain import interrupts
+interrupts.GRACE = 1
+class Deaf:
+    def __del__(self):  # Python loses what is raised here
+        print("ready", flush=True)
+        time.sleep(60.0)
+with interrupts.ended_alike():
+    try:
+        Deaf()
+    except KeyboardInterrupt:
+        sys.exit(130)
+    while True:
+        time.sleep(1.0)
+"""
+
+POLITE = """
+import signal, time
+from cosim.toolchain import interrupts
+interrupts.GRACE = 1
+try:
+    with interrupts.ended_alike():
+        print("ready", flush=True)
+        time.sleep(60.0)
+except KeyboardInterrupt:
+    assert signal.alarm(0) == 0
+    print("ended")
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize("program", [DEAF, POLITE])
+def test_a_signal_ends_a_command_that_does_not_hear_it(program: str, number: int) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    assert process.stdout is not None and process.stdout.readline() == "ready\n"
+    time.sleep(0.1)
+    process.send_signal(number)
+    said, _ = process.communicate(timeout=30)
+    if program is POLITE:
+        assert (process.returncode, said) == (0, "ended\n")
+    else:
+        assert process.returncode == -signal.SIGALRM
