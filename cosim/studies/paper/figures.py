@@ -96,8 +96,13 @@ def _name_phases(above: Axes, between: Axes, cycle: Cycle) -> None:
     title = f"T$_1$ = {first:.5g} ms, T$_2$ = {second:.5g} ms"
     above.set_title(title, loc="left", fontsize=10.5)
     above.legend(
-        **{"loc": "lower right", "bbox_to_anchor": (1.0, 0.99), "ncols": 4, "fontsize": 9},
-        **{"frameon": False, "columnspacing": 1.1, "handlelength": 1.6},
+        loc="lower right",
+        bbox_to_anchor=(1.0, 0.99),
+        ncols=4,
+        columnspacing=1.1,
+        handlelength=1.6,
+        fontsize=9,
+        frameon=False,
     )
     near = second - first < 0.05e3 * cycle.times[3]
     axis = between.get_xaxis_transform()
