@@ -5,8 +5,8 @@
 #   make test-all    the slow ones too
 #   make fuzz        the random tests with new examples, many more (ARGS=--hypothesis-seed=N to repeat)
 #   make setup       sets up: system packages, .venv from the hashed lock, the compiled C
-#   make charts      remakes the README's figures and tables in results/, some minutes;
-#                    `make test` writes results/datasheet.*
+#   make charts      remakes the figures and tables in results/, some minutes (TRIALS=DIR: the
+#                    paper's figure 7, too); `make test` writes results/datasheet.*
 #   make bench       remakes results/bench.json, some minutes (ARGS='--trials DIR')
 #   make check       ruff and pyright
 #   make dist        wheel and source distribution in dist/, each built in an empty environment
@@ -22,6 +22,7 @@ MAKEFLAGS += --no-print-directory
 
 SCENE ?= paper
 ARGS ?=
+TRIALS ?=
 UV ?= uv
 
 VENV := .venv
@@ -81,7 +82,7 @@ charts: setup
 	@$(VENV)/bin/cosim run paper
 	@cp results/paper/figure.png results/paper.png
 	@$(VENV)/bin/cosim theory
-	@cp results/theory/knife_edge.png results/knife_edge.png
+	@cp results/theory/knife_edge.png results/theory/figure[34].png results
 	@$(VENV)/bin/cosim sweep paper-limited --over drive.pot_max=0.4:1:4 \
 		--over drive.pot_frequency=0.1:0.95:18 --over drive.pot_offset=0:0.7:15
 	@cp results/paper-limited-sweep/figure.png results/sweep.png
@@ -89,6 +90,7 @@ charts: setup
 	@$(VENV)/bin/cosim chart accuracy
 	@$(VENV)/bin/cosim chart limits
 	@$(VENV)/bin/cosim chart ladder paper trial-10 gripper
+	@test -z '$(TRIALS)' || $(VENV)/bin/cosim chart trials '$(TRIALS)'
 
 bench: setup
 	@$(VENV)/bin/cosim bench $(ARGS)

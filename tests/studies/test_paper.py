@@ -4,6 +4,7 @@
 the form of the friction law alone. Published and derived numbers have µ_s = 0.7 and µ_k = 0.6.
 """
 
+import csv
 import json
 import math
 import subprocess
@@ -31,8 +32,9 @@ from cosim.drive.surface.waveforms import (
     quaid_velocity,
 )
 from cosim.errors import BadInput
-from cosim.studies.paper import errata_text, exact, theory
+from cosim.studies.paper import errata_text, exact, figure7, figures, theory
 from cosim.studies.paper.errata import errata
+from tests.helpers import needs
 from tests.helpers.examples import examples
 
 pytestmark = pytest.mark.physics
@@ -497,3 +499,51 @@ def test_there_is_no_theory_without_transport():
 def test_formulas_do_without_matplotlib():
     code = "import sys, cosim.studies.paper; sys.exit('matplotlib' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_the_line_of_optima_runs_through_the_best_of_each_curve():
+    case = Transport(**FIGURE_3)
+    ratios, speeds = figures.optima(case, 20 * G)
+    assert (np.diff(ratios) > 0).all() and (np.diff(speeds) > 0).all()
+    for peak in (5 * G, 10 * G, 20 * G):
+        found: Any = minimize_scalar(
+            lambda f, a=peak: -formulas.average_velocity(Transport(0.7, 0.6, a, f, 0.05)),
+            bounds=(1.0001 / 0.7, (peak / G - 1) / 0.7 * 0.9999),
+            method="bounded",
+            options={"xatol": 1e-8},
+        )
+        assert np.interp(found.x, ratios, speeds) == pytest.approx(-found.fun, rel=1e-4)
+
+
+def test_the_figures_show_the_line_of_optima_and_what_is_printed():
+    found = theory()
+    drawn = found.plot().axes[0].get_lines()
+    starts = {str(line.get_label()): np.asarray(line.get_ydata())[0] for line in drawn}
+    assert starts["surface, as printed: not closed"] == pytest.approx(
+        0.6 * 5 - 1
+    )  # g; µ_k where µ_s belongs
+    assert starts["surface"] == pytest.approx(0.7 * 5 - 1)
+    (curves, _) = figures.draw_velocities(found.case, [10 * G]).axes
+    assert figures.OPTIMA in {line.get_label() for line in curves.get_lines()}
+
+
+@needs.ngspice_library
+def test_figure_7_has_the_published_errors_and_the_machines_own(trials: Path, tmp_path: Path):
+    told = []
+    found = figure7.trials(trials, lambda: told.append(1))
+    figure7.write(tmp_path, found)
+    assert len(told) == 10
+    rows = list(csv.DictReader((tmp_path / "figure7.csv").read_text().splitlines()))
+    numbers = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+    # the published mean error; that of the same parameters solved exactly
+    assert numbers["error_theirs [mm]"].mean() == pytest.approx(0.1611, abs=5e-5)
+    assert numbers["error_exact [mm]"].mean() == pytest.approx(0.1569, abs=5e-5)
+    # trial 5 in the paper's figure: from 0 to 4.2 mm in 0.319 s, the last of its 16 kicks at 4.55
+    (shown,) = (one.theirs for one in found if one.number == figure7.TRIAL)
+    assert shown.simulated[0][-1] == pytest.approx(0.319, abs=1e-3)
+    assert shown.simulated[1][-1] == pytest.approx(4.2e-3, abs=0.05e-3)
+    assert shown.simulated[1].max() == pytest.approx(4.55e-3, abs=0.05e-3)
+    # which the whole machine repeats, too
+    apart = numbers["v_machine [mm/s]"] - numbers["v_measured [mm/s]"]
+    assert np.abs(apart).mean() < 0.6
+    assert (tmp_path / "figure7.png").read_bytes().startswith(b"\x89PNG")

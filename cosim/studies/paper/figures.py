@@ -1,11 +1,15 @@
-"""The paper's figures 3 and 4, drawn from the corrected closed forms."""
+"""The paper's figures 3 and 4 from the corrected closed forms, with what it prints beside."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
+from cosim.arrays import Array
 from cosim.drive.surface import formulas
 from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import Cycle, optimal_cycle
@@ -13,8 +17,12 @@ from cosim.files.picture import Picture
 
 # The colours of surface and part in all figures.
 SURFACE, PART, STICKING = "#1f6fb2", "#d1495b", "#f4e3c1"
+PRINTED = "0.55"
+GUIDELINE = (4.0, 16.0)
+"""The paper's range for µ_s F_n, in weights of the part."""
 CURVES = ("#8d99ae", "#1f6fb2", "#2a9d8f", "#e9a03b")
 DASHED, BEYOND = (0, (5, 2)), (0, (4, 3))
+OPTIMA = "line of optima"
 POINTS = 400
 
 
@@ -25,6 +33,7 @@ def draw_cycle(case: Transport) -> Picture:
     figure = Picture(8.4, 8.6, "constrained")
     axes = figure.subplots(3, 1, sharex=True)
     _motion(axes, cycle, slowed, gravity)
+    _as_printed(axes, cycle, case)
     sticking = (0.0, cycle.times[1] * 1e3)
     for axis in axes:
         axis.axvspan(*sticking, color=STICKING, alpha=0.6, lw=0, zorder=0, label="sticking")
@@ -64,12 +73,37 @@ def _motion(axes: Sequence[Axes], cycle: Cycle, slowed: float, gravity: float) -
         axis.set_ylabel(name)
 
 
+def _as_printed(axes: Sequence[Axes], cycle: Cycle, case: Transport) -> None:
+    """The surface with the misprinted acceleration of the first phase, from the same start."""
+    first, *others = cycle.accelerations
+    printed = formulas.slipping_acceleration(case.mu_k, case.f_n, 1.0, case.gravity)
+    times, velocities = cycle.knots()
+    less = (printed - first) * cycle.times[1]
+    style: dict[str, Any] = {"color": PRINTED, "lw": 1.1, "ls": BEYOND}
+    edges = np.repeat(cycle.times, 2)[1:-1]
+    accelerations = np.repeat([printed, *others], 2) / case.gravity
+    axes[0].plot(
+        edges * 1e3, accelerations, zorder=1, label="surface, as printed: not closed", **style
+    )
+    axes[1].plot(
+        times * 1e3, (velocities + np.array([0.0, less, less, less])) * 1e3, zorder=1, **style
+    )
+
+
 def _name_phases(above: Axes, between: Axes, cycle: Cycle) -> None:
     """The values of T1 and T2 with the legend, and their names above the lines."""
     first, second = (time * 1e3 for time in cycle.times[1:3])
     title = f"T$_1$ = {first:.5g} ms, T$_2$ = {second:.5g} ms"
     above.set_title(title, loc="left", fontsize=10.5)
-    above.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, fontsize=9, frameon=False)
+    above.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 0.99),
+        ncols=4,
+        columnspacing=1.1,
+        handlelength=1.6,
+        fontsize=9,
+        frameon=False,
+    )
     near = second - first < 0.05e3 * cycle.times[3]
     axis = between.get_xaxis_transform()
     for name, time, side in (("1", first, "right"), ("2", second, "left")):
@@ -81,8 +115,11 @@ def draw_velocities(case: Transport, peaks: Sequence[float]) -> Picture:
     """Figure 4: v_ave over the normal force for several a_max, m/s²."""
     figure = Picture(9.0, 6.0, "constrained")
     axis = figure.subplots()
+    axis.axvspan(*(weight / case.mu_s for weight in GUIDELINE), color=STICKING, alpha=0.45, lw=0)
     for peak, color in zip(peaks, CURVES, strict=False):
         _curve(axis, case, peak, color)
+    ratios, speeds = optima(case, max(peaks))
+    axis.plot(ratios, speeds * 1e3, color="0.15", lw=1.3, ls=DASHED, zorder=2, label=OPTIMA)
     axis.grid(alpha=0.25)
     axis.axhline(0.0, color="0.5", lw=0.8, zorder=1)
     axis.set(
@@ -94,11 +131,26 @@ def draw_velocities(case: Transport, peaks: Sequence[float]) -> Picture:
     low, high = axis.get_ylim()
     axis.twinx().set(ylim=(low / scale, high / scale), ylabel="v$_{ave}$/(gT) [1]")
     figure.legend(
-        handles=_legend(axis), loc="outside lower center", ncols=4, fontsize=9, frameon=False
+        handles=_legend(axis), loc="outside lower center", ncols=3, fontsize=9, frameon=False
     )
     title = f"Fastest transport upwards: {_friction(case)}, T = {case.period * 1e3:.5g} ms"
     axis.set_title(title, fontsize=12)
     return figure
+
+
+def optima(case: Transport, most: float) -> tuple[Array, Array]:
+    """The line of optima: the best f_n and its v_ave, m/s, for each a_max up to ``most``, m/s²."""
+    least = formulas.least_peak_acceleration_at_any_force(case.gravity)
+    peaks = np.linspace(least * (1 + 1e-6), most, POINTS)
+    mu_s, mu_k, period, gravity = case.mu_s, case.mu_k, case.period, case.gravity
+    ratios = [formulas.optimal_force_ratio(mu_s, mu_k, float(peak), gravity) for peak in peaks]
+    speeds = [
+        formulas.horizontal_velocity(
+            *formulas.horizontal_equivalent(mu_s, mu_k, ratio), float(peak), period, gravity
+        )
+        for ratio, peak in zip(ratios, peaks, strict=True)
+    ]
+    return np.array(ratios), np.array(speeds)
 
 
 def _curve(axis: Axes, case: Transport, peak: float, color: str) -> None:
@@ -125,15 +177,23 @@ def _curve(axis: Axes, case: Transport, peak: float, color: str) -> None:
     axis.plot(sliding, 0.0, "v", color=color, ms=6.5, clip_on=False, zorder=3)
 
 
-def _legend(axis: Axes) -> list[Line2D]:
+def _legend(axis: Axes) -> list[Artist]:
     curves = [line for line in axis.get_lines() if not str(line.get_label()).startswith("_")]
     grey = "0.35"
     return [
         *curves,
         Line2D([], [], color=grey, marker="o", ls="", label="f$_{opt}$"),
         Line2D([], [], color=grey, marker="s", ls="", label="f$_{max}$ of a part that sticks"),
-        Line2D([], [], color=grey, marker="v", ls="", label="f$_{n,max}$ of a part that slides"),
+        Line2D(
+            [],
+            [],
+            color=grey,
+            marker="v",
+            ls="",
+            label="f$_{n,max}$ as printed: of one that slides",
+        ),
         Line2D([], [], color=grey, lw=1.1, ls=BEYOND, label="the formula beyond f$_{max}$"),
+        Patch(color=STICKING, alpha=0.45, label="the paper's guideline, µ$_s$F$_n$ = 4…16 m$_P$g"),
     ]
 
 

@@ -1,0 +1,139 @@
+"""The paper's figure 7, a part's measured and simulated height, with this project's beside it.
+
+The authors give their solver the surface's *tracked* motion and a normal force fitted to the trial.
+The whole machine knows neither: of a trial it has the drive, the start and the normal force of the
+identified scenes, and makes the surface's motion itself.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from cosim.arrays import Array
+from cosim.files.picture import Picture
+from cosim.studies.compare import each
+from cosim.studies.compare.run import Comparison
+from cosim.studies.fit.cases import FIRST_ROW
+from cosim.studies.fit.fit import fit
+from cosim.studies.fit.results import Shown
+from cosim.studies.paper.figures import DASHED, PART, SURFACE
+from cosim.studies.tables import Row, write_csv
+from cosim.trials.periods import drift
+
+TRIAL = 5
+"""The trial that the paper shows."""
+
+MEASURED, THEIRS, EXACT, MACHINE = "0.1", "#e9a03b", "#2a9d8f", PART
+OWN = ("surface, measured", "surface, whole machine", "part, measured")
+SIDES = (
+    ("theirs", THEIRS, "s", "the paper's parameters and solver, tracked surface"),
+    ("exact", EXACT, "D", "the same, solved exactly"),
+    ("machine", MACHINE, "o", "whole machine, of the trial only drive, start, normal force"),
+)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A trial on all sides. ``theirs`` and ``exact`` begin FIRST_ROW rows after ``machine``."""
+
+    number: int
+    theirs: Shown
+    exact: Shown
+    machine: Comparison
+
+    def row(self) -> Row:
+        """Mean velocities of the part over whole periods, mm/s, and mean errors of its height, mm.
+        The machine's height is off by a constant, too, since it does not begin on the part's own.
+        """
+        numbers = self.machine.numbers
+        frequency = numbers["frequency_measured"]
+        period = 1.0 / frequency if frequency else None
+        velocities = {
+            "measured": numbers["drift_measured"],
+            "theirs": drift(*self.theirs.simulated, period),
+            "exact": drift(*self.exact.simulated, period),
+            "machine": numbers["drift_simulated"],
+        }
+        errors = {
+            "theirs": self.theirs.error * 1e3,
+            "exact": self.exact.error * 1e3,
+            "machine": numbers["mean_error_mm"],
+        }
+        return {
+            "trial": self.number,
+            **{f"v_{side} [mm/s]": (v or 0.0) * 1e3 for side, v in velocities.items()},
+            **{f"error_{side} [mm]": error for side, error in errors.items()},
+        }
+
+
+def trials(folder: Path, done: Callable[[], object]) -> list[Trial]:
+    """The published trials of a folder, simulated in three ways; ``done`` is called after each.
+
+    Raises BadInput where they are not the published ones.
+    """
+    theirs = fit(folder, evaluate="published", solver="published").shown
+    exact = fit(folder, evaluate="published", solver="exact").shown
+    machine = each.each(each.pairs(folder), done)
+    together = zip(theirs, exact, machine, strict=True)
+    return [Trial(number, *sides) for number, sides in enumerate(together, start=1)]
+
+
+def write(folder: Path, found: list[Trial]) -> None:
+    """Write ``figure7.csv`` and ``figure7.png``."""
+    rows = [trial.row() for trial in found]
+    write_csv(folder / "figure7.csv", rows)
+    figure = Picture(13.0, 5.6, "constrained")
+    left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
+    _paths(left, next(trial for trial in found if trial.number == TRIAL))
+    _velocities(right, rows)
+    handles = [line for line in left.get_lines() if line.get_label() in OWN]
+    handles += [
+        Line2D([], [], color=c, marker=m, lw=1.3, label=f"part: {w}") for _, c, m, w in SIDES
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9, frameon=False)
+    figure.write(folder / "figure7.png")
+
+
+def _paths(axis: Axes, trial: Trial) -> None:
+    """Heights from the first row that the authors keep."""
+    seen, made = trial.machine.found.recording, trial.machine.found.simulated
+    time = (seen.time - seen.time[FIRST_ROW])[FIRST_ROW:]
+
+    def rise(heights: Array) -> Array:
+        return (heights - heights[FIRST_ROW])[FIRST_ROW:]
+
+    for heights, label, style in (
+        (seen.signals["z_surface"], OWN[0], {"color": SURFACE, "lw": 0.9}),
+        (made["z_surface"], OWN[1], {"color": SURFACE, "lw": 0.9, "ls": DASHED}),
+        (seen.signals["z_part"], OWN[2], {"color": MEASURED, "lw": 1.8}),
+    ):
+        axis.plot(time * 1e3, rise(heights) * 1e3, label=label, **style)
+    simulated = (trial.theirs.simulated, trial.exact.simulated, (time, rise(made["z_part"])))
+    for (at, height), (_, color, *_) in zip(simulated, SIDES, strict=True):
+        axis.plot(at * 1e3, height * 1e3, color=color, lw=1.3)
+    axis.grid(alpha=0.25)
+    axis.set(xlabel="time [ms]", ylabel="height [mm]", xlim=(0.0, time[-1] * 1e3))
+    row = trial.row()
+    theirs, exact, machine = (row[f"error_{side} [mm]"] for side, *_ in SIDES)
+    axis.set_title(
+        f"Trial {trial.number}, the paper's; mean error {theirs:.2f} mm as published, "
+        f"{exact:.2f} exactly, {machine:.2f} the machine",
+        fontsize=11,
+    )
+
+
+def _velocities(axis: Axes, rows: list[Row]) -> None:
+    numbers = np.array([row["trial"] for row in rows])
+    measured = [row["v_measured [mm/s]"] for row in rows]
+    axis.bar(numbers, measured, width=0.8, color="0.85", edgecolor=MEASURED, lw=0.8)
+    for shift, (side, color, marker, _) in zip((-0.22, 0.0, 0.22), SIDES, strict=True):
+        values = [row[f"v_{side} [mm/s]"] for row in rows]
+        axis.plot(numbers + shift, values, color=color, marker=marker, ls="", ms=5.5)
+    axis.axhline(0.0, color="0.4", lw=0.8)
+    axis.grid(alpha=0.25, axis="y")
+    axis.set(xlabel="trial", ylabel="mean velocity of the part [mm/s]", xticks=numbers)
+    axis.set_title("All trials: measured (bars) and simulated", fontsize=11)

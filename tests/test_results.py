@@ -1,0 +1,39 @@
+"""The gallery of results: it names all that is there, and the commands are commands."""
+
+import re
+import shlex
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from cosim.cli.main import _parser
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "results"
+GALLERY = (RESULTS / "README.md").read_text(encoding="utf-8")
+COMMANDS = sorted(set(re.findall(r"`cosim (.+?)`", GALLERY)))
+
+
+def test_every_file_is_in_the_gallery_and_every_link_leads_to_one() -> None:
+    there = {path.name for path in RESULTS.iterdir() if path.is_file()} - {"README.md"}
+    links = {name for name in re.findall(r"\]\(([^)#]+)", GALLERY) if not name.startswith("../")}
+    assert len(there) > 20
+    assert links == there
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_its_commands_can_be_given(line: str) -> None:
+    words = shlex.split(line.replace("TRIALS_DIR", "trials"))
+    assert callable(_parser(words).parse_args(words).call)
+
+
+def test_each_row_has_a_command() -> None:
+    rows = [row.split("|")[1:-1] for row in GALLERY.splitlines() if row.startswith("| [")]
+    assert len(rows) > 12
+    assert all(len(row) == 3 and re.search(r"`(cosim|make) |the same", row[2]) for row in rows)
+
+
+def test_the_citation_is_of_this_version() -> None:
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
