@@ -7,6 +7,7 @@ is treated alike; ``circuits/README.md`` says what it must have.
 """
 
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -69,8 +70,9 @@ def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
     The run goes to ``run.duration`` with steps of at most ``circuit.max_step``. Raises BadInput,
     beginning with the netlist's file and line, for what is wrong with it or might do harm.
     """
-    lines = read(path_of(scene))
-    elements = check(lines).elements
+    path = path_of(scene)
+    # A netlist of one's own may have changed since it was read last.
+    lines, elements = (_own if scene.circuit.netlist is None else _checked)(path)
     external = _external_sources(elements)
     present = {node for element in elements for node in element.nodes}
     companion = scene.coupling.method == "companion"
@@ -105,6 +107,15 @@ def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
         ".end",
     ]
     return "\n".join(deck), saved
+
+
+def _checked(path: Path) -> tuple[Sequence[Line], Sequence[Element]]:
+    lines = read(path)
+    return lines, check(lines).elements
+
+
+_own = cache(_checked)
+"""The same of a netlist of the package."""
 
 
 def _external_sources(elements: Sequence[Element]) -> dict[Line, str]:

@@ -1,5 +1,6 @@
 """The data folders that stand beside the package in a checkout and inside it in a wheel."""
 
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,6 +17,7 @@ def fmu_sources() -> Path:
     return _folder("cosim._fmu", "fmu", "src/physics/variables.def")
 
 
+@cache
 def circuits() -> Path:
     """The folder of the netlists."""
     return _folder("cosim._circuits", "circuits", ".")

@@ -73,6 +73,17 @@ class Tape:
             self._kept = more
         self._kept[before : self._rows] = block
 
+    def room(self, rows: int) -> Array | None:
+        """Where as many rows that come next can be written down in place, of which ``fill`` then
+        tells; None where they are to be appended."""
+        end = self._rows + rows
+        return self._kept[self._rows : end] if end <= len(self._kept) else None
+
+    def fill(self, rows: int) -> None:
+        """So many rows stand in the last ``room`` now."""
+        self._rows += rows
+        self._array = None
+
     def _spill(self, before: int, block: Array) -> None:
         folder = _folder.get()
         try:

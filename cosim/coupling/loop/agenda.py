@@ -34,6 +34,11 @@ def count(step: float, end: float) -> int:
 Agenda = tuple[Array, npt.NDArray[np.int32]]
 
 
+def rows(what: npt.NDArray[np.int32]) -> int:
+    """How many rows are to be written down."""
+    return int(np.count_nonzero(what & _ROW))
+
+
 def agendas(
     row_step: float, duration: float, settle: float, stops: tuple[float, ...], shutter: float
 ) -> Iterator[Agenda]:

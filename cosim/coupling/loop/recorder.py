@@ -50,8 +50,9 @@ class Recorder:
         self._width = width = len(mechanics.columns)
         self._step_of_rows = run.output_step
         rows = agenda.count(run.output_step, run.duration)
-        self._rows, self._frames, self._time = Tape(width, rows), Tape(1), Tape(1, rows)
-        # What is not on the tapes yet. A frame's sample goes behind the last row.
+        # One row more, since a frame's sample goes behind the last row.
+        self._rows, self._frames, self._time = Tape(width, rows + 1), Tape(1), Tape(1, rows)
+        # What is not on the tapes yet; rows only where their tape has no room for them.
         self._new_rows, self._new_frames = np.empty((0, width)), np.empty(0)
         self._totals = (c_double * len(mechanics.total_names))()
         self._counters = (c_int32 * len(COUNTERS))()
@@ -174,16 +175,23 @@ class Recorder:
             self._reached = float(self._agenda[0][state.next - 1])
         self._agenda = next(self._agendas)
         times, what = self._agenda
-        if len(self._new_rows) <= len(times):
+        room = self._rows.room(agenda.rows(what) + 1)
+        self._in_place = room is not None
+        if room is None and len(self._new_rows) <= len(times):
             self._new_rows = np.empty((len(times) + 1, self._width))
+        if len(self._new_frames) <= len(times):
             self._new_frames = np.empty(len(times) + 1)
-            state.rows, state.frames = self._new_rows.ctypes.data, self._new_frames.ctypes.data
+        state.rows = (self._new_rows if room is None else room).ctypes.data
+        state.frames = self._new_frames.ctypes.data
         state.times, state.what = times.ctypes.data, what.ctypes.data
         state.n_times, state.next = len(times), 0
 
     def _take(self) -> None:
         state = self.state
-        if state.n_rows:
+        if state.n_rows and self._in_place:
+            self._rows.fill(state.n_rows)
+            state.rows += state.n_rows * self._width * 8
+        elif state.n_rows:
             self._rows.append(self._new_rows[: state.n_rows])
         if state.n_frames:
             self._frames.append(self._new_frames[: state.n_frames])

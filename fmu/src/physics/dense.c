@@ -353,8 +353,8 @@ STICKSLIP_INLINE void interpolant_of(const Variant kind, const Law *law, int wal
         GIVE(((Variant){0, N_STATES, 1, I_COIL, 0, 1}));                                              \
     GIVE(((Variant){0, N_STATES, 1, I_COIL, 0, 0}));
 
-double stickslip_long_step(const Model *m, int wall, double h, const Knot *from,
-                                          Knot *to, Stages *stages)
+STICKSLIP_INLINE double stickslip_long_step_any(const Model *m, int wall, double h, const Knot *from,
+                                                Knot *to, Stages *stages)
 {
     const Law law = stickslip_law(m);
 #define GIVE(kind) return step_of(kind, &law, wall, h, from, to, stages)
@@ -362,8 +362,12 @@ double stickslip_long_step(const Model *m, int wall, double h, const Knot *from,
 #undef GIVE
 }
 
-void stickslip_interpolant(const Model *m, int wall, double h, const Knot *from,
-                                          const Knot *to, Stages *stages, Dense *dense)
+STICKSLIP_WIDE(double, stickslip_long_step,
+               (const Model *m, int wall, double h, const Knot *from, Knot *to, Stages *stages),
+               (m, wall, h, from, to, stages))
+
+STICKSLIP_INLINE void stickslip_interpolant_any(const Model *m, int wall, double h, const Knot *from,
+                                                const Knot *to, Stages *stages, Dense *dense)
 {
     const Law law = stickslip_law(m);
 #define GIVE(kind)                                                                                 \
@@ -374,6 +378,11 @@ void stickslip_interpolant(const Model *m, int wall, double h, const Knot *from,
     KINDS(GIVE)
 #undef GIVE
 }
+
+STICKSLIP_WIDE(void, stickslip_interpolant,
+               (const Model *m, int wall, double h, const Knot *from, const Knot *to,
+                Stages *stages, Dense *dense),
+               (m, wall, h, from, to, stages, dense))
 
 double stickslip_reading_error(const Model *m, const Dense *dense)
 {

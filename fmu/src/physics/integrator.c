@@ -72,9 +72,9 @@ STICKSLIP_INLINE double step_of(const int n, const int acting, const int source,
     return worst;
 }
 
-double stickslip_trial_step(const Model *m, double tau, double h,
-                                           const double y0[N_ALL], const double dy0[N_ALL],
-                                           double y1[N_ALL], double dy1[N_ALL])
+STICKSLIP_INLINE double stickslip_trial_step_any(const Model *m, double tau, double h,
+                                                 const double y0[N_ALL], const double dy0[N_ALL],
+                                                 double y1[N_ALL], double dy1[N_ALL])
 {
     const Law law = stickslip_law(m);
     if (moving(m) > 1)
@@ -85,6 +85,11 @@ double stickslip_trial_step(const Model *m, double tau, double h,
         return step_of(N_STATES, N_ACTING, 1, &law, tau, h, y0, dy0, y1, dy1);
     return step_of(N_STATES, I_COIL, 0, &law, tau, h, y0, dy0, y1, dy1);
 }
+
+STICKSLIP_WIDE(double, stickslip_trial_step,
+               (const Model *m, double tau, double h, const double y0[N_ALL],
+                const double dy0[N_ALL], double y1[N_ALL], double dy1[N_ALL]),
+               (m, tau, h, y0, dy0, y1, dy1))
 
 double stickslip_step_factor(double error)
 {

@@ -20,4 +20,27 @@
 #define STICKSLIP_INLINE static inline
 #endif
 
+/* STICKSLIP_WIDE(result, name, parameters, arguments) makes the function `name` of the inlined one
+ * name_any: twice, where the compiler can, for processors with vectors of four doubles and for all.
+ * Both compute the same bits: nothing is fused or summed anew. */
+#if defined __x86_64__ && defined __GNUC__ && !defined __clang__ && !defined _WIN32
+#define STICKSLIP_WIDE(result, name, parameters, arguments)                                        \
+    static __attribute__((target("avx2"))) result name##_wide parameters                           \
+    {                                                                                              \
+        return name##_any arguments;                                                               \
+    }                                                                                              \
+    result name parameters                                                                         \
+    {                                                                                              \
+        if (__builtin_cpu_supports("avx2"))                                                        \
+            return name##_wide arguments;                                                          \
+        return name##_any arguments;                                                               \
+    }
+#else
+#define STICKSLIP_WIDE(result, name, parameters, arguments)                                        \
+    result name parameters                                                                         \
+    {                                                                                              \
+        return name##_any arguments;                                                               \
+    }
+#endif
+
 #endif
