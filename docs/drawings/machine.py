@@ -62,7 +62,7 @@ def machine(axes: Axes) -> None:
     axes.text(5.2, high - 0.31, "wall", ha="center", va="center", fontsize=SMALL)
     axes.text(5.2, low + 0.29, "wall", ha="center", va="center", fontsize=SMALL)
     axes.text(
-        6.75, high + 0.35, "surface, $m_s$: housing and platform", ha="center", fontsize=SMALL
+        7.1, high + 0.35, "surface, $m_s$: housing and platform", ha="center", fontsize=SMALL
     )
 
     # The ram on its suspension, a little above the middle; the coil around it.

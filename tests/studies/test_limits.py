@@ -233,14 +233,13 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runs, "SETTLE", 0.02)
     monkeypatch.setattr(runs, "SPAN", 0.05)
     monkeypatch.setattr(search, "STEADY", 1)
-    monkeypatch.setattr(search, "TOP", 1)
     values: dict[str, tuple[float, ...]] = {
         "supply voltage": (24.0,),
         "coil heat": (),
         "slew rate": (),
     }
     limits = [replace(BY_NAME[name], values=few) for name, few in values.items()]
-    efforts = study.Efforts(SMALL, Effort(8, (), 2), Effort(8, (), 2))
+    efforts = study.Efforts(SMALL, Effort(8, (), 2), Effort(8, (), 2), 1)
     scene = load("reference", {"run.duration": 0.2})
     rigs: list[Any] = [{"mechanics.surface_mass": 0.02}]
     there = [load("trial-05", {"run.duration": 0.15, "run.settle": 0.05})]
@@ -292,8 +291,8 @@ def test_ensemble(tmp_path: Path) -> None:
     path = tmp_path / "rigs.json"
     rigs = [{"cost": n, "mechanics.surface_mass": 0.01 + 0.001 * n} for n in range(7)]
     path.write_text(json.dumps({"ensemble": rigs, "seed": 0}))
-    found = study.ensemble(path)
-    assert [round(1e3 * float(rig["mechanics.surface_mass"])) for rig in found] == [10, 12, 14, 16]
+    found = study.ensemble(path, 3)
+    assert [round(1e3 * float(rig["mechanics.surface_mass"])) for rig in found] == [12, 14, 16]
     scene = load("paper")
     study.checked(scene, found, path)
     with pytest.raises(BadInput, match=r"rigs\.json, ensemble 0: .*surface_mass"):
@@ -301,7 +300,7 @@ def test_ensemble(tmp_path: Path) -> None:
     for text in ("[]", "{}", '{"ensemble": [1]}'):
         path.write_text(text)
         with pytest.raises(BadInput, match="has no list"):
-            study.ensemble(path)
+            study.ensemble(path, 3)
     path.write_text("{")
     with pytest.raises(BadInput, match="neither JSON"):
-        study.ensemble(path)
+        study.ensemble(path, 3)

@@ -56,7 +56,8 @@ def _run(arguments: Namespace) -> None:
     if arguments.seed < 0:
         raise BadInput(f"--seed {arguments.seed}: must be a whole number from 0.")
     scene = load(arguments.scene, arguments.overrides)
-    rigs = ensemble(arguments.rigs) if arguments.rigs else []
+    efforts = QUICK if arguments.quick else FULL
+    rigs = ensemble(arguments.rigs, efforts.rigs) if arguments.rigs else []
     checked(scene, rigs, arguments.rigs)
     there = [load(name) for name in arguments.at]
     asked = " ".join([arguments.scene, *(f"--set {text}" for text in arguments.overrides)])
@@ -74,7 +75,7 @@ def _run(arguments: Namespace) -> None:
             rigs,
             there,
             seed=arguments.seed,
-            efforts=QUICK if arguments.quick else FULL,
+            efforts=efforts,
             workers=arguments.workers,
             told=told,
             progress=bar.refresh,

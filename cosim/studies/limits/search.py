@@ -21,11 +21,9 @@ best of them is left."""
 ELITE, NEAR, INFLATION = 6, 0.1, 2.0
 """Those settings: how many, from how far, and by how much their covariance is blown up."""
 
-STEADY, STEADY_APART = 3, 0.015
-"""Settings of each quantity whose surroundings are looked at, and how far apart."""
-
-TOP = 2
-"""Best settings of each quantity that are kept, so that others stand in for one that is refuted."""
+STEADY, STEADY_APART = 2, 0.015
+"""Settings of each quantity whose surroundings are looked at beside those of the best one, and how
+far apart. They stand in for one that is refuted, too."""
 
 CLOSE, FEWEST = 1.5 * TURN, 5
 """What is known of a setting's surroundings: how far they reach, and from how many runs."""
@@ -140,7 +138,7 @@ class Search:
 
     def found(self, quantity: int) -> Best:
         """The best settings of a quantity, and those whose surroundings seem the best."""
-        places = [*self.ranked(quantity, STEADY_APART, TOP), *self._steady(quantity)]
+        places = [*self.ranked(quantity, STEADY_APART, 1), *self._steady(quantity)]
         every = dict.fromkeys(tuple(place.tolist()) for place in places)
         settings = [self.around(np.array(place), quantity) for place in every]
         achievable = (one for one in settings if one.value > 0.0)

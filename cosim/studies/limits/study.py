@@ -32,18 +32,18 @@ class Efforts:
     """Of a circuit that knows what was found for those before it."""
     others: Effort
     """Of the other rigs of an ensemble."""
+    rigs: int
+    """Of these, spread over their order, which is that of their cost."""
 
 
 FULL = Efforts(
     Effort(512, (0.08, 0.05, 0.04, 0.03, 0.025, 0.02, 0.01, 0.005), 4),
     Effort(32, (0.04, 0.02, 0.01, 0.005), 4),
     Effort(32, (0.04, 0.02, 0.01, 0.005), 2),
+    3,
 )
 _COARSE = Effort(32, (0.05, 0.02), 2)
-QUICK = Efforts(Effort(128, (0.05, 0.02), 2), _COARSE, _COARSE)
-
-MOST_RIGS = 4
-"""Of an ensemble, spread over its order, which is that of their cost."""
+QUICK = Efforts(Effort(128, (0.05, 0.02), 2), _COARSE, _COARSE, 1)
 
 Name = tuple[str, float]
 """A limit and its value; OWN and IDEAL besides."""
@@ -178,9 +178,10 @@ def _as_hints(bench: Bench, found: Bests, there: Case, here: Case) -> Array:
     return places
 
 
-def ensemble(path: Path) -> list[Settings]:
+def ensemble(path: Path, most: int) -> list[Settings]:
     """The rigs of a file: the tables of its list ``ensemble``, each of keys ("table.key") and
-    values, SI; entries without a dot are passed over. At most MOST_RIGS, spread over the list.
+    values, SI; entries without a dot are passed over. Of more than ``most`` these are spread over
+    the list, without its first, the best, for which the scene stands.
 
     Raises BadInput.
     """
@@ -195,8 +196,10 @@ def ensemble(path: Path) -> list[Settings]:
     rigs = said.get("ensemble") if isinstance(said, dict) else None
     if not isinstance(rigs, list) or not rigs or not all(isinstance(rig, dict) for rig in rigs):
         raise BadInput(f'{name}: has no list "ensemble" of tables of keys and values.')
-    kept = np.unique(np.linspace(0, len(rigs) - 1, min(MOST_RIGS, len(rigs))).round().astype(int))
-    return [{key: value for key, value in rigs[k].items() if "." in key} for k in kept.tolist()]
+    if len(rigs) > most:
+        places = np.linspace(0, len(rigs) - 1, most + 1)[1:]
+        rigs = [rigs[k] for k in np.unique(places.round().astype(int)).tolist()]
+    return [{key: value for key, value in rig.items() if "." in key} for rig in rigs]
 
 
 def checked(scene: Scene, rigs: Sequence[Settings], path: Path) -> None:

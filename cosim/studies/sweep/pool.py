@@ -75,7 +75,8 @@ class Pool:
             ready = wait([worker.pipe for worker in busy], timeout=1.0)
             for worker in busy:
                 assert worker.point is not None
-                number, lost, answer = worker.point[0], "", None
+                number, lost = worker.point[0], ""
+                answer: Any = None
                 if worker.pipe in ready:
                     try:
                         kind, answer = worker.hear()
