@@ -7,6 +7,7 @@ after some points, after one that has spoilt the library, and after their death.
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from multiprocessing.connection import wait
+from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import Scene
