@@ -17,7 +17,6 @@ from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
 from cosim.simulation.rungs.rung import Driven, Led
 
-
 _IN_CACHE = 1 << 12
 """Rows whose intermediate values stay in the processor's cache; larger arrays are taken from the
 system anew in each run."""
