@@ -121,10 +121,10 @@ class Tape:
         return self.array()[:, number]
 
 
-def blocks(count: int) -> Iterator[slice]:
-    """Slices of BLOCK rows, ``count`` in all; after each the tapes' pages leave the memory."""
-    for start in range(0, count, BLOCK):
-        yield slice(start, min(start + BLOCK, count))
+def blocks(count: int, most: int = BLOCK) -> Iterator[slice]:
+    """Slices of ``most`` rows, ``count`` in all; after each the tapes' pages leave the memory."""
+    for start in range(0, count, most):
+        yield slice(start, min(start + most, count))
         release()
 
 

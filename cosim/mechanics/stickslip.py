@@ -95,6 +95,7 @@ def _names(has_source: bool, two_surfaces: bool, changing_force: bool) -> _Names
         "inputs": ramps,
         "held_inputs": (*ramps, "inputs_hold_for"),
         "step_outputs": step_outputs,
+        "inner": (*step_outputs[4:], *sampled),
         "reals": sampled,
         "wholes": wholes,
         "totals": totals,

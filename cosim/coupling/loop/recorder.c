@@ -7,6 +7,7 @@
 #include "loop.h"
 
 #include <stdint.h>
+#include <string.h>
 #include <time.h>
 
 static const double SAME_TIME = 1e-12; /* s; communication points closer than this are one */
@@ -81,16 +82,18 @@ static int step_within(Recorder *r, double time, double edge, const double *star
     Fmu *f = r->fmu;
     if (f->time >= r->holds_until - SAME_TIME && !set_inputs(r, edge, start, end))
         return 0;
+    if (!f->step(f, time - f->time))
+        return 0;
     /* Who leads looks at the interval's end alone. */
-    const int64_t first = time < edge ? EXTREMES : 0;
-    if (!f->step(f, time - f->time) ||
-        !f->get(f, r->step_places + first, r->step_outputs - first, r->outputs + first))
+    const int64_t extremes = r->step_outputs - EXTREMES;
+    const double *found = time < edge ? r->inner_outputs : r->outputs + EXTREMES;
+    if (!(time < edge ? f->get(f, r->inner_places, extremes + r->reals, r->inner_outputs)
+                      : f->get(f, r->step_places, r->step_outputs, r->outputs)))
         return 0;
     f->time = time;
     f->steps++;
     if (time > r->settle) {
-        const double *found = r->outputs + EXTREMES;
-        for (int64_t k = 0; k < r->step_outputs - EXTREMES; k += 2) {
+        for (int64_t k = 0; k < extremes; k += 2) {
             if (found[k] > r->extremes[k])
                 r->extremes[k] = found[k];
             if (found[k + 1] < r->extremes[k + 1])
@@ -100,8 +103,8 @@ static int step_within(Recorder *r, double time, double edge, const double *star
     return 1;
 }
 
-/* Write down what the agenda has for this time. */
-static int visit(Recorder *r)
+/* Write down what the agenda has for this time; `reals` are those of a row, if they are known. */
+static int visit(Recorder *r, const double *reals)
 {
     Fmu *f = r->fmu;
     const int32_t what = r->what[r->next++];
@@ -112,7 +115,9 @@ static int visit(Recorder *r)
         /* The row's place holds the sample of a frame too; the array has one row to spare. */
         double *row = r->rows + r->n_rows * (r->reals + r->wholes);
         int32_t whole[2];
-        if (!f->get(f, r->real_places, r->reals, row) ||
+        if (reals)
+            memcpy(row, reals, (size_t)r->reals * sizeof *row);
+        if ((!reals && !f->get(f, r->real_places, r->reals, row)) ||
             !f->get_whole(f, r->whole_places, r->wholes, whole))
             return 0;
         for (int64_t k = 0; k < r->wholes; k++)
@@ -131,7 +136,7 @@ static int visit(Recorder *r)
 
 int recorder_begin(Recorder *r)
 {
-    return visit(r);
+    return visit(r, NULL);
 }
 
 /* As recorder_follow(); until `stop` steps of the FMU, or `late` (ms). */
@@ -146,13 +151,14 @@ static int64_t follow(Recorder *r, int64_t n, const double *edges, const double 
         while (r->times[r->next] < edges[k] - SAME_TIME) {
             if (f->steps >= stop || loop_milliseconds() >= late)
                 return k;
-            if (!step_within(r, r->times[r->next], edges[k], start, end) || !visit(r))
+            if (!step_within(r, r->times[r->next], edges[k], start, end) ||
+                !visit(r, r->inner_outputs + r->step_outputs - EXTREMES))
                 return -1;
         }
         if (!step_within(r, edges[k], edges[k], start, end))
             return -1;
         r->inside = 0;
-        if (r->times[r->next] <= edges[k] + SAME_TIME && !visit(r))
+        if (r->times[r->next] <= edges[k] + SAME_TIME && !visit(r, NULL))
             return -1;
         if (f->steps >= stop || loop_milliseconds() >= late)
             return k + 1;

@@ -17,6 +17,10 @@ from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
 from cosim.simulation.rungs.rung import Driven, Led
 
+_IN_CACHE = 1 << 12
+"""Rows whose intermediate values stay in the processor's cache; larger arrays are taken from the
+system anew in each run."""
+
 
 class Ideal(Led):
     """The current is given; the coil's voltage follows from it."""
@@ -82,7 +86,7 @@ class _Coil:
         branch = eddy.follow(h, start, end)
         step = scene.run.output_step
         stop = min(count(step, edges[-1] + SAME_TIME), self._rows)
-        for few in blocks(stop - len(self._waves)):
+        for few in blocks(stop - len(self._waves), _IN_CACHE):
             first_row = len(self._waves)
             row = step * np.arange(first_row, first_row + few.stop - few.start)
             # A row on an edge belongs to what is before it.

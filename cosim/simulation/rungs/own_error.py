@@ -28,6 +28,9 @@ from cosim.simulation.rungs.electrics import Eddy
 _INTERVAL = 1e-4
 """s; the mechanics see the mean current of each: shorter than what the ram can follow."""
 
+_TOLERANCE = 1e-7
+"""Of the mechanics, at least: far below what the estimate leaves out."""
+
 _STRAIGHT, _TOGETHER = 1e-5, 20
 """Intervals over which the current is straight within this share of its limit are one, so many at
 most."""
@@ -159,9 +162,11 @@ class _Alone:
         # Nothing is written down but where settling ends.
         rare = scene.run.model_copy(update={"output_step": scene.run.duration})
         self._run = rare
-        self._mechanics = Mechanics(scene, fmi_version)
+        tolerance = max(scene.mechanics.tolerance, _TOLERANCE)
+        mechanics = scene.mechanics.model_copy(update={"tolerance": tolerance})
+        alone = scene.model_copy(update={"run": rare, "mechanics": mechanics})
+        self._mechanics = Mechanics(alone, fmi_version)
         try:
-            alone = scene.model_copy(update={"run": rare})
             self._recorder = Recorder(alone, self._mechanics, lambda _: None)
         except BaseException:
             self._mechanics.close()
