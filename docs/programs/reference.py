@@ -40,7 +40,8 @@ def sentence(text: str) -> str:
     for plain, better in (("``", "`"), ("|", "\\|"), ("<", "&lt;")):
         text = text.replace(plain, better)
     text = re.sub(r"(?<=\d) us\b", " µs", " ".join(text.split()))
-    return text[:1].upper() + text[1:]
+    first = text.partition(" ")[0]
+    return text if "_" in first else text[:1].upper() + text[1:]  # names stay as they are
 
 
 def number(value: float) -> str:
