@@ -8,10 +8,11 @@
 #   make charts      remakes the figures and tables in results/, some minutes (TRIALS=DIR: the
 #                    paper's figure 7, too); `make test` writes results/datasheet.*
 #   make bench       remakes results/bench.json, some minutes (ARGS='--trials DIR')
+#   make docs        draws the pictures and builds the documentation site, site/index.html
 #   make check       ruff and pyright
 #   make dist        wheel and source distribution in dist/, each built in an empty environment
-#   make lock        remakes requirements.lock with uv  (ARGS=--upgrade for newer versions)
-#   make clean       removes .venv and everything built
+#   make lock        remakes the locks with uv  (ARGS=--upgrade for newer versions)
+#   make clean       removes the environments and everything built
 #
 # PYTHON=/path/to/python3 chooses the interpreter that .venv is made with.
 
@@ -37,7 +38,7 @@ SOURCES := $(sort $(shell find fmu/src fmu/include cosim -path cosim/_compiled -
 	-type f \( -name '*.[ch]' -o -name '*.def' \) -print)) build_c.py setup.py pyproject.toml fmu/LICENSE
 COMPILED := cosim/_compiled/build.json
 
-.PHONY: help run test test-all fuzz setup charts bench check dist lock clean FORCE
+.PHONY: help run test test-all fuzz setup charts bench docs check dist lock clean FORCE
 
 help:
 	@sed -n 's/^#  \( .*\)/\1/p' Makefile
@@ -96,6 +97,22 @@ bench: setup
 	@$(VENV)/bin/cosim bench $(ARGS)
 	@cp results/bench/bench.json results/bench.json
 
+# In an environment of its own, without what is compiled: it takes the tables from the sources.
+DOCS := .venv-docs
+DOCS_PY := PYTHONPATH=. $(DOCS)/bin/python
+
+$(DOCS)/.installed: docs/requirements.lock
+	@echo "Installing what the site is built with into $(DOCS)"
+	@$(or $(PYTHON),python3) -m venv --clear $(DOCS)
+	@$(DOCS)/bin/python -m pip --disable-pip-version-check --no-input -q install \
+		--require-hashes -r docs/requirements.lock
+	@touch $@
+
+docs: $(DOCS)/.installed
+	@for drawing in machine circuit coupling; do $(DOCS_PY) docs/drawings/$$drawing.py || exit; done
+	@$(DOCS_PY) docs/programs/reference.py
+	@NO_MKDOCS_2_WARNING=1 $(DOCS_PY) -m mkdocs build --strict
+
 check: setup
 	@$(VENV)/bin/ruff check
 	@$(VENV)/bin/ruff format --check
@@ -113,8 +130,11 @@ lock:
 	@$(UV) pip compile --quiet --universal --fork-strategy fewest --generate-hashes --python-version 3.11 \
 		--custom-compile-command "make lock" \
 		pyproject.toml --extra test --extra dev -o requirements.lock $(ARGS)
-	@! grep -n '://' requirements.lock || { echo "requirements.lock must name no registry." >&2; exit 1; }
+	@$(UV) pip compile --quiet --universal --fork-strategy fewest --generate-hashes --python-version 3.11 \
+		--custom-compile-command "make lock" pyproject.toml --extra docs -o docs/requirements.lock $(ARGS)
+	@! grep -n '://' requirements.lock docs/requirements.lock || \
+		{ echo "A lock must name no registry." >&2; exit 1; }
 
 clean:
-	@rm -rf $(VENV) build dist *.egg-info cosim/_compiled .pytest_cache .hypothesis .ruff_cache
+	@rm -rf $(VENV) $(DOCS) site build dist *.egg-info cosim/_compiled .pytest_cache .hypothesis .ruff_cache
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

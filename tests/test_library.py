@@ -175,24 +175,6 @@ def test_without_a_main_guard(way: str, tmp_path: Path) -> None:
     assert failed == "0" and (tmp_path / "own.png").read_bytes().startswith(PNG)
 
 
-def test_notebook() -> None:
-    import nbformat
-    from nbclient import NotebookClient
-
-    path = REPOSITORY / "tests" / "library.ipynb"
-    notebook = nbformat.read(path, as_version=4)
-    client = NotebookClient(
-        notebook, timeout=300, resources={"metadata": {"path": str(path.parent)}}
-    )
-    client.execute()
-    shown = [
-        {kind for output in cell.outputs for kind in output.get("data", {})}
-        for cell in notebook.cells
-        if cell.cell_type == "code"
-    ]
-    assert "text/html" in shown[0] and "image/png" in shown[-1]
-
-
 def test_import_is_light() -> None:
     program = (
         "import sys, cosim; cosim.BadInput; "
@@ -201,15 +183,3 @@ def test_import_is_light() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert (done.stdout.split("\n")[:2], done.stderr) == (["", ""], "")
-
-
-def test_the_snippet_of_the_readme_runs_from_stdin(tmp_path: Path) -> None:
-    text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
-    snippet = text.split("```python\n", 1)[1].split("```", 1)[0]
-    (tmp_path / "circuits").symlink_to(REPOSITORY / "circuits")
-    done = subprocess.run(
-        [sys.executable, "-"], input=snippet, cwd=tmp_path, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    assert (tmp_path / "run.png").read_bytes().startswith(PNG)
-    assert (tmp_path / "results/mine/waveforms.nc").is_file()

@@ -61,9 +61,7 @@ def machine(axes: Axes) -> None:
     block(axes, 3.6, low + 0.6, 4.1, high - low - 1.2, "white")
     axes.text(5.2, high - 0.31, "wall", ha="center", va="center", fontsize=SMALL)
     axes.text(5.2, low + 0.29, "wall", ha="center", va="center", fontsize=SMALL)
-    axes.text(
-        7.1, high + 0.35, "surface, $m_s$: housing and platform", ha="center", fontsize=SMALL
-    )
+    axes.text(7.1, high + 0.35, "surface, $m_s$: housing and platform", ha="center", fontsize=SMALL)
 
     # The ram on its suspension, a little above the middle; the coil around it.
     block(axes, 4.6, centre - 1.0, 1.9, 2.0, RAM)

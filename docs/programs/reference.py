@@ -40,7 +40,8 @@ def sentence(text: str) -> str:
     for plain, better in (("``", "`"), ("|", "\\|"), ("<", "&lt;")):
         text = text.replace(plain, better)
     text = re.sub(r"(?<=\d) us\b", " µs", " ".join(text.split()))
-    return text[:1].upper() + text[1:]
+    first = text.partition(" ")[0]
+    return text if "_" in first else text[:1].upper() + text[1:]  # names stay as they are
 
 
 def number(value: float) -> str:
@@ -53,7 +54,10 @@ def code(value: object) -> str:
 
 # --- the scene ------------------------------------------------------------------------------------
 
-REGISTRIES = {"circuit.model": RUNGS, "coupling.method": METHODS}
+REGISTRIES = {
+    "circuit.model": (RUNGS, "How much of the circuit is modelled; the values stand below"),
+    "coupling.method": (METHODS, "How circuit and mechanics are joined; the values stand below"),
+}
 
 
 def default(key: Key) -> str:
@@ -77,9 +81,9 @@ def allowed(key: Key) -> str:
 
 
 def meaning(key: Key) -> str:
-    text = key.text.partition(";")[0] if key.full in REGISTRIES else key.text
+    text = REGISTRIES[key.full][1] if key.full in REGISTRIES else key.text
     rungs = [name for name, rung in RUNGS.items() if key.name in rung.keys]
-    acts = f" Acts on {', '.join(rungs)}." if key.table == "circuit" and rungs else ""
+    acts = f" Acts in {', '.join(rungs)}." if key.table == "circuit" and rungs else ""
     return sentence(text).removesuffix(".") + "." + acts
 
 
@@ -102,7 +106,7 @@ def scene() -> str:
             if key.table == name
         ]
         parts.append(table(["key", "default", "unit", "range", "meaning"], rows))
-        for full, registry in REGISTRIES.items():
+        for full, (registry, _) in REGISTRIES.items():
             if full.startswith(f"{name}."):
                 parts.append(f"The values of `{full}`:")
                 rows = [[code(f'"{one.name}"'), sentence(one.text)] for one in registry.values()]

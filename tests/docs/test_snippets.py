@@ -28,6 +28,8 @@ AGREEMENT = 5e-3
 """Of a number on a page and the one that is printed, besides a unit in the last place: libraries
 and processors differ."""
 
+COMMANDS = "cosim|make|pip|python|ngspice|git"
+
 LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(?:#([^)\s]+))?\)")
 """Of a link that is not one to elsewhere: file and heading."""
 
@@ -92,7 +94,8 @@ def check(said: str, found: str, block: Block) -> None:
 
 
 def run(page: str, folder: Path, slow: bool) -> None:
-    (folder / "circuits").symlink_to(REPOSITORY / "circuits")
+    for part in ("circuits", "fmu"):
+        shutil.copytree(REPOSITORY / part, folder / part)
     names: dict[str, object] = {"__name__": "__main__"}
     out: str | None = None
     for block in RUNS[page]:
@@ -137,12 +140,15 @@ def test_blocks_say_what_they_are(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     found = RUNS[name(page)]
     assert text.count("```") == 2 * len(found), "a fence has no language, or no end"
+    hidden = re.search(rf"^    ({COMMANDS}) .*", text, re.MULTILINE)
+    inside = hidden and any(block.start < hidden.start() < block.end for block in found)
+    assert not hidden or inside, f"a command outside of a fence: {hidden[0]}"
     for block in found:
         assert block.language in {"python", "sh", "text", "toml", "spice", "csv"}, block.line
         known = block.note in ("", "slow") or re.match(r"needs \w+$|not run: \w.*\w", block.note)
         assert known or not block.runs, f"line {block.line}: {block.note}"
         if block.language in ("text", "spice", "csv") and not block.title:
-            hidden = re.search(r"^\s*\$? *(cosim|make|pip) ", block.text, re.MULTILINE)
+            hidden = re.search(rf"^\s*\$? *({COMMANDS}) ", block.text, re.MULTILINE)
             assert not hidden, f"line {block.line}: a command in a block that is not run"
 
 
