@@ -5,8 +5,8 @@
 #   make test-all    the slow ones too
 #   make fuzz        the random tests with new examples, many more (ARGS=--hypothesis-seed=N to repeat)
 #   make setup       sets up: system packages, .venv from the hashed lock, the compiled C
-#   make charts      remakes the figures and tables in results/, some minutes (TRIALS=DIR: the
-#                    paper's figure 7, too); `make test` writes results/datasheet.*
+#   make charts      remakes the figures and tables in results/, some minutes (TRIALS=DIR:
+#                    those that need the trials, too); `make test` writes results/datasheet.*
 #   make bench       remakes results/bench.json, some minutes (ARGS='--trials DIR')
 #   make docs        draws the pictures and builds the documentation site, site/index.html
 #   make check       ruff and pyright
@@ -91,7 +91,7 @@ charts: setup
 	@$(VENV)/bin/cosim chart accuracy
 	@$(VENV)/bin/cosim chart limits
 	@$(VENV)/bin/cosim chart ladder paper trial-10 gripper
-	@test -z '$(TRIALS)' || $(VENV)/bin/cosim chart trials '$(TRIALS)'
+	@test -z '$(TRIALS)' || { $(VENV)/bin/cosim chart trials '$(TRIALS)' && $(VENV)/bin/cosim chart paper '$(TRIALS)'; }
 
 bench: setup
 	@$(VENV)/bin/cosim bench $(ARGS)

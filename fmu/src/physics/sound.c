@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Could a model that comes from elsewhere, byte by byte, be one that was left by a step? Its checksum
  * tells only that nobody has damaged it by chance. What is sound can be integrated: no index leaves
  * its array, no loop goes on for ever, and what is still absurd fails as a step. */
