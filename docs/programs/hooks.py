@@ -29,6 +29,7 @@ OUTSIDE = (
     "CHANGELOG.md",
     "SECURITY.md",
     "LICENSE",
+    "fmu/LICENSE",
     "CITATION.cff",
     "CONTRIBUTING.md",
     "CODE_OF_CONDUCT.md",
@@ -36,7 +37,7 @@ OUTSIDE = (
 """What the site takes from outside docs/, where it is there."""
 
 TUTORIALS = "tutorials/"
-LINK = re.compile(r"(\]\(|\]: +)(?!\w+:|#|/)([^)#\s]+)")
+LINK = re.compile(r"(\]\(|\]: +)(?!\w+:|#|/)([^)#\s]+)(#[^)\s]+)?")
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -65,6 +66,9 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
     def moved(match: re.Match[str]) -> str:
         target = posixpath.normpath(posixpath.join(own.as_posix(), match[2]))
-        return match[1] + posixpath.relpath(target.removeprefix("docs/"), here or ".")
+        heading = match[3] or ""
+        if target == "README.md":  # the repository's front page; the site has its own
+            target, heading = "index.md", ""
+        return match[1] + posixpath.relpath(target.removeprefix("docs/"), here or ".") + heading
 
     return LINK.sub(moved, markdown)
