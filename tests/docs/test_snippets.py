@@ -126,6 +126,7 @@ def test_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)  # one page identifies a rig
 @pytest.mark.parametrize("page", pages(slow=True))
 @pytest.mark.filterwarnings("ignore")
 def test_whole_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
