@@ -75,7 +75,11 @@ def printed(block: Block, names: dict[str, object]) -> str:
 
 
 def alike(said: str, found: str) -> bool:
-    """Whether two lines have the same words, and numbers that agree as far as they are told."""
+    """Whether two lines have the same words, and numbers that agree as far as they are told. A line
+    of the page that ends with “…” is the beginning of one."""
+    if said.endswith("…"):
+        words = said.removesuffix("…").split()
+        said, found = " ".join(words), " ".join(found.split()[: len(words)])
     if NUMBER.sub("#", said).split() != NUMBER.sub("#", found).split():
         return False
     for one, other in zip(NUMBER.finditer(said), NUMBER.finditer(found), strict=True):
