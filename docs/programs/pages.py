@@ -7,8 +7,8 @@ A block is a fence of three backticks with a language. Those that run:
 - any other with ``title="NAME"``: the contents of the file NAME.
 
 They run in order, in one folder. A block ``text`` right after one holds lines that it prints, in
-their order; one that ends with “…” is cut. A comment on the line before a block changes that: ``<!-- slow -->`` for long ones,
-``<!-- needs PROGRAM -->``, ``<!-- not run: REASON -->``.
+their order; one that ends with “…” is cut. A comment on the line before a block changes that:
+``<!-- slow -->`` for long ones, ``<!-- needs PROGRAM -->``, ``<!-- not run: REASON -->``.
 """
 
 import json

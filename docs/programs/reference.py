@@ -202,7 +202,7 @@ def command(parser: argparse.ArgumentParser, text: str, level: int) -> list[str]
 
 def command_line() -> str:
     commands = "run sweep tune export scenes compare fit identify theory bench chart fmu"
-    parser = _parser(commands.split())
+    parser = _parser([*commands.split()])
     about = "`python -m cosim` is the same command. `--help` after any of these prints its options."
     codes = table(
         ["exit code", "meaning"],
