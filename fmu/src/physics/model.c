@@ -272,7 +272,7 @@ static double time_to(double gap, double u, double a)
 
 static double time_to_impact(const Model *m, const double y[N_STATES], double a_q)
 {
-    if (m->n.contact == 1 || m->n.prescribed || m->mode[0].wall != WALL_FREE)
+    if (m->n.prescribed || m->mode[0].wall != WALL_FREE)
         return NO_IMPACT;
     const double above = time_to(m->r.travel - y[Q], y[U], a_q);
     const double below = time_to(m->r.travel + y[Q], -y[U], -a_q);
