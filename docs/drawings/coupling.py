@@ -130,7 +130,7 @@ def step_locked(axes: Axes) -> None:
         axes,
         t2 + 0.2,
         12.1,
-        "a rigid impact also ends the\ncircuit's step, since the\nback-EMF jumps there",
+        "a wall also ends the circuit's\nstep, since the back-EMF\njumps or turns there",
         INK,
         "left",
     )

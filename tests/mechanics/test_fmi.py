@@ -323,6 +323,7 @@ FOLLOWING = [
     "plate_force",
     "wall_force",
 ]
+"""In lines: time_to_impact, too, but in a curve."""
 OF_SECOND = ["a_surface_2", "friction_force_2"]
 TWO = {"independent": 1, "n_surfaces": 2}
 
@@ -360,11 +361,32 @@ def test_directional_derivatives_are_the_differences(
     assert len({wall for _, wall in modes}) > 1
 
 
+def test_the_derivative_of_the_time_to_an_impact(version: int) -> None:
+    """Against small differences, where the ram flies towards a wall."""
+    seen = 0
+    with rig(version) as it:
+        it.begin({})
+        for _ in range(1200):
+            trajectory(it, 1)
+            if not 1e-4 < it.get("time_to_impact") < 1e-2:
+                continue
+            here, h = it.get("current"), 1e-5
+            sides = []
+            for value in (here + h, here - h):
+                it.set(current=value)
+                sides.append(it.get("time_to_impact"))
+            it.set(current=here)
+            (found,) = it.derivative(["time_to_impact"], ["current"], [1.0])
+            assert found == pytest.approx((sides[0] - sides[1]) / (2.0 * h), rel=1e-3, abs=1e-9)
+            seen += 1
+    assert seen > 10
+
+
 def test_only_the_declared_outputs_follow_inputs_at_once(version: int) -> None:
     description = fmpy.read_model_description(str(fmu.unpacked(version)))
     declared = {u.variable.name for u in description.outputs if u.variable and u.dependencies}
     of_second = {*OF_SECOND, "coil_voltage_2"}
-    assert declared == {*FOLLOWING, "coil_voltage", *of_second}
+    assert declared == {*FOLLOWING, "time_to_impact", "coil_voltage", *of_second}
     with rig(version) as it:
         it.begin({"mu_plate": 0.1})
         followed = set()

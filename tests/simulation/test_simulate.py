@@ -425,7 +425,7 @@ def test_finer_circuit_gives_the_same_average() -> None:
     short = ["run.duration=0.8", "run.settle=0.4"]
     usual = simulate(load("reference", short))
     circuit = usual.scene.circuit
-    fine = [f"circuit.max_step={circuit.max_step / 2}", f"circuit.reltol={circuit.reltol / 10}"]
+    fine = [f"circuit.max_step={circuit.max_step / 4}", f"circuit.reltol={circuit.reltol / 10}"]
     finer = simulate(load("reference", short + fine))
     assert finer.summary["circuit_steps"] > 1.5 * usual.summary["circuit_steps"]  # type: ignore
     expected = pytest.approx(finer.summary["v_average"], rel=1e-3)

@@ -151,7 +151,7 @@ typedef struct Lead {
     double given;                  /* V s; its integral since the start, by the trapezoidal rule */
     double owed;                   /* V s; flux of the mechanics less the given, at the macro point */
     double flux_at_start;          /* V s; that of the mechanics */
-    double impact;                 /* s; a step ends on it, just after a rigid impact; inf: none */
+    double impact;                 /* s; a step ends on it, just after the ram meets a wall; inf: none */
     double jump;                  /* s; the command's next one */
     int64_t at_jump;              /* the macro point lies on one */
     double told;                  /* s; time of the last accepted step that ngspice told of */

@@ -7,8 +7,8 @@ order where nothing jumps. The extrapolation uses nothing older than t_n, so a j
 an event in the mechanics is forgotten at the next step. Two things are done about the step that
 holds the event:
 
-- A rigid impact, at which the back-EMF jumps, is expected by the mechanics; the circuit's step is
-  cut to end just after it, and the next one is short.
+- That the ram meets a wall, where the back-EMF jumps or soon turns, is expected by the mechanics;
+  the circuit's step is cut to end just after it, and the next one is short.
 - The flux that the circuit was given, the integral of its back-EMF, falls behind that of the
   mechanics, which their displacement alone tells. What is owed is paid back over the next steps, so
   that no event leaves an error that lasts.

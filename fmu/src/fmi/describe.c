@@ -219,6 +219,7 @@ static int has_feedthrough(size_t place)
     case PLACE(friction_force):
     case PLACE(plate_force):
     case PLACE(wall_force):
+    case PLACE(time_to_impact):
     case PLACE(a_surface_2):
     case PLACE(friction_force_2):
         return 1;

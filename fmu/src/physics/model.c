@@ -272,11 +272,18 @@ static double time_to(double gap, double u, double a)
 
 static double time_to_impact(const Model *m, const double y[N_STATES], double a_q)
 {
-    if (m->n.contact == 1 || m->n.prescribed || m->mode[0].wall != WALL_FREE)
+    if (m->n.prescribed || m->mode[0].wall != WALL_FREE)
         return NO_IMPACT;
     const double above = time_to(m->r.travel - y[Q], y[U], a_q);
     const double below = time_to(m->r.travel + y[Q], -y[U], -a_q);
     return above < below ? above : below;
+}
+
+/* The derivative of the same by a_q: the place at that time is the wall's, whatever a_q is. */
+static double time_to_impact_slope(const Model *m, const double y[N_STATES], double a_q)
+{
+    const double t = time_to_impact(m, y, a_q), speed = y[U] + a_q * t;
+    return t >= NO_IMPACT || speed == 0.0 ? 0.0 : -0.5 * t * t / speed;
 }
 
 void stickslip_model_outputs(Model *m)
@@ -351,7 +358,7 @@ double stickslip_model_derivative(const Model *m, size_t output, size_t input)
                              offsetof(Reals, current_2) / sizeof(double),
                              offsetof(Reals, normal_force) / sizeof(double),
                              offsetof(Reals, surface_acceleration) / sizeof(double)};
-    Forces low, high, low_2 = {0}, high_2 = {0};
+    Forces here, low, high, low_2 = {0}, high_2 = {0};
 
     if (output == offsetof(Reals, coil_voltage) / sizeof(double) &&
         input == offsetof(Reals, command_slope) / sizeof(double))
@@ -380,6 +387,9 @@ double stickslip_model_derivative(const Model *m, size_t output, size_t input)
             return (high.a_surface + high.a_slip) - (low.a_surface + low.a_slip);
         case PLACE(back_emf_slope):
             return force_factor_at(m, m->y[Q]) * (high.a_q - low.a_q);
+        case PLACE(time_to_impact):
+            stickslip_forces(m, m->mode, m->y, 0, 0.0, &here);
+            return time_to_impact_slope(m, m->y, here.a_q) * (high.a_q - low.a_q);
         case PLACE(friction_force):
             return high.friction - low.friction;
         case PLACE(plate_force):
