@@ -221,24 +221,34 @@ def achievable(study: Study, points: Points) -> str:
 
 
 def binding(study: Study, points: Points, found: Sequence[Change]) -> str:
-    """Which limits bind, the largest change first."""
+    """Which limits bind and which help, the largest change first."""
     said = []
-    for name in largest(found):
-        parts = []
-        limit = next(change.limit for change in found if change.limit.name == name)
-        for change in found:
-            quantity = QUANTITIES[change.quantity]
-            sure = change.verdict in (BINDS, HELPS)
-            if change.limit is not limit or not sure or quantity.name not in ASKED:
-                continue
-            noise = max(change.noise) if isfinite(max(change.noise)) else 0.0
-            since = costs_from(study, points, limit, change.quantity, noise)
-            parts.append(f"{quantity.title} {interval(change)}{_since(limit, since)}")
-        if parts:
-            said.append(f"{name} ({'; '.join(parts)})")
-    if not said:
-        return "No limit binds: none changes a frontier by more than the interval of its change."
-    return f"What binds, with what lifting it changes: {', '.join(said)}."
+    for verdict, words, none in (
+        (BINDS, "What binds, with what lifting it brings", "No limit binds for sure"),
+        (HELPS, "What is better with a limit than without, with what lifting it costs", ""),
+    ):
+        listed_ = [
+            text for name in largest(found) if (text := _sure(study, points, found, name, verdict))
+        ]
+        if listed_:
+            said.append(f"{words}: {', '.join(listed_)}.")
+        elif none:
+            said.append(f"{none}: none raises a frontier by more than the search's own difference.")
+    return " ".join(said)
+
+
+def _sure(study: Study, points: Points, found: Sequence[Change], name: str, verdict: str) -> str:
+    """A limit with the quantities of a verdict; empty where there are none."""
+    parts = []
+    for change in found:
+        quantity = QUANTITIES[change.quantity]
+        if change.limit.name != name or change.verdict != verdict or quantity.name not in ASKED:
+            continue
+        noise = max(change.noise) if isfinite(max(change.noise)) else 0.0
+        since = costs_from(study, points, change.limit, change.quantity, noise)
+        where = _since(change.limit, since) if verdict == BINDS else ""
+        parts.append(f"{quantity.title} {interval(change)}{where}")
+    return f"{name} ({'; '.join(parts)})" if parts else ""
 
 
 def interval(change: Change) -> str:
@@ -255,16 +265,14 @@ def nothing(found: Sequence[Change]) -> str:
         if verdicts == {NOTHING}:
             free.append(name)
         elif UNTOLD in verdicts:
-            some = [c for c in found if c.limit.name == name and c.verdict == UNTOLD and known(c)]
-            titles = ", ".join(QUANTITIES[c.quantity].name for c in some)
-            open_.append(f"the {name} ({titles})")
+            open_.append(f"the {name}")
     said = []
     if free:
         said.append(f"No frontier changes by more than 2 % without the {listed(free)}.")
     if open_:
         said.append(
-            f"Whether these bind cannot be told from the search's own difference, or the rigs "
-            f"differ in it: {listed(open_)}."
+            f"What lifting {listed(open_)} does to some of the frontiers cannot be told from the "
+            f"search's own difference, or the rigs differ in it."
         )
     return " ".join(said)
 

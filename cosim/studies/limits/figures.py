@@ -74,7 +74,7 @@ def answer(path: Path, study: Study, points: Points, found: Sequence[Change]) ->
         axis.set_xlabel(f"{quantity.title} [{quantity.unit}]", fontsize=9)
         right = 1.12 * axis.get_xlim()[1]
         axis.set_xticks([tick for tick in axis.get_xticks() if 0.0 <= tick <= right])
-        axis.set_xlim(0.0, right)
+        axis.set_xlim(-0.1 * right, right)  # room for the names of the low ends
         if quantity.falls:
             needed = needed_acceleration(study.scene)
             axis.axvline(needed, color=VERMILION, lw=1.4, ls="--")
@@ -197,8 +197,8 @@ def frontier(
     unit = QUANTITIES[NUMBER[next(iter(lines))]].unit
     for axis in axes[::3]:
         axis.set_ylabel(f"{'downward acceleration' if falls else 'mean velocity'} [{unit}]")
-    if not falls:
-        axes[0].set_ylim(bottom=0.0)
+    # Bands of settings that a turn spoils reach down to nothing, which is not worth three decades.
+    axes[0].set_ylim(bottom=10.0 if falls else 0.0)
     axes[0].legend(fontsize=8)
     figure.write(path)
 
