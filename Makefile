@@ -89,7 +89,7 @@ charts: setup
 	@cp results/paper-limited-sweep/figure.png results/sweep.png
 	@$(VENV)/bin/cosim chart stability
 	@$(VENV)/bin/cosim chart accuracy
-	@$(VENV)/bin/cosim chart limits
+	@$(VENV)/bin/cosim chart limits --rigs results/identify.json
 	@$(VENV)/bin/cosim chart ladder paper trial-10 gripper
 	@test -z '$(TRIALS)' || { $(VENV)/bin/cosim chart trials '$(TRIALS)' && $(VENV)/bin/cosim chart paper '$(TRIALS)'; }
 
