@@ -70,7 +70,7 @@ def exported(library: Path) -> set[str]:
     return {line.split()[-1] for line in listing.stdout.splitlines()}
 
 
-@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("version", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_fmpy_compile_gives_the_same_bits(
     packed: dict[int, Path], shipped: bytes, version: int, tmp_path: Path
 ) -> None:

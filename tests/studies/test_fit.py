@@ -129,6 +129,7 @@ def test_one_search_against_a_fine_grid(cases: list[Case]):
         assert limit[0] <= low <= static <= high <= limit[1] * (1 + 1e-12)
 
 
+@pytest.mark.slow
 def test_with_friction_of_the_springed_plate(trials: Path):
     result = fit(trials, forces="published", plate=True).numbers
     assert result["mean_error_mm"] <= 0.095

@@ -41,6 +41,10 @@ def brief(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     yield
 
 
+NOWHERE = np.empty((0, 3))
+"""No places in the knobs' cube."""
+
+
 def bench(folder: Path, scene: Any = "reference", **more: Any) -> Bench:
     return Bench(load(scene), str(scene), folder / JOURNAL, 2, **more)
 
@@ -148,10 +152,10 @@ def test_search_finds_what_an_exhaustive_grid_finds(tmp_path: Path) -> None:
         one = Search(lambda places: made.scores(case, places), (0,))
         one.run(Effort(256, (0.08, 0.05, 0.03, 0.02, 0.01), 4), np.empty((0, 3)))
         best = np.where(borne[:, None], scores, -np.inf).max(axis=0)
-        found = [one.found(number) for number in range(len(QUANTITIES))]
+        found = [one.found(number, NOWHERE) for number in range(len(QUANTITIES))]
         again = Search(lambda places: made.scores(case, places), (0,))
         again.run(Effort(256, (0.08, 0.05, 0.03, 0.02, 0.01), 4), np.empty((0, 3)))
-        assert [again.found(number) for number in range(len(QUANTITIES))] == found
+        assert [again.found(number, NOWHERE) for number in range(len(QUANTITIES))] == found
         for number, top in enumerate(found):
             if best[number] > 0.0:
                 assert top.settings[0].value >= 0.95 * best[number], QUANTITIES[number].name
@@ -190,7 +194,7 @@ def test_search_climbs_ridges_and_keeps_out_of_what_is_forbidden() -> None:
         one = Search(ridge, (seed,))
         one.run(study.FULL.first, np.empty((0, 3)))
         for number in range(2):
-            top = one.found(number).settings[0]
+            top = one.found(number, NOWHERE).settings[0]
             assert top.place[0] > 0.35 and 0.93 * best[number] <= top.value <= best[number]
 
 

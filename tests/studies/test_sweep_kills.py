@@ -44,7 +44,7 @@ def lines(out: Path) -> int:
     ("scene", "points", "kills"),
     [
         (THREADS, 4, 3),
-        (PROCESSES, 4, 1),
+        pytest.param(PROCESSES, 4, 1, marks=pytest.mark.slow),
         *(pytest.param(scene, 10, 6, marks=pytest.mark.slow) for scene in SHORT),
     ],
 )

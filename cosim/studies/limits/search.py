@@ -136,9 +136,13 @@ class Search:
         order = order[np.isfinite(column[order])]
         return _apart(places[order[:MOST]], distance, count)
 
-    def found(self, quantity: int) -> Best:
-        """The best settings of a quantity, and those whose surroundings seem the best."""
+    def found(self, quantity: int, also: Array) -> Best:
+        """The best setting of a quantity, those whose surroundings seem the best, and ``also``
+        those at places (rows) that are the best elsewhere. Those that cannot be borne are left out.
+        """
         places = [*self.ranked(quantity, STEADY_APART, 1), *self._steady(quantity)]
+        self.scores(also)
+        places += [place for place in also if self._borne[tuple(place.tolist())]]
         every = dict.fromkeys(tuple(place.tolist()) for place in places)
         settings = [self.around(np.array(place), quantity) for place in every]
         achievable = (one for one in settings if one.value > 0.0)

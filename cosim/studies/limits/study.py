@@ -18,7 +18,7 @@ from cosim.errors import BadInput, plain
 from cosim.scene import Scene, changed
 from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, rounded
 from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import Best, Effort, Search
+from cosim.studies.limits.search import Best, Effort, Search, Setting
 from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
 
 
@@ -140,11 +140,17 @@ def _search(
         )
         rig.found[name] = _best(searches[name])
         told(f"{rig.name}: {name[0]} {name[1]:.3g}")
-    for name in rig.cases:
+    for name, case in rig.cases.items():
         # The first ones hear of all that was found; so do the others then, through these.
         known = list(rig.found) if name in (OWN, IDEAL) else _kin(rig, name)
         searches[name].scores(np.vstack(_hints(bench, rig, name, known)))
-        rig.found[name] = _best(searches[name])
+        # What the own circuit does best is looked at closely on all: no machine is the worse for
+        # a lifted limit only because its search has missed that.
+        own = [
+            _moved(bench, [*best.settings[:1], *best.robust[:1]], rig.cases[OWN], case)
+            for best in rig.found[OWN]
+        ]
+        rig.found[name] = _best(searches[name], own)
 
 
 def _kin(rig: Rig, name: Name) -> list[Name]:
@@ -165,17 +171,26 @@ def _searched(
     return search
 
 
-def _best(search: Search) -> Bests:
-    return tuple(search.found(quantity) for quantity in range(len(QUANTITIES)))
+def _best(search: Search, also: Sequence[Array] | None = None) -> Bests:
+    """What was found for each quantity; ``also`` has further places (rows) for each."""
+    none = np.empty((0, KNOB_COUNT))
+    return tuple(
+        search.found(quantity, none if also is None else also[quantity])
+        for quantity in range(len(QUANTITIES))
+    )
 
 
 def _as_hints(bench: Bench, found: Bests, there: Case, here: Case) -> Array:
-    """The settings found for one machine as places of another, with the same currents."""
+    """The settings found for one machine as places of another."""
     both = [one for best in found for one in (*best.settings[:1], *best.robust[:1])]
-    places = np.array([one.place for one in both]).reshape(-1, KNOB_COUNT)
+    return np.unique(_moved(bench, both, there, here), axis=0)
+
+
+def _moved(bench: Bench, found: Sequence[Setting], there: Case, here: Case) -> Array:
+    """Settings of one machine as places (rows) of another, with the same currents."""
+    places = np.array([one.place for one in found]).reshape(-1, KNOB_COUNT)
     ratio = bench.amperes(there) / bench.amperes(here)
-    places = np.unique(rounded(places * [ratio, 1.0, ratio]), axis=0)
-    return places
+    return rounded(places * [ratio, 1.0, ratio])
 
 
 def ensemble(path: Path, most: int) -> list[Settings]:
