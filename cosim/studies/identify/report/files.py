@@ -41,7 +41,7 @@ def write(folder: Path, found: Solved) -> None:
     numbers = found.numbers
     write_json(folder / "identify.json", numbers)
     write_csv(folder / "identify.csv", _aligned([*numbers["trials"], *numbers["apart"]]))
-    write_page(folder / "identify.md", "The identified rig", NOTES, _tables(numbers))
+    write_page(folder / "identify.md", "The identified rig", _notes(found), _tables(numbers))
     for name, draw in figures.FIGURES.items():
         draw(found).write(folder / f"identify-{name}.png")
     words = f"The rig identified from {len(found.trials)} trials"
@@ -57,6 +57,19 @@ def write(folder: Path, found: Solved) -> None:
                 told = f"Trial {trial.label} on the identified rig, which does not reproduce it"
             label = f"{int(trial.label):02d}" if trial.label.isdecimal() else trial.label
             write_text(folder / f"trial-{label}.toml", toml(told, rig | settings))
+
+
+def _notes(found: Solved) -> list[str]:
+    weighed = [
+        f"{entry.key} {entry.prior:.4g} (σ {entry.sigma:.2g}{' of it' if entry.log else ''})"
+        for entry in found.space.free
+        if entry.prior is not None and entry.sigma is not None
+    ]
+    told = (
+        f"Weak priors, a thousandth of the cost for each σ², took part: {'; '.join(weighed)}. They "
+        "decide where the trials do not tell."
+    )
+    return [*NOTES, *([told] if weighed else [])]
 
 
 def summary(found: Solved) -> str:
