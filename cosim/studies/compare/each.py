@@ -5,6 +5,7 @@ from the command to the part, can be trusted.
 from collections.abc import Callable, Sequence
 from math import nan
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -102,10 +103,11 @@ def message(rows: Sequence[Row]) -> str:
     )
     apart = [abs(one["drift [mm/s]"] - one["measured drift [mm/s]"]) for one in rows]
     return (
-        f"Over {len(rows)} trials the chain explains {min(shares):.2f} to {max(shares):.2f} of the "
-        f"variance of the surface's velocity, is closer to the part's path than the best straight "
-        f"line in {closer}, and misses the part's drift by {sum(apart) / len(apart):.2g} mm/s on "
-        f"average and {max(apart):.2g} mm/s at most."
+        f"Over {len(rows)} trials the chain from the command to the part explains "
+        f"{min(shares):.2f} to {max(shares):.2f} of the variance of the surface's velocity, "
+        f"{median(shares):.2f} in the middle one, is closer to the part's path than the best "
+        f"straight line in {closer}, and misses the part's drift by "
+        f"{sum(apart) / len(apart):.2g} mm/s on average and {max(apart):.2g} mm/s at most."
     )
 
 

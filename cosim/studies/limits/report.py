@@ -23,8 +23,8 @@ def write(folder: Path, bench: Bench, study: Study, points: Points, there: Seque
     said = [text for text in answer.paragraphs(study, points, found) if text]
     if not_held := answer.refuted(points):
         said.append(
-            f"{len(not_held)} of {len(points)} points are not confirmed within 2 % by the more "
-            "complete circuit; limits.csv has both values."
+            f"Of {len(points)} points the more complete circuit does not confirm {len(not_held)} "
+            "within 2 %; limits.csv has both values."
         )
     write_csv(folder / "limits.csv", [row(bench, study, point) for point in points.values()])
     tables: dict[str, Sequence[Row]] = {

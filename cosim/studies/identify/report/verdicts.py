@@ -107,7 +107,10 @@ def _verdict(
     tied = _tie(key, partners)
     numbers = f"{bottom:.3g} to {top:.3g}"
     if not (open_low or open_high) and share <= TRUSTED:
-        kind, words = "identified", f"identified: {value:.3g} within {numbers} (±{share:.0%})"
+        kind, words = (
+            "identified",
+            f"identified: {value:.3g} within {numbers}; with the folds ±{share:.0%}",
+        )
     elif tied:
         kind, words = "product", f"only as its {tied}; alone {numbers}"
     elif open_low and open_high:
