@@ -90,7 +90,7 @@ charts: setup
 	@$(VENV)/bin/cosim chart stability
 	@$(VENV)/bin/cosim chart accuracy
 	@$(VENV)/bin/cosim chart limits --rigs results/identify.json
-	@$(VENV)/bin/cosim chart ladder paper trial-10 gripper
+	@$(VENV)/bin/cosim chart ladder paper trial-05 gripper
 	@test -z '$(TRIALS)' || { $(VENV)/bin/cosim chart trials '$(TRIALS)' && $(VENV)/bin/cosim chart paper '$(TRIALS)'; }
 
 bench: setup
