@@ -72,7 +72,8 @@ $(VENV)/.installed: $(VENV)/.created requirements.lock
 # This project, in place; that compiles its C.
 $(COMPILED): $(VENV)/.installed $(VENV)/.sources $(SOURCES)
 	@echo "Installing cosim and compiling its C"
-	@$(PIP) install --no-build-isolation --no-deps -e . || \
+	@$(PIP) install --no-build-isolation --no-deps \
+		--config-settings editable_mode=compat -e . || \
 		{ echo "cosim set-up: cosim could not be installed (see above)." >&2; exit 1; }
 
 # Sums of the sources, so that one that is gone, or changed but not newer, is noticed too.
@@ -101,7 +102,7 @@ bench: setup
 DOCS := .venv-docs
 DOCS_PY := PYTHONPATH=. $(DOCS)/bin/python
 
-$(DOCS)/.installed: docs/requirements.lock
+$(DOCS)/.installed: docs/requirements.lock $(VENV)/.created
 	@echo "Installing what the site is built with into $(DOCS)"
 	@$(or $(PYTHON),python3) -m venv --clear $(DOCS)
 	@$(DOCS)/bin/python -m pip --disable-pip-version-check --no-input -q install \
