@@ -72,7 +72,7 @@ def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
     """
     path = path_of(scene)
     # A netlist of one's own may have changed since it was read last.
-    lines, elements = (_own if scene.circuit.netlist is None else _checked)(path)
+    lines, elements = (_packaged if scene.circuit.netlist is None else _checked)(path)
     external = _external_sources(elements)
     present = {node for element in elements for node in element.nodes}
     companion = scene.coupling.method == "companion"
@@ -114,8 +114,8 @@ def _checked(path: Path) -> tuple[Sequence[Line], Sequence[Element]]:
     return lines, check(lines).elements
 
 
-_own = cache(_checked)
-"""The same of a netlist of the package."""
+_packaged = cache(_checked)
+"""The same of a netlist of the package, once a process."""
 
 
 def _external_sources(elements: Sequence[Element]) -> dict[Line, str]:

@@ -16,9 +16,10 @@ def _options(parser: ArgumentParser) -> None:
 
 def _run(arguments: Namespace) -> None:
     from cosim.studies.paper import figure7
+    from cosim.trials.published import TRIALS
 
     with writable(arguments.out, shared=True):
-        with progress_bar("trials", 10, "trial") as bar:
+        with progress_bar("trials", len(TRIALS), "trial") as bar:
             found = figure7.trials(arguments.trials, bar.update)
         figure7.write(arguments.out, found)
     print(f"Written to {arguments.out}: figure7.csv")

@@ -96,8 +96,7 @@ EXPORT int recorder_begin(Recorder *r);
 /* Advance through `n` intervals that end at `edges`; in each, every port's input goes linearly from
    `start` to `end` (a row of `ports` values for each interval). Not further once `most` steps were
    made or LOOP_PATIENCE is over, perhaps within an interval, and then to be called again with the
-   rest. Gives how many
-   intervals were finished, or -1 if something failed. */
+   rest. Gives how many intervals were finished, or -1 if something failed. */
 EXPORT int64_t recorder_follow(Recorder *r, int64_t n, const double *edges, const double *start,
                                const double *end, int64_t most);
 
