@@ -155,7 +155,7 @@ sys.exit(main(sys.argv[1:]))
 def test_a_pause_spoils_no_point(whole: bool, tmp_path: Path) -> None:
     """Stopped for longer than a point may work without progress, with and without the parent."""
     command = [
-        "sweep", "paper", "--over=friction.mu_k=0.4,0.5", "--set=run.duration=4",
+        "sweep", "paper", "--over=friction.mu_k=0.4,0.5", "--set=run.duration=20",
         "--workers=2", f"--out={tmp_path}",
     ]  # fmt: skip
     process = subprocess.Popen(
@@ -166,6 +166,7 @@ def test_a_pause_spoils_no_point(whole: bool, tmp_path: Path) -> None:
     while not any(worker.cpu_times().user > 1.0 for worker in workers) and process.poll() is None:
         time.sleep(0.02)
         workers = psutil.Process(process.pid).children()
+    assert process.poll() is None, "the points were done before the pause"
     stopped = [psutil.Process(process.pid), *workers] if whole else workers
     for one in stopped:
         one.suspend()
