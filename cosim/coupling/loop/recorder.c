@@ -92,7 +92,7 @@ static int step_within(Recorder *r, double time, double edge, const double *star
         return 0;
     f->time = time;
     f->steps++;
-    if (time > r->settle) {
+    if (time > r->settle + SAME_TIME) { /* the end of settling may be a corner within rounding */
         for (int64_t k = 0; k < extremes; k += 2) {
             if (found[k] > r->extremes[k])
                 r->extremes[k] = found[k];
