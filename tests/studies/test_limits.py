@@ -191,7 +191,7 @@ def ridge(places: Array) -> tuple[Array, Any]:
 def test_search_climbs_ridges_and_keeps_out_of_what_is_forbidden() -> None:
     best = 1.05, np.exp(-(0.05**2) / 0.02)  # in the middle; where what is allowed begins
     for seed in range(3):
-        one = Search(ridge, (seed,))
+        one = Search(ridge, (seed,), 2)
         one.run(study.FULL.first, np.empty((0, 3)))
         for number in range(2):
             top = one.found(number, NOWHERE).settings[0]
@@ -243,7 +243,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "slew rate": (),
     }
     limits = [replace(BY_NAME[name], values=few) for name, few in values.items()]
-    efforts = study.Efforts(SMALL, Effort(8, (), 2), Effort(8, (), 2), 1)
+    efforts = study.Efforts(SMALL, Effort(8, (), 2), Effort(8, (), 2), 1, 1)
     scene = load("reference", {"run.duration": 0.2})
     rigs: list[Any] = [{"mechanics.surface_mass": 0.02}]
     there = [load("trial-05", {"run.duration": 0.15, "run.settle": 0.05})]

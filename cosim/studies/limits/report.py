@@ -11,7 +11,7 @@ from cosim.studies.limits.answer import Change, changes, height
 from cosim.studies.limits.at import There, acting, at
 from cosim.studies.limits.confirm import Point, Points, confirmed, judged
 from cosim.studies.limits.runs import Bench
-from cosim.studies.limits.study import FULL, IDEAL, OWN, Efforts, Study, machines, study
+from cosim.studies.limits.study import FULL, IDEAL, OWN, Efforts, Study, search_count, study
 from cosim.studies.limits.table import LIMITS, Limit, Settings, needed_acceleration
 from cosim.studies.sweep.pool import workers_asked
 from cosim.studies.tables import Row, write_csv, write_page
@@ -166,7 +166,9 @@ def run(
     ``asked`` are the words after ``cosim run`` that stand for the scene; ``told`` hears of each
     step, and how many there are, ``progress`` of each run. Raises BadInput.
     """
-    steps = machines(limits, True) + len(rigs) * machines(limits, False) + 3 + len(there)
+    rounds = efforts.rounds
+    own, others = (search_count(limits, rounds, every) for every in (True, False))
+    steps = own + (len(rigs) + 1) * others + 2 + len(there)
     journal = folder / JOURNAL
 
     def done(name: str) -> None:

@@ -5,14 +5,14 @@ the space, then clouds that shrink about the best few settings of each quantity,
 from each other, so that each quantity is climbed from several starts.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cosim.arrays import Array
-from cosim.studies.limits.aims import KNOB_COUNT, TURN, corners, faces, rounded
+from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, TURN, corners, faces, rounded
 
 STARTS, APART = 3, 0.1
 """Starts of each quantity, and how far apart, as a share of a knob's turn; half-way through, the
@@ -79,11 +79,16 @@ class Best:
         return tuple(sorted(firm, key=lambda one: -one.median))
 
 
+Bests = tuple[Best, ...]
+"""For each quantity."""
+
+
 class Search:
     """All places of a machine that have been asked for, with their scores."""
 
-    def __init__(self, ask: Ask, seed: tuple[int, ...]) -> None:
+    def __init__(self, ask: Ask, seed: tuple[int, ...], quantities: int = len(QUANTITIES)) -> None:
         self._ask, self._random = ask, np.random.default_rng(seed)
+        self._quantities = quantities
         self._known: dict[tuple[float, ...], Array] = {}
         self._borne: dict[tuple[float, ...], bool] = {}
         self._arrays: tuple[Array, Array] | None = None
@@ -100,16 +105,20 @@ class Search:
         return np.array([self._known[row] for row in rows])
 
     def run(self, effort: Effort, hints: Array) -> None:
-        """Ask for ``hints`` (rows), for places that fill the cube, and climb from the best."""
+        """Ask for places that fill the cube, and climb from the best of these and of ``hints``."""
         from scipy.stats import qmc
 
-        sobol = qmc.Sobol(KNOB_COUNT, rng=self._random).random(effort.design)
-        found = self.scores(rounded(np.vstack([hints.reshape(-1, KNOB_COUNT), sobol])))
+        self.scores(rounded(qmc.Sobol(KNOB_COUNT, rng=self._random).random(effort.design)))
+        self.climb(effort, hints)
+
+    def climb(self, effort: Effort, hints: Array) -> None:
+        """Ask for ``hints`` (rows), and climb from the best of all that is known."""
+        self.scores(rounded(hints))
         for number, spread in enumerate(effort.spreads):
             wide = 2 * number < len(effort.spreads)
             starts, half = (STARTS, effort.samples // 2) if wide else (1, effort.samples)
             clouds = [np.empty((0, KNOB_COUNT))]
-            for quantity in range(found.shape[1]):
+            for quantity in range(self._quantities):
                 places = [*self.ranked(quantity, APART, starts), *self._steady(quantity)[:1]]
                 clouds += [self._cloud(p, quantity, spread, half) for p in places]
             self.scores(np.vstack(clouds))
@@ -147,6 +156,14 @@ class Search:
         settings = [self.around(np.array(place), quantity) for place in every]
         achievable = (one for one in settings if one.value > 0.0)
         return Best(tuple(sorted(achievable, key=lambda one: -one.value)))
+
+    def bests(self, also: Sequence[Array] | None = None) -> Bests:
+        """What was found for each quantity; ``also`` has further places (rows) for each."""
+        none = np.empty((0, KNOB_COUNT))
+        return tuple(
+            self.found(quantity, none if also is None else also[quantity])
+            for quantity in range(self._quantities)
+        )
 
     def around(self, place: Array, quantity: int) -> Setting:
         """A place with all its turns."""

@@ -16,9 +16,9 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.scene import Scene, changed
-from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, rounded
+from cosim.studies.limits.aims import KNOB_COUNT, rounded
 from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import Best, Effort, Search, Setting
+from cosim.studies.limits.search import Bests, Effort, Search, Setting
 from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
 
 
@@ -31,27 +31,27 @@ class Efforts:
     next: Effort
     """Of a circuit that knows what was found for those before it."""
     others: Effort
-    """Of the other rigs of an ensemble."""
+    """Of the other rigs of an ensemble, and of the own rig when it is searched again."""
+    rounds: int
+    """In which what is best on one machine of a rig is tried on all, and climbed on from."""
     rigs: int
-    """Of these, spread over their order, which is that of their cost."""
+    """Of an ensemble, spread over their order, which is that of their cost."""
 
 
 FULL = Efforts(
     Effort(512, (0.08, 0.05, 0.04, 0.03, 0.025, 0.02, 0.01, 0.005), 4),
     Effort(32, (0.04, 0.02, 0.01, 0.005), 4),
     Effort(32, (0.04, 0.02, 0.01, 0.005), 2),
+    2,
     3,
 )
 _COARSE = Effort(32, (0.05, 0.02), 2)
-QUICK = Efforts(Effort(128, (0.05, 0.02), 2), _COARSE, _COARSE, 1)
+QUICK = Efforts(Effort(128, (0.05, 0.02), 2), _COARSE, _COARSE, 1, 1)
 
 Name = tuple[str, float]
 """A limit and its value; OWN and IDEAL besides."""
 
 OWN, IDEAL = ("own", 0.0), ("ideal current", 0.0)
-
-Bests = tuple[Best, ...]
-"""For each of QUANTITIES."""
 
 
 @dataclass
@@ -68,7 +68,7 @@ class Rig:
 class Study:
     """What was found: the scene's own rig first, then those of the ensemble.
 
-    ``again`` is the own circuit of the first rig, searched anew with another seed.
+    ``again`` is the own circuit of the first rig, searched anew with another seed and less effort.
     """
 
     scene: Scene
@@ -82,9 +82,10 @@ def searched(limits: Iterable[Limit]) -> list[Limit]:
     return [limit for limit in limits if limit.rung == "limited"]
 
 
-def machines(limits: Iterable[Limit], all_values: bool) -> int:
-    """How many machines are searched on a rig."""
-    return 2 + sum(1 + all_values * len(limit.values) for limit in searched(limits))
+def search_count(limits: Iterable[Limit], rounds: int, all_values: bool) -> int:
+    """How many searches and rounds of them a rig takes."""
+    machines = 2 + sum(1 + all_values * len(limit.values) for limit in searched(limits))
+    return machines * (1 + rounds)
 
 
 def study(
@@ -100,18 +101,19 @@ def study(
     ``told`` hears of each machine when it is done. The same for the same seed.
     """
     found = []
-    for number, settings in enumerate([{}, *rigs]):
-        rig = Rig("its own rig" if number == 0 else f"rig {number}", settings)
+    # The last is the own rig once more, searched like the others.
+    for number, settings in enumerate([{}, *rigs, {}]):
+        again = number == len(rigs) + 1
+        name = "another seed" if again else f"rig {number}" if number else "its own rig"
+        rig = Rig(name, settings)
         scene = changed(bench.scene, rig.settings, rig.name)
         rig.cases = _cases(scene, settings, limits, all_values=number == 0)
         first, others = efforts.first, efforts.next
         if number:
             first = others = efforts.others
-        _search(bench, rig, (seed, number), first, others, told)
+        _search(bench, rig, (seed, number), first, others, efforts.rounds, told)
         found.append(rig)
-    anew = _searched(bench, found[0].cases[OWN], (seed + 1, 0, 0), efforts.first, [])
-    told("own, another seed")
-    return Study(bench.scene, limits, found, _best(anew))
+    return Study(bench.scene, limits, found[:-1], found[-1].found[OWN])
 
 
 def _cases(
@@ -130,27 +132,30 @@ def _search(
     seed: tuple[int, int],
     first: Effort,
     others: Effort,
+    rounds: int,
     told: Callable[[str], object],
 ) -> None:
     searches: dict[Name, Search] = {}
     for number, (name, case) in enumerate(rig.cases.items()):
         effort = first if name in (OWN, IDEAL) else others
-        searches[name] = _searched(
-            bench, case, (*seed, number), effort, _hints(bench, rig, name, _kin(rig, name))
-        )
-        rig.found[name] = _best(searches[name])
+        search = searches[name] = Search(partial(bench.scores, case), (*seed, number))
+        search.run(effort, _hints(bench, rig, name, _kin(rig, name)))
+        rig.found[name] = search.bests()
         told(f"{rig.name}: {name[0]} {name[1]:.3g}")
+    for number in range(1, rounds + 1):
+        # What is best on one machine is tried on all, and climbed on from where it is better.
+        for name, search in searches.items():
+            search.climb(others, _hints(bench, rig, name, rig.found))
+            rig.found[name] = search.bests()
+            told(f"{rig.name}, round {number}: {name[0]} {name[1]:.3g}")
     for name, case in rig.cases.items():
-        # The first ones hear of all that was found; so do the others then, through these.
-        known = list(rig.found) if name in (OWN, IDEAL) else _kin(rig, name)
-        searches[name].scores(np.vstack(_hints(bench, rig, name, known)))
         # What the own circuit does best is looked at closely on all: no machine is the worse for
         # a lifted limit only because its search has missed that.
         own = [
             _moved(bench, [*best.settings[:1], *best.robust[:1]], rig.cases[OWN], case)
             for best in rig.found[OWN]
         ]
-        rig.found[name] = _best(searches[name], own)
+        rig.found[name] = searches[name].bests(own)
 
 
 def _kin(rig: Rig, name: Name) -> list[Name]:
@@ -158,26 +163,10 @@ def _kin(rig: Rig, name: Name) -> list[Name]:
     return [other for other in rig.found if other in (OWN, IDEAL) or other[0] == name[0]]
 
 
-def _hints(bench: Bench, rig: Rig, name: Name, others: Iterable[Name]) -> list[Array]:
+def _hints(bench: Bench, rig: Rig, name: Name, others: Iterable[Name]) -> Array:
     here, cases = rig.cases[name], rig.cases
-    return [_as_hints(bench, rig.found[other], cases[other], here) for other in others]
-
-
-def _searched(
-    bench: Bench, case: Case, seed: tuple[int, ...], effort: Effort, hints: Sequence[Array]
-) -> Search:
-    search = Search(partial(bench.scores, case), seed)
-    search.run(effort, np.vstack([np.empty((0, KNOB_COUNT)), *hints]))
-    return search
-
-
-def _best(search: Search, also: Sequence[Array] | None = None) -> Bests:
-    """What was found for each quantity; ``also`` has further places (rows) for each."""
-    none = np.empty((0, KNOB_COUNT))
-    return tuple(
-        search.found(quantity, none if also is None else also[quantity])
-        for quantity in range(len(QUANTITIES))
-    )
+    found = [_as_hints(bench, rig.found[other], cases[other], here) for other in others]
+    return np.vstack([np.empty((0, KNOB_COUNT)), *found])
 
 
 def _as_hints(bench: Bench, found: Bests, there: Case, here: Case) -> Array:
