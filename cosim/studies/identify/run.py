@@ -13,7 +13,7 @@ from cosim.files.picture import Picture
 from cosim.scene import keys
 from cosim.studies.identify.chain.chain import OWN
 from cosim.studies.identify.problem.space import Space, read_space
-from cosim.studies.identify.problem.targets import Measured, read_trials
+from cosim.studies.identify.problem.targets import WEIGHTS, Measured, read_trials
 from cosim.studies.identify.report.exact import exact
 from cosim.studies.identify.report.measures import Row, bands, errors, own_numbers, repeatability
 from cosim.studies.identify.report.scenes import trial_settings
@@ -144,7 +144,7 @@ def _asked(space: Space, trials: Sequence[Measured], effort: object) -> Any:
         ]
         for trial in trials
     ]
-    return [entries, sums, repr(effort)]
+    return [entries, sums, repr(effort), WEIGHTS]
 
 
 def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[HeldOut]]:
