@@ -55,7 +55,10 @@ NETLISTS = {
     "no source of the back-EMF": (edited("Vemf c3 sense 0", "R9 c3 sense 1m"), r"Vemf"),
     "no source of the command": (edited("Vcommand v1 0", "Vother v1 0"), r"Vcommand"),
     "truncated in a bracket": (AMPLIFIER[: AMPLIFIER.index("{1e-3*slew}") + 5], r"own\.cir"),
-    "truncated in a subcircuit": (edited("\n.end", "\n.subckt cut a b\nR1 a b 1\n.end"), r"\.ends"),
+    "truncated in a subcircuit": (
+        edited("\n.end\n", "\n.subckt cut a b\nR1 a b 1\n.end\n"),
+        r"\.ends",
+    ),
     "back-EMF the wrong way round": (edited("Vemf c3 sense", "Vemf sense c3"), r"in series with"),
     "back-EMF beside the coil": (
         edited("Vemf c3 sense 0", "R9 c3 sense 1m\nR8 x8 0 1k\nVemf x8 0 0"),
