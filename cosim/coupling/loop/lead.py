@@ -37,7 +37,8 @@ remembers of the slopes before it misleads its choice of the step. The start is 
 at once. This step is of first order and nothing judges it, so finer runs must shorten it too."""
 
 _EMF_CHANGE = 3e-3
-"""Most that the back-EMF may change in a step, in units of the supply."""
+"""What the back-EMF may change in a step where the output is at its limits, too, in units of the
+supply."""
 
 LOG = ("time", "emf", "owed")
 """Time, s; the back-EMF that the circuit was given, V; by how much the integral of that lagged the
