@@ -100,7 +100,8 @@ def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
         saved += (MOTIONAL,)
     run, circuit = scene.run, scene.circuit
     deck += [
-        f".options reltol={circuit.reltol!r}",
+        # Without norefvalue it asks for the CPU time at each step, to print how far it is.
+        f".options norefvalue reltol={circuit.reltol!r}",
         # All vectors are sent step by step; ngspice is to keep none, which would take memory.
         ".save none",
         f".tran {circuit.max_step!r} {run.duration!r} 0 {circuit.max_step!r}",

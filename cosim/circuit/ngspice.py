@@ -69,13 +69,18 @@ class Leader(Protocol):
 
 
 @cache
-def engine(callbacks: Callbacks) -> "Engine":
-    """The process's one ngspice, which calls back. Raises BadInput where the library is missing."""
+def engine(callbacks: Callbacks, code_models: bool) -> "Engine":
+    """The process's one ngspice, which calls back. Raises BadInput where the library is missing.
+
+    With ``code_models`` it knows POLY and TABLE, as a netlist of the user's own may need, which
+    has a process of its own. Each step looks at all kinds of elements, so the models cost 5 % of a
+    run that has none.
+    """
     name = library_name()
     try:
         if os.sep in name and not os.path.isfile(name):  # to open a pipe would wait for ever
             raise OSError("there is no such file")
-        return Engine(name, callbacks)
+        return Engine(name, callbacks, code_models)
     except (OSError, AttributeError) as error:  # the latter where it lacks ngspice's functions
         reason = str(error).partition("Additionally")[0].strip(" .")
         raise BadInput(
@@ -111,14 +116,14 @@ class Engine(Shared.NgSpiceShared):
     poisoned = False
     """ngspice has given up for good: nothing runs in this process's library any more."""
 
-    def __init__(self, library: str, callbacks: Callbacks) -> None:
+    def __init__(self, library: str, callbacks: Callbacks, code_models: bool) -> None:
         # A path is made absolute, since it is opened from another folder; a bare name is not.
         self.LIBRARY_PATH = os.path.abspath(library) if os.sep in library else library
         self._leader: Leader | None = None
         self._failure: BaseException | None = None
         self._save: tuple[str, ...] = ()
         self._data = callbacks.data
-        with caught_signals(self.fail), _nowhere():
+        with caught_signals(self.fail), _nowhere(code_models):
             super().__init__(ngspice_id=0, send_data=True)
             self._library: Any = self._ngspice_shared
             # PySpice leaves GetSyncData out; a second call puts it in, and a faster GetVSRCData.
@@ -209,9 +214,10 @@ class Engine(Shared.NgSpiceShared):
 
 
 @contextmanager
-def _nowhere() -> Iterator[None]:
+def _nowhere(spinit: bool) -> Iterator[None]:
     """In an empty folder that is also home, without ngspice's variables: it runs the .spiceinit
-    that it finds in either, and the spinit of the folders that SPICE_SCRIPTS and others name."""
+    that it finds in either, and the spinit of the folders that SPICE_SCRIPTS and others name. Its
+    own ``spinit``, which loads the code models, is run where it is asked for."""
     here, before = os.getcwd(), dict(os.environ)
     with TemporaryDirectory() as empty:
         os.chdir(empty)
@@ -219,6 +225,8 @@ def _nowhere() -> Iterator[None]:
             if name.startswith(("SPICE", "NGSPICE", "USERPROFILE")):
                 del os.environ[name]
         os.environ["HOME"] = empty
+        if not spinit:
+            os.environ["SPICE_SCRIPTS"] = empty
         try:
             yield
         finally:

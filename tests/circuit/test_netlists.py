@@ -443,7 +443,7 @@ def test_a_snubber_alone_leaves_the_coil_alone(tmp_path, name):
 
 def test_coils_in_parallel_share_the_current(tmp_path):
     edit = (r"^Vcommand.*$", "Vcommand v1 0 0\nVac out 0 AC 1")
-    cut = (r"^Vout before out 0$", "Vout before 0 0")
+    cut = (r"^Epole out 0 va 0 1$", "Epole apart 0 va 0 1")
     values = {"eddy_inductance": 1.46e-3, "eddy_resistance": 3.83}
     decks = [
         netlist("amplifier", edit, cut, tran=".ac dec 5 10 100k", count=n, **values) for n in (1, 2)
@@ -456,6 +456,16 @@ def test_coils_in_parallel_share_the_current(tmp_path):
         single, 7.1 + s * 1.2e-3 + 1 / (1 / 3.83 + 1 / (s * 1.46e-3)), rtol=1e-9
     )
     np.testing.assert_allclose(double, single / 2, rtol=1e-9)
+
+
+def test_absent_parts_of_the_amplifier_cost_no_node(tmp_path):
+    values = {"output_resistance": 6.0, "snubber_resistance": 10.0, "snubber_capacitance": 1e-8}
+    values |= {"eddy_inductance": 1.46e-3, "eddy_resistance": 3.83}
+    short = ".tran 10u 1m"
+    whole, bare = run_all(
+        tmp_path, netlist("amplifier", tran=short, **values), netlist("amplifier", tran=short)
+    )
+    assert whole.keys() - bare.keys() == {"pole", "snubber", "c2", "leddy#branch"}
 
 
 # --- amplifier.cir against its own defining equation --------------------------------

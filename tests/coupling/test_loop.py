@@ -112,6 +112,12 @@ def test_no_step_goes_through_python(monkeypatch: pytest.MonkeyPatch) -> None:
     simulate(load("reference", [*BRIEF, "coupling.method=jacobi"]))
 
 
+def test_no_step_asks_for_the_cpu_time() -> None:
+    """ngspice would, to print four times a second how far it is."""
+    simulate(load("reference", ["run.duration=1", "circuit.max_step=1e-5"]))
+    assert not [line for line in lead._engine(False)._stdout if "Reference value" in line]
+
+
 @pytest.mark.parametrize("name", METHODS)
 def test_a_method_does_the_same_between_both_masters(name: str) -> None:
     """ngspice, finely resolved, leads as the exactly solved amplifier does: they part by less than

@@ -36,7 +36,8 @@ def test_the_tolerance_is_met_and_the_error_told(name: str, tolerance: float) ->
     told = result.summary["error_estimate"]
     assert isinstance(told, float)
     assert true <= tolerance
-    assert true / 3.0 < told < 3.0 * true
+    # A fiftieth of the tolerance is less than the finer runs, by which it is told, err themselves.
+    assert true / 3.0 < told < max(3.0 * true, tolerance / 50.0)
     again = simulate(result.scene)
     assert np.array_equal(again.columns["z_part"], result.columns["z_part"])
 

@@ -23,9 +23,13 @@ static const double CARRIED = 0.2;
 
 static const double AT_LIMIT = 0.5; /* V; |v(swing)| from which on the output is at its limit */
 
-static const double REACH = 0.25;
+static const double REACH = 0.05;
 /* Of the range between its limits: so near to one, the output may reach it where its way is not
    straight. */
+
+static const double EMF_OF_ROOM = 0.1;
+/* Most that the back-EMF may change in a step, of what the output has left until its limit: till
+   there the amplifier makes up for what the back-EMF is off. */
 
 static const double STEPS_OF_SINE = 200.0;
 /* A period's least number: the mechanics take the current as straight within a step. */
@@ -260,8 +264,9 @@ static double accepted(Lead *c, double time, double next_step)
     if (c->segment.end > time && c->segment.end - time < next_step)
         next_step = c->segment.end - time;
     /* A limit that a passing back-EMF touches is not to be stepped over. */
-    const double gentle = c->emf_change / fabs(c->segment.c[1]);
-    next_step = fmin(next_step, fmax(gentle, c->answer_step));
+    const double room = fmin(c->output_high - c->output, c->output - c->output_low);
+    const double change = fmax(c->emf_change, EMF_OF_ROOM * room);
+    next_step = fmin(next_step, fmax(change / fabs(c->segment.c[1]), c->answer_step));
     if (c->impact - time < next_step)
         next_step = c->impact - time;
     return c->jump - time < next_step ? c->jump - time : next_step;
@@ -336,7 +341,7 @@ void lead_begin(Lead *c)
 {
     c->jump = piece_at(c, 0.0)->jump;
     c->impact = INFINITY;
-    c->answer_step = c->time_constant / 20.0;
+    c->answer_step = c->time_constant / 28.0;
     c->limited_step = c->time_constant / 5.0;
     c->near_step = c->time_constant;
     c->answered = c->time_constant * log(1.0 / SETTLED_SHARE); /* V1 leaves 0 at once */

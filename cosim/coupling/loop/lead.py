@@ -7,6 +7,7 @@ prepares the command and takes the log away in blocks.
 import ctypes
 from collections.abc import Callable
 from ctypes import c_int64
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,8 @@ remembers of the slopes before it misleads its choice of the step. The start is 
 at once. This step is of first order and nothing judges it, so finer runs must shorten it too."""
 
 _EMF_CHANGE = 3e-3
-"""Most that the back-EMF may change in a step, in units of the supply."""
+"""What the back-EMF may change in a step where the output is at its limits, too, in units of the
+supply."""
 
 LOG = ("time", "emf", "owed")
 """Time, s; the back-EMF that the circuit was given, V; by how much the integral of that lagged the
@@ -69,6 +71,7 @@ class Lead:
         self._recorder = recorder
         self._replay = replay
         self._deck, self._saved = deck or prepare(scene)
+        self._engine = partial(_engine, scene.circuit.netlist is not None)
         width = len(LOG) + len(self._saved)
         self._log = Tape(width)
         # With `uic`, ngspice accepts t = 0 before it has sent any value.
@@ -114,7 +117,7 @@ class Lead:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         state = self.state
         try:
-            _engine().transient(self._deck, self._saved, self)
+            self._engine().transient(self._deck, self._saved, self)
         finally:
             self._attend()
         if state.status == FMU_FAILED:
@@ -129,7 +132,7 @@ class Lead:
         if self._time < self._duration * (1 - 1e-9):
             raise SimulationFailed(
                 f"ngspice stopped at t = {self._time:.6g} s of {self._duration:g} s: "
-                f"{_engine().said()}. If the circuit is right, a smaller circuit.max_step or "
+                f"{self._engine().said()}. If the circuit is right, a smaller circuit.max_step or "
                 "another circuit.reltol may help."
             )
 
@@ -141,7 +144,7 @@ class Lead:
     @property
     def ngspice(self) -> str:
         """Version of ngspice."""
-        return str(_engine().ngspice_version)
+        return str(self._engine().ngspice_version)
 
     def log(self) -> dict[str, npt.NDArray[np.float64]]:
         """LOG and the saved vectors (A, V) at the accepted points."""
@@ -154,7 +157,7 @@ class Lead:
         self.state.macro_point = ctypes.cast(called, ctypes.c_void_p).value
 
     def _fail(self, failure: BaseException) -> None:
-        _engine().fail(failure)
+        self._engine().fail(failure)
 
     # What ngspice's engine asks for (see cosim.circuit.ngspice.Leader).
 
@@ -186,6 +189,6 @@ class Lead:
         state.pieces, state.n_pieces, state.piece = self._row, len(self._pieces), 0
 
 
-def _engine() -> ngspice.Engine:
+def _engine(code_models: bool) -> ngspice.Engine:
     names = ("lead_data", "lead_source", "lead_step")
-    return ngspice.engine(ngspice.Callbacks(*map(address, names)))
+    return ngspice.engine(ngspice.Callbacks(*map(address, names)), code_models)

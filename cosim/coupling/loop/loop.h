@@ -143,7 +143,7 @@ typedef struct Lead {
     double max_step;              /* s; circuit.max_step */
     double output_high, output_low; /* V; limits of the output without current */
     double output;                /* V; at the last accepted point */
-    double emf_change;            /* V; most that the back-EMF may change in a step */
+    double emf_change;            /* V; that the back-EMF may change in a step at the limits, too */
     double answered;              /* s; when it has done so */
     double time, current, carried; /* at the last accepted point: s; A of one coil; V carried */
     double emf;                    /* V; that the circuit had there */
