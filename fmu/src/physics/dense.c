@@ -405,9 +405,9 @@ double stickslip_reading_error(const Model *m, const Dense *dense)
     return late > worst || late != late ? late : worst;
 }
 
-/* For n states from place `low` on. */
-STICKSLIP_INLINE void evaluate(const int low, const int n, const Dense *dense, double x,
-                               double y[N_ALL])
+/* For n states from place `low` on. y may lie in the same model as the polynomials, but elsewhere. */
+STICKSLIP_INLINE void evaluate(const int low, const int n, const Dense *restrict dense, double x,
+                               double *restrict y)
 {
     const double rest = 1.0 - x;
     for (int j = low; j < low + n; j++) {
@@ -422,18 +422,30 @@ STICKSLIP_INLINE void evaluate(const int low, const int n, const Dense *dense, d
     }
 }
 
-void stickslip_interpolate(const Model *m, const Dense *dense, double share,
-                                          Knot *knot)
+STICKSLIP_INLINE double stickslip_interpolate_acting_any(const Model *m, const Dense *dense,
+                                                         double share, double y[N_ALL])
 {
-    evaluate(0, N_ACTING, dense, share, knot->y);
+    evaluate(0, N_ACTING, dense, share, y);
     if (moving(m) > 1)
-        evaluate(N_STATES, N_ACTING, dense, share, knot->y);
+        evaluate(N_STATES, N_ACTING, dense, share, y);
+    if (dense->wall < 0)
+        return 0.0;
+    double *q = &y[dense->wall * N_STATES + Q];
+    const double root = *q;
+    *q = m->mode[dense->wall].side * (m->r.travel + root * fabs(root));
+    return root;
+}
+
+STICKSLIP_WIDE(double, stickslip_interpolate_acting,
+               (const Model *m, const Dense *dense, double share, double y[N_ALL]),
+               (m, dense, share, y))
+
+void stickslip_interpolate(const Model *m, const Dense *dense, double share, Knot *knot)
+{
+    knot->root = stickslip_interpolate_acting(m, dense, share, knot->y);
     knot->tau = share * dense->length;
     if (dense->wall >= 0) {
         double d[N_DERIVATIVES];
-        double *q = &knot->y[dense->wall * N_STATES + Q];
-        knot->root = *q;
-        *q = m->mode[dense->wall].side * (m->r.travel + knot->root * fabs(knot->root));
         stickslip_clock_derivatives(dense, share, d);
         knot->tau = d[0];
     }

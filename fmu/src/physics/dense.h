@@ -46,8 +46,11 @@ double stickslip_reading_error(const Model *m, const Dense *dense);
 /* The share of the step at a time (s) after its start. */
 double stickslip_share_at(const Dense *dense, double time);
 
-/* At a share of the step: all of a knot but its rates; only the states that act, or all. */
+/* At a share of the step: all of a knot but its rates, of the states those that act; these states
+ * alone, giving the wall's root if the step is by its clock; or the other states. */
 void stickslip_interpolate(const Model *m, const Dense *dense, double share, Knot *knot);
+double stickslip_interpolate_acting(const Model *m, const Dense *dense, double share,
+                                    double y[N_ALL]);
 void stickslip_interpolate_energies(const Model *m, const Dense *dense, double share,
                                     double y[N_ALL]);
 
