@@ -137,42 +137,48 @@ static double weigh_clock(int s, const Stages *g)
     return sum;
 }
 
-/* By the wall's clock, y[Q] of its surface is the root. */
-STICKSLIP_INLINE void rates_at(const Variant kind, const Law *law, int wall, double tau, double y[N_ALL],
-                               double k[N_ALL])
+/* The rates times `per`. By the wall's clock, y[Q] of its surface is the root. */
+STICKSLIP_INLINE void rates_at(const Variant kind, const Law *law, int wall, double tau,
+                               const double per, double y[N_ALL], double k[N_ALL])
 {
     const Model *m = law->m;
-    if (!kind.by_wall) {
-        if (kind.general)
-            stickslip_state_rates(m, m->mode, y, tau, k);
-        else
-            stickslip_law_rates(law, kind.source, y, law->touch ? stickslip_law_root(law, y) : 0.0,
-                                tau, k);
+    double root = 0.0;
+    if (kind.by_wall) {
+        double *q = &y[wall * N_STATES + Q];
+        root = *q;
+        *q = m->mode[wall].side * (m->r.travel + root * fabs(root));
+    } else if (law->touch) {
+        root = stickslip_law_root(law, y);
+    }
+    if (!kind.general) {
+        stickslip_law_rates(law, kind.source, y, root, tau, per, k);
         return;
     }
-    const int place = wall * N_STATES;
-    const double root = y[place + Q], side = m->mode[wall].side;
-    y[place + Q] = side * (m->r.travel + root * fabs(root));
-    if (kind.general)
-        stickslip_state_rates(m, m->mode, y, tau, k);
-    else
-        stickslip_law_rates(law, kind.source, y, root, tau, k);
+    stickslip_state_rates(m, m->mode, y, tau, k);
+    for (int j = 0; j < kind.n; j++)
+        k[j] *= per;
+}
+
+/* The rate of the root by the wall's clock, in the place of that of q. */
+static inline void rate_root(const Model *m, int wall, const double y[N_ALL], double k[N_ALL])
+{
+    k[wall * N_STATES + Q] = 0.5 * m->mode[wall].side * y[wall * N_STATES + U];
 }
 
 /* From rates in time to those by the wall's clock. */
-STICKSLIP_INLINE void by_clock(const Variant kind, const Model *m, int wall, double root, double u,
+STICKSLIP_INLINE void by_clock(const Variant kind, const Model *m, int wall, const Knot *at,
                                double k[N_ALL])
 {
     for (int j = 0; j < kind.n; j++)
-        k[j] *= root;
-    k[wall * N_STATES + Q] = 0.5 * m->mode[wall].side * u;
+        k[j] = at->dy[j] * at->root;
+    rate_root(m, wall, at->y, k);
 }
 
-/* `newest` has the rates of the stage before, and then those of this one. */
 STICKSLIP_INLINE void stage(const Variant kind, const Law *law, int wall, double h, int s,
-                            const Knot *from, double y[N_ALL], double newest[N_ALL], Stages *g)
+                            const Knot *from, double y[N_ALL], Stages *g)
 {
-    double sum[N_ALL];
+    double sum[N_ALL], *k = g->k[s];
+    const double *newest = g->k[s - 1];
     const double weight = newest_weight(s);
     for (int i = 0; i < kind.surfaces; i++) {
         const int low = i * N_STATES;
@@ -180,19 +186,15 @@ STICKSLIP_INLINE void stage(const Variant kind, const Law *law, int wall, double
         for (int j = low; j < low + kind.acting; j++)
             y[j] = from->y[j] + h * (sum[j] + weight * newest[j]);
     }
-    if (kind.by_wall) {
-        const int place = wall * N_STATES;
-        const double root = from->root + h * (sum[place + Q] + weight * newest[place + Q]);
-        const double u = y[place + U];
-        y[place + Q] = root;
-        rates_at(kind, law, wall, from->tau + h * weigh_clock(s, g), y, newest);
-        g->clock[s] = root;
-        by_clock(kind, law->m, wall, root, u, newest);
-    } else {
-        rates_at(kind, law, wall, from->tau + C[s] * h, y, newest);
+    if (!kind.by_wall) {
+        rates_at(kind, law, wall, from->tau + C[s] * h, 1.0, y, k);
+        return;
     }
-    for (int j = 0; j < kind.n; j++)
-        g->k[s][j] = newest[j];
+    const int place = wall * N_STATES;
+    const double root = from->root + h * (sum[place + Q] + weight * newest[place + Q]);
+    y[place + Q] = g->clock[s] = root;
+    rates_at(kind, law, wall, from->tau + h * weigh_clock(s, g), root, y, k);
+    rate_root(law->m, wall, y, k);
 }
 
 /* The larger of the errors over what is allowed, of the solution of order 5 and of that of order 3. */
@@ -255,21 +257,23 @@ STICKSLIP_INLINE double step_of(const Variant kind, const Law *law, int wall, do
                                 const Knot *from, Knot *to, Stages *g)
 {
     const Model *m = law->m;
-    double y[N_ALL], sum[N_ALL], newest[N_ALL] = {0.0};
+    double y[N_ALL], sum[N_ALL];
+    if (kind.surfaces == 1)
+        wall = 0; /* a constant for the compiler */
     for (int j = 0; j < kind.n; j++) {
         g->k[0][j] = from->dy[j];
         y[j] = from->y[j];
     }
     const int place = wall * N_STATES;
     if (kind.by_wall) {
-        by_clock(kind, m, wall, from->root, from->y[place + U], g->k[0]);
+        by_clock(kind, m, wall, from, g->k[0]);
         g->clock[0] = from->root;
     }
     for (int s = 1; s < 12; s++)
-        stage(kind, law, wall, h, s, from, y, newest, g);
+        stage(kind, law, wall, h, s, from, y, g);
     weigh(0, kind.n, 12, g, sum);
     for (int j = 0; j < kind.n; j++) {
-        sum[j] += newest_weight(12) * newest[j];
+        sum[j] += newest_weight(12) * g->k[11][j];
         to->y[j] = from->y[j] + h * sum[j];
     }
     to->tau = from->tau + h;
@@ -278,12 +282,12 @@ STICKSLIP_INLINE double step_of(const Variant kind, const Law *law, int wall, do
         to->y[place + Q] = to->root;
         to->tau = from->tau + h * weigh_clock(12, g);
     }
-    rates_at(kind, law, wall, to->tau, to->y, to->dy);
+    rates_at(kind, law, wall, to->tau, 1.0, to->y, to->dy);
     for (int j = 0; j < kind.n; j++)
         g->k[12][j] = to->dy[j];
     if (kind.by_wall) {
         g->clock[12] = to->root;
-        by_clock(kind, m, wall, to->root, to->y[place + U], g->k[12]);
+        by_clock(kind, m, wall, to, g->k[12]);
     }
     return errors_of(kind, m, wall, h, from, g);
 }
@@ -291,13 +295,13 @@ STICKSLIP_INLINE double step_of(const Variant kind, const Law *law, int wall, do
 STICKSLIP_INLINE void interpolant_of(const Variant kind, const Law *law, int wall, double h,
                                      const Knot *from, const Knot *to, Stages *g, Dense *dense)
 {
-    double y[N_ALL], newest[N_ALL];
-    for (int j = 0; j < kind.n; j++) {
+    double y[N_ALL];
+    if (kind.surfaces == 1)
+        wall = 0;
+    for (int j = 0; j < kind.n; j++)
         y[j] = from->y[j];
-        newest[j] = g->k[12][j];
-    }
     for (int s = 13; s < STAGES; s++)
-        stage(kind, law, wall, h, s, from, y, newest, g);
+        stage(kind, law, wall, h, s, from, y, g);
     dense->length = h;
     dense->wall = kind.by_wall ? wall : -1;
     for (int j = 0; j < kind.n; j++) {
