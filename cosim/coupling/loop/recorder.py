@@ -17,7 +17,7 @@ from cosim.mechanics.stickslip import COUNTERS, Mechanics
 from cosim.scene import Scene
 from cosim.toolchain.interrupts import caught_signals
 
-STEPS = 4096
+STEPS = 1 << 15
 """Steps between two looks at what Python has to do, about ten milliseconds; fewer at first, since
 nobody knows yet how long a step takes."""
 
@@ -137,7 +137,7 @@ class Recorder:
                 if taken < 0:
                     raise self.failure()
                 done += taken
-                self.at_once = min(4 * self.at_once, STEPS)
+                self.at_once = min(8 * self.at_once, STEPS)
                 self.tell()
                 if self._fault:
                     raise self._fault
