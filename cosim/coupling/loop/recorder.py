@@ -123,15 +123,16 @@ class Recorder:
         """
         ports = len(self.mechanics.ports)
         edges, start, end = (np.ascontiguousarray(values) for values in (edges, start, end))
+        at = [values.ctypes.data for values in (edges, start, end)]
         done = 0
         with caught_signals(self._stop):
             while done < len(edges):
                 taken = self._library.recorder_follow(
                     self._state,
                     len(edges) - done,
-                    edges.ctypes.data + 8 * done,
-                    start.ctypes.data + 8 * ports * done,
-                    end.ctypes.data + 8 * ports * done,
+                    at[0] + 8 * done,
+                    at[1] + 8 * ports * done,
+                    at[2] + 8 * ports * done,
                     self.at_once,
                 )
                 if taken < 0:
@@ -152,7 +153,7 @@ class Recorder:
 
     def _tell_time(self) -> None:
         done = self.state.next
-        reached = float(self._agenda[0][done - 1]) if done else self._reached
+        reached = float(self._agenda.times[done - 1]) if done else self._reached
         if reached > self._told:
             self._told = reached
             self._progress(reached)
@@ -175,19 +176,19 @@ class Recorder:
         self._take()
         state = self.state
         if state.next:
-            self._reached = float(self._agenda[0][state.next - 1])
+            self._reached = float(self._agenda.times[state.next - 1])
         self._agenda = next(self._agendas)
-        times, what = self._agenda
-        room = self._rows.room(agenda.rows(what) + 1)
+        entries = len(self._agenda.times)
+        room = self._rows.room(self._agenda.rows + 1)
         self._in_place = room is not None
-        if room is None and len(self._new_rows) <= len(times):
-            self._new_rows = np.empty((len(times) + 1, self._width))
-        if len(self._new_frames) <= len(times):
-            self._new_frames = np.empty(len(times) + 1)
+        if room is None and len(self._new_rows) <= entries:
+            self._new_rows = np.empty((entries + 1, self._width))
+        if len(self._new_frames) <= entries:
+            self._new_frames = np.empty(entries + 1)
         state.rows = (self._new_rows if room is None else room).ctypes.data
         state.frames = self._new_frames.ctypes.data
-        state.times, state.what = times.ctypes.data, what.ctypes.data
-        state.n_times, state.next = len(times), 0
+        state.times, state.what = self._agenda.addresses
+        state.n_times, state.next = entries, 0
 
     def _take(self) -> None:
         state = self.state

@@ -463,16 +463,16 @@ void stickslip_interpolate_energies(const Model *m, const Dense *dense, double s
         evaluate(N_STATES + N_ACTING, N_STATES - N_ACTING, dense, share, y);
 }
 
-/* Of the polynomial whose coefficients lie `stride` apart. */
-STICKSLIP_INLINE void derive(const double *c, size_t stride, double share, double d[N_DERIVATIVES])
+/* Of the polynomial whose coefficients lie `stride` apart: the first n of its derivatives. */
+STICKSLIP_INLINE void derive(const double *c, size_t stride, const int n, double share, double *d)
 {
-    for (int k = 1; k < N_DERIVATIVES; k++)
+    for (int k = 1; k < n; k++)
         d[k] = 0.0;
     d[0] = c[7 * stride];
     for (int i = 6; i >= 0; i--) {
         /* times x or 1 - x, by turns */
         const double slope = i % 2 == 0 ? 1.0 : -1.0, x = i % 2 == 0 ? share : 1.0 - share;
-        for (int k = N_DERIVATIVES - 1; k > 0; k--)
+        for (int k = n - 1; k > 0; k--)
             d[k] = d[k] * x + k * slope * d[k - 1];
         d[0] = d[0] * x + c[(size_t)i * stride];
     }
@@ -480,12 +480,12 @@ STICKSLIP_INLINE void derive(const double *c, size_t stride, double share, doubl
 
 void stickslip_derivatives(const Dense *dense, int state, double share, double d[N_DERIVATIVES])
 {
-    derive(&dense->c[0][state], N_ALL, share, d);
+    derive(&dense->c[0][state], N_ALL, N_DERIVATIVES, share, d);
 }
 
 void stickslip_clock_derivatives(const Dense *dense, double share, double d[N_DERIVATIVES])
 {
-    derive(dense->clock, 1, share, d);
+    derive(dense->clock, 1, N_DERIVATIVES, share, d);
 }
 
 double stickslip_share_at(const Dense *dense, double time)
@@ -493,9 +493,9 @@ double stickslip_share_at(const Dense *dense, double time)
     if (dense->wall < 0)
         return time / dense->length;
     /* The clock's rate is the root, and grows or falls: bisection where Newton would leave. */
-    double low = 0.0, high = 1.0, x = 0.5, d[N_DERIVATIVES];
+    double low = 0.0, high = 1.0, x = 0.5, d[2];
     for (int i = 0; i < 100; i++) {
-        stickslip_clock_derivatives(dense, x, d);
+        derive(dense->clock, 1, 2, x, d);
         if (d[0] < time)
             low = x;
         else
