@@ -141,7 +141,7 @@ int64_t following_run(void *task)
     if (taken < 0)
         return FAILED;
     job->done += taken;
-    job->at_once = 2 * job->at_once < job->most ? 2 * job->at_once : job->most;
+    job->at_once = 8 * job->at_once < job->most ? 8 * job->at_once : job->most;
     int32_t steps[2];
     if (!f->get_whole(f, job->internal, 2, steps))
         return FAILED;

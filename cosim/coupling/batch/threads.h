@@ -22,7 +22,7 @@ typedef struct {
     Recorder *recorder;
     const double *edges, *start, *end;
     int64_t n, done;          /* intervals: all of them, those finished */
-    int64_t at_once, most;    /* steps of the next call, which doubles up to `most` */
+    int64_t at_once, most;    /* steps of the next call, which grows up to `most` */
     const uint32_t *internal; /* value references of internal steps, taken and rejected */
     double enough;            /* such beyond the steps asked for, after which it is judged */
 } Following;

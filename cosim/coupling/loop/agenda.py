@@ -31,19 +31,23 @@ def count(step: float, end: float) -> int:
     return int(end / step * (1 + 1e-12)) + 1
 
 
-Agenda = tuple[Array, npt.NDArray[np.int32]]
+class Agenda:
+    """Times, s, and what is to be written down at each."""
 
-
-def rows(what: npt.NDArray[np.int32]) -> int:
-    """How many rows are to be written down."""
-    return int(np.count_nonzero(what & _ROW))
+    def __init__(self, times: Array, what: npt.NDArray[np.int32]) -> None:
+        self.times, self.what = times, what
+        # Asked for once, since many runs have the same agenda.
+        self.rows = int(np.count_nonzero(what & _ROW))
+        """How many rows are to be written down."""
+        self.addresses = times.ctypes.data, what.ctypes.data
+        """Where compiled code finds both arrays."""
 
 
 def agendas(
     row_step: float, duration: float, settle: float, stops: tuple[float, ...], shutter: float
 ) -> Iterator[Agenda]:
-    """Times (s) at which something is to be written down, and what, part after part; not more than
-    ENTRIES rows and frames in one. The last time of all is endless.
+    """When something is to be written down, part after part; not more than ENTRIES rows and frames
+    in one. The last time of all is endless.
 
     Of frames, which are exposed for a share ``shutter`` of their interval, the instants.
     """
@@ -56,8 +60,7 @@ def _kept(*given: Any) -> tuple[Agenda, ...]:
     """Those of a run, as many other runs have them."""
     made = tuple(_agendas(*given))
     for agenda in made:
-        for array in agenda:
-            array.flags.writeable = False
+        agenda.times.flags.writeable = agenda.what.flags.writeable = False
     return made
 
 
@@ -89,9 +92,9 @@ def _agendas(
         first = np.flatnonzero(np.append(True, place[1:] != place[:-1]))
         times, joined = times[order[first]], np.bitwise_or.reduceat(what[order], first)
         if end == _NEVER:
-            yield np.append(times, np.inf), np.append(joined, np.int32(0))
+            yield Agenda(np.append(times, np.inf), np.append(joined, np.int32(0)))
         else:
-            yield times, joined
+            yield Agenda(times, joined)
 
 
 def exposures(

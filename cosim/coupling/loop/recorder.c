@@ -93,11 +93,10 @@ static int step_within(Recorder *r, double time, double edge, const double *star
     f->time = time;
     f->steps++;
     if (time > r->settle + SAME_TIME) { /* the end of settling may be a corner within rounding */
+        double *most = r->extremes, *least = r->extremes + 1;
         for (int64_t k = 0; k < extremes; k += 2) {
-            if (found[k] > r->extremes[k])
-                r->extremes[k] = found[k];
-            if (found[k + 1] < r->extremes[k + 1])
-                r->extremes[k + 1] = found[k + 1];
+            most[k] = found[k] > most[k] ? found[k] : most[k];
+            least[k] = found[k + 1] < least[k] ? found[k + 1] : least[k];
         }
     }
     return 1;

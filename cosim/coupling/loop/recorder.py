@@ -17,7 +17,7 @@ from cosim.mechanics.stickslip import COUNTERS, Mechanics
 from cosim.scene import Scene
 from cosim.toolchain.interrupts import caught_signals
 
-STEPS = 4096
+STEPS = 1 << 15
 """Steps between two looks at what Python has to do, about ten milliseconds; fewer at first, since
 nobody knows yet how long a step takes."""
 
@@ -123,21 +123,22 @@ class Recorder:
         """
         ports = len(self.mechanics.ports)
         edges, start, end = (np.ascontiguousarray(values) for values in (edges, start, end))
+        at = [values.ctypes.data for values in (edges, start, end)]
         done = 0
         with caught_signals(self._stop):
             while done < len(edges):
                 taken = self._library.recorder_follow(
                     self._state,
                     len(edges) - done,
-                    edges.ctypes.data + 8 * done,
-                    start.ctypes.data + 8 * ports * done,
-                    end.ctypes.data + 8 * ports * done,
+                    at[0] + 8 * done,
+                    at[1] + 8 * ports * done,
+                    at[2] + 8 * ports * done,
                     self.at_once,
                 )
                 if taken < 0:
                     raise self.failure()
                 done += taken
-                self.at_once = min(4 * self.at_once, STEPS)
+                self.at_once = min(8 * self.at_once, STEPS)
                 self.tell()
                 if self._fault:
                     raise self._fault
@@ -152,7 +153,7 @@ class Recorder:
 
     def _tell_time(self) -> None:
         done = self.state.next
-        reached = float(self._agenda[0][done - 1]) if done else self._reached
+        reached = float(self._agenda.times[done - 1]) if done else self._reached
         if reached > self._told:
             self._told = reached
             self._progress(reached)
@@ -175,19 +176,19 @@ class Recorder:
         self._take()
         state = self.state
         if state.next:
-            self._reached = float(self._agenda[0][state.next - 1])
+            self._reached = float(self._agenda.times[state.next - 1])
         self._agenda = next(self._agendas)
-        times, what = self._agenda
-        room = self._rows.room(agenda.rows(what) + 1)
+        entries = len(self._agenda.times)
+        room = self._rows.room(self._agenda.rows + 1)
         self._in_place = room is not None
-        if room is None and len(self._new_rows) <= len(times):
-            self._new_rows = np.empty((len(times) + 1, self._width))
-        if len(self._new_frames) <= len(times):
-            self._new_frames = np.empty(len(times) + 1)
+        if room is None and len(self._new_rows) <= entries:
+            self._new_rows = np.empty((entries + 1, self._width))
+        if len(self._new_frames) <= entries:
+            self._new_frames = np.empty(entries + 1)
         state.rows = (self._new_rows if room is None else room).ctypes.data
         state.frames = self._new_frames.ctypes.data
-        state.times, state.what = times.ctypes.data, what.ctypes.data
-        state.n_times, state.next = len(times), 0
+        state.times, state.what = self._agenda.addresses
+        state.n_times, state.next = entries, 0
 
     def _take(self) -> None:
         state = self.state

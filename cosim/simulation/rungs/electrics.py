@@ -39,7 +39,9 @@ def commanded(command: Command, rows: Array) -> Array:
     the command has not begun."""
     made = Tape(1, len(rows))
     for part in blocks(len(rows)):
-        made.append(np.where(rows[part] > 0.0, command.values_before(rows[part]), 0.0))
+        values = command.values_before(rows[part])
+        values[: rows[part].searchsorted(0.0, "right")] = 0.0
+        made.append(values)
     return made.column()
 
 

@@ -90,13 +90,15 @@ class _Coil:
             first_row = len(self._waves)
             row = step * np.arange(first_row, first_row + few.stop - few.start)
             # A row on an edge belongs to what is before it.
-            at = np.clip(np.searchsorted(edges, row - SAME_TIME) - 1, 0, len(h) - 1)
-            since = row - edges[at]
-            current = start[at] + slope[at] * since
-            voltage = scene.coil.resistance * current + scene.coil.inductance * slope[at]
+            passed = (row - SAME_TIME).searchsorted(edges[1:-1], "right")
+            rows = np.diff(passed, prepend=0, append=len(row))
+            since, steep = row - np.repeat(edges[:-1], rows), np.repeat(slope, rows)
+            begun = np.repeat(start, rows)
+            current = begun + steep * since
+            voltage = scene.coil.resistance * current + scene.coil.inductance * steep
             if branch is not None:
-                lag = slope[at] * eddy.tau
-                rest = start[at] - branch[at] - lag
+                lag = steep * eddy.tau
+                rest = begun - np.repeat(branch, rows) - lag
                 voltage += eddy.resistance * (lag + rest * np.exp(-since / eddy.tau))
             self._waves.append(np.stack([current, voltage], axis=1))
 

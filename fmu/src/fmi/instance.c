@@ -26,13 +26,9 @@ int stickslip_refuse(const Instance *inst, const char *function, const char *for
     return 0;
 }
 
-int stickslip_allowed(const Instance *inst, const char *function, int phases)
+int stickslip_untimely(const Instance *inst, const char *function)
 {
-    if (!inst)
-        return 0;
     const int phase = inst->state.phase;
-    if (phase & phases)
-        return 1;
     return stickslip_refuse(inst, function, "not allowed %s",
                             phase == INSTANTIATED   ? "before the initialization mode"
                             : phase == INITIALISING ? "in the initialization mode"
@@ -163,29 +159,11 @@ static void tell_events(const Instance *inst, const char *function, const Model 
     inst->send(inst, SEVERITY_OK, "logEvents", message);
 }
 
-int stickslip_step(Instance *inst, const char *function, double time, double h)
+/* Where steps of the integration end, which may fail. */
+static int step_on(Instance *inst, const char *function, double time, double h)
 {
     char message[MODEL_MESSAGE_SIZE];
-    if (!stickslip_allowed(inst, function, STEPPING))
-        return 0;
     State *s = &inst->state;
-    if (!(h > 0.0) || !isfinite(time + h))
-        return stickslip_refuse(
-            inst, function, "a step of %g s from %g s: it must be positive and finite", h, time);
-    const double slack = 1e-9 * h + 4.0 * DBL_EPSILON * fmax(fabs(time), fabs(s->time));
-    if (!(fabs(time - s->time) <= slack))
-        return stickslip_refuse(inst, function,
-                                "the communication point %.17g s is not the current time %.17g s",
-                                time, s->time);
-    /* Importers that add up their steps miss the stop time by far more than an ulp. */
-    if (s->has_stop_time && time + h > s->stop_time + slack + 1e-3 * h)
-        return stickslip_refuse(inst, function, "a step to %.17g s goes past the stop time %.17g s",
-                                time + h, s->stop_time);
-    if (stickslip_model_step_within(&s->model, h)) {
-        s->time = time + h;
-        s->outputs_stale = 0;
-        return 1;
-    }
     Model before = s->model;
     if (stickslip_model_step(&s->model, h, message)) {
         s->model = before;
@@ -195,6 +173,31 @@ int stickslip_step(Instance *inst, const char *function, double time, double h)
     s->outputs_stale = !s->model.ahead.active;
     if (inst->log_events)
         tell_events(inst, function, &before);
+    return 1;
+}
+
+int stickslip_step(Instance *inst, const char *function, double time, double h)
+{
+    if (!stickslip_allowed(inst, function, STEPPING))
+        return 0;
+    State *s = &inst->state;
+    if (!(h > 0.0) || !isfinite(time + h))
+        return stickslip_refuse(
+            inst, function, "a step of %g s from %g s: it must be positive and finite", h, time);
+    const double said = fabs(time), known = fabs(s->time);
+    const double slack = 1e-9 * h + 4.0 * DBL_EPSILON * (said > known ? said : known);
+    if (!(fabs(time - s->time) <= slack))
+        return stickslip_refuse(inst, function,
+                                "the communication point %.17g s is not the current time %.17g s",
+                                time, s->time);
+    /* Importers that add up their steps miss the stop time by far more than an ulp. */
+    if (s->has_stop_time && time + h > s->stop_time + slack + 1e-3 * h)
+        return stickslip_refuse(inst, function, "a step to %.17g s goes past the stop time %.17g s",
+                                time + h, s->stop_time);
+    if (!stickslip_model_step_within(&s->model, h))
+        return step_on(inst, function, time, h);
+    s->time = time + h;
+    s->outputs_stale = 0;
     return 1;
 }
 

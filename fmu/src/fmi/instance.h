@@ -61,7 +61,12 @@ void stickslip_free(Instance *inst);
 
 /* Reports "function: sentence" as an error. Always 0. */
 int stickslip_refuse(const Instance *inst, const char *function, const char *format, ...);
-int stickslip_allowed(const Instance *inst, const char *function, int phases);
+/* Refuses what the present phase does not allow. */
+int stickslip_untimely(const Instance *inst, const char *function);
+static inline int stickslip_allowed(const Instance *inst, const char *function, int phases)
+{
+    return inst && ((inst->state.phase & phases) || stickslip_untimely(inst, function));
+}
 int stickslip_set_logging(Instance *inst, const char *function, int on, size_t n,
                           const char *const categories[]);
 

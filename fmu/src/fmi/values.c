@@ -30,6 +30,15 @@ static int are_fresh(const Instance *inst)
     return !s->outputs_stale && s->model.initialised && s->phase != INSTANTIATED;
 }
 
+/* From the first one on, so many reals are simply there. */
+static size_t reals_there(const Instance *inst)
+{
+    const Model *m = &inst->state.model;
+    if (!are_fresh(inst))
+        return 0;
+    return m->coupling_old ? FIRST_COUPLING : m->energies_old ? FIRST_ENERGY : N_REALS;
+}
+
 static int outputs_fresh(Instance *inst, const char *function)
 {
     State *s = &inst->state;
@@ -64,6 +73,8 @@ static int get_special(Instance *inst, const char *function, uint32_t vr, double
         return 0;
     if (place >= FIRST_ENERGY && model->energies_old)
         stickslip_model_energies(model);
+    else if (place >= FIRST_COUPLING && place < FIRST_ENERGY && model->coupling_old)
+        stickslip_model_coupling(model);
     memcpy(value, (const char *)&model->r + place * sizeof(double), sizeof *value);
     return 1;
 }
@@ -75,13 +86,17 @@ int stickslip_get_reals(Instance *inst, const char *function, const uint32_t vr[
         !arrays_given(inst, function, n, vr, values))
         return 0;
     const double *reals = (const double *)&inst->state.model.r;
-    size_t i = 0;
-    if (are_fresh(inst))
-        for (; i < n && (size_t)vr[i] - REFERENCE_REALS < FIRST_ENERGY; i++)
-            values[i] = reals[(size_t)vr[i] - REFERENCE_REALS];
-    for (; i < n; i++)
+    size_t there = reals_there(inst);
+    for (size_t i = 0; i < n; i++) {
+        const size_t place = (size_t)vr[i] - REFERENCE_REALS;
+        if (place < there) {
+            values[i] = reals[place];
+            continue;
+        }
         if (!get_special(inst, function, vr[i], &values[i]))
             return 0;
+        there = reals_there(inst);
+    }
     return 1;
 }
 
@@ -140,7 +155,7 @@ int stickslip_set_reals(Instance *inst, const char *function, const uint32_t vr[
     }
     for (size_t i = 0; i < n; i++) {
         const size_t place = (size_t)vr[i] - REFERENCE_REALS;
-        stickslip_model_set_real(&s->model, place, values[i], message);
+        stickslip_model_put_real(&s->model, place, values[i]);
         if (place == PLACE(tolerance))
             s->tolerance_set = 1;
     }

@@ -77,13 +77,9 @@ static void note_point(Model *m, const Point *point)
 static void go_on_to(Model *m, double at)
 {
     Ahead *ahead = &m->ahead;
-    Knot knot;
     note_time(m, at - ahead->at);
     stickslip_note_inner_extremes(m, ahead->at, at);
-    stickslip_interpolate(m, &ahead->dense, stickslip_share_at(&ahead->dense, at), &knot);
-    for (int s = 0; s < moving(m); s++)
-        for (int j = s * N_STATES; j < s * N_STATES + N_ACTING; j++)
-            m->y[j] = knot.y[j];
+    stickslip_interpolate_acting(m, &ahead->dense, stickslip_share_at(&ahead->dense, at), m->y);
     ahead->at = at;
     ahead->behind = 1;
 }

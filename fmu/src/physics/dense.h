@@ -39,15 +39,19 @@ double stickslip_long_step(const Model *m, int wall, double h, const Knot *from,
 void stickslip_interpolant(const Model *m, int wall, double h, const Knot *from, const Knot *to,
                            Stages *stages, Dense *dense);
 
-/* About what the interpolant is off within the step, over the tolerance: measured against steps to
- * its middle, this share of its last term is never less. The end of the step is free of it. */
+/* About what the interpolant is off within the step, over what is allowed there: measured against
+ * steps to its middle, the share of its last term that is taken for it is never less. The end of the
+ * step is free of it. */
 double stickslip_reading_error(const Model *m, const Dense *dense);
 
 /* The share of the step at a time (s) after its start. */
 double stickslip_share_at(const Dense *dense, double time);
 
-/* At a share of the step: all of a knot but its rates; only the states that act, or all. */
+/* At a share of the step: all of a knot but its rates, of the states those that act; these states
+ * alone, giving the wall's root if the step is by its clock; or the other states. */
 void stickslip_interpolate(const Model *m, const Dense *dense, double share, Knot *knot);
+double stickslip_interpolate_acting(const Model *m, const Dense *dense, double share,
+                                    double y[N_ALL]);
 void stickslip_interpolate_energies(const Model *m, const Dense *dense, double share,
                                     double y[N_ALL]);
 

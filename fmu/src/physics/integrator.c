@@ -52,7 +52,7 @@ STICKSLIP_INLINE double step_of(const int n, const int acting, const int source,
             stickslip_state_rates(m, m->mode, y1, tau + C[s] * h, k[s + 1]);
         else
             stickslip_law_rates(law, source, y1, law->touch ? stickslip_law_root(law, y1) : 0.0,
-                                tau + C[s] * h, k[s + 1]);
+                                tau + C[s] * h, 1.0, k[s + 1]);
     }
     for (int j = 0; j < n; j++)
         dy1[j] = k[6][j];

@@ -54,10 +54,12 @@ static inline double stickslip_law_root(const Law *l, const double y[N_STATES])
     return depth > 0.0 ? sqrt(depth) : 0.0;
 }
 
-/* Of one surface. `root` is that of the penetration; it counts while a compliant wall is touched. */
+/* Of one surface, each times `per`, which a loop could not do as fast: a processor cannot read as a
+ * vector what it has just written one by one. `root` is that of the penetration; it counts while a
+ * compliant wall is touched. */
 STICKSLIP_INLINE void
 stickslip_law_rates(const Law *l, const int source, const double y[N_STATES], double root,
-                    double tau, double dy[N_STATES])
+                    double tau, const double per, double dy[N_STATES])
 {
     const Model *m = l->m;
     const Reals *p = &m->r;
@@ -81,16 +83,16 @@ stickslip_law_rates(const Law *l, const int source, const double y[N_STATES], do
         friction = normal > 0.0 ? l->kinetic * normal : 0.0;
     }
     const double a = (springs - (l->rest ? 0.0 : on_ram) - friction) * l->per_moving;
-    dy[Z] = v;
-    dy[V] = a;
-    dy[Q] = u;
-    dy[U] = l->rest ? 0.0 : on_ram * l->per_ram - p->gravity - a;
-    dy[D] = w;
-    dy[W] = l->slips ? friction * l->per_part - p->gravity - a : 0.0;
-    dy[E_IN] = drive * u;
-    dy[E_FRICTION] = -friction * w; /* of sticking, w is 0 */
-    dy[E_IMPACT] = lost;
-    dy[E_DAMPING] = p->flexure_damping * v * v + p->suspension_damping * u * u;
+    dy[Z] = per * v;
+    dy[V] = per * a;
+    dy[Q] = per * u;
+    dy[U] = l->rest ? 0.0 : per * (on_ram * l->per_ram - p->gravity - a);
+    dy[D] = per * w;
+    dy[W] = l->slips ? per * (friction * l->per_part - p->gravity - a) : 0.0;
+    dy[E_IN] = per * (drive * u);
+    dy[E_FRICTION] = per * (-friction * w); /* of sticking, w is 0 */
+    dy[E_IMPACT] = per * lost;
+    dy[E_DAMPING] = per * (p->flexure_damping * v * v + p->suspension_damping * u * u);
     if (!source) {
         dy[I_COIL] = dy[I_EDDY] = dy[E_OUTPUT] = dy[E_COPPER] = 0.0;
         return;
@@ -104,10 +106,10 @@ stickslip_law_rates(const Law *l, const int source, const double y[N_STATES], do
     } else {
         output = at_rest + p->inductance * rate;
     }
-    dy[I_COIL] = rate;
-    dy[I_EDDY] = l->eddy ? eddy / p->eddy_inductance : 0.0;
-    dy[E_OUTPUT] = output * i;
-    dy[E_COPPER] = loop * i * i + (l->eddy ? eddy * (i - y[I_EDDY]) : 0.0);
+    dy[I_COIL] = per * rate;
+    dy[I_EDDY] = l->eddy ? per * (eddy / p->eddy_inductance) : 0.0;
+    dy[E_OUTPUT] = per * (output * i);
+    dy[E_COPPER] = per * (loop * i * i + (l->eddy ? eddy * (i - y[I_EDDY]) : 0.0));
 }
 
 #endif

@@ -81,9 +81,15 @@ int stickslip_model_set_real(Model *m, size_t place, double value, char *message
 {
     if (stickslip_model_check_real(m, place, value, message))
         return -1;
+    stickslip_model_put_real(m, place, value);
+    return 0;
+}
+
+void stickslip_model_put_real(Model *m, size_t place, double value)
+{
     double *now = (double *)&m->r + place;
     if (*now == value)
-        return 0;
+        return;
     /* An importer that leads an input along a straight has other roundings. */
     const double off = fabs(value - *now);
     if (off > ROUNDING * fabs(value) && off > ROUNDING &&
@@ -92,7 +98,6 @@ int stickslip_model_set_real(Model *m, size_t place, double value, char *message
         m->steady_for = 0.0;
     }
     *now = value;
-    return 0;
 }
 
 int stickslip_model_set_integer(Model *m, size_t place, int value, char *message)
@@ -305,9 +310,6 @@ void stickslip_model_outputs(Model *m)
     r->q = y[Q];
     r->q_rate = y[U];
     r->back_emf = force_factor_at(m, y[Q]) * y[U];
-    r->back_emf_slope = back_emf_slope(m, y, f.a_q);
-    r->time_to_impact = time_to_impact(m, y, f.a_q);
-    r->motional_flux = motional_flux(m, y[Q]);
     r->friction_force = f.friction;
     r->plate_force = f.plate;
     r->wall_force = f.wall;
@@ -316,10 +318,19 @@ void stickslip_model_outputs(Model *m)
     m->n.output_clamped = m->mode[0].output;
     m->n.command_limited = m->mode[0].limited;
     m->n.sticking = m->mode[0].slip == 0;
-    m->energies_old = 1;
+    m->a_q = f.a_q;
+    m->coupling_old = m->energies_old = 1;
     m->n.wall_contact = m->mode[0].side;
     if (m->n.independent)
         outputs_of_second(m);
+}
+
+void stickslip_model_coupling(Model *m)
+{
+    m->coupling_old = 0;
+    m->r.back_emf_slope = back_emf_slope(m, m->y, m->a_q);
+    m->r.motional_flux = motional_flux(m, m->y[Q]);
+    m->r.time_to_impact = time_to_impact(m, m->y, m->a_q);
 }
 
 /* Sum of one of the energies over all surfaces that move. */

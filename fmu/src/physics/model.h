@@ -31,6 +31,8 @@ void stickslip_model_defaults(Model *m);
  * parameter after initialisation, not finite, out of range. */
 int stickslip_model_set_real(Model *m, size_t place, double value, char *message);
 int stickslip_model_check_real(const Model *m, size_t place, double value, char *message);
+/* Set what can be. */
+void stickslip_model_put_real(Model *m, size_t place, double value);
 int stickslip_model_set_integer(Model *m, size_t place, int value, char *message);
 
 /* Parameters that each are in range, but not together. 0, or -1 with a sentence in message. */
@@ -55,9 +57,14 @@ int stickslip_model_step_within(Model *m, double h);
 /* Refresh the outputs from state and inputs, after a step or a change of an input. */
 void stickslip_model_outputs(Model *m);
 
-/* The outputs called energy_..., the last of all, are refreshed by themselves, since few look at
- * them: m->energies_old tells that they have not been since the last of the above. */
-enum { FIRST_ENERGY = offsetof(Reals, energy_in) / sizeof(double) };
+/* The last outputs are refreshed by themselves, since few look at them: those that a circuit's
+ * solver asks for, and those called energy_... m->coupling_old and m->energies_old tell that they
+ * have not been since the last of the above. */
+enum {
+    FIRST_COUPLING = offsetof(Reals, back_emf_slope) / sizeof(double),
+    FIRST_ENERGY = offsetof(Reals, energy_in) / sizeof(double)
+};
+void stickslip_model_coupling(Model *m);
 void stickslip_model_energies(Model *m);
 
 /* d(output)/d(current, current_2, normal_force or surface_acceleration) in the present mode,

@@ -109,7 +109,7 @@ int stickslip_model_check(const Model *m, char *message)
 {
     if (check_variables(m, message))
         return -1;
-    if (!is_flag(m->initialised) || !is_flag(m->energies_old))
+    if (!is_flag(m->initialised) || !is_flag(m->coupling_old) || !is_flag(m->energies_old))
         return say(message, "its flags are none");
     if (!m->initialised)
         return 0;
@@ -117,7 +117,7 @@ int stickslip_model_check(const Model *m, char *message)
         return -1;
     if (!is_mode(m, &m->mode[0]) || !is_mode(m, &m->mode[1]))
         return say(message, "its modes do not go with its parameters");
-    if (!are_finite(m->y, N_ALL) || !isfinite(m->energy_at_start))
+    if (!are_finite(m->y, N_ALL) || !isfinite(m->energy_at_start) || !isfinite(m->a_q))
         return say(message, "its states are not finite numbers");
     const double lengths[] = {m->step[0], m->step[1], m->touch_step, m->steady_for};
     if (!are_finite(lengths, 4) || !(m->step[0] > 0.0 && m->step[1] > 0.0) ||

@@ -114,8 +114,9 @@ typedef struct {
     double last_length, last_error; /* of the long step before; 0: there was an event since */
     double steady_for; /* time since an input was changed, s */
     double energy_at_start;
+    double a_q; /* d2 q/dt2 of the first surface, as old as the outputs, m/s2 */
     int initialised;
-    int energies_old; /* the outputs of that name */
+    int coupling_old, energies_old; /* outputs: see model.h */
     Ahead ahead; /* the last: what is before it makes a state by itself */
 } Model;
 
