@@ -23,6 +23,8 @@ from cosim.version import __version__
 INTERRUPTED = 130
 
 _NO_MEMORY = "The memory ran out: try fewer --workers, or a longer run.output_step"
+_NO_THREADS = "The system allows no more threads: try --workers 1"
+_NO_THREAD = "start new thread"  # in Python's words
 _NO_ROOM = re.compile(
     "failed to map|cannot allocate|bad_alloc|without setting an exception", re.IGNORECASE
 )
@@ -73,6 +75,10 @@ def main(argv: list[str] | None = None) -> int:
         if not isinstance(error, MemoryError) and not _NO_ROOM.search(str(error)):
             raise
         return _told(_NO_MEMORY, SimulationFailed.exit_code)
+    except RuntimeError as error:
+        if _NO_THREAD not in str(error):
+            raise
+        return _told(_NO_THREADS, SimulationFailed.exit_code)
     except BrokenPipeError:  # the reader closed the pipe
         _discard_output()
         return 0

@@ -1,6 +1,5 @@
 """The last of a search: least squares over the rig and all trials' own numbers together."""
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -33,16 +32,12 @@ def finish(search: Search, found: Found, steps: int) -> Found:
     def residuals(x: Array) -> Array:
         place, own = apart(x)
         rig = search.space.rigs(place[None])
-        with ThreadPoolExecutor(search.workers) as pool:
-            rows = pool.map(
-                lambda k: simulate(targets[k], rig, own[k][None])[1][0], range(len(own))
-            )
-            return np.concatenate([*rows])
+        rows = search.each(lambda k: simulate(targets[k], rig, own[k][None])[1][0])
+        return np.concatenate(rows)
 
     def slopes(x: Array) -> Array:
         place, own = apart(x)
-        with ThreadPoolExecutor(search.workers) as pool:
-            parts = [*pool.map(lambda k: search.slopes(place, own, k)[1], range(len(own)))]
+        parts = search.each(lambda k: search.slopes(place, own, k)[1])
         whole = np.zeros((len(x), sum(part.shape[1] for part in parts)))
         row = 0
         for k, part in enumerate(parts):

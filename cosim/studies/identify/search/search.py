@@ -10,6 +10,7 @@ from time to time (`screen`).
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from cmaes import CMA
@@ -172,8 +173,7 @@ class Search:
             inner = normal[d:, d:] + SOFT * np.diag(np.diag(normal)[d:] + 1e-9)
             return normal[:d, :d] - normal[:d, d:] @ np.linalg.solve(inner, normal[d:, :d])
 
-        with ThreadPoolExecutor(self.workers) as pool:
-            whole = np.sum([*pool.map(one, range(len(self.targets)))], axis=0)
+        whole = np.sum(self.each(one), axis=0)
         rest = [k for k in range(len(place)) if k != key]
         inner = whole[np.ix_(rest, rest)] + SOFT * np.diag(np.diag(whole)[rest] + 1e-9)
         found = np.ones(len(place))
@@ -195,8 +195,15 @@ class Search:
                 found[free] = -np.linalg.solve(inner, normal[d:, :d]) * scale[:, None]
             return found
 
+        return np.array(self.each(one))
+
+    def each(self, work: Callable[[int], Any]) -> list[Any]:
+        """What ``work`` makes of the number of each target, by as many threads as are asked for."""
+        numbers = range(len(self.targets))
+        if self.workers == 1:
+            return [work(k) for k in numbers]
         with ThreadPoolExecutor(self.workers) as pool:
-            return np.array([*pool.map(one, range(len(self.targets)))])
+            return [*pool.map(work, numbers)]
 
     def nested(
         self,
