@@ -50,9 +50,6 @@ static const double E5[8] = {
 static const double E3[8] = {
     -0.18980075407240762, 4.450312892752409, 1.8915178993145003, -5.801203960010585,
     -0.4226823213237919, -0.1521609496625161, 0.20136540080403034, 0.02265179219836082};
-/* The step's own error over the estimate that these make: 0.1 in free flight and 0.02 at a wall on
- * average, against sixteenths of the step. */
-static const double OWN_SHARE = 0.1;
 /* Of stage 0, then of stages 5 ... 15: the four highest coefficients of the interpolant. */
 static const double HIGHEST[4][12] = {
     {-8.428938276109013, 0.5667149535193777, -3.0689499459498917, 2.38466765651207,
@@ -253,7 +250,7 @@ STICKSLIP_INLINE double errors_of(const Variant kind, const Model *m, int wall, 
     if (!(worst.third < 1e30))
         return worst.third;
     const double ratio = worst.third / worst.fifth;
-    return OWN_SHARE * worst.fifth / sqrt(1.0 + 0.01 * ratio * ratio);
+    return worst.fifth / sqrt(1.0 + 0.01 * ratio * ratio);
 }
 
 STICKSLIP_INLINE double step_of(const Variant kind, const Law *law, int wall, double h,
@@ -393,9 +390,7 @@ STICKSLIP_WIDE(void, stickslip_interpolant,
 
 double stickslip_reading_error(const Model *m, const Dense *dense)
 {
-    /* x^4 (1 - x)^3 is at most 0.0084; of that a seventeenth. Ten times what a step may be off is
-     * allowed of positions and velocities: it does not go on into the next step. */
-    static const double SHARE = 5e-4, ALLOWED = 10.0;
+    static const double SHARE = 5e-4; /* x^4 (1 - x)^3 is at most 0.0084; of that a seventeenth */
     double worst = 0.0;
     for (int s = 0; s < moving(m); s++) {
         for (int j = 0; j < N_ACTING; j++) {
@@ -403,15 +398,14 @@ double stickslip_reading_error(const Model *m, const Dense *dense)
             const double allowed = s == dense->wall && j == Q
                                        ? m->r.tolerance * ROOT_SCALE
                                        : stickslip_allowed_error(m, j, dense->c[0][at]);
-            const double error =
-                SHARE * fabs(dense->c[7][at]) / (j < I_COIL ? ALLOWED * allowed : allowed);
+            const double error = SHARE * fabs(dense->c[7][at]) / allowed;
             if (error > worst || error != error)
                 worst = error;
         }
     }
     if (dense->wall < 0)
         return worst;
-    const double late = SHARE * fabs(dense->clock[7]) / (ALLOWED * m->r.tolerance * CLOCK_SCALE);
+    const double late = SHARE * fabs(dense->clock[7]) / (m->r.tolerance * CLOCK_SCALE);
     return late > worst || late != late ? late : worst;
 }
 
@@ -522,6 +516,6 @@ double stickslip_long_factor(double error)
     if (!(error < 1e30))
         return 0.1;
     const double root = sqrt(sqrt(sqrt(error > 1e-30 ? error : 1e-30)));
-    const double factor = 0.8 / root; /* nearer to 1 more steps are rejected than saved */
+    const double factor = 0.9 / root;
     return factor < 0.1 ? 0.1 : factor > 6.0 ? 6.0 : factor;
 }

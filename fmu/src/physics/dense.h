@@ -39,9 +39,8 @@ double stickslip_long_step(const Model *m, int wall, double h, const Knot *from,
 void stickslip_interpolant(const Model *m, int wall, double h, const Knot *from, const Knot *to,
                            Stages *stages, Dense *dense);
 
-/* About what the interpolant is off within the step, over what is allowed there: measured against
- * steps to its middle, the share of its last term that is taken for it is never less. The end of the
- * step is free of it. */
+/* About what the interpolant is off within the step, over the tolerance: measured against steps to
+ * its middle, this share of its last term is never less. The end of the step is free of it. */
 double stickslip_reading_error(const Model *m, const Dense *dense);
 
 /* The share of the step at a time (s) after its start. */
