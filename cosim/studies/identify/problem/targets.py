@@ -21,7 +21,7 @@ from cosim.trials.periods import period_of
 from cosim.trials.recording import Recording, read_recording
 from cosim.trials.tracked import number_of, trial_files
 
-WEIGHTS = {"v_surface": 0.4, "z_surface": 0.35, "v_part": 0.15, "z_part": 0.1}
+WEIGHTS = {"v_surface": 0.5, "z_surface": 0.25, "v_part": 0.15, "z_part": 0.1}
 """Of the squared NRMSE; those of the signals that a trial has are scaled to a sum of 1. Velocities
 show the fast part of a motion, heights the slow one, from which transport follows, too."""
 
