@@ -85,10 +85,10 @@ def answer(path: Path, study: Study, points: Points, found: Sequence[Change]) ->
     axes[0].set_yticks(range(len(order)), list(reversed(order)), fontsize=10)
     axes[0].set_ylim(-0.7, len(order) - 0.1)
     for label in axes[0].get_yticklabels():
-        verdicts = {c.verdict for c in found if c.limit.name == label.get_text() and c.every}
-        label.set_color(
-            VERMILION if BINDS in verdicts else "0.6" if verdicts == {NOTHING} else "0.1"
-        )
+        its = [c for c in found if c.limit.name == label.get_text() and c.every]
+        drawn = {c.verdict for c in its if QUANTITIES[c.quantity].name in ANSWER}
+        nothing = {c.verdict for c in its} == {NOTHING}
+        label.set_color(VERMILION if BINDS in drawn else "0.6" if nothing else "0.1")
     figure.write(path)
 
 

@@ -37,7 +37,7 @@ def write(folder: Path, bench: Bench, study: Study, points: Points, there: Seque
         ]
     commands = [
         {
-            "quantity": QUANTITIES[point.quantity].name,
+            "": QUANTITIES[point.quantity].title,
             "setting": point.kind,
             "command": f"`{bench.command(point.settings)}`",
         }
@@ -96,6 +96,7 @@ def achieved(study: Study, points: Points) -> list[Row]:
         found.append(
             {
                 "": f"{quantity.title} [{quantity.unit}]",
+                "name": quantity.name,
                 "best": height(best) * scale,
                 "robust: median": height(robust) * scale,
                 "robust: worst": robust.setting.worst * scale if robust else nan,
