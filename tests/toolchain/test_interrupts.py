@@ -42,12 +42,18 @@ except KeyboardInterrupt:
 """
 
 
+def heed_all() -> None:
+    """A background job ignores SIGINT, one under nohup SIGHUP, and so would their children."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 @pytest.mark.parametrize("program", [DEAF, POLITE])
 def test_a_signal_ends_a_command_that_does_not_hear_it(program: str, number: int) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=heed_all,
     )  # fmt: skip
     assert process.stdout is not None and process.stdout.readline() == "ready\n"
     time.sleep(0.1)
