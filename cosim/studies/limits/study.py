@@ -16,7 +16,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.scene import Scene, changed
-from cosim.studies.limits.aims import KNOB_COUNT, rounded
+from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, rounded
 from cosim.studies.limits.runs import Bench, Case
 from cosim.studies.limits.search import Bests, Effort, Search, Setting
 from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
@@ -148,14 +148,24 @@ def _search(
             search.climb(others, _hints(bench, rig, name, rig.found))
             rig.found[name] = search.bests()
             told(f"{rig.name}, round {number}: {name[0]} {name[1]:.3g}")
-    for name, case in rig.cases.items():
-        # What the own circuit does best is looked at closely on all: no machine is the worse for
-        # a lifted limit only because its search has missed that.
-        own = [
-            _moved(bench, [*best.settings[:1], *best.robust[:1]], rig.cases[OWN], case)
-            for best in rig.found[OWN]
-        ]
-        rig.found[name] = searches[name].bests(own)
+    for name, search in searches.items():
+        # What its kin does best is looked at closely: no machine is the worse for a lifted limit
+        # only because its search has missed that.
+        rig.found[name] = search.bests(_of_kin(bench, rig, name))
+
+
+def _of_kin(bench: Bench, rig: Rig, name: Name) -> list[Array]:
+    """For each quantity the best places of a machine's kin, but for the ideal current's."""
+    kin = [other for other in _kin(rig, name) if other not in (name, IDEAL)]
+    every = []
+    for quantity in range(len(QUANTITIES)):
+        places = [np.empty((0, KNOB_COUNT))]
+        for other in kin:
+            best = rig.found[other][quantity]
+            both = [*best.settings[:1], *best.robust[:1]]
+            places.append(_moved(bench, both, rig.cases[other], rig.cases[name]))
+        every.append(np.vstack(places))
+    return every
 
 
 def _kin(rig: Rig, name: Name) -> list[Name]:
