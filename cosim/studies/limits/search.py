@@ -7,9 +7,11 @@ from each other, so that each quantity is climbed from several starts.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from cosim.arrays import Array
 from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, TURN, corners, faces, rounded
@@ -176,9 +178,9 @@ class Search:
         """Places whose surroundings, as far as they are known, are good, the best first."""
         places, column = self._column(quantity)
         order = np.argsort(-column, kind="stable")[:MOST]
-        close = np.abs(places[order, None] - places[None]).max(axis=2) <= CLOSE
+        close = self._tree.query_ball_point(places[order], CLOSE, p=inf)
         quarter = [
-            np.quantile(column[row], 0.25, method="lower") if row.sum() >= FEWEST else -np.inf
+            np.sort(column[row])[(len(row) - 1) // 4] if len(row) >= FEWEST else -inf
             for row in close
         ]
         best = order[np.argsort(-np.array(quarter), kind="stable")]
@@ -191,6 +193,7 @@ class Search:
             every = np.array(list(self._known.values()))
             every[~np.array(list(self._borne.values()))] = -np.inf
             self._arrays = np.array(list(self._known)), every
+            self._tree = KDTree(self._arrays[0])
         places, every = self._arrays
         return places, every[:, quantity]
 
