@@ -159,9 +159,11 @@ def judged(bench: Bench, study: Study, points: Points, told: Callable[[str], obj
         outcomes = bench.outcomes(every)
         for quantity in range(len(QUANTITIES)):
             values = {
-                place: (float(scores(outcome.numbers)[quantity]), settings, outcome)
+                place: (value, settings, outcome)
                 for place, settings, outcome in zip(places, every, outcomes, strict=True)
-                if not outcome.failure and bench.bearable(case, settings, outcome.numbers)
+                if not outcome.failure
+                and bench.bearable(case, settings, outcome.numbers)
+                and (value := float(scores(outcome.numbers)[quantity])) > 0.0  # achievable
             }
             if not values:
                 continue
