@@ -255,6 +255,15 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for row in (rows[0], rows[-1]):
         repeats(row, tmp_path)
     assert all(float(row["heat of a coil [W]"]) < 3.53 for row in rows if row["limit"] == "own")
+    # What the own circuit does best is allowed where the coil bears any heat.
+    best = {
+        (row["limit"], row["quantity"]): float(row["found"])
+        for row in rows
+        if row["setting"] == "best" and row["limit"] in ("own", "coil heat")
+    }
+    for (limit, quantity), value in best.items():
+        if limit == "own":
+            assert best["coil heat", quantity] >= 0.98 * value, quantity
     page = (tmp_path / "limits.md").read_text(encoding="utf-8")
     assert all(f"| {limit.name} |" in page for limit in limits) and "| trial-05 |" in page
     assert len(drawn) == 4 + 2  # and those of the two commands
