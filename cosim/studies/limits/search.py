@@ -80,6 +80,11 @@ class Best:
         firm = (one for one in self.settings if one.firm)
         return tuple(sorted(firm, key=lambda one: -one.median))
 
+    @property
+    def tops(self) -> tuple[Setting, ...]:
+        """The best one, and the best of those that may be turned, as far as there are any."""
+        return (*self.settings[:1], *self.robust[:1])
+
 
 Bests = tuple[Best, ...]
 """For each quantity."""

@@ -161,9 +161,8 @@ def _of_kin(bench: Bench, rig: Rig, name: Name) -> list[Array]:
     for quantity in range(len(QUANTITIES)):
         places = [np.empty((0, KNOB_COUNT))]
         for other in kin:
-            best = rig.found[other][quantity]
-            both = [*best.settings[:1], *best.robust[:1]]
-            places.append(_moved(bench, both, rig.cases[other], rig.cases[name]))
+            tops = rig.found[other][quantity].tops
+            places.append(_moved(bench, tops, rig.cases[other], rig.cases[name]))
         every.append(np.vstack(places))
     return every
 
@@ -181,8 +180,8 @@ def _hints(bench: Bench, rig: Rig, name: Name, others: Iterable[Name]) -> Array:
 
 def _as_hints(bench: Bench, found: Bests, there: Case, here: Case) -> Array:
     """The settings found for one machine as places of another."""
-    both = [one for best in found for one in (*best.settings[:1], *best.robust[:1])]
-    return np.unique(_moved(bench, both, there, here), axis=0)
+    tops = [one for best in found for one in best.tops]
+    return np.unique(_moved(bench, tops, there, here), axis=0)
 
 
 def _moved(bench: Bench, found: Sequence[Setting], there: Case, here: Case) -> Array:
