@@ -6,17 +6,6 @@
 #include "law.h"
 #include "mechanics.h"
 
-/* Errors are relative to |y| plus these: what counts as large for this machine, m, m/s, A. */
-static const double POSITION_SCALE = 1e-3, VELOCITY_SCALE = 0.1, CURRENT_SCALE = 0.1;
-
-double stickslip_allowed_error(const Model *m, int state, double value)
-{
-    const double scale = state >= I_COIL                                ? CURRENT_SCALE
-                         : state == V || state == U || state == W ? VELOCITY_SCALE
-                                                                        : POSITION_SCALE;
-    return m->r.tolerance * (scale + fabs(value));
-}
-
 /* The first n states take part; of those that act on the rates, `acting` for each surface. With
  * constants the compiler makes vectors of the inner loops. */
 STICKSLIP_INLINE double step_of(const int n, const int acting, const int source, const Law *law,

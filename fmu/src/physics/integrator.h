@@ -4,6 +4,8 @@
 #ifndef STICKSLIP_INTEGRATOR_H
 #define STICKSLIP_INTEGRATOR_H
 
+#include <math.h>
+
 #include "internal.h"
 #include "state.h"
 
@@ -18,9 +20,17 @@ double stickslip_trial_step(const Model *m, double tau, double h, const double y
 /* The factor by which the next step may differ, for an error as trial_step returns it. */
 double stickslip_step_factor(double error);
 
-/* The error that the tolerance allows in a state, by its place among those of a surface. */
-double stickslip_allowed_error(const Model *m, int state, double value);
-
 STICKSLIP_INTERNAL_END
+
+/* The error that the tolerance allows in a state, by its place among those of a surface: relative to
+ * |value| plus what counts as large for this machine, m, m/s, A. */
+static inline double stickslip_allowed_error(const Model *m, int state, double value)
+{
+    static const double POSITION_SCALE = 1e-3, VELOCITY_SCALE = 0.1, CURRENT_SCALE = 0.1;
+    const double scale = state >= I_COIL                          ? CURRENT_SCALE
+                         : state == V || state == U || state == W ? VELOCITY_SCALE
+                                                                  : POSITION_SCALE;
+    return m->r.tolerance * (scale + fabs(value));
+}
 
 #endif

@@ -16,6 +16,7 @@ typedef struct {
     int touch, rest, slips, eddy, clamped;
     double side, slip;
     double per_moving, per_ram, per_part; /* inverse masses, 1/kg */
+    double per_both;                      /* of the ram against the surface: their sum; 0 at rest */
     double load;                          /* constant part of what moves the surface, N */
     double kinetic;                       /* mu_k, against the slip */
     double following_rate;                /* of the current while it follows its target, A/s */
@@ -39,6 +40,7 @@ static inline Law stickslip_law(const Model *m)
     l.per_moving = 1.0 / (l.slips ? body : body + part);
     l.per_ram = 1.0 / p->ram_mass;
     l.per_part = 1.0 / part;
+    l.per_both = l.rest ? 0.0 : l.per_ram + l.per_moving;
     l.load = -(l.slips ? body : body + part) * p->gravity;
     l.kinetic = -p->mu_k * mode->slip;
     l.eddy = m->n.source && has_eddy(m);
@@ -56,39 +58,43 @@ static inline double stickslip_law_root(const Law *l, const double y[N_STATES])
 
 /* Of one surface, each times `per`, which a loop could not do as fast: a processor cannot read as a
  * vector what it has just written one by one. `root` is that of the penetration; it counts while a
- * compliant wall is touched. */
+ * compliant wall is touched. A stage waits for the one before it: the sums are such that few
+ * operations lie between the ram's place and its acceleration. */
 STICKSLIP_INLINE void
 stickslip_law_rates(const Law *l, const int source, const double y[N_STATES], double root,
                     double tau, const double per, double dy[N_STATES])
 {
     const Model *m = l->m;
     const Reals *p = &m->r;
-    const double q = y[Q], u = y[U], v = y[V], w = y[W];
-    const double bl = p->force_factor * (1.0 + q * (p->b1 + q * p->b2));
+    const double q = y[Q], u = y[U], v = y[V], w = y[W], square = q * q;
+    const double shape = (1.0 + q * p->b1) + square * p->b2;
     const double i = source ? y[I_COIL] : p->current + p->current_slope * tau;
-    const double drive = bl * i;
-    double on_ram = drive - q * (p->suspension_k1 + q * (p->suspension_k2 + q * p->suspension_k3)) -
-                    p->suspension_damping * u;
+    const double drive = (p->force_factor * i) * shape;
+    const double suspension =
+        q * p->suspension_k1 + square * (p->suspension_k2 + q * p->suspension_k3);
+    double on_ram = (drive - p->suspension_damping * u) - suspension;
     double lost = 0.0;
     if (l->touch) {
-        const double spring = p->contact_stiffness * root * root * root, closing = l->side * u;
-        const double damped = spring * p->contact_damping * closing;
+        const double spring = (p->contact_stiffness * root) * (root * root), closing = l->side * u;
+        const double damped = spring * (p->contact_damping * closing);
         on_ram -= l->side * (spring + damped);
         lost = damped * closing;
     }
-    const double springs = -p->flexure_stiffness * y[Z] - p->flexure_damping * v + l->load;
     double friction = 0.0;
     if (l->slips) {
         const double normal = p->normal_force + p->normal_force_slope * tau;
         friction = normal > 0.0 ? l->kinetic * normal : 0.0;
     }
-    const double a = (springs - (l->rest ? 0.0 : on_ram) - friction) * l->per_moving;
+    /* Acceleration of the surface but for what the ram does to it. */
+    const double alone =
+        ((l->load - friction) - p->flexure_stiffness * y[Z] - p->flexure_damping * v) * l->per_moving;
+    const double a = l->rest ? alone : alone - on_ram * l->per_moving;
     dy[Z] = per * v;
     dy[V] = per * a;
     dy[Q] = per * u;
-    dy[U] = l->rest ? 0.0 : per * (on_ram * l->per_ram - p->gravity - a);
+    dy[U] = l->rest ? 0.0 : per * (on_ram * l->per_both - (p->gravity + alone));
     dy[D] = per * w;
-    dy[W] = l->slips ? per * (friction * l->per_part - p->gravity - a) : 0.0;
+    dy[W] = l->slips ? per * ((friction * l->per_part - p->gravity) - a) : 0.0;
     dy[E_IN] = per * (drive * u);
     dy[E_FRICTION] = per * (-friction * w); /* of sticking, w is 0 */
     dy[E_IMPACT] = per * lost;
@@ -98,7 +104,7 @@ stickslip_law_rates(const Law *l, const int source, const double y[N_STATES], do
         return;
     }
     const double eddy = l->eddy ? p->eddy_resistance * (i - y[I_EDDY]) : 0.0;
-    const double loop = loop_resistance(m), at_rest = loop * i + eddy + bl * u;
+    const double loop = loop_resistance(m), at_rest = loop * i + eddy + (p->force_factor * u) * shape;
     double output, rate = l->following_rate;
     if (l->clamped) {
         output = output_limit(m, m->mode[0].output);

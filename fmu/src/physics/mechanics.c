@@ -3,13 +3,7 @@
 
 #include <math.h>
 
-#include "coil.h"
-#include "source.h"
-
-double stickslip_part_mass_per_surface(const Model *m)
-{
-    return m->r.part_mass / m->n.n_surfaces;
-}
+#include "forces.h"
 
 double stickslip_rest_height(const Model *m)
 {
@@ -18,26 +12,8 @@ double stickslip_rest_height(const Model *m)
            m->r.flexure_stiffness;
 }
 
-/* Penetration of the touched wall. Clamped at 0: trial points of a step may lie beyond the event. */
-static double penetration(const Model *m, const Mode *mode, const double y[N_STATES])
-{
-    double depth = mode->side * y[Q] - m->r.travel;
-    return depth > 0.0 ? depth : 0.0;
-}
-
-static int held_by_plate(const Model *m, const Mode *mode)
-{
-    return mode->plate == 0 && m->r.mu_plate > 0.0;
-}
-
-static double normal_force_at(const Model *m, double tau)
-{
-    const double force = m->r.normal_force + m->r.normal_force_slope * tau;
-    return force > 0.0 ? force : 0.0; /* not fmax, which is a call */
-}
-
-/* Where the surface's acceleration is given: the part alone, the ram standing still in the actuator. */
-static void forces_on_part(const Model *m, const Mode *mode, double tau, double a_surface, Forces *f)
+void stickslip_forces_on_part(const Model *m, const Mode *mode, double tau, double a_surface,
+                              Forces *f)
 {
     const Reals *p = &m->r;
     const double part = stickslip_part_mass_per_surface(m), weight = part * p->gravity;
@@ -80,40 +56,6 @@ static void rates_on_part(const Model *m, const Mode *mode, const Forces *f, For
         rate->plate = -rate->friction;
 }
 
-/* What acts on one surface without friction. */
-typedef struct {
-    double suspension, drive, wall; /* on the ram, N */
-    double body;                    /* mass that moves as one with the surface, kg */
-    double load;                    /* force on it, N */
-} Load;
-
-static inline double suspension_force(const Model *m, double q, double u)
-{
-    const Reals *p = &m->r;
-    return -q * (p->suspension_k1 + q * (p->suspension_k2 + q * p->suspension_k3)) -
-           p->suspension_damping * u;
-}
-
-static inline void load_on(const Model *m, const Mode *mode, const double y[N_STATES], int s, double tau,
-                    Load *l)
-{
-    const Reals *p = &m->r;
-    const double q = y[Q], u = y[U];
-    const int rest = mode->wall == WALL_REST;
-    l->suspension = suspension_force(m, q, u);
-    l->drive = force_factor_at(m, q) * stickslip_coil_current(m, y, s, tau);
-    l->wall = 0.0;
-    if (mode->wall == WALL_TOUCH) {
-        double depth = penetration(m, mode, y);
-        l->wall = -mode->side * p->contact_stiffness * depth * sqrt(depth) *
-                  (1.0 + p->contact_damping * mode->side * u);
-    }
-    const double on_ram = l->drive + l->suspension + l->wall;
-    l->body = rest ? p->surface_mass + p->ram_mass : p->surface_mass;
-    l->load = -p->flexure_stiffness * y[Z] - p->flexure_damping * y[V] - l->body * p->gravity -
-              (rest ? 0.0 : on_ram);
-}
-
 double stickslip_carried_mass(const Model *m, const Mode mode[N_MOVING], int s)
 {
     if (!m->n.independent)
@@ -124,10 +66,8 @@ double stickslip_carried_mass(const Model *m, const Mode mode[N_MOVING], int s)
     return m->r.part_mass + m->r.surface_mass + (other->wall == WALL_REST ? m->r.ram_mass : 0.0);
 }
 
-/* Force on what surface s carries, beside that surface and the weight of carried_mass: the friction
- * of the other surface where that slips, and what acts on the other surface where it moves along. */
-static double lift_on(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], int s,
-                      double tau, double normal)
+double stickslip_lift_on(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], int s,
+                         double tau, double normal)
 {
     const int other = 1 - s;
     if (mode[other].slip != 0)
@@ -137,70 +77,13 @@ static double lift_on(const Model *m, const Mode mode[N_MOVING], const double y[
     return l.load + l.body * m->r.gravity;
 }
 
-static inline __attribute__((always_inline)) void forces_of(const Model *m,
-                                                            const Mode modes[N_MOVING],
-                                                            const double all[N_ALL], int s,
-                                                            double tau, Forces *f)
-{
-    if (m->n.prescribed) {
-        forces_on_part(m, modes, tau, m->r.surface_acceleration, f);
-        return;
-    }
-    const Reals *p = &m->r;
-    const Mode *mode = modes + s;
-    const double *y = all + s * N_STATES;
-
-    if (mode->wall == WALL_REST && m->n.ram_fixed) {
-        forces_on_part(m, mode, tau, 0.0, f);
-        f->drive = force_factor_at(m, y[Q]) * stickslip_coil_current(m, y, s, tau);
-        f->wall = -p->flexure_stiffness * y[Z] - p->surface_mass * p->gravity - f->friction -
-                  f->drive - suspension_force(m, y[Q], y[U]);
-        return;
-    }
-    Load l;
-    load_on(m, mode, y, s, tau, &l);
-    f->drive = l.drive;
-    f->wall = l.wall;
-    f->normal = normal_force_at(m, tau);
-    const double part = stickslip_carried_mass(m, modes, s), body = l.body;
-    const double lift = m->n.independent ? lift_on(m, modes, all, s, tau, f->normal) : 0.0;
-    const int held = held_by_plate(m, mode);
-
-    f->plate = -p->mu_plate * f->normal * mode->plate;
-    if (mode->slip == 0) {
-        if (held) {
-            f->a_surface = 0.0;
-            f->friction = l.load;
-            f->plate = part * p->gravity - f->friction;
-        } else {
-            f->a_surface = (l.load - part * p->gravity + f->plate + lift) / (body + part);
-            f->friction = part * (f->a_surface + p->gravity) - f->plate - lift;
-        }
-        f->a_slip = 0.0;
-    } else {
-        f->friction = -p->mu_k * f->normal * mode->slip;
-        f->a_surface = (l.load - f->friction) / body;
-        if (held) {
-            f->plate = part * p->gravity - f->friction;
-            f->a_slip = -f->a_surface;
-        } else {
-            f->a_slip = (f->friction + f->plate + lift) / part - p->gravity - f->a_surface;
-        }
-    }
-    if (mode->wall == WALL_REST) {
-        f->a_q = 0.0;
-        f->wall = p->ram_mass * (f->a_surface + p->gravity) - f->drive - l.suspension;
-    } else if (m->n.ram_fixed) {
-        f->a_q = -f->a_surface;
-    } else {
-        f->a_q = (l.drive + l.suspension + l.wall) / p->ram_mass - p->gravity - f->a_surface;
-    }
-}
-
 void stickslip_forces(const Model *m, const Mode modes[N_MOVING], const double all[N_ALL], int s,
                       double tau, Forces *f)
 {
-    forces_of(m, modes, all, s, tau, f);
+    if (is_plain(m))
+        forces_of(1, m, modes, all, s, tau, f);
+    else
+        forces_of(0, m, modes, all, s, tau, f);
 }
 
 /* Rate of the force on the ram without the wall's. */
@@ -300,7 +183,7 @@ void stickslip_state_rates(const Model *m, const Mode modes[N_MOVING], const dou
         const double *y = all + s * N_STATES;
         double *dy = rates + s * N_STATES;
         Forces f;
-        forces_of(m, modes, all, s, tau, &f);
+        stickslip_forces(m, modes, all, s, tau, &f);
         dy[Z] = y[V];
         dy[V] = f.a_surface;
         dy[Q] = y[U];

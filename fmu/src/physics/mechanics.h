@@ -6,6 +6,11 @@
 #include "internal.h"
 #include "state.h"
 
+static inline double stickslip_part_mass_per_surface(const Model *m)
+{
+    return m->r.part_mass / m->n.n_surfaces;
+}
+
 STICKSLIP_INTERNAL_BEGIN
 
 typedef struct {
@@ -29,6 +34,16 @@ void stickslip_force_rates(const Model *m, const Mode mode[N_MOVING], const doub
 /* Mass that moves with surface s while the part sticks to it, without the surface and its ram, kg. */
 double stickslip_carried_mass(const Model *m, const Mode mode[N_MOVING], int s);
 
+/* Force on what surface s carries, beside that surface and the weight of carried_mass, N: the
+ * friction of the other surface where that slips, and what acts on the other surface where it moves
+ * along. */
+double stickslip_lift_on(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL], int s,
+                         double tau, double normal);
+/* Where the surface's acceleration is given: on the part alone, the ram standing still in the
+ * actuator. */
+void stickslip_forces_on_part(const Model *m, const Mode *mode, double tau, double a_surface,
+                              Forces *f);
+
 /* For all surfaces that move. */
 void stickslip_state_rates(const Model *m, const Mode mode[N_MOVING], const double y[N_ALL],
                            double tau, double dy[N_ALL]);
@@ -36,7 +51,6 @@ double stickslip_energy_stored(const Model *m, const double y[N_ALL]);
 
 /* For one surface, of its own mode and states. */
 
-double stickslip_part_mass_per_surface(const Model *m);
 /* Height of the surface at rest, under the weight of all that it carries, m. */
 double stickslip_rest_height(const Model *m);
 /* What the spring of a touched compliant wall holds, J. */

@@ -8,6 +8,7 @@
 #include "advance.h"
 #include "coil.h"
 #include "events.h"
+#include "forces.h"
 #include "mechanics.h"
 #include "source.h"
 
@@ -291,16 +292,17 @@ static double time_to_impact_slope(const Model *m, const double y[N_STATES], dou
     return t >= NO_IMPACT || speed == 0.0 ? 0.0 : -0.5 * t * t / speed;
 }
 
-void stickslip_model_outputs(Model *m)
+/* `plain` as forces_of() has it. */
+STICKSLIP_INLINE void outputs_of_first(const int plain, Model *m)
 {
     Forces f;
     const double *y = m->y;
     Reals *r = &m->r;
-    stickslip_forces(m, m->mode, y, 0, 0.0, &f);
+    forces_of(plain, m, m->mode, y, 0, 0.0, &f);
     r->z_surface = y[Z];
     r->v_surface = y[V];
     r->a_surface = f.a_surface;
-    r->z_ram = m->n.ram_fixed && !m->n.prescribed ? stickslip_rest_height(m) : y[Z] + y[Q];
+    r->z_ram = !plain && m->n.ram_fixed && !m->n.prescribed ? stickslip_rest_height(m) : y[Z] + y[Q];
     r->v_ram = y[V] + y[U];
     r->a_ram = f.a_surface + f.a_q;
     r->z_part = y[Z] + y[D];
@@ -321,6 +323,15 @@ void stickslip_model_outputs(Model *m)
     m->a_q = f.a_q;
     m->coupling_old = m->energies_old = 1;
     m->n.wall_contact = m->mode[0].side;
+}
+
+void stickslip_model_outputs(Model *m)
+{
+    if (is_plain(m)) {
+        outputs_of_first(1, m);
+        return;
+    }
+    outputs_of_first(0, m);
     if (m->n.independent)
         outputs_of_second(m);
 }

@@ -99,7 +99,7 @@ static int is_ahead(const Model *m)
             return 0;
     return a->at >= 0.0 && a->end >= a->at && isfinite(a->end) && isfinite(a->acceleration) &&
            are_finite(a->last, (size_t)moving(m) * N_STATES) && d->length > 0.0 &&
-           isfinite(d->length) && d->wall >= -1 && d->wall < moving(m) &&
+           isfinite(d->length) && d->per_length == 1.0 / d->length && d->wall >= -1 && d->wall < moving(m) &&
            are_finite(&d->c[0][0], sizeof d->c / sizeof(double)) &&
            are_finite(d->clock, sizeof d->clock / sizeof(double)) &&
            (a->ends_with == -1 || is_due(m, a->ends_with, a->surface));

@@ -74,7 +74,7 @@ typedef struct {
 /* The solution within one long step (see dense.h): a polynomial of each state in the share of the
  * step that has gone by. */
 typedef struct {
-    double length; /* of the step, s or s/m^0.5 */
+    double length, per_length; /* of the step, s or s/m^0.5, and its inverse */
     int wall;      /* the surface whose wall's clock it goes by; -1: the time */
     double c[8][N_ALL], clock[8];
 } Dense;
@@ -111,7 +111,6 @@ typedef struct {
      * touched, and where one is. */
     double step[2];
     double touch_step; /* the next long step by a wall's clock, s/m^0.5; 0: unknown */
-    double last_length, last_error; /* of the long step before; 0: there was an event since */
     double steady_for; /* time since an input was changed, s */
     double energy_at_start;
     double a_q; /* d2 q/dt2 of the first surface, as old as the outputs, m/s2 */
