@@ -29,7 +29,10 @@ ROOT = Path(__file__).resolve().parent
 FMU = ROOT / "fmu"
 MODEL = "stickslip"
 LIBRARIES = {
-    "loop": (ROOT / "cosim/coupling/loop", ROOT / "cosim/coupling/batch", ROOT / "cosim/drive"),
+    "loop": tuple(
+        ROOT / "cosim" / folder
+        for folder in ("coupling/loop", "coupling/batch", "drive", "simulation/rungs")
+    ),
     "part": (ROOT / "cosim/mechanics",),
     "chain": (ROOT / "cosim/studies/identify/chain",),
 }

@@ -1,8 +1,10 @@
 """Rung ``ideal``: the coil's current is the command's, whatever voltage it takes."""
 
 from collections.abc import Generator, Sequence
+from ctypes import c_double, c_int64, c_void_p
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +18,18 @@ from cosim.files.spill import Tape, blocks
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
 from cosim.simulation.rungs.rung import Driven, Led
+from cosim.toolchain.libraries import library
 
-_IN_CACHE = 1 << 12
-"""Rows whose intermediate values stay in the processor's cache; larger arrays are taken from the
-system anew in each run."""
+
+@cache
+def _library() -> Any:
+    found = library("loop")
+    found.coil_rows.restype = None
+    found.coil_rows.argtypes = (
+        *(c_int64, *(c_void_p,) * 4, *(c_double,) * 5),
+        *(c_int64, c_int64, c_void_p),
+    )
+    return found
 
 
 class Ideal(Led):
@@ -84,23 +94,22 @@ class _Coil:
             self._most = max(self._most, float(first.max()), float(end[late].max()))
             self._least = min(self._least, float(first.min()), float(end[late].min()))
         branch = eddy.follow(h, start, end)
-        step = scene.run.output_step
+        step, first = scene.run.output_step, len(self._waves)
         stop = min(count(step, edges[-1] + SAME_TIME), self._rows)
-        for few in blocks(stop - len(self._waves), _IN_CACHE):
-            first_row = len(self._waves)
-            row = step * np.arange(first_row, first_row + few.stop - few.start)
-            # A row on an edge belongs to what is before it.
-            passed = (row - SAME_TIME).searchsorted(edges[1:-1], "right")
-            rows = np.diff(passed, prepend=0, append=len(row))
-            since, steep = row - np.repeat(edges[:-1], rows), np.repeat(slope, rows)
-            begun = np.repeat(start, rows)
-            current = begun + steep * since
-            voltage = scene.coil.resistance * current + scene.coil.inductance * steep
-            if branch is not None:
-                lag = steep * eddy.tau
-                rest = begun - np.repeat(branch, rows) - lag
-                voltage += eddy.resistance * (lag + rest * np.exp(-since / eddy.tau))
-            self._waves.append(np.stack([current, voltage], axis=1))
+        edges, start, end = (np.ascontiguousarray(values) for values in (edges, start, end))
+        for few in blocks(stop - first):
+            rows = self._waves.room(few.stop - few.start)
+            found = np.empty((few.stop - few.start, 2)) if rows is None else rows
+            _library().coil_rows(
+                *(len(h), edges.ctypes.data, start.ctypes.data, end.ctypes.data),
+                None if branch is None else branch.ctypes.data,
+                *(scene.coil.resistance, scene.coil.inductance, eddy.resistance, eddy.tau),
+                *(step, first + few.start, first + few.stop, found.ctypes.data),
+            )
+            if rows is None:
+                self._waves.append(found)
+            else:
+                self._waves.fill(len(found))
 
     def waves(self, back_emf: Array) -> tuple[Array, Array]:
         """Current (A) and voltage (V) in the rows, in which the back-EMF (V) is known."""
