@@ -14,11 +14,14 @@ from cosim.scene import changed
 from cosim.studies.limits.aims import QUANTITIES, scores
 from cosim.studies.limits.runs import Bench, Case
 from cosim.studies.limits.search import Setting
-from cosim.studies.limits.study import IDEAL, OWN, Bests, Name, Study
+from cosim.studies.limits.study import IDEAL, OWN, Name, Rig, Study, moved
 from cosim.studies.limits.table import Machine, Settings
 
 WITHIN = 0.02
 """Relative difference of a confirmed value."""
+
+OTHERS = 6
+"""Settings of other machines whose turns are run where one is refuted."""
 
 KINDS = ("best", "robust")
 
@@ -66,38 +69,74 @@ Points = dict[Key, Point]
 def confirmed(bench: Bench, study: Study, told: Callable[[str], object]) -> Points:
     """The points of the scene's own rig: of those settings that the amplifier confirms the best;
     where it confirms none the best of all.
+
+    Where it refutes a setting, those that it confirms on other machines are tried there, too.
     """
     rig = study.rigs[0]
-    waiting: dict[Key, list[Setting]] = {}
-    for name, bests in rig.found.items():
-        for quantity, best in enumerate(bests):
-            for kind, settings in zip(KINDS, (best.settings, best.robust), strict=True):
-                if settings:
-                    waiting[name, quantity, kind] = list(settings)
-    points: Points = {}
-    first: Points = {}
-    while waiting:
-        rows = list(waiting)
-        found = _points(bench, rig.cases, {key: waiting[key][0] for key in rows})
-        for key, point in found.items():
-            first.setdefault(key, point)
-            refuted = len(_choices(rig.found[key[0]], key)) - len(waiting[key])
-            waiting[key].pop(0)
-            if point.holds:
-                points[key] = replace(point, refuted=refuted)
-            elif not waiting[key]:
-                points[key] = replace(first[key], refuted=refuted + 1)
-            else:
-                continue
-            del waiting[key]
+    choices = {
+        (name, quantity, kind): settings
+        for name, bests in rig.found.items()
+        for quantity, best in enumerate(bests)
+        for kind, settings in zip(KINDS, (best.settings, best.robust), strict=True)
+        if settings
+    }
+    points = _first_that_holds(bench, rig.cases, choices)
+    more = {
+        key: settings
+        for key, point in points.items()
+        if point.refuted and (settings := _of_others(bench, rig, points, key, choices[key]))
+    }
+    for key, point in _first_that_holds(bench, rig.cases, more).items():
+        refuted = points[key].refuted + point.refuted
+        points[key] = replace(point if point.holds else points[key], refuted=refuted)
     told("confirmed")
     return _on_full(bench, rig.cases, points)
 
 
-def _choices(bests: Bests, key: Key) -> tuple[Setting, ...]:
-    """The settings that stand for a point, the first choice first."""
-    _, quantity, kind = key
-    return bests[quantity].settings if kind == "best" else bests[quantity].robust
+def _first_that_holds(
+    bench: Bench, cases: dict[Name, Case], choices: dict[Key, tuple[Setting, ...]]
+) -> Points:
+    """For each point the first of its settings that is confirmed; where none is, the first."""
+    points: Points = {}
+    first: Points = {}
+    tried = 0
+    while left := {key: settings for key, settings in choices.items() if key not in points}:
+        found = _points(bench, cases, {key: settings[tried] for key, settings in left.items()})
+        tried += 1
+        for key, point in found.items():
+            first.setdefault(key, point)
+            if point.holds:
+                points[key] = replace(point, refuted=tried - 1)
+            elif tried == len(left[key]):
+                points[key] = replace(first[key], refuted=tried)
+    return points
+
+
+def _of_others(
+    bench: Bench, rig: Rig, points: Points, key: Key, tried: tuple[Setting, ...]
+) -> tuple[Setting, ...]:
+    """Settings that are confirmed on other machines and do better on that of a point than what is
+    confirmed there, the best first."""
+    name, quantity, kind = key
+    elsewhere = [
+        moved(bench, [point.setting], rig.cases[other], rig.cases[name])
+        for (other, number, _), point in points.items()
+        if other != name and number == quantity and point.holds
+    ]
+    if not elsewhere:
+        return ()
+    best = rig.searches[name].best_of(np.unique(np.vstack(elsewhere), axis=0), quantity, OTHERS)
+    known, point = {one.place for one in tried}, points[key]
+    return tuple(
+        one
+        for one in (best.settings if kind == "best" else best.robust)
+        if one.place not in known
+        and not (point.holds and _rank(one, kind) <= _rank(point.setting, kind))
+    )
+
+
+def _rank(setting: Setting, kind: str) -> float:
+    return setting.value if kind == "best" else setting.median
 
 
 def _points(bench: Bench, cases: dict[Name, Case], chosen: dict[Key, Setting]) -> Points:

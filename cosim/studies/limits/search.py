@@ -164,6 +164,16 @@ class Search:
         achievable = (one for one in settings if one.value > 0.0)
         return Best(tuple(sorted(achievable, key=lambda one: -one.value)))
 
+    def best_of(self, places: Array, quantity: int, count: int) -> Best:
+        """The best ``count`` of places (rows) for a quantity, without what cannot be borne."""
+        column = self.scores(places)[:, quantity]
+        good = [
+            places[k]
+            for k in np.argsort(-column, kind="stable")
+            if column[k] > 0.0 and self._borne[tuple(places[k].tolist())]
+        ]
+        return Best(tuple(self.around(place, quantity) for place in good[:count]))
+
     def bests(self, also: Sequence[Array] | None = None) -> Bests:
         """What was found for each quantity; ``also`` has further places (rows) for each."""
         none = np.empty((0, KNOB_COUNT))

@@ -27,9 +27,9 @@ class Efforts:
     """What the searches may cost."""
 
     first: Effort
-    """Of the scene's own circuit, and of the ideal current."""
+    """Of a circuit of the scene's own rig."""
     next: Effort
-    """Of a circuit that knows what was found for those before it."""
+    """Of the same in a round."""
     others: Effort
     """Of the other rigs of an ensemble, and of the own rig when it is searched again."""
     rounds: int
@@ -46,7 +46,7 @@ FULL = Efforts(
     3,
 )
 _COARSE = Effort(32, (0.05, 0.02), 2)
-QUICK = Efforts(Effort(128, (0.05, 0.02), 2), _COARSE, _COARSE, 1, 1)
+QUICK = Efforts(Effort(64, (0.05, 0.02), 2), _COARSE, _COARSE, 1, 1)
 
 Name = tuple[str, float]
 """A limit and its value; OWN and IDEAL besides."""
@@ -62,6 +62,7 @@ class Rig:
     settings: Settings
     cases: dict[Name, Case] = field(default_factory=dict[Name, Case])
     found: dict[Name, Bests] = field(default_factory=dict[Name, Bests])
+    searches: dict[Name, Search] = field(default_factory=dict[Name, Search])
 
 
 @dataclass
@@ -108,10 +109,8 @@ def study(
         rig = Rig(name, settings)
         scene = changed(bench.scene, rig.settings, rig.name)
         rig.cases = _cases(scene, settings, limits, all_values=number == 0)
-        first, others = efforts.first, efforts.next
-        if number:
-            first = others = efforts.others
-        _search(bench, rig, (seed, number), first, others, efforts.rounds, told)
+        first, later = (efforts.others,) * 2 if number else (efforts.first, efforts.next)
+        _search(bench, rig, (seed, number), first, later, efforts.rounds, told)
         found.append(rig)
     return Study(bench.scene, limits, found[:-1], found[-1].found[OWN])
 
@@ -131,21 +130,20 @@ def _search(
     rig: Rig,
     seed: tuple[int, int],
     first: Effort,
-    others: Effort,
+    later: Effort,
     rounds: int,
     told: Callable[[str], object],
 ) -> None:
-    searches: dict[Name, Search] = {}
+    searches = rig.searches
     for number, (name, case) in enumerate(rig.cases.items()):
-        effort = first if name in (OWN, IDEAL) else others
         search = searches[name] = Search(partial(bench.scores, case), (*seed, number))
-        search.run(effort, _hints(bench, rig, name, _kin(rig, name)))
+        search.run(first, _hints(bench, rig, name, _kin(rig, name)))
         rig.found[name] = search.bests()
         told(f"{rig.name}: {name[0]} {name[1]:.3g}")
     for number in range(1, rounds + 1):
         # What is best on one machine is tried on all, and climbed on from where it is better.
         for name, search in searches.items():
-            search.climb(others, _hints(bench, rig, name, rig.found))
+            search.climb(later, _hints(bench, rig, name, rig.found))
             rig.found[name] = search.bests()
             told(f"{rig.name}, round {number}: {name[0]} {name[1]:.3g}")
     for name, search in searches.items():
@@ -162,7 +160,7 @@ def _of_kin(bench: Bench, rig: Rig, name: Name) -> list[Array]:
         places = [np.empty((0, KNOB_COUNT))]
         for other in kin:
             tops = rig.found[other][quantity].tops
-            places.append(_moved(bench, tops, rig.cases[other], rig.cases[name]))
+            places.append(moved(bench, tops, rig.cases[other], rig.cases[name]))
         every.append(np.vstack(places))
     return every
 
@@ -181,10 +179,10 @@ def _hints(bench: Bench, rig: Rig, name: Name, others: Iterable[Name]) -> Array:
 def _as_hints(bench: Bench, found: Bests, there: Case, here: Case) -> Array:
     """The settings found for one machine as places of another."""
     tops = [one for best in found for one in best.tops]
-    return np.unique(_moved(bench, tops, there, here), axis=0)
+    return np.unique(moved(bench, tops, there, here), axis=0)
 
 
-def _moved(bench: Bench, found: Sequence[Setting], there: Case, here: Case) -> Array:
+def moved(bench: Bench, found: Sequence[Setting], there: Case, here: Case) -> Array:
     """Settings of one machine as places (rows) of another, with the same currents."""
     places = np.array([one.place for one in found]).reshape(-1, KNOB_COUNT)
     ratio = bench.amperes(there) / bench.amperes(here)
