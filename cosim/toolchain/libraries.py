@@ -32,6 +32,13 @@ def library(name: str) -> ctypes.CDLL:
         raise BadInput(f"The compiled library {path} cannot be loaded: {error}.") from error
 
 
+def digest(name: str) -> str:
+    """The hash of the shared library ``name``, as the build wrote it down."""
+    path = compiled(name + SUFFIX)
+    found = json.loads((path.parent / "build.json").read_bytes())["files"][path.name][1]
+    return str(found)
+
+
 def compiled(name: str) -> Path:
     """The absolute path of one of the compiled files or folders; BadInput if it is missing, if what
     is there is not what was built, or if it is open to others."""

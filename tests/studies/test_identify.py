@@ -13,6 +13,7 @@ import cosim
 from cosim.arrays import Array
 from cosim.cli.main import main
 from cosim.errors import BadInput
+from cosim.studies.identify import run
 from cosim.studies.identify.chain import chain
 from cosim.studies.identify.problem.space import read_space
 from cosim.studies.identify.problem.targets import (
@@ -27,6 +28,7 @@ from cosim.studies.identify.report.verdicts import judge
 from cosim.studies.identify.run import identify
 from cosim.studies.identify.search.checkpoint import Journal
 from cosim.studies.identify.search.finish import finish
+from cosim.studies.identify.search.plan import QUICK
 from cosim.studies.identify.search.search import Found, Search
 from cosim.trials.camera import FRAME_RATE, hermite
 from cosim.trials.recording import Recording
@@ -277,6 +279,16 @@ def test_a_journal_of_other_trials_is_not_taken(tmp_path: Path) -> None:
     assert Journal(path, 0, "these").resumed == 1
     assert Journal(path, 0, "others").resumed == 0
     assert Journal(path, 1, "these").resumed == 0
+
+
+def test_a_journal_of_another_build_is_not_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its stages would stand among those of this one."""
+    asked = run._asked(read_space(), [], QUICK)
+    assert asked == run._asked(read_space(), [], QUICK)
+    monkeypatch.setattr(run, "digest", lambda name: f"another {name}")
+    assert asked != run._asked(read_space(), [], QUICK)
 
 
 def test_verdicts() -> None:

@@ -23,6 +23,8 @@ from cosim.studies.identify.search.checkpoint import Journal
 from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds
 from cosim.studies.identify.search.search import Found, Progress, Search
 from cosim.studies.sweep.pool import workers_asked
+from cosim.toolchain.libraries import digest
+from cosim.toolchain.versions import versions
 
 UNSTEADY = 0.5
 """Repeatability of a velocity (NRMSE of its cycles) beyond which no steady drive explains it."""
@@ -130,7 +132,7 @@ def _steady(trial: Measured) -> bool:
 
 
 def _asked(space: Space, trials: Sequence[Measured], effort: object) -> Any:
-    """All that decides what a stage finds, beside the seed."""
+    """All that decides what a stage finds, beside the seed; this build of the programs, too."""
     entries = [
         repr(entry) for entry in (*space.rig_entries.values(), *space.trial_entries.values())
     ]
@@ -144,7 +146,7 @@ def _asked(space: Space, trials: Sequence[Measured], effort: object) -> Any:
         ]
         for trial in trials
     ]
-    return [entries, sums, repr(effort), WEIGHTS]
+    return [entries, sums, repr(effort), WEIGHTS, versions(), digest("chain")]
 
 
 def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[HeldOut]]:
