@@ -13,7 +13,12 @@ from cosim.files.picture import Picture
 from cosim.scene import keys
 from cosim.studies.identify.chain.chain import OWN
 from cosim.studies.identify.problem.space import Space, read_space
-from cosim.studies.identify.problem.targets import WEIGHTS, Measured, read_trials
+from cosim.studies.identify.problem.targets import (
+    TRANSPORT,
+    WEIGHTS,
+    Measured,
+    read_trials,
+)
 from cosim.studies.identify.report.exact import exact
 from cosim.studies.identify.report.measures import Row, bands, errors, own_numbers, repeatability
 from cosim.studies.identify.report.scenes import trial_settings
@@ -146,7 +151,7 @@ def _asked(space: Space, trials: Sequence[Measured], effort: object) -> Any:
         ]
         for trial in trials
     ]
-    return [entries, sums, repr(effort), WEIGHTS, versions(), digest("chain")]
+    return [entries, sums, repr(effort), WEIGHTS, TRANSPORT, versions(), digest("chain")]
 
 
 def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[HeldOut]]:
@@ -157,7 +162,8 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[He
         rig = plan.finished(name, rows, found)
         surface = replace(plan.fine, targets=[trials[k].surface for k in left])
         alone = plan.drives(f"{name}: surface", rig.place, surface)
-        both = plan.drives(f"{name}: surface and part", rig.place, plan.fine.part(left))
+        transport = replace(plan.fine, targets=[trials[k].transport for k in left])
+        both = plan.drives(f"{name}: surface and part", rig.place, transport)
         rigs.append(rig)
         for k, one, two in zip(left, alone.own, both.own, strict=True):
             held_out.append(HeldOut(trials[k], number, rig.place, one, two))

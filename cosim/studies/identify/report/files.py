@@ -119,7 +119,8 @@ def _tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
         tables["Trials that were not fitted"] = [
             _told(row, floors=True) for row in numbers["apart"]
         ]
-    for kind, words in (("surface", "surface alone"), ("surface_and_part", "surface and part")):
+    both = "surface and part, whose heights count twice"
+    for kind, words in (("surface", "surface alone"), ("surface_and_part", both)):
         rows = [one[kind] for one in numbers["held_out"]]
         if rows:
             tables[f"Held out: rig from the other folds, own numbers from the trial's {words}"] = [

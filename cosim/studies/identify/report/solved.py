@@ -13,7 +13,7 @@ from cosim.studies.identify.search.search import Found
 @dataclass(frozen=True, eq=False)
 class HeldOut:
     """A trial on a rig that was found without it: its own numbers fitted to its surface alone, and
-    to surface and part."""
+    to surface and part, whose heights count twice there."""
 
     trial: Measured
     fold: int
