@@ -488,11 +488,14 @@ double stickslip_share_at(const Dense *dense, double time)
 {
     if (dense->wall < 0)
         return time * dense->per_length;
-    /* The clock's rate is the root, and grows or falls: bisection where Newton would leave. */
+    /* The clock's rate is the root, and grows or falls: bisection where Newton would leave. Past the
+     * end of a touch, where the step has an event, the root is below zero and the clock runs back. */
     double low = 0.0, high = 1.0, x = time / dense->clock[1], d[2];
+    if (!(x > 0.0 && x < 1.0))
+        x = 0.5;
     for (int i = 0; i < 100; i++) {
         derive(dense->clock, 1, 2, x, d);
-        if (d[0] < time)
+        if (d[0] < time && d[1] > 0.0)
             low = x;
         else
             high = x;
