@@ -545,5 +545,5 @@ def test_figure_7_has_the_published_errors_and_the_machines_own(trials: Path, tm
     assert shown.simulated[1].max() == pytest.approx(4.55e-3, abs=0.05e-3)
     # which the whole machine repeats, too
     apart = numbers["v_machine [mm/s]"] - numbers["v_measured [mm/s]"]
-    assert np.abs(apart).mean() < 0.6
+    assert np.abs(apart).mean() < 0.65
     assert (tmp_path / "figure7.png").read_bytes().startswith(b"\x89PNG")
