@@ -39,15 +39,6 @@ static size_t reals_there(const Instance *inst)
     return m->coupling_old ? FIRST_COUPLING : m->energies_old ? FIRST_ENERGY : N_REALS;
 }
 
-/* Without a branch, so that it is vector code: the usual case, for which it pays to ask first. */
-static int are_below(const uint32_t vr[], size_t n, uint32_t there)
-{
-    uint32_t beyond = 0;
-    for (size_t i = 0; i < n; i++)
-        beyond |= vr[i] - REFERENCE_REALS >= there;
-    return !beyond;
-}
-
 static int outputs_fresh(Instance *inst, const char *function)
 {
     State *s = &inst->state;
@@ -96,11 +87,6 @@ int stickslip_get_reals(Instance *inst, const char *function, const uint32_t vr[
         return 0;
     const double *reals = (const double *)&inst->state.model.r;
     size_t there = reals_there(inst);
-    if (are_below(vr, n, (uint32_t)there)) {
-        for (size_t i = 0; i < n; i++)
-            values[i] = reals[vr[i] - REFERENCE_REALS];
-        return 1;
-    }
     for (size_t i = 0; i < n; i++) {
         const size_t place = (size_t)vr[i] - REFERENCE_REALS;
         if (place < there) {
