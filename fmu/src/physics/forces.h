@@ -61,12 +61,6 @@ static inline void load_on(const Model *m, const Mode *mode, const double y[N_ST
               (rest ? 0.0 : on_ram);
 }
 
-/* One surface that moves with its ram by itself and touches no plate: what most scenes have. */
-static inline int is_plain(const Model *m)
-{
-    return !(m->n.prescribed | m->n.independent | m->n.ram_fixed) && m->r.mu_plate == 0.0;
-}
-
 /* `plain` is a constant for the compiler: 1 only where the machine is. */
 STICKSLIP_INLINE void forces_of(const int plain, const Model *m, const Mode modes[N_MOVING],
                                 const double all[N_ALL], int s, double tau, Forces *f)

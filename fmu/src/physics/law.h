@@ -27,7 +27,7 @@ static inline Law stickslip_law(const Model *m)
     const Reals *p = &m->r;
     const Mode *mode = m->mode;
     Law l = {.m = m};
-    l.general = moving(m) > 1 || m->n.prescribed || m->n.ram_fixed || p->mu_plate > 0.0;
+    l.general = !is_plain(m);
     if (l.general)
         return l;
     const double part = stickslip_part_mass_per_surface(m);

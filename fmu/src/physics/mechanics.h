@@ -11,6 +11,13 @@ static inline double stickslip_part_mass_per_surface(const Model *m)
     return m->r.part_mass / m->n.n_surfaces;
 }
 
+/* One surface that moves with its ram by itself and touches no plate: the case that has code of its
+ * own wherever speed counts. */
+static inline int is_plain(const Model *m)
+{
+    return !(m->n.prescribed | m->n.independent | m->n.ram_fixed) && m->r.mu_plate == 0.0;
+}
+
 STICKSLIP_INTERNAL_BEGIN
 
 typedef struct {
