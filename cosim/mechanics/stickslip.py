@@ -29,7 +29,7 @@ STEP_OUTPUTS = (
     *("v_surface_max", "v_surface_min", "z_surface_max", "z_surface_min"),
 )
 """What is read after every step: back-EMF of one coil (V, V/s) and its integral over time (Wb),
-extremes within the step."""
+extremes since the inputs were set last."""
 
 SAMPLE_OUTPUTS = (
     *("back_emf", "z_surface", "v_surface", "a_surface", "z_ram", "v_ram"),
@@ -95,7 +95,6 @@ def _names(has_source: bool, two_surfaces: bool, changing_force: bool) -> _Names
         "inputs": ramps,
         "held_inputs": (*ramps, "inputs_hold_for"),
         "step_outputs": step_outputs,
-        "inner": (*step_outputs[4:], *sampled),
         "reals": sampled,
         "wholes": wholes,
         "totals": totals,

@@ -22,12 +22,12 @@ DRIVE: dict[str, Any] = {"current": -0.9, "current_slope": 28.0}
 
 
 def rows(hold: float | None, tolerance: float, turn: int = ROWS, **changes: float) -> Any:
-    """Values of NAMES at each row, extremes over all rows, and internal steps; the current turns at
-    one of the rows. Where ``hold`` (s) is None, a step ends at every row."""
+    """Values of NAMES at each row, extremes since the row before, and internal steps; the current
+    turns at one of the rows. Where ``hold`` (s) is None, a step ends at every row."""
     with Bench(tolerance=tolerance, **DRIVE, **changes) as bench:
-        bench.set(inputs_hold_for=hold or 0.0)
         found, extremes = [], []
         for row in range(ROWS):
+            bench.set(inputs_hold_for=hold or 0.0)
             if hold is None:
                 bench.set(command=row)  # a change, though without effect
             if row == turn:
@@ -72,6 +72,31 @@ def test_extremes_within_a_step_are_found(turn: int) -> None:
         # Where the part breaks away within a row, the acceleration has a corner.
         allowed = 1e-3 if name.startswith("a_") else 1e-6
         assert np.sort(off)[-4] < allowed, name
+
+
+def test_extremes_are_those_since_the_inputs_were_set_last() -> None:
+    """However many steps that takes, within an internal step too, and whether they are looked at or
+    not. The truth: the extremes of each row."""
+    most = ("a_surface_max", "v_surface_max", "z_surface_max")
+    least = ("a_surface_min", "v_surface_min", "z_surface_min")
+    turns, over = range(0, 600, 47), 0.0
+    highest, lowest = np.full(3, -np.inf), np.full(3, np.inf)
+    for looked_at in (True, False):
+        with Bench(**DRIVE) as fine, Bench(**DRIVE) as bench:
+            for row in range(600):
+                for it in (fine, bench) if row in turns else (fine,):
+                    it.set(inputs_hold_for=1.0)
+                if row in turns:
+                    highest, lowest = np.full(3, -np.inf), np.full(3, np.inf)
+                fine.step(ROW)
+                bench.step(ROW)
+                highest = np.maximum(highest, fine.get(*most))
+                lowest = np.minimum(lowest, fine.get(*least))
+                if looked_at or row + 1 in turns:
+                    found = np.array([bench.get(*most), bench.get(*least)])
+                    off = np.abs(found - (highest, lowest)) / np.maximum(highest - lowest, 1e-6)
+                    over = max(over, off.max())
+    assert over < 1e-9
 
 
 def _peak(signal: Any) -> float:

@@ -65,8 +65,6 @@ typedef struct Recorder {
     const Schedule *schedule;     /* of one more input that follows the time alone; or NULL */
     const uint32_t *step_places;  /* as the enum above has them, then pairs of maximum and minimum */
     int64_t step_outputs;
-    const uint32_t *inner_places; /* at once for a row within an interval: the extremes, the reals */
-    double *inner_outputs;        /* their values */
     const uint32_t *real_places, *whole_places; /* of a row: the reals, then the whole numbers */
     int64_t reals, wholes;
     const uint32_t *total_places, *counter_places;

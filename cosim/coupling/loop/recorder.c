@@ -47,12 +47,31 @@ static int64_t corners(const Schedule *s, double t, int with_it)
     return low;
 }
 
+/* Take in the extremes since the inputs were set last: before they are set again. */
+static void widen(Recorder *r, const double *found)
+{
+    /* The end of settling may be a corner within rounding. */
+    if (r->fmu->time <= r->settle + SAME_TIME)
+        return;
+    double *most = r->extremes, *least = r->extremes + 1;
+    for (int64_t k = 0; k < r->step_outputs - EXTREMES; k += 2) {
+        most[k] = found[k] > most[k] ? found[k] : most[k];
+        least[k] = found[k + 1] < least[k] ? found[k + 1] : least[k];
+    }
+}
+
 /* The inputs of the interval under way from the time reached on: they go linearly from `start`, or
  * what the schedule has, until the interval's or the schedule's next corner. */
 static int set_inputs(Recorder *r, double edge, const double *start, const double *end)
 {
     Fmu *f = r->fmu;
     const double reached = f->time - r->began;
+    if (reached > SAME_TIME) {
+        const int64_t extremes = r->step_outputs - EXTREMES;
+        if (!f->get(f, r->step_places + EXTREMES, extremes, r->outputs + EXTREMES))
+            return 0;
+        widen(r, r->outputs + EXTREMES);
+    }
     double *input = r->inputs;
     r->holds_until = edge;
     for (int64_t k = 0; k < r->ports; k++) {
@@ -83,39 +102,32 @@ static int step_within(Recorder *r, double time, double edge, const double *star
         return 0;
     if (!f->step(f, time - f->time))
         return 0;
-    /* Who leads looks at the interval's end alone. */
-    const int64_t extremes = r->step_outputs - EXTREMES;
-    const double *found = time < edge ? r->inner_outputs : r->outputs + EXTREMES;
-    if (!(time < edge ? f->get(f, r->inner_places, extremes + r->reals, r->inner_outputs)
-                      : f->get(f, r->step_places, r->step_outputs, r->outputs)))
-        return 0;
     f->time = time;
     f->steps++;
-    if (time > r->settle + SAME_TIME) { /* the end of settling may be a corner within rounding */
-        double *most = r->extremes, *least = r->extremes + 1;
-        for (int64_t k = 0; k < extremes; k += 2) {
-            most[k] = found[k] > most[k] ? found[k] : most[k];
-            least[k] = found[k + 1] < least[k] ? found[k + 1] : least[k];
-        }
-    }
+    if (time < edge) /* who leads looks at the interval's end alone */
+        return 1;
+    if (!f->get(f, r->step_places, r->step_outputs, r->outputs))
+        return 0;
+    widen(r, r->outputs + EXTREMES);
     return 1;
 }
 
-/* Write down what the agenda has for this time; `reals` are those of a row, if they are known. */
-static int visit(Recorder *r, const double *reals)
+/* Write down what the agenda has for this time. */
+static int visit(Recorder *r)
 {
     Fmu *f = r->fmu;
     const int32_t what = r->what[r->next++];
-    if (what & SETTLED && !(f->get(f, r->total_places, r->totals, r->totals_at_settle) &&
-                            f->get_whole(f, r->counter_places, r->counters, r->counters_at_settle)))
-        return 0;
+    if (what & SETTLED) {
+        if (!f->get(f, r->total_places, r->totals, r->totals_at_settle) ||
+            !f->get_whole(f, r->counter_places, r->counters, r->counters_at_settle))
+            return 0;
+        r->holds_until = f->time; /* the inputs are to be set again, so that extremes begin here */
+    }
     if (what & (ROW | FRAME)) {
         /* The row's place holds the sample of a frame too; the array has one row to spare. */
         double *row = r->rows + r->n_rows * (r->reals + r->wholes);
         int32_t whole[2];
-        for (int64_t k = 0; reals && k < r->reals; k++)
-            row[k] = reals[k];
-        if ((!reals && !f->get(f, r->real_places, r->reals, row)) ||
+        if (!f->get(f, r->real_places, r->reals, row) ||
             !f->get_whole(f, r->whole_places, r->wholes, whole))
             return 0;
         for (int64_t k = 0; k < r->wholes; k++)
@@ -134,7 +146,7 @@ static int visit(Recorder *r, const double *reals)
 
 int recorder_begin(Recorder *r)
 {
-    return visit(r, NULL);
+    return visit(r);
 }
 
 /* To ask the clock costs as much as a tenth of a row. */
@@ -156,13 +168,13 @@ static int64_t follow(Recorder *r, int64_t n, const double *edges, const double 
             if (f->steps >= stop || is_late(f, late))
                 return k;
             if (!step_within(r, r->times[r->next], edges[k], start, end) ||
-                !visit(r, r->inner_outputs + r->step_outputs - EXTREMES))
+                !visit(r))
                 return -1;
         }
         if (!step_within(r, edges[k], edges[k], start, end))
             return -1;
         r->inside = 0;
-        if (r->times[r->next] <= edges[k] + SAME_TIME && !visit(r, NULL))
+        if (r->times[r->next] <= edges[k] + SAME_TIME && !visit(r))
             return -1;
         if (f->steps >= stop || is_late(f, late))
             return k + 1;

@@ -57,7 +57,6 @@ class Recorder:
         self._totals = (c_double * len(mechanics.total_names))()
         self._counters = (c_int32 * len(COUNTERS))()
         self._inputs = (c_double * len(mechanics.places["held_inputs"]))()
-        self._inner = (c_double * len(mechanics.places["inner"]))()
         extremes = len(mechanics.step_outputs) - 4
         self.extremes = (c_double * extremes)(*[-np.inf, np.inf] * (extremes // 2))
         """Largest and smallest values after settling, in pairs: acceleration (m/s²), velocity (m/s)
@@ -82,8 +81,6 @@ class Recorder:
             schedule=schedule and ctypes.pointer(schedule),
             step_places=places["step_outputs"],
             step_outputs=len(mechanics.step_outputs),
-            inner_places=places["inner"],
-            inner_outputs=self._inner,
             real_places=places["reals"],
             whole_places=places["wholes"],
             reals=len(places["reals"]),

@@ -42,7 +42,6 @@ class RecorderState(Structure):
         ("fmu", POINTER(Fmu)),
         *(("input_places", _PLACES), ("ports", c_int64), ("schedule", POINTER(Schedule))),
         *(("step_places", _PLACES), ("step_outputs", c_int64)),
-        *(("inner_places", _PLACES), ("inner_outputs", _DOUBLES)),
         *_of(_PLACES, "real_places", "whole_places"),
         *_of(c_int64, "reals", "wholes"),
         *_of(_PLACES, "total_places", "counter_places"),

@@ -21,6 +21,9 @@ static void about_to_set(State *s)
 {
     if (s->phase == INITIALISING)
         s->model.initialised = 0;
+    if (s->model.extremes_old)
+        stickslip_model_extremes(&s->model);
+    s->model.extremes_over = 1;
     s->outputs_stale = 1;
 }
 
@@ -36,7 +39,10 @@ static size_t reals_there(const Instance *inst)
     const Model *m = &inst->state.model;
     if (!are_fresh(inst))
         return 0;
-    return m->coupling_old ? FIRST_COUPLING : m->energies_old ? FIRST_ENERGY : N_REALS;
+    return m->coupling_old   ? FIRST_COUPLING
+           : m->extremes_old ? FIRST_EXTREME
+           : m->energies_old ? FIRST_ENERGY
+                             : N_REALS;
 }
 
 static int outputs_fresh(Instance *inst, const char *function)
@@ -73,7 +79,9 @@ static int get_special(Instance *inst, const char *function, uint32_t vr, double
         return 0;
     if (place >= FIRST_ENERGY && model->energies_old)
         stickslip_model_energies(model);
-    else if (place >= FIRST_COUPLING && place < FIRST_ENERGY && model->coupling_old)
+    else if (place >= FIRST_EXTREME && place < FIRST_ENERGY && model->extremes_old)
+        stickslip_model_extremes(model);
+    else if (place >= FIRST_COUPLING && place < FIRST_EXTREME && model->coupling_old)
         stickslip_model_coupling(model);
     memcpy(value, (const char *)&model->r + place * sizeof(double), sizeof *value);
     return 1;
@@ -139,6 +147,7 @@ int stickslip_set_reals(Instance *inst, const char *function, const uint32_t vr[
         return 0;
     State *s = &inst->state;
     const int initialised = s->model.initialised, stale = s->outputs_stale;
+    const int over = s->model.extremes_over;
     about_to_set(s);
     for (size_t i = 0; i < n; i++) {
         const char *why = NULL;
@@ -151,6 +160,7 @@ int stickslip_set_reals(Instance *inst, const char *function, const uint32_t vr[
             continue;
         s->model.initialised = initialised;
         s->outputs_stale = stale;
+        s->model.extremes_over = over;
         return stickslip_refuse(inst, function, "%s", why);
     }
     for (size_t i = 0; i < n; i++) {

@@ -71,6 +71,15 @@ static void note_point(Model *m, const Point *point)
     stickslip_note_extremes(m, point->knot.y, point->knot.dy[V]);
 }
 
+/* Where the inputs were set since they were begun. */
+static void begin_extremes(Model *m, const double y[N_ALL], double acceleration)
+{
+    if (m->extremes_over)
+        stickslip_begin_extremes(m, y, acceleration);
+    m->extremes_over = 0;
+    m->extremes_old = 0;
+}
+
 /* ---- a step under way, beyond the communication point ---- */
 
 /* The states at its point `at`, which the clock has reached. */
@@ -78,7 +87,8 @@ static void go_on_to(Model *m, double at)
 {
     Ahead *ahead = &m->ahead;
     note_time(m, at - ahead->at);
-    stickslip_note_inner_extremes(m, ahead->at, at);
+    if (ahead->n_extremes)
+        stickslip_note_inner_extremes(m, ahead->at, at);
     stickslip_interpolate_acting(m, &ahead->dense, stickslip_share_at(&ahead->dense, at), m->y);
     ahead->at = at;
     ahead->behind = 1;
@@ -89,7 +99,7 @@ int stickslip_advance_within(Model *m, double h)
     Ahead *ahead = &m->ahead;
     if (!ahead->active || ahead->end - ahead->at <= h + STEP_MIN)
         return 0;
-    stickslip_begin_extremes(m, m->y, ahead->acceleration);
+    begin_extremes(m, m->y, ahead->acceleration);
     go_on_to(m, ahead->at + h);
     return 1;
 }
@@ -97,7 +107,7 @@ int stickslip_advance_within(Model *m, double h)
 void stickslip_reached(Model *m)
 {
     m->ahead.acceleration = m->r.a_surface;
-    stickslip_note_extremes(m, m->y, m->r.a_surface);
+    m->extremes_old = 1;
 }
 
 void stickslip_catch_up(Model *m)
@@ -123,7 +133,7 @@ static void finish_ahead(Model *m, double h, Point *now)
     double tau = ahead->end - ahead->at;
     if (fabs(tau - h) <= STEP_MIN)
         tau = h;
-    stickslip_begin_extremes(m, m->y, ahead->acceleration);
+    begin_extremes(m, m->y, ahead->acceleration);
     note_time(m, ahead->end - ahead->at);
     stickslip_note_inner_extremes(m, ahead->at, ahead->end);
     ahead->active = ahead->behind = 0;
@@ -308,7 +318,8 @@ int stickslip_advance(Model *m, double h, char *message)
             set_surface(m);
         stickslip_settle_mode(m, 0.0);
         start_from(m, 0.0, now);
-        stickslip_begin_extremes(m, now->knot.y, now->knot.dy[V]);
+        begin_extremes(m, now->knot.y, now->knot.dy[V]);
+        note_point(m, now);
     }
 
     for (int trials = 0; now->knot.tau < h; trials++) {

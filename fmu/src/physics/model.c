@@ -8,6 +8,7 @@
 #include "advance.h"
 #include "coil.h"
 #include "events.h"
+#include "extremes.h"
 #include "forces.h"
 #include "mechanics.h"
 #include "source.h"
@@ -196,6 +197,7 @@ int stickslip_model_initialise(Model *m, char *message)
     m->r.a_surface_max = m->r.a_surface_min = m->r.a_surface;
     m->r.v_surface_max = m->r.v_surface_min = m->r.v_surface;
     m->r.z_surface_max = m->r.z_surface_min = m->r.z_surface;
+    m->extremes_over = 1;
     return 0;
 }
 
@@ -342,6 +344,12 @@ void stickslip_model_coupling(Model *m)
     m->r.back_emf_slope = back_emf_slope(m, m->y, m->a_q);
     m->r.motional_flux = motional_flux(m, m->y[Q]);
     m->r.time_to_impact = time_to_impact(m, m->y, m->a_q);
+}
+
+void stickslip_model_extremes(Model *m)
+{
+    m->extremes_old = 0;
+    stickslip_note_extremes(m, m->y, m->r.a_surface);
 }
 
 /* Sum of one of the energies over all surfaces that move. */

@@ -115,7 +115,8 @@ typedef struct {
     double energy_at_start;
     double a_q; /* d2 q/dt2 of the first surface, as old as the outputs, m/s2 */
     int initialised;
-    int coupling_old, energies_old; /* outputs: see model.h */
+    int coupling_old, extremes_old, energies_old; /* outputs: see model.h */
+    int extremes_over; /* the next step begins them anew */
     Ahead ahead; /* the last: what is before it makes a state by itself */
 } Model;
 
