@@ -41,13 +41,15 @@ REPLAY = ROOT / "cosim/studies/bench/replay.c"
 DESCRIBE = FMU / "src/fmi/describe.c"
 FMU_LICENSE = FMU / "LICENSE"
 
-# Without contraction every platform computes the same bits.
-FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-Wall", "-Wextra")
+# Without contraction every platform computes the same bits. The two after it change none: roots and
+# choices can then be vector code.
+FLAGS = (
+    *("-std=c11", "-O3", "-Wall", "-Wextra"),
+    *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
+)
 # Older systems have threads in a library of their own.
 THREADS = () if sys.platform == "win32" else ("-pthread",)
 LIBRARY_FLAGS = ("-fPIC", "-fvisibility=hidden")
-# Lets roots and choices be vector code; the numbers stay the same.
-LANE_FLAGS = {"chain": ("-fno-math-errno", "-fno-trapping-math")}
 # A shared library has FMI's functions by their plain names; source code has them with a prefix.
 PLAIN_NAMES = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
@@ -82,7 +84,7 @@ def make(folder: Path) -> None:
         work, new = Path(name), Path(name) / "new"
         new.mkdir()
         for library, folders in LIBRARIES.items():
-            objects = _objects(_code(folders, "*.c"), work, *LANE_FLAGS.get(library, ()))
+            objects = _objects(_code(folders, "*.c"), work)
             link(objects, new / (library + SUFFIX), "-shared", *THREADS)
         if sys.platform != "win32":
             link([REPLAY], new / "replay", "-ldl")
@@ -180,7 +182,7 @@ def _sum(data: bytes) -> str:
 
 
 def _hash(files: list[Path]) -> str:
-    digest = hashlib.sha256(repr((FLAGS, LIBRARY_FLAGS, LANE_FLAGS)).encode())
+    digest = hashlib.sha256(repr((FLAGS, LIBRARY_FLAGS)).encode())
     for file in files:
         data = file.read_bytes()
         digest.update(f"{file.relative_to(ROOT).as_posix()} {len(data)}\n".encode() + data)

@@ -176,14 +176,10 @@ static int step_on(Instance *inst, const char *function, double time, double h)
     return 1;
 }
 
-int stickslip_step(Instance *inst, const char *function, double time, double h)
+/* Does a step go on from the current time, and end before the stop time? */
+static int is_timely(const Instance *inst, const char *function, double time, double h)
 {
-    if (!stickslip_allowed(inst, function, STEPPING))
-        return 0;
-    State *s = &inst->state;
-    if (!(h > 0.0) || !isfinite(time + h))
-        return stickslip_refuse(
-            inst, function, "a step of %g s from %g s: it must be positive and finite", h, time);
+    const State *s = &inst->state;
     const double said = fabs(time), known = fabs(s->time);
     const double slack = 1e-9 * h + 4.0 * DBL_EPSILON * (said > known ? said : known);
     if (!(fabs(time - s->time) <= slack))
@@ -194,6 +190,19 @@ int stickslip_step(Instance *inst, const char *function, double time, double h)
     if (s->has_stop_time && time + h > s->stop_time + slack + 1e-3 * h)
         return stickslip_refuse(inst, function, "a step to %.17g s goes past the stop time %.17g s",
                                 time + h, s->stop_time);
+    return 1;
+}
+
+int stickslip_step(Instance *inst, const char *function, double time, double h)
+{
+    if (!stickslip_allowed(inst, function, STEPPING))
+        return 0;
+    State *s = &inst->state;
+    if (!(h > 0.0) || !isfinite(time + h))
+        return stickslip_refuse(
+            inst, function, "a step of %g s from %g s: it must be positive and finite", h, time);
+    if ((time != s->time || s->has_stop_time) && !is_timely(inst, function, time, h))
+        return 0;
     if (!stickslip_model_step_within(&s->model, h))
         return step_on(inst, function, time, h);
     s->time = time + h;

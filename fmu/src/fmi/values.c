@@ -114,7 +114,7 @@ int stickslip_get_integers(Instance *inst, const char *function, const uint32_t 
     if (!stickslip_allowed(inst, function, ANY_PHASE) ||
         !arrays_given(inst, function, n, vr, values))
         return 0;
-    const char *integers = (const char *)&inst->state.model.n;
+    const int *integers = (const int *)&inst->state.model.n;
     int fresh = are_fresh(inst);
     for (size_t i = 0; i < n; i++) {
         const size_t place = (size_t)vr[i] - REFERENCE_INTEGERS;
@@ -126,7 +126,7 @@ int stickslip_get_integers(Instance *inst, const char *function, const uint32_t 
                 return 0;
             fresh = 1;
         }
-        memcpy(&values[i], integers + place * sizeof(int), sizeof(int));
+        values[i] = integers[place];
     }
     return 1;
 }

@@ -91,7 +91,6 @@ static void go_on_to(Model *m, double at)
         stickslip_note_inner_extremes(m, ahead->at, at);
     stickslip_interpolate_acting(m, &ahead->dense, stickslip_share_at(&ahead->dense, at), m->y);
     ahead->at = at;
-    ahead->behind = 1;
 }
 
 int stickslip_advance_within(Model *m, double h)
@@ -110,19 +109,43 @@ void stickslip_reached(Model *m)
     m->extremes_old = 1;
 }
 
-void stickslip_catch_up(Model *m)
+void stickslip_energies_now(const Model *m, double y[N_ALL])
 {
-    Ahead *ahead = &m->ahead;
-    if (!ahead->behind)
+    const Ahead *ahead = &m->ahead;
+    for (int j = 0; j < moving(m) * N_STATES; j++)
+        y[j] = m->y[j];
+    if (!ahead->active)
         return;
-    stickslip_interpolate_energies(m, &ahead->dense, stickslip_share_at(&ahead->dense, ahead->at),
-                                   m->y);
-    ahead->behind = 0;
+    /* Gauss and Legendre's nodes and weights for eight: exact up to order 15. */
+    static const double NODE[] = {0.18343464249564980, 0.52553240991632899, 0.79666647741362674,
+                                  0.96028985649753623};
+    static const double WEIGHT[] = {0.36268378337836198, 0.31370664587788729, 0.22238103445337447,
+                                    0.10122853629037626};
+    const double half = 0.5 * stickslip_share_at(&ahead->dense, ahead->at);
+    for (int i = 0; i < 8; i++) {
+        Knot knot;
+        double clock[N_DERIVATIVES] = {0.0, ahead->dense.length};
+        const double share = half * (1.0 + (i % 2 ? NODE[i / 2] : -NODE[i / 2]));
+        for (int j = 0; j < moving(m) * N_STATES; j++)
+            knot.y[j] = 0.0;
+        stickslip_interpolate(m, &ahead->dense, share, &knot);
+        if (ahead->dense.wall >= 0)
+            stickslip_derivatives(ahead->dense.clock, 1, share, clock);
+        stickslip_state_rates(m, m->mode, knot.y, knot.tau - ahead->at, knot.dy);
+        for (int s = 0; s < moving(m); s++)
+            for (int j = s * N_STATES + N_ACTING; j < (s + 1) * N_STATES; j++)
+                y[j] += WEIGHT[i / 2] * half * clock[1] * knot.dy[j];
+    }
 }
 
 void stickslip_turn_back(Model *m)
 {
-    stickslip_catch_up(m);
+    double y[N_ALL];
+    if (!m->ahead.active)
+        return;
+    stickslip_energies_now(m, y);
+    for (int j = 0; j < moving(m) * N_STATES; j++)
+        m->y[j] = y[j];
     m->ahead.active = 0;
 }
 
@@ -136,7 +159,7 @@ static void finish_ahead(Model *m, double h, Point *now)
     begin_extremes(m, m->y, ahead->acceleration);
     note_time(m, ahead->end - ahead->at);
     stickslip_note_inner_extremes(m, ahead->at, ahead->end);
-    ahead->active = ahead->behind = 0;
+    ahead->active = 0;
     for (int j = 0; j < moving(m) * N_STATES; j++)
         m->y[j] = ahead->last[j];
     start_from(m, tau, now);

@@ -305,24 +305,27 @@ STICKSLIP_INLINE void interpolant_of(const Variant kind, const Law *law, int wal
     dense->length = h;
     dense->per_length = 1.0 / h;
     dense->wall = kind.by_wall ? wall : -1;
-    for (int j = 0; j < kind.n; j++) {
-        const double rise = to->y[j] - from->y[j];
-        dense->c[0][j] = from->y[j];
-        dense->c[1][j] = rise;
-        dense->c[2][j] = h * g->k[0][j] - rise;
-        dense->c[3][j] = 2.0 * rise - h * (g->k[12][j] + g->k[0][j]);
-    }
-    for (int i = 0; i < 4; i++) {
-        double sum[N_ALL];
-        for (int j = 0; j < kind.n; j++)
-            sum[j] = HIGHEST[i][0] * g->k[0][j];
-        for (int l = 5; l < STAGES; l++) {
-            const double weight = HIGHEST[i][l - 4];
-            for (int j = 0; j < kind.n; j++)
-                sum[j] += weight * g->k[l][j];
+    for (int surface = 0; surface < kind.surfaces; surface++) {
+        const int low = surface * N_STATES, high = low + N_ACTING;
+        for (int j = low; j < high; j++) {
+            const double rise = to->y[j] - from->y[j];
+            dense->c[0][j] = from->y[j];
+            dense->c[1][j] = rise;
+            dense->c[2][j] = h * g->k[0][j] - rise;
+            dense->c[3][j] = 2.0 * rise - h * (g->k[12][j] + g->k[0][j]);
         }
-        for (int j = 0; j < kind.n; j++)
-            dense->c[4 + i][j] = h * sum[j];
+        for (int i = 0; i < 4; i++) {
+            double sum[N_ALL];
+            for (int j = low; j < high; j++)
+                sum[j] = HIGHEST[i][0] * g->k[0][j];
+            for (int l = 5; l < STAGES; l++) {
+                const double weight = HIGHEST[i][l - 4];
+                for (int j = low; j < high; j++)
+                    sum[j] += weight * g->k[l][j];
+            }
+            for (int j = low; j < high; j++)
+                dense->c[4 + i][j] = h * sum[j];
+        }
     }
     if (!kind.by_wall)
         return;
@@ -410,13 +413,13 @@ double stickslip_reading_error(const Model *m, const Dense *dense)
     return late > worst || late != late ? late : worst;
 }
 
-/* For n states from place `low` on. y may lie in the same model as the polynomials, but elsewhere. */
-STICKSLIP_INLINE void evaluate(const int low, const int n, const Dense *restrict dense, double x,
+/* For the acting states from place `low` on. y may lie in the same model as the polynomials, but elsewhere. */
+STICKSLIP_INLINE void evaluate(const int low, const Dense *restrict dense, double x,
                                double *restrict y)
 {
     /* Not after Horner, whose every operation waits for the one before. */
     const double b2 = x * (1.0 - x), b3 = b2 * x, b4 = b2 * b2, b5 = b4 * x, b6 = b4 * b2, b7 = b6 * x;
-    for (int j = low; j < low + n; j++)
+    for (int j = low; j < low + N_ACTING; j++)
         y[j] = (dense->c[0][j] + dense->c[1][j] * x + (dense->c[2][j] * b2 + dense->c[3][j] * b3)) +
                ((dense->c[4][j] * b4 + dense->c[5][j] * b5) +
                 (dense->c[6][j] * b6 + dense->c[7][j] * b7));
@@ -425,9 +428,9 @@ STICKSLIP_INLINE void evaluate(const int low, const int n, const Dense *restrict
 STICKSLIP_INLINE double stickslip_interpolate_acting_any(const Model *m, const Dense *dense,
                                                          double share, double y[N_ALL])
 {
-    evaluate(0, N_ACTING, dense, share, y);
+    evaluate(0, dense, share, y);
     if (moving(m) > 1)
-        evaluate(N_STATES, N_ACTING, dense, share, y);
+        evaluate(N_STATES, dense, share, y);
     if (dense->wall < 0)
         return 0.0;
     double *q = &y[dense->wall * N_STATES + Q];
@@ -446,55 +449,20 @@ void stickslip_interpolate(const Model *m, const Dense *dense, double share, Kno
     knot->tau = share * dense->length;
     if (dense->wall >= 0) {
         double d[N_DERIVATIVES];
-        stickslip_clock_derivatives(dense, share, d);
+        stickslip_derivatives(dense->clock, 1, share, d);
         knot->tau = d[0];
     }
 }
 
-void stickslip_interpolate_energies(const Model *m, const Dense *dense, double share,
-                                                   double y[N_ALL])
+double stickslip_share_by_clock(const Dense *dense, double time)
 {
-    evaluate(N_ACTING, N_STATES - N_ACTING, dense, share, y);
-    if (moving(m) > 1)
-        evaluate(N_STATES + N_ACTING, N_STATES - N_ACTING, dense, share, y);
-}
-
-/* Of the polynomial whose coefficients lie `stride` apart: the first n of its derivatives. */
-STICKSLIP_INLINE void derive(const double *c, size_t stride, const int n, double share, double *d)
-{
-    for (int k = 1; k < n; k++)
-        d[k] = 0.0;
-    d[0] = c[7 * stride];
-    for (int i = 6; i >= 0; i--) {
-        /* times x or 1 - x, by turns */
-        const double slope = i % 2 == 0 ? 1.0 : -1.0, x = i % 2 == 0 ? share : 1.0 - share;
-        for (int k = n - 1; k > 0; k--)
-            d[k] = d[k] * x + k * slope * d[k - 1];
-        d[0] = d[0] * x + c[(size_t)i * stride];
-    }
-}
-
-void stickslip_derivatives(const Dense *dense, int state, double share, double d[N_DERIVATIVES])
-{
-    derive(&dense->c[0][state], N_ALL, N_DERIVATIVES, share, d);
-}
-
-void stickslip_clock_derivatives(const Dense *dense, double share, double d[N_DERIVATIVES])
-{
-    derive(dense->clock, 1, N_DERIVATIVES, share, d);
-}
-
-double stickslip_share_at(const Dense *dense, double time)
-{
-    if (dense->wall < 0)
-        return time * dense->per_length;
     /* The clock's rate is the root, and grows or falls: bisection where Newton would leave. Past the
      * end of a touch, where the step has an event, the root is below zero and the clock runs back. */
-    double low = 0.0, high = 1.0, x = time / dense->clock[1], d[2];
+    double low = 0.0, high = 1.0, x = time / dense->clock[1], d[N_DERIVATIVES];
     if (!(x > 0.0 && x < 1.0))
         x = 0.5;
     for (int i = 0; i < 100; i++) {
-        derive(dense->clock, 1, 2, x, d);
+        stickslip_derivatives(dense->clock, 1, x, d);
         if (d[0] < time && d[1] > 0.0)
             low = x;
         else

@@ -46,9 +46,10 @@ static int functions_of(const Model *m, const double all[N_ALL], int s, double t
     const Mode *mode = m->mode + s;
     const double *y = all + s * N_STATES;
     Forces f;
-    ForceRates rate;
+    ForceRates rate = {0};
     stickslip_forces(m, m->mode, all, s, tau, &f);
-    stickslip_force_rates(m, m->mode, all, s, tau, &f, &rate);
+    if (mode->wall == WALL_REST || mode->slip == 0 || plate_acts(m)) /* else nothing looks at them */
+        stickslip_force_rates(m, m->mode, all, s, tau, &f, &rate);
 
     const double length = 1e-15 * p->travel, force = force_noise(&f);
     const double speed = 1e-16;

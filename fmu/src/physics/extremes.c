@@ -94,14 +94,14 @@ int stickslip_may_have_extreme(const Model *m, int wall, const Knot *from, const
 /* Of a state its rate at a share of the step, 0, and what has the signs and zeros of its first two
  * derivatives in time, 1 and 2. */
 enum { N_SLOPES = 3 };
-static void slopes(const Dense *dense, int state, double share, double d[N_DERIVATIVES])
+STICKSLIP_INLINE void slopes(const Dense *dense, int state, double share, double d[N_DERIVATIVES])
 {
     double clock[N_DERIVATIVES];
-    stickslip_derivatives(dense, state, share, d);
+    stickslip_derivatives(&dense->c[0][state], N_ALL, share, d);
     if (dense->wall < 0)
         return;
     /* dx/dt = x' / t', so d2x/dt2 goes with x'' t' - x' t''. */
-    stickslip_clock_derivatives(dense, share, clock);
+    stickslip_derivatives(dense->clock, 1, share, clock);
     d[2] = d[2] * clock[1] - d[1] * clock[2];
 }
 

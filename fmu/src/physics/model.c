@@ -353,26 +353,27 @@ void stickslip_model_extremes(Model *m)
 }
 
 /* Sum of one of the energies over all surfaces that move. */
-static double sum_of(const Model *m, int state)
+static double sum_of(const Model *m, const double y[N_ALL], int state)
 {
-    return m->n.independent ? m->y[state] + m->y[N_STATES + state] : m->y[state];
+    return m->n.independent ? y[state] + y[N_STATES + state] : y[state];
 }
 
 void stickslip_model_energies(Model *m)
 {
     Reals *r = &m->r;
-    stickslip_catch_up(m);
+    double all[N_ALL];
+    stickslip_energies_now(m, all);
     m->energies_old = 0;
-    r->energy_in = sum_of(m, E_IN);
-    r->energy_friction = sum_of(m, E_FRICTION);
-    r->energy_impact = sum_of(m, E_IMPACT);
-    r->energy_damping = sum_of(m, E_DAMPING);
-    r->energy_stored = stickslip_energy_stored(m, m->y) - m->energy_at_start;
-    r->energy_output = sum_of(m, E_OUTPUT);
-    r->energy_copper = sum_of(m, E_COPPER);
+    r->energy_in = sum_of(m, all, E_IN);
+    r->energy_friction = sum_of(m, all, E_FRICTION);
+    r->energy_impact = sum_of(m, all, E_IMPACT);
+    r->energy_damping = sum_of(m, all, E_DAMPING);
+    r->energy_stored = stickslip_energy_stored(m, all) - m->energy_at_start;
+    r->energy_output = sum_of(m, all, E_OUTPUT);
+    r->energy_copper = sum_of(m, all, E_COPPER);
     r->energy_magnetic = 0.0;
     for (int s = 0; s < moving(m); s++) {
-        const double *y = m->y + s * N_STATES;
+        const double *y = all + s * N_STATES;
         r->energy_magnetic += stickslip_magnetic_energy(m, y);
         if (m->mode[s].wall == WALL_PARTING)
             r->energy_impact -= stickslip_wall_energy(m, m->mode + s, y);

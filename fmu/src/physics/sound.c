@@ -88,11 +88,10 @@ static int is_ahead(const Model *m)
 {
     const Ahead *a = &m->ahead;
     const Dense *d = &a->dense;
-    if (a->n_extremes < 0 || a->n_extremes > MAX_EXTREMES || !is_flag(a->active) ||
-        !is_flag(a->behind))
+    if (a->n_extremes < 0 || a->n_extremes > MAX_EXTREMES || !is_flag(a->active))
         return 0;
     if (!a->active)
-        return !a->behind;
+        return 1;
     for (int i = 0; i < a->n_extremes; i++)
         if ((int)a->extremes[i].of < EXTREME_A || (int)a->extremes[i].of > EXTREME_CURRENT ||
             !isfinite(a->extremes[i].at) || !isfinite(a->extremes[i].value))

@@ -87,11 +87,11 @@ typedef struct {
 } Extreme;
 enum { MAX_EXTREMES = 16 };
 
-/* A long step that goes on beyond the last communication point, since the inputs do. y and the
- * mode are those at that point; what ends the step is still to come. */
+/* A long step that goes on beyond the last communication point, since the inputs do. The mode, and y
+ * but for the energies, are those at that point; the energies are those at the step's start. What ends
+ * the step is still to come. */
 typedef struct {
     int active;
-    int behind;     /* the energies in y are older than the other states */
     int ends_with;  /* the kind of the event that the step ends with; -1: none */
     int surface;    /* whose event that is */
     int n_extremes;
