@@ -15,6 +15,7 @@ pytestmark = pytest.mark.physics
 
 SURFACE, PART, MU_S, MU_K, NORMAL = 0.0145, 0.009, 0.72, 0.59, 0.5
 PAIR = {"independent": 1, "n_surfaces": 2}
+EXACT = "mechanics.tolerance=1e-10"
 TWICE = [  # the rig of the scene reference
     "circuit.model=limited", "drive.phase_deg=90", "mechanics.n_surfaces=2",
     "mechanics.part_mass=0.018",
@@ -54,7 +55,7 @@ def test_in_phase_they_are_one_surface_with_half_the_part(contact: int):
 
 @pytest.mark.parametrize("model", ["ideal", "limited"])
 def test_a_scene_in_phase_is_the_scene_of_one(model: str):
-    run = [f"circuit.model={model}", "run.duration=0.5", "run.settle=0.25"]
+    run = [f"circuit.model={model}", "run.duration=0.5", "run.settle=0.25", EXACT]
     one = simulate(load("reference", run)).summary
     result = simulate(load("reference", [*TWICE, *run, "drive.phase_deg=0"]))
     two, waves = result.summary, result.columns
@@ -72,7 +73,7 @@ def test_a_scene_in_phase_is_the_scene_of_one(model: str):
 def test_the_energy_account_closes_at_any_phase(model: str, contact: str):
     for phase in (0, 45, 180, 299):
         keys = [f"circuit.model={model}", f"mechanics.contact={contact}"]
-        run = ["run.duration=0.3", "run.settle=0.1", "run.output_step=1e-3"]
+        run = ["run.duration=0.3", "run.settle=0.1", "run.output_step=1e-3", EXACT]
         scene = load("reference", [*TWICE, *keys, f"drive.phase_deg={phase}", *run])
         assert simulate(scene).summary["energy_residual"] < 1e-9  # pyright: ignore
 

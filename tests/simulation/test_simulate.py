@@ -388,7 +388,7 @@ def test_back_emf_is_that_of_the_ram_in_its_actuator(run: Run) -> None:
 
 def test_undriven_part_hangs_still(runs: dict[str, Run]) -> None:
     held = runs["held"]
-    assert np.ptp(held["z_part"]) < 1e-12
+    assert np.ptp(held["z_part"]) < 1e-10  # m; what mechanics.tolerance allows
     assert held.summary["stick_fraction"] == 1.0
     assert held.summary["impacts"] == held.summary["stick_slip_events"] == 0
     weight = held.scene.mechanics.part_mass * held.scene.mechanics.gravity

@@ -23,14 +23,17 @@ double stickslip_step_factor(double error);
 STICKSLIP_INTERNAL_END
 
 /* The error that the tolerance allows in a state, by its place among those of a surface: relative to
- * |value| plus what counts as large for this machine, m, m/s, A. */
+ * |value| plus what counts as large for this machine, m, m/s, A; of currents, which drive all that
+ * moves and change for short times alone, a small share of that. */
 static inline double stickslip_allowed_error(const Model *m, int state, double value)
 {
     static const double POSITION_SCALE = 1e-3, VELOCITY_SCALE = 0.1, CURRENT_SCALE = 0.1;
+    static const double CURRENT_SHARE = 0.03;
     const double scale = state >= I_COIL                          ? CURRENT_SCALE
                          : state == V || state == U || state == W ? VELOCITY_SCALE
                                                                   : POSITION_SCALE;
-    return m->r.tolerance * (scale + fabs(value));
+    const double allowed = m->r.tolerance * (scale + fabs(value));
+    return state >= I_COIL ? CURRENT_SHARE * allowed : allowed;
 }
 
 #endif
