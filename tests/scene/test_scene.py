@@ -85,7 +85,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "contact_damping": 0.38,
         "n_surfaces": 1,
         "gravity": 9.81,
-        "tolerance": 1e-9,
+        "tolerance": 1e-8,
         "initial_lift": 0.0,
     },
     "friction": {

@@ -392,8 +392,8 @@ def test_undriven_part_hangs_still(runs: dict[str, Run]) -> None:
     assert held.summary["stick_fraction"] == 1.0
     assert held.summary["impacts"] == held.summary["stick_slip_events"] == 0
     weight = held.scene.mechanics.part_mass * held.scene.mechanics.gravity
-    # The flexures' force is as exact as the height is: some 1e-9 mm at the default tolerance.
-    np.testing.assert_allclose(held["friction_force"], weight, rtol=1e-8)
+    # The flexures' force is as exact as the height is: some 1e-8 mm at the default tolerance.
+    np.testing.assert_allclose(held["friction_force"], weight, rtol=1e-7)
 
 
 # --- whole runs against each other -----------------------------------------------

@@ -56,6 +56,7 @@ def test_back_emf_is_turned_alone() -> None:
         [
             *("run.duration=0.2", "run.settle=0.1", "circuit.model=limited"),
             *("drive.waveform=sine", "circuit.supply=100", "coil.count=2"),
+            "mechanics.tolerance=1e-10",
         ],
     )
     machine = BY_NAME["back-EMF"].machine(base, 0.25)

@@ -89,7 +89,7 @@ def test_frequencies_last_whole_periods() -> None:
             ],
         )
     ).summary["v_average"]
-    assert whole == pytest.approx(known, rel=1e-9)
+    assert whole == pytest.approx(known, rel=1e-8)
     assert abs(broken - known) > 1e-3 * abs(known)
 
 
