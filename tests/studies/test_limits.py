@@ -19,7 +19,7 @@ from cosim.errors import BadInput
 from cosim.files.picture import Picture
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.limits import aims, runs, search, study
+from cosim.studies.limits import aims, confirm, runs, search, study
 from cosim.studies.limits.aims import QUANTITIES
 from cosim.studies.limits.answer import BINDS, NOTHING, UNTOLD, Change
 from cosim.studies.limits.report import JOURNAL, run
@@ -197,6 +197,35 @@ def test_search_climbs_ridges_and_keeps_out_of_what_is_forbidden() -> None:
         for number in range(2):
             top = one.found(number, NOWHERE).settings[0]
             assert top.place[0] > 0.35 and 0.93 * best[number] <= top.value <= best[number]
+
+
+def test_what_is_refuted_gives_way_to_the_best_that_is_confirmed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The more complete circuit here bears out nothing near the best that a search has found."""
+    one = Search(ridge, (0,), 2)
+    one.run(study.FULL.first, np.empty((0, 3)))
+    rig = study.Rig("its own rig", {}, {study.OWN: Case({}, Machine())})
+    rig.searches[study.OWN], rig.found[study.OWN] = one, one.bests()
+    middle = rig.found[study.OWN][0].settings[0].place[0]
+
+    def judged(bench: Any, cases: Any, chosen: dict[Any, Any]) -> dict[Any, confirm.Point]:
+        return {key: point(key, setting) for key, setting in chosen.items()}
+
+    def point(key: confirm.Key, setting: Any) -> confirm.Point:
+        near = abs(setting.place[0] - middle) < 0.03
+        there = setting.value * (0.5 if near else 1.01)
+        return confirm.Point(*key, setting, 0.0, {}, "amplifier", there)
+
+    monkeypatch.setattr(confirm, "_points", judged)
+    monkeypatch.setattr(confirm, "_on_full", lambda bench, cases, points: points)
+    made: Any = None
+    known = study.Study(load("reference"), [], [rig], one.bests())
+    top = confirm.confirmed(made, known, lambda said: None)[study.OWN, 0, "best"]
+    assert top.holds and top.refuted > 0
+    x = np.linspace(0.351, 1.0, 1299)
+    heights = ridge(np.stack([x, x, 0.5 + 0.3 * (x - 0.5)], axis=1))[0][:, 0]
+    assert top.setting.value > 0.9 * heights[np.abs(x - middle) >= 0.03].max()
 
 
 @pytest.mark.usefixtures("brief")

@@ -13,15 +13,15 @@ import numpy as np
 from cosim.scene import changed
 from cosim.studies.limits.aims import QUANTITIES, scores
 from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import Setting
+from cosim.studies.limits.search import Best, Setting
 from cosim.studies.limits.study import IDEAL, OWN, Name, Rig, Study, moved
 from cosim.studies.limits.table import Machine, Settings
 
 WITHIN = 0.02
 """Relative difference of a confirmed value."""
 
-OTHERS = 6
-"""Settings of other machines whose turns are run where one is refuted."""
+SPARE = 12
+"""Settings that stand by where one is refuted, of its own machine and of the others each."""
 
 KINDS = ("best", "robust")
 
@@ -70,7 +70,8 @@ def confirmed(bench: Bench, study: Study, told: Callable[[str], object]) -> Poin
     """The points of the scene's own rig: of those settings that the amplifier confirms the best;
     where it confirms none the best of all.
 
-    Where it refutes a setting, those that it confirms on other machines are tried there, too.
+    Where it refutes a setting, others that its own search found apart from it are tried, and those
+    that are confirmed on other machines.
     """
     rig = study.rigs[0]
     choices = {
@@ -84,7 +85,7 @@ def confirmed(bench: Bench, study: Study, told: Callable[[str], object]) -> Poin
     more = {
         key: settings
         for key, point in points.items()
-        if point.refuted and (settings := _of_others(bench, rig, points, key, choices[key]))
+        if point.refuted and (settings := _spare(bench, rig, points, key, choices[key]))
     }
     for key, point in _first_that_holds(bench, rig.cases, more).items():
         refuted = points[key].refuted + point.refuted
@@ -112,20 +113,23 @@ def _first_that_holds(
     return points
 
 
-def _of_others(
+def _spare(
     bench: Bench, rig: Rig, points: Points, key: Key, tried: tuple[Setting, ...]
 ) -> tuple[Setting, ...]:
-    """Settings that are confirmed on other machines and do better on that of a point than what is
-    confirmed there, the best first."""
+    """Settings of a point's own search, and those that are confirmed on other machines, that do
+    better there than what is confirmed, the best first."""
     name, quantity, kind = key
     elsewhere = [
         moved(bench, [point.setting], rig.cases[other], rig.cases[name])
         for (other, number, _), point in points.items()
         if other != name and number == quantity and point.holds
     ]
-    if not elsewhere:
-        return ()
-    best = rig.searches[name].best_of(np.unique(np.vstack(elsewhere), axis=0), quantity, OTHERS)
+    search = rig.searches[name]
+    settings = search.apart(quantity, SPARE).settings
+    if elsewhere:
+        places = np.unique(np.vstack(elsewhere), axis=0)
+        settings += search.best_of(places, quantity, SPARE).settings
+    best = Best(tuple(sorted(settings, key=lambda one: -one.value)))
     known, point = {one.place for one in tried}, points[key]
     return tuple(
         one

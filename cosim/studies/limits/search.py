@@ -126,7 +126,7 @@ class Search:
             starts, half = (STARTS, effort.samples // 2) if wide else (1, effort.samples)
             clouds = [np.empty((0, KNOB_COUNT))]
             for quantity in range(self._quantities):
-                places = [*self.ranked(quantity, APART, starts), *self._steady(quantity)[:1]]
+                places = [*self.ranked(quantity, APART, starts), *self._steady(quantity, 1)]
                 clouds += [self._cloud(p, quantity, spread, half) for p in places]
             self.scores(np.vstack(clouds))
 
@@ -156,13 +156,19 @@ class Search:
         """The best setting of a quantity, those whose surroundings seem the best, and ``also``
         those at places (rows) that are the best elsewhere. Those that cannot be borne are left out.
         """
-        places = [*self.ranked(quantity, STEADY_APART, 1), *self._steady(quantity)]
+        places = [*self.ranked(quantity, STEADY_APART, 1), *self._steady(quantity, STEADY)]
         self.scores(also)
         places += [place for place in also if self._borne[tuple(place.tolist())]]
         every = dict.fromkeys(tuple(place.tolist()) for place in places)
         settings = [self.around(np.array(place), quantity) for place in every]
         achievable = (one for one in settings if one.value > 0.0)
         return Best(tuple(sorted(achievable, key=lambda one: -one.value)))
+
+    def apart(self, quantity: int, count: int) -> Best:
+        """The best ``count`` settings that are apart from each other, and as many whose
+        surroundings seem the best."""
+        places = [*self.ranked(quantity, STEADY_APART, count), *self._steady(quantity, count)]
+        return self.best_of(np.unique(places, axis=0), quantity, 2 * count)
 
     def best_of(self, places: Array, quantity: int, count: int) -> Best:
         """The best ``count`` of places (rows) for a quantity, without what cannot be borne."""
@@ -189,7 +195,7 @@ class Search:
             tuple(place.tolist()), float(every[0]), float(np.median(every)), float(every.min())
         )
 
-    def _steady(self, quantity: int) -> Array:
+    def _steady(self, quantity: int, count: int) -> Array:
         """Places whose surroundings, as far as they are known, are good, the best first."""
         places, column = self._column(quantity)
         order = np.argsort(-column, kind="stable")[:MOST]
@@ -200,7 +206,7 @@ class Search:
         ]
         best = order[np.argsort(-np.array(quarter), kind="stable")]
         best = best[column[best] > 0.0]
-        return _apart(places[best], STEADY_APART, STEADY)
+        return _apart(places[best], STEADY_APART, count)
 
     def _column(self, quantity: int) -> tuple[Array, Array]:
         """All places, and their scores of a quantity; -inf where they are not bearable."""
