@@ -41,8 +41,8 @@ REPLAY = ROOT / "cosim/studies/bench/replay.c"
 DESCRIBE = FMU / "src/fmi/describe.c"
 FMU_LICENSE = FMU / "LICENSE"
 
-# Without contraction every platform computes the same bits. The two after it change none: roots and
-# choices can then be vector code.
+# Without contraction every platform computes the same bits. The other two -fno leave them as they
+# are, and let roots and choices be vector code.
 FLAGS = (
     *("-std=c11", "-O3", "-Wall", "-Wextra"),
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),

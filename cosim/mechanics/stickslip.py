@@ -28,8 +28,8 @@ STEP_OUTPUTS = (
     ),
     *("v_surface_max", "v_surface_min", "z_surface_max", "z_surface_min"),
 )
-"""What is read after every step: back-EMF of one coil (V, V/s) and its integral over time (Wb),
-extremes since the inputs were set last."""
+"""What is read after every interval of the inputs: back-EMF of one coil (V, V/s) and its integral
+over time (Wb), extremes since the inputs were set last."""
 
 SAMPLE_OUTPUTS = (
     *("back_emf", "z_surface", "v_surface", "a_surface", "z_ram", "v_ram"),
@@ -43,7 +43,7 @@ TOTALS = (
     "energy_stored",
 )
 SOURCE_STEP_OUTPUTS = ("coil_current_max", "coil_current_min")
-"""What is read besides after every step where the source is in the FMU: one coil's, A."""
+"""What is read besides where the source is in the FMU: one coil's, A."""
 
 SOURCE_SAMPLE_OUTPUTS = ("coil_current", "coil_voltage")
 """What a row takes besides then: current of one coil (A) and voltage across the coils (V)."""
@@ -127,7 +127,7 @@ class Mechanics:
         self.inputs = (c_double * len(self.places["inputs"]))()
         """Value and slope of each input, as set last."""
         self.step_outputs = (c_double * len(self.places["step_outputs"]))()
-        """Values of STEP_OUTPUTS, and SOURCE_STEP_OUTPUTS, after the last step."""
+        """Values of STEP_OUTPUTS, and SOURCE_STEP_OUTPUTS, as read last."""
         self._slope_place, self._current_place = places(("back_emf_slope",)), places(("current",))
         self._gain = (c_double * 1)()
         reals, integers = _settings(scene)

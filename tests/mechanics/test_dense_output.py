@@ -99,6 +99,30 @@ def test_extremes_are_those_since_the_inputs_were_set_last() -> None:
     assert over < 1e-9
 
 
+def test_extremes_do_not_mind_who_looks() -> None:
+    """Or what is refused; and no row lies beyond them. Random currents, of 100 rows each; in the
+    last but one the acceleration turns where the stages of a step do not show it."""
+    rng, names = np.random.default_rng(1008), ("z_surface", "v_surface", "a_surface")
+    rig = {"contact": 2, "flexure_damping": 0.05}
+    with Bench(**rig) as alone, Bench(**rig) as watched, Bench(**rig) as refused:
+        for _ in range(60):
+            inputs = {"current": rng.normal(0.0, 0.2), "current_slope": rng.normal(0.0, 10.0)}
+            seen = []
+            for row in range(100):
+                hold = {"inputs_hold_for": 100 * ROW, **inputs} if row == 0 else {}
+                for it in (alone, watched, refused):
+                    it.step(ROW, **hold)
+                watched.get("z_surface_min")
+                with pytest.raises(Exception, match="status 3"):
+                    refused.set(current=1e9)
+                seen.append(alone.get(*names))
+            for name, column in zip(names, np.array(seen).T, strict=True):
+                ends = (f"{name}_min", f"{name}_max")
+                found = alone.get(*ends)
+                assert found == watched.get(*ends) == refused.get(*ends)
+                assert found[0] <= column.min() and column.max() <= found[1]
+
+
 def _peak(signal: Any) -> float:
     at = int(np.argmax(signal))
     if at in (0, len(signal) - 1):

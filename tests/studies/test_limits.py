@@ -273,7 +273,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "slew rate": (),
     }
     limits = [replace(BY_NAME[name], values=few) for name, few in values.items()]
-    efforts = study.Efforts(SMALL, Effort(8, (), 2), Effort(8, (), 2), 1, 1)
+    efforts = study.Efforts(SMALL, Effort(8, (), 2), Effort(8, (), 2), (1, 1), 1)
     scene = load("reference", {"run.duration": 0.2})
     rigs: list[Any] = [{"mechanics.surface_mass": 0.02}]
     there = [load("trial-05", {"run.duration": 0.15, "run.settle": 0.05})]

@@ -70,7 +70,7 @@ typedef struct Recorder {
     const uint32_t *total_places, *counter_places;
     int64_t totals, counters;
     double *inputs;  /* as set last */
-    double *outputs; /* as read after the last step */
+    double *outputs; /* as read at the end of the last interval; the extremes, when they were read last */
     double settle;
     const double *times; /* at which something is to be written down; the last of all is endless */
     const int32_t *what;

@@ -11,17 +11,18 @@ from math import nan
 import numpy as np
 
 from cosim.scene import changed
-from cosim.studies.limits.aims import QUANTITIES, scores
+from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, scores
 from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import Best, Setting
+from cosim.studies.limits.search import Setting
 from cosim.studies.limits.study import IDEAL, OWN, Name, Rig, Study, moved
 from cosim.studies.limits.table import Machine, Settings
 
 WITHIN = 0.02
 """Relative difference of a confirmed value."""
 
-SPARE = 12
-"""Settings that stand by where one is refuted, of its own machine and of the others each."""
+SPARE = 6
+"""Settings that stand by where one is refuted: the best of its own search, those with the best
+surroundings there, and the best of other machines, so many of each."""
 
 KINDS = ("best", "robust")
 
@@ -125,11 +126,11 @@ def _spare(
         if other != name and number == quantity and point.holds
     ]
     search = rig.searches[name]
-    settings = search.apart(quantity, SPARE).settings
+    places = [search.apart(quantity, SPARE)]
     if elsewhere:
-        places = np.unique(np.vstack(elsewhere), axis=0)
-        settings += search.best_of(places, quantity, SPARE).settings
-    best = Best(tuple(sorted(settings, key=lambda one: -one.value)))
+        best = search.best_of(np.unique(np.vstack(elsewhere), axis=0), quantity, SPARE)
+        places += [np.array([one.place for one in best.settings]).reshape(-1, KNOB_COUNT)]
+    best = search.best_of(np.unique(np.vstack(places), axis=0), quantity, 3 * SPARE)
     known, point = {one.place for one in tried}, points[key]
     return tuple(
         one

@@ -167,8 +167,10 @@ def run(
     ``asked`` are the words after ``cosim run`` that stand for the scene; ``told`` hears of each
     step, and how many there are, ``progress`` of each run. Raises BadInput.
     """
-    rounds = efforts.rounds
-    own, others = (search_count(limits, rounds, every) for every in (True, False))
+    own, others = (
+        search_count(limits, rounds, every)
+        for rounds, every in zip(efforts.rounds, (True, False), strict=True)
+    )
     steps = own + (len(rigs) + 1) * others + 2 + len(there)
     journal = folder / JOURNAL
 

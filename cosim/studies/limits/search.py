@@ -164,11 +164,11 @@ class Search:
         achievable = (one for one in settings if one.value > 0.0)
         return Best(tuple(sorted(achievable, key=lambda one: -one.value)))
 
-    def apart(self, quantity: int, count: int) -> Best:
-        """The best ``count`` settings that are apart from each other, and as many whose
+    def apart(self, quantity: int, count: int) -> Array:
+        """The best ``count`` places (rows) that are apart from each other, and as many whose
         surroundings seem the best."""
-        places = [*self.ranked(quantity, STEADY_APART, count), *self._steady(quantity, count)]
-        return self.best_of(np.unique(places, axis=0), quantity, 2 * count)
+        best = self.ranked(quantity, STEADY_APART, count)
+        return np.vstack([best, self._steady(quantity, count)])
 
     def best_of(self, places: Array, quantity: int, count: int) -> Best:
         """The best ``count`` of places (rows) for a quantity, without what cannot be borne."""

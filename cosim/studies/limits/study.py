@@ -32,8 +32,9 @@ class Efforts:
     """Of the same in a round."""
     others: Effort
     """Of the other rigs of an ensemble, and of the own rig when it is searched again."""
-    rounds: int
-    """In which what is best on one machine of a rig is tried on all, and climbed on from."""
+    rounds: tuple[int, int]
+    """In which what is best on one machine of a rig is tried on all, and climbed on from: on the
+    own rig, and on the others."""
     rigs: int
     """Of an ensemble, spread over their order, which is that of their cost."""
 
@@ -42,11 +43,11 @@ FULL = Efforts(
     Effort(512, (0.08, 0.05, 0.04, 0.03, 0.025, 0.02, 0.01, 0.005), 4),
     Effort(32, (0.04, 0.02, 0.01, 0.005), 4),
     Effort(32, (0.04, 0.02, 0.01, 0.005), 2),
-    3,
+    (3, 2),
     3,
 )
 _COARSE = Effort(32, (0.05, 0.02), 2)
-QUICK = Efforts(Effort(64, (0.05, 0.02), 2), _COARSE, _COARSE, 1, 1)
+QUICK = Efforts(Effort(64, (0.05, 0.02), 2), _COARSE, _COARSE, (1, 1), 1)
 
 Name = tuple[str, float]
 """A limit and its value; OWN and IDEAL besides."""
@@ -110,7 +111,7 @@ def study(
         scene = changed(bench.scene, rig.settings, rig.name)
         rig.cases = _cases(scene, settings, limits, all_values=number == 0)
         first, later = (efforts.others,) * 2 if number else (efforts.first, efforts.next)
-        _search(bench, rig, (seed, number), first, later, efforts.rounds, told)
+        _search(bench, rig, (seed, number), first, later, efforts.rounds[number > 0], told)
         found.append(rig)
     return Study(bench.scene, limits, found[:-1], found[-1].found[OWN])
 

@@ -21,8 +21,6 @@ static void about_to_set(State *s)
 {
     if (s->phase == INITIALISING)
         s->model.initialised = 0;
-    if (s->model.extremes_old)
-        stickslip_model_extremes(&s->model);
     s->model.extremes_over = 1;
     s->outputs_stale = 1;
 }
@@ -39,10 +37,7 @@ static size_t reals_there(const Instance *inst)
     const Model *m = &inst->state.model;
     if (!are_fresh(inst))
         return 0;
-    return m->coupling_old   ? FIRST_COUPLING
-           : m->extremes_old ? FIRST_EXTREME
-           : m->energies_old ? FIRST_ENERGY
-                             : N_REALS;
+    return m->coupling_old ? FIRST_COUPLING : m->energies_old ? FIRST_ENERGY : N_REALS;
 }
 
 static int outputs_fresh(Instance *inst, const char *function)
@@ -79,9 +74,7 @@ static int get_special(Instance *inst, const char *function, uint32_t vr, double
         return 0;
     if (place >= FIRST_ENERGY && model->energies_old)
         stickslip_model_energies(model);
-    else if (place >= FIRST_EXTREME && place < FIRST_ENERGY && model->extremes_old)
-        stickslip_model_extremes(model);
-    else if (place >= FIRST_COUPLING && place < FIRST_EXTREME && model->coupling_old)
+    else if (place >= FIRST_COUPLING && place < FIRST_ENERGY && model->coupling_old)
         stickslip_model_coupling(model);
     memcpy(value, (const char *)&model->r + place * sizeof(double), sizeof *value);
     return 1;
@@ -145,6 +138,8 @@ int stickslip_set_reals(Instance *inst, const char *function, const uint32_t vr[
     if (!stickslip_allowed(inst, function, INSTANTIATED | INITIALISING | STEPPING) ||
         !arrays_given(inst, function, n, vr, values))
         return 0;
+    if (n == 0)
+        return 1;
     State *s = &inst->state;
     const int initialised = s->model.initialised, stale = s->outputs_stale;
     const int over = s->model.extremes_over;

@@ -77,7 +77,6 @@ static void begin_extremes(Model *m, const double y[N_ALL], double acceleration)
     if (m->extremes_over)
         stickslip_begin_extremes(m, y, acceleration);
     m->extremes_over = 0;
-    m->extremes_old = 0;
 }
 
 /* ---- a step under way, beyond the communication point ---- */
@@ -106,7 +105,7 @@ int stickslip_advance_within(Model *m, double h)
 void stickslip_reached(Model *m)
 {
     m->ahead.acceleration = m->r.a_surface;
-    m->extremes_old = 1;
+    stickslip_note_extremes(m, m->y, m->r.a_surface);
 }
 
 void stickslip_energies_now(const Model *m, double y[N_ALL])

@@ -19,7 +19,8 @@ int stickslip_advance_within(Model *m, double h);
 /* To be called once the outputs are those of the point that was reached within a step under way. */
 void stickslip_reached(Model *m);
 
-/* The energies there, which nothing but the outputs looks at. */
+/* The states there with the energies, which nothing but the outputs looks at. The inputs must have been
+ * moved there. */
 void stickslip_energies_now(const Model *m, double y[N_ALL]);
 
 /* Stay at that point, and give up what the step under way has beyond it. */

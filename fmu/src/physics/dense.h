@@ -57,7 +57,7 @@ double stickslip_long_factor(double error);
 
 STICKSLIP_INTERNAL_END
 
-/* The same of any step. */
+/* The share of any step at a time (s) after its start. */
 static inline double stickslip_share_at(const Dense *dense, double time)
 {
     return dense->wall < 0 ? time * dense->per_length : stickslip_share_by_clock(dense, time);

@@ -8,7 +8,6 @@
 #include "advance.h"
 #include "coil.h"
 #include "events.h"
-#include "extremes.h"
 #include "forces.h"
 #include "mechanics.h"
 #include "source.h"
@@ -344,12 +343,6 @@ void stickslip_model_coupling(Model *m)
     m->r.back_emf_slope = back_emf_slope(m, m->y, m->a_q);
     m->r.motional_flux = motional_flux(m, m->y[Q]);
     m->r.time_to_impact = time_to_impact(m, m->y, m->a_q);
-}
-
-void stickslip_model_extremes(Model *m)
-{
-    m->extremes_old = 0;
-    stickslip_note_extremes(m, m->y, m->r.a_surface);
 }
 
 /* Sum of one of the energies over all surfaces that move. */

@@ -58,15 +58,13 @@ int stickslip_model_step_within(Model *m, double h);
 void stickslip_model_outputs(Model *m);
 
 /* The last outputs are refreshed by themselves, since few look at them: those that a circuit's
- * solver asks for, the extremes, and those called energy_... m->coupling_old, m->extremes_old and
- * m->energies_old tell that they have not been since the last of the above. */
+ * solver asks for, and those called energy_... m->coupling_old and m->energies_old tell that they
+ * have not been since the last of the above. */
 enum {
     FIRST_COUPLING = offsetof(Reals, back_emf_slope) / sizeof(double),
-    FIRST_EXTREME = offsetof(Reals, a_surface_max) / sizeof(double),
     FIRST_ENERGY = offsetof(Reals, energy_in) / sizeof(double)
 };
 void stickslip_model_coupling(Model *m);
-void stickslip_model_extremes(Model *m);
 void stickslip_model_energies(Model *m);
 
 /* d(output)/d(current, current_2, normal_force or surface_acceleration) in the present mode,

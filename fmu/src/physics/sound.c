@@ -109,7 +109,7 @@ int stickslip_model_check(const Model *m, char *message)
     if (check_variables(m, message))
         return -1;
     if (!is_flag(m->initialised) || !is_flag(m->coupling_old) ||
-        !is_flag(m->extremes_old) || !is_flag(m->extremes_over) || !is_flag(m->energies_old))
+        !is_flag(m->energies_old) || !is_flag(m->extremes_over))
         return say(message, "its flags are none");
     if (!m->initialised)
         return 0;

@@ -71,8 +71,8 @@ typedef struct {
     int limited; /* 0 the target is the command; else the current limit of that sign */
 } Mode;
 
-/* The solution within one long step (see dense.h): a polynomial of each state in the share of the
- * step that has gone by. */
+/* The solution within one long step (see dense.h): a polynomial of each state that acts in the share of
+ * the step that has gone by. */
 typedef struct {
     double length, per_length; /* of the step, s or s/m^0.5, and its inverse */
     int wall;      /* the surface whose wall's clock it goes by; -1: the time */
@@ -115,7 +115,7 @@ typedef struct {
     double energy_at_start;
     double a_q; /* d2 q/dt2 of the first surface, as old as the outputs, m/s2 */
     int initialised;
-    int coupling_old, extremes_old, energies_old; /* outputs: see model.h */
+    int coupling_old, energies_old; /* outputs: see model.h */
     int extremes_over; /* the next step begins them anew */
     Ahead ahead; /* the last: what is before it makes a state by itself */
 } Model;
