@@ -5,7 +5,7 @@ The file has no name, so it vanishes however the process ends.
 
 import mmap
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -72,6 +72,16 @@ class Tape:
             more[:before] = self._kept[:before]
             self._kept = more
         self._kept[before : self._rows] = block
+
+    def add(self, rows: int, write: Callable[[Array], object]) -> None:
+        """Add as many rows, which ``write`` writes into the array that it is given."""
+        room = self.room(rows)
+        block = np.empty((rows, self._columns)) if room is None else room
+        write(block)
+        if room is None:
+            self.append(block)
+        else:
+            self.fill(rows)
 
     def room(self, rows: int) -> Array | None:
         """Where as many rows that come next can be written down in place, of which ``fill`` then

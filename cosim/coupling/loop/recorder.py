@@ -232,7 +232,8 @@ class Recorder:
         self._take()
         for start in range(len(self._time), len(self._rows), BLOCK):
             stop = min(start + BLOCK, len(self._rows))
-            self._time.append(self._step_of_rows * np.arange(start, stop, dtype=np.float64))
+            steps = np.arange(start, stop, dtype=np.float64)[:, np.newaxis]
+            self._time.add(stop - start, partial(np.multiply, self._step_of_rows, steps))
         return self._time.column()
 
     def column(self, name: str) -> Array:

@@ -4,6 +4,7 @@ Energies are those of all ``coil.count`` coils, J; currents and voltages those o
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,10 +39,13 @@ def commanded(command: Command, rows: Array) -> Array:
     """V1 (V) at the times of the rows (s), at a jump the value before it; 0 in the first row, where
     the command has not begun."""
     made = Tape(1, len(rows))
+
+    def write(at: Array, values: Array) -> None:
+        command.values_before(at, values)
+        values[: at.searchsorted(0.0, "right")] = 0.0
+
     for part in blocks(len(rows)):
-        values = command.values_before(rows[part])
-        values[: rows[part].searchsorted(0.0, "right")] = 0.0
-        made.append(values)
+        made.add(part.stop - part.start, partial(write, rows[part]))
     return made.column()
 
 

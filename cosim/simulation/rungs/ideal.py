@@ -98,24 +98,21 @@ class _Coil:
         stop = min(count(step, edges[-1] + SAME_TIME), self._rows)
         edges, start, end = (np.ascontiguousarray(values) for values in (edges, start, end))
         for few in blocks(stop - first):
-            rows = self._waves.room(few.stop - few.start)
-            found = np.empty((few.stop - few.start, 2)) if rows is None else rows
-            _library().coil_rows(
+            write = partial(
+                _library().coil_rows,
                 *(len(h), edges.ctypes.data, start.ctypes.data, end.ctypes.data),
                 None if branch is None else branch.ctypes.data,
                 *(scene.coil.resistance, scene.coil.inductance, eddy.resistance, eddy.tau),
-                *(step, first + few.start, first + few.stop, found.ctypes.data),
+                *(step, first + few.start, first + few.stop),
             )
-            if rows is None:
-                self._waves.append(found)
-            else:
-                self._waves.fill(len(found))
+            self._waves.add(few.stop - few.start, lambda rows, write=write: write(rows.ctypes.data))
 
     def waves(self, back_emf: Array) -> tuple[Array, Array]:
         """Current (A) and voltage (V) in the rows, in which the back-EMF (V) is known."""
         waves, voltage = self._waves.array(), Tape(1, self._rows)
         for few in blocks(len(waves)):
-            voltage.append(waves[few, 1] + back_emf[few])
+            both = (waves[few, 1, np.newaxis], back_emf[few, np.newaxis])
+            voltage.add(len(both[0]), partial(np.add, *both))
         return self._waves.column(0), voltage.column()
 
     def electrics(self, motion: float) -> Electrics:
