@@ -199,10 +199,12 @@ def test_search_climbs_ridges_and_keeps_out_of_what_is_forbidden() -> None:
             assert top.place[0] > 0.35 and 0.93 * best[number] <= top.value <= best[number]
 
 
+@pytest.mark.parametrize("width", [0.03, 0.3])
 def test_what_is_refuted_gives_way_to_the_best_that_is_confirmed(
-    monkeypatch: pytest.MonkeyPatch,
+    width: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The more complete circuit here bears out nothing near the best that a search has found."""
+    """The more complete circuit here bears out nothing near the best that a search has found. Where
+    all else is much poorer, that stays, with what it does there."""
     one = Search(ridge, (0,), 2)
     one.run(study.FULL.first, np.empty((0, 3)))
     rig = study.Rig("its own rig", {}, {study.OWN: Case({}, Machine())})
@@ -213,8 +215,8 @@ def test_what_is_refuted_gives_way_to_the_best_that_is_confirmed(
         return {key: point(key, setting) for key, setting in chosen.items()}
 
     def point(key: confirm.Key, setting: Any) -> confirm.Point:
-        near = abs(setting.place[0] - middle) < 0.03
-        there = setting.value * (0.5 if near else 1.01)
+        near = abs(setting.place[0] - middle) < width
+        there = setting.value * (0.8 if near else 1.01)
         return confirm.Point(*key, setting, 0.0, {}, "amplifier", there)
 
     monkeypatch.setattr(confirm, "_points", judged)
@@ -222,7 +224,10 @@ def test_what_is_refuted_gives_way_to_the_best_that_is_confirmed(
     made: Any = None
     known = study.Study(load("reference"), [], [rig], one.bests())
     top = confirm.confirmed(made, known, lambda said: None)[study.OWN, 0, "best"]
-    assert top.holds and top.refuted > 0
+    assert top.holds is (width < 0.1) and top.refuted > 0
+    if not top.holds:
+        assert top.confirmed > 0.75 * rig.found[study.OWN][0].settings[0].value
+        return
     x = np.linspace(0.351, 1.0, 1299)
     heights = ridge(np.stack([x, x, 0.5 + 0.3 * (x - 0.5)], axis=1))[0][:, 0]
     assert top.setting.value > 0.9 * heights[np.abs(x - middle) >= 0.03].max()

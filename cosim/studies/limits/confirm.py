@@ -20,7 +20,10 @@ from cosim.studies.limits.table import Machine, Settings
 WITHIN = 0.02
 """Relative difference of a confirmed value."""
 
-SPARE = 6
+POORER = 0.05
+"""So much less than a refuted setting does where it was judged, a confirmed one is passed over."""
+
+SPARE = 4
 """Settings that stand by where one is refuted: the best of its own search, those with the best
 surroundings there, and the best of other machines, so many of each."""
 
@@ -69,7 +72,7 @@ Points = dict[Key, Point]
 
 def confirmed(bench: Bench, study: Study, told: Callable[[str], object]) -> Points:
     """The points of the scene's own rig: of those settings that the amplifier confirms the best;
-    where it confirms none the best of all.
+    where it confirms none, or only much poorer ones, the one that does best on the amplifier.
 
     Where it refutes a setting, others that its own search found apart from it are tried, and those
     that are confirmed on other machines.
@@ -82,36 +85,47 @@ def confirmed(bench: Bench, study: Study, told: Callable[[str], object]) -> Poin
         for kind, settings in zip(KINDS, (best.settings, best.robust), strict=True)
         if settings
     }
-    points = _first_that_holds(bench, rig.cases, choices)
+    tried = _until_one_holds(bench, rig.cases, choices)
+    points = {key: _chosen(found) for key, found in tried.items()}
     more = {
         key: settings
         for key, point in points.items()
         if point.refuted and (settings := _spare(bench, rig, points, key, choices[key]))
     }
-    for key, point in _first_that_holds(bench, rig.cases, more).items():
-        refuted = points[key].refuted + point.refuted
-        points[key] = replace(point if point.holds else points[key], refuted=refuted)
+    for key, found in _until_one_holds(bench, rig.cases, more).items():
+        points[key] = _chosen([*tried[key], *found])
     told("confirmed")
     return _on_full(bench, rig.cases, points)
 
 
-def _first_that_holds(
+def _until_one_holds(
     bench: Bench, cases: dict[Name, Case], choices: dict[Key, tuple[Setting, ...]]
-) -> Points:
-    """For each point the first of its settings that is confirmed; where none is, the first."""
-    points: Points = {}
-    first: Points = {}
-    tried = 0
-    while left := {key: settings for key, settings in choices.items() if key not in points}:
-        found = _points(bench, cases, {key: settings[tried] for key, settings in left.items()})
-        tried += 1
-        for key, point in found.items():
-            first.setdefault(key, point)
-            if point.holds:
-                points[key] = replace(point, refuted=tried - 1)
-            elif tried == len(left[key]):
-                points[key] = replace(first[key], refuted=tried)
-    return points
+) -> dict[Key, list[Point]]:
+    """For each point its settings, judged, up to the first that is confirmed."""
+    tried: dict[Key, list[Point]] = {key: [] for key in choices}
+    number = 0
+    while left := {
+        key: settings[number]
+        for key, settings in choices.items()
+        if number < len(settings) and not any(point.holds for point in tried[key])
+    }:
+        for key, point in _points(bench, cases, left).items():
+            tried[key].append(point)
+        number += 1
+    return tried
+
+
+def _chosen(tried: list[Point]) -> Point:
+    """The best of those that are confirmed; but the one that does best where it was judged, if it
+    does so much better there that the frontier would be the poorer without it."""
+    held = [point for point in tried if point.holds]
+    point = max(held, key=_rank) if held else tried[0]
+    known = [one for one in tried if one.confirmed > 0.0]
+    if point.kind == "best" and known:
+        there = max(known, key=lambda one: one.confirmed)
+        if not held or point.confirmed < (1.0 - POORER) * there.confirmed:
+            point = there
+    return replace(point, refuted=len(tried) - len(held))
 
 
 def _spare(
@@ -136,12 +150,12 @@ def _spare(
         one
         for one in (best.settings if kind == "best" else best.robust)
         if one.place not in known
-        and not (point.holds and _rank(one, kind) <= _rank(point.setting, kind))
+        and not (point.holds and _rank(replace(point, setting=one)) <= _rank(point))
     )
 
 
-def _rank(setting: Setting, kind: str) -> float:
-    return setting.value if kind == "best" else setting.median
+def _rank(point: Point) -> float:
+    return point.setting.value if point.kind == "best" else point.setting.median
 
 
 def _points(bench: Bench, cases: dict[Name, Case], chosen: dict[Key, Setting]) -> Points:
