@@ -221,30 +221,32 @@ def nine(tmp_path_factory: pytest.TempPathFactory) -> list[Measured]:
 
 @pytest.mark.slow
 @pytest.mark.physics
-@pytest.mark.parametrize(
-    ("seed", "also"), [(2, "mechanics.suspension_k3"), (3, "coil.force_factor")]
-)
-def test_nine_trials_give_their_rig_back(nine: list[Measured], seed: int, also: str) -> None:
-    """From a start 6 % of the bounds away in each key, within 10 %. Of two keys the records tell
-    less: from the first start the force factor stays 31 % off, since nothing tells the volts of the
-    drive, and from the second the cubic stiffness 12 %."""
+def test_nine_trials_give_their_rig_back(nine: list[Measured]) -> None:
+    """The best of three starts, each 6 % of the bounds away in every key, is within 10 %. One start
+    alone need not be: nothing measured tells the volts of the drive, and of six starts the others
+    ended with the force factor 14 to 45 % off, at a higher cost."""
     space = read_space()
-    coarse = Search(space, [trial.target for trial in nine], 2)
-    fine = Search(space, [trial.fine for trial in nine], 2)
     true = np.array([KNOWN["rig"][key] for key in space.names])
-    rng = np.random.default_rng(seed)
-    beside = space.place(true) + 0.06 * rng.choice([-1.0, 1.0], len(true))
-    found = coarse.screen(np.clip(beside, 0.0, 1.0)[None], rng, 256, 16, 4)[0]
-    found = coarse.nested(coarse.rescreened(found, rng, 256, 16, 4), rng, 250, 0.05, quiet)
-    found = fine.rescreened(fine.refined(found.place, found.own, 5), rng, 256, 16, 4)
-    found = finish(fine, found, 60)
+    found = min((_from_beside(nine, true, seed) for seed in (1, 2, 3)), key=lambda one: one.total)
     assert found.costs.mean() <= 0.005
     share = dict(zip(space.names, space.values(found.place) / true, strict=True))
     for key in (
         *("mechanics.surface_mass", "mechanics.flexure_stiffness", "friction.mu_plate"),
-        *("mechanics.suspension_k2", also),
+        *("mechanics.suspension_k2", "mechanics.suspension_k3", "coil.force_factor"),
     ):
         assert share[key] == pytest.approx(1.0, abs=0.1), key
+
+
+def _from_beside(trials: list[Measured], true: Array, seed: int) -> Found:
+    """What the search makes of a start beside the true values."""
+    space, rng = read_space(), np.random.default_rng(seed)
+    coarse = Search(space, [trial.target for trial in trials], 2)
+    fine = Search(space, [trial.fine for trial in trials], 2)
+    beside = space.place(true) + 0.06 * rng.choice([-1.0, 1.0], len(true))
+    found = coarse.screen(np.clip(beside, 0.0, 1.0)[None], rng, 256, 16, 4)[0]
+    found = coarse.nested(coarse.rescreened(found, rng, 256, 16, 4), rng, 250, 0.05, quiet)
+    found = fine.rescreened(fine.refined(found.place, found.own, 5), rng, 256, 16, 4)
+    return finish(fine, found, 60)
 
 
 def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(tmp_path: Path) -> None:
