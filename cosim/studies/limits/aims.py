@@ -21,8 +21,9 @@ KNOB_COUNT = len(KNOBS)
 TURN = 0.02
 """Of a knob's whole turn: how well a hand finds a setting again."""
 
-DIGITS = 6
-"""Of a knob's whole turn, so that a setting can be typed."""
+STEPS = firmware.COUNTS - 1
+"""Of a knob's whole turn: the firmware reads each in so many, and nothing between them can be set.
+"""
 
 FREE = {f"drive.{knob}": None for knob in KNOBS}
 """Lets amplitude, frequency and offset stand for themselves."""
@@ -30,21 +31,21 @@ FREE = {f"drive.{knob}": None for knob in KNOBS}
 
 def settings(place: Array, reach: float = 1.0) -> dict[str, float]:
     """Amplitude (V), frequency (Hz) and offset (V) of a place in the cube, as the firmware maps its
-    potentiometers but without their steps; ``reach`` multiplies both volts.
+    potentiometers; ``reach`` multiplies both volts.
 
     The third knob sets where the ramp ends, so the mean moves with the amplitude.
     """
     amplitude, top = reach * RANGE * place[0], reach * RANGE * place[2]
     return {
         "drive.amplitude": _typed(amplitude),
-        "drive.frequency": _typed(firmware.knob_frequency(0.0) - 99.0 * place[1]),
+        "drive.frequency": _typed(firmware.knob_frequency(place[1] * STEPS / firmware.COUNTS)),
         "drive.offset": _typed(top - amplitude / 2.0),
     }
 
 
 def rounded(places: Array) -> Array:
-    """Places (rows) that can be typed, inside the cube."""
-    return np.round(np.clip(places, 0.0, 1.0), DIGITS)
+    """Places (rows) that can be set, inside the cube."""
+    return np.round(np.clip(places, 0.0, 1.0) * STEPS) / STEPS
 
 
 def faces(place: Array) -> Array:
@@ -58,7 +59,7 @@ def corners(place: Array) -> Array:
 
 
 def _typed(value: float) -> float:
-    return round(float(value), DIGITS)
+    return round(float(value), 6)
 
 
 Numbers = Mapping[str, float]
