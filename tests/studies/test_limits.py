@@ -24,13 +24,15 @@ from cosim.studies.limits.aims import QUANTITIES
 from cosim.studies.limits.answer import BINDS, NOTHING, UNTOLD, Change
 from cosim.studies.limits.report import JOURNAL, run
 from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import Effort, Search
+from cosim.studies.limits.search import NOWHERE, Clouds, Effort, Leads, Search
 from cosim.studies.limits.table import LIMITS, Machine, needed_acceleration
+from cosim.studies.sweep.point import Outcome
 from tests.studies.test_figures import assert_legible
 
 BY_NAME = {limit.name: limit for limit in LIMITS}
 NUMBER = {quantity.name: number for number, quantity in enumerate(QUANTITIES)}
-SMALL = Effort(16, (0.05, 0.02), 2)
+FEW = (Clouds(0.05, 1, 2), Clouds(0.02, 1, 2))
+SMALL = Effort(16, FEW, FEW)
 
 
 @pytest.fixture
@@ -39,10 +41,6 @@ def brief(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(runs, "SETTLE", 0.05)
     monkeypatch.setattr(runs, "SPAN", 0.1)
     yield
-
-
-NOWHERE = np.empty((0, 3))
-"""No places in the knobs' cube."""
 
 
 def bench(folder: Path, scene: Any = "reference", **more: Any) -> Bench:
@@ -88,14 +86,14 @@ def test_needed_acceleration() -> None:
     assert needed_acceleration(both) == pytest.approx(89.81)
 
 
-def test_the_cube_is_the_range_of_the_potentiometers() -> None:
-    for place in ([0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.3, 0.7, 0.9]):
-        pots = dict(zip(("pot_max", "pot_frequency", "pot_offset"), place, strict=True))
-        drive = load("reference", {f"drive.{name}": x for name, x in pots.items()}).drive
-        # A potentiometer is read in 1024 steps.
-        for key, value in aims.settings(np.array(place)).items():
-            step = 0.1 if key == "drive.frequency" else 0.016
-            assert value == pytest.approx(getattr(drive, key.split(".")[1]), abs=step)
+def test_the_cube_is_what_the_potentiometers_set() -> None:
+    """Each is read in 1024 steps, 0 to 1023; a place between two of them is none."""
+    for steps in ([0, 0, 0], [1023, 1023, 1023], [307, 716, 921]):
+        pots = dict(zip(("pot_max", "pot_frequency", "pot_offset"), steps, strict=True))
+        drive = load("reference", {f"drive.{name}": n / 1024 for name, n in pots.items()}).drive
+        place = aims.rounded((np.array(steps) + 0.3) / 1023)
+        for key, value in aims.settings(place).items():
+            assert value == pytest.approx(getattr(drive, key.split(".")[1]), abs=1e-6)
 
 
 LINEAR = {
@@ -151,11 +149,11 @@ def test_search_finds_what_an_exhaustive_grid_finds(tmp_path: Path) -> None:
     with bench(tmp_path) as made:
         scores, borne = made.scores(case, aims.rounded(grid))
         one = Search(lambda places: made.scores(case, places), (0,))
-        one.run(Effort(256, (0.08, 0.05, 0.03, 0.02, 0.01), 4), np.empty((0, 3)))
+        searched(one, 256)
         best = np.where(borne[:, None], scores, -np.inf).max(axis=0)
         found = [one.found(number, NOWHERE) for number in range(len(QUANTITIES))]
         again = Search(lambda places: made.scores(case, places), (0,))
-        again.run(Effort(256, (0.08, 0.05, 0.03, 0.02, 0.01), 4), np.empty((0, 3)))
+        searched(again, 256)
         assert [again.found(number, NOWHERE) for number in range(len(QUANTITIES))] == found
         for number, top in enumerate(found):
             if best[number] > 0.0:
@@ -166,6 +164,14 @@ def test_search_finds_what_an_exhaustive_grid_finds(tmp_path: Path) -> None:
         for settings, outcome in zip(every, made.outcomes(every), strict=True):
             assert made.heat(case, settings, outcome.numbers) <= case.machine.heat
         independent(case.settings(np.array(steady.place)), steady.value)
+
+
+def searched(one: Search, design: int = 1024, quantities: int = len(QUANTITIES)) -> None:
+    """With the effort of a study, but for the places that fill the cube."""
+    one.fill(design)
+    hints, own = Leads(NOWHERE, np.empty((0, quantities))), study.FULL.own
+    for clouds in (own.first, *[own.next] * study.FULL.rounds[0]):
+        one.climb(clouds, hints)
 
 
 def independent(settings: dict[str, Any], v_average: float) -> None:
@@ -193,40 +199,137 @@ def test_search_climbs_ridges_and_keeps_out_of_what_is_forbidden() -> None:
     best = 1.05, np.exp(-(0.05**2) / 0.02)  # in the middle; where what is allowed begins
     for seed in range(3):
         one = Search(ridge, (seed,), 2)
-        one.run(study.FULL.first, np.empty((0, 3)))
+        searched(one, quantities=2)
         for number in range(2):
             top = one.found(number, NOWHERE).settings[0]
-            assert top.place[0] > 0.35 and 0.93 * best[number] <= top.value <= best[number]
+            assert top.place[0] > 0.35 and 0.95 * best[number] <= top.value <= best[number]
+
+
+def test_places_that_fill_the_cube_keep_to_what_can_be_borne() -> None:
+    """A ninth of it; and they are dense where a knob is near an end of its turn."""
+    asked: list[Array] = []
+
+    def ask(places: Array) -> tuple[Array, Any]:
+        asked.append(places)
+        return np.zeros((len(places), 1)), (places[:, :2] < 1 / 3).all(axis=1)
+
+    Search(ask, (0,), 1).fill(256)
+    first, later = asked[0], np.vstack(asked[1:])
+    assert len(first) + len(later) == 256
+    # By the arcsine law 0.39 lie in the first third of a turn, and 0.20 in either tenth.
+    assert 0.08 < (first[:, :2] < 1 / 3).all(axis=1).mean() < 0.25
+    assert (later[:, :2] < 1 / 3).all(axis=1).mean() > 0.6
+    assert 0.15 < (later[:, 2] > 0.9).mean() < 0.26
+
+
+def test_a_machine_that_bears_nothing_stops_no_other(tmp_path: Path) -> None:
+    def ask(places: Array) -> tuple[Array, Any]:
+        return np.zeros((len(places), len(QUANTITIES))), np.zeros(len(places), bool)
+
+    one = Search(ask, (0,))
+    searched(one, 16)
+    assert not any(best.settings for best in one.bests())
+    assert len(one.leads().places) == 0
+
+
+def salt(places: Array) -> tuple[Array, Any]:
+    """A hill on which all but a scattered tenth of the places are worth nothing."""
+    steps = np.round(places * aims.STEPS).astype(np.int64)
+    scattered = (steps @ [7919, 104729, 1299709]) % 211 < 20
+    hill = np.exp(-((places - [0.3, 0.95, 0.05]) ** 2).sum(axis=1) / 0.05)
+    return np.where(scattered, hill, -1.0)[:, None], np.ones(len(places), bool)
+
+
+def test_what_is_rugged_is_asked_more_often() -> None:
+    """Places that are worth something lie closer than the last clouds are wide, but far between."""
+    for seed in range(3):
+        one = Search(salt, (seed,), 1)
+        searched(one, quantities=1)
+        assert one.found(0, NOWHERE).settings[0].value > 0.9
+
+
+def test_a_ridge_that_runs_beside_a_hint_is_found() -> None:
+    """What is best on another machine is worth nothing here, a few steps beside it."""
+
+    def needle(places: Array) -> tuple[Array, Any]:
+        off = np.abs(places - [0.5, 0.5, 0.5]).max(axis=1)
+        return np.where(off < 0.004, 2.0, -1.0)[:, None], np.ones(len(places), bool)
+
+    hint = aims.rounded(np.array([[0.5, 0.5044, 0.5]]))
+    for there, found in ((2.0, True), (-1.0, False)):
+        one = Search(needle, (0,), 1)
+        one.fill(16)
+        one.climb((), Leads(hint, np.array([[there]])))
+        assert bool(one.found(0, NOWHERE).settings) is found
+
+
+def test_what_does_not_grow_is_left_alone_until_a_hint_raises_it() -> None:
+    count = [0]
+
+    def ask(places: Array) -> tuple[Array, Any]:
+        count[0] += len(places)
+        low, high = (((places - middle) ** 2).sum(axis=1) for middle in (0.3, 0.8))
+        heights = np.maximum(np.exp(-low / 0.02), 2.0 * np.exp(-high / 1e-4))
+        return heights[:, None], np.ones(len(places), bool)
+
+    one, clouds = Search(ask, (0,), 1), study.FULL.own.next
+    searched(one, 64, 1)
+    none = Leads(NOWHERE, np.empty((0, 1)))
+    one.climb(clouds, none)
+    before = count[0]
+    one.climb(clouds, none)
+    assert count[0] == before and one.found(0, NOWHERE).settings[0].value < 1.01
+    one.climb(clouds, Leads(aims.rounded(np.full((1, 3), 0.805)), np.array([[2.0]])))
+    assert count[0] > before and one.found(0, NOWHERE).settings[0].value > 1.9
+
+
+class Judge:
+    """A more complete circuit that bears out nothing near the best that a search has found, and has
+    the ridge a few steps beside there."""
+
+    def __init__(self, middle: float, width: float) -> None:
+        self.middle, self.width = middle, width
+
+    def scores(self, case: Case, places: Array) -> tuple[Array, Any]:
+        near = np.abs(places[:, 0] - self.middle) < self.width
+        found, borne = ridge(places)
+        beside, _ = ridge(places - [0.006, -0.006, 0.0])
+        return np.where(near[:, None], 0.8 * beside, 1.01 * found), borne
+
+    def outcomes(self, every: Any) -> list[Outcome]:
+        return [Outcome({}) for _ in every]
+
+    def heat(self, *run: object) -> float:
+        return 0.0
 
 
 @pytest.mark.parametrize("width", [0.03, 0.3])
 def test_what_is_refuted_gives_way_to_the_best_that_is_confirmed(
     width: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The more complete circuit here bears out nothing near the best that a search has found. Where
-    all else is much poorer, that stays, with what it does there."""
+    """Where all that is confirmed is much poorer, the circuit that refutes is searched itself."""
     one = Search(ridge, (0,), 2)
-    one.run(study.FULL.first, np.empty((0, 3)))
+    searched(one, quantities=2)
     rig = study.Rig("its own rig", {}, {study.OWN: Case({}, Machine())})
     rig.searches[study.OWN], rig.found[study.OWN] = one, one.bests()
     middle = rig.found[study.OWN][0].settings[0].place[0]
+    judge: Any = Judge(middle, width)
 
     def judged(bench: Any, cases: Any, chosen: dict[Any, Any]) -> dict[Any, confirm.Point]:
         return {key: point(key, setting) for key, setting in chosen.items()}
 
     def point(key: confirm.Key, setting: Any) -> confirm.Point:
-        near = abs(setting.place[0] - middle) < width
-        there = setting.value * (0.8 if near else 1.01)
+        there = judge.scores(None, np.array([setting.place]))[0][0, key[1]]
         return confirm.Point(*key, setting, 0.0, {}, "amplifier", there)
 
     monkeypatch.setattr(confirm, "_points", judged)
     monkeypatch.setattr(confirm, "_on_full", lambda bench, cases, points: points)
-    made: Any = None
     known = study.Study(load("reference"), [], [rig], one.bests())
-    top = confirm.confirmed(made, known, lambda said: None)[study.OWN, 0, "best"]
-    assert top.holds is (width < 0.1) and top.refuted > 0
-    if not top.holds:
-        assert top.confirmed > 0.75 * rig.found[study.OWN][0].settings[0].value
+    top = confirm.confirmed(judge, known, lambda said: None)[study.OWN, 0, "best"]
+    assert top.holds and top.refuted > 0
+    if width == 0.3:
+        assert top.settings["circuit.model"] == "amplifier"
+        assert top.confirmed > 0.97 * 0.8 * 1.05  # 0.94 at what was tried
         return
     x = np.linspace(0.351, 1.0, 1299)
     heights = ridge(np.stack([x, x, 0.5 + 0.3 * (x - 0.5)], axis=1))[0][:, 0]
@@ -278,7 +381,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "slew rate": (),
     }
     limits = [replace(BY_NAME[name], values=few) for name, few in values.items()]
-    efforts = study.Efforts(SMALL, Effort(8, (), 2), Effort(8, (), 2), (1, 1), 1)
+    efforts = study.Efforts(SMALL, Effort(8, (), ()), (1, 1), 1)
     scene = load("reference", {"run.duration": 0.2})
     rigs: list[Any] = [{"mechanics.surface_mass": 0.02}]
     there = [load("trial-05", {"run.duration": 0.15, "run.settle": 0.05})]

@@ -189,11 +189,11 @@ def paragraphs(study: Study, points: Points, found: Sequence[Change]) -> list[st
         nothing(found),
         first(study, points),
         (
-            "Best is the best setting of the three knobs, found anew for each circuit; robust the "
-            "one with the greatest median over turns of ±2 % of a whole turn, of one knob and of "
-            "all together. An interval is over the rigs; a change counts where it exceeds 2 % and "
-            "what two searches of the same circuit differ by. A setting that makes more heat than "
-            "the coil bears does not count."
+            "Best is the best setting of the three knobs, of the 1024 that the firmware reads of "
+            "each, found anew for each circuit; robust the one with the greatest median over turns "
+            "of ±2 % of a whole turn, of one knob and of all together. An interval is over the "
+            "rigs; a change counts where it exceeds 2 % and what two searches of the same circuit "
+            "differ by. A setting that makes more heat than the coil bears does not count."
         ),
     ]
 
@@ -314,6 +314,11 @@ def rated(limit: Limit, value: float) -> str:
 def refuted(points: Points) -> list[Point]:
     """Points that the more complete circuit does not confirm."""
     return [point for point in points.values() if not point.holds]
+
+
+def sought(points: Points) -> list[Point]:
+    """Points that were found on the circuit that had refuted others."""
+    return [p for p in points.values() if p.refuted and p.settings["circuit.model"] == p.rung]
 
 
 def _since(limit: Limit, value: float | None) -> str:

@@ -1,6 +1,7 @@
 """Judges what the cheapest circuit has found by circuits with more in them.
 
-A setting that the amplifier refutes gives way to the next one. The limits that the cheapest circuit
+A setting that the amplifier refutes gives way to the next one; where all good ones are refuted, the
+amplifier is searched itself. The limits that the cheapest circuit
 does not have are turned here, at the settings found for the scene's own circuit.
 """
 
@@ -9,11 +10,13 @@ from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
+from numpy.typing import NDArray
 
+from cosim.arrays import Array
 from cosim.scene import changed
 from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, scores
 from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import Setting
+from cosim.studies.limits.search import STEADY_APART, Clouds, Leads, Search, Setting
 from cosim.studies.limits.study import IDEAL, OWN, Name, Rig, Study, moved
 from cosim.studies.limits.table import Machine, Settings
 
@@ -28,6 +31,9 @@ SPARE = 4
 surroundings there, and the best of other machines, so many of each."""
 
 KINDS = ("best", "robust")
+
+JUDGE = (Clouds(0.01, 2, 4), Clouds(0.003, 2, 4), Clouds(0.001, 2, 6))
+"""Climbed with on the more complete circuit itself."""
 
 CORNERS = (OWN, ("supply voltage", 10.0), ("supply voltage", 30.0))
 """Machines whose points are run on the whole schematic."""
@@ -72,7 +78,7 @@ Points = dict[Key, Point]
 
 def confirmed(bench: Bench, study: Study, told: Callable[[str], object]) -> Points:
     """The points of the scene's own rig: of those settings that the amplifier confirms the best;
-    where it confirms none, or only much poorer ones, the one that does best on the amplifier.
+    where it confirms none, or only much poorer ones, the best that is found on the amplifier.
 
     Where it refutes a setting, others that its own search found apart from it are tried, and those
     that are confirmed on other machines.
@@ -93,7 +99,11 @@ def confirmed(bench: Bench, study: Study, told: Callable[[str], object]) -> Poin
         if point.refuted and (settings := _spare(bench, rig, points, key, choices[key]))
     }
     for key, found in _until_one_holds(bench, rig.cases, more).items():
-        points[key] = _chosen([*tried[key], *found])
+        tried[key] += found
+        points[key] = _chosen(tried[key])
+    for key, point in points.items():
+        if point.kind == "best" and not point.holds:
+            points[key] = _searched(bench, rig.cases[key[0]], point, tried[key])
     told("confirmed")
     return _on_full(bench, rig.cases, points)
 
@@ -128,6 +138,28 @@ def _chosen(tried: list[Point]) -> Point:
     return replace(point, refuted=len(tried) - len(held))
 
 
+def _searched(bench: Bench, case: Case, point: Point, tried: list[Point]) -> Point:
+    """What a climb on the circuit that refuted all good settings of a point finds from these; the
+    point itself where none of them is achievable there."""
+    judge = replace(case, rung=point.rung)
+
+    def ask(places: Array) -> tuple[Array, NDArray[np.bool_]]:
+        found, borne = bench.scores(judge, places)
+        return found[:, [point.quantity]], borne
+
+    places = np.unique([one.setting.place for one in tried], axis=0)
+    search = Search(ask, (0,), 1)
+    search.climb(JUDGE, Leads(places, search.scores(places)))
+    best = search.ranked(0, STEADY_APART, 1)
+    value = float(search.scores(best).max(initial=0.0))
+    if value <= 0.0:
+        return point
+    settings = judge.settings(best[0])
+    heat = bench.heat(case, settings, bench.outcomes([settings])[0].numbers)
+    setting = Setting(tuple(best[0].tolist()), value, nan, nan)
+    return replace(point, setting=setting, heat=heat, settings=settings, confirmed=value)
+
+
 def _spare(
     bench: Bench, rig: Rig, points: Points, key: Key, tried: tuple[Setting, ...]
 ) -> tuple[Setting, ...]:
@@ -135,12 +167,12 @@ def _spare(
     better there than what is confirmed, the best first."""
     name, quantity, kind = key
     elsewhere = [
-        moved(bench, [point.setting], rig.cases[other], rig.cases[name])
+        moved(bench, np.array(point.setting.place), rig.cases[other], rig.cases[name])
         for (other, number, _), point in points.items()
         if other != name and number == quantity and point.holds
     ]
     search = rig.searches[name]
-    places = [search.apart(quantity, SPARE)]
+    places = [search.distinct(quantity, SPARE)]
     if elsewhere:
         best = search.best_of(np.unique(np.vstack(elsewhere), axis=0), quantity, SPARE)
         places += [np.array([one.place for one in best.settings]).reshape(-1, KNOB_COUNT)]
@@ -194,15 +226,14 @@ def _on_full(bench: Bench, cases: dict[Name, Case], points: Points) -> Points:
 
 def judged(bench: Bench, study: Study, points: Points, told: Callable[[str], object]) -> Points:
     """The limits that only the amplifier has: for each value the best among the settings that were
-    found for the scene's own circuit, and the robust one. The own circuit's points stand among
-    them, on the amplifier, too.
+    found for the scene's own circuit and those of its ``points``, and the robust one. The own
+    circuit's points stand among them, on the amplifier, too.
     """
     rig = study.rigs[0]
-    places = {
-        setting.place: setting
-        for best in rig.found[OWN]
-        for setting in (*best.settings[:2], *best.robust[:2])
-    }
+    kept = [point.setting for key, point in points.items() if key[0] == OWN]
+    for best in rig.found[OWN]:
+        kept += [*best.settings[:2], *best.robust[:2]]
+    places = list(dict.fromkeys(setting.place for setting in kept))
     found: Points = {}
     here = changed(bench.scene, rig.settings, rig.name)
     asked: dict[Name, Machine] = {}

@@ -26,6 +26,11 @@ def write(folder: Path, bench: Bench, study: Study, points: Points, there: Seque
             f"Of {len(points)} points the more complete circuit does not confirm {len(not_held)} "
             "within 2 %; limits.csv has both values."
         )
+    if sought := answer.sought(points):
+        said.append(
+            "Points sought on the more complete circuit itself, since it refuted all good settings "
+            f"of the cheapest one: {len(sought)}."
+        )
     write_csv(folder / "limits.csv", [row(bench, study, point) for point in points.values()])
     tables: dict[str, Sequence[Row]] = {
         "What is achievable": achieved(study, points),

@@ -1,8 +1,8 @@
 """Finds the best settings of the knobs for several quantities at once, from the same runs.
 
 The heights are ragged and lie on narrow ridges, so nothing here trusts a slope: a design that fills
-the space, then clouds that shrink about the best few settings of each quantity, which are apart
-from each other, so that each quantity is climbed from several starts.
+what can be borne of the space, then clouds that shrink about the best few settings of each
+quantity, which are apart from each other, so that each quantity is climbed from several starts.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,22 +16,42 @@ from scipy.spatial import KDTree
 from cosim.arrays import Array
 from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, TURN, corners, faces, rounded
 
-STARTS, APART = 3, 0.1
-"""Starts of each quantity, and how far apart, as a share of a knob's turn; half-way through, the
-best of them is left."""
+APART = 0.06
+"""How far apart the starts of a quantity are, as a share of a knob's turn."""
 
 ELITE, NEAR, INFLATION = 6, 0.1, 2.0
 """Those settings: how many, from how far, and by how much their covariance is blown up."""
 
-STEADY, STEADY_APART = 2, 0.015
-"""Settings of each quantity whose surroundings are looked at beside those of the best one, and how
-far apart. They stand in for one that is refuted, too."""
+STEADY, STEADY_APART, LOOKS = 2, 0.015, 5
+"""Settings of each quantity whose surroundings are looked at beside those of the best one, how far
+apart, and how often, each time those that seem best by then. They stand in for one that is refuted,
+too."""
+
+LEADS = 3
+"""Places of each quantity that are tried on other machines."""
+
+RUGGED, FEW = 0.05, 0.3
+"""A quantity whose samples do worse than its best by the one, but for a share of the other, is
+sampled once more: where heights are ragged the best is luck, and more samples have more of it."""
+
+PROMISING, ABOUT, ABOUT_COUNT = 2, 0.003, 8
+"""Of those that do better there than all that is known here, so many have their neighbours asked
+for, too: their standard deviation, as a share of a knob's turn, and how many."""
+
+CANDIDATES = 64
+"""Times a quarter of the places that fill the cube: so many are looked at for the others."""
+
+SETTLED = 0.003
+"""Relative growth between two climbs, of a quantity's best, below which it is left alone."""
 
 CLOSE, FEWEST = 1.5 * TURN, 5
 """What is known of a setting's surroundings: how far they reach, and from how many runs."""
 
-MOST = 400
-"""Best places among which some are picked that are apart."""
+MOST = 100
+"""Best places among which those are picked whose surroundings seem the best."""
+
+NOWHERE: Array = np.empty((0, KNOB_COUNT))
+"""No places."""
 
 Ask = Callable[[Array], tuple[Array, NDArray[np.bool_]]]
 """Scores (a row each, a column a quantity) of places (rows) in the cube, and which of these the
@@ -39,15 +59,37 @@ coil and the power amplifier bear."""
 
 
 @dataclass(frozen=True)
+class Clouds:
+    """Samples about the best places of each quantity."""
+
+    spread: float
+    """Their standard deviation."""
+    starts: int
+    """Places of each quantity about which they lie."""
+    samples: int
+    """About each; even, since every other one lies along the best settings near by."""
+    times: int = 1
+    """At most, while the quantity grows or proves rugged."""
+
+
+@dataclass(frozen=True)
 class Effort:
     """How much a search may cost."""
 
     design: int
-    """Places that fill the cube; a power of two."""
-    spreads: tuple[float, ...]
-    """Standard deviations of the clouds."""
-    samples: int
-    """Of a cloud; even, since every other one lies along the best settings near by."""
+    """Places that fill the cube, and then what can be borne of it; a power of two, from 4."""
+    first: tuple[Clouds, ...]
+    """Of the first climb, one after the other: ever narrower, and about fewer starts."""
+    next: tuple[Clouds, ...]
+    """Of a later one."""
+
+
+@dataclass(frozen=True)
+class Leads:
+    """Places (rows) that do well on a machine, and their scores there (rows)."""
+
+    places: Array
+    scores: Array
 
 
 @dataclass(frozen=True)
@@ -98,6 +140,7 @@ class Search:
         self._quantities = quantities
         self._known: dict[tuple[float, ...], Array] = {}
         self._borne: dict[tuple[float, ...], bool] = {}
+        self._heights = np.full(quantities, -inf)
         self._arrays: tuple[Array, Array] | None = None
 
     def scores(self, places: Array) -> Array:
@@ -109,39 +152,106 @@ class Search:
             found, borne = self._ask(np.array(new))
             self._known.update(zip(new, found, strict=True))
             self._borne.update(zip(new, borne.tolist(), strict=True))
-        return np.array([self._known[row] for row in rows])
+        return np.array([self._known[row] for row in rows]).reshape(-1, self._quantities)
 
-    def run(self, effort: Effort, hints: Array) -> None:
-        """Ask for places that fill the cube, and climb from the best of these and of ``hints``."""
+    def fill(self, count: int) -> None:
+        """Ask for ``count`` places that fill what can be borne of the cube: those of a sequence of
+        which the nearest that is known can be. A quarter of them fills the cube."""
         from scipy.stats import qmc
 
-        self.scores(rounded(qmc.Sobol(KNOB_COUNT, rng=self._random).random(effort.design)))
-        self.climb(effort, hints)
+        sequence, batch = qmc.Sobol(KNOB_COUNT, rng=self._random), max(count // 4, 1)
+        self.scores(_to_the_stops(sequence.random(batch)))
+        for _ in range(CANDIDATES):
+            if len(self._known) >= count:
+                break
+            places = _to_the_stops(sequence.random(batch))
+            borne, tree = np.array(list(self._borne.values())), KDTree(np.array(list(self._known)))
+            near = borne[tree.query(places)[1]] if borne.any() else np.ones(batch, bool)
+            self.scores(places[near][: count - len(self._known)])
 
-    def climb(self, effort: Effort, hints: Array) -> None:
-        """Ask for ``hints`` (rows), and climb from the best of all that is known."""
-        self.scores(rounded(hints))
-        for number, spread in enumerate(effort.spreads):
-            wide = 2 * number < len(effort.spreads)
-            starts, half = (STARTS, effort.samples // 2) if wide else (1, effort.samples)
-            clouds = [np.empty((0, KNOB_COUNT))]
-            for quantity in range(self._quantities):
-                places = [*self.ranked(quantity, APART, starts), *self._steady(quantity, 1)]
-                clouds += [self._cloud(p, quantity, spread, half) for p in places]
-            self.scores(np.vstack(clouds))
+    def climb(self, steps: Sequence[Clouds], hints: Leads) -> None:
+        """Ask for ``hints``, and climb from the best of all that is known, but for the quantities
+        that have not grown since the last climb began."""
+        self.scores(hints.places)
+        self._look_about(hints)
+        growing = self._growing()
+        for clouds in steps:
+            left = growing
+            for _ in range(clouds.times):
+                before = self._tops()
+                every = {quantity: self._about(quantity, clouds) for quantity in left}
+                self.scores(np.vstack([NOWHERE, *every.values()]))
+                grown = _grown(before, self._tops())
+                left = [q for q in left if grown[q] or self._rugged(q, every[q])]
+                if not left:
+                    break
 
-    def _cloud(self, start: Array, quantity: int, spread: float, half: int) -> Array:
+    def _about(self, quantity: int, clouds: Clouds) -> Array:
+        """Samples about the best places of a quantity, as far as they are not known."""
+        starts = [*self.ranked(quantity, APART, clouds.starts), *self._steady(quantity, 1)]
+        places = np.vstack([NOWHERE, *(self._cloud(place, quantity, clouds) for place in starts)])
+        return np.array(
+            [place for place in places if tuple(place.tolist()) not in self._known]
+        ).reshape(-1, KNOB_COUNT)
+
+    def _rugged(self, quantity: int, places: Array) -> bool:
+        """Whether few of the places (rows) can be borne and do nearly as well as the best that is
+        known; no place is not rugged."""
+        best = self._column(quantity)[1].max()
+        nearly = self.scores(places)[:, quantity] >= best - RUGGED * abs(best)
+        return bool(len(places)) and bool(np.mean(nearly & self._are_borne(places)) < FEW)
+
+    def _are_borne(self, places: Array) -> NDArray[np.bool_]:
+        """Of known places (rows)."""
+        return np.array([self._borne[tuple(place.tolist())] for place in places], bool)
+
+    def _look_about(self, hints: Leads) -> None:
+        """Ask for what is close to the hints that do better elsewhere than all that is known here:
+        on this machine the ridge on which they lie may run a few steps beside."""
+        every, least = [NOWHERE], _above(self._tops())
+        borne = self._are_borne(hints.places)
+        for quantity in range(self._quantities):
+            there = np.where(borne, hints.scores[:, quantity], -inf)
+            order = np.argsort(-there, kind="stable")
+            promising = hints.places[order[there[order] > least[quantity]]]
+            for place in promising[apart(promising, APART, PROMISING)]:
+                steps = self._random.normal(0.0, ABOUT, (ABOUT_COUNT, KNOB_COUNT))
+                every.append(rounded(place + steps))
+        self.scores(np.vstack(every))
+
+    def _growing(self) -> list[int]:
+        """The quantities whose best has grown since this was asked last."""
+        last, self._heights = self._heights, self._tops()
+        return np.flatnonzero(_grown(last, self._heights)).tolist()
+
+    def _tops(self) -> Array:
+        """The best score of each quantity."""
+        every = [self._column(quantity)[1].max() for quantity in range(self._quantities)]
+        return np.array(every)
+
+    def leads(self) -> Leads:
+        """What to try on other machines: for each quantity some of the best places, and that whose
+        surroundings seem the best."""
+        every = [
+            place
+            for quantity in range(self._quantities)
+            for place in (*self.ranked(quantity, APART, LEADS), *self._steady(quantity, 1))
+        ]
+        places = np.unique(np.array(every).reshape(-1, KNOB_COUNT), axis=0)
+        return Leads(places, self.scores(places))
+
+    def _cloud(self, start: Array, quantity: int, clouds: Clouds) -> Array:
         """Samples about a place, half of them along the ridge that it lies on."""
         places, column = self._column(quantity)
         near = np.abs(places - start).max(axis=1) <= NEAR
         order = np.argsort(-column[near], kind="stable")[:ELITE]
-        round_ = spread**2 * np.eye(KNOB_COUNT)
+        round_ = clouds.spread**2 * np.eye(KNOB_COUNT)
         ridge = round_ / 16.0
         if len(order) > KNOB_COUNT:
             ridge += INFLATION * np.cov(places[near][order].T)
         steps = [
-            self._random.multivariate_normal(np.zeros(KNOB_COUNT), spread_, half)
-            for spread_ in (round_, ridge)
+            self._random.multivariate_normal(np.zeros(KNOB_COUNT), spread, clouds.samples // 2)
+            for spread in (round_, ridge)
         ]
         return rounded(start + np.vstack(steps))
 
@@ -149,22 +259,31 @@ class Search:
         """Places with a score, the best first, each ``distance`` from those before it."""
         places, column = self._column(quantity)
         order = np.argsort(-column, kind="stable")
-        order = order[np.isfinite(column[order])]
-        return _apart(places[order[:MOST]], distance, count)
+        best = places[order[np.isfinite(column[order])]]
+        return best[apart(best, distance, count)]
 
     def found(self, quantity: int, also: Array) -> Best:
         """The best setting of a quantity, those whose surroundings seem the best, and ``also``
         those at places (rows) that are the best elsewhere. Those that cannot be borne are left out.
         """
-        places = [*self.ranked(quantity, STEADY_APART, 1), *self._steady(quantity, STEADY)]
         self.scores(also)
-        places += [place for place in also if self._borne[tuple(place.tolist())]]
-        every = dict.fromkeys(tuple(place.tolist()) for place in places)
-        settings = [self.around(np.array(place), quantity) for place in every]
-        achievable = (one for one in settings if one.value > 0.0)
+        places = [*self.ranked(quantity, STEADY_APART, 1), *also[self._are_borne(also)]]
+        settings: dict[tuple[float, ...], Setting] = {}
+        for _ in range(LOOKS):
+            # What is known of surroundings changes with each look at them.
+            places += [*self._steady(quantity, STEADY)]
+            new = dict.fromkeys(tuple(place.tolist()) for place in places)
+            if new.keys() <= settings.keys():
+                break
+            settings |= {
+                place: self.around(np.array(place), quantity)
+                for place in new
+                if place not in settings
+            }
+        achievable = (one for one in settings.values() if one.value > 0.0)
         return Best(tuple(sorted(achievable, key=lambda one: -one.value)))
 
-    def apart(self, quantity: int, count: int) -> Array:
+    def distinct(self, quantity: int, count: int) -> Array:
         """The best ``count`` places (rows) that are apart from each other, and as many whose
         surroundings seem the best."""
         best = self.ranked(quantity, STEADY_APART, count)
@@ -182,9 +301,8 @@ class Search:
 
     def bests(self, also: Sequence[Array] | None = None) -> Bests:
         """What was found for each quantity; ``also`` has further places (rows) for each."""
-        none = np.empty((0, KNOB_COUNT))
         return tuple(
-            self.found(quantity, none if also is None else also[quantity])
+            self.found(quantity, NOWHERE if also is None else also[quantity])
             for quantity in range(self._quantities)
         )
 
@@ -205,8 +323,8 @@ class Search:
             for row in close
         ]
         best = order[np.argsort(-np.array(quarter), kind="stable")]
-        best = best[column[best] > 0.0]
-        return _apart(places[best], STEADY_APART, count)
+        good = places[best[column[best] > 0.0]]
+        return good[apart(good, STEADY_APART, count)]
 
     def _column(self, quantity: int) -> tuple[Array, Array]:
         """All places, and their scores of a quantity; -inf where they are not bearable."""
@@ -219,12 +337,29 @@ class Search:
         return places, every[:, quantity]
 
 
-def _apart(places: Array, distance: float, count: int) -> Array:
-    """The first of ``places`` (rows), and those after it that are ``distance`` from all kept."""
-    kept: list[Array] = []
-    for place in places:
-        if len(kept) == count:
-            break
-        if not kept or np.abs(np.array(kept) - place).max(axis=1).min() >= distance:
-            kept.append(place)
-    return np.array(kept).reshape(-1, KNOB_COUNT)
+def apart(places: Array, distance: float, count: int) -> list[int]:
+    """The first of ``places`` (rows), and those after it that are ``distance`` from all before them
+    that count: ``count`` numbers of rows at most."""
+    kept: list[int] = []
+    left = np.ones(len(places), bool)
+    while left.any() and len(kept) != count:
+        kept.append(int(left.argmax()))
+        left &= np.abs(places - places[kept[-1]]).max(axis=1) >= distance
+    return kept
+
+
+def _to_the_stops(uniform: Array) -> Array:
+    """Places (rows) that are dense where a knob is near an end of its turn, by the arcsine law:
+    what is best often lies there."""
+    return rounded(np.sin(0.5 * np.pi * uniform) ** 2)
+
+
+def _above(heights: Array) -> Array:
+    """Heights that are more than settled ones."""
+    finite = np.where(np.isfinite(heights), heights, 0.0)
+    return np.where(np.isfinite(heights), finite + SETTLED * np.abs(finite), -inf)
+
+
+def _grown(before: Array, after: Array) -> NDArray[np.bool_]:
+    found: NDArray[np.bool_] = after > _above(before)
+    return found

@@ -18,7 +18,7 @@ from cosim.errors import BadInput, plain
 from cosim.scene import Scene, changed
 from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, rounded
 from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import Bests, Effort, Search, Setting
+from cosim.studies.limits.search import NOWHERE, Bests, Clouds, Effort, Leads, Search, apart
 from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
 
 
@@ -26,28 +26,44 @@ from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
 class Efforts:
     """What the searches may cost."""
 
-    first: Effort
+    own: Effort
     """Of a circuit of the scene's own rig."""
-    next: Effort
-    """Of the same in a round."""
     others: Effort
     """Of the other rigs of an ensemble, and of the own rig when it is searched again."""
     rounds: tuple[int, int]
     """In which what is best on one machine of a rig is tried on all, and climbed on from: on the
-    own rig, and on the others."""
+    own rig, and on the others; after the first."""
     rigs: int
     """Of an ensemble, spread over their order, which is that of their cost."""
 
 
+def _clouds(*every: tuple[float, int, int, int]) -> tuple[Clouds, ...]:
+    return tuple(Clouds(*one) for one in every)
+
+
 FULL = Efforts(
-    Effort(512, (0.08, 0.05, 0.04, 0.03, 0.025, 0.02, 0.01, 0.005), 4),
-    Effort(32, (0.04, 0.02, 0.01, 0.005), 4),
-    Effort(32, (0.04, 0.02, 0.01, 0.005), 2),
-    (3, 2),
+    Effort(
+        1024,
+        _clouds(
+            *((0.06, 8, 4, 1), (0.04, 6, 4, 1), (0.02, 4, 4, 4), (0.01, 2, 4, 8)),
+            *((0.005, 1, 4, 8), (0.002, 1, 4, 6), (0.001, 1, 4, 6)),
+        ),
+        _clouds((0.03, 3, 4, 1), (0.01, 2, 4, 4), (0.003, 1, 4, 6), (0.001, 1, 4, 6)),
+    ),
+    Effort(
+        128,
+        _clouds((0.05, 4, 4, 1), (0.02, 2, 4, 2), (0.005, 1, 4, 4), (0.001, 1, 4, 3)),
+        _clouds((0.02, 2, 4, 1), (0.005, 1, 4, 2), (0.001, 1, 4, 2)),
+    ),
+    (2, 1),
     3,
 )
-_COARSE = Effort(32, (0.05, 0.02), 2)
-QUICK = Efforts(Effort(64, (0.05, 0.02), 2), _COARSE, _COARSE, (1, 1), 1)
+_COARSE = _clouds((0.05, 2, 2, 1), (0.02, 1, 4, 1))
+QUICK = Efforts(Effort(64, _COARSE, _COARSE), Effort(32, _COARSE, _COARSE), (1, 1), 1)
+
+CLOSE_BY, HINTS = 0.02, 24
+"""Of places of other machines closer than this, of a knob's turn, one is tried; and how many for
+each quantity."""
 
 Name = tuple[str, float]
 """A limit and its value; OWN and IDEAL besides."""
@@ -100,7 +116,7 @@ def study(
 ) -> Study:
     """Search the machines of the bench's scene, and those of ``rigs`` with each limit lifted.
 
-    ``told`` hears of each machine when it is done. The same for the same seed.
+    ``told`` hears of each machine in each round. The same for the same seed.
     """
     found = []
     # The last is the own rig once more, searched like the others.
@@ -110,8 +126,8 @@ def study(
         rig = Rig(name, settings)
         scene = changed(bench.scene, rig.settings, rig.name)
         rig.cases = _cases(scene, settings, limits, all_values=number == 0)
-        first, later = (efforts.others,) * 2 if number else (efforts.first, efforts.next)
-        _search(bench, rig, (seed, number), first, later, efforts.rounds[number > 0], told)
+        effort = efforts.others if number else efforts.own
+        _search(bench, rig, (seed, number), effort, efforts.rounds[number > 0], told)
         found.append(rig)
     return Study(bench.scene, limits, found[:-1], found[-1].found[OWN])
 
@@ -130,23 +146,24 @@ def _search(
     bench: Bench,
     rig: Rig,
     seed: tuple[int, int],
-    first: Effort,
-    later: Effort,
+    effort: Effort,
     rounds: int,
     told: Callable[[str], object],
 ) -> None:
     searches = rig.searches
+    leads: dict[Name, Leads] = {}
     for number, (name, case) in enumerate(rig.cases.items()):
         search = searches[name] = Search(partial(bench.scores, case), (*seed, number))
-        search.run(first, _hints(bench, rig, name, _kin(rig, name)))
-        rig.found[name] = search.bests()
-        told(f"{rig.name}: {name[0]} {name[1]:.3g}")
-    for number in range(1, rounds + 1):
+        search.fill(effort.design)
+        leads[name] = search.leads()
+    for number in range(1 + rounds):
         # What is best on one machine is tried on all, and climbed on from where it is better.
         for name, search in searches.items():
-            search.climb(later, _hints(bench, rig, name, rig.found))
-            rig.found[name] = search.bests()
+            hints = _hints(bench, rig, leads, name)
+            search.climb(effort.next if number else effort.first, hints)
+            leads[name] = search.leads()
             told(f"{rig.name}, round {number}: {name[0]} {name[1]:.3g}")
+    rig.found = {name: search.bests() for name, search in searches.items()}
     for name, search in searches.items():
         # What its kin does best is looked at closely: no machine is the worse for a lifted limit
         # only because its search has missed that.
@@ -154,40 +171,49 @@ def _search(
 
 
 def _of_kin(bench: Bench, rig: Rig, name: Name) -> list[Array]:
-    """For each quantity the best places of a machine's kin, but for the ideal current's."""
-    kin = [other for other in _kin(rig, name) if other not in (name, IDEAL)]
+    """For each quantity the best places of the scene's own circuit and of the same limit's other
+    values."""
+    kin = [other for other in rig.found if other == OWN or other[0] == name[0]]
     every = []
     for quantity in range(len(QUANTITIES)):
-        places = [np.empty((0, KNOB_COUNT))]
+        places = [NOWHERE]
         for other in kin:
-            tops = rig.found[other][quantity].tops
-            places.append(moved(bench, tops, rig.cases[other], rig.cases[name]))
+            if other != name:
+                tops = np.array([one.place for one in rig.found[other][quantity].tops])
+                places.append(moved(bench, tops, rig.cases[other], rig.cases[name]))
         every.append(np.vstack(places))
     return every
 
 
-def _kin(rig: Rig, name: Name) -> list[Name]:
-    """Of the machines that were searched those that are most like one."""
-    return [other for other in rig.found if other in (OWN, IDEAL) or other[0] == name[0]]
+def _hints(bench: Bench, rig: Rig, leads: dict[Name, Leads], name: Name) -> Leads:
+    """The leads of all other machines as places of one, for each quantity without those that lie
+    close to one that does better on its own machine."""
+    others = [other for other in leads if other != name]
+    if not others:
+        return Leads(NOWHERE, np.empty((0, len(QUANTITIES))))
+    places = np.vstack(
+        [moved(bench, leads[x].places, rig.cases[x], rig.cases[name]) for x in others]
+    )
+    relative = np.vstack([_relative(leads[x].scores) for x in others])
+    kept: set[int] = set()
+    for quantity in range(len(QUANTITIES)):
+        order = np.argsort(-relative[:, quantity], kind="stable")
+        kept |= set(order[apart(places[order], CLOSE_BY, HINTS)].tolist())
+    rows = sorted(kept)
+    return Leads(places[rows], np.vstack([leads[x].scores for x in others])[rows])
 
 
-def _hints(bench: Bench, rig: Rig, name: Name, others: Iterable[Name]) -> Array:
-    here, cases = rig.cases[name], rig.cases
-    found = [_as_hints(bench, rig.found[other], cases[other], here) for other in others]
-    return np.vstack([np.empty((0, KNOB_COUNT)), *found])
+def _relative(scores: Array) -> Array:
+    """Scores (rows), relative to the best of each column."""
+    best = np.abs(scores.max(axis=0, initial=-np.inf))
+    found: Array = scores / np.where(np.isfinite(best) & (best > 0.0), best, 1.0)
+    return found
 
 
-def _as_hints(bench: Bench, found: Bests, there: Case, here: Case) -> Array:
-    """The settings found for one machine as places of another."""
-    tops = [one for best in found for one in best.tops]
-    return np.unique(moved(bench, tops, there, here), axis=0)
-
-
-def moved(bench: Bench, found: Sequence[Setting], there: Case, here: Case) -> Array:
-    """Settings of one machine as places (rows) of another, with the same currents."""
-    places = np.array([one.place for one in found]).reshape(-1, KNOB_COUNT)
+def moved(bench: Bench, places: Array, there: Case, here: Case) -> Array:
+    """Places (rows) of one machine as places of another, with the same currents."""
     ratio = bench.amperes(there) / bench.amperes(here)
-    return rounded(places * [ratio, 1.0, ratio])
+    return rounded(places.reshape(-1, KNOB_COUNT) * [ratio, 1.0, ratio])
 
 
 def ensemble(path: Path, most: int) -> list[Settings]:
