@@ -22,7 +22,7 @@ APART = 0.06
 ELITE, NEAR, INFLATION = 6, 0.1, 2.0
 """Those settings: how many, from how far, and by how much their covariance is blown up."""
 
-STEADY, STEADY_APART, LOOKS = 2, 0.015, 5
+STEADY, STEADY_APART, LOOKS = 2, 0.015, 2
 """Settings of each quantity whose surroundings are looked at beside those of the best one, how far
 apart, and how often, each time those that seem best by then. They stand in for one that is refuted,
 too."""

@@ -18,7 +18,16 @@ from cosim.errors import BadInput, plain
 from cosim.scene import Scene, changed
 from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, rounded
 from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import NOWHERE, Bests, Clouds, Effort, Leads, Search, apart
+from cosim.studies.limits.search import (
+    NOWHERE,
+    STEADY_APART,
+    Bests,
+    Clouds,
+    Effort,
+    Leads,
+    Search,
+    apart,
+)
 from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
 
 
@@ -172,16 +181,17 @@ def _search(
 
 def _of_kin(bench: Bench, rig: Rig, name: Name) -> list[Array]:
     """For each quantity the best places of the scene's own circuit and of the same limit's other
-    values."""
-    kin = [other for other in rig.found if other == OWN or other[0] == name[0]]
+    values; for the own circuit those of all limits, as far as they lie apart."""
+    kin = [other for other in rig.found if name == OWN or other == OWN or other[0] == name[0]]
     every = []
     for quantity in range(len(QUANTITIES)):
         places = [NOWHERE]
         for other in kin:
-            if other != name:
+            if other not in (name, IDEAL):
                 tops = np.array([one.place for one in rig.found[other][quantity].tops])
                 places.append(moved(bench, tops, rig.cases[other], rig.cases[name]))
-        every.append(np.vstack(places))
+        all_ = np.vstack(places)
+        every.append(all_[apart(all_, STEADY_APART, len(all_))])
     return every
 
 
