@@ -293,7 +293,7 @@ class Judge:
     def scores(self, case: Case, places: Array) -> tuple[Array, Any]:
         near = np.abs(places[:, 0] - self.middle) < self.width
         found, borne = ridge(places)
-        beside, _ = ridge(places - [0.006, -0.006, 0.0])
+        beside, _ = ridge(places - [0.012, -0.012, 0.0])
         return np.where(near[:, None], 0.8 * beside, 1.01 * found), borne
 
     def outcomes(self, every: Any) -> list[Outcome]:
@@ -314,12 +314,15 @@ def test_what_is_refuted_gives_way_to_the_best_that_is_confirmed(
     rig.searches[study.OWN], rig.found[study.OWN] = one, one.bests()
     middle = rig.found[study.OWN][0].settings[0].place[0]
     judge: Any = Judge(middle, width)
+    tried: list[float] = []
 
     def judged(bench: Any, cases: Any, chosen: dict[Any, Any]) -> dict[Any, confirm.Point]:
         return {key: point(key, setting) for key, setting in chosen.items()}
 
     def point(key: confirm.Key, setting: Any) -> confirm.Point:
         there = judge.scores(None, np.array([setting.place]))[0][0, key[1]]
+        if key[1] == 0:
+            tried.append(there)
         return confirm.Point(*key, setting, 0.0, {}, "amplifier", there)
 
     monkeypatch.setattr(confirm, "_points", judged)
@@ -329,7 +332,7 @@ def test_what_is_refuted_gives_way_to_the_best_that_is_confirmed(
     assert top.holds and top.refuted > 0
     if width == 0.3:
         assert top.settings["circuit.model"] == "amplifier"
-        assert top.confirmed > 0.97 * 0.8 * 1.05  # 0.94 at what was tried
+        assert max(tried) * 1.02 < top.confirmed <= 0.8 * 1.05
         return
     x = np.linspace(0.351, 1.0, 1299)
     heights = ridge(np.stack([x, x, 0.5 + 0.3 * (x - 0.5)], axis=1))[0][:, 0]
