@@ -222,7 +222,7 @@ def test_places_that_fill_the_cube_keep_to_what_can_be_borne() -> None:
     assert 0.15 < (later[:, 2] > 0.9).mean() < 0.26
 
 
-def test_a_machine_that_bears_nothing_stops_no_other(tmp_path: Path) -> None:
+def test_a_machine_that_bears_nothing_stops_no_other() -> None:
     def ask(places: Array) -> tuple[Array, Any]:
         return np.zeros((len(places), len(QUANTITIES))), np.zeros(len(places), bool)
 

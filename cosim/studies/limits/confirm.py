@@ -1,8 +1,8 @@
 """Judges what the cheapest circuit has found by circuits with more in them.
 
 A setting that the amplifier refutes gives way to the next one; where all good ones are refuted, the
-amplifier is searched itself. The limits that the cheapest circuit
-does not have are turned here, at the settings found for the scene's own circuit.
+amplifier is searched itself. The limits that the cheapest circuit does not have are turned here, at
+the settings found for the scene's own circuit.
 """
 
 from collections.abc import Callable

@@ -20,7 +20,8 @@ APART = 0.06
 """How far apart the starts of a quantity are, as a share of a knob's turn."""
 
 ELITE, NEAR, INFLATION = 6, 0.1, 2.0
-"""Those settings: how many, from how far, and by how much their covariance is blown up."""
+"""The best settings near a start, along which half its cloud lies: how many, from how far, and by
+how much their covariance is blown up."""
 
 STEADY, STEADY_APART, LOOKS = 2, 0.015, 2
 """Settings of each quantity whose surroundings are looked at beside those of the best one, how far
@@ -272,14 +273,9 @@ class Search:
         for _ in range(LOOKS):
             # What is known of surroundings changes with each look at them.
             places += [*self._steady(quantity, STEADY)]
-            new = dict.fromkeys(tuple(place.tolist()) for place in places)
-            if new.keys() <= settings.keys():
-                break
-            settings |= {
-                place: self.around(np.array(place), quantity)
-                for place in new
-                if place not in settings
-            }
+            for place in places:
+                if (row := tuple(place.tolist())) not in settings:
+                    settings[row] = self.around(place, quantity)
         achievable = (one for one in settings.values() if one.value > 0.0)
         return Best(tuple(sorted(achievable, key=lambda one: -one.value)))
 
@@ -292,11 +288,8 @@ class Search:
     def best_of(self, places: Array, quantity: int, count: int) -> Best:
         """The best ``count`` of places (rows) for a quantity, without what cannot be borne."""
         column = self.scores(places)[:, quantity]
-        good = [
-            places[k]
-            for k in np.argsort(-column, kind="stable")
-            if column[k] > 0.0 and self._borne[tuple(places[k].tolist())]
-        ]
+        order = np.argsort(-column, kind="stable")
+        good = places[order[((column > 0.0) & self._are_borne(places))[order]]]
         return Best(tuple(self.around(place, quantity) for place in good[:count]))
 
     def bests(self, also: Sequence[Array] | None = None) -> Bests:

@@ -180,18 +180,21 @@ def _search(
 
 
 def _of_kin(bench: Bench, rig: Rig, name: Name) -> list[Array]:
-    """For each quantity the best places of the scene's own circuit and of the same limit's other
-    values; for the own circuit those of all limits, as far as they lie apart."""
-    kin = [other for other in rig.found if name == OWN or other == OWN or other[0] == name[0]]
+    """For each quantity, as far as they lie apart, the best places of the scene's own circuit and
+    of the same limit's other values; for the own circuit those of all limits."""
+    kin = [
+        other
+        for other in rig.found
+        if other not in (name, IDEAL) and (OWN in (name, other) or other[0] == name[0])
+    ]
     every = []
     for quantity in range(len(QUANTITIES)):
         places = [NOWHERE]
         for other in kin:
-            if other not in (name, IDEAL):
-                tops = np.array([one.place for one in rig.found[other][quantity].tops])
-                places.append(moved(bench, tops, rig.cases[other], rig.cases[name]))
-        all_ = np.vstack(places)
-        every.append(all_[apart(all_, STEADY_APART, len(all_))])
+            tops = np.array([one.place for one in rig.found[other][quantity].tops])
+            places.append(moved(bench, tops, rig.cases[other], rig.cases[name]))
+        tried = np.vstack(places)
+        every.append(tried[apart(tried, STEADY_APART, len(tried))])
     return every
 
 
@@ -199,8 +202,6 @@ def _hints(bench: Bench, rig: Rig, leads: dict[Name, Leads], name: Name) -> Lead
     """The leads of all other machines as places of one, for each quantity without those that lie
     close to one that does better on its own machine."""
     others = [other for other in leads if other != name]
-    if not others:
-        return Leads(NOWHERE, np.empty((0, len(QUANTITIES))))
     places = np.vstack(
         [moved(bench, leads[x].places, rig.cases[x], rig.cases[name]) for x in others]
     )
