@@ -162,8 +162,8 @@ class Scene(BaseModel):
                 *others,
             )
         pin = firmware.offset_pin(drive.offset, drive.amplitude)
-        # a knob at its end may come out a rounding error outside
-        if not -1e-9 <= pin <= firmware.V_REFERENCE + 1e-9:
+        # Volts typed to six digits may put a knob that is at its end a microvolt outside.
+        if not -1e-6 <= pin <= firmware.V_REFERENCE + 1e-6:
             half = drive.amplitude / 2
             raise fault(
                 f"drive.offset = {drive.offset:g} V must be a number from {-half:.4g} to "
