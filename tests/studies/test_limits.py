@@ -32,7 +32,7 @@ from tests.studies.test_figures import assert_legible
 BY_NAME = {limit.name: limit for limit in LIMITS}
 NUMBER = {quantity.name: number for number, quantity in enumerate(QUANTITIES)}
 FEW = (Clouds(0.05, 1, 2), Clouds(0.02, 1, 2))
-SMALL = Effort(16, FEW, FEW)
+SMALL = Effort(16, FEW, FEW, rounds=1)
 
 
 @pytest.fixture
@@ -67,6 +67,15 @@ def test_back_emf_is_turned_alone() -> None:
     np.testing.assert_allclose(current, own.columns["current"], rtol=1e-9, atol=1e-12)
     heat = less.summary["energy_copper"] * machine.coil_scale
     assert heat == pytest.approx(own.summary["energy_copper"], rel=1e-6)
+
+
+def test_every_setting_of_the_knobs_can_be_quantised() -> None:
+    """Volts with six digits put no knob that is at its end outside what the DAC gives."""
+    base = changed(load("reference"), aims.FREE, "test")
+    for step in range(aims.STEPS + 1):
+        for end in (0.0, 1.0):
+            volts = aims.settings(np.array([step / aims.STEPS, 0.5, end]))
+            assert changed(base, {**volts, "drive.quantised": True}, "test").drive.quantised
 
 
 def test_sense_resistor_leaves_the_current(tmp_path: Path) -> None:
@@ -151,10 +160,10 @@ def test_search_finds_what_an_exhaustive_grid_finds(tmp_path: Path) -> None:
         one = Search(lambda places: made.scores(case, places), (0,))
         searched(one, 256)
         best = np.where(borne[:, None], scores, -np.inf).max(axis=0)
-        found = [one.found(number, NOWHERE) for number in range(len(QUANTITIES))]
+        found = [one.found(number) for number in range(len(QUANTITIES))]
         again = Search(lambda places: made.scores(case, places), (0,))
         searched(again, 256)
-        assert [again.found(number, NOWHERE) for number in range(len(QUANTITIES))] == found
+        assert [again.found(number) for number in range(len(QUANTITIES))] == found
         for number, top in enumerate(found):
             if best[number] > 0.0:
                 assert top.settings[0].value >= 0.95 * best[number], QUANTITIES[number].name
@@ -170,7 +179,7 @@ def searched(one: Search, design: int = 1024, quantities: int = len(QUANTITIES))
     """With the effort of a study, but for the places that fill the cube."""
     one.fill(design)
     hints, own = Leads(NOWHERE, np.empty((0, quantities))), study.FULL.own
-    for clouds in (own.first, *[own.next] * study.FULL.rounds[0]):
+    for clouds in (own.first, *[own.next] * own.rounds):
         one.climb(clouds, hints)
 
 
@@ -201,7 +210,7 @@ def test_search_climbs_ridges_and_keeps_out_of_what_is_forbidden() -> None:
         one = Search(ridge, (seed,), 2)
         searched(one, quantities=2)
         for number in range(2):
-            top = one.found(number, NOWHERE).settings[0]
+            top = one.found(number).settings[0]
             assert top.place[0] > 0.35 and 0.95 * best[number] <= top.value <= best[number]
 
 
@@ -245,7 +254,7 @@ def test_what_is_rugged_is_asked_more_often() -> None:
     for seed in range(3):
         one = Search(salt, (seed,), 1)
         searched(one, quantities=1)
-        assert one.found(0, NOWHERE).settings[0].value > 0.9
+        assert one.found(0).settings[0].value > 0.9
 
 
 def test_a_ridge_that_runs_beside_a_hint_is_found() -> None:
@@ -260,7 +269,7 @@ def test_a_ridge_that_runs_beside_a_hint_is_found() -> None:
         one = Search(needle, (0,), 1)
         one.fill(16)
         one.climb((), Leads(hint, np.array([[there]])))
-        assert bool(one.found(0, NOWHERE).settings) is found
+        assert bool(one.found(0).settings) is found
 
 
 def test_what_does_not_grow_is_left_alone_until_a_hint_raises_it() -> None:
@@ -278,9 +287,9 @@ def test_what_does_not_grow_is_left_alone_until_a_hint_raises_it() -> None:
     one.climb(clouds, none)
     before = count[0]
     one.climb(clouds, none)
-    assert count[0] == before and one.found(0, NOWHERE).settings[0].value < 1.01
+    assert count[0] == before and one.found(0).settings[0].value < 1.01
     one.climb(clouds, Leads(aims.rounded(np.full((1, 3), 0.805)), np.array([[2.0]])))
-    assert count[0] > before and one.found(0, NOWHERE).settings[0].value > 1.9
+    assert count[0] > before and one.found(0).settings[0].value > 1.9
 
 
 class Judge:
@@ -339,6 +348,79 @@ def test_what_is_refuted_gives_way_to_the_best_that_is_confirmed(
     assert top.setting.value > 0.9 * heights[np.abs(x - middle) >= 0.03].max()
 
 
+def test_a_current_limit_that_acts_is_judged_on_the_circuit_that_has_one(tmp_path: Path) -> None:
+    with bench(tmp_path) as made:
+        made.scene = changed(made.scene, {"circuit.current_limit": 2.0}, "test")
+        judges = {
+            (amperes, limit): confirm._more_complete(
+                made,
+                Case({}, Machine()),
+                {"circuit.current_limit": limit} if limit else {},
+                {"current_max": 0.1, "current_min": -amperes},
+            )
+            for amperes in (0.39, 0.4, 2.0)
+            for limit in (0.4, None)
+            if amperes <= (limit or 2.0)
+        }
+        ideal = confirm._more_complete(made, Case({}, Machine(), "ideal"), {}, {})
+    assert judges == {
+        **{(0.39, 0.4): "amplifier", (0.4, 0.4): "full"},
+        **{(0.39, None): "amplifier", (0.4, None): "amplifier", (2.0, None): "full"},
+    }
+    assert ideal == "ideal"
+
+
+def test_a_limit_that_costs_is_climbed_on_from_what_the_own_circuit_does_best() -> None:
+    """The ridge lies a few steps beside that of the own circuit where the limit acts."""
+    middle, asked = 0.5, dict.fromkeys((1e5, 1e9, None), 0)
+
+    class Beside(Judge):
+        def scores(self, case: Case, places: Array) -> tuple[Array, Any]:
+            slew: Any = case.machine.settings.get("circuit.slew_rate")
+            asked[slew] += len(places)
+            off = places - middle - (0.006 if slew == 1e5 else 0.0)
+            heights = np.exp(-(off**2).sum(axis=1) / 2e-4)
+            return np.stack([heights] * len(QUANTITIES), axis=1), np.ones(len(places), bool)
+
+    judge: Any = Beside(middle, 0.0)
+    judge.scene = load("reference")
+    one = Search(lambda places: judge.scores(Case({}, Machine()), places), (0,))
+    one.scores(aims.rounded(np.full((1, 3), middle)))
+    rig = study.Rig("its own rig", {}, searches={study.OWN: one})
+    found = rig.found[study.OWN] = one.bests()
+    slew = replace(BY_NAME["slew rate"], values=(1e5,))
+    known = study.Study(judge.scene, [slew], [rig], found)
+    points = confirm.judged(judge, known, {}, lambda said: None)
+    start = np.exp(-3 * 0.006**2 / 2e-4)
+    for quantity in range(len(QUANTITIES)):
+        acts, lifted = (points[("slew rate", v), quantity, "best"].confirmed for v in (1e5, 1e9))
+        assert acts > 1.2 * start and lifted > 0.99
+    assert asked[1e9] < 20 < asked[1e5]
+
+
+def test_other_rigs_begin_with_what_is_best_on_the_own_one() -> None:
+    """A needle that few places do not find; with twice the amperes it lies at half the turn."""
+
+    class Needle:
+        scene = load("reference")
+
+        def amperes(self, case: Case) -> float:
+            return 2.0 if case.rig else 1.0
+
+        def scores(self, case: Case, places: Array) -> tuple[Array, Any]:
+            turned = places * [self.amperes(case), 1.0, self.amperes(case)]
+            heights = np.exp(-((turned - [0.31, 0.42, 0.63]) ** 2).sum(axis=1) / 1e-3)
+            return np.stack([heights] * len(QUANTITIES), axis=1), np.ones(len(places), bool)
+
+    needle: Any = Needle()
+    few = Effort(8, (Clouds(0.001, 1, 2),), (), rounds=0)
+    efforts = study.Efforts(Effort(512, study.FULL.own.first, (), rounds=0), few, few, 1)
+    found = study.study(needle, [{"mechanics.surface_mass": 0.02}], [], efforts=efforts)
+    own, other = (rig.found[study.OWN][0].settings[0].value for rig in found.rigs)
+    assert own > 0.8 and other > 0.8
+    assert all(best.settings[0].value < 0.1 for best in found.again)
+
+
 @pytest.mark.usefixtures("brief")
 def test_a_killed_study_goes_on(tmp_path: Path) -> None:
     places = aims.rounded(np.random.default_rng(0).random((12, 3)))
@@ -381,14 +463,20 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     values: dict[str, tuple[float, ...]] = {
         "supply voltage": (24.0,),
         "coil heat": (),
+        "DAC steps": (5e-5,),
         "slew rate": (),
     }
     limits = [replace(BY_NAME[name], values=few) for name, few in values.items()]
-    efforts = study.Efforts(SMALL, Effort(8, (), ()), (1, 1), 1)
+    efforts = study.Efforts(SMALL, Effort(8, (), (), rounds=1), Effort(8, (), (), rounds=0), 1)
     scene = load("reference", {"run.duration": 0.2})
     rigs: list[Any] = [{"mechanics.surface_mass": 0.02}]
     there = [load("trial-05", {"run.duration": 0.15, "run.settle": 0.05})]
-    said = run(tmp_path, scene, "reference", rigs, there, efforts=efforts, limits=limits, workers=2)
+    steps: list[int] = []
+    said = run(
+        tmp_path, scene, "reference", rigs, there, efforts=efforts, limits=limits, workers=2,
+        told=lambda count, name: steps.append(count),
+    )  # fmt: skip
+    assert steps == [len(steps)] * len(steps)
     assert "The part slips down from 50 m/s² on" in said and not (tmp_path / JOURNAL).exists()
     with open(tmp_path / "limits.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))

@@ -99,15 +99,15 @@ def changes(study: Study, points: Points) -> list[Change]:
 
 
 def _nominal(study: Study, points: Points, limit: Limit, quantity: int, kind: str) -> float:
-    own = name_of(study.scene, limit, limit.at_work(study.scene))
     before, after = (
-        height(points.get((name, quantity, kind))) for name in (own, (limit.name, limit.gone))
+        height(points.get((name_of(study.scene, limit, value), quantity, kind)))
+        for value in (limit.at_work(study.scene), limit.gone)
     )
     return after / before - 1.0
 
 
 def _others(study: Study, limit: Limit, quantity: int, kind: int) -> list[float]:
-    if limit.rung != "limited":
+    if not limit.searched:
         return []
     return [
         _height(rig.found[limit.name, limit.gone][quantity], kind)
@@ -149,7 +149,7 @@ def costs_from(
     robust frontier (of the best where there is no robust one); None where none does.
     """
     for kind in reversed(KINDS):
-        top = height(points.get(((limit.name, limit.gone), quantity, kind)))
+        top = height(points.get((name_of(study.scene, limit, limit.gone), quantity, kind)))
         if not isfinite(top):
             continue
         own = limit.own(study.scene)
@@ -164,9 +164,10 @@ def costs_from(
 
 def steps(study: Study, points: Points, quantity: int, kind: str) -> list[Step]:
     """Real changes for the better of a quantity, the largest gain first."""
-    own = height(points.get((OWN, quantity, kind)))
     found = []
     for limit in (limit for limit in study.limits if limit.real):
+        before = name_of(study.scene, limit, limit.own(study.scene))
+        own = height(points.get((before, quantity, kind)))
         for value in limit.values:
             better = (value > limit.own(study.scene)) is limit.more_is_better
             there = height(points.get(((limit.name, value), quantity, kind)))
@@ -190,7 +191,9 @@ def paragraphs(study: Study, points: Points, found: Sequence[Change]) -> list[st
         first(study, points),
         (
             "Best is the best setting of the three knobs, of the 1024 that the firmware reads of "
-            "each, found anew for each circuit; robust the one with the greatest median over turns "
+            "each, found anew for each circuit (for the gain-bandwidth and slew rate climbed on to "
+            "from the own circuit's where the limit costs; their robust one is the own circuit's); "
+            "robust the one with the greatest median over turns "
             "of ±2 % of a whole turn, of one knob and of all together. An interval is over the "
             "rigs; a change counts where it exceeds 2 % and what two searches of the same circuit "
             "differ by. A setting that makes more heat than the coil bears does not count."

@@ -1,24 +1,25 @@
 """Judges what the cheapest circuit has found by circuits with more in them.
 
 A setting that the amplifier refutes gives way to the next one; where all good ones are refuted, the
-amplifier is searched itself. The limits that the cheapest circuit does not have are turned here, at
-the settings found for the scene's own circuit.
+best is sought on the amplifier itself. The limits that the cheapest circuit does not have
+are turned here, at the settings found for the scene's own circuit, from which a climb begins where
+the limit costs.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import nan
+from math import inf, nan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cosim.arrays import Array
 from cosim.scene import changed
-from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, scores
+from cosim.studies.limits.aims import KNOB_COUNT, Numbers, scores
 from cosim.studies.limits.runs import Bench, Case
 from cosim.studies.limits.search import STEADY_APART, Clouds, Leads, Search, Setting
-from cosim.studies.limits.study import IDEAL, OWN, Name, Rig, Study, moved
-from cosim.studies.limits.table import Machine, Settings
+from cosim.studies.limits.study import OWN, Name, Rig, Study, moved
+from cosim.studies.limits.table import Limit, Machine, Settings
 
 WITHIN = 0.02
 """Relative difference of a confirmed value."""
@@ -30,9 +31,12 @@ SPARE = 4
 """Settings that stand by where one is refuted: the best of its own search, those with the best
 surroundings there, and the best of other machines, so many of each."""
 
+AT_LIMIT = 0.999
+"""Of a current limit: where the current reaches so far, the limit acted."""
+
 KINDS = ("best", "robust")
 
-JUDGE = (Clouds(0.01, 2, 4), Clouds(0.003, 2, 4), Clouds(0.001, 2, 6))
+JUDGE = (Clouds(0.01, 2, 4), Clouds(0.002, 2, 6))
 """Climbed with on the more complete circuit itself."""
 
 CORNERS = (OWN, ("supply voltage", 10.0), ("supply voltage", 30.0))
@@ -78,7 +82,7 @@ Points = dict[Key, Point]
 
 def confirmed(bench: Bench, study: Study, told: Callable[[str], object]) -> Points:
     """The points of the scene's own rig: of those settings that the amplifier confirms the best;
-    where it confirms none, or only much poorer ones, the best that is found on the amplifier.
+    where it confirms none, or only much poorer ones, the best one is that found there.
 
     Where it refutes a setting, others that its own search found apart from it are tried, and those
     that are confirmed on other machines.
@@ -141,23 +145,34 @@ def _chosen(tried: list[Point]) -> Point:
 def _searched(bench: Bench, case: Case, point: Point, tried: list[Point]) -> Point:
     """What a climb on the circuit that refuted all good settings of a point finds from these; the
     point itself where none of them is achievable there."""
-    judge = replace(case, rung=point.rung)
+    places = np.unique([one.setting.place for one in tried], axis=0)
+    there = replace(case, rung=point.rung)
+    found = _climbed(bench, there, (point.name, point.quantity, point.kind), places)
+    return replace(found, refuted=point.refuted) if found else point
+
+
+def _climbed(bench: Bench, case: Case, key: Key, places: Array) -> Point | None:
+    """The best that a climb from places (rows) finds on a circuit, if any of it is achievable."""
 
     def ask(places: Array) -> tuple[Array, NDArray[np.bool_]]:
-        found, borne = bench.scores(judge, places)
-        return found[:, [point.quantity]], borne
+        found, borne = bench.scores(case, places)
+        return found[:, [key[1]]], borne
 
-    places = np.unique([one.setting.place for one in tried], axis=0)
     search = Search(ask, (0,), 1)
     search.climb(JUDGE, Leads(places, search.scores(places)))
     best = search.ranked(0, STEADY_APART, 1)
     value = float(search.scores(best).max(initial=0.0))
     if value <= 0.0:
-        return point
-    settings = judge.settings(best[0])
+        return None
+    return _at(bench, case, key, best[0], value)
+
+
+def _at(bench: Bench, case: Case, key: Key, place: Array, value: float) -> Point:
+    """A place with its value on the circuit that judges."""
+    settings = case.settings(place)
     heat = bench.heat(case, settings, bench.outcomes([settings])[0].numbers)
-    setting = Setting(tuple(best[0].tolist()), value, nan, nan)
-    return replace(point, setting=setting, heat=heat, settings=settings, confirmed=value)
+    setting = Setting(tuple(place.tolist()), value, nan, nan)
+    return Point(*key, setting, heat, settings, case.rung, value)
 
 
 def _spare(
@@ -193,9 +208,13 @@ def _rank(point: Point) -> float:
 def _points(bench: Bench, cases: dict[Name, Case], chosen: dict[Key, Setting]) -> Points:
     """Each setting on its own circuit, of which the run is known, and on a more complete one."""
     plain = [cases[key[0]].settings(np.array(one.place)) for key, one in chosen.items()]
-    rungs = [_more_complete(key[0]) for key in chosen]
+    outcomes = bench.outcomes(plain)
+    rungs = [
+        _more_complete(bench, cases[key[0]], settings, outcome.numbers)
+        for key, settings, outcome in zip(chosen, plain, outcomes, strict=True)
+    ]
     more = [s | {"circuit.model": rung} for s, rung in zip(plain, rungs, strict=True)]
-    outcomes, judges = bench.outcomes(plain), bench.outcomes(more)
+    judges = bench.outcomes(more)
     found: Points = {}
     for n, (key, setting) in enumerate(chosen.items()):
         name, quantity, kind = key
@@ -206,11 +225,14 @@ def _points(bench: Bench, cases: dict[Name, Case], chosen: dict[Key, Setting]) -
     return found
 
 
-def _more_complete(name: Name) -> str:
-    """The circuit to confirm a machine's points on; of an ideal current there is none."""
-    if name == IDEAL:
+def _more_complete(bench: Bench, case: Case, settings: Settings, numbers: Numbers) -> str:
+    """The circuit to confirm a run on; of an ideal current there is none. The amplifier has no
+    current limit: where that acted, the whole schematic judges."""
+    if case.rung == "ideal":
         return "ideal"
-    return "full" if name[0] == "current limit" else "amplifier"
+    limit = float(settings.get("circuit.current_limit", bench.scene.circuit.current_limit))
+    peak = max(numbers["current_max"], -numbers["current_min"]) * bench.scene.coil.count
+    return "full" if peak > AT_LIMIT * limit else "amplifier"
 
 
 def _on_full(bench: Bench, cases: dict[Name, Case], points: Points) -> Points:
@@ -226,46 +248,60 @@ def _on_full(bench: Bench, cases: dict[Name, Case], points: Points) -> Points:
 
 def judged(bench: Bench, study: Study, points: Points, told: Callable[[str], object]) -> Points:
     """The limits that only the amplifier has: for each value the best among the settings that were
-    found for the scene's own circuit and those of its ``points``, and the robust one. The own
-    circuit's points stand among them, on the amplifier, too.
+    found for the scene's own circuit and those of its ``points``, and the robust one, with its
+    value. The own circuit's points stand among them, on the amplifier, too.
+
+    Where the best does worse than it does on the own circuit, it is climbed on from.
     """
     rig = study.rigs[0]
     kept = [point.setting for key, point in points.items() if key[0] == OWN]
     for best in rig.found[OWN]:
         kept += [*best.settings[:2], *best.robust[:2]]
-    places = list(dict.fromkeys(setting.place for setting in kept))
+    rows = list(dict.fromkeys(setting.place for setting in kept))
+    limits = [limit for limit in study.limits if limit.rung == "amplifier"] if rows else []
     found: Points = {}
-    here = changed(bench.scene, rig.settings, rig.name)
-    asked: dict[Name, Machine] = {}
-    for limit in study.limits:
-        if limit.rung == "amplifier":
-            asked[limit.name, limit.own(here)] = Machine()
-            for value in (*limit.values, limit.gone):
-                asked[limit.name, value] = limit.machine(here, value)
-    for name, machine in asked.items():
-        case = Case(rig.settings, machine, "amplifier")
-        every = [case.settings(np.array(place)) for place in places]
-        outcomes = bench.outcomes(every)
-        for quantity in range(len(QUANTITIES)):
-            values = {
-                place: (value, settings, outcome)
-                for place, settings, outcome in zip(places, every, outcomes, strict=True)
-                if not outcome.failure
-                and bench.bearable(case, settings, outcome.numbers)
-                and (value := float(scores(outcome.numbers)[quantity])) > 0.0  # achievable
-            }
-            if not values:
-                continue
-            top = max(values, key=lambda place: values[place][0])
-            chosen = {"best": top}
-            robust = points.get((OWN, quantity, "robust"))
-            if robust is not None and robust.setting.place in values:
-                chosen["robust"] = robust.setting.place
-            for kind, place in chosen.items():
-                value, settings, outcome = values[place]
-                heat = bench.heat(case, settings, outcome.numbers)
-                setting = Setting(place, value, nan, nan)
-                key = (name, quantity, kind)
-                found[key] = Point(*key, setting, heat, settings, "amplifier", value)
+    # What a climb finds for one value is tried for all.
+    for climbing in (True, False):
+        places = np.array(rows)
+        for limit in limits:
+            found |= _on_amplifier(bench, rig, limit, places, points, climbing)
+        rows = list(dict.fromkeys([*rows, *(point.setting.place for point in found.values())]))
     told("judged on the amplifier")
     return found
+
+
+def _on_amplifier(
+    bench: Bench, rig: Rig, limit: Limit, places: Array, points: Points, climbing: bool
+) -> Points:
+    """For each value of a limit, and for its own, the best of places (rows), or of what a climb
+    finds, and that of the own circuit's robust ``points``."""
+    here = changed(bench.scene, rig.settings, rig.name)
+    own, rows = limit.own(here), [tuple(place) for place in places.tolist()]
+    found: Points = {}
+    for value in dict.fromkeys((own, *limit.values, limit.gone)):
+        machine = Machine() if value == own else limit.machine(here, value)
+        name, case = (limit.name, value), Case(rig.settings, machine, "amplifier")
+        every, borne = bench.scores(case, places)
+        every[~borne] = -inf
+        for quantity, column in enumerate(every.T):
+            above = found.get(((limit.name, own), quantity, "best")) if climbing else None
+            top = _top(bench, case, (name, quantity, "best"), places, column, above)
+            if top:
+                found[name, quantity, "best"] = top
+            firm = points.get((OWN, quantity, "robust"))
+            if firm and column[row := rows.index(firm.setting.place)] > 0.0:
+                key = name, quantity, "robust"
+                found[key] = _at(bench, case, key, places[row], float(column[row]))
+    return found
+
+
+def _top(
+    bench: Bench, case: Case, key: Key, places: Array, column: Array, above: Point | None
+) -> Point | None:
+    """The best of places (rows) by their values, or what a climb from them finds where that does
+    worse than ``above``."""
+    row = int(column.argmax())
+    value = max(float(column[row]), 0.0)
+    if above and value < (1.0 - WITHIN) * above.confirmed:
+        return _climbed(bench, case, key, places)
+    return _at(bench, case, key, places[row], value) if value else None

@@ -56,7 +56,7 @@ def answer(path: Path, study: Study, points: Points, found: Sequence[Change]) ->
     order = list(largest(found))
     by_name = {limit.name: limit for limit in study.limits}
     note = (
-        "Filled: best setting of the knobs, found anew for each value; open: robust (median over "
+        "Filled: best setting of the knobs for each value; open: robust (median over "
         "turns of ±2 %). Black line: the device as it is; blue: with the limit eased or lifted; "
         "orange: tightened. Names in red bind, in grey do not matter."
     )

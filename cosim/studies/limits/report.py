@@ -11,7 +11,7 @@ from cosim.studies.limits.answer import Change, changes, height
 from cosim.studies.limits.at import There, acting, at
 from cosim.studies.limits.confirm import Point, Points, confirmed, judged
 from cosim.studies.limits.runs import Bench
-from cosim.studies.limits.study import FULL, IDEAL, OWN, Efforts, Study, search_count, study
+from cosim.studies.limits.study import FULL, IDEAL, OWN, Efforts, Study, study, told_count
 from cosim.studies.limits.table import LIMITS, Limit, Settings, needed_acceleration
 from cosim.studies.sweep.pool import workers_asked
 from cosim.studies.tables import Row, write_csv, write_page
@@ -28,8 +28,8 @@ def write(folder: Path, bench: Bench, study: Study, points: Points, there: Seque
         )
     if sought := answer.sought(points):
         said.append(
-            "Points sought on the more complete circuit itself, since it refuted all good settings "
-            f"of the cheapest one: {len(sought)}."
+            "Best points sought on the more complete circuit itself, since it refuted all good "
+            f"settings of the cheapest one: {len(sought)}."
         )
     write_csv(folder / "limits.csv", [row(bench, study, point) for point in points.values()])
     tables: dict[str, Sequence[Row]] = {
@@ -172,11 +172,7 @@ def run(
     ``asked`` are the words after ``cosim run`` that stand for the scene; ``told`` hears of each
     step, and how many there are, ``progress`` of each run. Raises BadInput.
     """
-    own, others = (
-        search_count(limits, rounds, every)
-        for rounds, every in zip(efforts.rounds, (True, False), strict=True)
-    )
-    steps = own + (len(rigs) + 1) * others + 2 + len(there)
+    steps = told_count(limits, efforts, len(rigs)) + 2 + len(there)
     journal = folder / JOURNAL
 
     def done(name: str) -> None:

@@ -23,10 +23,9 @@ ELITE, NEAR, INFLATION = 6, 0.1, 2.0
 """The best settings near a start, along which half its cloud lies: how many, from how far, and by
 how much their covariance is blown up."""
 
-STEADY, STEADY_APART, LOOKS = 2, 0.015, 2
-"""Settings of each quantity whose surroundings are looked at beside those of the best one, how far
-apart, and how often, each time those that seem best by then. They stand in for one that is refuted,
-too."""
+STEADY, STEADY_APART = 2, 0.015
+"""Settings of each quantity whose surroundings are looked at beside those of the best one, and how
+far apart. They stand in for one that is refuted, too."""
 
 LEADS = 3
 """Places of each quantity that are tried on other machines."""
@@ -83,6 +82,11 @@ class Effort:
     """Of the first climb, one after the other: ever narrower, and about fewer starts."""
     next: tuple[Clouds, ...]
     """Of a later one."""
+    rounds: int
+    """In which what is best on one machine of a rig is tried on all, and climbed on from; after the
+    first."""
+    looks: int = 1
+    """At surroundings, each time at those that seem the best by then."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +146,7 @@ class Search:
         self._known: dict[tuple[float, ...], Array] = {}
         self._borne: dict[tuple[float, ...], bool] = {}
         self._heights = np.full(quantities, -inf)
+        self._turned: list[dict[tuple[float, ...], Setting]] = [{} for _ in range(quantities)]
         self._arrays: tuple[Array, Array] | None = None
 
     def scores(self, places: Array) -> Array:
@@ -173,8 +178,7 @@ class Search:
     def climb(self, steps: Sequence[Clouds], hints: Leads) -> None:
         """Ask for ``hints``, and climb from the best of all that is known, but for the quantities
         that have not grown since the last climb began."""
-        self.scores(hints.places)
-        self._look_about(hints)
+        self.heed(hints)
         growing = self._growing()
         for clouds in steps:
             left = growing
@@ -206,9 +210,10 @@ class Search:
         """Of known places (rows)."""
         return np.array([self._borne[tuple(place.tolist())] for place in places], bool)
 
-    def _look_about(self, hints: Leads) -> None:
-        """Ask for what is close to the hints that do better elsewhere than all that is known here:
-        on this machine the ridge on which they lie may run a few steps beside."""
+    def heed(self, hints: Leads) -> None:
+        """Ask for ``hints``, and for what is close to those that do better elsewhere than all that
+        is known here: on this machine the ridge on which they lie may run a few steps beside."""
+        self.scores(hints.places)
         every, least = [NOWHERE], _above(self._tops())
         borne = self._are_borne(hints.places)
         for quantity in range(self._quantities):
@@ -263,14 +268,15 @@ class Search:
         best = places[order[np.isfinite(column[order])]]
         return best[apart(best, distance, count)]
 
-    def found(self, quantity: int, also: Array) -> Best:
+    def found(self, quantity: int, also: Array = NOWHERE, looks: int = 1) -> Best:
         """The best setting of a quantity, those whose surroundings seem the best, and ``also``
-        those at places (rows) that are the best elsewhere. Those that cannot be borne are left out.
+        those at places (rows) that are the best elsewhere, and all that were found before. Those
+        that cannot be borne are left out.
         """
         self.scores(also)
         places = [*self.ranked(quantity, STEADY_APART, 1), *also[self._are_borne(also)]]
-        settings: dict[tuple[float, ...], Setting] = {}
-        for _ in range(LOOKS):
+        settings = self._turned[quantity]
+        for _ in range(looks):
             # What is known of surroundings changes with each look at them.
             places += [*self._steady(quantity, STEADY)]
             for place in places:
@@ -292,12 +298,10 @@ class Search:
         good = places[order[((column > 0.0) & self._are_borne(places))[order]]]
         return Best(tuple(self.around(place, quantity) for place in good[:count]))
 
-    def bests(self, also: Sequence[Array] | None = None) -> Bests:
+    def bests(self, looks: int = 1, also: Sequence[Array] | None = None) -> Bests:
         """What was found for each quantity; ``also`` has further places (rows) for each."""
-        return tuple(
-            self.found(quantity, NOWHERE if also is None else also[quantity])
-            for quantity in range(self._quantities)
-        )
+        every = also or [NOWHERE] * self._quantities
+        return tuple(self.found(quantity, places, looks) for quantity, places in enumerate(every))
 
     def around(self, place: Array, quantity: int) -> Setting:
         """A place with all its turns."""

@@ -6,10 +6,11 @@ machines is not the luck of two searches.
 
 import json
 import tomllib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -37,11 +38,10 @@ class Efforts:
 
     own: Effort
     """Of a circuit of the scene's own rig."""
+    again: Effort
+    """Of the own rig when it is searched again."""
     others: Effort
-    """Of the other rigs of an ensemble, and of the own rig when it is searched again."""
-    rounds: tuple[int, int]
-    """In which what is best on one machine of a rig is tried on all, and climbed on from: on the
-    own rig, and on the others; after the first."""
+    """Of the other rigs of an ensemble, whose searches begin with what is best on the own one."""
     rigs: int
     """Of an ensemble, spread over their order, which is that of their cost."""
 
@@ -50,6 +50,7 @@ def _clouds(*every: tuple[float, int, int, int]) -> tuple[Clouds, ...]:
     return tuple(Clouds(*one) for one in every)
 
 
+_LATER = _clouds((0.02, 2, 4, 1), (0.005, 1, 4, 2), (0.001, 1, 4, 2))
 FULL = Efforts(
     Effort(
         1024,
@@ -58,17 +59,21 @@ FULL = Efforts(
             *((0.005, 1, 4, 8), (0.002, 1, 4, 6), (0.001, 1, 4, 6)),
         ),
         _clouds((0.03, 3, 4, 1), (0.01, 2, 4, 4), (0.003, 1, 4, 6), (0.001, 1, 4, 6)),
+        rounds=2,
+        looks=2,
     ),
     Effort(
         128,
         _clouds((0.05, 4, 4, 1), (0.02, 2, 4, 2), (0.005, 1, 4, 4), (0.001, 1, 4, 3)),
-        _clouds((0.02, 2, 4, 1), (0.005, 1, 4, 2), (0.001, 1, 4, 2)),
+        _LATER,
+        rounds=1,
     ),
-    (2, 1),
+    Effort(64, _clouds((0.02, 2, 4, 1), (0.005, 1, 4, 4), (0.001, 1, 4, 3)), _LATER, rounds=1),
     3,
 )
 _COARSE = _clouds((0.05, 2, 2, 1), (0.02, 1, 4, 1))
-QUICK = Efforts(Effort(64, _COARSE, _COARSE), Effort(32, _COARSE, _COARSE), (1, 1), 1)
+_FEW = Effort(32, _COARSE, _COARSE, rounds=1)
+QUICK = Efforts(Effort(64, _COARSE, _COARSE, rounds=1), _FEW, _FEW, 1)
 
 CLOSE_BY, HINTS = 0.02, 24
 """Of places of other machines closer than this, of a knob's turn, one is tried; and how many for
@@ -105,14 +110,23 @@ class Study:
 
 
 def searched(limits: Iterable[Limit]) -> list[Limit]:
-    """The limits that the cheapest circuit has, so that a search can be made for each value."""
-    return [limit for limit in limits if limit.rung == "limited"]
+    """The limits for each value of which a search is made."""
+    return [limit for limit in limits if limit.searched]
 
 
-def search_count(limits: Iterable[Limit], rounds: int, all_values: bool) -> int:
-    """How many searches and rounds of them a rig takes."""
-    machines = 2 + sum(1 + all_values * len(limit.values) for limit in searched(limits))
-    return machines * (1 + rounds)
+def climbed(limits: Iterable[Limit]) -> list[Limit]:
+    """The others that the cheapest circuit has: there it climbs from what is best elsewhere."""
+    return [limit for limit in limits if limit.rung == "limited" and not limit.searched]
+
+
+def told_count(limits: Sequence[Limit], efforts: Efforts, rigs: int) -> int:
+    """How many machines :func:`study` tells of, each round anew, with so many rigs besides the
+    scene's own."""
+    lifted = 2 + len(searched(limits))
+    every = lifted + sum(len(limit.values) for limit in searched(limits))
+    climbs = sum(len(limit.values) for limit in climbed(limits))
+    of_rigs = (1 + efforts.again.rounds) + rigs * (1 + efforts.others.rounds)
+    return every * (1 + efforts.own.rounds) + climbs + lifted * of_rigs
 
 
 def study(
@@ -127,23 +141,28 @@ def study(
 
     ``told`` hears of each machine in each round. The same for the same seed.
     """
-    found = []
-    # The last is the own rig once more, searched like the others.
-    for number, settings in enumerate([{}, *rigs, {}]):
-        again = number == len(rigs) + 1
-        name = "another seed" if again else f"rig {number}" if number else "its own rig"
-        rig = Rig(name, settings)
-        scene = changed(bench.scene, rig.settings, rig.name)
-        rig.cases = _cases(scene, settings, limits, all_values=number == 0)
-        effort = efforts.others if number else efforts.own
-        _search(bench, rig, (seed, number), effort, efforts.rounds[number > 0], told)
+    own = Rig("its own rig", {}, _cases(bench.scene, {}, limits, all_values=True))
+    late = {
+        (limit.name, value): Case({}, limit.machine(bench.scene, value))
+        for limit in climbed(limits)
+        for value in limit.values
+    }
+    _search(bench, own, (seed, 0), efforts.own, told, late=late)
+    found = [own]
+    for number, settings in enumerate(rigs, 1):
+        scene = changed(bench.scene, settings, f"rig {number}")
+        rig = Rig(f"rig {number}", settings, _cases(scene, settings, limits))
+        _search(bench, rig, (seed, number), efforts.others, told, own)
         found.append(rig)
-    return Study(bench.scene, limits, found[:-1], found[-1].found[OWN])
+    again = Rig("another seed", {}, _cases(bench.scene, {}, limits))
+    _search(bench, again, (seed, len(found)), efforts.again, told)
+    return Study(bench.scene, limits, found, again.found[OWN])
 
 
 def _cases(
-    scene: Scene, rig: Settings, limits: Iterable[Limit], all_values: bool
+    scene: Scene, rig: Settings, limits: Iterable[Limit], all_values: bool = False
 ) -> dict[Name, Case]:
+    """The machines of a rig, with each limit lifted, and with ``all_values``."""
     cases = {OWN: Case(rig, Machine()), IDEAL: Case(rig, Machine(), "ideal")}
     for limit in searched(limits):
         for value in (*limit.values, limit.gone) if all_values else (limit.gone,):
@@ -156,27 +175,41 @@ def _search(
     rig: Rig,
     seed: tuple[int, int],
     effort: Effort,
-    rounds: int,
     told: Callable[[str], object],
+    known: Rig | None = None,
+    late: Mapping[Name, Case] = MappingProxyType({}),
 ) -> None:
+    """Search the machines of a rig, from the best places of ``known``, if there is one; those in
+    ``late`` only climb from what is best on the others."""
     searches = rig.searches
     leads: dict[Name, Leads] = {}
     for number, (name, case) in enumerate(rig.cases.items()):
         search = searches[name] = Search(partial(bench.scores, case), (*seed, number))
         search.fill(effort.design)
+        if known:
+            there = known.searches[name].leads()
+            places = moved(bench, there.places, known.cases[name], case)
+            search.heed(Leads(places, there.scores))
         leads[name] = search.leads()
-    for number in range(1 + rounds):
+    for number in range(1 + effort.rounds):
         # What is best on one machine is tried on all, and climbed on from where it is better.
         for name, search in searches.items():
             hints = _hints(bench, rig, leads, name)
             search.climb(effort.next if number else effort.first, hints)
             leads[name] = search.leads()
             told(f"{rig.name}, round {number}: {name[0]} {name[1]:.3g}")
-    rig.found = {name: search.bests() for name, search in searches.items()}
+    for name, case in late.items():
+        rig.cases[name] = case
+        hints = _hints(bench, rig, leads, name)
+        if len(hints.places):
+            searches[name] = Search(partial(bench.scores, case), (*seed, len(rig.cases)))
+            searches[name].climb(effort.next, hints)
+        told(f"{rig.name}: {name[0]} {name[1]:.3g}")
+    rig.found = {name: search.bests(effort.looks) for name, search in searches.items()}
     for name, search in searches.items():
         # What its kin does best is looked at closely: no machine is the worse for a lifted limit
         # only because its search has missed that.
-        rig.found[name] = search.bests(_of_kin(bench, rig, name))
+        rig.found[name] = search.bests(effort.looks, _of_kin(bench, rig, name))
 
 
 def _of_kin(bench: Bench, rig: Rig, name: Name) -> list[Array]:

@@ -41,6 +41,9 @@ class Limit:
     gone: float
     machine: Callable[[Scene, float], Machine]
     rung: str = "limited"
+    searched: bool = True
+    """Whether a run is cheap enough for a search at each value; else only what is best elsewhere
+    is climbed on from."""
     more_is_better: bool = True
     """Whether lifting it means more of it."""
     real: bool = True
@@ -142,16 +145,16 @@ LIMITS = (
     ),
     Limit(
         "gain-bandwidth", "kHz", 1e-3, _own("circuit.gain_bandwidth"), (1e5, 3e5), 1e7,
-        _key("circuit.gain_bandwidth"), rung="amplifier",
+        _key("circuit.gain_bandwidth"), rung="amplifier", searched=False,
     ),
     Limit(
         "slew rate", "V/µs", 1e-6, _own("circuit.slew_rate"), (1e5, 1e6), 1e9,
-        _key("circuit.slew_rate"), rung="amplifier",
+        _key("circuit.slew_rate"), rung="amplifier", searched=False,
     ),
     Limit(
         "DAC steps", "µs", 1e6, lambda _: 0.0, (5e-5,), 0.0,
         lambda _, value: Machine({"drive.quantised": value > 0.0}),
-        rung="amplifier", more_is_better=False,
+        searched=False, more_is_better=False,
     ),
 )  # fmt: skip
 
