@@ -43,7 +43,7 @@ class Limit:
     rung: str = "limited"
     searched: bool = True
     """Whether a run is cheap enough for a search at each value; else only what is best elsewhere
-    is climbed on from."""
+    is climbed on from: on the cheapest circuit, or, where a value costs, on the amplifier."""
     more_is_better: bool = True
     """Whether lifting it means more of it."""
     real: bool = True
