@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cosim.errors import BadInput, SimulationFailed
+from cosim.toolchain.interrupts import deferred
 from cosim.version import __version__
 
 if TYPE_CHECKING:
@@ -57,7 +58,8 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    with deferred():
+        return getattr(import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:

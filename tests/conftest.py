@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
 import build_c
+from cosim.toolchain import processes
 from cosim.toolchain.libraries import FOLDER
 
 # How long an example takes says something of the machine, not of the code.
@@ -34,6 +36,13 @@ def pytest_sessionstart() -> None:
         made_of = None
     if made_of != build_c.digest():
         pytest.exit("The C sources have changed since they were compiled: run `make setup`.", 2)
+
+
+@pytest.fixture
+def in_place() -> Iterator[None]:
+    """Circuits run in the test's own process, in which it can change something."""
+    with processes.in_place():
+        yield
 
 
 @pytest.fixture(scope="session")

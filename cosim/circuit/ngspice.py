@@ -4,25 +4,23 @@ Order of calls within a transient run (ngspice 39): for each attempted step ``Ge
 Newton iteration and then ``GetSyncData`` at location 1; for an accepted one ``SendData`` and then
 ``GetSyncData`` at location 0, where the next step may be shortened. No such call follows the last.
 
-Importing this module loads PySpice, which takes a while: only runs with a circuit do.
+The library reads the .spiceinit of its home and of the working folder, and the spinit of folders
+that variables name: a worker has an empty folder for both, and none of those variables.
+
+Importing this module loads PySpice, which takes a while: only workers do.
 """
 
 import logging
 import os
 import re
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from ctypes.util import find_library
 from dataclasses import dataclass
-from functools import cache
-from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 from PySpice.Spice.NgSpice import Shared
 
 from cosim.errors import BadInput, SimulationFailed, plain
-from cosim.toolchain.interrupts import caught_signals
+from cosim.toolchain.libraries import ngspice_library
+from cosim.toolchain.processes import retire
 
 _ffi: Any = Shared.ffi
 
@@ -68,45 +66,34 @@ class Leader(Protocol):
         """Nothing is to be done any more: the sources become NaN, so that no step succeeds."""
 
 
-@cache
+_one: "list[Engine]" = []
+
+
 def engine(callbacks: Callbacks, code_models: bool) -> "Engine":
     """The process's one ngspice, which calls back. Raises BadInput where the library is missing.
 
-    With ``code_models`` it knows POLY and TABLE, as a netlist of the user's own may need, which
-    has a process of its own. Each step looks at all kinds of elements, so the models cost 5 % of a
-    run that has none.
+    With ``code_models``, when it is made, it knows POLY and TABLE, as a netlist of the user's own
+    may need. Each step looks at all kinds of elements, so the models cost 5 % of a run without one.
     """
-    name = library_name()
+    if not _one:
+        _one.append(_made(callbacks, code_models))
+    return _one[0]
+
+
+def _made(callbacks: Callbacks, code_models: bool) -> "Engine":
+    name = ngspice_library()
+    if not code_models:  # which its own start-up file loads
+        os.environ["SPICE_SCRIPTS"] = os.curdir
     try:
         if os.sep in name and not os.path.isfile(name):  # to open a pipe would wait for ever
             raise OSError("there is no such file")
-        return Engine(name, callbacks, code_models)
+        return Engine(name, callbacks)
     except (OSError, AttributeError) as error:  # the latter where it lacks ngspice's functions
         reason = str(error).partition("Additionally")[0].strip(" .")
         raise BadInput(
             f"{plain(name)}: this ngspice library cannot be loaded ({plain(reason)}); does "
             "NGSPICE_LIBRARY_PATH name it rightly?"
         ) from error
-
-
-def library_name() -> str:
-    """The path or name of libngspice on this machine. Raises BadInput where it is missing."""
-    # Debian's runtime package has only the versioned name, which the loader's own search finds.
-    name = os.environ.get("NGSPICE_LIBRARY_PATH") or find_library("ngspice")
-    if name is None and sys.platform == "darwin":
-        paths = (f"{folder}/libngspice.dylib" for folder in ("/opt/homebrew/lib", "/usr/local/lib"))
-        name = next(filter(os.path.exists, paths), None)
-    if name is None:
-        raise BadInput(
-            "libngspice was not found; install it (Debian and Ubuntu: libngspice0, macOS: brew "
-            "install libngspice) or name it in NGSPICE_LIBRARY_PATH."
-        )
-    return name
-
-
-def spoilt() -> bool:
-    """Whether ngspice has given up in this process: then another process must run the circuit."""
-    return Engine.poisoned
 
 
 class Engine(Shared.NgSpiceShared):
@@ -116,26 +103,22 @@ class Engine(Shared.NgSpiceShared):
     poisoned = False
     """ngspice has given up for good: nothing runs in this process's library any more."""
 
-    def __init__(self, library: str, callbacks: Callbacks, code_models: bool) -> None:
-        # A path is made absolute, since it is opened from another folder; a bare name is not.
-        self.LIBRARY_PATH = os.path.abspath(library) if os.sep in library else library
+    def __init__(self, library: str, callbacks: Callbacks) -> None:
+        self.LIBRARY_PATH = library
         self._leader: Leader | None = None
         self._failure: BaseException | None = None
         self._save: tuple[str, ...] = ()
         self._data = callbacks.data
-        with caught_signals(self.fail), _nowhere(code_models):
-            super().__init__(ngspice_id=0, send_data=True)
-            self._library: Any = self._ngspice_shared
-            # PySpice leaves GetSyncData out; a second call puts it in, and a faster GetVSRCData.
-            self._library.ngSpice_Init_Sync(
-                _ffi.cast("GetVSRCData *", callbacks.source),
-                self._get_isrc_data_c,
-                _ffi.cast("GetSyncData *", callbacks.step),
-                _ffi.NULL,
-                self._self_c,
-            )
-        if self._failure is not None:
-            raise self._failure
+        super().__init__(ngspice_id=0, send_data=True)
+        self._library: Any = self._ngspice_shared
+        # PySpice leaves GetSyncData out; a second call puts it in, and a faster GetVSRCData.
+        self._library.ngSpice_Init_Sync(
+            _ffi.cast("GetVSRCData *", callbacks.source),
+            self._get_isrc_data_c,
+            _ffi.cast("GetSyncData *", callbacks.step),
+            _ffi.NULL,
+            self._self_c,
+        )
 
     @property
     def _send_data_c(self) -> Any:
@@ -162,12 +145,11 @@ class Engine(Shared.NgSpiceShared):
     def _run(self, deck: str) -> None:
         self.clear_output()
         try:
-            with caught_signals(self.fail):
-                # Not PySpice's load_circuit and run: they take any word on stderr, and any node
-                # with "error" in its name, for a failure. What fails is known by what is missing.
-                self._load(deck)
-                if not self.poisoned:
-                    self._library.ngSpice_Command(b"run")
+            # Not PySpice's load_circuit and run: they take any word on stderr, and any node
+            # with "error" in its name, for a failure. What fails is known by what is missing.
+            self._load(deck)
+            if not self.poisoned:
+                self._library.ngSpice_Command(b"run")
             if self._failure is not None:
                 raise self._failure
         finally:
@@ -197,6 +179,7 @@ class Engine(Shared.NgSpiceShared):
         exit_status: int, immediate_unloding: bool, quit_exit: bool, ngspice_id: int, user_data: Any
     ) -> int:
         Engine.poisoned = True
+        retire()
         return exit_status
 
     @staticmethod
@@ -211,29 +194,6 @@ class Engine(Shared.NgSpiceShared):
         except ValueError as error:
             self.fail(SimulationFailed(f"The netlist has no such vector: {error}."))
         return 0
-
-
-@contextmanager
-def _nowhere(spinit: bool) -> Iterator[None]:
-    """In an empty folder that is also home, without ngspice's variables: it runs the .spiceinit
-    that it finds in either, and the spinit of the folders that SPICE_SCRIPTS and others name. Its
-    own ``spinit``, which loads the code models, is run where it is asked for."""
-    here, before = os.getcwd(), dict(os.environ)
-    with TemporaryDirectory() as empty:
-        os.chdir(empty)
-        for name in before:
-            if name.startswith(("SPICE", "NGSPICE", "USERPROFILE")):
-                del os.environ[name]
-        os.environ["HOME"] = empty
-        if not spinit:
-            os.environ["SPICE_SCRIPTS"] = empty
-        try:
-            yield
-        finally:
-            os.chdir(here)
-            for name in os.environ.keys() - before.keys():
-                del os.environ[name]
-            os.environ.update(before)
 
 
 def _vector(name: str) -> str:

@@ -2,9 +2,12 @@
 
 import json
 import os
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import Any
 from uuid import uuid4
 
@@ -14,6 +17,9 @@ try:
     import fcntl
 except ImportError:  # Windows
     fcntl = None
+
+_YOUNG = 60.0
+"""s that a folder stays although nobody has locked it: somebody may be about to."""
 
 _PREFIX = ".cosim-"
 """Of what takes the place of a file later: a kill leaves it, and :func:`tidy` finds it."""
@@ -97,17 +103,34 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def tidy(folder: Path) -> None:
-    """Remove temporary files of processes that have ended."""
+    """Remove temporary files and folders of processes that have ended."""
     if fcntl is None:
         return
     for path in folder.glob(f"{_PREFIX}*"):
         with suppress(OSError):
-            handle = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
+            whole = path.is_dir() and time.time() - path.stat().st_mtime > _YOUNG
+            handle = os.open(
+                path, (os.O_RDONLY if whole else os.O_RDWR) | os.O_NOFOLLOW | os.O_NONBLOCK
+            )
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                path.unlink()
+                if whole:
+                    rmtree(path)
+                else:
+                    path.unlink()
             finally:
                 os.close(handle)
+
+
+def folder_of_ones_own(parent: Path) -> tuple[str, int]:
+    """A new folder, and a handle that locks it while it is open here or in a child."""
+    tidy(parent)
+    folder = mkdtemp(prefix=_PREFIX, dir=parent)
+    handle = os.open(folder if fcntl is not None else os.devnull, os.O_RDONLY)
+    if fcntl is not None:
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    return folder, handle
 
 
 def write_text(path: Path, text: str) -> None:

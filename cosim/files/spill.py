@@ -4,8 +4,9 @@ The file has no name, so it vanishes however the process ends.
 """
 
 import mmap
+import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -37,6 +38,37 @@ def on_disk_in(folder: Path) -> Iterator[None]:
         yield
     finally:
         _folder.reset(token)
+
+
+def place() -> Path | None:
+    """Where tapes lie that outgrow memory; None for the system's own folder."""
+    return _folder.get()
+
+
+class Packed:
+    """Columns of equal length, on their way to another process in a file of the system's folder of
+    temporary ones: what arrives there is the columns, mapped, and the file is gone. Raises BadInput
+    where the disk is full."""
+
+    def __init__(self, columns: Mapping[str, Array]) -> None:
+        self._names, self._rows = tuple(columns), len(next(iter(columns.values())))
+        handle, self._path = tempfile.mkstemp()
+        with open(handle, "wb", buffering=0) as file:
+            for values in columns.values():
+                for part in blocks(self._rows):
+                    _write(file, values[part])
+
+    def __reduce__(self) -> tuple[Callable[..., dict[str, Array]], tuple[object, ...]]:
+        return _unpacked, (self._path, self._names, self._rows)
+
+
+def _unpacked(path: str, names: tuple[str, ...], rows: int) -> dict[str, Array]:
+    with open(path, "r+b") as file:
+        mapped = mmap.mmap(file.fileno(), 0)
+    os.unlink(path)
+    _mapped.add(mapped)
+    columns = np.frombuffer(mapped, np.float64).reshape(len(names), rows)
+    return dict(zip(names, columns, strict=True))
 
 
 class Tape:
@@ -95,24 +127,14 @@ class Tape:
         self._array = None
 
     def _spill(self, before: int, block: Array) -> None:
-        folder = _folder.get()
-        try:
-            if self._file is None:
-                self._file = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115
-                self._write(self._kept[:before])
-                self._kept = np.empty((0, self._columns))
-            self._write(block)
-        except OSError as error:
-            where = folder or tempfile.gettempdir()
-            raise BadInput(
-                f"{where}: cannot hold the waveforms while the scene runs ({error.strerror})."
-            ) from error
-
-    def _write(self, rows: Array) -> None:
-        assert self._file is not None
-        left = np.ascontiguousarray(rows).data.cast("B") if len(rows) else b""
-        while left:
-            left = left[self._file.write(left) :]
+        if self._file is None:
+            try:
+                self._file = tempfile.TemporaryFile(dir=_folder.get(), buffering=0)  # noqa: SIM115
+            except OSError as error:
+                raise _no_room(error) from error
+            _write(self._file, self._kept[:before])
+            self._kept = np.empty((0, self._columns))
+        _write(self._file, block)
 
     def array(self) -> Array:
         """All rows so far; the file itself, mapped, where they are on disk."""
@@ -129,6 +151,20 @@ class Tape:
     def column(self, number: int = 0) -> Array:
         """One of the columns of :meth:`array`."""
         return self.array()[:, number]
+
+
+def _write(file: IO[bytes], rows: Array) -> None:
+    left = np.ascontiguousarray(rows).data.cast("B") if len(rows) else b""
+    try:
+        while left:
+            left = left[file.write(left) :]
+    except OSError as error:
+        raise _no_room(error) from error
+
+
+def _no_room(error: OSError) -> BadInput:
+    where = _folder.get() or tempfile.gettempdir()
+    return BadInput(f"{where}: cannot hold the waveforms while the scene runs ({error.strerror}).")
 
 
 def blocks(count: int, most: int = BLOCK) -> Iterator[slice]:

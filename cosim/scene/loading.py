@@ -17,10 +17,7 @@ from cosim.scene import messages, toml
 from cosim.scene.describe import acts, keys
 from cosim.scene.methods import METHODS
 from cosim.scene.model import Scene
-from cosim.scene.tables import KNOBS, NORMAL_FORCES, TABLES
-
-PATHS = (("circuit", "netlist"), ("drive", "file"), ("friction", "normal_force_file"))
-"""The keys that name files."""
+from cosim.scene.tables import KNOBS, NORMAL_FORCES, PATHS, TABLES
 
 _FULL = frozenset(key.full for key in keys())
 

@@ -12,6 +12,7 @@ from cosim.scene.rungs import RUNGS, Rung
 from cosim.scene.tables import (
     GIVEN_SURFACES,
     KNOBS,
+    PATHS,
     TABLES,
     Circuit,
     Coil,
@@ -172,6 +173,12 @@ class Scene(BaseModel):
                 *others,
             )
         return self
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The paths of the files that the scene names, by key."""
+        given = {key: getattr(getattr(self, table), key) for table, key in PATHS}
+        return {key: path for key, path in given.items() if path is not None}
 
     @property
     def rung(self) -> Rung:

@@ -75,6 +75,9 @@ class Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
+PATHS = (("circuit", "netlist"), ("drive", "file"), ("friction", "normal_force_file"))
+"""The keys that name files."""
+
 NORMAL_FORCES = ("normal_force", "normal_force_file")
 """The keys of ``[friction]`` of which each replaces the other."""
 

@@ -19,8 +19,8 @@ def run(
     """Run a scene: a built-in name, a TOML file, or what :func:`cosim.load` gave.
 
     ``overrides`` are values for its keys, SI: ``{"drive.frequency": 30}``. ``progress`` is told the
-    simulated time, s, now and then. A netlist of the user's own (``circuit.netlist``) runs in a
-    process of its own.
+    simulated time, s, now and then. Circuits run in worker processes, as many at once as there are
+    processors; any thread may call this.
 
     Where the run leaves what the model or a data sheet holds for, ``summary["notes"]`` says so, a
     sentence each, and a warning :class:`cosim.errors.BeyondModel` is given.

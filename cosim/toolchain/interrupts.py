@@ -47,8 +47,9 @@ def ended_alike() -> Iterator[None]:
 
 @contextmanager
 def caught_signals(fail: Callable[[BaseException], None]) -> Iterator[None]:
-    """Hand what a signal raises to ``fail`` while compiled code runs that calls back into Python:
-    raised outside a callback's try, C would swallow it."""
+    """Hand what a signal raises to ``fail`` while compiled code runs that calls back into Python
+    (raised outside a callback's try, C would swallow it), or where nothing may be left half done.
+    """
 
     def caught(before: Handler) -> Handler | None:
         if not callable(before):
@@ -67,6 +68,17 @@ def caught_signals(fail: Callable[[BaseException], None]) -> Iterator[None]:
 
 
 @contextmanager
+def deferred() -> Iterator[None]:
+    """Let what a signal raises wait for the end of this context: a module of compiled code that was
+    interrupted while it was loaded cannot be loaded again."""
+    held: list[BaseException] = []
+    with caught_signals(held.append):
+        yield
+    if held:
+        raise held[0]
+
+
+@contextmanager
 def _handled(choose: Callable[[Handler], Handler | None]) -> Iterator[None]:
     """Have each signal handled as ``choose`` says, knowing how it is now; None leaves that."""
     if threading.current_thread() is not threading.main_thread():
@@ -80,5 +92,5 @@ def _handled(choose: Callable[[Handler], Handler | None]) -> Iterator[None]:
     try:
         yield
     finally:
-        for number in changed:
+        for number in reversed(changed):  # an interrupt that raises again finds the rest restored
             signal.signal(number, before[number])

@@ -9,6 +9,7 @@ import hashlib
 import json
 import os
 import sys
+from ctypes.util import find_library
 from functools import cache
 from pathlib import Path
 
@@ -30,6 +31,25 @@ def library(name: str) -> ctypes.CDLL:
         return ctypes.CDLL(str(path))
     except OSError as error:
         raise BadInput(f"The compiled library {path} cannot be loaded: {error}.") from error
+
+
+def ngspice_library() -> str:
+    """The path or name of libngspice on this machine. Raises BadInput where it is missing."""
+    # Debian's runtime package has only the versioned name, which the loader's own search finds.
+    name = os.environ.get("NGSPICE_LIBRARY_PATH") or _found("ngspice")
+    if name is None and sys.platform == "darwin":
+        paths = (f"{folder}/libngspice.dylib" for folder in ("/opt/homebrew/lib", "/usr/local/lib"))
+        name = next(filter(os.path.exists, paths), None)
+    if name is None:
+        raise BadInput(
+            "libngspice was not found; install it (Debian and Ubuntu: libngspice0, macOS: brew "
+            "install libngspice) or name it in NGSPICE_LIBRARY_PATH."
+        )
+    return os.path.abspath(name) if os.sep in name else name  # a worker has another folder
+
+
+_found = cache(find_library)
+"""It starts programs, which takes some milliseconds."""
 
 
 def digest(name: str) -> str:

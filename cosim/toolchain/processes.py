@@ -1,26 +1,38 @@
 """Work in processes of their own, which may hang, crash or be spoilt without harm.
 
 A netlist can make ngspice, one library a process, loop for ever, end the process, or refuse all
-further work. multiprocessing and pebble run the caller's program again, which standard input and a
-script without a main guard do not survive; pebble limits a call's whole time; loky loses all calls
-with one process. Here a process knows its function by its module, and work without progress ends
-it. No wall clock tells that: a machine that slept, or a process that was stopped, has lost nothing.
+further work; and a process has one ngspice, which one thread can use. multiprocessing and pebble
+run the caller's program again, which standard input and a script without a main guard do not
+survive; pebble limits a call's whole time; loky loses all calls with one process. Here a process
+knows its function by its module, and work without progress ends it. No wall clock tells that: a
+machine that slept, or a process that was stopped, has lost nothing.
+
+A process has a folder of its own to work in, and of the environment only what its libraries need;
+:class:`Bounds` close a fence around it. Those that are bounded alike are kept for further calls.
 """
 
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
-from collections.abc import Callable
-from contextlib import suppress
-from functools import partial
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from pathlib import Path
+from shutil import rmtree
 from typing import Any
+from weakref import WeakSet, finalize
 
-from cosim.errors import SimulationFailed
+from cosim.errors import SimulationFailed, plain
+from cosim.files.atomic import folder_of_ones_own
+from cosim.toolchain import fence
+from cosim.toolchain.interrupts import caught_signals
 
 PATIENCE = 30.0
 """s of a process's own CPU time without any progress after which its simulation hangs."""
@@ -32,9 +44,18 @@ that one is given up. The machine may be the reason."""
 ENDING = 30.0
 """s that a process has to end once its pipe is closed."""
 
+TRIES = 3
+"""A process may die of something else than its call, such as a kill from outside."""
+
+CALLS = 250
+"""After which a process is replaced: what ngspice leaks stays below some MB."""
+
 _REPORT_EVERY = 0.1  # s of wall time
 _BEAT = 1.0  # s between two reports of the CPU time used
 _MOST = 2.0  # s that count between two looks at a clock; whatever is more, one of them slept
+
+_KEPT = ("PATH", "LD_", "DYLD_", "PYTHON", "LANG", "LC_", "TZ", "SYSTEMROOT", "NGSPICE_LIBRARY")
+"""What the names of variables begin with that a process is given."""
 
 _PROGRAM = """
 import signal, sys
@@ -51,6 +72,20 @@ serve(pipe)
 Progress = Callable[[float], None]
 
 
+@dataclass(frozen=True)
+class Bounds:
+    """What a process may reach beyond its libraries and its own folder."""
+
+    reads: tuple[str, ...] = ()
+    """Paths of files and folders."""
+    inside: Path | None = None
+    """Where its own folder lies: with the tapes of long runs. None: with the system's."""
+    library: str = ""
+    """libngspice, which a process may not know where to find."""
+    first: tuple[Callable[[Any], object], Any] | None = None
+    """What is called with an argument before the fence closes: it loads what reads more."""
+
+
 def processors() -> int:
     """How many this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
@@ -64,18 +99,35 @@ class Worker:
     ``pipe`` is ready for :meth:`hear` when there is news. The process ends with its parent.
     """
 
-    def __init__(self, function: Callable[[Any, Progress], Any]) -> None:
+    def __init__(
+        self, function: Callable[[Any, Progress], Any], bounds: Bounds | None = None
+    ) -> None:
         self.pipe, there = Pipe()
-        with there:
-            self._process = _start(there)
+        inside = bounds.inside if bounds else None
+        self.kind = function, bounds
+        self.folder, lock = folder_of_ones_own(inside or Path(tempfile.gettempdir()))
+        held: list[subprocess.Popen[Any]] = []
+        self._remains = finalize(self, _clear, os.getpid(), held, self.folder)
+        _living.add(self)
+        try:
+            self._process = _start(there, self.folder, lock, bounds.library if bounds else "")
+        finally:
+            there.close()
+            os.close(lock)
+        held.append(self._process)
+        self.given = 0
+        self._retires = False
         self.began = False
-        """It has said something, so what ends it later is not its start."""
+        """It has said something of its call, so what ends it now is not its start."""
         self._rest()
-        self._send(sys.path)
+        self._send([os.path.abspath(path) for path in sys.path])
         self._send(function)
+        self._send(bounds)
 
     def give(self, argument: Any) -> None:
         """Have the function called; what comes of it is heard later."""
+        self.given += 1
+        self.began = False
         self._rest()
         self._send(argument)
 
@@ -85,6 +137,7 @@ class Worker:
         self._spent = self._waited = 0.0
         """s of its CPU time, and s of this process awake, since then."""
         self._looked = time.monotonic()
+        self.idle = False
 
     def hear(self) -> tuple[str, Any]:
         """The next message: ``("alive", None)``, ``("result", value)`` or ``("failure", error)``.
@@ -101,6 +154,8 @@ class Worker:
             self.reached = value
         elif kind == "spent":
             self._spent = value
+        elif kind == "retires":
+            self._retires = True
         else:
             return kind, value
         return "alive", None
@@ -117,46 +172,181 @@ class Worker:
         self._looked = now
         return self._waited >= STALLED
 
+    @property
+    def rests_since(self) -> float:
+        """On a clock, s."""
+        return self._looked
+
+    @property
+    def reusable(self) -> bool:
+        """It may be given another call."""
+        return not self._retires and self.given < CALLS
+
+    @property
+    def alive(self) -> bool:
+        return self._process.poll() is None
+
     def end(self, patience: float = 0.0) -> str:
-        """The signal or exit code that ended the process: SIGKILL, after ``patience`` s."""
+        """How the process ended: the signal or exit code, and its last word; SIGKILL, after
+        ``patience`` s."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(patience)
         self._process.kill()
         code = self._process.wait()
+        how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        with suppress(OSError):
+            words = Path(self.folder, _SAID).read_text("utf-8", "replace").split("\n")
+            how += "".join(f": {plain(word.strip())}" for word in words[-2:-1] if word.strip())
+        self._let_go()
+        self._remains()
+        return how
+
+    def _let_go(self) -> None:
+        """Close this process's ends of what leads to the other one."""
         assert self._process.stdin is not None
         self._process.stdin.close()
         self.pipe.close()
-        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
     def _send(self, message: Any) -> None:
         with suppress(OSError):  # of a process that has died: hear() tells it
             self.pipe.send(message)
 
 
-def isolated(simulate: Callable[..., Any], scene: Any, progress: Progress, **options: Any) -> Any:
-    """What ``simulate(scene, progress, **options)`` gives, from a fresh process.
+_living: "WeakSet[Worker]" = WeakSet()
+_idle: defaultdict[Any, "deque[Worker]"] = defaultdict(deque)
+"""Processes that wait for a call, by their function and bounds. What is taken out of a deque and
+then lost to an interrupt ends when Python frees it."""
 
-    Raises what it raises there, or SimulationFailed where the process hangs or dies.
-    """
-    worker = Worker(partial(simulate, **options))
+_places = threading.BoundedSemaphore(processors())
+"""For processes at work. Signals are held back while one is taken, so that none is lost."""
+
+_here = threading.local()
+
+
+def _forget() -> None:
+    """In a child of a fork: the processes are its parent's, and end with that one alone."""
+    global _places
+    for worker in list(_living):
+        with suppress(Exception):
+            worker._let_go()
+    _idle.clear()
+    _places = threading.BoundedSemaphore(processors())
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget)
+
+
+@contextmanager
+def in_place() -> Iterator[None]:
+    """Within this context what would be given to a process is done in this one: it is a worker
+    itself, or is to be measured or changed."""
+    before, _here.ours = in_a_worker(), True
     try:
-        worker.give(scene)
-        while not (worker.hangs or worker.stalls()):
-            if not worker.pipe.poll(_BEAT):
-                continue
-            kind, value = worker.hear()
-            if kind == "result":
-                return value
-            if kind == "failure":
-                raise value
-            progress(worker.reached)
-    except EOFError:
-        how = worker.end(ENDING)
-        raise SimulationFailed(
-            f"The simulation's process died at t = {worker.reached:.6g} s ({how})."
-        ) from None
+        yield
     finally:
-        worker.end()
+        _here.ours = before
+
+
+def in_a_worker() -> bool:
+    """Whether this thread is to do itself what others give to a process."""
+    return getattr(_here, "ours", False)
+
+
+def isolated(
+    function: Callable[[Any, Progress], Any],
+    argument: Any,
+    progress: Progress,
+    bounds: Bounds | None = None,
+) -> Any:
+    """What ``function(argument, progress)`` gives, from another process: a fresh one, or, with
+    ``bounds``, one that is kept; no more than there are processors at once.
+
+    Any thread may call it. Raises what the function raises, or SimulationFailed where the process
+    hangs or dies.
+    """
+    told: list[BaseException] = []
+    answer = None
+
+    def heed() -> None:
+        if told:
+            raise told[0]
+
+    with caught_signals(told.append), _place(heed):
+        for tried in range(TRIES):
+            worker = _taken(function, bounds)
+            try:
+                answer = _called(worker, argument, progress, heed)
+                break
+            except EOFError:
+                how = worker.end(ENDING)
+                if worker.began or tried == TRIES - 1:
+                    what = f"died at t = {worker.reached:.6g} s" if worker.began else "cannot start"
+                    words = f"The simulation's process {what} ({how})."
+                    raise SimulationFailed(words) from None
+            finally:
+                if worker.idle and bounds is not None and worker.reusable:
+                    _idle[worker.kind].append(worker)
+                    _thin_out()
+                else:
+                    worker.end()
+    heed()
+    return answer
+
+
+@contextmanager
+def _place(heed: Callable[[], None]) -> Iterator[None]:
+    """The right to have a process at work, when one ends. Those that ``progress`` asks for have
+    that of the call which told it."""
+    if getattr(_here, "at_work", False):
+        yield
+        return
+    while not _places.acquire(timeout=_REPORT_EVERY):
+        heed()
+    _here.at_work = True
+    try:
+        yield
+    finally:
+        _here.at_work = False
+        _places.release()
+
+
+def _taken(function: Callable[[Any, Progress], Any], bounds: Bounds | None) -> Worker:
+    """A process that waits and is still there, or a new one."""
+    with suppress(IndexError):
+        while bounds is not None:
+            worker = _idle[function, bounds].pop()
+            if worker.alive:
+                return worker
+            worker.end()
+    return Worker(function, bounds)
+
+
+def _thin_out() -> None:
+    """End those that have waited longest, beyond one for each processor."""
+    while len(waiting := [worker for each in list(_idle.values()) for worker in list(each)]) > (
+        processors()
+    ):
+        longest = min(waiting, key=lambda worker: worker.rests_since)
+        with suppress(ValueError):  # another thread has it
+            _idle[longest.kind].remove(longest)
+            longest.end()
+
+
+def _called(worker: Worker, argument: Any, progress: Progress, heed: Callable[[], None]) -> Any:
+    """What the call gives; the worker is idle then. Raises EOFError where it has died."""
+    worker.give(argument)
+    while not (worker.hangs or worker.stalls()):
+        heed()
+        if not worker.pipe.poll(_REPORT_EVERY):
+            continue
+        kind, value = worker.hear()
+        if kind == "result":
+            worker.idle = True
+            return value
+        if kind == "failure":
+            raise value
+        progress(worker.reached)
     raise SimulationFailed(
         f"The simulation hangs at t = {worker.reached:.6g} s: no step was finished in "
         f"{f'{PATIENCE:g} s of CPU time' if worker.hangs else f'{STALLED:g} s'}. A netlist without "
@@ -164,36 +354,79 @@ def isolated(simulate: Callable[..., Any], scene: Any, progress: Progress, **opt
     )
 
 
-def _start(pipe: Connection) -> "subprocess.Popen[Any]":
+def _clear(owner: int, processes: "list[subprocess.Popen[Any]]", folder: str) -> None:
+    """What is left of a worker that nobody has any more, or that this process leaves behind."""
+    if os.getpid() != owner:
+        return
+    for process in processes:
+        process.kill()
+        process.wait()
+    rmtree(folder, ignore_errors=True)
+
+
+_SAID = "said"
+"""The file of a process's own folder that has what it said on stderr."""
+
+
+def _start(pipe: Connection, folder: str, lock: int, library: str) -> "subprocess.Popen[Any]":
     """A process that serves the other end of ``pipe``, and whose input ends with this process."""
     handle = pipe.fileno()
-    options: dict[str, Any] = {"pass_fds": (handle,)}
+    options: dict[str, Any] = {"pass_fds": (handle, lock)}
     if sys.platform == "win32":
         os.set_handle_inheritable(handle, True)
         about = subprocess.STARTUPINFO(lpAttributeList={"handle_list": [handle]})
         options = {"startupinfo": about}
+    kept = {name: value for name, value in os.environ.items() if name.startswith(_KEPT)}
+    kept |= {"NGSPICE_LIBRARY_PATH": library} if library else {}
+    kept |= dict.fromkeys(("HOME", "TMPDIR", "TEMP"), folder) | {"OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, "-P", "-c", _PROGRAM, type(pipe).__name__, str(handle)]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, **options)
+    with open(os.path.join(folder, _SAID), "wb") as said:
+        return subprocess.Popen(
+            command, stdin=subprocess.PIPE, stderr=said, cwd=folder, env=kept, **options
+        )
 
 
 def serve(pipe: Connection) -> None:
     """What the process does until its parent ends: it calls the function, and tells."""
+    function, bounds = pipe.recv(), pipe.recv()
+    unfit: Exception | None = None
+    if bounds is not None:
+        try:
+            if bounds.first is not None:
+                load, argument = bounds.first
+                load(argument)
+            fence.close(bounds.reads)  # before there are threads, which would stay outside
+        except Exception as failure:
+            unfit = failure
     threading.Thread(target=_end_with_parent, daemon=True).start()
     reports = _Reports(pipe)
-    function = pipe.recv()
-    reports.send("progress", 0.0)
     while True:
         try:
             argument = pipe.recv()
         except (EOFError, OSError):
             return
+        reports.send("progress", 0.0)
         reports.at_work.set()
         try:
-            answer = ("result", function(argument, reports.progress))
+            if unfit is not None:
+                raise unfit
+            with in_place():
+                answer = ("result", function(argument, reports.progress))
         except Exception as failure:
             answer = ("failure", failure)
         reports.at_work.clear()
+        if _retires:
+            reports.send("retires", None)
         reports.send(*answer)
+
+
+_retires = False
+
+
+def retire() -> None:
+    """Have this process replaced after the call at hand: something is spoilt for good."""
+    global _retires
+    _retires = True
 
 
 class _Reports:

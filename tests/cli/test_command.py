@@ -24,6 +24,7 @@ from cosim.coupling.methods.mean_current import MeanCurrent
 from cosim.drive.command import Sawtooth
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
+from cosim.toolchain.processes import in_place
 from tests.helpers import needs
 
 pytestmark = pytest.mark.reliability
@@ -248,6 +249,11 @@ def heed_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+def worked(process: psutil.Process) -> float:
+    """CPU seconds of a process and its workers."""
+    return sum(sum(one.cpu_times()[:2]) for one in (process, *process.children()))
+
+
 @needs.posix
 @pytest.mark.parametrize("scene", ["paper", "paper-full", "ideal-current"])
 def test_interrupt(scene: str, tmp_path: Path) -> None:
@@ -265,7 +271,7 @@ def test_interrupt(scene: str, tmp_path: Path) -> None:
     try:
         for number, (process, _) in enumerate(running):
             # Not before Python itself has started, however loaded the machine.
-            while sum(psutil.Process(process.pid).cpu_times()[:2]) < 0.5 + 0.5 * number:
+            while worked(psutil.Process(process.pid)) < 0.5 + 0.5 * number:
                 time.sleep(0.01)
             process.send_signal(signal.SIGINT)
         for process, out in running:
@@ -384,7 +390,7 @@ def test_callback_fails(
     owner: type, name: str, calls: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = bits()
-    with monkeypatch.context() as patch:
+    with monkeypatch.context() as patch, in_place():
         patch.setattr(owner, name, after_calls(calls, getattr(owner, name), Trouble("here")))
         with pytest.raises(Trouble, match="here"):
             simulate(load("paper", [*SHORT, "coupling.method=mean-current"]))

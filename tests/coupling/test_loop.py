@@ -28,6 +28,8 @@ from cosim.simulation.simulate import simulate
 from cosim.studies.accuracy.cases import participants
 from cosim.waveforms.result import Result
 
+pytestmark = pytest.mark.usefixtures("in_place")
+
 LAST = ["run.duration=0.06", "run.settle=0.021"]
 BRIEF = ["run.duration=0.02", "run.settle=0.0049", "run.output_step=3.1e-5"]
 AMPLIFIER = (circuits() / "amplifier.cir").read_text(encoding="utf-8")
@@ -115,7 +117,7 @@ def test_no_step_goes_through_python(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_no_step_asks_for_the_cpu_time() -> None:
     """ngspice would, to print four times a second how far it is."""
     simulate(load("reference", ["run.duration=1", "circuit.max_step=1e-5"]))
-    assert not [line for line in lead._engine(False)._stdout if "Reference value" in line]
+    assert not [line for line in lead.engine(False)._stdout if "Reference value" in line]
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -20,6 +20,7 @@ from cosim.coupling.methods.jacobi import Jacobi
 from cosim.errors import BadInput, CosimError, SimulationFailed
 from cosim.files.resources import circuits
 from cosim.scene import load
+from cosim.simulation import elsewhere
 from cosim.simulation.simulate import simulate
 from cosim.toolchain import processes
 from tests.helpers import needs
@@ -138,16 +139,19 @@ def _harmful(harm: str, progress: object) -> None:
 
 
 def test_spoilt_library_is_left_behind(before: np.ndarray) -> None:
-    # In a process of its own, since nothing else can run in it afterwards.
-    after = processes.isolated(_spoil_and_run, None, lambda _: None)
-    assert np.array_equal(after, before)
+    bounds = elsewhere.bounds(load("reference", SHORT))
+    calls = [processes.isolated(_spoil_or_run, spoil, lambda _: None, bounds) for spoil in (1, 0)]
+    assert calls[0] != calls[1][0]
+    assert np.array_equal(calls[1][1], before)
 
 
-def _spoil_and_run(nothing: None, progress: object) -> np.ndarray:
+def _spoil_or_run(spoil: int, progress: object) -> object:
+    if not spoil:
+        return os.getpid(), good_run()
     deck = "spoilt\nV1 a 0 1\nR1 a 0 {nothing}\n.tran 1u 1m\n.end"
-    lead._engine(False).transient(deck, ("v(a)",), _Nobody())
-    assert ngspice.spoilt()
-    return good_run()
+    lead.engine(False).transient(deck, ("v(a)",), _Nobody())
+    assert ngspice.Engine.poisoned
+    return os.getpid()
 
 
 POLY = "E9 x9 0 POLY(1) v1 0 0 1\nR9 x9 0 1k"
@@ -164,7 +168,7 @@ def test_code_models_are_there_for_a_netlist_of_ones_own_alone(tmp_path: Path) -
 
 
 def _said(given: tuple[str, bool], progress: object) -> str:
-    engine = lead._engine(given[1])
+    engine = lead.engine(given[1])
     engine.transient(given[0], ("v(v1)",), _Nobody())
     return engine.said()
 
@@ -194,7 +198,7 @@ def test_exception_in_a_method(
         return original(*arguments)
 
     monkeypatch.setattr(Jacobi, name, fail)
-    with pytest.raises(type(failure)):
+    with processes.in_place(), pytest.raises(type(failure)):
         simulate(load("reference", [*SHORT, "coupling.method=jacobi"]))
     monkeypatch.undo()
     assert np.array_equal(good_run(), before)
@@ -203,7 +207,8 @@ def test_exception_in_a_method(
 def test_not_a_number_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndarray) -> None:
     calls = itertools.count()
     monkeypatch.setattr(Jacobi, "emf", lambda self, past: (np.nan if next(calls) > 20 else 0.0,))
-    with pytest.raises(SimulationFailed, match=r"range of numbers|stopped at t = 0\.00"):
+    told = r"range of numbers|stopped at t = 0\.00"
+    with processes.in_place(), pytest.raises(SimulationFailed, match=told):
         simulate(load("reference", [*SHORT, "coupling.method=jacobi"]))
     monkeypatch.undo()
     assert np.array_equal(good_run(), before)
@@ -217,7 +222,8 @@ def test_early_end_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndar
         return deck.replace(" 0.01 0 ", " 0.004 0 "), saved
 
     monkeypatch.setattr(lead, "prepare", shortened)
-    with pytest.raises(SimulationFailed, match=r"stopped at t = 0\.004 s of 0\.01 s"):
+    told = r"stopped at t = 0\.004 s of 0\.01 s"
+    with processes.in_place(), pytest.raises(SimulationFailed, match=told):
         simulate(load("reference", SHORT))
     monkeypatch.undo()
     assert np.array_equal(good_run(), before)

@@ -71,7 +71,7 @@ class Lead:
         self._recorder = recorder
         self._replay = replay
         self._deck, self._saved = deck or prepare(scene)
-        self._engine = partial(_engine, scene.circuit.netlist is not None)
+        self._engine = partial(engine, scene.circuit.netlist is not None)
         width = len(LOG) + len(self._saved)
         self._log = Tape(width)
         # With `uic`, ngspice accepts t = 0 before it has sent any value.
@@ -189,6 +189,7 @@ class Lead:
         state.pieces, state.n_pieces, state.piece = self._row, len(self._pieces), 0
 
 
-def _engine(code_models: bool) -> ngspice.Engine:
+def engine(code_models: bool) -> ngspice.Engine:
+    """This process's ngspice, which calls the loop. Raises BadInput."""
     names = ("lead_data", "lead_source", "lead_step")
     return ngspice.engine(ngspice.Callbacks(*map(address, names)), code_models)

@@ -6,6 +6,7 @@ since a process has one ngspice and ours has other callbacks.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from time import process_time
 from typing import Any, Literal
 
@@ -15,11 +16,11 @@ from fmpy.fmi3 import FMU3Slave
 from PySpice.Spice.NgSpice.Shared import NgSpiceShared
 
 from cosim.circuit.netlist import prepare
-from cosim.circuit.ngspice import library_name
 from cosim.mechanics.fmi import references
 from cosim.mechanics.package import MODEL, token, unpacked
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
+from cosim.toolchain.libraries import ngspice_library
 from cosim.toolchain.processes import isolated
 
 _FALL = 1e-9
@@ -28,14 +29,14 @@ _FALL = 1e-9
 
 def run(scene: Scene, times: Sequence[float]) -> tuple[float, npt.NDArray[np.float64]]:
     """CPU seconds, and the part's height (m) at ``times`` (s)."""
-    return isolated(_run, scene, lambda _: None, times=times)
+    return isolated(partial(_run, times=times), scene, lambda _: None)
 
 
 class Shared(NgSpiceShared):
     """ngspice with the two callbacks that PySpice means to be replaced."""
 
     def __init__(self) -> None:
-        self.LIBRARY_PATH = library_name()
+        self.LIBRARY_PATH = ngspice_library()
         known = references(3)
         self.inputs = [known["current"]]
         self.outputs = [known["back_emf"], known["z_part"]]

@@ -21,6 +21,7 @@ from cosim.drive.command import command
 from cosim.scene import Scene, load
 from cosim.simulation.choose_steps import LEVELS
 from cosim.studies.accuracy.cases import Case, participants
+from cosim.toolchain.processes import in_place
 
 _SAME_TIME = 1e-12
 
@@ -134,7 +135,8 @@ def _led(*overrides: str) -> Callable[[Scene, Case, float], Outcome]:
         given = [text.format(repr(setting)) for text in overrides]
         chosen = _over(case, f"run.output_step={times[0]!r}", *given)
         began = process_time()
-        result = simulate(chosen)
+        with in_place():
+            result = simulate(chosen)
         seconds = process_time() - began
         steps = result.summary["circuit_steps"]
         assert isinstance(steps, int)

@@ -18,6 +18,7 @@ from cosim.studies.bench.rungs import cost_exponent, real_time
 from cosim.studies.bench.timings import map_over_bare_calls, solvers, throughput
 from cosim.studies.fit.cases import Case
 from cosim.studies.tables import machine
+from cosim.toolchain.processes import in_place
 from cosim.trials.camera import film, frame_times
 from cosim.trials.tracked import Track, Trial, read_folder
 
@@ -34,7 +35,8 @@ def run(out: Path, trials: Path | None, quick: bool) -> dict[str, Any]:
     The part's solvers are timed on the trials of a folder or, without one, on trials that the
     camera makes of a simulated run. A ``quick`` bench takes fewer rounds and shorter runs.
     """
-    numbers = measure(trials, quick)
+    with in_place():  # CPU times are those of one process
+        numbers = measure(trials, quick)
     write_json(out / "bench.json", numbers)
     print(table(numbers))
     print(f"Written to {out}: bench.json")

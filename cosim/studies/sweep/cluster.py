@@ -1,6 +1,5 @@
 """The points of a sweep on a Dask cluster (the extra ``dask``)."""
 
-import threading
 from collections.abc import Iterable, Iterator
 from contextlib import closing
 from itertools import islice
@@ -16,9 +15,6 @@ PATIENCE = 15.0
 
 _IN_FLIGHT = 4
 """Points at the cluster for each of its threads: enough to keep it busy, whatever the number."""
-
-_ALONE = threading.Lock()
-"""A process has one ngspice, and Dask may run several threads in it."""
 
 
 def run_on_cluster(
@@ -75,5 +71,4 @@ def _client(address: str) -> Any:
 
 
 def _evaluate(base: Scene, values: dict[str, float], whole_periods: bool) -> Outcome:
-    with _ALONE:
-        return evaluate(base, values, whole_periods)
+    return evaluate(base, values, whole_periods)

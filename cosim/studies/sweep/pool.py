@@ -1,7 +1,6 @@
 """The points of a sweep in worker processes: one that crashes or hangs costs only its own point.
 
-ngspice leaks a little with every run, and can be spoilt for good. Workers are therefore replaced
-after some points, after one that has spoilt the library, and after their death.
+Workers are replaced after some points, after one that has spoilt ngspice, and after their death.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -9,16 +8,11 @@ from functools import partial
 from multiprocessing.connection import wait
 from typing import Any
 
-from cosim.errors import BadInput, SimulationFailed
+from cosim.errors import BadInput
 from cosim.scene import Scene
+from cosim.simulation.elsewhere import bounds
 from cosim.studies.sweep.point import Number, Outcome, evaluate, failed
-from cosim.toolchain.processes import ENDING, PATIENCE, STALLED, Worker, processors
-
-POINTS_A_WORKER = 250
-"""Points after which a worker is replaced: what ngspice leaks stays below some MB."""
-
-TRIES = 3
-"""A worker may die of something else than its point, such as a kill from outside."""
+from cosim.toolchain.processes import ENDING, PATIENCE, STALLED, TRIES, Worker, processors
 
 Point = tuple[int, Mapping[str, Number | str]]
 
@@ -27,11 +21,9 @@ class _Worker(Worker):
     """A process and the point that it has at hand."""
 
     point: Point | None = None
-    given = 0
 
     def give(self, argument: Point) -> None:
         self.point = argument
-        self.given += 1
         super().give(argument[1])
 
 
@@ -39,7 +31,8 @@ class Pool:
     """Runs points of one scene in ``workers`` processes; to be used in a ``with`` block."""
 
     def __init__(self, base: Scene, workers: int, whole_periods: bool = False) -> None:
-        self._base, self._whole_periods = base, whole_periods
+        self._function = partial(_evaluate, base, whole_periods)
+        self._bounds = bounds(base)
         self._count = workers
         self._workers: list[_Worker] = []
 
@@ -67,7 +60,7 @@ class Pool:
                     break
                 idle = [worker for worker in self._workers if worker.point is None]
                 if not idle:
-                    idle = [_Worker(partial(_evaluate, self._base, self._whole_periods))]
+                    idle = [_Worker(self._function, self._bounds)]
                     self._workers += idle
                 idle[0].give(point)
                 busy.append(idle[0])
@@ -83,14 +76,11 @@ class Pool:
                         kind, answer = worker.hear()
                     except EOFError:
                         how = self._drop(worker, ENDING)
-                        if not worker.began:
-                            words = f"The worker processes cannot start ({how})."
-                            raise SimulationFailed(words) from None
                         kind, lost = "lost", f"The worker process died ({how})."
                     if kind in ("result", "failure"):
-                        outcome, spoilt = answer if kind == "result" else (failed(answer), True)
+                        outcome = answer if kind == "result" else failed(answer)
                         worker.point = None
-                        if spoilt or worker.given == POINTS_A_WORKER:
+                        if kind == "failure" or not worker.reusable:
                             self._drop(worker)
                         yield number, outcome
                         continue
@@ -128,14 +118,9 @@ def _evaluate(
     whole_periods: bool,
     values: Mapping[str, Number | str],
     progress: Callable[[float], None],
-) -> tuple[Outcome, bool]:
-    """A point's outcome, and whether it has spoilt the process for others."""
+) -> Outcome:
+    """What becomes of a point."""
     try:
-        outcome = evaluate(base, values, whole_periods, progress)
+        return evaluate(base, values, whole_periods, progress)
     except Exception as error:
-        return failed(error), False
-    if base.rung.own_netlist or not base.rung.ngspice:
-        return outcome, False
-    from cosim.circuit.ngspice import spoilt
-
-    return outcome, spoilt()
+        return failed(error)

@@ -1,0 +1,59 @@
+"""Runs a scene in a worker process behind a fence: all those that ngspice has a part in.
+
+What only the worker needs is not imported here, since it takes a while.
+"""
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+from cosim.files.resources import circuits
+from cosim.files.spill import Packed, place
+from cosim.scene import Scene
+from cosim.toolchain import fence
+from cosim.toolchain.libraries import ngspice_library
+from cosim.toolchain.processes import Bounds, isolated
+from cosim.waveforms.result import Result
+
+Progress = Callable[[float], None]
+
+
+def simulate_elsewhere(scene: Scene, progress: Progress, fmi_version: int) -> Result:
+    """What :func:`cosim.simulation.here.simulate_here` gives. Raises also SimulationFailed where
+    the process dies or hangs."""
+    ran, columns, summary = isolated(_worked, (scene, fmi_version), progress, bounds(scene))
+    progress(scene.run.duration)
+    return Result(ran, columns, summary)
+
+
+def bounds(scene: Scene) -> Bounds:
+    """Of a worker for the scene, and for others with the same files. Raises BadInput where ngspice
+    is missing."""
+    files = scene.files
+    # A netlist may include files of its own folder.
+    folder = os.path.dirname(files.pop("netlist", "")) or str(circuits())
+    first = _load, scene.rung.own_netlist
+    return Bounds((folder, *files.values()), place(), ngspice_library(), first)
+
+
+def _load(code_models: bool) -> None:
+    """Load what the run will: ngspice looks up whose process this is, which the fence forbids."""
+    from cosim.circuit import false_cycles  # noqa: F401
+    from cosim.coupling.loop.lead import engine
+    from cosim.simulation import here  # noqa: F401
+
+    engine(code_models)
+
+
+def _worked(given: tuple[Scene, int], progress: Progress) -> tuple[Scene, Packed, dict[str, Any]]:
+    """A run in a worker."""
+    from cosim.simulation.here import simulate_here
+
+    scene, fmi_version = given
+    result = simulate_here(scene, progress, fmi_version)
+    if scene.rung.own_netlist and fence.lacking:
+        result.summary["notes"].append(
+            f"this system has no {' and no '.join(fence.lacking)}: nothing but the reader's own "
+            "checks stands between the netlist and your files."
+        )
+    return result.scene, Packed(result.columns), result.summary

@@ -1,0 +1,66 @@
+"""Runs a scene in this process: gives the mechanics to its rung and gathers the result."""
+
+import time
+from collections.abc import Callable
+
+from cosim.arrays import Array
+from cosim.coupling.loop.recorder import Recorder
+from cosim.files.spill import Tape, blocks
+from cosim.mechanics.part import Accounting
+from cosim.mechanics.stickslip import Mechanics
+from cosim.scene import Scene
+from cosim.simulation.guards import notes
+from cosim.simulation.numbers import motion, numbers
+from cosim.simulation.rungs.given_surface import lead_part
+from cosim.simulation.rungs.rung import Driven, ended, rungs
+from cosim.waveforms.columns import COLUMNS
+from cosim.waveforms.result import Result
+
+Progress = Callable[[float], None]
+
+
+def simulate_here(scene: Scene, progress: Progress, fmi_version: int) -> Result:
+    """The run of a scene whose circuit and coupling are chosen. Raises as
+    :func:`cosim.simulation.simulate.simulate` does."""
+    if scene.surface_is_given:
+        return _follow_surface(scene, progress)
+    return _move(scene, progress, fmi_version)
+
+
+def _follow_surface(scene: Scene, progress: Progress) -> Result:
+    began = time.perf_counter()
+    waveforms, moved = ended(lead_part(scene), Accounting.make)
+    progress(scene.run.duration)
+    summary = numbers(scene, moved, Driven(None, "exact"), 0, began)
+    return Result(scene, waveforms, summary | {"notes": notes(scene, waveforms, summary)})
+
+
+def _move(scene: Scene, progress: Progress, fmi_version: int) -> Result:
+    began = time.perf_counter()
+    mechanics = Mechanics(scene, fmi_version)
+    try:
+        recorder = Recorder(scene, mechanics, progress)
+        driven = rungs()[scene.circuit.model].drive(scene, recorder)
+        moved = motion(scene, recorder)
+    finally:
+        mechanics.close()
+    summary = numbers(scene, moved, driven, recorder.steps, began)
+    waveforms = _waveforms(scene, recorder, driven)
+    told = {"notes": notes(scene, waveforms, summary, mechanics.normal_force)}
+    return Result(scene, waveforms, summary | told)
+
+
+def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Array]:
+    known = {"time": recorder.time, **driven.waves()}
+    columns = recorder.mechanics.columns
+    known |= {name: recorder.rows[:, k] for k, name in enumerate(columns) if name in COLUMNS}
+    if driven.electric is None:
+        del known["back_emf"]
+    if scene.mechanics.actuator == "direct":
+        del known["z_ram"], known["v_ram"]
+    if (force := recorder.mechanics.normal_force) is not None:
+        forces = Tape(1)
+        for part in blocks(len(known["time"])):
+            forces.append([force.before(t) for t in known["time"][part].tolist()])
+        known["normal_force"] = forces.column()
+    return {name: known[name] for name in COLUMNS if name in known}
