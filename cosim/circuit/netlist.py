@@ -17,8 +17,8 @@ from cosim.arrays import Array
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import Line, read, refuse
-from cosim.circuit.lint.elements import Element
-from cosim.circuit.lint.words import definitions
+from cosim.circuit.lint.elements import Element, Scope
+from cosim.circuit.lint.write import written
 from cosim.files.resources import circuits
 from cosim.scene import Scene
 
@@ -72,29 +72,22 @@ def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
     """
     path = path_of(scene)
     # A netlist of one's own may have changed since it was read last.
-    lines, elements = (_packaged if scene.circuit.netlist is None else _checked)(path)
+    title, top = (_packaged if scene.circuit.netlist is None else _checked)(path)
+    elements = top.elements
     external = _external_sources(elements)
     present = {node for element in elements for node in element.nodes}
     companion = scene.coupling.method == "companion"
     if companion:
-        _carry_inertia(external, lines[0], present)
+        _carry_inertia(external, title, present)
     values = parameters(scene)
-    deck = [lines[0].text]
-    depth = 0
-    for line in lines[1:]:
-        first = line.text.split()[0].lower()
-        depth += (first == ".subckt") - (first == ".ends")
-        if line in external:
-            deck.append(external[line])
-        elif first == ".param" and depth == 0:
-            for (name, formal), expression in definitions(line.text):
-                value = repr(values[name]) if name in values else expression
-                deck.append(f".param {name}{formal or ''}={value}")
-        else:
-            deck.append(line.text)
+    deck = [title.text]
+    for line, element, holder in top.order:
+        if not all(each.used for each in holder.chain()):
+            continue  # nothing calls the subcircuit
+        deck.append(external.get(line) or written(line, element, values if holder is top else {}))
     for node in ("out", "sense"):
         if node not in present:
-            refuse(lines[0], f"the netlist must have a node {node}, one of the coil's two ends")
+            refuse(title, f"the netlist must have a node {node}, one of the coil's two ends")
     saved = REQUIRED + tuple(f"v({name})" for name in OPTIONAL if name in present)
     if companion:
         saved += (MOTIONAL,)
@@ -110,9 +103,9 @@ def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
     return "\n".join(deck), saved
 
 
-def _checked(path: Path) -> tuple[Sequence[Line], Sequence[Element]]:
+def _checked(path: Path) -> tuple[Line, Scope]:
     lines = read(path)
-    return lines, check(lines).elements
+    return lines[0], check(lines)
 
 
 _packaged = cache(_checked)

@@ -83,7 +83,7 @@ def reported(case: tuple, reltol: float) -> bool:
     return False
 
 
-@pytest.mark.usefixtures("trapezoidal")
+@pytest.mark.usefixtures("trapezoidal", "in_place")
 def test_worst_cases_are_reported() -> None:
     assert sum(reported(case, 1e-3) for case in WORST) >= 9
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import Line, read
 from cosim.circuit.lint.expressions import BEHAVIOURAL, PARAMETRIC
+from cosim.circuit.lint.write import written
 from cosim.errors import BadInput, plain
 from cosim.files.resources import circuits
 from tests.helpers import needs
@@ -73,15 +74,18 @@ def test_ordinary_netlists_pass(tmp_path, name):
 @needs.ngspice_library
 @pytest.mark.parametrize("name", ORDINARY)
 def test_ordinary_netlists_are_correct(tmp_path, name):
-    """ngspice runs each to its end, as it stands and as it is read."""
-    read_lines = checked(tmp_path, ORDINARY[name])
-    as_read = "\n".join([*(line.text for line in read_lines), ".tran 10u 2m", ".end"])
-    for deck in (ORDINARY[name], as_read):
+    """ngspice runs each to its end, as it stands and as it is written anew: to the same bits."""
+    top = check(checked(tmp_path, ORDINARY[name]))
+    anew = [written(line, element, {}) for line, element, _ in top.order]
+    finals = set()
+    for deck in (ORDINARY[name], "\n".join(["* title", *anew, ".tran 10u 2m", ".end"])):
         said = run(deck, tmp_path)
+        finals.update(re.findall(r"^.*final = .*$", said, re.MULTILINE))
         if "unable to find definition of model" in said:
             pytest.skip("POLY and TABLE need ngspice's code models, which its library lacks here")
         assert "finished = 2.000000e-03" in said, said[-2000:]
         assert "rror" not in said and "singular" not in said, said[-2000:]
+    assert len(finals) == 1
 
 
 def test_lines_know_where_they_began(tmp_path):

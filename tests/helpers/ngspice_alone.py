@@ -51,6 +51,8 @@ def main() -> None:
     ngspice.ngSpice_Command(b"run")
     ngspice.ngSpice_Command(b"let finished = time[length(time)-1]")
     ngspice.ngSpice_Command(b"print finished")
+    ngspice.ngSpice_Command(b"let final = vcommand#branch[length(time)-1]")
+    ngspice.ngSpice_Command(b"print final")
     sys.stdout.flush()
     os._exit(0)
 

@@ -74,6 +74,8 @@ class Scope:
     subcircuits: dict[str, list["Scope"]] = field(default_factory=dict)
     lines: list[tuple[Line, Element | None]] = field(default_factory=list)
     globals: set[str] = field(default_factory=set)
+    order: list[tuple[Line, Element | None, "Scope"]] = field(default_factory=list)
+    """Of the top level: all lines as they stand, each with its element and its scope."""
     used: bool = False
 
     def chain(self) -> "Iterator[Scope]":
@@ -140,12 +142,16 @@ class _Parser:
             self.scope.elements.append(element)
             self.scope.names.add(element.name)
             self.scope.lines.append((line, element))
+            self.top.order.append((line, element, self.scope))
             return
         word = re.match(r"\.\w*", line.text)
+        before = self.scope
         if handler := handlers.get(word[0].lower() if word else ""):
             handler(line, found)
         if self.scope.line is not line:
             self.scope.lines.append((line, None))
+        began = self.scope.parent is before
+        self.top.order.append((line, None, self.scope if began else before))
 
     def _subckt(self, line: Line, found: list[str]) -> None:
         positional, assigned = split_assignments(found[1:])

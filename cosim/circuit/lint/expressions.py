@@ -28,6 +28,9 @@ takes: with too many or too few ngspice calculates something else in silence."""
 BEHAVIOURAL = _COMMON | dict.fromkeys(word_set("ddt eq0 ge0 gt0 le0 lt0 ne0 u u2 uramp"), 1)
 """Those of its behavioural sources, except ``pwl``, which takes any number of points. ngspice
 replaces the random ones by a number as it reads the netlist."""
+MOST_CALLS, DEEPEST = 10_000, 100
+"""Calls of functions within functions, all told and one in another: ngspice 39 writes each out, so
+many in some 0.15 s."""
 CONSTANTS = word_set("time temper hertz")
 BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
 
@@ -81,6 +84,10 @@ class Names:
             for line, _ in scope.lines:
                 for function in _functions(line):
                     self.definitions.setdefault(function.name, []).append(function)
+        self.checked: set[tuple[str, bool | None]] = set()
+        """Names of these whose bodies have been looked at, and for which parser."""
+        self.calls: dict[str, int] = {}
+        """How many calls one of each becomes when ngspice writes them out."""
         self.mentioned = {word for s in scopes for e in s.elements for word in [e.model, *e.words]}
         self.called = {
             name
@@ -92,6 +99,11 @@ class Names:
         growing = True
         while growing:
             growing = sum(self._inherit(scope) for scope in scopes) > 0
+
+    def only(self, name: str) -> _Function | None:
+        """The function of this name, if there is but one."""
+        found = self.definitions.get(name, [])
+        return found[0] if len(found) == 1 else None
 
     def _inherit(self, caller: Scope) -> bool:
         grew = False
@@ -133,7 +145,7 @@ def check_names(scope: Scope, names: Names) -> None:
                     if name not in known and not (loose and name in BEHAVIOURAL_CONSTANTS):
                         refuse(line, f"the parameter {shown(name)} is not defined")
                 elif name in own:
-                    _check_own(line, name, arguments, names, behavioural, set())
+                    _check_own(line, name, arguments, names, behavioural)
                 else:
                     _check_call(line, name, arguments, behavioural)
         if element is not None and element.kind == "b":
@@ -182,24 +194,38 @@ def _check_own(
     arguments: list[str],
     names: Names,
     behavioural: bool | None,
-    met: set[str],
+    depth: int = 0,
 ) -> None:
-    """Check a call of the netlist's own function, whose body ngspice puts in its place."""
-    found = names.definitions.get(name, [])
-    if len(found) != 1 or name in met:  # which one is meant is not known
+    """Check a call of the netlist's own function, whose body ngspice puts in its place, and once
+    what the body calls."""
+    function = names.only(name)
+    if function is None:  # which one is meant is not known
         return
-    function = found[0]
     if len(arguments) != len(function.formals):
         wanted = _counted(len(function.formals))
         refuse(line, f"the function {shown(name)} takes {wanted}, not {len(arguments)}")
+    if (name, behavioural) in names.checked:
+        return
+    names.checked.add((name, behavioural))
+    if depth > DEEPEST:
+        refuse(line, f"the function {shown(name)} is called more than {DEEPEST} deep")
     for inner, inner_arguments in used(function.body):
         if inner_arguments is None:
             continue
         if inner in names.definitions:
-            below = met | {name}
-            _check_own(function.line, inner, inner_arguments, names, behavioural, below)
+            _check_own(function.line, inner, inner_arguments, names, behavioural, depth + 1)
         else:
             _check_call(function.line, inner, inner_arguments, behavioural)
+    # Those that it calls are counted by now; one that calls itself is not.
+    calls = [inner for inner, found in used(function.body) if found is not None]
+    names.calls[name] = 1 + sum(names.calls.get(inner, 0) for inner in calls)
+    if names.calls[name] > MOST_CALLS:
+        within = [inner for inner in dict.fromkeys(calls) if names.calls.get(inner, 0) > 1]
+        refuse(
+            function.line,
+            f"the function {shown(name)} makes {names.calls[name]} calls, by way of "
+            f"{', '.join(map(shown, within[:3]))}; ngspice can write out {MOST_CALLS}",
+        )
 
 
 def _check_blanks(line: Line, own: set[str]) -> None:

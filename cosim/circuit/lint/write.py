@@ -1,0 +1,151 @@
+"""Writes a netlist's lines anew from what was parsed of them: ngspice sees no other text.
+
+It takes a name that is glued to a number for the next word (``vto=1level=8`` sets the level), and
+drops what it does not know in silence. Here each number ends where it ends for the reader, and what
+no element has is refused.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+
+from cosim.circuit.lint.deck import MOS_LEVELS, Line, refuse, shown, word_set
+from cosim.circuit.lint.elements import Element
+from cosim.circuit.lint.words import definitions, words
+
+_NUMBER = re.compile(
+    r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(meg|mil|[tgkmunpfa])?[a-z]*(?![\w.])", re.IGNORECASE
+)
+_NAME = re.compile(r"[a-z_][\w.$#]*", re.IGNORECASE)
+_NODES = re.compile(r"[vi]\s*\([^(){}=']*\)", re.IGNORECASE)
+_DEVICE = re.compile(r"@[\w.#]+\[\w+\]")
+_SIGNS = frozenset("+-*/^%()<>=!&|?:,~ {}[]'")
+_HEAD = re.compile(r"[^\s(),{}='\"`\\]+")
+_PAIR = re.compile(r"([a-z_]\w*)=(.+)", re.IGNORECASE | re.DOTALL)
+_INITIAL = re.compile(r"\s*v\s*\(\s*([^\s(),{}=']+)\s*\)\s*=\s*(\{[^{}]*\}|'[^']*'|[^\s,]+)\s*,?")
+
+_WARM = "m temp dtemp"
+_KEYS = {
+    "r": f"r resistance ac scale w l tc tc1 tc2 tce noisy noise {_WARM}",
+    "c": f"c q capacitance ic scale w l tc tc1 tc2 {_WARM}",
+    "l": f"l flux inductance ic nt scale tc tc1 tc2 {_WARM}",
+    "d": f"area pj w l ic off perim lm wm lp wp thermal {_WARM}",
+    "q": f"area areab areac ic off thermal {_WARM}",
+    "m": f"l w ad as pd ps nrd nrs ic off thermal {_WARM}",
+    "j": f"area ic off {_WARM}",
+    "z": f"area ic off {_WARM}",
+    "t": "z0 zo td f nl ic",
+    "o": "ic",
+    "v": "dc ac r td portnum z0 pwr freq phase",
+    "i": "dc ac m td",
+    "e": "value vol gain tc1 tc2 temp dtemp name",
+    "g": "value cur gain m tc1 tc2 temp dtemp name",
+    "f": "value gain m",
+    "h": "value gain",
+    "b": "v i tc1 tc2 temp dtemp reciproctc reciprocm m",
+}
+"""What elements may set, as ngspice 39 has it; a call of a subcircuit sets what that one has."""
+_ELSEWHERE = {
+    "rser": "write a resistor in series", "rpar": "write a resistor in parallel",
+    "cpar": "write a capacitor in parallel", "laplace": "write the filter with R and C",
+}  # fmt: skip
+
+
+def written(line: Line, element: Element | None, values: Mapping[str, float]) -> str:
+    """The line's text anew, with ``values`` for the parameters of these names. Raises BadInput for
+    what the reader does not know.
+    """
+    text = line.text
+    word = text.split()[0].lower()
+    if element is not None:
+        return _element(element)
+    if word == ".param":
+        return "\n".join(
+            f".param {name}{formal or ''}="
+            + (repr(values[name]) if name in values else _expression(line, expression))
+            for (name, formal), expression in definitions(text)
+        )
+    if word == ".model":
+        return _model(line)
+    if word in (".ic", ".nodeset"):
+        return f"{word} {' '.join(_initial(line, text[len(word) :].lower()))}"
+    if word in (".subckt", ".ends", ".global"):
+        return " ".join([word, *(_word(line, each) for each in words(text)[1:])])
+    return _expression(line, text)  # of functions and conditions; options are numbers
+
+
+def _element(element: Element) -> str:
+    line = element.line
+    known = _KEYS.get(element.kind)
+    found = [match[1].lower() for match in map(_PAIR.match, element.words) if match]
+    for key in found if known is not None else ():
+        if key not in word_set(known or ""):
+            cure = _ELSEWHERE.get(key, "leave it out")
+            element.refuse(f": {shown(key)} is nothing that ngspice knows of it; {cure}")
+    if "laplace" in element.words:
+        element.refuse(f": laplace is not known here; {_ELSEWHERE['laplace']}")
+    if element.kind in "beghfvi":
+        return _expression(line, line.text)
+    head = [element.name, *element.nodes, *element.controls]
+    head += [element.model] if element.model else []
+    for part in head:
+        if not _HEAD.fullmatch(part):
+            element.refuse(f": {shown(part)} is no name")
+    return " ".join([*head, *(_word(line, word) for word in element.words)])
+
+
+def _model(line: Line) -> str:
+    _, name, kind, *rest = words(line.text)
+    for word in rest:
+        pair = _PAIR.fullmatch(word)
+        if pair is None and not _NAME.fullmatch(word):
+            refuse(line, f"{shown(word)} is no parameter of a model; write name=value")
+        if (pair[1] if pair else word) == "level":
+            most = MOS_LEVELS if kind in ("nmos", "pmos") else frozenset("123456789")
+            if pair is None or pair[2] not in most:
+                given = pair[2] if pair else "without ="
+                refuse(line, f"models of level {shown(given)} are not allowed: some write files")
+    return " ".join([".model", name, kind, *(_word(line, word) for word in rest)])
+
+
+def _initial(line: Line, text: str) -> Iterator[str]:
+    place = 0
+    while place < len(text.rstrip()):
+        match = _INITIAL.match(text, place)
+        if match is None:
+            refuse(line, f"{shown(text[place:].strip())} is not v(node)=value")
+        yield f"v({match[1]})={_word(line, match[2])}"
+        place = match.end()
+
+
+def _word(line: Line, word: str) -> str:
+    """A value, or ``key=value``."""
+    if pair := _PAIR.fullmatch(word):
+        return f"{pair[1]}={_word(line, pair[2])}"
+    if word[0] in "{'":
+        return _expression(line, word)
+    sign = word[: word[0] in "+-"]
+    if number := _NUMBER.fullmatch(word, len(sign)):
+        return f"{sign}{number[1]}{number[2] or ''}"
+    if not _HEAD.fullmatch(word) or (word[len(sign) : len(sign) + 1].isdigit() and "=" in word):
+        refuse(line, f"{shown(word)} is neither a value nor name=value; put a blank between two")
+    return word
+
+
+def _expression(line: Line, text: str) -> str:
+    """An expression, or a line of expressions, token by token; blanks stay where they are."""
+    found, place = "", 0
+    while place < len(text):
+        for kind in (_NODES, _NUMBER, _NAME, _DEVICE):
+            if match := kind.match(text, place):
+                break
+        if match is None:
+            if text[place] not in _SIGNS and text[place] != ".":
+                refuse(line, f"{shown(text[place:])} is no expression that ngspice can read")
+            found, place = found + text[place], place + 1
+            continue
+        number = match.re is _NUMBER
+        if number and re.match(r"\s*=(?!=)", text[match.end() :]):
+            refuse(line, f"{shown(match[0])} cannot be set; put a blank between two words")
+        found += f"{match[1]}{match[2] or ''}" if number else match[0]
+        place = match.end()
+    return found

@@ -1,1 +1,0 @@
-"""Threads that lead the mechanics of many runs at once."""
