@@ -30,8 +30,7 @@ FMU = ROOT / "fmu"
 MODEL = "stickslip"
 LIBRARIES = {
     "loop": tuple(
-        ROOT / "cosim" / folder
-        for folder in ("coupling/loop", "coupling/batch", "drive", "simulation/rungs")
+        ROOT / "cosim" / folder for folder in ("coupling/loop", "drive", "simulation/rungs")
     ),
     "part": (ROOT / "cosim/mechanics",),
     "chain": (ROOT / "cosim/studies/identify/chain",),

@@ -18,7 +18,7 @@ from functools import partial
 from cosim.drive.command import period
 from cosim.errors import BadInput
 from cosim.scene import Scene, changed
-from cosim.simulation.many import summaries
+from cosim.simulation.many import each, summary
 from cosim.toolchain.processes import processors
 from cosim.waveforms.result import Result
 
@@ -87,11 +87,15 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
 def _v_averages(scene: Scene, settings: Sequence[Mapping[str, float | str]]) -> list[float]:
     """Of a scene without ngspice with each of some settings, m/s."""
     scenes = [partial(changed, scene, values, "auto") for values in settings]
+
+    def v_average(make: Callable[[], Scene], progress: Callable[[float], None]) -> float:
+        return summary(make(), progress)["v_average"]
+
     found: dict[int, float] = {}
-    for number, summary in summaries(enumerate(scenes), min(len(scenes), processors())):
-        if isinstance(summary, Exception):
-            raise summary
-        found[number] = summary["v_average"]
+    for number, value in each(v_average, enumerate(scenes), min(len(scenes), processors())):
+        if isinstance(value, Exception):
+            raise value
+        found[number] = value
     return [found[number] for number in range(len(scenes))]
 
 

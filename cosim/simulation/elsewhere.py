@@ -26,6 +26,11 @@ def simulate_elsewhere(scene: Scene, progress: Progress, fmi_version: int) -> Re
     return Result(ran, columns, summary)
 
 
+def summary_elsewhere(scene: Scene, progress: Progress) -> dict[str, Any]:
+    """What :func:`cosim.simulation.here.summary_here` gives."""
+    return isolated(_summed_up, scene, progress, bounds(scene))
+
+
 def bounds(scene: Scene) -> Bounds:
     """Of a worker for the scene, and for others with the same files. Raises BadInput where ngspice
     is missing."""
@@ -57,3 +62,9 @@ def _worked(given: tuple[Scene, int], progress: Progress) -> tuple[Scene, Packed
             "checks stands between the netlist and your files."
         )
     return result.scene, Packed(result.columns), result.summary
+
+
+def _summed_up(scene: Scene, progress: Progress) -> dict[str, Any]:
+    from cosim.simulation.here import summary_here
+
+    return summary_here(scene, progress)

@@ -2,6 +2,8 @@
 
 import time
 from collections.abc import Callable
+from contextlib import closing
+from typing import Any
 
 from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
@@ -23,31 +25,38 @@ def simulate_here(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     """The run of a scene whose circuit and coupling are chosen. Raises as
     :func:`cosim.simulation.simulate.simulate` does."""
     if scene.surface_is_given:
-        return _follow_surface(scene, progress)
-    return _move(scene, progress, fmi_version)
-
-
-def _follow_surface(scene: Scene, progress: Progress) -> Result:
-    began = time.perf_counter()
-    waveforms, moved = ended(lead_part(scene), Accounting.make)
-    progress(scene.run.duration)
-    summary = numbers(scene, moved, Driven(None, "exact"), 0, began)
-    return Result(scene, waveforms, summary | {"notes": notes(scene, waveforms, summary)})
-
-
-def _move(scene: Scene, progress: Progress, fmi_version: int) -> Result:
-    began = time.perf_counter()
-    mechanics = Mechanics(scene, fmi_version)
-    try:
-        recorder = Recorder(scene, mechanics, progress)
-        driven = rungs()[scene.circuit.model].drive(scene, recorder)
-        moved = motion(scene, recorder)
-    finally:
-        mechanics.close()
-    summary = numbers(scene, moved, driven, recorder.steps, began)
+        waveforms, summary = _followed_surface(scene)
+        progress(scene.run.duration)
+        return Result(scene, waveforms, summary | {"notes": notes(scene, waveforms, summary)})
+    with closing(Mechanics(scene, fmi_version)) as mechanics:
+        recorder, driven, summary = _driven(scene, mechanics, progress)
     waveforms = _waveforms(scene, recorder, driven)
     told = {"notes": notes(scene, waveforms, summary, mechanics.normal_force)}
     return Result(scene, waveforms, summary | told)
+
+
+def summary_here(scene: Scene, progress: Progress) -> dict[str, Any]:
+    """The summary alone, without notes."""
+    if scene.surface_is_given:
+        return _followed_surface(scene)[1]
+    with closing(Mechanics(scene)) as mechanics:
+        return _driven(scene, mechanics, progress)[2]
+
+
+def _followed_surface(scene: Scene) -> tuple[dict[str, Array], dict[str, Any]]:
+    began = time.perf_counter()
+    waveforms, moved = ended(lead_part(scene), Accounting.make)
+    return waveforms, numbers(scene, moved, Driven(None, "exact"), 0, began)
+
+
+def _driven(
+    scene: Scene, mechanics: Mechanics, progress: Progress
+) -> tuple[Recorder, Driven, dict[str, Any]]:
+    began = time.perf_counter()
+    recorder = Recorder(scene, mechanics, progress)
+    driven = rungs()[scene.circuit.model].drive(scene, recorder)
+    summary = numbers(scene, motion(scene, recorder), driven, recorder.steps, began)
+    return recorder, driven, summary
 
 
 def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Array]:

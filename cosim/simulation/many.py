@@ -1,122 +1,71 @@
-"""Runs many scenes at once for the numbers of their summaries: a thread for each, in compiled code.
+"""Many runs at once for the numbers of their summaries, a thread for each.
 
-Python only prepares a run and sums it up, with what a single run does that with; so the numbers are
-those of single runs, to the last bit.
+The compiled loop leaves Python to the other threads while it runs, and so does a thread that waits
+for its worker; so the numbers are those of single runs, to the last bit.
 """
 
-import time
-from collections.abc import Callable, Generator, Iterable, Iterator
-from typing import Any
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import Any, TypeVar
 
-from cosim.coupling.batch.following import Following
-from cosim.coupling.batch.threads import Task, Threads
-from cosim.coupling.loop.recorder import Block, Recorder
-from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
-from cosim.simulation.numbers import motion, numbers
-from cosim.simulation.rungs.given_surface import lead_part
-from cosim.simulation.rungs.rung import Driven, Led, rungs
+from cosim.simulation.elsewhere import summary_elsewhere
+from cosim.simulation.here import summary_here
+from cosim.simulation.simulate import simulate
+from cosim.toolchain.processes import in_a_worker
 
-AHEAD = 16
-"""Runs at hand for each thread: the one that runs, and the next."""
+AHEAD = 2
+"""Tasks at hand for each thread: the one that runs, and the next."""
 
 Summary = dict[str, Any]
+Progress = Callable[[float], None]
+
+_Task = TypeVar("_Task")
+_Found = TypeVar("_Found")
 
 
-def led(scene: Scene) -> bool:
-    """Whether :func:`summaries` can run a scene: ngspice has no part in it."""
-    if scene.rung.automatic:
-        return False
-    return scene.surface_is_given or isinstance(rungs()[scene.circuit.model], Led)
+class _Ended(Exception):
+    """Nobody wants to know any more."""
 
 
-class _Run:
-    """A run at hand. Raises BadInput and SimulationFailed where it cannot begin."""
-
-    def __init__(self, number: int, scene: Scene) -> None:
-        self.number, self._scene, self._began = number, scene, time.perf_counter()
-        self._mechanics = None if scene.surface_is_given else Mechanics(scene)
-        self._leading = self._part() if self._mechanics is None else self._led(self._mechanics)
-
-    def _led(self, mechanics: Mechanics) -> Generator[Task, None, Summary]:
-        scene = self._scene
-        rung = rungs()[scene.circuit.model]
-        assert isinstance(rung, Led)
-        recorder = Recorder(scene, mechanics, lambda _: None)
-        driven = yield from _followed(recorder, rung.lead(scene, recorder))
-        return numbers(scene, motion(scene, recorder), driven, recorder.steps, self._began)
-
-    def _part(self) -> Generator[Task, None, Summary]:
-        _, moved = yield from lead_part(self._scene)
-        return numbers(self._scene, moved, Driven(None, "exact"), 0, self._began)
-
-    def go_on(self) -> Task | Summary:
-        """What is to be done next; the summary where there is nothing."""
-        try:
-            return next(self._leading)
-        except StopIteration as end:
-            return end.value
-
-    def close(self) -> None:
-        """End the run, whose task is not under way any more."""
-        if self._mechanics is not None:
-            self._mechanics.close()
+def summary(scene: Scene, progress: Progress = lambda _: None) -> Summary:
+    """The summary of a run, without notes. Raises as a run does."""
+    chosen = not (scene.rung.automatic or (scene.rung.ngspice and scene.coupling.method == "auto"))
+    if not chosen:
+        return simulate(scene, progress).summary
+    if scene.rung.ngspice and not in_a_worker():
+        return summary_elsewhere(scene, progress)
+    return summary_here(scene, progress)
 
 
-def _followed(
-    recorder: Recorder, leading: Generator[Block, None, Driven]
-) -> Generator[Task, None, Driven]:
-    while True:
-        try:
-            block = next(leading)
-        except StopIteration as end:
-            return end.value
-        yield Following(recorder, block)
+def each(
+    call: Callable[[_Task, Progress], _Found], tasks: Iterable[tuple[int, _Task]], count: int
+) -> Iterator[tuple[int, _Found | Exception]]:
+    """What ``call(task, progress)`` gives for each numbered task, or what it raises, in the order
+    in which ``count`` threads finish them. Tasks are drawn as threads become free.
 
-
-def summaries(
-    scenes: Iterable[tuple[int, Callable[[], Scene]]], count: int
-) -> Generator[tuple[int, Summary | Exception], None, None]:
-    """The summaries, without notes, of numbered scenes, in the order in which ``count`` threads
-    finish them; or what the run of a scene, or the making of it, raised.
-
-    Scenes are drawn and made as threads become free; all are :func:`led`.
+    ``progress`` ends what runs when nobody waits for it any more.
     """
-    waiting, runs = iter(scenes), dict[Task, _Run]()
+    waiting, running = iter(tasks), dict[Future[_Found], int]()
+    ended = threading.Event()
+
+    def progress(time: float) -> None:
+        if ended.is_set():
+            raise _Ended
+
+    threads = ThreadPoolExecutor(count)
     try:
-        with Threads(count) as threads:
-            while True:
-                while len(runs) < AHEAD * count and (following := next(waiting, None)):
-                    number, made = following
-                    try:
-                        run = _Run(number, made())
-                    except Exception as error:
-                        yield number, error
-                    else:
-                        yield from _gone_on(run, runs, threads)
-                if not runs:
-                    return
-                task, failure = threads.take()
-                yield from _gone_on(runs.pop(task), runs, threads, failure)
+        while True:
+            while len(running) < AHEAD * count and (task := next(waiting, None)) is not None:
+                running[threads.submit(call, task[1], progress)] = task[0]
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                error = future.exception()
+                if error is not None and not isinstance(error, Exception):
+                    raise error
+                yield running.pop(future), future.result() if error is None else error
     finally:
-        for run in runs.values():
-            run.close()
-
-
-def _gone_on(
-    run: _Run, runs: dict[Task, _Run], threads: Threads, failure: BaseException | None = None
-) -> Iterator[tuple[int, Summary | Exception]]:
-    """What has become of a run, if it has ended; else it goes on."""
-    found: Task | Summary | Exception
-    try:
-        if failure is not None:
-            raise failure
-        found = run.go_on()
-    except Exception as error:
-        found = error
-    if isinstance(found, dict | Exception):
-        run.close()
-        yield run.number, found
-        return
-    runs[found] = run
-    threads.give(found)
+        ended.set()
+        threads.shutdown(cancel_futures=True)

@@ -72,6 +72,10 @@ serve(pipe)
 Progress = Callable[[float], None]
 
 
+class ProcessLost(SimulationFailed):
+    """A process has died or did nothing; its call need not be the reason."""
+
+
 @dataclass(frozen=True)
 class Bounds:
     """What a process may reach beyond its libraries and its own folder."""
@@ -283,7 +287,7 @@ def isolated(
                 if worker.began or tried == TRIES - 1:
                     what = f"died at t = {worker.reached:.6g} s" if worker.began else "cannot start"
                     words = f"The simulation's process {what} ({how})."
-                    raise SimulationFailed(words) from None
+                    raise ProcessLost(words) from None
             finally:
                 if worker.idle and bounds is not None and worker.reusable:
                     _idle[worker.kind].append(worker)
@@ -338,6 +342,7 @@ def _called(worker: Worker, argument: Any, progress: Progress, heed: Callable[[]
     worker.give(argument)
     while not (worker.hangs or worker.stalls()):
         heed()
+        progress(worker.reached)
         if not worker.pipe.poll(_REPORT_EVERY):
             continue
         kind, value = worker.hear()
@@ -346,8 +351,7 @@ def _called(worker: Worker, argument: Any, progress: Progress, heed: Callable[[]
             return value
         if kind == "failure":
             raise value
-        progress(worker.reached)
-    raise SimulationFailed(
+    raise (SimulationFailed if worker.hangs else ProcessLost)(
         f"The simulation hangs at t = {worker.reached:.6g} s: no step was finished in "
         f"{f'{PATIENCE:g} s of CPU time' if worker.hangs else f'{STALLED:g} s'}. A netlist without "
         "a solution can do this to ngspice."

@@ -1,19 +1,17 @@
 """Many runs led at once by threads: their numbers are those of single runs, to the last bit."""
 
-import ctypes
 import random
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from cosim.coupling.batch.following import Intervals
-from cosim.coupling.batch.threads import Job, Threads, compiled
-from cosim.errors import CosimError, SimulationFailed
+from cosim.errors import CosimError
 from cosim.mechanics import pace
 from cosim.scene import Scene, load
-from cosim.simulation.many import Summary, led, summaries
+from cosim.simulation.many import Progress, Summary, each, summary
 from cosim.simulation.simulate import simulate
 
 SHORT: dict[str, Any] = {"run.duration": 0.15, "run.settle": 0.05, "run.output_step": 0.05}
@@ -37,11 +35,6 @@ SHAPES: list[dict[str, Any]] = [
 ]
 
 
-def test_structures_are_those_of_c() -> None:
-    for which, structure in enumerate((Job, Intervals)):
-        assert ctypes.sizeof(structure) == compiled().threads_size(which)
-
-
 @pytest.mark.parametrize("model", ["limited", "ideal"])
 def test_equal_to_single_runs(model: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -57,15 +50,14 @@ def test_equal_to_single_runs(model: str, tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def check(scenes: list[Scene]) -> None:
-    assert all(led(scene) for scene in scenes)
-    found = dict(summaries(enumerate(map(made, scenes)), 3))
+    found = dict(each(made, enumerate(lambda scene=scene: scene for scene in scenes), 3))
     assert sorted(found) == list(range(len(scenes)))
     for number, scene in enumerate(scenes):
         assert repeatable(found[number]) == repeatable(simulate(scene).summary), scene
 
 
-def made(scene: Scene) -> Any:
-    return lambda: scene
+def made(make: Callable[[], Scene], progress: Progress) -> Summary:
+    return summary(make(), progress)
 
 
 def repeatable(summary: Summary | Exception) -> Summary:
@@ -87,7 +79,7 @@ def test_failures_are_those_of_single_runs(monkeypatch: pytest.MonkeyPatch) -> N
         {},
     ]
     making = [partial(load, scene, change) for change in changes]
-    found = dict(summaries(enumerate(making), 2))
+    found = dict(each(made, enumerate(making), 2))
     said = []
     for number, make in enumerate(making[:-1]):
         with pytest.raises(CosimError) as single:
@@ -102,12 +94,7 @@ def test_what_runs_is_stopped() -> None:
     """A run that would take hours ends with the `with` block, and so when Ctrl-C leaves it."""
     endless = {"circuit.model": "ideal", "run.duration": 1e5, "run.output_step": 1e3}
     making = [partial(load, "reference", changes) for changes in (endless, endless | SHORT)]
-    found = summaries(enumerate(making), 2)
-    number, summary = next(found)
-    assert number == 1 and isinstance(summary, dict)
+    found = each(made, enumerate(making), 2)
+    number, numbers = next(found)
+    assert number == 1 and isinstance(numbers, dict)
     found.close()
-
-
-def test_no_threads() -> None:
-    with pytest.raises(SimulationFailed, match="no more threads"), Threads(0):
-        pass

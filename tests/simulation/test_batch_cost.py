@@ -5,7 +5,7 @@ import pstats
 from functools import partial
 
 from cosim.scene import load
-from cosim.simulation.many import summaries
+from cosim.simulation.many import each, summary
 from cosim.studies.sweep.point import point
 
 
@@ -15,7 +15,8 @@ def test_python_calls_few_functions_for_a_point() -> None:
     knobs = [{"drive.amplitude": 5.0 + 0.02 * k, "drive.offset": -0.01 * k} for k in range(100)]
 
     def run() -> None:
-        for _, found in summaries(enumerate(partial(point, base, at, False) for at in knobs), 1):
+        tasks = enumerate(partial(point, base, at, False) for at in knobs)
+        for _, found in each(lambda make, progress: summary(make(), progress), tasks, 1):
             assert isinstance(found, dict)
 
     run()  # what is kept from run to run is made

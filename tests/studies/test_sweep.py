@@ -1,6 +1,7 @@
 """Sweeps: what they find, what they make of points that fail, and where they run."""
 
 import os
+import re
 import threading
 import time
 from pathlib import Path
@@ -20,6 +21,7 @@ from cosim.studies.sweep.dataset import read
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.studies.sweep.point import Outcome, evaluate
 from cosim.studies.sweep.pool import Pool
+from cosim.toolchain import processes
 
 SHORT = ["run.duration=0.1", "run.settle=0.05"]
 
@@ -124,27 +126,28 @@ def test_failures_cost_only_themselves(tmp_path: Path) -> None:
 
 def test_worker_that_keeps_dying() -> None:
     """A point whose worker dies again and again is a failure; the others do not notice."""
-    scene = load("reference", ["circuit.model=ideal", *SHORT])
+    scene = load("reference", SHORT)
     points = [
         (0, {"run.duration": 2000.0}),
         *((k, {"drive.offset": -0.1 * k}) for k in range(1, 6)),
     ]
-    with Pool(scene, 1) as pool:
-        outcomes: dict[int, Outcome] = {}
+    outcomes: dict[int, Outcome] = {}
 
-        def kill() -> None:
-            while 0 not in outcomes:
-                for worker in list(pool._workers):
-                    if worker.began and worker.point is not None and worker.point[0] == 0:
-                        worker._process.kill()
-                time.sleep(0.05)
+    def kill() -> None:
+        while 0 not in outcomes:
+            for worker in list(processes._living):
+                # Only that point takes so long.
+                if worker.alive and worker.reached > 1.0:
+                    worker._process.kill()
+            time.sleep(0.05)
 
-        killer = threading.Thread(target=kill)
-        killer.start()
-        for number, outcome in pool.run(points):
-            outcomes[number] = outcome
-        killer.join()
-    assert outcomes[0].failure == "The worker process died (SIGKILL)."
+    killer = threading.Thread(target=kill)
+    killer.start()
+    for number, outcome in Pool(scene, 2).run(points):
+        outcomes[number] = outcome
+    killer.join()
+    assert re.match(r"The simulation's process died at t = .* s \(SIGKILL\)", outcomes[0].failure)
+    assert outcomes[0].machine
     for number, values in points[1:]:
         assert outcomes[number] == evaluate(scene, values, False)
 

@@ -7,9 +7,9 @@ import psutil
 import pytest
 
 from cosim.scene import load
-from cosim.studies.sweep.batch import runner
 from cosim.studies.sweep.design import grid
 from cosim.studies.sweep.journal import journal
+from cosim.studies.sweep.pool import Pool
 
 pytestmark = pytest.mark.reliability
 
@@ -21,9 +21,9 @@ def test_parent_stays_flat(name: str, tmp_path: Path) -> None:
     design = grid({"friction.mu_s": [0.6 + 1e-5 * k for k in range(6000)]})
     process = psutil.Process()
     sizes = []
-    with journal(tmp_path / "journal", "test", len(design)) as kept, runner(scene, 2) as pool:
+    with journal(tmp_path / "journal", "test", len(design)) as kept:
         points = ((k, design.point(k)) for k in range(len(design)))
-        for number, outcome in pool.run(points):
+        for number, outcome in Pool(scene, 2).run(points):
             assert not outcome.failure
             kept.add(number, outcome)
             if len(kept.done) % 1000 == 0:

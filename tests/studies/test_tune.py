@@ -11,8 +11,8 @@ from cosim.cli.main import main
 from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.sweep.batch import Batch
 from cosim.studies.sweep.point import periods_made_whole
+from cosim.studies.sweep.pool import Pool
 from cosim.studies.tune import tune
 
 
@@ -158,9 +158,9 @@ def test_a_search_that_was_interrupted_goes_on(
     calm, wild = tmp_path / "calm", tmp_path / "wild"
     assert main([*words, f"--out={calm}"]) == 0
     ran: list[object] = []
-    plain = Batch.run
+    plain = Pool.run
 
-    def counted(self: Batch, points: Any) -> Any:
+    def counted(self: Pool, points: Any) -> Any:
         for found in plain(self, points):
             if len(ran) == 17:
                 raise KeyboardInterrupt
@@ -168,12 +168,12 @@ def test_a_search_that_was_interrupted_goes_on(
             yield found
 
     with monkeypatch.context() as patch:
-        patch.setattr(Batch, "run", counted)
+        patch.setattr(Pool, "run", counted)
         assert main([*words, f"--out={wild}"]) == 130
         assert {path.name for path in wild.iterdir()} == {"tune.journal", "tune.csv"}
     heard: list[object] = []
     monkeypatch.setattr(
-        Batch, "run", lambda self, points: (heard.append(1) or one for one in plain(self, points))
+        Pool, "run", lambda self, points: (heard.append(1) or one for one in plain(self, points))
     )
     assert main([*words, f"--out={wild}"]) == 0
     with open(calm / "tune.csv", encoding="utf-8") as file:

@@ -116,8 +116,8 @@ def test_a_worker_loads_nothing_from_the_working_folder(tmp_path: Path) -> None:
     program = (
         "from cosim.studies.sweep.pool import Pool\n"
         "from cosim.scene import load\n"
-        "with Pool(load('held', ['run.duration=0.01', 'run.settle=0']), 1) as pool:\n"
-        "    print(*pool.run([(0, {})]))\n"
+        "pool = Pool(load('paper', ['run.duration=0.01', 'run.settle=0']), 1)\n"
+        "print(*pool.run([(0, {})]))\n"
     )
     done = subprocess.run(
         [sys.executable, "-P", "-c", program],

@@ -151,9 +151,8 @@ class Recorder:
     def _tell_time(self) -> None:
         done = self.state.next
         reached = float(self._agenda.times[done - 1]) if done else self._reached
-        if reached > self._told:
-            self._told = reached
-            self._progress(reached)
+        self._told = max(self._told, reached)
+        self._progress(self._told)
 
     def failure(self) -> BaseException:
         """What to raise for the call of the FMU that has failed, or what failed in Python."""

@@ -17,7 +17,6 @@ from cosim.scene import Scene
 from cosim.simulation.rungs.rung import Led, rungs
 from cosim.studies.bench.measures import ratios, take_turns
 from cosim.studies.fit.cases import Case, Solver
-from cosim.studies.sweep.batch import runner
 from cosim.studies.sweep.dataset import Numbers
 from cosim.studies.sweep.design import grid
 from cosim.studies.sweep.journal import journal
@@ -51,15 +50,14 @@ def throughput(scene: Scene, offsets: Sequence[float], rounds: int) -> dict[str,
     """
     points = [(k, {"drive.offset": offset}) for k, offset in enumerate(offsets)]
     bare, pooled = [], []
-    with Pool(scene, 1) as pool:
-        for _ in range(rounds + 1):
-            began = perf_counter()
-            list(pool.run(points))
-            between = perf_counter()
-            for _, values in points:
-                evaluate(scene, values, False)
-            bare.append(perf_counter() - between)
-            pooled.append(between - began)
+    for _ in range(rounds + 1):
+        began = perf_counter()
+        list(Pool(scene, 1).run(points))
+        between = perf_counter()
+        for _, values in points:
+            evaluate(scene, values, False)
+        bare.append(perf_counter() - between)
+        pooled.append(between - began)
     return ratios(bare[1:], pooled[1:])  # the first round warms up
 
 
@@ -79,11 +77,10 @@ def map_over_bare_calls(scene: Scene, offsets: Sequence[float], rounds: int) -> 
             journal(Path(folder) / "journal", "", len(design)) as written,
         ):
             began = process_time()
-            with runner(scene, 1) as batch:
-                numbers = Numbers(len(design))
-                for number, outcome in batch.run(points):
-                    written.add(number, outcome)
-                    numbers.add(number, outcome)
+            numbers = Numbers(len(design))
+            for number, outcome in Pool(scene, 1).run(points):
+                written.add(number, outcome)
+                numbers.add(number, outcome)
             swept.append(process_time() - began)
     return ratios(swept[1:], bare[1:])  # the first round warms up
 

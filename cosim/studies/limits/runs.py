@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from math import ceil, inf
@@ -17,9 +17,9 @@ from cosim.simulation.guards import coil_heat
 from cosim.studies.limits import aims
 from cosim.studies.limits.aims import NEEDED, QUANTITIES, Numbers, scores
 from cosim.studies.limits.table import Machine, Settings
-from cosim.studies.sweep.batch import runner
 from cosim.studies.sweep.journal import hashed, journal
-from cosim.studies.sweep.point import Number, Outcome
+from cosim.studies.sweep.point import Outcome
+from cosim.studies.sweep.pool import Pool
 
 SETTLE, SPAN = 0.4, 0.6
 """s, left out of averages and averaged over, at least; made whole periods."""
@@ -29,9 +29,6 @@ OPA548_CURRENT = 5.0
 
 NUMBERS = 1 << 56
 """How many settings can be told apart."""
-
-THREADED = ("ideal", "limited")
-"""Circuits without ngspice."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +78,7 @@ class Bench:
             for key, value in own.items()
             if isinstance(value, bool) and tables["drive"][key.split(".")[1]] != value
         }
-        self._workers, self._progress = workers, progress
+        self._pool, self._progress = Pool(self.scene, workers), progress
         self._asked, self._path = asked, path
         self._stack = ExitStack()
         self._done: dict[int, Outcome] = {}
@@ -93,10 +90,6 @@ class Bench:
         identity = hashed(self.scene.as_dict(), versions(), package.token())
         self._journal = self._stack.enter_context(journal(self._path, identity, NUMBERS))
         self._done = dict(self._journal.read())
-        spice = changed(self.scene, {"circuit.model": "amplifier"}, "amplifier")
-        enter = self._stack.enter_context
-        self._threads = enter(runner(self.scene, self._workers, whole_periods=False))
-        self._processes = enter(runner(spice, self._workers, whole_periods=False))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -106,15 +99,11 @@ class Bench:
         """What becomes of each settings, on the circuit that they name."""
         numbers = [_number(settings) for settings in every]
         new = {n: s for n, s in zip(numbers, every, strict=True) if n not in self._done}
-        for pool, threaded in ((self._threads, True), (self._processes, False)):
-            points: list[tuple[int, Mapping[str, Number | str]]] = [
-                (n, s) for n, s in new.items() if (s["circuit.model"] in THREADED) is threaded
-            ]
-            for number, outcome in pool.run(points) if points else ():
-                kept = {name: outcome.numbers[name] for name in NEEDED if name in outcome.numbers}
-                self._done[number] = Outcome(kept, outcome.failure, outcome.machine)
-                self._journal.add(number, self._done[number])
-                self._progress()
+        for number, outcome in self._pool.run(new.items()):
+            kept = {name: outcome.numbers[name] for name in NEEDED if name in outcome.numbers}
+            self._done[number] = Outcome(kept, outcome.failure, outcome.machine)
+            self._journal.add(number, self._done[number])
+            self._progress()
         return [self._done[number] for number in numbers]
 
     def scores(self, case: Case, places: Array) -> tuple[Array, NDArray[np.bool_]]:

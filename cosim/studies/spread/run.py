@@ -10,8 +10,7 @@ from cosim.scene import Scene, changed, keys, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.choose_rung import WITHOUT_NGSPICE, relative_error, without_ngspice
 from cosim.studies.spread.turns import TURN, Settings, turns
-from cosim.studies.sweep.batch import runner
-from cosim.studies.sweep.pool import workers_asked
+from cosim.studies.sweep.pool import Pool, workers_asked
 from cosim.studies.sweep.report import with_unit
 
 UNITS = {key.full: key.unit for key in keys()}
@@ -124,17 +123,17 @@ def spread(
         return found
 
     numbers = set(range(len(every)))
-    with runner(scene, min(count, len(every)), whole_periods=True) as pool:
-        if without_ngspice(scene) is None:
-            found = run(numbers, {})
-        else:
-            found = run(numbers, WITHOUT_NGSPICE)
-            known = [n for n, one in found.items() if one.v_average is not None]
-            ends = {0, *(end(known, key=lambda n: _speed(found[n])) for end in (min, max) if known)}
-            exact = run(ends, {})
-            if any(_off(found[n], exact[n]) > scene.run.tolerance for n in ends):
-                exact |= run(numbers - ends, {})
-            found |= exact
+    pool = Pool(scene, min(count, len(every)), whole_periods=True)
+    if without_ngspice(scene) is None:
+        found = run(numbers, {})
+    else:
+        found = run(numbers, WITHOUT_NGSPICE)
+        known = [n for n, one in found.items() if one.v_average is not None]
+        ends = {0, *(end(known, key=lambda n: _speed(found[n])) for end in (min, max) if known)}
+        exact = run(ends, {})
+        if any(_off(found[n], exact[n]) > scene.run.tolerance for n in ends):
+            exact |= run(numbers - ends, {})
+        found |= exact
     made = Spread([found[n] for n in sorted(found)])
     if not made.known:
         raise SimulationFailed(f"No setting could be run; the first one: {made.runs[0].failure}")

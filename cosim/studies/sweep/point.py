@@ -8,6 +8,7 @@ from typing import Any
 from cosim.drive.command import period
 from cosim.errors import CosimError
 from cosim.scene import Scene, changed
+from cosim.toolchain.processes import TRIES, ProcessLost
 
 Number = float | int
 
@@ -36,12 +37,17 @@ def evaluate(
     Waveforms are not made: the rows of a run are communication points too, so the numbers agree
     with those of `cosim run` within rounding, and the run is several times as fast.
     """
-    from cosim.simulation.simulate import simulate
+    from cosim.simulation.many import summary
 
-    try:
-        return outcome(simulate(point(base, values, whole_periods), progress).summary)
-    except CosimError as error:
-        return failed(error)
+    lost = Outcome({})
+    for _ in range(TRIES):
+        try:
+            return outcome(summary(point(base, values, whole_periods), progress))
+        except ProcessLost as error:
+            lost = failed(error)
+        except CosimError as error:
+            return failed(error)
+    return lost
 
 
 def point(base: Scene, values: Mapping[str, Number | str], whole_periods: bool) -> Scene:
@@ -67,7 +73,8 @@ def failed(error: Exception) -> Outcome:
     """Why a point has no numbers."""
     # What is no CosimError, no scene should meet: the other points go on.
     kind = "" if isinstance(error, CosimError) else f"{type(error).__name__}: "
-    machine = any(isinstance(e, MemoryError | OSError) for e in (error, error.__cause__))
+    met = MemoryError | OSError | ProcessLost
+    machine = any(isinstance(e, met) for e in (error, error.__cause__))
     return Outcome({}, " ".join(f"{kind}{error}".split()), machine)
 
 

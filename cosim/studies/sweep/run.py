@@ -14,11 +14,10 @@ from cosim.mechanics import package as fmu
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
 from cosim.studies.sweep import dataset
-from cosim.studies.sweep.batch import runner
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.studies.sweep.journal import hashed, journal
 from cosim.studies.sweep.point import Number, Outcome
-from cosim.studies.sweep.pool import Point, workers_asked
+from cosim.studies.sweep.pool import Point, Pool, workers_asked
 from cosim.toolchain.versions import versions
 
 JOURNAL = "sweep.journal"
@@ -133,8 +132,7 @@ def _run(
 
         yield from run_on_cluster(scene, points, dask, whole_periods)
         return
-    with runner(scene, min(workers, len(design)), whole_periods) as pool:
-        yield from pool.run(points)
+    yield from Pool(scene, min(workers, len(design)), whole_periods).run(points)
 
 
 def _identity(scene: Scene, design: Design, made_by: dict[str, str]) -> str:

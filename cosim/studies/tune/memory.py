@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 from cosim.errors import BadInput
 from cosim.files.journal import Journal
 from cosim.scene import Scene
-from cosim.studies.sweep.batch import Batch
 from cosim.studies.sweep.journal import outcome_of
 from cosim.studies.sweep.point import Number, Outcome
 from cosim.studies.sweep.pool import Pool
@@ -50,7 +49,7 @@ class Memory:
                 self._journal.remove()  # there is nothing to go on with
 
     def run(
-        self, pool: Batch | Pool, scene: Scene, points: Sequence[Mapping[str, Number]]
+        self, pool: Pool, scene: Scene, points: Sequence[Mapping[str, Number]]
     ) -> Iterator[tuple[int, Outcome]]:
         """The outcome of each point of ``scene``, with its place, in the order in which they are
         known."""

@@ -16,7 +16,6 @@ from cosim.mechanics import package as fmu
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.choose_rung import without_ngspice
-from cosim.studies.sweep.batch import Batch, runner
 from cosim.studies.sweep.design import FREQUENCIES, MOST_POINTS, numeric_key
 from cosim.studies.sweep.journal import hashed
 from cosim.studies.sweep.point import Number, Outcome, periods_made_whole
@@ -145,22 +144,24 @@ def _tuned(
     scouts, hints = 0, None
     ahead = without_ngspice(scene)
     # Quantities that only the scene's own rung has find no scouts.
-    with suppress(BadInput), runner(ahead or scene, workers, whole_periods) as pool:
+    with suppress(BadInput):
         if ahead is not None:
+            pool = Pool(ahead, workers, whole_periods)
             trial = _Trial(known, pool, ahead, quantity, largest, ranges, scouting)
             search(trial.costs, len(ranges), SCOUTS * searched, seed)
             scouts, hints = len(trial.known), apart(trial.ranked(), HINTS_APART)[:HINTS]
-    with runner(scene, workers, whole_periods) as pool:
-        trial = _Trial(known, pool, scene, quantity, largest, ranges, progress)
-        search(trial.costs, len(ranges), searched, seed, hints)
-        if trial.best is None:
-            reason = next(iter(trial.known.values())).outcome.failure
-            raise SimulationFailed(f"No setting could be run; the first one: {reason}")
+    trial = _Trial(
+        known, Pool(scene, workers, whole_periods), scene, quantity, largest, ranges, progress
+    )
+    search(trial.costs, len(ranges), searched, seed, hints)
+    if trial.best is None:
+        reason = next(iter(trial.known.values())).outcome.failure
+        raise SimulationFailed(f"No setting could be run; the first one: {reason}")
+    best, neighbours = trial.best, _turned(trial, trial.best)
+    while trial.best is not best and len(trial.known) + turned <= budget:
         best, neighbours = trial.best, _turned(trial, trial.best)
-        while trial.best is not best and len(trial.known) + turned <= budget:
-            best, neighbours = trial.best, _turned(trial, trial.best)
-        if trial.best is not best:
-            best, neighbours = trial.best, {}
+    if trial.best is not best:
+        best, neighbours = trial.best, {}
     runs = list(trial.known.values())
     tuned = changed(scene, best.values, "tune")
     if whole_periods:
@@ -182,7 +183,7 @@ class _Trial:
     """Runs settings, each once, and remembers them in the order in which they were asked for."""
 
     memory: memory.Memory
-    pool: Batch | Pool
+    pool: Pool
     scene: Scene
     quantity: str
     largest: bool
