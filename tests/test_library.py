@@ -6,6 +6,7 @@ import subprocess
 import sys
 from base64 import b64decode
 from pathlib import Path
+from typing import Any
 
 import netCDF4
 import numpy as np
@@ -22,6 +23,7 @@ OWN = {
     "circuit.netlist": str(REPOSITORY / "circuits" / "examples" / "h_bridge.cir"),
     "run.duration": 0.06,
 }
+ENDLESS = 10**6000
 SHORT = {"run.duration": 0.1, "run.settle": 0.05}
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -99,12 +101,61 @@ def test_scenes_from_scenes() -> None:
         ({"drive.frequency": -1}, "overrides: drive.frequency = -1 must be a number from 0.01"),
         ({"drive.frequency": None}, "overrides: drive.frequency = None must be a number"),
         ("drive.frequency=30", "not one string"),
+        ({1: 2}, "1 must be a text, table.key"),
+        ({"x" * 10_000: 1}, "must be table.key"),
+        ({"coil.count": ENDLESS}, "an endless number must be a whole number from 1 to 16"),
+        ({"drive.waveform": [ENDLESS]}, "an endless number must be one of"),
+        (["a"], "--set a: must be table.key=value"),
+        ([1], "1 must be a text, table.key=value"),
+        ([b"coil.count=1"], "must be a text, table.key=value"),
+        (42, "a mapping or a list of strings, not 42"),
+        (b"x", "a mapping or a list of strings, not b'x'"),
     ],
+    ids=range(14),
 )
-def test_bad_overrides(overrides: dict[str, object], words: str) -> None:
+def test_bad_overrides(overrides: Any, words: str) -> None:
     with pytest.raises(cosim.BadInput) as caught:
         cosim.run("paper", overrides)
     assert words in str(caught.value) and "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 500
+
+
+@pytest.mark.parametrize("scene", [1, None, ["paper"], ENDLESS], ids=range(4))
+def test_what_is_no_scene(scene: Any) -> None:
+    with pytest.raises(cosim.BadInput, match="must be a scene, or the name of one"):
+        cosim.load(scene)
+
+
+LONG = range(10_000_000_000)
+
+
+@pytest.mark.parametrize(
+    ("over", "more", "words"),
+    [
+        ({1: [2]}, {}, "--over 1: must be the name of a key"),
+        (["coil.count=1,2"], {}, "must be a mapping"),
+        ({"coil.count": 2}, {}, "2 must be a list of numbers"),
+        ({"coil.count": "12"}, {}, '"12" must be a list of numbers'),
+        ({"coil.count": ["a"]}, {}, '"a" must be a whole number from 1 to 16'),
+        ({"coil.count": [[1]]}, {}, "[1] must be a whole number from 1 to 16"),
+        ({"coil.count": [ENDLESS]}, {}, "an endless number must be a whole number from 1 to 16"),
+        ({"drive.amplitude": LONG}, {}, "10000000000 points; it may have 1000000"),
+        (
+            dict.fromkeys(["drive.amplitude", "drive.offset", "coil.b1"], range(1000)),
+            {},
+            "1000000000 points; it may have 1000000",
+        ),
+        ({"coil.count": [1, 2]}, {"samples": "a"}, '--samples "a": must be a whole number'),
+        ({"coil.count": [1, 2]}, {"samples": ENDLESS}, "must be a whole number from 1 to 1000000"),
+        ({"coil.count": [1, 2]}, {"samples": 3, "seed": 1.5}, "--seed 1.5: must be a whole"),
+    ],
+    ids=range(12),
+)
+def test_what_no_sweep_goes_over(over: Any, more: dict[str, Any], words: str) -> None:
+    """Said before any work is done, or any memory taken."""
+    with pytest.raises(cosim.BadInput) as caught:
+        cosim.sweep("held", over, SHORT, **more)
+    assert words in str(caught.value) and len(str(caught.value)) < 500
 
 
 def test_names_of_a_sweep() -> None:

@@ -59,9 +59,12 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
     if isinstance(source, Scene):
         layers = [_Layer(f"scene {source.name}", source.as_dict())]
     else:
-        layers = _layers(os.fspath(source))
-    if isinstance(overrides, str):
-        raise BadInput("overrides: must be a mapping or a list of strings, not one string.")
+        if not isinstance(source, str | bytes | os.PathLike):
+            raise BadInput(f"{messages.shown(source)}: must be a scene, or the name of one.")
+        layers = _layers(os.fsdecode(source))
+    if isinstance(overrides, str | bytes) or not isinstance(overrides or (), Iterable):
+        kind = "one string" if isinstance(overrides, str) else messages.shown(overrides)
+        raise BadInput(f"overrides: must be a mapping or a list of strings, not {kind}.")
     base = layers[-1].origin
     if isinstance(overrides, Mapping):
         changes = _Layer("overrides", _tables(overrides.items(), "overrides"))
@@ -105,7 +108,10 @@ def _layers(source: str) -> list[_Layer]:
     if base is None:
         return [_Layer(origin, data, source in builtin)]
     if base not in builtin:
-        hint = messages.suggestion(str(base), builtin) or f" ({', '.join(builtin)})"
+        hint = (
+            messages.suggestion(messages.shown(base).strip('"'), builtin)
+            or f" ({', '.join(builtin)})"
+        )
         what = f"base = {messages.shown(base)} must be a built-in scene{hint}"
         raise messages.bad(f"{origin}: {what}")
     below = _layers(base)
@@ -167,6 +173,8 @@ def _check_names(data: dict[str, Any], origin: str) -> None:
 def _parsed(overrides: Iterable[str]) -> Iterator[tuple[str, Any]]:
     """The keys and values of ``table.key=value`` options."""
     for text in overrides:
+        if not isinstance(text, str):
+            raise BadInput(f"overrides: {messages.shown(text)} must be a text, table.key=value.")
         left, equals, right = text.partition("=")
         full = left.strip()
         table, _, key = full.partition(".")
@@ -182,10 +190,14 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
     """The tables that pairs of ``table.key`` and a value give."""
     tables: dict[str, Any] = {}
     for full, value in values:
+        if not isinstance(full, str):
+            raise BadInput(f"{origin}: {messages.shown(full)} must be a text, table.key.")
         table, dot, key = full.partition(".")
         if full not in _FULL:
             if not dot:
-                raise messages.bad(f"{origin}: {full} must be table.key{messages.full_name(full)}")
+                raise messages.bad(
+                    f"{origin}: {plain(full)} must be table.key{messages.full_name(full)}"
+                )
             _check_names({table: {key: None}}, origin)
         if isinstance(value, os.PathLike):
             value = os.fspath(value)

@@ -111,6 +111,7 @@ def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], defa
     full = ".".join(str(part) for part in first["loc"])
     key = next((key for key in keys() if key.full == full), None)
     allowed = key.allowed if key else ALLOWED_TOP.get(full, "a table")
-    hint = suggestion(str(first["input"]), key.choices or ()) if key else ""
+    near = (key.choices if key else None) or ()
+    hint = suggestion(shown(first["input"]).strip('"'), near)
     origin = origins.get(full, (0, default))[1]
     return ended(f"{origin}: {full} = {shown(first['input'])} must be {allowed}{hint}")

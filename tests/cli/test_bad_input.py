@@ -130,6 +130,8 @@ FILES = [
     ("[drive]\nfrequency = 1\nfrequency = 2", ", line 3, column 14: this is not TOML"),
     ("[drive]\nwaveform = 'sine", ", line 2, column "),
     ("x = " + "[" * 100_000, "not TOML"),
+    ("[coil]\ncount = 1" + "0" * 5000, "a whole number in it has thousands of digits"),
+    ("base = 0x" + "9" * 5000, "base = an endless number must be a built-in scene"),
     ("a.b.c\x00d = 1", "not TOML"),
 ]
 
@@ -298,8 +300,12 @@ DIGITS = "9" * 5000
 LONG_NUMBERS = [
     ["run", "held", f"--set=drive.frequency={DIGITS}"],
     ["run", "held", f"--set=coil.count={DIGITS}"],
+    ["run", "held", f"--set=coil.count=0x{DIGITS}"],
+    ["run", "held", f"--set=circuit.model=0x{DIGITS}"],
+    ["run", "held", f"--set=drive.waveform=[0x{DIGITS}]"],
     ["sweep", "held", f"--over=friction.mu_s=0.7:0.8:{DIGITS}"],
     ["sweep", "held", f"--over=friction.mu_s={DIGITS}"],
+    ["sweep", "held", "--over=friction.mu_s=0.7:0.8:1000", "--over=drive.offset=0:1:1001"],
     ["sweep", "held", f"--over=mechanics.n_surfaces=1:{DIGITS}:3"],
     ["sweep", "held", "--over=friction.mu_s=0.7:0.8:3", f"--samples={DIGITS}"],
     ["sweep", "held", "--over=friction.mu_s=0.7:0.8:3", "--samples=3", f"--seed=-{DIGITS[:4000]}"],

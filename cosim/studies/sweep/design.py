@@ -3,15 +3,17 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, prod
+from numbers import Integral
 
 import numpy as np
 
 from cosim.errors import BadInput, plain
 from cosim.scene import Key, keys
-from cosim.scene.messages import ended, suggestion
+from cosim.scene.messages import ended, shown, suggestion
 from cosim.studies.sweep.point import Number
 
-MOST_POINTS = 10_000_000
+MOST_POINTS = 1_000_000
+"""Their numbers take 2.3 GB when the dataset is written."""
 
 FREQUENCIES = ("drive.frequency", "drive.pot_frequency", "drive.loop_time")
 
@@ -61,12 +63,21 @@ class Design:
 
 def grid(over: Mapping[str, Sequence[Number]]) -> Design:
     """Every combination of the values of each ``table.key``. Raises BadInput."""
-    axes = tuple(_axis(name, values) for name, values in over.items())
-    if not axes:
+    if not isinstance(over, Mapping):
+        raise BadInput(f"over: must be a mapping of keys to their values, not {shown(over)}.")
+    if not over:
         raise BadInput("--over: a sweep needs at least one key.")
-    if (count := prod(len(axis.values) for axis in axes)) > MOST_POINTS:
+    _check_count(over)
+    return Design(tuple(_axis(name, values) for name, values in over.items()))
+
+
+def _check_count(over: Mapping[str, Sequence[Number]]) -> None:
+    """Refuse too large a grid before its values are looked at."""
+    for name, values in over.items():
+        if isinstance(values, str | bytes) or not hasattr(values, "__len__"):
+            raise BadInput(f"--over {shown(name)}: {shown(values)} must be a list of numbers.")
+    if (count := prod(map(len, over.values()))) > MOST_POINTS:
         raise BadInput(f"--over: this grid has {count} points; it may have {MOST_POINTS}.")
-    return Design(axes)
 
 
 def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: bool) -> Design:
@@ -78,10 +89,10 @@ def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: 
     from scipy.stats import qmc
 
     axes = grid(over).axes
-    if not 1 <= count <= MOST_POINTS:
-        raise BadInput(f"--samples {count}: must be a whole number from 1 to {MOST_POINTS}.")
-    if seed < 0:
-        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
+    if not (isinstance(count, Integral) and 1 <= count <= MOST_POINTS):
+        raise BadInput(f"--samples {shown(count)}: must be a whole number from 1 to {MOST_POINTS}.")
+    if not (isinstance(seed, Integral) and seed >= 0):
+        raise BadInput(f"--seed {shown(seed)}: must be a whole number from 0.")
     for axis in axes:
         if len(set(axis.values)) < 2:
             raise BadInput(
@@ -112,6 +123,7 @@ def parse(options: Sequence[str]) -> dict[str, tuple[Number, ...]]:
             axes[name] = _range(text, right, key)
         else:
             axes[name] = tuple(_number(text, part) for part in right.split(","))
+        _check_count(axes)
     return axes
 
 
@@ -130,6 +142,8 @@ def split(options: Sequence[str], form: str) -> Iterator[tuple[str, str, str]]:
 
 def numeric_key(name: str) -> Key:
     """The key with this full name. Raises BadInput for one that is unknown or no number."""
+    if not isinstance(name, str):
+        raise BadInput(f"--over {shown(name)}: must be the name of a key.")
     numeric = {key.full: key for key in keys() if key.kind in (int, float) and not key.choices}
     if name in numeric:
         return numeric[name]
@@ -144,15 +158,20 @@ def _axis(name: str, values: Sequence[Number]) -> Axis:
     key = numeric_key(name)
     if len(values) == 0:
         raise BadInput(f"--over {name}: has no value.")
-    if len(set(values)) < len(values):
-        raise BadInput(f"--over {name}: a value stands there twice.")
+    kind = int if key.kind is int else float
+    found = []
     for value in values:
         assert key.low is not None and key.high is not None
-        inside = isfinite(value) and key.low <= value <= key.high
-        if not inside or (key.kind is int and value != int(value)):
+        try:
+            inside = isfinite(value) and key.low <= value <= key.high and kind(value) == value
+        except (TypeError, ValueError, OverflowError):  # no number, or one too large for a float
+            raise BadInput(f"--over {name}: {shown(value)} must be {key.allowed}.") from None
+        if not inside:
             raise BadInput(f"--over {name}: {value:g} must be {key.allowed}.")
-    kind = int if key.kind is int else float
-    return Axis(key, tuple(kind(value) for value in values))
+        found.append(kind(value))
+    if len(set(found)) < len(found):
+        raise BadInput(f"--over {name}: a value stands there twice.")
+    return Axis(key, tuple(found))
 
 
 def _range(text: str, right: str, key: Key) -> tuple[Number, ...]:
