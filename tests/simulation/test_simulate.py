@@ -507,3 +507,21 @@ def test_progress_goes_from_start_to_end() -> None:
     assert told[0] == 0.0
     assert told[-1] == pytest.approx(0.02, rel=1e-9)
     assert told == sorted(told)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        # The part falls past a surface at rest.
+        (
+            "optimal",
+            ("drive.waveform=sine", "drive.velocity_amplitude=0", "friction.normal_force=0"),
+        ),
+        # All hangs so lightly that the bodies move within the solver's tolerances.
+        ("held", ("mechanics.gravity=1e-9", "mechanics.suspension_k1=10000")),
+        ("ideal-current", ("drive.amplitude=0", "drive.offset=0", "mechanics.gravity=0")),
+    ],
+)
+def test_no_energy_is_missing_at_rest(name: str, changes: tuple[str, ...]) -> None:
+    scene = load(name, ["run.duration=0.05", "run.settle=0.01", *changes])
+    assert simulate(scene).summary["energy_residual"] < 1e-5  # type: ignore
