@@ -2,6 +2,7 @@
 
 import json
 import os
+import stat
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -33,11 +34,14 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def together(paths: Sequence[Path]) -> Iterator[list[Path]]:
+def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[list[Path]]:
     """Temporary paths beside ``paths`` that take their places, one right after the other, when the
-    block ends well. Raises BadInput where one cannot be written."""
+    block ends well; right before, what is ``outdated`` with them goes. Raises BadInput where one
+    cannot be written, or is a device or a pipe, which a file must not take the place of."""
     name = paths[0]
     try:
+        for name in (*outdated, *paths):
+            _refuse_devices(name)
         with ExitStack() as stack:
             pairs = []
             for path in paths:
@@ -50,6 +54,8 @@ def together(paths: Sequence[Path]) -> Iterator[list[Path]]:
                 name = path
                 # Else, after a loss of power, the name may be there and its content not.
                 os.fsync(handle)
+            for name in outdated:
+                name.unlink(missing_ok=True)
             for (_, temporary), path in pairs:
                 name = path
                 os.replace(temporary, path)
@@ -59,6 +65,14 @@ def together(paths: Sequence[Path]) -> Iterator[list[Path]]:
         if "embedded null" not in str(error):
             raise
         raise BadInput(f"{plain(str(name))}: it is no possible file name.") from None
+
+
+def _refuse_devices(path: Path) -> None:
+    """Also one that a link names: root could replace the link in /dev."""
+    with suppress(FileNotFoundError, NotADirectoryError):
+        mode = path.stat().st_mode
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+            raise BadInput(f"{plain(str(path))}: this is not a regular file.")
 
 
 @contextmanager

@@ -61,7 +61,8 @@ class Result:
         Raises BadInput where the folder cannot be written to.
         """
         *data, figure = (Path(folder) / name for name in identity.FILES)
-        with together(data) as (table, waveforms, scene, summary):
+        # A kill must not leave the figure of an older run beside the numbers of this one.
+        with together(data, outdated=[figure]) as (table, waveforms, scene, summary):
             with open(table, "wb") as file:
                 csv(file, self.columns, UNITS)
             run = identity.of_table(table)

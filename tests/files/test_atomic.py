@@ -64,6 +64,44 @@ def test_all_or_none(tmp_path: Path) -> None:
     assert [path.read_text() for path in tmp_path.iterdir()] == ["new"] * 3
 
 
+@pytest.mark.parametrize("linked", [False, True])
+def test_no_device_or_pipe_is_replaced(linked: bool, tmp_path: Path) -> None:
+    """Also not where a link names it, nor where it is only to go."""
+    odd, plain = tmp_path / "odd", tmp_path / "plain"
+    if linked:
+        odd.symlink_to("/dev/null")
+    else:
+        os.mkfifo(odd)
+    plain.write_text("old")
+    for paths, outdated in (([odd], []), ([plain, odd], []), ([plain], [odd])):
+        refused = pytest.raises(BadInput, match="odd: this is not a regular file")
+        with refused, together(paths, outdated) as new:
+            new[0].write_text("new")
+        assert {path.name for path in tmp_path.iterdir()} == {"odd", "plain"}
+        assert plain.read_text() == "old" and not odd.is_file()
+    assert odd.is_symlink() == linked
+    link = tmp_path / "link"
+    link.symlink_to(plain)
+    with whole(link) as new:
+        new.write_text("new")
+    assert link.read_text() == "new" and plain.read_text() == "old"
+
+
+def test_what_is_outdated_goes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A kill between two names leaves no old figure beside new numbers; a failure before leaves
+    all as it was."""
+    paths = [tmp_path / name for name in ("data", "figure")]
+    for path in paths:
+        path.write_text("old")
+    with pytest.raises(ZeroDivisionError), together(paths[:1], paths[1:]):
+        raise ZeroDivisionError
+    assert [path.read_text() for path in paths] == ["old", "old"]
+    monkeypatch.setattr(os, "replace", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError), together(paths[:1], paths[1:]):
+        pass
+    assert paths[0].read_text() == "old" and not paths[1].exists()
+
+
 def test_content_is_on_disk_before_its_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

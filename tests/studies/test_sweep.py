@@ -274,3 +274,12 @@ def test_rugged_ground_is_told_from_a_slope() -> None:
     norm = Normalize(0.0, 20.0)
     assert not figure._rugged(slope, norm)[1:-1, 1:-1].any()
     assert np.argwhere(figure._rugged(ground, norm)[1:-1, 1:-1]).tolist() == [[1, 2]]
+
+
+def test_a_kill_leaves_no_older_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between the numbers and the figure of another sweep, whose journal is gone."""
+    (tmp_path / "figure.png").write_bytes(b"old")
+    monkeypatch.setattr("cosim.studies.sweep.figure.draw", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        sweep("held", {"coil.count": [1]}, {"run.duration": 0.01}, out=tmp_path, workers=1)
+    assert {path.name for path in tmp_path.iterdir()} == {"sweep.nc", "sweep.journal"}

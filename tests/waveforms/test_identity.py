@@ -54,3 +54,16 @@ def test_equal_runs_are_one(two: tuple[Path, Path], tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", Note)
         formats.read(tmp_path)
+
+
+def test_a_kill_leaves_no_older_figure(
+    two: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between the data and the figure."""
+    folder = tmp_path / "run"
+    shutil.copytree(two[0], folder)
+    result = cosim.run("held", {"run.duration": 0.02})
+    monkeypatch.setattr(cosim.Result, "plot", lambda _: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        result.save(folder)
+    assert {path.name for path in folder.iterdir()} == {*FILES} - {"figure.png"}

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from cosim.arrays import Array
-from cosim.files.atomic import whole
+from cosim.files.atomic import together
 from cosim.scene import Scene, firmware, keys, to_toml
 from cosim.studies.sweep.design import Design
 from cosim.studies.sweep.point import Outcome
@@ -125,10 +125,10 @@ def _meant(scene: Scene, data: xr.Dataset) -> dict[str, xr.DataArray]:
     return {name: values for name, values in found.items() if name not in axes}
 
 
-def write(path: Path, data: xr.Dataset) -> None:
-    """NetCDF (classic format): equal data give equal bytes."""
+def write(path: Path, data: xr.Dataset, figure: Path) -> None:
+    """NetCDF (classic format): equal data give equal bytes. The ``figure`` of older ones goes."""
     content = data.to_netcdf(engine="scipy")
-    with whole(path) as temporary:
+    with together([path], outdated=[figure]) as (temporary,):
         temporary.write_bytes(bytes(content))
 
 

@@ -22,6 +22,7 @@ from cosim.toolchain.versions import versions
 
 JOURNAL = "sweep.journal"
 RESULT = "sweep.nc"
+FIGURE = "figure.png"
 
 _REFRESH = 10.0
 """s between two writings of the dataset, and at least _RARELY times as long as one takes."""
@@ -76,7 +77,7 @@ def sweep(
     data = _sweep(scene, design, folder, count, dask, progress)
     from cosim.studies.sweep import figure
 
-    figure.draw(data, scene.name).write(folder / "figure.png")
+    figure.draw(data, scene.name).write(folder / FIGURE)
     return data
 
 
@@ -94,7 +95,7 @@ def _sweep(
 
         def refreshed() -> xr.Dataset:
             data = dataset.dataset(scene, design, numbers, made_by)
-            dataset.write(folder / RESULT, data)
+            dataset.write(folder / RESULT, data, folder / FIGURE)
             return data
 
         numbers = dataset.Numbers(total, kept.read())
