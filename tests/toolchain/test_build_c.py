@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import stat
 import subprocess
@@ -54,6 +55,25 @@ def test_the_same_sources_give_the_same_bytes(copy: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert contents(copy / "cosim/_compiled") == contents(libraries.FOLDER)
     assert [path.name for path in (copy / "cosim").glob(".*")] == []
+
+
+@posix
+def test_hardening_where_the_compiler_has_it(copy: Path, tmp_path: Path) -> None:
+    """One that does not know a flag builds without it."""
+    flags = json.loads((libraries.FOLDER / "build.json").read_text())["flags"]
+    assert flags == [*build_c.FLAGS, *build_c.hardening()]
+    if sys.platform == "linux":
+        assert {"-fstack-protector-strong", "-Wl,-z,relro,-z,now"} <= {*flags}
+    old = tmp_path / "oldcc"
+    old.write_text(
+        '#!/bin/sh\ncase "$*" in *-strong*|*SOURCE=3*|*-Wl,*) echo "error: what?" >&2; exit 1;; '
+        f'esac\nexec {shlex.join(build_c.compiler())} "$@"\n'
+    )
+    old.chmod(0o755)
+    done = make(copy, CC=str(old))
+    assert done.returncode == 0, done.stderr
+    made = json.loads((copy / "cosim/_compiled/build.json").read_text())["flags"]
+    assert made[len(build_c.FLAGS) :] in ([], ["-U_FORTIFY_SOURCE", "-D_FORTIFY_SOURCE=2"])
 
 
 def test_changed_sources_are_another_fmu(copy: Path) -> None:
