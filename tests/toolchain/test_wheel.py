@@ -2,9 +2,11 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
@@ -131,3 +133,22 @@ def test_it_runs_without_a_compiler(wheel: Path, tmp_path: Path) -> None:
         run(environment / "bin" / "cosim", *arguments, cwd=there, **bare)
     for name in ("paper-limited-sweep/sweep.nc", "fmu/stickslip-fmi3.fmu"):
         assert (there / "results" / name).stat().st_size > 1000
+
+
+def test_what_builds_it_is_what_the_lock_has() -> None:
+    (needed,) = tomllib.loads((build_c.ROOT / "pyproject.toml").read_text())["build-system"][
+        "requires"
+    ]
+    lock = (build_c.ROOT / "requirements.lock").read_text().splitlines()
+    assert "==" in needed and f"{needed} \\" in lock
+
+
+def test_actions_are_pinned() -> None:
+    """By the hash of a commit, with its version beside it; no checkout keeps a password."""
+    for path in (build_c.ROOT / ".github/workflows").glob("*.yml"):
+        text = path.read_text()
+        used = re.findall(r"uses: (.*)", text)
+        assert used
+        for one in used:
+            assert re.fullmatch(r"[\w/-]+@[0-9a-f]{40} # v[\d.]+", one), one
+        assert text.count("actions/checkout") == text.count("persist-credentials: false")
