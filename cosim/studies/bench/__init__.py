@@ -15,7 +15,7 @@ from cosim.studies.bench.memory import growth
 from cosim.studies.bench.parts import coupled_over_parts
 from cosim.studies.bench.peers import compare
 from cosim.studies.bench.rungs import cost_exponent, real_time
-from cosim.studies.bench.timings import map_over_bare_calls, solvers, throughput
+from cosim.studies.bench.timings import map_over_bare_calls, solvers
 from cosim.studies.fit.cases import Case
 from cosim.studies.tables import machine
 from cosim.toolchain.processes import in_place
@@ -49,8 +49,6 @@ def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
     circuits = {"amplifier": load("reference", BRIEF), "full": load("reference", BRIEF_FULL)}
     found = read_folder(trials) if trials is not None else [_made_up(k) for k in range(10)]
     seconds = solvers([Case(trial) for trial in found], 11 if quick else 51)
-    offsets = _OFFSETS[:: 4 if quick else 1]
-    scene = load("reference", ["circuit.model=ideal", "run.duration=1"])
     numbers: dict[str, Any] = {
         "coupled_over_parts": {
             name: coupled_over_parts(scene, rounds) for name, scene in circuits.items()
@@ -63,7 +61,6 @@ def measure(trials: Path | None, quick: bool) -> dict[str, Any]:
         "memory_growth": growth(1 if quick else 3, (20, 200) if quick else (100, 1000)),
         "instructions_per_period": per_period(),
         "part": {**seconds, "trials": len(found), "measured": trials is not None},
-        "sweep_over_bare_loop": throughput(scene, offsets, 3 if quick else 7),
         "map_over_bare_calls": map_over_bare_calls(
             load("paper-limited", ["run.duration=1"]), _OFFSETS, 3 if quick else 7
         ),

@@ -31,7 +31,6 @@ _TITLES = {
     "instructions_per_period": "Instructions of the FMU per period",
     "part": "The part on a given surface, exact over published solver",
     "map_over_bare_calls": "CPU time of a sweep over that of bare calls of the compiled loop",
-    "sweep_over_bare_loop": "Points a second of a sweep's worker over those of a bare loop",
 }
 
 

@@ -1,11 +1,11 @@
-"""Times of the part's two solvers beside each other, and of a sweep beside a bare loop."""
+"""Times of the part's two solvers beside each other, and of a sweep beside bare calls."""
 
 from collections.abc import Callable, Sequence
 from ctypes import addressof
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time
+from time import process_time
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from cosim.studies.fit.cases import Case, Solver
 from cosim.studies.sweep.dataset import Numbers
 from cosim.studies.sweep.design import grid
 from cosim.studies.sweep.journal import journal
-from cosim.studies.sweep.point import evaluate, point
+from cosim.studies.sweep.point import point
 from cosim.studies.sweep.pool import Pool
 from cosim.trials import published
 
@@ -41,24 +41,6 @@ def solvers(cases: Sequence[Case], rounds: int) -> dict[str, float]:
     )
     seconds = {solver: median(values) for solver, values in taken.items()}
     return {**seconds, "ratio": ratios(taken["exact"], taken["published"])["median"]}
-
-
-def throughput(scene: Scene, offsets: Sequence[float], rounds: int) -> dict[str, float]:
-    """Points a second of one worker over those of a bare loop: median, ``low`` and ``high``.
-
-    The points are ``scene`` with each of the ``offsets`` (V). Both ways take turns, both warm.
-    """
-    points = [(k, {"drive.offset": offset}) for k, offset in enumerate(offsets)]
-    bare, pooled = [], []
-    for _ in range(rounds + 1):
-        began = perf_counter()
-        list(Pool(scene, 1).run(points))
-        between = perf_counter()
-        for _, values in points:
-            evaluate(scene, values, False)
-        bare.append(perf_counter() - between)
-        pooled.append(between - began)
-    return ratios(bare[1:], pooled[1:])  # the first round warms up
 
 
 def map_over_bare_calls(scene: Scene, offsets: Sequence[float], rounds: int) -> dict[str, float]:
