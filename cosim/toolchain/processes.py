@@ -29,7 +29,7 @@ from shutil import rmtree
 from typing import Any
 from weakref import WeakSet, finalize
 
-from cosim.errors import SimulationFailed, plain
+from cosim.errors import BadInput, SimulationFailed, plain
 from cosim.files.atomic import folder_of_ones_own
 from cosim.toolchain import fence
 from cosim.toolchain.interrupts import caught_signals
@@ -350,6 +350,7 @@ def _called(worker: Worker, argument: Any, progress: Progress, heed: Callable[[]
             worker.idle = True
             return value
         if kind == "failure":
+            worker.idle = isinstance(value, BadInput)  # it has done nothing yet
             raise value
     raise (SimulationFailed if worker.hangs else ProcessLost)(
         f"The simulation hangs at t = {worker.reached:.6g} s: no step was finished in "
