@@ -31,6 +31,11 @@ FASTEST = 1e-6
 """Least time constant, s, that the integration in the FMU can follow all the time: of a coil, of a
 damper with its mass, and of a spring with its mass (the time of a radian)."""
 
+FASTEST_NEAR, FASTEST_FAR, FAR = 1e-13, 1e-8, 2.0
+"""Least time constants, s, of a coil in ngspice: where a drive takes the output FAR times beyond
+its limits, which it then is at for a third of the time and more, and else, where a step's rounding
+is taken for a course towards them. Faster ones take above a minute for 0.1 s."""
+
 
 class Scene(BaseModel):
     """Everything that a run needs to know, checked; frozen and comparable."""
@@ -76,6 +81,28 @@ class Scene(BaseModel):
                     *("coil.resistance", "coil.eddy_resistance", "coil.count"),
                     "circuit.sense_resistance",
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _check_speed_of_circuit(self) -> "Scene":
+        """At the output's limits each step of ngspice lasts a time constant of the coil."""
+        drive, circuit, coil = self.drive, self.circuit, self.coil
+        peak = abs(drive.offset) + drive.amplitude / 2.0
+        if not self.rung.ngspice or self.rung.own_netlist or drive.start_time >= self.run.duration:
+            return self
+        around = coil.resistance + coil.count * circuit.sense_resistance
+        current = min(peak / circuit.sense_resistance, circuit.current_limit)
+        room = circuit.supply - min(circuit.swing_loss_high, circuit.swing_loss_low)
+        needed = current * around / coil.count
+        least = (FASTEST_FAR if needed > FAR * room else FASTEST_NEAR) * around
+        if peak and coil.inductance < least:
+            raise fault(
+                f"coil.inductance = {coil.inductance:g} H must be at least {least:.3g} H with "
+                f"coil.resistance = {coil.resistance:g} Ohm and circuit.sense_resistance = "
+                f"{circuit.sense_resistance:g} Ohm, whose drive of up to {peak:g} V would take "
+                f"{needed:.3g} V at the output, or the circuit is too fast to be solved",
+                *("coil.count", "circuit.supply", "drive.amplitude", "drive.offset"),
+            )
         return self
 
     @model_validator(mode="after")

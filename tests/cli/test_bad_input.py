@@ -122,6 +122,14 @@ FILES = [
         "drive.offset = -4.5 V must be a number from -4",
     ),
     ("[drive]\nquantised = true\noffset = 7", "to 6.532 V with drive.quantised = true"),
+    (
+        "[coil]\nresistance = 1e6\ninductance = 1e-9",
+        "coil.inductance = 1e-09 H must be at least 0.01 H with coil.resistance = 1e+06 Ohm",
+    ),
+    (
+        "[coil]\nresistance = 1e4\ninductance = 1e-9\n[circuit]\nsense_resistance = 1e4",
+        "coil.inductance = 1e-09 H must be at least 2e-09 H with",
+    ),
     # broken TOML
     ("[drive]\nfrequency 20", ", line 2, column 11: this is not TOML"),
     ("[drive]\nfrequency = ", ", line 2, column 13: this is not TOML"),
