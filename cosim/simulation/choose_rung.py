@@ -18,7 +18,8 @@ from functools import partial
 from cosim.drive.command import period
 from cosim.errors import BadInput
 from cosim.scene import Scene, changed
-from cosim.simulation.many import each, summary
+from cosim.simulation.here import summary_here
+from cosim.simulation.many import each
 from cosim.toolchain.processes import processors
 from cosim.waveforms.result import Result
 
@@ -89,7 +90,7 @@ def _v_averages(scene: Scene, settings: Sequence[Mapping[str, float | str]]) -> 
     scenes = [partial(changed, scene, values, "auto") for values in settings]
 
     def v_average(make: Callable[[], Scene], progress: Callable[[float], None]) -> float:
-        return summary(make(), progress)["v_average"]
+        return summary_here(make(), progress)["v_average"]
 
     found: dict[int, float] = {}
     for number, value in each(v_average, enumerate(scenes), min(len(scenes), processors())):

@@ -4,15 +4,18 @@ What only the worker needs is not imported here, since it takes a while.
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
+from cosim.files import spill
 from cosim.files.resources import circuits
 from cosim.files.spill import Packed, place
 from cosim.scene import Scene
 from cosim.toolchain import fence
 from cosim.toolchain.libraries import ngspice_library
-from cosim.toolchain.processes import Bounds, isolated
+from cosim.toolchain.processes import Bounds, end_idle, isolated
 from cosim.waveforms.result import Result
 
 Progress = Callable[[float], None]
@@ -29,6 +32,17 @@ def simulate_elsewhere(scene: Scene, progress: Progress, fmi_version: int) -> Re
 def summary_elsewhere(scene: Scene, progress: Progress) -> dict[str, Any]:
     """What :func:`cosim.simulation.here.summary_here` gives."""
     return isolated(_summed_up, scene, progress, bounds(scene))
+
+
+@contextmanager
+def on_disk_in(folder: Path) -> Iterator[None]:
+    """What :func:`cosim.files.spill.on_disk_in` does, for runs in workers too, whose folders are
+    gone at its end."""
+    with spill.on_disk_in(folder):
+        try:
+            yield
+        finally:
+            end_idle(folder)
 
 
 def bounds(scene: Scene) -> Bounds:

@@ -1,4 +1,4 @@
-"""Many runs at once for the numbers of their summaries, a thread for each.
+"""Many runs at once, a thread for each.
 
 The compiled loop leaves Python to the other threads while it runs, and so does a thread that waits
 for its worker; so the numbers are those of single runs, to the last bit.
@@ -7,18 +7,11 @@ for its worker; so the numbers are those of single runs, to the last bit.
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from typing import Any, TypeVar
-
-from cosim.scene import Scene
-from cosim.simulation.elsewhere import summary_elsewhere
-from cosim.simulation.here import summary_here
-from cosim.simulation.simulate import simulate
-from cosim.toolchain.processes import in_a_worker
+from typing import TypeVar
 
 AHEAD = 2
 """Tasks at hand for each thread: the one that runs, and the next."""
 
-Summary = dict[str, Any]
 Progress = Callable[[float], None]
 
 _Task = TypeVar("_Task")
@@ -27,16 +20,6 @@ _Found = TypeVar("_Found")
 
 class _Ended(Exception):
     """Nobody wants to know any more."""
-
-
-def summary(scene: Scene, progress: Progress = lambda _: None) -> Summary:
-    """The summary of a run, without notes. Raises as a run does."""
-    chosen = not (scene.rung.automatic or (scene.rung.ngspice and scene.coupling.method == "auto"))
-    if not chosen:
-        return simulate(scene, progress).summary
-    if scene.rung.ngspice and not in_a_worker():
-        return summary_elsewhere(scene, progress)
-    return summary_here(scene, progress)
 
 
 def each(

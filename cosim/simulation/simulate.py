@@ -3,9 +3,10 @@
 import time
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 from cosim.scene import Scene, changed
-from cosim.simulation.elsewhere import simulate_elsewhere
+from cosim.simulation.elsewhere import simulate_elsewhere, summary_elsewhere
 from cosim.toolchain.processes import in_a_worker
 from cosim.waveforms.result import Result
 
@@ -30,6 +31,17 @@ def simulate(scene: Scene, progress: Progress = lambda _: None, fmi_version: int
     from cosim.simulation.here import simulate_here
 
     return simulate_here(scene, progress, fmi_version)
+
+
+def summary(scene: Scene, progress: Progress = lambda _: None) -> dict[str, Any]:
+    """The summary of a run alone, without notes. Raises as a run does."""
+    if scene.rung.automatic or (scene.rung.ngspice and scene.coupling.method == "auto"):
+        return simulate(scene, progress).summary
+    if scene.rung.ngspice and not in_a_worker():
+        return summary_elsewhere(scene, progress)
+    from cosim.simulation.here import summary_here
+
+    return summary_here(scene, progress)
 
 
 def _cheapest(scene: Scene, run: Callable[[Scene], Result]) -> Result:

@@ -337,6 +337,13 @@ def _thin_out() -> None:
             longest.end()
 
 
+def end_idle(inside: Path) -> None:
+    """End those that wait and have their folders there."""
+    for (_, bounds), waiting in list(_idle.items()):
+        while bounds.inside == inside and waiting:
+            waiting.pop().end()
+
+
 def _called(worker: Worker, argument: Any, progress: Progress, heed: Callable[[], None]) -> Any:
     """What the call gives; the worker is idle then. Raises EOFError where it has died."""
     worker.give(argument)

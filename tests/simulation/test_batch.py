@@ -11,9 +11,10 @@ import pytest
 from cosim.errors import CosimError
 from cosim.mechanics import pace
 from cosim.scene import Scene, load
-from cosim.simulation.many import Progress, Summary, each, summary
-from cosim.simulation.simulate import simulate
+from cosim.simulation.many import Progress, each
+from cosim.simulation.simulate import simulate, summary
 
+Summary = dict[str, Any]
 SHORT: dict[str, Any] = {"run.duration": 0.15, "run.settle": 0.05, "run.output_step": 0.05}
 KNOBS = {
     "drive.frequency": (15.0, 80.0),

@@ -5,7 +5,8 @@ import pstats
 from functools import partial
 
 from cosim.scene import load
-from cosim.simulation.many import each, summary
+from cosim.simulation.many import each
+from cosim.simulation.simulate import summary
 from cosim.studies.sweep.point import point
 
 

@@ -14,7 +14,9 @@ from cosim.drive import straights
 from cosim.files import spill as tape
 from cosim.scene import load
 from cosim.simulation import simulate
+from cosim.simulation.elsewhere import on_disk_in
 from cosim.studies.bench.memory import peak
+from cosim.toolchain import processes
 from cosim.waveforms import storage
 
 pytestmark = pytest.mark.reliability
@@ -73,7 +75,7 @@ def test_blocks_and_disk_change_nothing(
     monkeypatch.setattr(straights, "_TOGETHER", 3)
     monkeypatch.setattr(lead, "_POINTS", 11)
     monkeypatch.setattr(lead, "_PIECES", 2)
-    with tape.on_disk_in(tmp_path):
+    with on_disk_in(tmp_path), processes.in_place():
         parts = simulate.simulate(scene)
     assert not os.listdir(tmp_path)
     assert list(parts.columns) == list(whole.columns)
@@ -137,6 +139,7 @@ def test_disk_that_takes_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(tape.tempfile, "TemporaryFile", lambda **_: Full())
     for model in ("amplifier", "ideal"):
         with (
+            processes.in_place(),
             tape.on_disk_in(tmp_path),
             pytest.raises(BadInput, match=r"cannot hold the waveforms .*No space left"),
         ):

@@ -185,7 +185,7 @@ def test_failures_of_the_machine_are_tried_again(
     short = {"run.duration": 0.01, "run.settle": 0.0}
     whole = sweep("paper", over, short, out=tmp_path / "calm", workers=1)
     with monkeypatch.context() as patch:
-        patch.setattr("cosim.studies.sweep.pool.STALLED", -1.0)
+        patch.setattr("cosim.toolchain.processes.STALLED", -1.0)
         patch.setattr("cosim.toolchain.processes.STALLED", -1.0)
         lost = sweep("paper", over, short, out=tmp_path / "wild", workers=1)
     assert (lost.failure != "").all() and "did nothing" in str(lost.failure.values[0])

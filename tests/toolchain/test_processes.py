@@ -79,8 +79,8 @@ def strike():
 def v():
     return cosim.run("paper", {"run.duration": 0.05}).summary["v_average"]
 
-threading.Thread(target=strike, daemon=True).start()
 try:
+    threading.Thread(target=strike, daemon=True).start()
     while True:
         v()
 except KeyboardInterrupt:

@@ -36,7 +36,7 @@ def _run(arguments: Namespace) -> None:
     with writable(folder):
         import cosim
         from cosim.files.atomic import write_json
-        from cosim.files.spill import on_disk_in
+        from cosim.simulation.elsewhere import on_disk_in
         from cosim.waveforms.report import table
 
         def progress(time: float) -> None:

@@ -12,7 +12,9 @@ _RUN = """
 import sys
 from pathlib import Path
 from cosim.cli.main import main
-code = main()
+from cosim.toolchain.processes import in_place
+with in_place():
+    code = main()
 lines = Path("/proc/self/status").read_text().splitlines()
 print(next(line.split()[1] for line in lines if line.startswith("VmHWM")), file=sys.stderr)
 sys.exit(code)

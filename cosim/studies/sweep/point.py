@@ -37,7 +37,7 @@ def evaluate(
     Waveforms are not made: the rows of a run are communication points too, so the numbers agree
     with those of `cosim run` within rounding, and the run is several times as fast.
     """
-    from cosim.simulation.many import summary
+    from cosim.simulation.simulate import summary
 
     lost = Outcome({})
     for _ in range(TRIES):
