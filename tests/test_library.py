@@ -100,7 +100,7 @@ def test_scenes_from_scenes() -> None:
         ({"drive.frequncy": 30}, "did you mean drive.frequency?"),
         ({"drive.frequency": -1}, "overrides: drive.frequency = -1 must be a number from 0.01"),
         ({"drive.frequency": None}, "overrides: drive.frequency = None must be a number"),
-        ("drive.frequency=30", "not one string"),
+        ("drive.frequency=30", 'not "drive.frequency=30"'),
         ({1: 2}, "1 must be a text, table.key"),
         ({"x" * 10_000: 1}, "must be table.key"),
         ({"coil.count": ENDLESS}, "an endless number must be a whole number from 1 to 16"),
@@ -132,10 +132,10 @@ LONG = range(10_000_000_000)
 @pytest.mark.parametrize(
     ("over", "more", "words"),
     [
-        ({1: [2]}, {}, "--over 1: must be the name of a key"),
-        (["coil.count=1,2"], {}, "must be a mapping"),
-        ({"coil.count": 2}, {}, "2 must be a list of numbers"),
-        ({"coil.count": "12"}, {}, '"12" must be a list of numbers'),
+        ({1: [2]}, {}, "--over: 1 must be a key"),
+        (["coil.count=1,2"], {}, "a sweep needs at least one key"),
+        ({"coil.count": 2}, {}, '--over: "coil.count" must be a key, 2 its numbers'),
+        ({"coil.count": "12"}, {}, '"12" its numbers'),
         ({"coil.count": ["a"]}, {}, '"a" must be a whole number from 1 to 16'),
         ({"coil.count": [[1]]}, {}, "[1] must be a whole number from 1 to 16"),
         ({"coil.count": [ENDLESS]}, {}, "an endless number must be a whole number from 1 to 16"),

@@ -17,6 +17,7 @@ from cosim.cli.command import add_commands
 from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain
 from cosim.files.declared import declared
 from cosim.files.door import watched
+from cosim.toolchain import memory
 from cosim.toolchain.interrupts import ended_alike
 from cosim.version import __version__
 
@@ -64,6 +65,8 @@ def main(argv: list[str] | None = None) -> int:
             warnings.simplefilter("always", Note)
             warnings.showwarning = _note
             argv = sys.argv[1:] if argv is None else argv
+            if argv and not any(word.startswith(("-h", "--h", "--version")) for word in argv):
+                memory.check(argv[0])
             arguments = _parser(argv).parse_args(argv)
             code = arguments.call(arguments) or 0
         sys.stdout.flush()

@@ -36,12 +36,15 @@ def whole(path: Path) -> Iterator[Path]:
 @contextmanager
 def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[list[Path]]:
     """Temporary paths beside ``paths`` that take their places, one right after the other, when the
-    block ends well; right before, what is ``outdated`` with them goes. Raises BadInput where one
-    cannot be written, or is a device or a pipe, which a file must not take the place of."""
+    block ends well; what is ``outdated`` by them goes right before. Raises BadInput where one
+    cannot be written, or is a device or a pipe."""
     name = paths[0]
     try:
         for name in (*outdated, *paths):
-            _refuse_devices(name)
+            with suppress(FileNotFoundError, NotADirectoryError):
+                mode = name.stat().st_mode  # of what a link names: root could replace it in /dev
+                if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+                    raise BadInput(f"{plain(str(name))}: this is not a regular file.")
         with ExitStack() as stack:
             pairs = []
             for path in paths:
@@ -65,14 +68,6 @@ def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[l
         if "embedded null" not in str(error):
             raise
         raise BadInput(f"{plain(str(name))}: it is no possible file name.") from None
-
-
-def _refuse_devices(path: Path) -> None:
-    """Also one that a link names: root could replace the link in /dev."""
-    with suppress(FileNotFoundError, NotADirectoryError):
-        mode = path.stat().st_mode
-        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-            raise BadInput(f"{plain(str(path))}: this is not a regular file.")
 
 
 @contextmanager

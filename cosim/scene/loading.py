@@ -63,8 +63,8 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
             raise BadInput(f"{messages.shown(source)}: must be a scene, or the name of one.")
         layers = _layers(os.fsdecode(source))
     if isinstance(overrides, str | bytes) or not isinstance(overrides or (), Iterable):
-        kind = "one string" if isinstance(overrides, str) else messages.shown(overrides)
-        raise BadInput(f"overrides: must be a mapping or a list of strings, not {kind}.")
+        given = messages.shown(overrides)
+        raise BadInput(f"overrides: must be a mapping or a list of strings, not {given}.")
     base = layers[-1].origin
     if isinstance(overrides, Mapping):
         changes = _Layer("overrides", _tables(overrides.items(), "overrides"))
@@ -108,11 +108,9 @@ def _layers(source: str) -> list[_Layer]:
     if base is None:
         return [_Layer(origin, data, source in builtin)]
     if base not in builtin:
-        hint = (
-            messages.suggestion(messages.shown(base).strip('"'), builtin)
-            or f" ({', '.join(builtin)})"
-        )
-        what = f"base = {messages.shown(base)} must be a built-in scene{hint}"
+        given = messages.shown(base)
+        hint = messages.suggestion(given.strip('"'), builtin) or f" ({', '.join(builtin)})"
+        what = f"base = {given} must be a built-in scene{hint}"
         raise messages.bad(f"{origin}: {what}")
     below = _layers(base)
     below[-1].tables.pop("description", None)
@@ -145,6 +143,8 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
 def _syntax(error: Exception, text: str, origin: str) -> str:
     """A sentence on broken TOML: file, line, column."""
     message = "too deeply nested" if isinstance(error, RecursionError) else str(error)
+    if message.startswith("Exceeds the limit"):  # Python's words for who programs in it
+        message = "a whole number in it has thousands of digits"
     place = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", message)
     if place is None:
         return f"{origin}: this is not TOML: {plain(message)}."
@@ -195,9 +195,8 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
         table, dot, key = full.partition(".")
         if full not in _FULL:
             if not dot:
-                raise messages.bad(
-                    f"{origin}: {plain(full)} must be table.key{messages.full_name(full)}"
-                )
+                hint = messages.full_name(full)
+                raise messages.bad(f"{origin}: {plain(full)} must be table.key{hint}")
             _check_names({table: {key: None}}, origin)
         if isinstance(value, os.PathLike):
             value = os.fspath(value)

@@ -111,7 +111,6 @@ def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], defa
     full = ".".join(str(part) for part in first["loc"])
     key = next((key for key in keys() if key.full == full), None)
     allowed = key.allowed if key else ALLOWED_TOP.get(full, "a table")
-    near = (key.choices if key else None) or ()
-    hint = suggestion(shown(first["input"]).strip('"'), near)
+    hint = suggestion(shown(first["input"]).strip('"'), (key and key.choices) or ())
     origin = origins.get(full, (0, default))[1]
     return ended(f"{origin}: {full} = {shown(first['input'])} must be {allowed}{hint}")

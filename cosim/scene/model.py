@@ -87,20 +87,18 @@ class Scene(BaseModel):
     def _check_speed_of_circuit(self) -> "Scene":
         """At the output's limits each step of ngspice lasts a time constant of the coil."""
         drive, circuit, coil = self.drive, self.circuit, self.coil
-        peak = abs(drive.offset) + drive.amplitude / 2.0
-        if not self.rung.ngspice or self.rung.own_netlist or drive.start_time >= self.run.duration:
-            return self
-        around = coil.resistance + coil.count * circuit.sense_resistance
-        current = min(peak / circuit.sense_resistance, circuit.current_limit)
+        peak, sense = abs(drive.offset) + drive.amplitude / 2.0, circuit.sense_resistance
+        around = coil.resistance + coil.count * sense
+        needed = min(peak / sense, circuit.current_limit) * around / coil.count
         room = circuit.supply - min(circuit.swing_loss_high, circuit.swing_loss_low)
-        needed = current * around / coil.count
         least = (FASTEST_FAR if needed > FAR * room else FASTEST_NEAR) * around
-        if peak and coil.inductance < least:
+        driven = peak and self.rung.ngspice and drive.start_time < self.run.duration
+        if driven and not self.rung.own_netlist and coil.inductance < least:
             raise fault(
                 f"coil.inductance = {coil.inductance:g} H must be at least {least:.3g} H with "
                 f"coil.resistance = {coil.resistance:g} Ohm and circuit.sense_resistance = "
-                f"{circuit.sense_resistance:g} Ohm, whose drive of up to {peak:g} V would take "
-                f"{needed:.3g} V at the output, or the circuit is too fast to be solved",
+                f"{sense:g} Ohm, where {peak:g} V of the drive ask {needed:.3g} V of the output, "
+                "or the circuit is too fast to be solved",
                 *("coil.count", "circuit.supply", "drive.amplitude", "drive.offset"),
             )
         return self

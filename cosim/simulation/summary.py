@@ -94,10 +94,8 @@ def _energies(
     missing = energy_in - copper - sum(lost.values()) - stored
     # What a part that falls has lost in height it has won in speed: the sum is rounding.
     fallen = count * scene.mechanics.part_mass * scene.mechanics.gravity * abs(totals["z_part"])
-    scale = max(
-        *(abs(energy_in), copper + sum(lost.values()), abs(stored)),
-        *(_hanging(scene), fallen, _RESOLVED),
-    )
+    moved = max(abs(energy_in), copper + sum(lost.values()), abs(stored), fallen)
+    scale = max(moved, _hanging(scene), _RESOLVED)
     return {
         "energy_in": energy_in,
         "energy_copper": copper,

@@ -63,9 +63,7 @@ class Design:
 
 def grid(over: Mapping[str, Sequence[Number]]) -> Design:
     """Every combination of the values of each ``table.key``. Raises BadInput."""
-    if not isinstance(over, Mapping):
-        raise BadInput(f"over: must be a mapping of keys to their values, not {shown(over)}.")
-    if not over:
+    if not isinstance(over, Mapping) or not over:
         raise BadInput("--over: a sweep needs at least one key.")
     _check_count(over)
     return Design(tuple(_axis(name, values) for name, values in over.items()))
@@ -74,8 +72,9 @@ def grid(over: Mapping[str, Sequence[Number]]) -> Design:
 def _check_count(over: Mapping[str, Sequence[Number]]) -> None:
     """Refuse too large a grid before its values are looked at."""
     for name, values in over.items():
-        if isinstance(values, str | bytes) or not hasattr(values, "__len__"):
-            raise BadInput(f"--over {shown(name)}: {shown(values)} must be a list of numbers.")
+        listed = hasattr(values, "__len__") and not isinstance(values, str | bytes)
+        if not isinstance(name, str) or not listed:
+            raise BadInput(f"--over: {shown(name)} must be a key, {shown(values)} its numbers.")
     if (count := prod(map(len, over.values()))) > MOST_POINTS:
         raise BadInput(f"--over: this grid has {count} points; it may have {MOST_POINTS}.")
 
@@ -142,8 +141,6 @@ def split(options: Sequence[str], form: str) -> Iterator[tuple[str, str, str]]:
 
 def numeric_key(name: str) -> Key:
     """The key with this full name. Raises BadInput for one that is unknown or no number."""
-    if not isinstance(name, str):
-        raise BadInput(f"--over {shown(name)}: must be the name of a key.")
     numeric = {key.full: key for key in keys() if key.kind in (int, float) and not key.choices}
     if name in numeric:
         return numeric[name]
@@ -159,7 +156,6 @@ def _axis(name: str, values: Sequence[Number]) -> Axis:
     if len(values) == 0:
         raise BadInput(f"--over {name}: has no value.")
     kind = int if key.kind is int else float
-    found = []
     for value in values:
         assert key.low is not None and key.high is not None
         try:
@@ -168,10 +164,10 @@ def _axis(name: str, values: Sequence[Number]) -> Axis:
             raise BadInput(f"--over {name}: {shown(value)} must be {key.allowed}.") from None
         if not inside:
             raise BadInput(f"--over {name}: {value:g} must be {key.allowed}.")
-        found.append(kind(value))
+    found = tuple(map(kind, values))
     if len(set(found)) < len(found):
         raise BadInput(f"--over {name}: a value stands there twice.")
-    return Axis(key, tuple(found))
+    return Axis(key, found)
 
 
 def _range(text: str, right: str, key: Key) -> tuple[Number, ...]:
