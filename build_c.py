@@ -58,7 +58,7 @@ HARDENING = (
     ("-Wl,-z,noexecstack",),
 )
 """Against faults in the C; taken where compiler and linker have them, the first of each kind. Not
--fcf-protection: it costs 2.5 % of a run on the rung "limited"."""
+-fcf-protection: with it a run on the rung "limited" seemed to take 2 % longer (a noisy machine)."""
 # A shared library has FMI's functions by their plain names; source code has them with a prefix.
 PLAIN_NAMES = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
