@@ -205,6 +205,8 @@ def test_full_disk(size: int, file: str, tmp_path: Path) -> None:
     assert complaint(done) == f"cosim: {file}: cannot be written (File too large).\n"
     after = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
     del before["summary.json"], after["summary.json"]  # the time it took
+    if file.endswith("figure.png"):
+        del before["figure.png"]  # of another run than the numbers now beside it
     assert after == before
 
 

@@ -191,4 +191,4 @@ def test_failures_of_the_machine_are_tried_again(
     again = sweep("paper", over, short, out=tmp_path / "wild", workers=1)
     assert again.identical(whole)
     assert "mu_k" in str(again.failure.values[1])  # the point's own
-    assert lines(tmp_path / "wild") == 1 + 2 + 2
+    assert lines(tmp_path / "wild") == 1 + 2 + 1
