@@ -6,7 +6,8 @@ for its worker; so the numbers are those of single runs, to the last bit.
 
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from queue import Empty, SimpleQueue
 from typing import TypeVar
 
 AHEAD = 2
@@ -30,25 +31,42 @@ def each(
 
     ``progress`` ends what runs when nobody waits for it any more.
     """
-    waiting, running = iter(tasks), dict[Future[_Found], int]()
-    ended = threading.Event()
+    waiting, ended = iter(tasks), threading.Event()
+    todo: SimpleQueue[tuple[int, _Task] | None] = SimpleQueue()
+    found: SimpleQueue[tuple[int, _Found | Exception]] = SimpleQueue()
+    threads: list[threading.Thread] = []
 
     def progress(time: float) -> None:
         if ended.is_set():
             raise _Ended
 
-    threads = ThreadPoolExecutor(count)
+    def work() -> None:
+        while (task := todo.get()) is not None:
+            try:
+                found.put((task[0], call(task[1], progress)))
+            except Exception as error:
+                found.put((task[0], error))
+
+    at_hand = 0
     try:
         while True:
-            while len(running) < AHEAD * count and (task := next(waiting, None)) is not None:
-                running[threads.submit(call, task[1], progress)] = task[0]
-            if not running:
+            while at_hand < AHEAD * count and (task := next(waiting, None)) is not None:
+                todo.put(task)
+                at_hand += 1
+                if len(threads) < min(count, at_hand):
+                    threads.append(threading.Thread(target=work, daemon=True))
+                    threads[-1].start()
+            if not at_hand:
                 return
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                error = future.exception()
-                if error is not None and not isinstance(error, Exception):
-                    raise error
-                yield running.pop(future), future.result() if error is None else error
+            one = found.get()
+            at_hand -= 1
+            yield one
     finally:
         ended.set()
-        threads.shutdown(cancel_futures=True)
+        with suppress(Empty):
+            while True:
+                todo.get_nowait()
+        for _ in threads:
+            todo.put(None)
+        for thread in threads:
+            thread.join()
