@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import IO
-from weakref import WeakSet
+from weakref import ref
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,9 @@ IN_MEMORY = 8 << 20
 BLOCK = 1 << 16
 """Rows that are processed at a time where not all of them need to be in memory."""
 
-_mapped: "WeakSet[mmap.mmap]" = WeakSet()
+_mapped: dict[int, "ref[mmap.mmap]"] = {}
+"""By their ids. No WeakSet: an interrupt that comes while a file is unmapped would be raised in its
+callback, where Python loses it."""
 
 _folder: ContextVar[Path | None] = ContextVar("folder", default=None)
 
@@ -66,7 +68,7 @@ def _unpacked(path: str, names: tuple[str, ...], rows: int) -> dict[str, Array]:
     with open(path, "r+b") as file:
         mapped = mmap.mmap(file.fileno(), 0)
     os.unlink(path)
-    _mapped.add(mapped)
+    _mapped[id(mapped)] = ref(mapped)
     columns = np.frombuffer(mapped, np.float64).reshape(len(names), rows)
     return dict(zip(names, columns, strict=True))
 
@@ -142,7 +144,7 @@ class Tape:
             shape = (self._rows, self._columns)
             if self._file is not None:
                 mapped = mmap.mmap(self._file.fileno(), self._rows * self._columns * 8)
-                _mapped.add(mapped)
+                _mapped[id(mapped)] = ref(mapped)
                 self._array = np.frombuffer(mapped, np.float64).reshape(shape)
             else:
                 self._array = self._kept[: self._rows]
@@ -176,6 +178,7 @@ def blocks(count: int, most: int = BLOCK) -> Iterator[slice]:
 
 def release() -> None:
     """Drop the pages of tapes on disk from this process's memory; they can be read again."""
-    if _mapped and hasattr(mmap, "MADV_DONTNEED"):
-        for mapped in list(_mapped):
-            mapped.madvise(mmap.MADV_DONTNEED)
+    if hasattr(mmap, "MADV_DONTNEED"):
+        for each in list(_mapped.values()):
+            if (mapped := each()) is not None:
+                mapped.madvise(mmap.MADV_DONTNEED)

@@ -158,48 +158,29 @@ def exact(
     return PartMotion(times, z, v, _shares(times, stuck), events)
 
 
-class Accounting:
-    """The call of compiled code that finds the exact motion on a surface at the times ``output``,
-    and what passed between the two; the part starts at the height 0 with the surface's velocity.
-    See :class:`Case`. Any thread may call ``run`` with ``arguments``, once.
+def account(
+    surface: Surface,
+    output: Real,
+    *,
+    mu_s: float,
+    mu_k: float,
+    force_per_mass: float,
+    gravity: float = 9.81,
+    mu_plate: float = 0.0,
+) -> Account:
+    """The exact motion on a surface at the times ``output``, and what passed between the two; the
+    part starts at the height 0 with the surface's velocity. See :class:`Case`.
     """
-
-    def __init__(
-        self,
-        surface: Surface,
-        output: Real,
-        *,
-        mu_s: float,
-        mu_k: float,
-        force_per_mass: float,
-        gravity: float = 9.81,
-        mu_plate: float = 0.0,
-    ) -> None:
-        law = (mu_s, mu_k, force_per_mass, gravity, mu_plate)
-        case = _Case(surface.times, surface.velocities, *law, periods=surface.periods)
-        times = case.times(output)
-        self._results = np.empty((3, len(times))), np.empty((len(times), len(_TOLD)))
-        self._kept = case, times  # the arguments point to them
-        self.run = ctypes.cast(part_library().exact_run, _POINTER).value or 0
-        """Where the function lies."""
-        motion, told = self._results
-        self.arguments = _Exact(
-            *(*case.arguments(), surface.half, surface.turn, len(times), times.ctypes.data),
-            *(*(row.ctypes.data for row in motion), told.ctypes.data),
-        )
-
-    def make(self) -> None:
-        """Make the call in this thread."""
-        part_library().exact_run(ctypes.byref(self.arguments))
-
-    def goes_on(self, outcome: int) -> bool:
-        """It is called once, and never fails."""
-        return False
-
-    def account(self) -> Account:
-        """What the call has found."""
-        motion, told = self._results
-        return Account(self._kept[1], *motion, **dict(zip(_TOLD, told.T, strict=True)))
+    law = (mu_s, mu_k, force_per_mass, gravity, mu_plate)
+    case = _Case(surface.times, surface.velocities, *law, periods=surface.periods)
+    times = case.times(output)
+    motion, told = np.empty((3, len(times))), np.empty((len(times), len(_TOLD)))
+    arguments = _Exact(
+        *(*case.arguments(), surface.half, surface.turn, len(times), times.ctypes.data),
+        *(*(row.ctypes.data for row in motion), told.ctypes.data),
+    )
+    part_library().exact_run(ctypes.byref(arguments))
+    return Account(times, *motion, **dict(zip(_TOLD, told.T, strict=True)))
 
 
 def bounds(

@@ -12,6 +12,7 @@ be relied on.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
@@ -19,7 +20,6 @@ from cosim.drive.command import period
 from cosim.errors import BadInput
 from cosim.scene import Scene, changed
 from cosim.simulation.here import summary_here
-from cosim.simulation.many import each
 from cosim.toolchain.processes import processors
 from cosim.waveforms.result import Result
 
@@ -88,16 +88,9 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
 def _v_averages(scene: Scene, settings: Sequence[Mapping[str, float | str]]) -> list[float]:
     """Of a scene without ngspice with each of some settings, m/s."""
     scenes = [partial(changed, scene, values, "auto") for values in settings]
-
-    def v_average(make: Callable[[], Scene], progress: Callable[[float], None]) -> float:
-        return summary_here(make(), progress)["v_average"]
-
-    found: dict[int, float] = {}
-    for number, value in each(v_average, enumerate(scenes), min(len(scenes), processors())):
-        if isinstance(value, Exception):
-            raise value
-        found[number] = value
-    return [found[number] for number in range(len(scenes))]
+    with ThreadPoolExecutor(processors()) as threads:
+        found = threads.map(lambda make: summary_here(make(), lambda _: None), scenes)
+        return [summary["v_average"] for summary in found]
 
 
 def relative_error(value: float, reference: float) -> float:

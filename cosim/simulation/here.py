@@ -8,13 +8,12 @@ from typing import Any
 from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
 from cosim.files.spill import Tape, blocks
-from cosim.mechanics.part import Accounting
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
 from cosim.simulation.guards import notes
 from cosim.simulation.numbers import motion, numbers
-from cosim.simulation.rungs.given_surface import lead_part
-from cosim.simulation.rungs.rung import Driven, ended, rungs
+from cosim.simulation.rungs.given_surface import move_part
+from cosim.simulation.rungs.rung import Driven, rungs
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.result import Result
 
@@ -45,7 +44,7 @@ def summary_here(scene: Scene, progress: Progress) -> dict[str, Any]:
 
 def _followed_surface(scene: Scene) -> tuple[dict[str, Array], dict[str, Any]]:
     began = time.perf_counter()
-    waveforms, moved = ended(lead_part(scene), Accounting.make)
+    waveforms, moved = move_part(scene)
     return waveforms, numbers(scene, moved, Driven(None, "exact"), 0, began)
 
 

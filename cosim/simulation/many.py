@@ -5,7 +5,7 @@ for its worker; so the numbers are those of single runs, to the last bit.
 """
 
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import TypeVar
@@ -25,7 +25,7 @@ class _Ended(Exception):
 
 def each(
     call: Callable[[_Task, Progress], _Found], tasks: Iterable[tuple[int, _Task]], count: int
-) -> Iterator[tuple[int, _Found | Exception]]:
+) -> Generator[tuple[int, _Found | Exception], None, None]:
     """What ``call(task, progress)`` gives for each numbered task, or what it raises, in the order
     in which ``count`` threads finish them. Tasks are drawn as threads become free.
 

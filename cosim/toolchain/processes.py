@@ -27,7 +27,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from shutil import rmtree
 from typing import Any
-from weakref import WeakSet, finalize
+from weakref import finalize, ref
 
 from cosim.errors import BadInput, SimulationFailed, plain
 from cosim.files.atomic import folder_of_ones_own
@@ -99,8 +99,8 @@ def processors() -> int:
 class Worker:
     """A process that calls ``function(argument, progress)`` with one argument after another.
 
-    ``function`` must be importable, and travels once, as do the values that a partial binds.
-    ``pipe`` is ready for :meth:`hear` when there is news. The process ends with its parent.
+    ``function`` must be importable, and travels once, as do the values that a partial binds. The
+    process ends with its parent.
     """
 
     def __init__(
@@ -112,15 +112,14 @@ class Worker:
         self.folder, lock = folder_of_ones_own(inside or Path(tempfile.gettempdir()))
         held: list[subprocess.Popen[Any]] = []
         self._remains = finalize(self, _clear, os.getpid(), held, self.folder)
-        _living.add(self)
+        _living[id(self)] = ref(self)
         try:
             self._process = _start(there, self.folder, lock, bounds.library if bounds else "")
         finally:
             there.close()
             os.close(lock)
         held.append(self._process)
-        self.given = 0
-        self._retires = False
+        self.given, self.usable = 0, False
         self.began = False
         """It has said something of its call, so what ends it now is not its start."""
         self._rest()
@@ -128,63 +127,53 @@ class Worker:
         self._send(function)
         self._send(bounds)
 
-    def give(self, argument: Any) -> None:
-        """Have the function called; what comes of it is heard later."""
-        self.given += 1
-        self.began = False
+    def call(self, argument: Any, progress: Progress, heed: Callable[[], None]) -> Any:
+        """What the function gives, while ``progress`` is told the time that it has reached and
+        ``heed`` may raise. Raises EOFError where the process has died; and what the function
+        raises: then, but for BadInput, and where it hangs, the process is not to be used again.
+        """
+        self.given, self.began, self.usable = self.given + 1, False, False
         self._rest()
         self._send(argument)
+        while self._spent < PATIENCE and self._waited < STALLED:
+            heed()
+            progress(self.reached)
+            now = time.monotonic()
+            self._waited += min(now - self.rested, _MOST)
+            self.rested = now
+            if not self.pipe.poll(_REPORT_EVERY):
+                continue
+            try:
+                kind, value = self.pipe.recv()
+            except OSError as error:
+                raise EOFError from error
+            self.began = True
+            if kind == "progress":
+                self._rest()
+                self.reached = value
+            elif kind == "spent":
+                self._spent = value
+            elif kind == "retires":
+                self.given = CALLS
+            else:
+                good = kind == "result"
+                self.usable = self.given < CALLS and (good or isinstance(value, BadInput))
+                if good:
+                    return value
+                raise value
+        hangs = self._spent >= PATIENCE
+        raise (SimulationFailed if hangs else ProcessLost)(
+            f"The simulation hangs at t = {self.reached:.6g} s: no step was finished in "
+            f"{f'{PATIENCE:g} s of CPU time' if hangs else f'{STALLED:g} s'}. A netlist without a "
+            "solution can do this to ngspice."
+        )
 
     def _rest(self) -> None:
         self.reached = 0.0
         """The latest progress of the call at hand, s of simulated time."""
         self._spent = self._waited = 0.0
         """s of its CPU time, and s of this process awake, since then."""
-        self._looked = time.monotonic()
-        self.idle = False
-
-    def hear(self) -> tuple[str, Any]:
-        """The next message: ``("alive", None)``, ``("result", value)`` or ``("failure", error)``.
-
-        Raises EOFError where the process has died.
-        """
-        try:
-            kind, value = self.pipe.recv()
-        except OSError as error:
-            raise EOFError from error
-        self.began = True
-        if kind == "progress":
-            self._rest()
-            self.reached = value
-        elif kind == "spent":
-            self._spent = value
-        elif kind == "retires":
-            self._retires = True
-        else:
-            return kind, value
-        return "alive", None
-
-    @property
-    def hangs(self) -> bool:
-        """It has worked for PATIENCE without progress."""
-        return self._spent >= PATIENCE
-
-    def stalls(self) -> bool:
-        """It has waited for STALLED without progress; to be asked every second or so."""
-        now = time.monotonic()
-        self._waited += min(now - self._looked, _MOST)
-        self._looked = now
-        return self._waited >= STALLED
-
-    @property
-    def rests_since(self) -> float:
-        """On a clock, s."""
-        return self._looked
-
-    @property
-    def reusable(self) -> bool:
-        """It may be given another call."""
-        return not self._retires and self.given < CALLS
+        self.rested = time.monotonic()
 
     @property
     def alive(self) -> bool:
@@ -216,7 +205,8 @@ class Worker:
             self.pipe.send(message)
 
 
-_living: "WeakSet[Worker]" = WeakSet()
+_living: dict[int, "ref[Worker]"] = {}
+"""By their ids: the callback of a WeakSet would lose an interrupt."""
 _idle: defaultdict[Any, "deque[Worker]"] = defaultdict(deque)
 """Processes that wait for a call, by their function and bounds. What is taken out of a deque and
 then lost to an interrupt ends when Python frees it."""
@@ -230,9 +220,10 @@ _here = threading.local()
 def _forget() -> None:
     """In a child of a fork: the processes are its parent's, and end with that one alone."""
     global _places
-    for worker in list(_living):
+    for each in list(_living.values()):
         with suppress(Exception):
-            worker._let_go()
+            if (worker := each()) is not None:
+                worker._let_go()
     _idle.clear()
     _places = threading.BoundedSemaphore(processors())
 
@@ -280,7 +271,7 @@ def isolated(
         for tried in range(TRIES):
             worker = _taken(function, bounds)
             try:
-                answer = _called(worker, argument, progress, heed)
+                answer = worker.call(argument, progress, heed)
                 break
             except EOFError:
                 how = worker.end(ENDING)
@@ -289,7 +280,7 @@ def isolated(
                     words = f"The simulation's process {what} ({how})."
                     raise ProcessLost(words) from None
             finally:
-                if worker.idle and bounds is not None and worker.reusable:
+                if worker.usable and bounds is not None:
                     _idle[worker.kind].append(worker)
                     _thin_out()
                 else:
@@ -331,7 +322,7 @@ def _thin_out() -> None:
     while len(waiting := [worker for each in list(_idle.values()) for worker in list(each)]) > (
         processors()
     ):
-        longest = min(waiting, key=lambda worker: worker.rests_since)
+        longest = min(waiting, key=lambda worker: worker.rested)
         with suppress(ValueError):  # another thread has it
             _idle[longest.kind].remove(longest)
             longest.end()
@@ -342,28 +333,6 @@ def end_idle(inside: Path) -> None:
     for (_, bounds), waiting in list(_idle.items()):
         while bounds.inside == inside and waiting:
             waiting.pop().end()
-
-
-def _called(worker: Worker, argument: Any, progress: Progress, heed: Callable[[], None]) -> Any:
-    """What the call gives; the worker is idle then. Raises EOFError where it has died."""
-    worker.give(argument)
-    while not (worker.hangs or worker.stalls()):
-        heed()
-        progress(worker.reached)
-        if not worker.pipe.poll(_REPORT_EVERY):
-            continue
-        kind, value = worker.hear()
-        if kind == "result":
-            worker.idle = True
-            return value
-        if kind == "failure":
-            worker.idle = isinstance(value, BadInput)  # it has done nothing yet
-            raise value
-    raise (SimulationFailed if worker.hangs else ProcessLost)(
-        f"The simulation hangs at t = {worker.reached:.6g} s: no step was finished in "
-        f"{f'{PATIENCE:g} s of CPU time' if worker.hangs else f'{STALLED:g} s'}. A netlist without "
-        "a solution can do this to ngspice."
-    )
 
 
 def _clear(owner: int, processes: "list[subprocess.Popen[Any]]", folder: str) -> None:

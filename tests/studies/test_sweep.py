@@ -135,9 +135,9 @@ def test_worker_that_keeps_dying() -> None:
 
     def kill() -> None:
         while 0 not in outcomes:
-            for worker in list(processes._living):
+            for worker in [each() for each in list(processes._living.values())]:
                 # Only that point takes so long.
-                if worker.alive and worker.reached > 1.0:
+                if worker is not None and worker.alive and worker.reached > 1.0:
                     worker._process.kill()
             time.sleep(0.05)
 

@@ -5,7 +5,6 @@ between the knots and its own events (:mod:`cosim.mechanics.part`): there is no 
 """
 
 import math
-from collections.abc import Generator
 from pathlib import Path
 
 import numpy as np
@@ -92,11 +91,8 @@ def _trial(path: Path) -> tuple[Array, Array]:
     return times - times[0], velocities
 
 
-def lead_part(
-    scene: Scene,
-) -> Generator[part.Accounting, None, tuple[dict[str, Array], Motion]]:
-    """The call to be made for a scene whose surface is given, before the next is asked for; then
-    waveforms (SI, by name) and motion. Raises BadInput."""
+def move_part(scene: Scene) -> tuple[dict[str, Array], Motion]:
+    """Waveforms (SI, by name) and motion of a scene whose surface is given. Raises BadInput."""
     moved = surface(scene)
     file, run = scene.drive.file, scene.run
     if file is not None and run.duration > moved.times[-1] * (1 + 1e-12):
@@ -107,9 +103,7 @@ def lead_part(
     rows = grid(run.output_step, run.duration)
     frames = exposures(run.duration, run.settle, run.shutter)
     wanted = np.unique(np.concatenate([rows, frames, [run.settle, run.duration]]))
-    accounting = part.Accounting(moved, wanted, mu_k=scene.friction.mu_k, **_law(scene))
-    yield accounting
-    found = accounting.account()
+    found = part.account(moved, wanted, mu_k=scene.friction.mu_k, **_law(scene))
     mass = scene.mechanics.part_mass / scene.mechanics.n_surfaces
     at = np.searchsorted(wanted, rows)
     columns = {

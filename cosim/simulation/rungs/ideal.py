@@ -1,6 +1,6 @@
 """Rung ``ideal``: the coil's current is the command's, whatever voltage it takes."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from ctypes import c_double, c_int64, c_void_p
 from dataclasses import replace
 from functools import cache, partial
@@ -10,14 +10,14 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.coupling.loop.agenda import SAME_TIME, count
-from cosim.coupling.loop.recorder import Block, Recorder
+from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import commands
 from cosim.drive.pieces import Command
 from cosim.drive.straights import straights
 from cosim.files.spill import Tape, blocks
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
-from cosim.simulation.rungs.rung import Driven, Led
+from cosim.simulation.rungs.rung import Driven, Rung
 from cosim.toolchain.libraries import library
 
 
@@ -32,18 +32,18 @@ def _library() -> Any:
     return found
 
 
-class Ideal(Led):
+class Ideal(Rung):
     """The current is given; the coil's voltage follows from it."""
 
     names = ("ideal",)
 
-    def lead(self, scene: Scene, recorder: Recorder) -> Generator[Block, None, Driven]:
+    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
         drives = commands(scene)
         share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
         coils = [_Coil(scene) for _ in drives]
         for edges, start, end in straights(drives, scene.run.duration):
             start, end = share * start, share * end
-            yield edges[1:], start, end
+            recorder.follow(edges[1:], start, end)
             for k, coil in enumerate(coils):
                 coil.follow(edges, start[:, k], end[:, k])
         motion = recorder.at_end["energy_in"]

@@ -3,28 +3,28 @@
 The source's command is an input of the FMU; there is no ngspice.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 from cosim.arrays import Array
-from cosim.coupling.loop.recorder import Block, Recorder
+from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import commands
 from cosim.drive.pieces import Command
 from cosim.drive.straights import straights
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Electrics, commanded
-from cosim.simulation.rungs.rung import Driven, Led
+from cosim.simulation.rungs.rung import Driven, Rung
 
 
-class Limited(Led):
+class Limited(Rung):
     """One monolithic solution of source, coil and mechanics."""
 
     names = ("limited",)
 
-    def lead(self, scene: Scene, recorder: Recorder) -> Generator[Block, None, Driven]:
+    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
         drives = commands(scene)
         for edges, start, end in straights(drives, scene.run.duration):
-            yield edges[1:], start, end
+            recorder.follow(edges[1:], start, end)
         waves = partial(_waves, drives, recorder)
         return Driven(_electrics(scene, recorder), method="monolithic", waves=waves)
 

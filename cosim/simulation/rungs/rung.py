@@ -4,16 +4,16 @@
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import ClassVar, TypeVar
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.arrays import Array
-from cosim.coupling.loop.recorder import Block, Recorder
+from cosim.coupling.loop.recorder import Recorder
 from cosim.files.declared import modules
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Electrics
@@ -71,37 +71,8 @@ class Rung(ABC):
         """
 
 
-class Led(Rung):
-    """A rung whose inputs to the mechanics are known beforehand."""
-
-    @abstractmethod
-    def lead(self, scene: Scene, recorder: Recorder) -> Generator[Block, None, Driven]:
-        """Blocks for the recorder, which must have followed each before the next is asked for.
-
-        Raises BadInput and SimulationFailed.
-        """
-
-    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
-        return ended(self.lead(scene, recorder), lambda block: recorder.follow(*block))
-
-
-_Task = TypeVar("_Task")
-_Found = TypeVar("_Found")
-
-
-def ended(leading: Generator[_Task, None, _Found], do: Callable[[_Task], object]) -> _Found:
-    """What a generator returns, each of its tasks having been done before the next is asked for."""
-    while True:
-        try:
-            task = next(leading)
-        except StopIteration as end:
-            return end.value
-        do(task)
-
-
 @cache
 def rungs() -> dict[str, Rung]:
     """Each rung with mechanics by its names; a file in this folder is a rung."""
     modules(__name__.rpartition(".")[0])
-    kinds = [kind for kind in (*Rung.__subclasses__(), *Led.__subclasses__()) if kind is not Led]
-    return {name: kind() for kind in kinds for name in kind.names}
+    return {name: kind() for kind in Rung.__subclasses__() for name in kind.names}

@@ -1,20 +1,18 @@
 """Rung ``none`` with a command: no coil; the mechanics move by themselves."""
 
-from collections.abc import Generator
-
 import numpy as np
 
-from cosim.coupling.loop.recorder import Block, Recorder
+from cosim.coupling.loop.recorder import Recorder
 from cosim.scene import Scene
-from cosim.simulation.rungs.rung import Driven, Led
+from cosim.simulation.rungs.rung import Driven, Rung
 
 
-class Undriven(Led):
+class Undriven(Rung):
     """The coil carries no current."""
 
     names = ("none",)
 
-    def lead(self, scene: Scene, recorder: Recorder) -> Generator[Block, None, Driven]:
+    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
         nothing = np.zeros((1, 1))
-        yield np.array([scene.run.duration]), nothing, nothing
+        recorder.follow(np.array([scene.run.duration]), nothing, nothing)
         return Driven(None)

@@ -1,6 +1,7 @@
 """Times of the part's two solvers beside each other, and of a sweep beside bare calls."""
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from ctypes import addressof
 from pathlib import Path
 from statistics import median
@@ -9,12 +10,13 @@ from time import process_time
 
 import numpy as np
 
+from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
 from cosim.coupling.loop.structures import loop
 from cosim.mechanics import part
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
-from cosim.simulation.rungs.rung import Led, rungs
+from cosim.simulation.rungs.rung import rungs
 from cosim.studies.bench.measures import ratios, take_turns
 from cosim.studies.fit.cases import Case, Solver
 from cosim.studies.sweep.dataset import Numbers
@@ -69,17 +71,19 @@ def map_over_bare_calls(scene: Scene, offsets: Sequence[float], rounds: int) -> 
 
 def _bare(scene: Scene) -> float:
     """CPU seconds of the compiled loop alone for a scene whose inputs are known beforehand."""
-    mechanics, rung = Mechanics(scene), rungs()[scene.circuit.model]
-    assert isinstance(rung, Led)
-    recorder = Recorder(scene, mechanics, lambda _: None)
     seconds = 0.0
-    for block in rung.lead(scene, recorder):
-        edges, start, end = (np.ascontiguousarray(values) for values in block)
-        inputs = (edges.ctypes.data, start.ctypes.data, end.ctypes.data)
-        began = process_time()
-        loop().recorder_follow(addressof(recorder.state), len(edges), *inputs, 1 << 40)
-        seconds += process_time() - began
-    mechanics.close()
+
+    class Bare(Recorder):
+        def follow(self, edges: Array, start: Array, end: Array) -> None:
+            nonlocal seconds
+            block = [np.ascontiguousarray(values) for values in (edges, start, end)]
+            at = [values.ctypes.data for values in block]
+            began = process_time()
+            loop().recorder_follow(addressof(self.state), len(edges), *at, 1 << 40)
+            seconds += process_time() - began
+
+    with closing(Mechanics(scene)) as mechanics:
+        rungs()[scene.circuit.model].drive(scene, Bare(scene, mechanics, lambda _: None))
     return seconds
 
 

@@ -36,7 +36,7 @@ def run_on_cluster(
 
         def submit(point: Point) -> Any:
             number, values = point
-            future = client.submit(_evaluate, shared, dict(values), whole_periods, pure=False)
+            future = client.submit(evaluate, shared, dict(values), whole_periods, pure=False)
             numbers[future.key] = number
             return future
 
@@ -68,7 +68,3 @@ def _client(address: str) -> Any:
     except (OSError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise BadInput(f"--dask {address}: no cluster answers there ({reason}).") from error
-
-
-def _evaluate(base: Scene, values: dict[str, float], whole_periods: bool) -> Outcome:
-    return evaluate(base, values, whole_periods)
