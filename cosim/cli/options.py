@@ -54,10 +54,11 @@ def add_overrides(parser: ArgumentParser) -> None:
 
 
 def add_workers(parser: ArgumentParser) -> None:
-    """``--workers``."""
+    """``--workers`` and ``--dask``."""
     parser.add_argument(
-        "--workers", type=int, metavar="N", help="processes (default: one for each processor)"
+        "--workers", type=int, metavar="N", help="runs at once (default: one for each processor)"
     )
+    parser.add_argument("--dask", metavar="ADDRESS", help="run on the Dask cluster at this address")
 
 
 def add_quick(parser: ArgumentParser, text: str) -> None:

@@ -77,3 +77,19 @@ def meaning(name: str) -> dict[str, str]:
     """The attributes ``units`` and ``long_name`` of an entry in a dataset."""
     found = SUMMARY[name]
     return {"units": found.unit, "long_name": found.text}
+
+
+def with_unit(value: float, unit: str, digits: int = 6) -> str:
+    """``number unit``; a plain number has no unit."""
+    return f"{value:.{digits}g}" + ("" if unit == "1" else f" {unit}")
+
+
+def label(name: str, unit: str) -> str:
+    """``name [unit]`` for an axis."""
+    return name if unit == "1" else f"{name} [{unit}]"
+
+
+def bench_unit(quantity: str) -> tuple[str, float]:
+    """The unit in which a number of the summary is shown, and how many of it are one in SI."""
+    si = SUMMARY[quantity].unit
+    return ("mm/s", 1e3) if si == "m/s" else (si, 1.0)

@@ -21,8 +21,8 @@ import psutil
 import pytest
 
 from cosim.cli.main import main
+from cosim.evaluate.store import Store
 from cosim.files.atomic import alone
-from cosim.files.journal import Journal
 from cosim.files.resources import REPOSITORY
 from cosim.scene import load
 from cosim.studies.identify.problem.space import read_space
@@ -66,7 +66,7 @@ AT_WORK: dict[str, list[str]] = {
 
 LEAVES = {
     "run": {"waveforms.csv", "waveforms.nc", "scene.toml", "summary.json", "figure.png"},
-    "sweep": {"sweep.nc", "sweep.journal", "figure.png"},
+    "sweep": {"sweep.nc", "sweep.sqlite", "figure.png"},
     "tune": {"tune.json", "tune.csv", "best.toml", "figure.png"},
     "identify": {"identify.json", "identify.csv", "identify.md", "rig.toml", "trial-01.toml"},
     "chart": {"ladder.csv", "ladder.md", "ladder.png"},
@@ -76,9 +76,9 @@ LEAVES = {
     "build": {"stickslip-fmi2.fmu", "stickslip-fmi3.fmu"},
 }
 
-JOURNALS = {
-    "sweep": "sweep.journal", "tune": "tune.journal", "chart": "ladder.journal",
-    "identify": "identify-journal.json",
+STORES = {
+    "sweep": "sweep.sqlite", "tune": "tune.sqlite", "chart": "ladder.sqlite",
+    "identify": "identify.sqlite",
 }  # fmt: skip
 """From which a killed one goes on."""
 
@@ -266,9 +266,8 @@ def signalled(number: int, phase: str, made: dict[str, str], out: Path) -> None:
     _, alive = psutil.wait_procs(workers, timeout=60)
     assert not alive, "workers outlive their parent"
     whole(out, killed=number == signal.SIGKILL)
-    journals = [path.name for path in out.glob("*.journal")]
-    for journal in journals:  # what they hold belongs to the work at hand
-        (out / journal).unlink()
+    for store in [*out.glob("*.sqlite*")]:  # what they hold belongs to the work at hand
+        store.unlink()
     if phase != "chart":
         does_its_work(phase, made, out)
 
@@ -312,7 +311,7 @@ def disk_full(phase: str, made: dict[str, str], out: Path, capsys) -> None:
     told(capsys.readouterr().err, "cannot be written")
     whole(out)
     left = {path.name for path in out.iterdir()} - before.keys()
-    assert left <= {"tune.journal", "ladder.journal"}, left
+    assert left <= {"tune.sqlite", "ladder.sqlite"}, left
     for name, content in before.items():
         assert len((out / name).read_bytes()) <= 2000 or (out / name).read_bytes() == content
     does_its_work(phase, made, out)
@@ -338,10 +337,10 @@ def closed_stdout(phase: str, made: dict[str, str], out: Path) -> None:
 def same_folder(phase: str, made: dict[str, str], out: Path, capsys) -> None:
     out.mkdir()
     if phase == "chart":  # different ones may share a folder
-        with Journal(out / JOURNALS[phase], "", vars, lambda *line: None):
+        with Store(out / STORES[phase]):
             assert main(words(COMMANDS[phase], made, out)) == 2
         told(capsys.readouterr().err, "another process is writing it")
-        assert [path.name for path in out.iterdir()] == [JOURNALS[phase]]
+        assert [path.name for path in out.iterdir()] == [STORES[phase]]
         return
     with alone(out):
         assert main(words(COMMANDS[phase], made, out)) == 2
@@ -365,8 +364,8 @@ def damaged(phase: str, made: dict[str, str], out: Path, capsys) -> None:
     elif phase in ("fit", "identify"):
         if phase == "identify":  # what it keeps is no cache: it is not thrown away in silence
             assert main(words(COMMANDS[phase], made, out)) == 2
-            told(capsys.readouterr().err, JOURNALS[phase])
-            (out / JOURNALS[phase]).unlink()
+            told(capsys.readouterr().err, STORES[phase])
+            (out / STORES[phase]).unlink()
         trials = out.with_name("spoilt")
         shutil.copytree(made["trials"], trials)
         trial = next(trials.iterdir())
@@ -398,11 +397,11 @@ def devices(phase: str, made: dict[str, str], out: Path, capsys) -> None:
             ]
         assert main(words(command, given, out)) == 2
         told(capsys.readouterr().err, str(path) if phase != "export" else "waveforms.nc")
-    if phase in JOURNALS:
+    if phase in STORES:
         out.mkdir(exist_ok=True)
-        os.mkfifo(out / JOURNALS[phase])
+        os.mkfifo(out / STORES[phase])
         assert main(words(COMMANDS[phase], made, out)) == 2
-        told(capsys.readouterr().err, JOURNALS[phase])
+        told(capsys.readouterr().err, STORES[phase])
 
 
 def comma_locale(phase: str, made: dict[str, str], out: Path) -> None:

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.evaluate.point import evaluate
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.sweep.point import evaluate
 from tests.reference import monolithic
 
 pytestmark = pytest.mark.physics

@@ -4,10 +4,10 @@ import cProfile
 import pstats
 from functools import partial
 
+from cosim.evaluate.point import point
 from cosim.scene import load
 from cosim.simulation.many import each
 from cosim.simulation.simulate import summary
-from cosim.studies.sweep.point import point
 
 
 def test_python_calls_few_functions_for_a_point() -> None:

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from cosim.evaluate.point import evaluate
 from cosim.scene import list_scenes, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.sweep.point import evaluate
 
 NEEDS_A_FILE = {"trial"}
 DIRECTIONS = {

@@ -13,6 +13,7 @@ import cosim
 from cosim.arrays import Array
 from cosim.cli.main import main
 from cosim.errors import BadInput
+from cosim.evaluate.store import Store
 from cosim.studies.identify import run
 from cosim.studies.identify.chain import chain
 from cosim.studies.identify.problem.space import read_space
@@ -26,7 +27,6 @@ from cosim.studies.identify.report.measures import nrmse
 from cosim.studies.identify.report.scenes import Settings, scene, trial_settings
 from cosim.studies.identify.report.verdicts import judge
 from cosim.studies.identify.run import identify
-from cosim.studies.identify.search.checkpoint import Journal
 from cosim.studies.identify.search.finish import finish
 from cosim.studies.identify.search.plan import QUICK
 from cosim.studies.identify.search.search import Found, Search
@@ -249,9 +249,11 @@ def _from_beside(trials: list[Measured], true: Array, seed: int) -> Found:
     return finish(fine, found, 60)
 
 
-def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(tmp_path: Path) -> None:
-    """On one thread and on two; with a journal that lacks the last stages, and a trial whose part
-    was not measured."""
+def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On one thread and on two; with a store of the first stages, and a trial whose part was not
+    measured."""
     write(tmp_path, "4", record("4", 100))
     write(tmp_path, "5", {k: z for k, z in record("5", 100).items() if k != "z_part"})
     free = {"coil.force_factor", "mechanics.surface_mass"}
@@ -259,16 +261,28 @@ def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(tmp_path: P
     bounds = tmp_path / "bounds.toml"
     bounds.write_text("".join(given))
     more: dict[str, Any] = {"bounds": bounds, "quick": True, "seed": 4}
-    whole = identify(tmp_path, workers=2, journal=tmp_path / "whole.json", **more)
-    content = json.loads((tmp_path / "whole.json").read_text())
-    stages = list(content["done"])
-    content["done"] = {name: content["done"][name] for name in stages[: len(stages) // 2]}
-    (tmp_path / "half.json").write_text(json.dumps(content))
-    again = identify(tmp_path, workers=1, journal=tmp_path / "half.json", **more)
+    whole = identify(tmp_path, workers=2, out=tmp_path / "out", **more)
+    plain, done = Store.add, [0]
+
+    def counted(store: Store, key: str, found: Any) -> None:
+        plain(store, key, found)
+        done[0] += 1
+        if done[0] == 5:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(Store, "add", counted)
+        identify(tmp_path, workers=2, out=tmp_path / "wild", **more)
+    assert {path.name for path in (tmp_path / "wild").iterdir()} == {"identify.sqlite"}
+    with pytest.raises(BadInput, match="belongs to other work"):
+        identify(tmp_path, workers=1, out=tmp_path / "wild", **{**more, "seed": 5})
+    heard = Store.once
+    monkeypatch.setattr(Store, "once", lambda *given: done.append(1) or heard(*given))
+    monkeypatch.setattr(Store, "add", lambda *given: done.append(-1) or plain(*given))
+    again = identify(tmp_path, workers=1, out=tmp_path / "wild", **more)
+    assert sum(done[1:]) == 5, "stages that were not done again"
     assert again.numbers == whole.numbers
-    assert (tmp_path / "half.json").read_text() == (tmp_path / "whole.json").read_text()
     assert whole.numbers["cost"] < 0.1
-    whole.save(tmp_path / "out")
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"identify.json", "identify.csv", "identify.md", "rig.toml", "trial-04.toml"} <= names
     loaded = cosim.load(tmp_path / "out" / "trial-04.toml")
@@ -276,16 +290,7 @@ def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(tmp_path: P
     assert loaded.mechanics.surface_mass == pytest.approx(mass, rel=1e-5)
 
 
-def test_a_journal_of_other_trials_is_not_taken(tmp_path: Path) -> None:
-    path = tmp_path / "journal.json"
-    one = Found(np.zeros(2), np.zeros((1, 7)), np.ones(1), 1.0)
-    Journal(path, 0, "these").stage("a", lambda rng: [one])
-    assert Journal(path, 0, "these").resumed == 1
-    assert Journal(path, 0, "others").resumed == 0
-    assert Journal(path, 1, "these").resumed == 0
-
-
-def test_a_journal_of_another_build_is_not_taken(
+def test_a_store_of_another_build_is_not_taken(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Its stages would stand among those of this one."""

@@ -16,17 +16,17 @@ from scipy.linalg import expm
 from cosim.arrays import Array
 from cosim.cli.main import main
 from cosim.errors import BadInput
+from cosim.evaluate.point import Outcome
 from cosim.files.picture import Picture
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
 from cosim.studies.limits import aims, confirm, runs, search, study
 from cosim.studies.limits.aims import QUANTITIES
 from cosim.studies.limits.answer import BINDS, NOTHING, UNTOLD, Change
-from cosim.studies.limits.report import JOURNAL, run
+from cosim.studies.limits.report import STORE, run
 from cosim.studies.limits.runs import Bench, Case
 from cosim.studies.limits.search import NOWHERE, Clouds, Effort, Leads, Search
 from cosim.studies.limits.table import LIMITS, Machine, needed_acceleration
-from cosim.studies.sweep.point import Outcome
 from tests.studies.test_figures import assert_legible
 
 BY_NAME = {limit.name: limit for limit in LIMITS}
@@ -44,7 +44,7 @@ def brief(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def bench(folder: Path, scene: Any = "reference", **more: Any) -> Bench:
-    return Bench(load(scene), str(scene), folder / JOURNAL, 2, **more)
+    return Bench(load(scene), str(scene), folder / STORE, 2, **more)
 
 
 def test_back_emf_is_turned_alone() -> None:
@@ -477,7 +477,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         told=lambda count, name: steps.append(count),
     )  # fmt: skip
     assert steps == [len(steps)] * len(steps)
-    assert "The part slips down from 50 m/s² on" in said and not (tmp_path / JOURNAL).exists()
+    assert "The part slips down from 50 m/s² on" in said and not (tmp_path / STORE).exists()
     with open(tmp_path / "limits.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert {row["limit"] for row in rows} == {"own", "ideal current", *(x.name for x in limits)}

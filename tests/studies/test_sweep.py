@@ -14,13 +14,13 @@ from matplotlib.colors import Normalize
 
 from cosim.cli.main import main
 from cosim.errors import BadInput
+from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.point import Outcome, evaluate
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.sweep import figure, sweep
 from cosim.studies.sweep.dataset import read
 from cosim.studies.sweep.design import Design, grid, sample
-from cosim.studies.sweep.point import Outcome, evaluate
-from cosim.studies.sweep.pool import Pool
 from cosim.toolchain import processes
 
 SHORT = ["run.duration=0.1", "run.settle=0.05"]
@@ -143,8 +143,9 @@ def test_worker_that_keeps_dying() -> None:
 
     killer = threading.Thread(target=kill)
     killer.start()
-    for number, outcome in Pool(scene, 2).run(points):
-        outcomes[number] = outcome
+    with Evaluator(scene, workers=2) as bench:
+        for number, outcome in bench.run(points):
+            outcomes[number] = outcome
     killer.join()
     assert re.match(r"The simulation's process died at t = .* s \(SIGKILL\)", outcomes[0].failure)
     assert outcomes[0].machine
@@ -170,7 +171,7 @@ def test_dask(tmp_path: Path) -> None:
 
 
 def test_no_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cosim.studies.sweep.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("cosim.evaluate.cluster.PATIENCE", 0.5)
     with pytest.raises(BadInput, match="no cluster answers"):
         sweep(load("held"), {"friction.mu_s": [0.7]}, out=tmp_path, dask="tcp://127.0.0.1:9")
 
@@ -182,8 +183,8 @@ def test_folder_of_another_sweep(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="other work"):
         sweep(scene, {"friction.mu_s": [0.8]}, out=tmp_path, workers=1)
     assert (tmp_path / "sweep.nc").read_bytes() == before
-    (tmp_path / "sweep.journal").write_bytes(b'{"journal": "torn')
-    with pytest.raises(BadInput, match="other work"):
+    (tmp_path / "sweep.sqlite").write_bytes(b'{"journal": "torn')
+    with pytest.raises(BadInput, match="no store of cosim's"):
         sweep(scene, {"friction.mu_s": [0.7]}, out=tmp_path, workers=1)
 
 
@@ -243,7 +244,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*arguments, *over, "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert "6 points, 0 failed" in said and "fastest up" in said
-    assert {path.name for path in tmp_path.iterdir()} == {"sweep.nc", "sweep.journal", "figure.png"}
+    assert {path.name for path in tmp_path.iterdir()} == {"sweep.nc", "sweep.sqlite", "figure.png"}
 
 
 def test_no_point_could_be_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -282,4 +283,4 @@ def test_a_kill_leaves_no_older_figure(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr("cosim.studies.sweep.figure.draw", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         sweep("held", {"coil.count": [1]}, {"run.duration": 0.01}, out=tmp_path, workers=1)
-    assert {path.name for path in tmp_path.iterdir()} == {"sweep.nc", "sweep.journal"}
+    assert {path.name for path in tmp_path.iterdir()} == {"sweep.nc", "sweep.sqlite"}

@@ -6,10 +6,9 @@ from pathlib import Path
 import psutil
 import pytest
 
+from cosim.evaluate.evaluator import Evaluator
 from cosim.scene import load
 from cosim.studies.sweep.design import grid
-from cosim.studies.sweep.journal import journal
-from cosim.studies.sweep.pool import Pool
 
 pytestmark = pytest.mark.reliability
 
@@ -21,13 +20,11 @@ def test_parent_stays_flat(name: str, tmp_path: Path) -> None:
     design = grid({"friction.mu_s": [0.6 + 1e-5 * k for k in range(6000)]})
     process = psutil.Process()
     sizes = []
-    with journal(tmp_path / "journal", "test", len(design)) as kept:
+    with Evaluator(scene, tmp_path / "store", workers=2) as bench:
         points = ((k, design.point(k)) for k in range(len(design)))
-        for number, outcome in Pool(scene, 2).run(points):
+        for done, (_, outcome) in enumerate(bench.run(points), 1):
             assert not outcome.failure
-            kept.add(number, outcome)
-            if len(kept.done) % 1000 == 0:
+            if done % 1000 == 0:
                 gc.collect()
                 sizes.append(process.memory_info().rss / 1e6)
-    # The numbers of the points that are done are remembered: 60 bytes each.
     assert sizes[-1] - sizes[0] < 2.0, f"MB after each 1,000 points: {sizes}"

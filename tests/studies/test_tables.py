@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from cosim.errors import SimulationFailed
+from cosim.evaluate.store import Store
 from cosim.scene import Scene
 from cosim.studies.accuracy.accuracy import error_in, order, time_to
 from cosim.studies.accuracy.cases import CASES, Case
 from cosim.studies.accuracy.runs import FALSE_CYCLE, Run, measure, reference
 from cosim.studies.accuracy.solvers import Outcome, Solver
-from cosim.studies.pieces import Pieces
 from cosim.studies.tables import write_csv, write_page
 
 REFERENCE = CASES["reference"]
@@ -34,7 +34,9 @@ def solver(errors: dict[float, float | str]) -> Solver:
 
 
 def test_error_and_order_of_known_runs() -> None:
-    runs = measure(REFERENCE, [solver({h: 30.0 * h**1.5 for h in STEPS})], rounds=2, piece=Pieces())
+    runs = measure(
+        REFERENCE, [solver({h: 30.0 * h**1.5 for h in STEPS})], rounds=2, store=Store(None)
+    )
     assert [run.error for run in runs] == pytest.approx([30.0 * h**1.5 for h in STEPS], rel=1e-6)
     assert order(runs) == pytest.approx(1.5, abs=1e-6)
     assert not any(run.failure for run in runs)
@@ -58,7 +60,7 @@ def test_failures_are_marked() -> None:
             )
         ],
         rounds=1,
-        piece=Pieces(),
+        store=Store(None),
     )
     assert [run.failure for run in found] == [
         "false limit cycle",

@@ -9,10 +9,10 @@ import pytest
 
 from cosim.cli.main import main
 from cosim.errors import BadInput, SimulationFailed
+from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.point import periods_made_whole
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.sweep.point import periods_made_whole
-from cosim.studies.sweep.pool import Pool
 from cosim.studies.tune import tune
 
 
@@ -158,9 +158,9 @@ def test_a_search_that_was_interrupted_goes_on(
     calm, wild = tmp_path / "calm", tmp_path / "wild"
     assert main([*words, f"--out={calm}"]) == 0
     ran: list[object] = []
-    plain = Pool.run
+    plain = Evaluator._run
 
-    def counted(self: Pool, points: Any) -> Any:
+    def counted(self: Evaluator, points: Any) -> Any:
         for found in plain(self, points):
             if len(ran) == 17:
                 raise KeyboardInterrupt
@@ -168,16 +168,18 @@ def test_a_search_that_was_interrupted_goes_on(
             yield found
 
     with monkeypatch.context() as patch:
-        patch.setattr(Pool, "run", counted)
+        patch.setattr(Evaluator, "_run", counted)
         assert main([*words, f"--out={wild}"]) == 130
-        assert {path.name for path in wild.iterdir()} == {"tune.journal", "tune.csv"}
+        assert {path.name for path in wild.iterdir()} == {"tune.sqlite", "tune.csv"}
     heard: list[object] = []
     monkeypatch.setattr(
-        Pool, "run", lambda self, points: (heard.append(1) or one for one in plain(self, points))
+        Evaluator,
+        "_run",
+        lambda self, points: (heard.append(1) or one for one in plain(self, points)),
     )
     assert main([*words, f"--out={wild}"]) == 0
     with open(calm / "tune.csv", encoding="utf-8") as file:
         assert len(heard) + 17 == len(file.readlines()) - 1
     for name in ("tune.csv", "tune.json", "best.toml"):
         assert (wild / name).read_bytes() == (calm / name).read_bytes()
-    assert not (wild / "tune.journal").exists()
+    assert not (wild / "tune.sqlite").exists()

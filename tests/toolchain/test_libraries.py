@@ -114,10 +114,11 @@ def test_a_worker_loads_nothing_from_the_working_folder(tmp_path: Path) -> None:
     for name in ("multiprocessing", "signal", "numpy"):
         (tmp_path / f"{name}.py").write_text(f"open('{name} was run', 'w')\nraise SystemExit\n")
     program = (
-        "from cosim.studies.sweep.pool import Pool\n"
+        "from cosim.evaluate.evaluator import Evaluator\n"
         "from cosim.scene import load\n"
-        "pool = Pool(load('paper', ['run.duration=0.01', 'run.settle=0']), 1)\n"
-        "print(*pool.run([(0, {})]))\n"
+        "scene = load('paper', ['run.duration=0.01', 'run.settle=0'])\n"
+        "with Evaluator(scene, workers=1) as bench:\n"
+        "    print(*bench.run([(0, {})]))\n"
     )
     done = subprocess.run(
         [sys.executable, "-P", "-c", program],

@@ -16,16 +16,17 @@ def _run(arguments: Namespace) -> None:
 
     scenes = [load(source, arguments.overrides) for source in arguments.scenes or ["paper"]]
     with writable(arguments.out, shared=True):
+        from cosim.evaluate.store import Store
         from cosim.studies.circuit import ladder, ladder_report
-        from cosim.studies.pieces import pieces
 
         asked = [scene.as_dict() for scene in scenes]
         with (
-            pieces(arguments.out / "ladder.journal", "ladder", asked) as piece,
+            Store(arguments.out / "ladder.sqlite", asked) as store,
             progress_bar("ladder", ladder.runs_in_all() * len(scenes), "run") as bar,
         ):
-            found = [(scene, ladder.ladder(scene, piece, bar.update)) for scene in scenes]
+            found = [(scene, ladder.ladder(scene, store, bar.update)) for scene in scenes]
             print(ladder_report.write(arguments.out, found))
+            store.remove()
 
 
 COMMAND = Command(

@@ -77,6 +77,7 @@ def _run(arguments: Namespace) -> None:
             seed=arguments.seed,
             efforts=efforts,
             workers=arguments.workers,
+            dask=arguments.dask,
             told=told,
             progress=bar.refresh,
         )

@@ -29,7 +29,6 @@ def _options(parser: ArgumentParser) -> None:
         "--seed", type=int, default=0, metavar="N", help="of the samples (default: 0)"
     )
     add_workers(parser)
-    parser.add_argument("--dask", metavar="ADDRESS", help="run on the Dask cluster at this address")
     add_out(parser, "results/<scene>-sweep", known=False)
 
 

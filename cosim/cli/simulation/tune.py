@@ -64,6 +64,7 @@ def _run(arguments: Namespace) -> None:
                 seed=arguments.seed,
                 out=folder,
                 workers=arguments.workers,
+                dask=arguments.dask,
                 progress=progress,
                 scouting=scouting,
             )

@@ -61,7 +61,6 @@ class _Line:
 
 def _run(arguments: Namespace) -> None:
     import cosim
-    from cosim.studies.identify.run import JOURNAL
 
     line = _Line()
     with writable(arguments.out):
@@ -72,13 +71,12 @@ def _run(arguments: Namespace) -> None:
                 apart=arguments.apart,
                 quick=arguments.quick,
                 seed=arguments.seed,
-                journal=arguments.out / JOURNAL,
+                out=arguments.out,
                 workers=arguments.workers,
                 progress=line,
             )
         finally:
             line.end()
-        found.save(arguments.out)
     print(found)
     print(f"Written to {arguments.out}: identify.json, .csv, .md, figures and scenes")
 

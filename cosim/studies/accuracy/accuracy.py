@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from cosim.evaluate.store import Store
 from cosim.studies.accuracy import chaos, figures, friction
 from cosim.studies.accuracy.cases import CASES
 from cosim.studies.accuracy.runs import Run, measure, reference
 from cosim.studies.accuracy.solvers import ALL_IN_NGSPICE, DEFAULT, LSODA, SOLVERS, Solver
-from cosim.studies.pieces import pieces
 from cosim.studies.tables import Row, brief, span, write_csv, write_page
 
 EQUAL_TIME, EQUAL_ERROR = 0.5, 1e-3
@@ -140,16 +140,17 @@ def run(out: Path, quick: bool) -> None:
     they show."""
     cases = [case for case in CASES.values() if not case.netlist]
     rounds = 1 if quick else _ROUNDS
-    with pieces(out / "accuracy.journal", "accuracy", quick) as piece:
+    with Store(out / "accuracy.sqlite", quick) as store:
         runs = [
             run
             for case in (cases[-1:] if quick else cases)
-            for run in measure(case, SOLVERS, rounds, piece)
+            for run in measure(case, SOLVERS, rounds, store)
         ]
         write_csv(out / "accuracy.csv", [asdict(run) for run in runs])
         print(write(out, runs))
-        print(friction.run(out, piece))
-        print(chaos.run(out, piece))
+        print(friction.run(out, store))
+        print(chaos.run(out, store))
+        store.remove()
     print(f"Written to {out}: {{accuracy,friction,chaos}}.{{csv,md,png}}")
 
 

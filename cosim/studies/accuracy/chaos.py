@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from cosim.evaluate.store import Store
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.accuracy.figures import draw_chaos
-from cosim.studies.pieces import Pieces
 from cosim.studies.tables import Row, write_csv, write_page
 from cosim.waveforms.result import Result
 
@@ -68,21 +68,23 @@ def growth(scene: Sequence[str], more: Sequence[str] = ()) -> float:
     return float(np.abs(nudged - path).max() / np.ptp(path)) / NUDGE
 
 
-def ensemble(scene: Sequence[str], more: Sequence[str], members: int, piece: Pieces) -> Ensemble:
+def ensemble(scene: Sequence[str], more: Sequence[str], members: int, store: Store) -> Ensemble:
     """The statistics of runs with normal forces apart by :data:`APART`."""
 
     def member(k: int) -> dict[str, float]:
         summary: Any = solved(scene, more, APART * k).summary
         return {name: float(summary[name]) for name in STATISTICS}
 
-    found = [piece(f"chaos, {[*scene, *more]}, {k}", lambda k=k: member(k)) for k in range(members)]
+    found = [
+        store.once(f"chaos, {[*scene, *more]}, {k}", lambda k=k: member(k)) for k in range(members)
+    ]
     return {name: [one[name] for one in found] for name in STATISTICS}
 
 
-def run(out: Path, piece: Pieces) -> str:
+def run(out: Path, store: Store) -> str:
     """Write ``chaos`` as png, csv and md into ``out``; gives what it shows."""
-    grown = piece("chaos, growth", lambda: growth(SCENE))
-    ensembles = {name: ensemble(SCENE, more, MEMBERS, piece) for name, more in METHODS.items()}
+    grown = store.once("chaos, growth", lambda: growth(SCENE))
+    ensembles = {name: ensemble(SCENE, more, MEMBERS, store) for name, more in METHODS.items()}
     first = next(iter(ensembles.values()))
     most = max(apart(first[name], one[name]) for one in ensembles.values() for name in STATISTICS)
     message = (

@@ -21,13 +21,13 @@ from typing import Any
 import numpy as np
 
 from cosim.drive.command import Command
+from cosim.evaluate.store import Store
 from cosim.scene import Scene, load
 from cosim.simulation.peers.lsoda import Machine, U
 from cosim.simulation.peers.lsoda import run as run_machine
 from cosim.studies.accuracy.cases import CASES
 from cosim.studies.accuracy.figures import CREEP, ERROR, draw_friction
 from cosim.studies.accuracy.runs import reference
-from cosim.studies.pieces import Pieces
 from cosim.studies.tables import Row, span, write_csv, write_page
 
 FREQUENCY, ACCELERATION, SLIP = 40.0, 15.0, 0.02
@@ -46,9 +46,9 @@ COULOMB = "set-valued Coulomb"
 _RTOL_IN_THE_MACHINE = 1e-6
 
 
-def run(out: Path, piece: Pieces) -> str:
+def run(out: Path, store: Store) -> str:
     """Write ``friction`` as png, csv and md into ``out``; gives what it shows."""
-    moved = {(row["law"], row["width"]): row for row in in_the_machine(piece)}
+    moved = {(row["law"], row["width"]): row for row in in_the_machine(store)}
     nothing = {ERROR: nan, "CPU time [s]": nan}
     rows = [row | moved.get((row["law"], row["width"]), nothing) for row in creep()]
     exact, *smoothed = rows
@@ -120,7 +120,7 @@ class _Smoothed(Machine):
         return 1.0
 
 
-def in_the_machine(piece: Pieces) -> Iterator[Row]:
+def in_the_machine(store: Store) -> Iterator[Row]:
     """Of each law: error of the part's path on the scene ``stick-slip`` over its range, CPU s."""
     case = CASES["stick-slip"]
     scene = load("reference", [*case.overrides, f"run.duration={case.duration!r}"])
@@ -129,11 +129,11 @@ def in_the_machine(piece: Pieces) -> Iterator[Row]:
         seconds, path = run_machine(scene, case.times(), _RTOL_IN_THE_MACHINE, make)
         return {ERROR: reference(case.name).error(path[np.newaxis]), "CPU time [s]": seconds}
 
-    yield {"law": COULOMB, "width": ""} | piece(COULOMB, lambda: measured(Machine))
+    yield {"law": COULOMB, "width": ""} | store.once(COULOMB, lambda: measured(Machine))
     for name in ("tanh", "LuGre"):
         for width in LAWS[name]:
             law = law_of(name, width, scene)
-            found = piece(
+            found = store.once(
                 f"{name}, {width:g}",
                 lambda law=law: measured(lambda s, d: _Smoothed(s, d, law)),
             )

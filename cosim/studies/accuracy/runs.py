@@ -15,10 +15,10 @@ from time import process_time
 import numpy as np
 
 from cosim.errors import SimulationFailed
+from cosim.evaluate.store import Store
 from cosim.scene import load
 from cosim.studies.accuracy.cases import Case
 from cosim.studies.accuracy.solvers import Solver
-from cosim.studies.pieces import Pieces
 
 _WORSE = 1.5
 """An error this many times that of the next coarser setting marks a run as not monotone."""
@@ -69,7 +69,7 @@ def reference(name: str) -> Reference:
     return Reference(signals, entry["other_method"], entry["growth"])
 
 
-def measure(case: Case, solvers: Sequence[Solver], rounds: int, piece: Pieces) -> list[Run]:
+def measure(case: Case, solvers: Sequence[Solver], rounds: int, store: Store) -> list[Run]:
     """All settings of all solvers on a scene, interleaved; times are medians over the rounds."""
     scene = load("reference", case.overrides)
     plan = [(solver, value) for solver in solvers for value in solver.values(case)]
@@ -93,7 +93,7 @@ def measure(case: Case, solvers: Sequence[Solver], rounds: int, piece: Pieces) -
             if turn and (done[k][3] or seconds[k][0] > 1.0):
                 continue
             name = f"{case.name}, {solver.name}, {value!r}, {turn}"
-            found = piece(name, lambda solver=solver, value=value: once(solver, value))
+            found = store.once(name, lambda solver=solver, value=value: once(solver, value))
             seconds[k].append(found[0])
             if not turn:
                 done.append(found)

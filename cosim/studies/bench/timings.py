@@ -13,17 +13,14 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
 from cosim.coupling.loop.structures import loop
+from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.point import point
 from cosim.mechanics import part
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
 from cosim.simulation.rungs.rung import rungs
 from cosim.studies.bench.measures import ratios, take_turns
 from cosim.studies.fit.cases import Case, Solver
-from cosim.studies.sweep.dataset import Numbers
-from cosim.studies.sweep.design import grid
-from cosim.studies.sweep.journal import journal
-from cosim.studies.sweep.point import point
-from cosim.studies.sweep.pool import Pool
 from cosim.trials import published
 
 OTHER_FORCE = 14.0  # weights of the part, on a trial that is not among the published
@@ -46,25 +43,21 @@ def solvers(cases: Sequence[Case], rounds: int) -> dict[str, float]:
 
 
 def map_over_bare_calls(scene: Scene, offsets: Sequence[float], rounds: int) -> dict[str, float]:
-    """CPU time of a sweep, from its points to their numbers in journal and memory, over that of
+    """CPU time of many runs, from their settings to the numbers in a file, over that of
     bare calls of the compiled loop, whose preparation does not count: median, ``low``, ``high``.
 
     The points are ``scene`` with each of the ``offsets`` (V). Both take turns.
     """
-    design = grid({"drive.offset": offsets})
-    points = [(number, design.point(number)) for number in range(len(design))]
+    points = [*enumerate({"drive.offset": offset} for offset in offsets)]
     bare, swept = [], []
     for _ in range(rounds + 1):
         bare.append(sum(_bare(point(scene, values, False)) for _, values in points))
         with (
             TemporaryDirectory() as folder,
-            journal(Path(folder) / "journal", "", len(design)) as written,
+            Evaluator(scene, Path(folder) / "store", workers=1) as bench,
         ):
             began = process_time()
-            numbers = Numbers(len(design))
-            for number, outcome in Pool(scene, 1).run(points):
-                written.add(number, outcome)
-                numbers.add(number, outcome)
+            assert len(list(bench.run(points))) == len(points)
             swept.append(process_time() - began)
     return ratios(swept[1:], bare[1:])  # the first round warms up
 

@@ -8,12 +8,11 @@ from statistics import median
 from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
+from cosim.evaluate.point import periods_made_whole
+from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene, changed
 from cosim.simulation.choose_rung import relative_error
 from cosim.simulation.simulate import simulate
-from cosim.studies.pieces import Pieces
-from cosim.studies.sweep.journal import hashed
-from cosim.studies.sweep.point import periods_made_whole
 
 RUNGS = ("ideal", "limited", "amplifier", "full")
 """Cheapest first. "full" has the data sheet's output stage and the firmware's staircase besides."""
@@ -41,9 +40,7 @@ def runs_in_all() -> int:
     return sum(REPEATS.get(model, MOST) for model in RUNGS)
 
 
-def ladder(
-    scene: Scene, piece: Pieces, progress: Callable[[], object] = lambda: None
-) -> list[Rung]:
+def ladder(scene: Scene, store: Store, progress: Callable[[], object] = lambda: None) -> list[Rung]:
     """Run a scene on each rung in turn, and again for the cost. Raises BadInput, SimulationFailed.
 
     Averages are over whole periods; few rows are written, so that the cost is the rung's own.
@@ -67,7 +64,7 @@ def ladder(
     for repeat in range(MOST):
         for model in (model for model in RUNGS if repeat < REPEATS.get(model, MOST)):
             name = f"{own}, {model}, {repeat}"
-            seconds, numbers[model] = piece(name, lambda model=model: once(model))
+            seconds, numbers[model] = store.once(name, lambda model=model: once(model))
             spent[model].append(seconds / runs[model].run.duration)
             progress()
     averages = {model: found["v_average"] for model, found in numbers.items()}

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import BadInput, plain
+from cosim.evaluate.evaluator import workers_asked
+from cosim.evaluate.store import Store
 from cosim.files.picture import Picture
 from cosim.scene import keys
 from cosim.studies.identify.chain.chain import OWN
@@ -24,12 +26,9 @@ from cosim.studies.identify.report.measures import Row, bands, errors, own_numbe
 from cosim.studies.identify.report.scenes import trial_settings
 from cosim.studies.identify.report.solved import HeldOut, Solved
 from cosim.studies.identify.report.verdicts import Profile, ensemble_of, judge
-from cosim.studies.identify.search.checkpoint import Journal
 from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds
 from cosim.studies.identify.search.search import Found, Progress, Search
-from cosim.studies.sweep.pool import workers_asked
 from cosim.toolchain.libraries import digest
-from cosim.toolchain.versions import versions
 
 UNSTEADY = 0.5
 """Repeatability of a velocity (NRMSE of its cycles) beyond which no steady drive explains it."""
@@ -40,7 +39,7 @@ FIRSTS = 3
 PROFILE_STEPS = (0.04, 0.12, 0.25)
 """Distances from the best value of a key at which it is held, of its bounds' range."""
 
-JOURNAL = "identify-journal.json"
+STORE = "identify.sqlite"
 
 
 class Identification(Solved):
@@ -72,7 +71,7 @@ def identify(
     apart: Sequence[str] = (),
     quick: bool = False,
     seed: int = 0,
-    journal: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Identification:
@@ -80,9 +79,10 @@ def identify(
 
     ``bounds`` is a TOML file in the form of the shipped ``bounds.toml``, for one's own rig; trials
     named in ``apart``, and those that do not repeat themselves, are not fitted but only reported.
-    ``quick`` searches little. Stages that are done are kept in the file ``journal`` and not done
-    again. The same ``seed`` gives the same result, on any number of ``workers`` (threads; one for
-    each processor by default). ``progress`` is told what is done and the best cost so far.
+    ``quick`` searches little. In the folder ``out`` it leaves what ``Identification.save`` writes,
+    and takes up what an interrupted identification has left there. The same ``seed`` gives the same
+    result, on any number of ``workers`` (threads; one for each processor by default). ``progress``
+    is told what is done and the best cost so far.
 
     The method: :mod:`cosim.studies.identify.search.plan`. Raises BadInput.
     """
@@ -101,14 +101,29 @@ def identify(
     if not steady:
         raise BadInput(f"{trials}: no trial is left to be fitted: none repeats itself.")
     effort, count = QUICK if quick else FULL, workers_asked(workers)
-    plan = Plan(
-        Search(space, [trial.target for trial in steady], count),
-        Search(space, [trial.fine for trial in steady], count),
-        effort,
-        Journal(Path(journal) if journal else None, seed, _asked(space, steady, effort)),
-        progress or (lambda what, best: None),
-    )
-    rows = [*range(len(steady))]
+    path = None
+    if out is not None:
+        path = Path(out) / STORE
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with Store(path, seed, *_asked(space, steady, effort)) as store:
+        plan = Plan(
+            Search(space, [trial.target for trial in steady], count),
+            Search(space, [trial.fine for trial in steady], count),
+            effort,
+            store.once,
+            seed,
+            progress or (lambda what, best: None),
+        )
+        made = _identified(plan, steady, others)
+        made = replace(made, numbers=_numbers(made, seed, quick))
+        if out is not None:
+            made.save(out)
+            store.remove()
+    return made
+
+
+def _identified(plan: Plan, steady: list[Measured], others: list[Measured]) -> Identification:
+    space, effort, rows = plan.coarse.space, plan.effort, [*range(len(steady))]
     found = plan.ensemble("all trials", rows, effort.rounds)
     ensemble = ensemble_of(found)
     # The step of the search does not order solutions that are as good: the finish does.
@@ -121,14 +136,13 @@ def identify(
     best = min(ends, key=lambda one: one.total)
     fold_rigs, held_out = _folds(plan, steady) if len(steady) >= 3 else ([], [])
     verdicts = judge(space, best, ensemble, fold_rigs, profiles)
-    aside = Search(space, [trial.fine for trial in others], count)
+    aside = replace(plan.fine, targets=[trial.fine for trial in others])
     apart_own = plan.drives("trials apart", best.place, aside).own if others else np.empty((0, 0))
     made_up = _made_up(plan)
-    made = Identification(
+    return Identification(
         *(space, steady, others, best, apart_own, ensemble, fold_rigs, held_out),
         *(verdicts, profiles, made_up, {}),
     )
-    return replace(made, numbers=_numbers(made, seed, quick))
 
 
 def _steady(trial: Measured) -> bool:
@@ -151,7 +165,7 @@ def _asked(space: Space, trials: Sequence[Measured], effort: object) -> Any:
         ]
         for trial in trials
     ]
-    return [entries, sums, repr(effort), WEIGHTS, TRANSPORT, versions(), digest("chain")]
+    return [entries, sums, repr((effort, WEIGHTS, TRANSPORT)), digest("chain")]
 
 
 def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[HeldOut]]:

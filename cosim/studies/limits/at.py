@@ -3,11 +3,11 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
+from cosim.evaluate.point import Outcome
 from cosim.scene import Scene, changed
 from cosim.scene.tables import KNOBS
 from cosim.studies.limits.runs import Bench
 from cosim.studies.limits.table import Limit, Settings
-from cosim.studies.sweep.point import Outcome
 
 WITHOUT = ("knobs' range", "coil heat")
 """Limits that only bound the choice of a setting."""

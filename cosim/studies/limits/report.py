@@ -13,7 +13,6 @@ from cosim.studies.limits.confirm import Point, Points, confirmed, judged
 from cosim.studies.limits.runs import Bench
 from cosim.studies.limits.study import FULL, IDEAL, OWN, Efforts, Study, study, told_count
 from cosim.studies.limits.table import LIMITS, Limit, Settings, needed_acceleration
-from cosim.studies.sweep.pool import workers_asked
 from cosim.studies.tables import Row, write_csv, write_page
 
 
@@ -149,7 +148,7 @@ def cost(there: There, limit: Limit) -> float:
     return after - before
 
 
-JOURNAL = "limits.journal"
+STORE = "limits.sqlite"
 
 
 def run(
@@ -163,25 +162,25 @@ def run(
     efforts: Efforts = FULL,
     limits: Sequence[Limit] = LIMITS,
     workers: int | None = None,
+    dask: str | None = None,
     told: Callable[[int, str], object] = lambda steps, name: None,
     progress: Callable[[], object] = lambda: None,
 ) -> str:
     """Search, confirm, lift at the scenes ``there``, and write ``limits.*`` into ``folder``; gives
-    what is printed. The journal beside them, from which a killed study goes on, is gone at the end.
+    what is printed. The store beside them, from which a killed study goes on, is gone at the end.
 
     ``asked`` are the words after ``cosim run`` that stand for the scene; ``told`` hears of each
     step, and how many there are, ``progress`` of each run. Raises BadInput.
     """
     steps = told_count(limits, efforts, len(rigs)) + 2 + len(there)
-    journal = folder / JOURNAL
 
     def done(name: str) -> None:
         told(steps, name)
 
-    with Bench(scene, asked, journal, workers_asked(workers), progress) as bench:
+    with Bench(scene, asked, folder / STORE, workers, dask, progress) as bench:
         found = study(bench, rigs, limits, seed, efforts, done)
         points = confirmed(bench, found, done)
         points |= judged(bench, found, points, done)
         words = write(folder, bench, found, points, at(bench, there, limits, done))
-    journal.unlink()
+        bench.evaluator.forget()
     return words

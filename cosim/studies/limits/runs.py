@@ -1,9 +1,6 @@
-"""Runs settings of machines, each once, and keeps them in a journal: a killed study goes on."""
+"""What the runs of machines tell: scores, heat, and what coil and power amplifier bear."""
 
-import hashlib
-import json
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from math import ceil, inf
 from pathlib import Path
@@ -12,23 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.arrays import Array
+from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.point import Outcome
 from cosim.scene import Scene, changed, firmware
 from cosim.simulation.guards import coil_heat
 from cosim.studies.limits import aims
 from cosim.studies.limits.aims import NEEDED, QUANTITIES, Numbers, scores
 from cosim.studies.limits.table import Machine, Settings
-from cosim.studies.sweep.journal import hashed, journal
-from cosim.studies.sweep.point import Outcome
-from cosim.studies.sweep.pool import Pool
 
 SETTLE, SPAN = 0.4, 0.6
 """s, left out of averages and averaged over, at least; made whole periods."""
 
 OPA548_CURRENT = 5.0
 """A: the OPA548's peak current (data sheet SBOS070D)."""
-
-NUMBERS = 1 << 56
-"""How many settings can be told apart."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +57,8 @@ class Bench:
         scene: Scene,
         asked: str,
         path: Path,
-        workers: int,
+        workers: int | None = None,
+        dask: str | None = None,
         progress: Callable[[], object] = lambda: None,
     ) -> None:
         own = aims.FREE | {
@@ -78,33 +72,23 @@ class Bench:
             for key, value in own.items()
             if isinstance(value, bool) and tables["drive"][key.split(".")[1]] != value
         }
-        self._pool, self._progress = Pool(self.scene, workers), progress
-        self._asked, self._path = asked, path
-        self._stack = ExitStack()
-        self._done: dict[int, Outcome] = {}
+        self._asked, self._progress = asked, progress
+        self.evaluator = Evaluator(self.scene, path, kept=NEEDED, workers=workers, dask=dask)
 
     def __enter__(self) -> "Bench":
-        from cosim.mechanics import package
-        from cosim.toolchain.versions import versions
-
-        identity = hashed(self.scene.as_dict(), versions(), package.token())
-        self._journal = self._stack.enter_context(journal(self._path, identity, NUMBERS))
-        self._done = dict(self._journal.read())
+        self.evaluator.__enter__()
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
+    def __exit__(self, *failure: object) -> None:
+        self.evaluator.__exit__(*failure)
 
     def outcomes(self, every: Sequence[Settings]) -> list[Outcome]:
         """What becomes of each settings, on the circuit that they name."""
-        numbers = [_number(settings) for settings in every]
-        new = {n: s for n, s in zip(numbers, every, strict=True) if n not in self._done}
-        for number, outcome in self._pool.run(new.items()):
-            kept = {name: outcome.numbers[name] for name in NEEDED if name in outcome.numbers}
-            self._done[number] = Outcome(kept, outcome.failure, outcome.machine)
-            self._journal.add(number, self._done[number])
+        found: dict[int, Outcome] = {}
+        for number, outcome in self.evaluator.run(enumerate(every)):
+            found[number] = outcome
             self._progress()
-        return [self._done[number] for number in numbers]
+        return [found[number] for number in range(len(every))]
 
     def scores(self, case: Case, places: Array) -> tuple[Array, NDArray[np.bool_]]:
         """The scores of places (rows), -inf where a run fails, and which of them are bearable."""
@@ -149,11 +133,6 @@ class Bench:
         every = {**self._unlike, **settings, **rows}
         words = (f"--set {key}={_typed(value)}" for key, value in every.items())
         return f"cosim run {self._asked} {' '.join(words)}"
-
-
-def _number(settings: Settings) -> int:
-    said = json.dumps(settings, sort_keys=True).encode()
-    return int.from_bytes(hashlib.sha256(said).digest()[:7], "big")  # below NUMBERS
 
 
 def _typed(value: float | int | str) -> str:

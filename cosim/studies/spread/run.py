@@ -6,12 +6,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
+from cosim.evaluate.evaluator import Evaluator
 from cosim.scene import Scene, changed, keys, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.choose_rung import WITHOUT_NGSPICE, relative_error, without_ngspice
 from cosim.studies.spread.turns import TURN, Settings, turns
-from cosim.studies.sweep.pool import Pool, workers_asked
-from cosim.studies.sweep.report import with_unit
+from cosim.waveforms.quantities import with_unit
 
 UNITS = {key.full: key.unit for key in keys()}
 
@@ -99,7 +99,7 @@ def spread(
     >>> found.least.v_average <= found.runs[0].v_average <= found.most.v_average
     True
     """
-    scene, count = load(scene, overrides), workers_asked(workers)
+    scene = load(scene, overrides)
     every: list[Settings] = [{}, *turns(scene)]
     done = 0
 
@@ -115,7 +115,7 @@ def spread(
                 found[n] = Turned(every[n], model, None, str(error))
             else:
                 points[n] = {**every[n], **circuit}
-        for n, outcome in pool.run(points.items()):
+        for n, outcome in bench.run(points.items()):
             value = None if outcome.failure else outcome.numbers["v_average"]
             found[n] = Turned(every[n], model, value, outcome.failure)
             done += 1
@@ -123,17 +123,17 @@ def spread(
         return found
 
     numbers = set(range(len(every)))
-    pool = Pool(scene, min(count, len(every)), whole_periods=True)
-    if without_ngspice(scene) is None:
-        found = run(numbers, {})
-    else:
-        found = run(numbers, WITHOUT_NGSPICE)
-        known = [n for n, one in found.items() if one.v_average is not None]
-        ends = {0, *(end(known, key=lambda n: _speed(found[n])) for end in (min, max) if known)}
-        exact = run(ends, {})
-        if any(_off(found[n], exact[n]) > scene.run.tolerance for n in ends):
-            exact |= run(numbers - ends, {})
-        found |= exact
+    with Evaluator(scene, whole_periods=True, workers=workers) as bench:
+        if without_ngspice(scene) is None:
+            found = run(numbers, {})
+        else:
+            found = run(numbers, WITHOUT_NGSPICE)
+            known = [n for n, one in found.items() if one.v_average is not None]
+            ends = {0, *(end(known, key=lambda n: _speed(found[n])) for end in (min, max) if known)}
+            exact = run(ends, {})
+            if any(_off(found[n], exact[n]) > scene.run.tolerance for n in ends):
+                exact |= run(numbers - ends, {})
+            found |= exact
     made = Spread([found[n] for n in sorted(found)])
     if not made.known:
         raise SimulationFailed(f"No setting could be run; the first one: {made.runs[0].failure}")

@@ -18,8 +18,8 @@ from cosim.coupling.rewind.iterated import Iterated
 from cosim.coupling.rewind.joint import Joint
 from cosim.coupling.rewind.stability import largest_stable_step, observed_limit
 from cosim.drive.command import command
+from cosim.evaluate.store import Store
 from cosim.scene import changed
-from cosim.studies.pieces import Pieces
 from cosim.studies.stability.machines import (
     DIRECT,
     REFERENCE,
@@ -109,7 +109,7 @@ def observed(method: str, regime: Regime, expected: float) -> float:
         return observed_limit(fresh, low, high, steps=steps, leap=1.05)
 
 
-def limits(regimes: Sequence[Regime], piece: Pieces) -> Iterator[Limit]:
+def limits(regimes: Sequence[Regime], store: Store) -> Iterator[Limit]:
     """Each method in each regime."""
     for regime in regimes:
         m, part = regime.machine, "slips" if regime.slips else "sticks"
@@ -120,7 +120,7 @@ def limits(regimes: Sequence[Regime], piece: Pieces) -> Iterator[Limit]:
                 expected = predicted(method, regime)
                 return [expected, observed(method, regime, expected)]
 
-            yield Limit(*given, method, *piece(f"{method}, {given}", found))
+            yield Limit(*given, method, *store.once(f"{method}, {given}", found))
 
 
 def with_limits(steps: Sequence[float]) -> Iterator[Row]:

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from cosim.coupling.rewind.methods import ORDERS
-from cosim.studies.pieces import pieces
+from cosim.evaluate.store import Store
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, End, label_ends, panels
 from cosim.studies.stability.limits import (
     LONGEST,
@@ -26,9 +26,10 @@ _COLORS = {1: ORANGE, 2: BLUE, 3: GREEN}
 def run(out: Path, quick: bool) -> None:
     """Write ``stability`` as png, csv and md into ``out``, and print what it shows."""
     regimes = [*(REGIMES[:1] if quick else REGIMES), *over_strength(3 if quick else 9)]
-    with pieces(out / "stability.journal", "stability", quick) as piece:
-        found = list(limits(regimes, piece))
+    with Store(out / "stability.sqlite", quick) as store:
+        found = list(limits(regimes, store))
         _report(out, found)
+        store.remove()
 
 
 def _report(out: Path, found: Sequence[Limit]) -> None:

@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from cosim.arrays import Array
+from cosim.evaluate.point import Outcome
 from cosim.files.atomic import together
 from cosim.scene import Scene, firmware, keys, to_toml
 from cosim.studies.sweep.design import Design
-from cosim.studies.sweep.point import Outcome
 from cosim.waveforms.quantities import meaning
 
 FAILURE = "failure"

@@ -1,6 +1,6 @@
 """Which settings a sweep visits: a grid of axes, or a sample of the ranges that they span."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, prod
 from numbers import Integral
@@ -8,14 +8,13 @@ from numbers import Integral
 import numpy as np
 
 from cosim.errors import BadInput, plain
-from cosim.scene import Key, keys
-from cosim.scene.messages import ended, shown, suggestion
-from cosim.studies.sweep.point import Number
+from cosim.evaluate.keys import FREQUENCIES, numeric_key, split
+from cosim.evaluate.point import Number
+from cosim.scene import Key
+from cosim.scene.messages import shown
 
 MOST_POINTS = 1_000_000
 """Their numbers take 2.3 GB when the dataset is written."""
-
-FREQUENCIES = ("drive.frequency", "drive.pot_frequency", "drive.loop_time")
 
 
 @dataclass(frozen=True)
@@ -124,31 +123,6 @@ def parse(options: Sequence[str]) -> dict[str, tuple[Number, ...]]:
             axes[name] = tuple(_number(text, part) for part in right.split(","))
         _check_count(axes)
     return axes
-
-
-def split(options: Sequence[str], form: str) -> Iterator[tuple[str, str, str]]:
-    """Each option of this form, its key, which no other one has, and its values; BadInput."""
-    names: set[str] = set()
-    for text in options:
-        name, _, right = (part.strip() for part in text.partition("="))
-        if not (name and right):
-            raise BadInput(f"--over {plain(text)}: must be {form}.")
-        if name in names:
-            raise BadInput(f"--over {plain(name)}: this key is given twice.")
-        names.add(name)
-        yield text, name, right
-
-
-def numeric_key(name: str) -> Key:
-    """The key with this full name. Raises BadInput for one that is unknown or no number."""
-    numeric = {key.full: key for key in keys() if key.kind in (int, float) and not key.choices}
-    if name in numeric:
-        return numeric[name]
-    if any(key.full == name for key in keys()):
-        raise BadInput(f"--over {plain(name)}: this key is not a number.")
-    bare = [full for full, key in numeric.items() if key.name == name]
-    hint = f"; did you mean {bare[0]}?" if bare else suggestion(name, numeric)
-    raise BadInput(ended(f"--over {plain(name)}: there is no such key{hint}"))
 
 
 def _axis(name: str, values: Sequence[Number]) -> Axis:

@@ -16,7 +16,8 @@ from cosim.arrays import Array
 from cosim.files.picture import Picture
 from cosim.scene import firmware
 from cosim.studies.sweep.dataset import FAILURE, POINT, swept
-from cosim.studies.sweep.report import label, setting
+from cosim.studies.sweep.report import setting
+from cosim.waveforms.quantities import label
 
 STAYS = 0.05e-3
 """m/s; a part that moves more slowly than this counts as not transported."""

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from cosim.studies.sweep.dataset import FAILURE, swept
-from cosim.waveforms.quantities import unit as unit_of
+from cosim.waveforms.quantities import with_unit
 
 MOST_REASONS = 5
 
@@ -40,19 +40,3 @@ def _at(data: xr.Dataset, place: np.intp) -> str:
 def setting(value: xr.DataArray, digits: int = 6) -> str:
     """``table.key = number unit`` of a point's coordinate."""
     return f"{value.key} = {with_unit(float(value), value.units, digits)}"
-
-
-def with_unit(value: float, unit: str, digits: int = 6) -> str:
-    """``number unit``; a plain number has no unit."""
-    return f"{value:.{digits}g}" + ("" if unit == "1" else f" {unit}")
-
-
-def label(name: str, unit: str) -> str:
-    """``name [unit]`` for an axis."""
-    return name if unit == "1" else f"{name} [{unit}]"
-
-
-def bench_unit(quantity: str) -> tuple[str, float]:
-    """The unit in which a number of the summary is shown, and how many of it are one in SI."""
-    unit = unit_of(quantity)
-    return ("mm/s", 1e3) if unit == "m/s" else (unit, 1.0)

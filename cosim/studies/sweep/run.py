@@ -1,26 +1,25 @@
-"""Runs a sweep: takes up what its journal holds, runs the rest, keeps the dataset up to date."""
+"""Runs a sweep: takes up what its store holds, runs the rest, keeps the dataset up to date."""
 
 import os
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import xarray as xr
 
 from cosim.errors import BadInput, Note
+from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.point import Number
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.design import Design, grid, sample
-from cosim.studies.sweep.journal import hashed, journal
-from cosim.studies.sweep.point import Number, Outcome
-from cosim.studies.sweep.pool import Point, Pool, workers_asked
 from cosim.toolchain.versions import versions
 
-JOURNAL = "sweep.journal"
+STORE = "sweep.sqlite"
 RESULT = "sweep.nc"
 FIGURE = "figure.png"
 
@@ -64,17 +63,16 @@ def sweep(
     >>> data.v_average.dims, data.mu_s.key
     (('mu_s',), 'friction.mu_s')
     """
-    count = workers_asked(workers)
     scene = load(scene, overrides)
     if random and samples is None:
         raise BadInput("--random needs --samples N.")
     design = grid(over) if samples is None else sample(over, samples, seed, random)
     if out is None:
         with TemporaryDirectory() as folder:
-            return _sweep(scene, design, Path(folder), count, dask, progress)
+            return _sweep(scene, design, Path(folder), workers, dask, progress)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    data = _sweep(scene, design, folder, count, dask, progress)
+    data = _sweep(scene, design, folder, workers, dask, progress)
     from cosim.studies.sweep import figure
 
     figure.draw(data, scene.name).write(folder / FIGURE)
@@ -85,28 +83,36 @@ def _sweep(
     scene: Scene,
     design: Design,
     folder: Path,
-    workers: int,
+    workers: int | None,
     dask: str | None,
     progress: Callable[[int, int, int], None],
 ) -> xr.Dataset:
     made_by = {**versions(), "fmu": fmu.token()}
-    total = len(design)
-    with journal(folder / JOURNAL, _identity(scene, design, made_by), total) as kept:
+    total, numbers = len(design), dataset.Numbers(len(design))
+    asked = [(axis.key.full, axis.values) for axis in design.axes], design.sample
+    whole_periods = design.changes_frequency
 
-        def refreshed() -> xr.Dataset:
-            data = dataset.dataset(scene, design, numbers, made_by)
-            dataset.write(folder / RESULT, data, folder / FIGURE)
-            return data
+    def refreshed() -> xr.Dataset:
+        data = dataset.dataset(scene, design, numbers, made_by)
+        dataset.write(folder / RESULT, data, folder / FIGURE)
+        return data
 
-        numbers = dataset.Numbers(total, kept.read())
-        done = len(kept.done)
-        progress(done, numbers.failed, total)
+    with Evaluator(
+        scene, folder / STORE, *asked, whole_periods=whole_periods, workers=workers, dask=dask
+    ) as bench:
+        done: set[int] = set()
+        for number in range(total) if bench.resumed else ():
+            if (outcome := bench.known(design.point(number))) is not None:
+                numbers.add(number, outcome)
+                done.add(number)
+        before = frozenset(done)
+        progress(len(done), numbers.failed, total)
         due = time.monotonic() + _REFRESH
-        for number, outcome in _run(scene, design, kept.done, workers, dask):
-            kept.add(number, outcome)
+        points = ((n, design.point(n)) for n in range(total) if n not in before)
+        for number, outcome in bench.run(points):
             numbers.add(number, outcome)
-            done += 1
-            progress(done, numbers.failed, total)
+            done.add(number)
+            progress(len(done), numbers.failed, total)
             if time.monotonic() >= due:
                 began = time.monotonic()
                 try:
@@ -116,27 +122,3 @@ def _sweep(
                 ended = time.monotonic()
                 due = ended + max(_REFRESH, _RARELY * (ended - began))
         return refreshed()
-
-
-def _run(
-    scene: Scene, design: Design, done: Set[int], workers: int, dask: str | None
-) -> Iterator[tuple[int, Outcome]]:
-    if len(done) == len(design):
-        return
-    before = frozenset(done)
-    points: Iterator[Point] = (
-        (number, design.point(number)) for number in range(len(design)) if number not in before
-    )
-    whole_periods = design.changes_frequency
-    if dask is not None:
-        from cosim.studies.sweep.cluster import run_on_cluster
-
-        yield from run_on_cluster(scene, points, dask, whole_periods)
-        return
-    yield from Pool(scene, min(workers, len(design)), whole_periods).run(points)
-
-
-def _identity(scene: Scene, design: Design, made_by: dict[str, str]) -> str:
-    """A hash of all that the numbers follow from."""
-    axes = [(axis.key.full, axis.values) for axis in design.axes]
-    return hashed(scene.as_dict(), axes, design.sample, made_by)

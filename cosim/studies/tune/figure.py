@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from cosim.evaluate.keys import numeric_key
 from cosim.files.picture import Picture
-from cosim.studies.sweep.design import numeric_key
-from cosim.studies.sweep.report import bench_unit, label, with_unit
 from cosim.studies.tune.found import TURNS, Search
+from cosim.waveforms.quantities import bench_unit, label, with_unit
 
 COLORS = ("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#8d99ae", "#6a4c93")
 MOST_KEYS = 4

@@ -5,13 +5,13 @@ from math import inf, isfinite
 from pathlib import Path
 
 from cosim.errors import BadInput, plain
+from cosim.evaluate.keys import numeric_key, split
 from cosim.files.atomic import write_json, write_text
 from cosim.scene import to_toml
 from cosim.scene.tables import KNOBS
-from cosim.studies.sweep.design import numeric_key, split
-from cosim.studies.sweep.report import bench_unit, with_unit
 from cosim.studies.tables import write_csv
 from cosim.studies.tune.found import TURNS, Run, Search
+from cosim.waveforms.quantities import bench_unit, with_unit
 
 
 def write(folder: Path, tuning: Search) -> None:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from math import inf
 
+from cosim.evaluate.point import Number, Outcome
 from cosim.scene import Scene
-from cosim.studies.sweep.point import Number, Outcome
 
 TURNS = (-0.05, -0.01, 0.01, 0.05)
 """How far each key is turned about the best, as shares of its range."""

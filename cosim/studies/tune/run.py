@@ -11,19 +11,16 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, SimulationFailed
+from cosim.evaluate.evaluator import Evaluator, Settings
+from cosim.evaluate.keys import FREQUENCIES, numeric_key
+from cosim.evaluate.point import Number, Outcome, periods_made_whole
 from cosim.files.picture import Picture
-from cosim.mechanics import package as fmu
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
-from cosim.simulation.choose_rung import without_ngspice
-from cosim.studies.sweep.design import FREQUENCIES, MOST_POINTS, numeric_key
-from cosim.studies.sweep.journal import hashed
-from cosim.studies.sweep.point import Number, Outcome, periods_made_whole
-from cosim.studies.sweep.pool import Pool, workers_asked
-from cosim.studies.tune import files, memory
+from cosim.simulation.choose_rung import WITHOUT_NGSPICE, without_ngspice
+from cosim.studies.tune import files
 from cosim.studies.tune.found import TURNS, Run, Search
 from cosim.studies.tune.search import apart, search
-from cosim.toolchain.versions import versions
 
 KNOBS: dict[str, tuple[float, float]] = {
     f"drive.{knob}": (0.0, 1.0) for knob in ("pot_max", "pot_frequency", "pot_offset")
@@ -33,8 +30,12 @@ KNOBS: dict[str, tuple[float, float]] = {
 SEARCHED = 0.93
 """Most that the search has of the runs; the rest turns one key after another about its best."""
 
+STORE = "tune.sqlite"
+
 FEWEST_RUNS = 20
 """Of the search."""
+
+MOST_RUNS = 1_000_000
 
 SCOUTS = 5
 """Runs without ngspice that go ahead of each run with it: some ten times cheaper each."""
@@ -72,6 +73,7 @@ def tune(
     seed: int = 0,
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
+    dask: str | None = None,
     progress: Callable[[Run, Run | None], None] = lambda run, best: None,
     scouting: Callable[[Run, Run | None], None] = lambda run, best: None,
 ) -> Tuning:
@@ -81,7 +83,8 @@ def tune(
     SI; by default the three knobs. Where the scene needs ngspice, SCOUTS times as many runs on the
     rung "limited" look first where it is worth while. After the search each key is turned a little
     about the best, which moves on while that helps and the budget lasts. The same for the same
-    ``seed``, whatever the number of ``workers``. ``progress`` is told each run and the best so far,
+    ``seed``, whatever the number of ``workers``, local ones or those of the Dask cluster at the
+    address ``dask``. ``progress`` is told each run and the best so far,
     as they finish, ``scouting`` each one ahead. Where the frequency is tuned, each run lasts whole
     periods.
 
@@ -105,24 +108,27 @@ def tune(
     ranges = _checked(over or KNOBS)
     turned = len(TURNS) * len(ranges)
     least = FEWEST_RUNS + turned
-    if not least <= budget <= MOST_POINTS:
+    if not least <= budget <= MOST_RUNS:
         raise BadInput(
             f"--budget {budget}: must be a whole number from {least}, for these keys, to "
-            f"{MOST_POINTS}."
+            f"{MOST_RUNS}."
         )
     path = None
     if out is not None:
-        path = Path(out) / memory.NAME
+        path = Path(out) / STORE
         Path(out).mkdir(parents=True, exist_ok=True)
     whole_periods = any(key in FREQUENCIES for key in ranges)
-    identity = hashed(scene.as_dict(), whole_periods, versions(), fmu.token())
-    count = workers_asked(workers)
-    with memory.Memory(path, identity) as known:
-        aim = quantity, largest, ranges, budget, seed, whole_periods
-        found = _tuned(scene, *aim, count, known, progress, scouting)
+    aim = quantity, largest, ranges, budget, seed, whole_periods
+    with Evaluator(scene, path, whole_periods=whole_periods, workers=workers, dask=dask) as bench:
+        try:
+            found = _tuned(scene, *aim, bench, progress, scouting)
+        except BadInput:
+            if not bench.resumed:
+                bench.forget()  # there is nothing to go on with
+            raise
         if out is not None:
             found.save(out)
-            known.forget()
+            bench.forget()
     return found
 
 
@@ -134,25 +140,20 @@ def _tuned(
     budget: int,
     seed: int,
     whole_periods: bool,
-    workers: int,
-    known: memory.Memory,
+    bench: Evaluator,
     progress: Callable[[Run, Run | None], None],
     scouting: Callable[[Run, Run | None], None],
 ) -> Tuning:
     turned = len(TURNS) * len(ranges)
     searched = min(round(SEARCHED * budget), budget - turned)
     scouts, hints = 0, None
-    ahead = without_ngspice(scene)
     # Quantities that only the scene's own rung has find no scouts.
     with suppress(BadInput):
-        if ahead is not None:
-            pool = Pool(ahead, workers, whole_periods)
-            trial = _Trial(known, pool, ahead, quantity, largest, ranges, scouting)
+        if without_ngspice(scene) is not None:
+            trial = _Trial(bench, WITHOUT_NGSPICE, quantity, largest, ranges, scouting)
             search(trial.costs, len(ranges), SCOUTS * searched, seed)
             scouts, hints = len(trial.known), apart(trial.ranked(), HINTS_APART)[:HINTS]
-    trial = _Trial(
-        known, Pool(scene, workers, whole_periods), scene, quantity, largest, ranges, progress
-    )
+    trial = _Trial(bench, {}, quantity, largest, ranges, progress)
     search(trial.costs, len(ranges), searched, seed, hints)
     if trial.best is None:
         reason = next(iter(trial.known.values())).outcome.failure
@@ -182,9 +183,9 @@ def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, 
 class _Trial:
     """Runs settings, each once, and remembers them in the order in which they were asked for."""
 
-    memory: memory.Memory
-    pool: Pool
-    scene: Scene
+    bench: Evaluator
+    circuit: Settings
+    """What makes the scene one of the circuit that is run."""
     quantity: str
     largest: bool
     ranges: dict[str, tuple[float, float]]
@@ -210,7 +211,8 @@ class _Trial:
         new = [place for place in dict.fromkeys(places) if place not in self.known]
         runs: dict[int, Run] = {}
         settings = [self.settings(place) for place in new]
-        for number, outcome in self.memory.run(self.pool, self.scene, settings):
+        asked = ({**self.circuit, **values} for values in settings)
+        for number, outcome in self.bench.run(enumerate(asked)):
             runs[number] = Run(settings[number], outcome, self._value(outcome))
             self.progress(runs[number], self.best)
         for number, place in enumerate(new):

@@ -5,13 +5,14 @@ are searched further, fewer and fewer for longer and longer; all that end near t
 ensemble.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
+from zlib import crc32
 
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.studies.identify.search.checkpoint import Journal
 from cosim.studies.identify.search.finish import finish
 from cosim.studies.identify.search.search import Found, Progress, Search
 
@@ -54,15 +55,26 @@ class Plan:
     coarse: Search
     fine: Search
     effort: Effort
-    journal: Journal
+    once: Callable[[str, Callable[[], Any]], Any]
+    """A store's, of the stages that are done: an interrupted identification goes on there."""
+    seed: int
     progress: Progress
+
+    def _stage(
+        self, name: str, work: Callable[[np.random.Generator], Sequence[Found]]
+    ) -> list[Found]:
+        """The solutions of a stage: those of the store, or of ``work``. A stage draws random
+        numbers of its own, so it comes out the same whichever of those before it were done."""
+        rng = np.random.default_rng([self.seed, crc32(name.encode())])
+        found = self.once(name, lambda: [_plain(one) for one in work(rng)])
+        return [_found(one) for one in found]
 
     def singles(self) -> list[Found]:
         """Rigs that fit one trial each, ``effort.singles`` of each."""
         found = []
         for k in range(len(self.coarse.targets)):
             for n in range(self.effort.singles):
-                found += self.journal.stage(
+                found += self._stage(
                     f"single {k + 1}-{n + 1}", lambda rng, k=k: [self._single(k, rng)]
                 )
         return found
@@ -81,7 +93,7 @@ class Plan:
         first; each has ended its search, most of them early."""
         search, each = self.coarse.part(rows), self.effort.singles
         places = [one.place for i, one in enumerate(self.singles()) if i // each in rows]
-        several = self.journal.stage(
+        several = self._stage(
             f"{name}: starts",
             lambda rng: search.screen(np.array(places), rng, SCREENED, KEPT, SCREEN_ROUNDS),
         )
@@ -112,7 +124,7 @@ class Plan:
             begun = search.rescreened(search.borrowed(start, others), rng, *AGAIN)
             return [search.nested(begun, rng, generations, sigma, told)]
 
-        return self.journal.stage(title, work)
+        return self._stage(title, work)
 
     def finished(self, name: str, rows: Sequence[int], found: Found) -> Found:
         """The solution at the finish's step, and by least squares."""
@@ -123,11 +135,11 @@ class Plan:
             nested = fine.nested(start, rng, 40, 0.01, self._telling(f"{name}: finish"))
             return [finish(fine, min(start, nested, key=lambda one: one.total), 12)]
 
-        return self.journal.stage(f"{name}: finish", work)[0]
+        return self._stage(f"{name}: finish", work)[0]
 
     def drives(self, name: str, place: Array, targets: Search) -> Found:
         """The best own numbers of trials on a rig, of many starts."""
-        return self.journal.stage(name, lambda rng: targets.screen(place[None], rng, *CAREFUL))[0]
+        return self._stage(name, lambda rng: targets.screen(place[None], rng, *CAREFUL))[0]
 
     def profile(self, key: int, place: float, start: Found, others: Sequence[Found]) -> Found:
         """The best solution with one key at a place: from a neighbour on, or from that of
@@ -144,7 +156,7 @@ class Plan:
             n = self.effort.profile_generations
             return [self.coarse.nested(there, rng, n, 0.04, self._telling(name), fixed=key)]
 
-        return self.journal.stage(name, work)[0]
+        return self._stage(name, work)[0]
 
     def _moved(self, start: Found, key: int, place: float) -> list[Found]:
         """A solution with one key moved to a place."""
@@ -173,3 +185,13 @@ def folds(count: int) -> list[list[int]]:
 def with_targets(search: Search, targets: Sequence[object]) -> Search:
     """The same search for other targets."""
     return replace(search, targets=targets)
+
+
+def _plain(found: Found) -> dict[str, Any]:
+    arrays = {name: getattr(found, name).tolist() for name in ("place", "own", "costs")}
+    return arrays | {"total": found.total}
+
+
+def _found(plain: Mapping[str, Any]) -> Found:
+    place, own, costs = (np.array(plain[name], np.float64) for name in ("place", "own", "costs"))
+    return Found(place, own, costs, plain["total"])

@@ -1,6 +1,5 @@
 """A chart that is interrupted goes on where it was."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,11 +7,10 @@ from typing import Any
 import pytest
 
 from cosim.cli.main import main
-from cosim.errors import BadInput
+from cosim.evaluate.store import Store
 from cosim.studies.accuracy.cases import CASES
 from cosim.studies.accuracy.runs import measure
 from cosim.studies.circuit import ladder
-from cosim.studies.pieces import Pieces, pieces
 from cosim.studies.stability import limits
 from tests.studies.test_tables import solver
 
@@ -32,32 +30,6 @@ class Interrupted:
         return self.function(*given)
 
 
-def test_pieces_come_back_bit_by_bit(tmp_path: Path) -> None:
-    path = tmp_path / "any.journal"
-    made: dict[str, Any] = {
-        "numbers": [0.1 + 0.2, 5e-324, -math.inf, 7],
-        "table": {"text": "µ, 'quoted'", "nested": [[1e300], "", True]},
-    }
-    with pytest.raises(KeyboardInterrupt), pieces(path, "study", 1) as piece:
-        for name, found in made.items():
-            assert piece(name, lambda found=found: found) == found
-        piece("nan", lambda: math.nan)
-        raise KeyboardInterrupt
-    with pytest.raises(BadInput, match="journal of other work"), pieces(path, "study", 2):
-        pass
-    with pieces(path, "study", 1) as piece:
-        with (
-            pytest.raises(BadInput, match="another process is writing it"),
-            pieces(path, "study", 1),
-        ):
-            pass
-        for name, found in made.items():
-            assert piece(name, lambda: pytest.fail("done twice")) == found
-        assert math.isnan(piece("nan", lambda: 0.0))
-        assert piece("new", lambda: 3) == 3
-    assert not path.exists()
-
-
 def test_an_interrupted_ladder_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -67,7 +39,7 @@ def test_an_interrupted_ladder_goes_on(
     monkeypatch.setattr(ladder, "simulate", first)
     assert main(command) == 130
     assert "interrupted" in capsys.readouterr().err
-    assert {path.name for path in tmp_path.iterdir()} == {"ladder.journal"}
+    assert {path.name for path in tmp_path.iterdir()} == {"ladder.sqlite"}
     second = Interrupted(first.function, at=0)
     monkeypatch.setattr(ladder, "simulate", second)
     assert main(command) == 0
@@ -82,14 +54,14 @@ def test_interrupted_limits_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     first = Interrupted(lambda *given: 1.1e-3, at=4)
     monkeypatch.setattr(limits, "observed", first)
     regimes = limits.REGIMES[:2]
-    with pytest.raises(KeyboardInterrupt), pieces(tmp_path / "journal") as piece:
-        list(limits.limits(regimes, piece))
+    with pytest.raises(KeyboardInterrupt), Store(tmp_path / "store") as store:
+        list(limits.limits(regimes, store))
     second = Interrupted(first.function, at=0)
     monkeypatch.setattr(limits, "observed", second)
-    with pieces(tmp_path / "journal") as piece:
-        found = list(limits.limits(regimes, piece))
+    with Store(tmp_path / "store") as store:
+        found = list(limits.limits(regimes, store))
     assert second.calls == len(found) - 3 == 2 * len(limits.METHODS) - 3
-    assert found == list(limits.limits(regimes, Pieces()))
+    assert found == list(limits.limits(regimes, Store(None)))
 
 
 def test_an_interrupted_measurement_goes_on(tmp_path: Path) -> None:
@@ -97,11 +69,11 @@ def test_an_interrupted_measurement_goes_on(tmp_path: Path) -> None:
     case = CASES["reference"]
     known = solver({8.0: "failed", 4.0: 3.0, 2.0: 0.1, 1.0: 0.01})
     first, second = Interrupted(known.run, at=3), Interrupted(known.run, at=0)
-    with pytest.raises(KeyboardInterrupt), pieces(tmp_path / "journal") as piece:
-        measure(case, [replace(known, run=first)], 2, piece)
-    with pieces(tmp_path / "journal") as piece:
-        found = measure(case, [replace(known, run=second)], 2, piece)
+    with pytest.raises(KeyboardInterrupt), Store(tmp_path / "store") as store:
+        measure(case, [replace(known, run=first)], 2, store)
+    with Store(tmp_path / "store") as store:
+        found = measure(case, [replace(known, run=second)], 2, store)
     assert second.calls == 7 - 2  # a failed run has no second time
-    expected = measure(case, [known], 2, Pieces())
+    expected = measure(case, [known], 2, Store(None))
     assert [str(run.error) for run in found] == [str(run.error) for run in expected]
     assert [run.failure for run in found] == [run.failure for run in expected]

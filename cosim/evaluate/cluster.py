@@ -1,14 +1,12 @@
-"""The points of a sweep on a Dask cluster (the extra ``dask``)."""
+"""Points of a scene on a Dask cluster (the extra ``dask``)."""
 
-from collections.abc import Iterable, Iterator
-from contextlib import closing
+from collections.abc import Iterator
 from itertools import islice
 from typing import Any
 
 from cosim.errors import BadInput
+from cosim.evaluate.point import Outcome, evaluate
 from cosim.scene import Scene
-from cosim.studies.sweep.point import Outcome, evaluate
-from cosim.studies.sweep.pool import Point
 
 PATIENCE = 15.0
 """s in which the cluster must answer."""
@@ -17,30 +15,42 @@ _IN_FLIGHT = 4
 """Points at the cluster for each of its threads: enough to keep it busy, whatever the number."""
 
 
-def run_on_cluster(
-    base: Scene, points: Iterable[Point], address: str, whole_periods: bool
-) -> Iterator[tuple[int, Outcome]]:
-    """The outcome of each point, in the order in which the cluster at ``address`` finishes them.
+class Cluster:
+    """The cluster at ``address``, for points of ``base``; to be used in a ``with`` block.
 
     Its workers must have this version of cosim. Raises BadInput where there is no such cluster.
     """
-    waiting = iter(points)
-    numbers: dict[str, int] = {}
-    with closing(_client(address)) as client:
+
+    def __init__(self, address: str, base: Scene, whole_periods: bool) -> None:
+        self._client, self._whole_periods = _client(address), whole_periods
+        self._threads = sum(self._client.nthreads().values())
+        if not self._threads:
+            self._client.close()
+            raise BadInput(f"--dask {address}: this cluster has no workers.")
+        self._base = self._client.scatter(base, broadcast=True)
+
+    def __enter__(self) -> "Cluster":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._client.close()
+
+    def run(self, points: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Outcome]]:
+        """The outcome of each point, in the order in which the cluster finishes them."""
         from distributed import as_completed
 
-        threads = sum(client.nthreads().values())
-        if not threads:
-            raise BadInput(f"--dask {address}: this cluster has no workers.")
-        shared = client.scatter(base, broadcast=True)
+        numbers: dict[str, int] = {}
 
-        def submit(point: Point) -> Any:
+        def submit(point: tuple[int, Any]) -> Any:
             number, values = point
-            future = client.submit(evaluate, shared, dict(values), whole_periods, pure=False)
+            future = self._client.submit(
+                evaluate, self._base, dict(values), self._whole_periods, pure=False
+            )
             numbers[future.key] = number
             return future
 
-        running = as_completed([submit(point) for point in islice(waiting, _IN_FLIGHT * threads)])
+        first = islice(points, _IN_FLIGHT * self._threads)
+        running = as_completed([submit(point) for point in first])
         for future in running:
             number, failure = numbers.pop(future.key), future.exception()
             if failure is None:
@@ -50,7 +60,7 @@ def run_on_cluster(
                 words = " ".join(str(failure).split())
                 words = f"The cluster gave it up: {type(failure).__name__}: {words}"
                 outcome = Outcome({}, words, machine=True)
-            following = next(waiting, None)
+            following = next(points, None)
             if following is not None:
                 running.add(submit(following))
             yield number, outcome

@@ -1,7 +1,7 @@
-"""One point of a sweep: the scene with some keys changed, run for the numbers of its summary."""
+"""One point of a study: the scene with some keys changed, run for the numbers of its summary."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
 from math import ceil, isinf, nan
 from typing import Any
 
@@ -24,6 +24,11 @@ class Outcome:
     failure: str = ""
     machine: bool = False
     """The failure may have been the machine's, not the point's: it is worth another try."""
+
+    def only(self, names: Collection[str]) -> "Outcome":
+        """This outcome with as few numbers."""
+        kept = {name: value for name, value in self.numbers.items() if name in names}
+        return replace(self, numbers=kept)
 
 
 def evaluate(
@@ -76,6 +81,21 @@ def failed(error: Exception) -> Outcome:
     met = MemoryError | OSError | ProcessLost
     machine = any(isinstance(e, met) for e in (error, error.__cause__))
     return Outcome({}, " ".join(f"{kind}{error}".split()), machine)
+
+
+def outcome_of(record: Any) -> Outcome | None:
+    """The outcome of which ``record``, as JSON gives it, has the fields; None where it is none, or
+    one of the machine's."""
+    try:
+        numbers, failure, machine = record["numbers"], record["failure"], record["machine"]
+        named = all(name.isidentifier() and len(name) < 100 for name in numbers)
+        values = [float(value) for value in numbers.values() if type(value) in (int, float)]
+    except (TypeError, KeyError, AttributeError, OverflowError):
+        return None
+    told = type(failure) is str and machine is False
+    if not (named and told and len(values) == len(numbers)):
+        return None
+    return Outcome(dict(zip(numbers, values, strict=True)), failure)
 
 
 def periods_made_whole(scene: Scene) -> dict[str, Number]:

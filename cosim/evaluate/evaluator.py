@@ -1,0 +1,120 @@
+"""Settings of a scene and what becomes of them: each once, many at once, kept in a file.
+
+What all studies of many runs stand on. A point that crashes or hangs costs only itself.
+"""
+
+from collections import deque
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import BadInput
+from cosim.evaluate.point import Number, Outcome, evaluate, failed, outcome_of, point
+from cosim.evaluate.store import Store, hashed
+from cosim.scene import Scene
+from cosim.simulation.many import Progress, each
+from cosim.toolchain.processes import processors
+
+Settings = Mapping[str, Number | str]
+"""``table.key`` and value, SI."""
+
+
+class Evaluator:
+    """Runs settings on top of ``scene``; to be used in a ``with`` block.
+
+    The outcomes are kept in the file ``path``, or in memory alone, with what they follow from:
+    the scene, ``whole_periods`` and ``asked`` (what JSON can hold). Only the numbers that ``kept``
+    names, if it does. ``workers`` runs at once (default: one for each processor, and never more
+    circuits than these), or as many as the Dask cluster at the address ``dask`` has threads.
+
+    Raises BadInput where the file cannot be used or there is no such cluster.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        path: Path | None = None,
+        *asked: Any,
+        whole_periods: bool = False,
+        kept: Collection[str] = (),
+        workers: int | None = None,
+        dask: str | None = None,
+    ) -> None:
+        self._scene = point(scene, {}, False)  # what all points have in common is changed once
+        self._whole_periods, self._kept = whole_periods, kept
+        self._workers, self._dask = workers_asked(workers), dask
+        self._stack = ExitStack()
+        self._store = Store(path, scene.as_dict(), whole_periods, *asked)
+        self.resumed = self._store.resumed
+        """Outcomes that stood in the file."""
+        self._cluster: Any = None
+
+    def __enter__(self) -> "Evaluator":
+        self._stack.enter_context(self._store)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def known(self, settings: Settings) -> Outcome | None:
+        """What has become of settings; None where they are still to be run, or to be run again
+        because the machine was the reason of their failure."""
+        return outcome_of(self._store.get(hashed(settings)))
+
+    def run(self, points: Iterable[tuple[int, Settings]]) -> Iterator[tuple[int, Outcome]]:
+        """The outcome of each point (number, settings), in the order in which they are known."""
+        waiting: dict[str, list[int]] = {}
+        """The points that wait for the same settings, by their key."""
+        known: deque[tuple[int, Outcome]] = deque()
+        keys: dict[int, str] = {}
+
+        def new() -> Iterator[tuple[int, Settings]]:
+            for number, settings in points:
+                key = hashed(settings)
+                found = outcome_of(self._store.get(key))
+                if found is not None:
+                    known.append((number, found))
+                elif key in waiting:
+                    waiting[key].append(number)
+                else:
+                    waiting[key], keys[number] = [number], key
+                    yield number, settings
+
+        for number, outcome in self._run(new()):
+            key = keys.pop(number)
+            if self._kept:
+                outcome = outcome.only(self._kept)
+            self._store.add(key, vars(outcome))
+            known.extend((other, outcome) for other in waiting.pop(key))
+            while known:
+                yield known.popleft()
+        yield from known
+
+    def forget(self) -> None:
+        """The study is done: remove the file."""
+        self._store.remove()
+
+    def _run(self, points: Iterator[tuple[int, Settings]]) -> Iterator[tuple[int, Outcome]]:
+        if self._dask is not None:
+            from cosim.evaluate.cluster import Cluster
+
+            if self._cluster is None:
+                cluster = Cluster(self._dask, self._scene, self._whole_periods)
+                self._cluster = self._stack.enter_context(cluster)
+            yield from self._cluster.run(points)
+            return
+        for number, found in each(self._evaluate, points, self._workers):
+            yield number, failed(found) if isinstance(found, Exception) else found
+
+    def _evaluate(self, settings: Settings, progress: Progress) -> Outcome:
+        return evaluate(self._scene, settings, self._whole_periods, progress)
+
+
+def workers_asked(workers: int | None) -> int:
+    """The number of workers: those asked for, or one for each processor. Raises BadInput."""
+    if workers is None:
+        return processors()
+    if not 1 <= workers <= 1024:
+        raise BadInput(f"--workers {workers}: must be a whole number from 1 to 1024.")
+    return workers

@@ -1,0 +1,34 @@
+"""The keys of a scene that a study may change."""
+
+from collections.abc import Iterator, Sequence
+
+from cosim.errors import BadInput, plain
+from cosim.scene import Key, keys
+from cosim.scene.messages import ended, suggestion
+
+FREQUENCIES = ("drive.frequency", "drive.pot_frequency", "drive.loop_time")
+
+
+def numeric_key(name: str) -> Key:
+    """The key with this full name. Raises BadInput for one that is unknown or no number."""
+    numeric = {key.full: key for key in keys() if key.kind in (int, float) and not key.choices}
+    if name in numeric:
+        return numeric[name]
+    if any(key.full == name for key in keys()):
+        raise BadInput(f"--over {plain(name)}: this key is not a number.")
+    bare = [full for full, key in numeric.items() if key.name == name]
+    hint = f"; did you mean {bare[0]}?" if bare else suggestion(name, numeric)
+    raise BadInput(ended(f"--over {plain(name)}: there is no such key{hint}"))
+
+
+def split(options: Sequence[str], form: str) -> Iterator[tuple[str, str, str]]:
+    """Each option of this form, its key, which no other one has, and its values; BadInput."""
+    names: set[str] = set()
+    for text in options:
+        name, _, right = (part.strip() for part in text.partition("="))
+        if not (name and right):
+            raise BadInput(f"--over {plain(text)}: must be {form}.")
+        if name in names:
+            raise BadInput(f"--over {plain(name)}: this key is given twice.")
+        names.add(name)
+        yield text, name, right

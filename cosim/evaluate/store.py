@@ -1,0 +1,200 @@
+"""What long work has found, in a file from which a killed one goes on.
+
+The file is SQLite's, in its write-ahead mode: whatever moment a kill strikes, what was written
+stays, and others may read the file while it grows. One process at a time may write.
+"""
+
+import hashlib
+import json
+import os
+import sqlite3
+import stat
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+from cosim.errors import BadInput, Note, plain
+from cosim.mechanics import package
+from cosim.toolchain.versions import versions
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None
+
+T = TypeVar("T")
+
+MOST_OWED = 64 << 20
+"""Bytes that are kept for a disk that takes them later."""
+
+_TABLE = "CREATE TABLE found (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID"
+_WORK = ""
+"""The key of the hash of what the findings follow from."""
+
+
+class Store:
+    """What was found (all that JSON can hold) by key, in the file ``path``, or in memory alone.
+
+    The findings follow from ``asked`` (what JSON can hold) and this version of all programs. To be
+    used in a ``with`` block, by one thread; a file that nothing was added to does not outlive it.
+
+    Raises BadInput where the file belongs to other work, is damaged, a link or no regular file, or
+    another process writes it.
+    """
+
+    def __init__(self, path: Path | None, *asked: Any) -> None:
+        self._path, self._file = path, None if path is None else _locked(path)
+        self._owed: dict[str, str] = {}
+        """What the disk did not take."""
+        try:
+            where = ":memory:" if path is None else str(path)
+            self._base = sqlite3.connect(where, isolation_level=None)
+            self._told(self._take_up, hashed(asked, versions(), package.token()))
+            self.resumed = len(self)
+            """How much stood in the file."""
+        except BaseException:
+            self._close()
+            raise
+
+    def __enter__(self) -> "Store":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with suppress(sqlite3.Error, BadInput):
+            if not len(self):
+                self.remove()
+        self._close()
+
+    def __len__(self) -> int:
+        """How much was found."""
+        return self._told(self._base.execute, "SELECT count(*) - 1 FROM found").fetchone()[0]
+
+    def get(self, key: str) -> Any:
+        """What was found; None for nothing."""
+        text = self._owed.get(key)
+        if text is None:
+            row = self._told(
+                self._base.execute, "SELECT value FROM found WHERE key = ?", (key,)
+            ).fetchone()
+            text = None if row is None else row[0]
+        try:
+            return None if text is None else json.loads(text)
+        except (ValueError, TypeError, RecursionError):
+            return None  # somebody has changed it
+
+    def add(self, key: str, found: Any) -> None:
+        """Write down what was found.
+
+        What the disk does not take is kept and tried again with the next one; a note tells it.
+        Raises BadInput where that is too much.
+        """
+        self._owed[key] = json.dumps(found)
+        try:
+            with self._base:  # all of them or none
+                self._base.execute("BEGIN")
+                self._base.executemany(
+                    "INSERT OR REPLACE INTO found VALUES (?, ?)", self._owed.items()
+                )
+            self._owed.clear()
+        except sqlite3.OperationalError as error:
+            words = f"{plain(str(self._path))}: cannot be written ({error})"
+            if sum(map(len, self._owed.values())) > MOST_OWED:
+                raise BadInput(f"{words}.") from error
+            if len(self._owed) == 1:
+                warnings.warn(
+                    f"{words}; the work goes on, and a kill now would lose what is not written.",
+                    Note,
+                    stacklevel=2,
+                )
+
+    def once(self, key: str, work: Callable[[], T]) -> T:
+        """What stands under ``key``, or else what ``work`` finds, which is added."""
+        found = self.get(key)
+        if found is None:
+            found = work()
+            self.add(key, found)
+        return found
+
+    def remove(self) -> None:
+        """The work is done, and the file of no more use."""
+        self._close()
+        if self._path is not None:
+            for path in _files(self._path):
+                path.unlink(missing_ok=True)
+
+    def _take_up(self, work: str) -> None:
+        for pragma in ("trusted_schema = OFF", "journal_mode = WAL", "synchronous = NORMAL"):
+            self._base.execute(f"PRAGMA {pragma}")
+        tables = self._base.execute("SELECT type, name, sql FROM sqlite_master").fetchall()
+        if not tables:  # a kill may have left it so
+            with self._base:
+                self._base.execute("BEGIN")
+                self._base.execute(_TABLE)
+                self._base.execute("INSERT INTO found VALUES (?, ?)", (_WORK, work))
+        elif tables != [("table", "found", _TABLE)]:
+            raise sqlite3.DatabaseError("its tables are others")
+        elif self._base.execute("SELECT value FROM found WHERE key = ''").fetchone() != (work,):
+            raise BadInput(
+                f"{plain(str(self._path))}: this belongs to other work (its scene, keys, values or "
+                "version of cosim differ); remove it, or choose another --out."
+            )
+
+    def _told(self, act: Callable[..., T], *given: Any) -> T:
+        """What ``act`` gives. Raises BadInput where the file or the disk is no good."""
+        name = plain(str(self._path))
+        try:
+            return act(*given)
+        except sqlite3.OperationalError as error:
+            raise BadInput(f"{name}: cannot be written ({error}).") from error
+        except sqlite3.DatabaseError as error:
+            raise BadInput(
+                f"{name}: this is no store of cosim's, or it is damaged ({error}); remove it, or "
+                "choose another --out."
+            ) from error
+
+    def _close(self) -> None:
+        """SQLite's own locks on the file would go if it were closed here first."""
+        if hasattr(self, "_base"):
+            self._base.close()
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+
+def hashed(*said: Any) -> str:
+    """A hash of what JSON can hold."""
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+
+
+def _files(path: Path) -> list[Path]:
+    """All that SQLite writes."""
+    return [path, *(path.with_name(f"{path.name}-{more}") for more in ("wal", "shm", "journal"))]
+
+
+def _locked(path: Path) -> int:
+    """The file, this process's own until it is closed. SQLite would follow a link elsewhere."""
+    flags = os.O_RDWR | os.O_CREAT
+    for more in ("O_NOFOLLOW", "O_CLOEXEC", "O_NONBLOCK", "O_BINARY"):
+        flags |= getattr(os, more, 0)
+    name = plain(str(path))
+    for each in _files(path):
+        if each.is_symlink() or (each.exists() and not each.is_file()):
+            what = "it is a link" if each.is_symlink() else "this is not a regular file"
+            raise BadInput(f"{plain(str(each))}: cannot be written ({what}).")
+    try:
+        file = os.open(path, flags, 0o666)
+    except OSError as error:
+        raise BadInput(f"{name}: cannot be written ({error.strerror}).") from error
+    try:
+        if not stat.S_ISREG(os.fstat(file).st_mode):
+            raise BadInput(f"{name}: this is not a regular file.")
+        if fcntl is not None:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BaseException as error:
+        os.close(file)
+        if isinstance(error, OSError):
+            raise BadInput(f"{name}: another process is writing it.") from error
+        raise
+    return file
