@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from cosim.arrays import Array
+from cosim.search.climb import apart
 from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, TURN, corners, faces, rounded
 
 APART = 0.06
@@ -332,17 +333,6 @@ class Search:
             self._tree = KDTree(self._arrays[0])
         places, every = self._arrays
         return places, every[:, quantity]
-
-
-def apart(places: Array, distance: float, count: int) -> list[int]:
-    """The first of ``places`` (rows), and those after it that are ``distance`` from all before them
-    that count: ``count`` numbers of rows at most."""
-    kept: list[int] = []
-    left = np.ones(len(places), bool)
-    while left.any() and len(kept) != count:
-        kept.append(int(left.argmax()))
-        left &= np.abs(places - places[kept[-1]]).max(axis=1) >= distance
-    return kept
 
 
 def _to_the_stops(uniform: Array) -> Array:

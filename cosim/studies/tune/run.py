@@ -17,10 +17,10 @@ from cosim.evaluate.point import Number, Outcome, periods_made_whole
 from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
+from cosim.search.climb import POPULATION, Climb, apart
 from cosim.simulation.choose_rung import WITHOUT_NGSPICE, without_ngspice
 from cosim.studies.tune import files
 from cosim.studies.tune.found import TURNS, Run, Search
-from cosim.studies.tune.search import apart, search
 
 KNOBS: dict[str, tuple[float, float]] = {
     f"drive.{knob}": (0.0, 1.0) for knob in ("pot_max", "pot_frequency", "pot_offset")
@@ -36,6 +36,12 @@ FEWEST_RUNS = 20
 """Of the search."""
 
 MOST_RUNS = 1_000_000
+
+EXPLORED = 0.4
+"""Share of the search's runs that listens to the whole range."""
+
+IDLE = 50
+"""Generations without a new point after which whole numbers leave no more to ask for."""
 
 SCOUTS = 5
 """Runs without ngspice that go ahead of each run with it: some ten times cheaper each."""
@@ -146,15 +152,16 @@ def _tuned(
 ) -> Tuning:
     turned = len(TURNS) * len(ranges)
     searched = min(round(SEARCHED * budget), budget - turned)
-    scouts, hints = 0, None
+    scouts, hints = 0, np.empty((0, len(ranges)))
     # Quantities that only the scene's own rung has find no scouts.
     with suppress(BadInput):
         if without_ngspice(scene) is not None:
             trial = _Trial(bench, WITHOUT_NGSPICE, quantity, largest, ranges, scouting)
-            search(trial.costs, len(ranges), SCOUTS * searched, seed)
-            scouts, hints = len(trial.known), apart(trial.ranked(), HINTS_APART)[:HINTS]
+            trial.search(SCOUTS * searched, seed)
+            ranked = trial.ranked()
+            scouts, hints = len(trial.known), ranked[apart(ranked, HINTS_APART, HINTS)]
     trial = _Trial(bench, {}, quantity, largest, ranges, progress)
-    search(trial.costs, len(ranges), searched, seed, hints)
+    trial.search(searched, seed, hints)
     if trial.best is None:
         reason = next(iter(trial.known.values())).outcome.failure
         raise SimulationFailed(f"No setting could be run; the first one: {reason}")
@@ -203,6 +210,20 @@ class _Trial:
         found = [place for place, run in self.known.items() if run.value is not None]
         found.sort(key=lambda place: self._cost(self.known[place].value))
         return np.array(found).reshape(-1, len(self.ranges))
+
+    def search(self, runs: int, seed: int, hints: Array | None = None) -> None:
+        """Ask for at most ``runs`` points; for ``hints`` (rows) first, in place of most of the
+        exploration."""
+        explored = round(EXPLORED * runs)
+        hints = np.empty((0, len(self.ranges))) if hints is None else hints[:explored]
+        climb = Climb(len(self.ranges), max(explored, len(hints) + POPULATION), seed)
+        left, idle = runs, 0
+        points = hints if len(hints) else climb.ask(left)
+        while len(points) and idle < IDLE:
+            found, taken = self.costs(points)
+            climb.tell(points, found)
+            left, idle = left - taken, 0 if taken else idle + 1
+            points = climb.ask(left)
 
     def costs(self, points: Array) -> tuple[Array, int]:
         """The cost of each point of the unit cube (rows), and how many of them were run for it."""
