@@ -1,4 +1,4 @@
-"""Rungs ``amplifier``, ``full`` and ``file``: ngspice solves the circuit and leads the coupling."""
+"""The rungs in ngspice, which solves the circuit and leads the coupling."""
 
 from collections.abc import Iterator
 
@@ -12,6 +12,7 @@ from cosim.errors import BadInput
 from cosim.files.spill import Tape, blocks
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
+from cosim.scene.rungs import RUNGS
 from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
 from cosim.simulation.rungs.own_error import own_error
 from cosim.simulation.rungs.rung import Driven, Rung
@@ -20,7 +21,7 @@ from cosim.simulation.rungs.rung import Driven, Rung
 class Spice(Rung):
     """The coupling method of the scene joins ngspice and the mechanics."""
 
-    names = ("amplifier", "full", "file")
+    names = tuple(name for name, rung in RUNGS.items() if rung.ngspice and not rung.automatic)
 
     def drive(self, scene: Scene, recorder: Recorder) -> Driven:
         # Only those who run a circuit load PySpice, which takes a while.
