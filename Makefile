@@ -47,7 +47,7 @@ run: setup
 	@$(VENV)/bin/cosim run $(SCENE) $(ARGS)
 
 test: setup
-	@$(PY) -m pytest -m "not slow" $(ARGS)
+	@$(PY) -m pytest -n auto -m "not slow" $(ARGS)
 
 test-all: setup
 	@$(PY) -m pytest $(ARGS)

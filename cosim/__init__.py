@@ -14,12 +14,16 @@ from cosim.version import __version__
 
 if TYPE_CHECKING:
     from cosim.scene import load
-    from cosim.simulation.run import run
+    from cosim.simulation.simulate import run
+    from cosim.studies.accuracy.accuracy import accuracy
+    from cosim.studies.circuit.ladder_report import ladder
     from cosim.studies.compare.run import compare
     from cosim.studies.fit.fit import fit
     from cosim.studies.identify.run import identify
+    from cosim.studies.limits.report import limits
     from cosim.studies.paper.theory import theory
     from cosim.studies.spread import spread
+    from cosim.studies.stability.stability import stability
     from cosim.studies.sweep import sweep
     from cosim.studies.tune import tune
     from cosim.waveforms.result import Result
@@ -29,12 +33,16 @@ __all__ = [
     "Result",
     "SimulationFailed",
     "__version__",
+    "accuracy",
     "compare",
     "fit",
     "identify",
+    "ladder",
+    "limits",
     "load",
     "run",
     "spread",
+    "stability",
     "sweep",
     "theory",
     "tune",
@@ -43,7 +51,7 @@ __all__ = [
 _HOMES = {
     "Result": "cosim.waveforms.result",
     "load": "cosim.scene",
-    "run": "cosim.simulation.run",
+    "run": "cosim.simulation.simulate",
     "spread": "cosim.studies.spread",
     "sweep": "cosim.studies.sweep",
     "tune": "cosim.studies.tune",
@@ -51,6 +59,10 @@ _HOMES = {
     "fit": "cosim.studies.fit.fit",
     "identify": "cosim.studies.identify.run",
     "theory": "cosim.studies.paper.theory",
+    "accuracy": "cosim.studies.accuracy.accuracy",
+    "ladder": "cosim.studies.circuit.ladder_report",
+    "limits": "cosim.studies.limits.report",
+    "stability": "cosim.studies.stability.stability",
 }
 """Loaded on first use: `import cosim` and light commands need none of them."""
 

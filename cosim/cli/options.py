@@ -30,13 +30,14 @@ def scene_of(arguments: Namespace) -> "Scene":
     return load(arguments.scene, arguments.overrides)
 
 
-def add_scenes(parser: ArgumentParser, default: str) -> None:
+def add_scenes(parser: ArgumentParser) -> None:
     """Any number of SCENEs, and ``--set``."""
     parser.add_argument(
         "scenes",
         metavar="SCENE",
         nargs="*",
-        help=f"built-in scenes or TOML files (default: {default})",
+        default=["paper"],
+        help="built-in scenes or TOML files (default: paper)",
     )
     add_overrides(parser)
 
@@ -64,12 +65,6 @@ def add_workers(parser: ArgumentParser) -> None:
 def add_quick(parser: ArgumentParser, text: str) -> None:
     """``--quick``."""
     parser.add_argument("--quick", action="store_true", help=text)
-
-
-def add_study(parser: ArgumentParser) -> None:
-    """``--quick`` and ``--out`` of a chart that is one long study."""
-    add_quick(parser, "a part of it, in a fraction of the time")
-    add_out(parser, "results")
 
 
 def add_out(parser: ArgumentParser, default: str, known: bool = True) -> None:

@@ -7,14 +7,14 @@ from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from cosim.errors import BadInput
 from cosim.evaluate.point import Number, Outcome, evaluate, failed, outcome_of, point
 from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene
-from cosim.simulation.many import Progress, each
-from cosim.toolchain.processes import processors
+from cosim.simulation.many import each
+from cosim.toolchain.processes import Progress, processors
 
 Settings = Mapping[str, Number | str]
 """``table.key`` and value, SI."""
@@ -50,7 +50,7 @@ class Evaluator:
         """Outcomes that stood in the file."""
         self._cluster: Any = None
 
-    def __enter__(self) -> "Evaluator":
+    def __enter__(self) -> Self:
         self._stack.enter_context(self._store)
         return self
 

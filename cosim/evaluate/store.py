@@ -8,7 +8,6 @@ import hashlib
 import json
 import os
 import sqlite3
-import stat
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
@@ -184,17 +183,14 @@ def _locked(path: Path) -> int:
             what = "it is a link" if each.is_symlink() else "this is not a regular file"
             raise BadInput(f"{plain(str(each))}: cannot be written ({what}).")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(path, flags, 0o666)
     except OSError as error:
         raise BadInput(f"{name}: cannot be written ({error.strerror}).") from error
     try:
-        if not stat.S_ISREG(os.fstat(file).st_mode):
-            raise BadInput(f"{name}: this is not a regular file.")
         if fcntl is not None:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BaseException as error:
+    except OSError as error:
         os.close(file)
-        if isinstance(error, OSError):
-            raise BadInput(f"{name}: another process is writing it.") from error
-        raise
+        raise BadInput(f"{name}: another process is writing it.") from error
     return file

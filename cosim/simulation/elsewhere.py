@@ -4,7 +4,7 @@ What only the worker needs is not imported here, since it takes a while.
 """
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,10 +15,8 @@ from cosim.files.spill import Packed, place
 from cosim.scene import Scene
 from cosim.toolchain import fence
 from cosim.toolchain.libraries import ngspice_library
-from cosim.toolchain.processes import Bounds, end_idle, isolated
+from cosim.toolchain.processes import Bounds, Progress, end_idle, isolated
 from cosim.waveforms.result import Result
-
-Progress = Callable[[float], None]
 
 
 def simulate_elsewhere(scene: Scene, progress: Progress, fmi_version: int) -> Result:

@@ -1,7 +1,6 @@
 """Runs a scene in this process: gives the mechanics to its rung and gathers the result."""
 
 import time
-from collections.abc import Callable
 from contextlib import closing
 from typing import Any
 
@@ -11,13 +10,12 @@ from cosim.files.spill import Tape, blocks
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
 from cosim.simulation.guards import notes
-from cosim.simulation.numbers import motion, numbers
 from cosim.simulation.rungs.given_surface import move_part
 from cosim.simulation.rungs.rung import Driven, rungs
+from cosim.simulation.summary import motion, numbers
+from cosim.toolchain.processes import Progress
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.result import Result
-
-Progress = Callable[[float], None]
 
 
 def simulate_here(scene: Scene, progress: Progress, fmi_version: int) -> Result:

@@ -10,10 +10,10 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import TypeVar
 
+from cosim.toolchain.processes import Progress
+
 AHEAD = 2
 """Tasks at hand for each thread: the one that runs, and the next."""
-
-Progress = Callable[[float], None]
 
 _Task = TypeVar("_Task")
 _Found = TypeVar("_Found")

@@ -1,17 +1,20 @@
 """The numbers of a run: what ``summary.json`` holds and the table that is printed."""
 
 import math
+import time
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import period
 from cosim.files.spill import blocks
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Electrics
-from cosim.simulation.rungs.rung import Motion
+from cosim.simulation.rungs.rung import Driven, Motion
+from cosim.toolchain.versions import versions
 from cosim.trials.camera import FRAME_RATE, accelerations, instants_a_frame, shown
 
 _RESOLVED = 1e-15
@@ -114,3 +117,39 @@ def _hanging(scene: Scene) -> float:
     mass = ram + mechanics.surface_mass + mechanics.part_mass / mechanics.n_surfaces
     force = mass * mechanics.gravity
     return scene.coil.count * force**2 / (2.0 * mechanics.flexure_stiffness)
+
+
+def motion(scene: Scene, recorder: Recorder) -> Motion:
+    """What surface and part did, at the end of a run."""
+    ram = None
+    if scene.mechanics.actuator == "ram":
+        last = dict(zip(recorder.mechanics.columns, recorder.rows[-1].tolist(), strict=True))
+        ram = last["z_ram"] - last["z_surface"]
+    return Motion(
+        recorder.at_end, recorder.at_settle, _extremes(scene, recorder), recorder.frames, ram
+    )
+
+
+def _extremes(scene: Scene, recorder: Recorder) -> dict[str, float]:
+    names = (f"{what}_surface_{end}" for what in "avz" for end in ("max", "min"))
+    found = dict(zip(names, recorder.extremes, strict=False))  # the current's follow
+    if scene.mechanics.contact == "rigid":  # an impact changes velocities in no time
+        found |= {"a_surface_max": math.inf, "a_surface_min": -math.inf}
+    return found
+
+
+def numbers(
+    scene: Scene, motion: Motion, driven: Driven, steps: int, began: float
+) -> dict[str, Any]:
+    """The summary but for its notes. ``steps`` are those of the FMU; the run began at ``began`` on
+    the clock."""
+    error = {"v_average_error": driven.v_average_error} if scene.rung.ngspice else {}
+    return summarise(scene, motion, driven.electric) | {
+        "circuit_steps": driven.circuit_steps,
+        "circuit_rejected": driven.circuit_rejected,
+        "fmu_steps": steps,
+        "wall_time": time.perf_counter() - began,
+        "method": driven.method,
+        "versions": {**versions(), **driven.versions},
+        **error,
+    }

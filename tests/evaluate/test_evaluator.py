@@ -11,12 +11,12 @@ from typing import Any
 import psutil
 import pytest
 
+import cosim
 from cosim.evaluate import evaluator
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import Outcome
 from cosim.scene import load
-from cosim.studies.limits.report import run as limits
-from cosim.studies.limits.study import QUICK
+from cosim.studies.limits import report
 from cosim.studies.sweep import sweep
 from tests.helpers import needs
 
@@ -59,8 +59,11 @@ def test_only_what_is_kept(tmp_path: Path) -> None:
 @pytest.mark.reliability
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("study", ["sweep", "limits"])
-def test_dask_workers_that_are_killed(study: str, tmp_path: Path) -> None:
+def test_dask_workers_that_are_killed(
+    study: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The cluster starts others, and the result is that of this machine alone."""
+    monkeypatch.setattr(report, "LIMITS", [])
     cluster = pytest.importorskip("distributed").LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address="", host="127.0.0.1"
     )
@@ -71,8 +74,7 @@ def test_dask_workers_that_are_killed(study: str, tmp_path: Path) -> None:
             changes = {"run.duration": 0.3, "run.settle": 0.1}
             sweep("ideal-current", over, changes, out=out, **where)
             return (out / "sweep.nc").read_bytes()
-        out.mkdir()
-        limits(out, load("paper"), "paper", efforts=QUICK, limits=[], **where)
+        cosim.limits("paper", at=["trial-05"], quick=True, out=out, **where)
         return (out / "limits.csv").read_bytes()
 
     over, killed = threading.Event(), []

@@ -60,7 +60,7 @@ def assert_legible(figure: Figure) -> None:
 def test_every_method_is_a_line_or_the_page_says_why(drawn: list[Figure], tmp_path: Path) -> None:
     runs = read(Run, "accuracy.csv")
     assert {run.method for run in runs} == {solver.name for solver in SOLVERS}
-    accuracy.write(tmp_path, runs)
+    accuracy.report(runs).save(tmp_path)
     page = (tmp_path / "accuracy.md").read_text(encoding="utf-8").splitlines()
     assert len(page) <= 60
     assert_legible(drawn[0])
@@ -75,10 +75,11 @@ def test_every_method_is_a_line_or_the_page_says_why(drawn: list[Figure], tmp_pa
 
 def test_a_false_limit_cycle_is_marked_and_not_joined(drawn: list[Figure], tmp_path: Path) -> None:
     runs = [run for run in read(Run, "accuracy.csv") if run.scene == "reference"]
-    accuracy.write(tmp_path, runs)
+    accuracy.report(runs).save(tmp_path)
     method = next(solver for solver in SOLVERS if solver.takes_macro_steps)
     given = ("reference", method.name, method.setting, 1e-6)
-    accuracy.write(tmp_path, [*runs, Run(*given, float("nan"), 0.123, 0, FALSE_CYCLE)])
+    false = Run(*given, float("nan"), 0.123, 0, FALSE_CYCLE)
+    accuracy.report([*runs, false]).save(tmp_path)
     before, after = (figure.axes[0].lines for figure in drawn)
     marks = [line for line in after if list(line.get_xdata()) == [0.123]]  # pyright: ignore
     assert len(after) == len(before) + 1 and [line.get_marker() for line in marks] == ["x"]
@@ -87,7 +88,7 @@ def test_a_false_limit_cycle_is_marked_and_not_joined(drawn: list[Figure], tmp_p
 
 def test_every_limit_is_drawn_and_in_the_page(drawn: list[Figure], tmp_path: Path) -> None:
     clamped = [{"macro step [s]": 4e-3}]
-    stability.write(tmp_path, read(Limit, "stability.csv"), clamped)
+    stability.report(read(Limit, "stability.csv"), clamped).save(tmp_path)
     page = (tmp_path / "stability.md").read_text(encoding="utf-8")
     assert page.count("\n") <= 60 and all(f"| {name} |" in page for name in METHODS)
     said = " ".join(text.get_text() for text in drawn[0].axes[0].texts)

@@ -13,17 +13,19 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.linalg import expm
 
+import cosim
 from cosim.arrays import Array
 from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.evaluate.point import Outcome
+from cosim.evaluate.store import Store
 from cosim.files.picture import Picture
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.limits import aims, confirm, runs, search, study
+from cosim.studies.limits import aims, confirm, report, runs, search, study
 from cosim.studies.limits.aims import QUANTITIES
 from cosim.studies.limits.answer import BINDS, NOTHING, UNTOLD, Change
-from cosim.studies.limits.report import STORE, run
+from cosim.studies.limits.report import STORE
 from cosim.studies.limits.runs import Bench, Case
 from cosim.studies.limits.search import NOWHERE, Clouds, Effort, Leads, Search
 from cosim.studies.limits.table import LIMITS, Machine, needed_acceleration
@@ -422,19 +424,21 @@ def test_other_rigs_begin_with_what_is_best_on_the_own_one() -> None:
 
 
 @pytest.mark.usefixtures("brief")
-def test_a_killed_study_goes_on(tmp_path: Path) -> None:
+def test_a_killed_study_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     places = aims.rounded(np.random.default_rng(0).random((12, 3)))
-    case, count = Case({}, Machine()), [0]
+    case, count, add = Case({}, Machine()), [0], Store.add
 
-    def tick() -> None:
+    def counted(store: Store, key: str, found: Any) -> None:
+        add(store, key, found)
         count[0] += 1
         if count[0] == 5:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt), bench(tmp_path, progress=tick) as made:
+    monkeypatch.setattr(Store, "add", counted)
+    with pytest.raises(KeyboardInterrupt), bench(tmp_path) as made:
         made.scores(case, places)
     with bench(tmp_path) as made:
-        assert made.evaluator.resumed == count[0] == 5
+        assert made.resumed == 5
         found, _ = made.scores(case, places)
     with Bench(load("reference"), "", tmp_path / "other", 1) as made:
         np.testing.assert_array_equal(made.scores(case, places)[0], found)
@@ -469,15 +473,18 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     limits = [replace(BY_NAME[name], values=few) for name, few in values.items()]
     efforts = study.Efforts(SMALL, Effort(8, (), (), rounds=1), Effort(8, (), (), rounds=0), 1)
     scene = load("reference", {"run.duration": 0.2})
-    rigs: list[Any] = [{"mechanics.surface_mass": 0.02}]
+    rigs = tmp_path / "rigs.json"
+    rigs.write_text('{"ensemble": [{}, {"mechanics.surface_mass": 0.02}]}')
     there = [load("trial-05", {"run.duration": 0.15, "run.settle": 0.05})]
-    steps: list[int] = []
-    said = run(
-        tmp_path, scene, "reference", rigs, there, efforts=efforts, limits=limits, workers=2,
-        told=lambda count, name: steps.append(count),
+    steps: list[tuple[int, int]] = []
+    monkeypatch.setattr(report, "FULL", efforts)
+    monkeypatch.setattr(report, "LIMITS", limits)
+    said = cosim.limits(
+        scene, rigs=rigs, at=there, out=tmp_path, workers=2,
+        progress=lambda done, total, what: steps.append((done, total)),
     )  # fmt: skip
-    assert steps == [len(steps)] * len(steps)
-    assert "The part slips down from 50 m/s² on" in said and not (tmp_path / STORE).exists()
+    assert steps == [(k, len(steps)) for k in range(1, len(steps) + 1)]
+    assert "The part slips down from 50 m/s² on" in repr(said) and not (tmp_path / STORE).exists()
     with open(tmp_path / "limits.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert {row["limit"] for row in rows} == {"own", "ideal current", *(x.name for x in limits)}

@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import minimize_scalar
 
+import cosim
 from cosim.drive.surface import formulas
 from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import (
@@ -529,17 +530,17 @@ def test_the_figures_show_the_line_of_optima_and_what_is_printed():
 
 @needs.ngspice_library
 def test_figure_7_has_the_published_errors_and_the_machines_own(trials: Path, tmp_path: Path):
-    told = []
-    found = figure7.trials(trials, lambda: told.append(1))
-    figure7.write(tmp_path, found)
-    assert len(told) == 10
+    told: list[int] = []
+    figure7.paper(trials, out=tmp_path, progress=lambda done, total, what: told.append(total))
+    assert told == [10] * 10
     rows = list(csv.DictReader((tmp_path / "figure7.csv").read_text().splitlines()))
     numbers = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
     # the published mean error; that of the same parameters solved exactly
     assert numbers["error_theirs [mm]"].mean() == pytest.approx(0.1611, abs=5e-5)
     assert numbers["error_exact [mm]"].mean() == pytest.approx(0.1569, abs=5e-5)
     # trial 5 in the paper's figure: from 0 to 4.2 mm in 0.319 s, the last of its 16 kicks at 4.55
-    (shown,) = (one.theirs for one in found if one.number == figure7.TRIAL)
+    every = cosim.fit(trials, evaluate="published", solver="published").shown
+    shown = every[figure7.TRIAL - 1]
     assert shown.simulated[0][-1] == pytest.approx(0.319, abs=1e-3)
     assert shown.simulated[1][-1] == pytest.approx(4.2e-3, abs=0.05e-3)
     assert shown.simulated[1].max() == pytest.approx(4.55e-3, abs=0.05e-3)

@@ -30,7 +30,7 @@ def _run(arguments: Namespace) -> None:
     scene = scene_of(arguments)
     folder = arguments.out or Path("results") / scene.name
     if arguments.spread:
-        from cosim.studies.spread.turns import turns
+        from cosim.studies.spread.run import turns
 
         turns(scene)  # refuses a scene without knobs before it is run
     with writable(folder):

@@ -1,14 +1,10 @@
 """``cosim identify``."""
 
-import sys
-import time
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from cosim.cli.command import Command
-from cosim.cli.options import add_out, add_quick, writable
-
-EVERY = 10.0  # s; between lines where stderr is no terminal
+from cosim.cli.options import add_out, add_quick, progress_bar, writable
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -35,48 +31,25 @@ def _options(parser: ArgumentParser) -> None:
     add_out(parser, "results/identify")
 
 
-class _Line:
-    """The progress on one line of a terminal, else a line now and then."""
-
-    def __init__(self) -> None:
-        self._began = self._told = time.monotonic()
-        self._terminal = sys.stderr.isatty()
-
-    def __call__(self, what: str, best: float) -> None:
-        now = time.monotonic()
-        if now - self._told < (0.2 if self._terminal else EVERY):
-            return
-        self._told = now
-        line = f"{now - self._began:6.0f} s  {what}: cost {best:.4f}"
-        if self._terminal:
-            print(f"\r{line:<78.78}", end="", file=sys.stderr, flush=True)
-        else:
-            print(line, file=sys.stderr, flush=True)
-
-    def end(self) -> None:
-        """Leave the terminal's line."""
-        if self._terminal:
-            print(file=sys.stderr)
-
-
 def _run(arguments: Namespace) -> None:
     import cosim
 
-    line = _Line()
-    with writable(arguments.out):
-        try:
-            found = cosim.identify(
-                arguments.trials,
-                bounds=arguments.bounds,
-                apart=arguments.apart,
-                quick=arguments.quick,
-                seed=arguments.seed,
-                out=arguments.out,
-                workers=arguments.workers,
-                progress=line,
-            )
-        finally:
-            line.end()
+    with writable(arguments.out), progress_bar("identify", None, "look") as bar:
+
+        def progress(what: str, best: float) -> None:
+            bar.set_description_str(f"{what}: cost {best:.4f}", refresh=False)
+            bar.update()
+
+        found = cosim.identify(
+            arguments.trials,
+            bounds=arguments.bounds,
+            apart=arguments.apart,
+            quick=arguments.quick,
+            seed=arguments.seed,
+            out=arguments.out,
+            workers=arguments.workers,
+            progress=progress,
+        )
     print(found)
     print(f"Written to {arguments.out}: identify.json, .csv, .md, figures and scenes")
 

@@ -3,9 +3,11 @@
 What the runs say: orders, errors at equal run time, and the page.
 """
 
+import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import partial
 from itertools import accumulate
 from math import exp, inf, isfinite, log, nan
 from pathlib import Path
@@ -17,11 +19,14 @@ from cosim.studies.accuracy import chaos, figures, friction
 from cosim.studies.accuracy.cases import CASES
 from cosim.studies.accuracy.runs import Run, measure, reference
 from cosim.studies.accuracy.solvers import ALL_IN_NGSPICE, DEFAULT, LSODA, SOLVERS, Solver
-from cosim.studies.tables import Row, brief, span, write_csv, write_page
+from cosim.studies.report import Progress, Report, silent
+from cosim.studies.tables import Row, brief, span
 
 EQUAL_TIME, EQUAL_ERROR = 0.5, 1e-3
 """CPU seconds, and error over range, at which methods are compared."""
 _HALVINGS = 4  # over which an order is fitted
+STORE = "accuracy.sqlite"
+
 _ROUNDS = 3
 
 
@@ -135,29 +140,36 @@ class Study:
         return rows
 
 
-def run(out: Path, quick: bool) -> None:
-    """Write ``accuracy``, ``friction`` and ``chaos`` as png, csv and md into ``out``; print what
-    they show."""
-    cases = [case for case in CASES.values() if not case.netlist]
+def accuracy(
+    *,
+    quick: bool = False,
+    out: str | os.PathLike[str] | None = None,
+    progress: Progress = silent,
+) -> tuple[Report, Report, Report]:
+    """The error of every coupling method over its run time, of laws of friction, and of statistics
+    where motion is chaotic; ``quick``: on one scene.
+
+    In the folder ``out`` it leaves what each ``Report.save`` writes, and takes up what an
+    interrupted study has left there. Raises BadInput.
+    """
+    cases = [case for case in CASES.values() if not case.netlist][-1 if quick else 0 :]
     rounds = 1 if quick else _ROUNDS
-    with Store(out / "accuracy.sqlite", quick) as store:
-        runs = [
-            run
-            for case in (cases[-1:] if quick else cases)
-            for run in measure(case, SOLVERS, rounds, store)
-        ]
-        write_csv(out / "accuracy.csv", [asdict(run) for run in runs])
-        print(write(out, runs))
-        print(friction.run(out, store))
-        print(chaos.run(out, store))
+    with Store(None if out is None else Path(out) / STORE, quick) as store:
+        runs: list[Run] = []
+        for done, case in enumerate(cases, 1):
+            runs += measure(case, SOLVERS, rounds, store)
+            progress(done, len(cases), case.title)
+        found = report(runs), friction.report(store), chaos.report(store)
+        if out is not None:
+            for one in found:
+                one.save(out)
         store.remove()
-    print(f"Written to {out}: {{accuracy,friction,chaos}}.{{csv,md,png}}")
+    return found
 
 
-def write(out: Path, runs: Sequence[Run]) -> str:
-    """Write ``accuracy.md`` and ``accuracy.png`` into ``out``; gives the message."""
+def report(runs: Sequence[Run]) -> Report:
+    """What the runs show."""
     study = Study(runs)
-    figures.draw_accuracy(runs, study.strong, study.message, out / "accuracy.png")
     trust = max(reference(name).other_method for name in study.scenes)
     growth = max(reference(name).growth for name in study.scenes)
     notes = [
@@ -178,5 +190,8 @@ def write(out: Path, runs: Sequence[Run]) -> str:
         "(interpolated between runs)": study.compared(),
         "Every method: order in its step, fitted over the last four halvings": study.methods(),
     }
-    write_page(out / "accuracy.md", "Speed against accuracy", notes, tables)
-    return study.message
+    draw = partial(figures.draw_accuracy, runs, study.strong, study.message)
+    return Report(
+        "accuracy", "Speed against accuracy", [asdict(run) for run in runs], notes, tables,
+        {"": draw}, study.message,
+    )  # fmt: skip

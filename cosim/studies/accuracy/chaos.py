@@ -8,8 +8,8 @@ ensemble's own spread leaves open.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from math import hypot, sqrt
-from pathlib import Path
 from statistics import mean, stdev
 from typing import Any
 
@@ -19,7 +19,8 @@ from cosim.evaluate.store import Store
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.accuracy.figures import draw_chaos
-from cosim.studies.tables import Row, write_csv, write_page
+from cosim.studies.report import Report
+from cosim.studies.tables import Row
 from cosim.waveforms.result import Result
 
 CHAOTIC = 1e4
@@ -81,8 +82,8 @@ def ensemble(scene: Sequence[str], more: Sequence[str], members: int, store: Sto
     return {name: [one[name] for one in found] for name in STATISTICS}
 
 
-def run(out: Path, store: Store) -> str:
-    """Write ``chaos`` as png, csv and md into ``out``; gives what it shows."""
+def report(store: Store) -> Report:
+    """Whether methods agree in the statistics of a chaotic scene."""
     grown = store.once("chaos, growth", lambda: growth(SCENE))
     ensembles = {name: ensemble(SCENE, more, MEMBERS, store) for name, more in METHODS.items()}
     first = next(iter(ensembles.values()))
@@ -109,10 +110,10 @@ def run(out: Path, store: Store) -> str:
         {"method": method} | {name: _cell(one[name], first[name]) for name in STATISTICS}
         for method, one in ensembles.items()
     ]
-    write_csv(out / "chaos.csv", raw)
-    write_page(out / "chaos.md", "A chaotic scene", notes, {"Ensembles": table})
-    draw_chaos(ensembles, average, message, out / "chaos.png")
-    return message
+    return Report(
+        "chaos", "A chaotic scene", raw, notes, {"Ensembles": table},
+        {"": partial(draw_chaos, ensembles, average, message)}, message,
+    )  # fmt: skip
 
 
 def _cell(values: Sequence[float], first: Sequence[float]) -> str:

@@ -14,8 +14,8 @@ still slips: by set-valued Coulomb friction, nothing.
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from math import cos, exp, isfinite, nan, pi, sqrt, tanh
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,8 @@ from cosim.simulation.peers.lsoda import run as run_machine
 from cosim.studies.accuracy.cases import CASES
 from cosim.studies.accuracy.figures import CREEP, ERROR, draw_friction
 from cosim.studies.accuracy.runs import reference
-from cosim.studies.tables import Row, span, write_csv, write_page
+from cosim.studies.report import Report
+from cosim.studies.tables import Row, span
 
 FREQUENCY, ACCELERATION, SLIP = 40.0, 15.0, 0.02
 """Of the surface, Hz and m/s²; of the surface against the part at first, m/s."""
@@ -46,8 +47,8 @@ COULOMB = "set-valued Coulomb"
 _RTOL_IN_THE_MACHINE = 1e-6
 
 
-def run(out: Path, store: Store) -> str:
-    """Write ``friction`` as png, csv and md into ``out``; gives what it shows."""
+def report(store: Store) -> Report:
+    """What smoothed laws of friction do to a held part, and to the machine."""
     moved = {(row["law"], row["width"]): row for row in in_the_machine(store)}
     nothing = {ERROR: nan, "CPU time [s]": nan}
     rows = [row | moved.get((row["law"], row["width"]), nothing) for row in creep()]
@@ -69,10 +70,10 @@ def run(out: Path, store: Store) -> str:
         "but for Coulomb, which is solved with events. Karnopp's band is left out: LSODA comes to "
         "a stop at its edges.",
     ]
-    write_csv(out / "friction.csv", rows)
-    write_page(out / "friction.md", "Laws of friction", notes, {"Each law": rows})
-    draw_friction(rows, message, out / "friction.png")
-    return message
+    return Report(
+        "friction", "Laws of friction", rows, notes, {"Each law": rows},
+        {"": partial(draw_friction, rows, message)}, message,
+    )  # fmt: skip
 
 
 def law_of(name: str, width: float, scene: Scene) -> Law:

@@ -1,25 +1,54 @@
-"""The ladder in words, a table and a figure."""
+"""The ladder as a study: in words, a table and a figure."""
 
+import os
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cosim.scene import Scene
-from cosim.studies.circuit.ladder import Rung, cheapest
+from cosim.evaluate.store import Store
+from cosim.scene import Scene, load
+from cosim.scene.loading import Overrides
+from cosim.studies.circuit.ladder import Rung, cheapest, runs_in_all
+from cosim.studies.circuit.ladder import ladder as each_rung
 from cosim.studies.plots import GREEN, panels
-from cosim.studies.tables import Row, brief, write_csv, write_page
+from cosim.studies.report import Progress, Report, counted, silent
+from cosim.studies.tables import Row, brief
 
 Found = Sequence[tuple[Scene, list[Rung]]]
 
+STORE = "ladder.sqlite"
 
-def write(folder: Path, found: Found) -> str:
-    """Write ladder.csv, .md and .png into ``folder``; gives what is printed."""
+
+def ladder(
+    scenes: Sequence[Scene | str | os.PathLike[str]] = ("paper",),
+    overrides: Overrides | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    progress: Progress = silent,
+) -> Report:
+    """Run scenes on each rung of the circuit in turn: what each costs, and how far its v_average is
+    from the top's and the amplifier's.
+
+    In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
+    study has left there. Raises BadInput and
+    SimulationFailed.
+    """
+    every = [load(scene, overrides) for scene in scenes]
+    tick = counted(progress, runs_in_all() * len(every))
+    path = None if out is None else Path(out) / STORE
+    with Store(path, [scene.as_dict() for scene in every]) as store:
+        found = report([(scene, each_rung(scene, store, tick)) for scene in every])
+        if out is not None:
+            found.save(out)
+        store.remove()
+    return found
+
+
+def report(found: Found) -> Report:
+    """Which circuit each scene needs, and what it costs."""
     said = [words(scene, rungs) for scene, rungs in found]
     table = [row for pair in found for row in rows(*pair)]
-    write_csv(folder / "ladder.csv", table)
-    notes = [f"{message(found)}.", *said]
-    write_page(folder / "ladder.md", "The ladder of circuits", notes, {"Each rung": table})
-    draw(found, folder / "ladder.png")
     printed: list[str] = []
     for (_, rungs), sentence in zip(found, said, strict=True):
         lines = [
@@ -28,7 +57,11 @@ def write(folder: Path, found: Found) -> str:
             for rung in rungs
         ]
         printed += [sentence, "", *lines, ""]
-    return "\n".join([*printed, f"Written to {folder}: ladder.csv, ladder.md, ladder.png"])
+    notes, figures = [f"{message(found)}.", *said], {"": partial(draw, found)}
+    return Report(
+        "ladder", "The ladder of circuits", table, notes, {"Each rung": table}, figures,
+        "\n".join(printed),
+    )  # fmt: skip
 
 
 def rows(scene: Scene, rungs: list[Rung]) -> list[Row]:

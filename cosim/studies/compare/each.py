@@ -3,6 +3,7 @@ from the command to the part, can be trusted.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import nan
 from pathlib import Path
 from statistics import median
@@ -15,7 +16,8 @@ from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides, list_scenes
 from cosim.studies.compare.run import Comparison, compare
 from cosim.studies.plots import BLUE, VERMILION, panels
-from cosim.studies.tables import Row, write_csv, write_page
+from cosim.studies.report import Progress, Report, counted, silent
+from cosim.studies.tables import Row
 from cosim.trials.tracked import number_of, trial_files
 
 
@@ -71,14 +73,27 @@ def row(found: Comparison) -> Row:
     }
 
 
-def write(folder: Path, found: Sequence[Comparison]) -> str:
-    """Write trials.csv, .md and .png into ``folder``; gives what is printed."""
+def trials(
+    trials: Path,
+    overrides: Overrides | None = None,
+    *,
+    out: Path | None = None,
+    progress: Progress = silent,
+) -> Report:
+    """Compare the published trials of a folder with their scenes; saved in ``out``."""
+    every = pairs(trials, overrides)
+    found = report(each(every, counted(progress, len(every))))
+    if out is not None:
+        found.save(out)
+    return found
+
+
+def report(found: Sequence[Comparison]) -> Report:
+    """How well one machine repeats the trials."""
     rows = [row(one) for one in found]
-    write_csv(folder / "trials.csv", rows)
-    said = [message(rows), *NOTES]
-    write_page(folder / "trials.md", "The whole chain against the trials", said, {"Trials": rows})
-    draw(rows, folder / "trials.png")
-    return "\n\n".join([said[0], f"Written to {folder}: trials.csv, trials.md, trials.png"])
+    said, tables = [message(rows), *NOTES], {"Trials": rows}
+    figures = {"": partial(draw, rows)}
+    return Report("trials", "The whole chain against the trials", rows, said, tables, figures)
 
 
 NOTES = (

@@ -21,9 +21,8 @@ from cosim.studies.identify.problem.targets import (
     Measured,
     read_trials,
 )
-from cosim.studies.identify.report.exact import exact
 from cosim.studies.identify.report.measures import Row, bands, errors, own_numbers, repeatability
-from cosim.studies.identify.report.scenes import trial_settings
+from cosim.studies.identify.report.scenes import exact, trial_settings
 from cosim.studies.identify.report.solved import HeldOut, Solved
 from cosim.studies.identify.report.verdicts import Profile, ensemble_of, judge
 from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds
@@ -101,10 +100,7 @@ def identify(
     if not steady:
         raise BadInput(f"{trials}: no trial is left to be fitted: none repeats itself.")
     effort, count = QUICK if quick else FULL, workers_asked(workers)
-    path = None
-    if out is not None:
-        path = Path(out) / STORE
-        path.parent.mkdir(parents=True, exist_ok=True)
+    path = None if out is None else Path(out) / STORE
     with Store(path, seed, *_asked(space, steady, effort)) as store:
         plan = Plan(
             Search(space, [trial.target for trial in steady], count),

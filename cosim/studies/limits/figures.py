@@ -1,6 +1,6 @@
 """The figures of the limits, one message each."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite
 from pathlib import Path
 from textwrap import fill
@@ -31,24 +31,24 @@ ANSWER = ("a_camera", "a_walls", "v_up")
 """What the first figure shows."""
 
 
-def draw(
-    folder: Path, study: Study, points: Points, found: Sequence[Change], there: Sequence[There]
-) -> list[str]:
-    """Draw all figures into ``folder``; their names."""
-    names = ["limits.png", "limits-acceleration.png", "limits-transport.png"]
-    answer(folder / names[0], study, points, found)
+def drawn(
+    study: Study, points: Points, found: Sequence[Change], there: Sequence[There]
+) -> dict[str, Callable[[Path], None]]:
+    """What draws each figure into a file, by what its name has after the study's."""
     acceleration = {
         "a_walls": ("true peak, walls' contact law", PURPLE),
         "a_camera": ("as a camera reads it", BLUE),
         "a_free": ("true peak, no wall touched", GREEN),
     }
-    frontier(folder / names[1], study, points, acceleration, True)
     transport = {"v_up": ("upwards", BLUE), "v_down": ("downwards", VERMILION)}
-    frontier(folder / names[2], study, points, transport, False)
+    every: dict[str, Callable[[Path], None]] = {
+        "": lambda path: answer(path, study, points, found),
+        "-acceleration": lambda path: frontier(path, study, points, acceleration, True),
+        "-transport": lambda path: frontier(path, study, points, transport, False),
+    }
     if there:
-        names.append("limits-settings.png")
-        costs(folder / names[-1], there, acting(study.limits))
-    return names
+        every["-settings"] = lambda path: costs(path, there, acting(study.limits))
+    return every
 
 
 def answer(path: Path, study: Study, points: Points, found: Sequence[Change]) -> None:

@@ -1,23 +1,38 @@
 """The whole study, and limits.csv, limits.md and the figures that it leaves."""
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Mapping, Sequence
 from math import nan
 from pathlib import Path
 
-from cosim.scene import Scene
+from cosim.errors import BadInput
+from cosim.scene import Scene, load
+from cosim.scene.loading import Overrides
 from cosim.studies.limits import answer, figures
 from cosim.studies.limits.aims import QUANTITIES
 from cosim.studies.limits.answer import Change, changes, height
-from cosim.studies.limits.at import There, acting, at
+from cosim.studies.limits.at import There, acting
+from cosim.studies.limits.at import at as lifted_at
 from cosim.studies.limits.confirm import Point, Points, confirmed, judged
 from cosim.studies.limits.runs import Bench
-from cosim.studies.limits.study import FULL, IDEAL, OWN, Efforts, Study, study, told_count
-from cosim.studies.limits.table import LIMITS, Limit, Settings, needed_acceleration
-from cosim.studies.tables import Row, write_csv, write_page
+from cosim.studies.limits.study import (
+    FULL,
+    IDEAL,
+    OWN,
+    QUICK,
+    Study,
+    checked,
+    ensemble,
+    study,
+    told_count,
+)
+from cosim.studies.limits.table import LIMITS, Limit, needed_acceleration
+from cosim.studies.report import Progress, Report, counted, silent
+from cosim.studies.tables import Row
 
 
-def write(folder: Path, bench: Bench, study: Study, points: Points, there: Sequence[There]) -> str:
-    """Write the tables and figures into ``folder``; gives what is printed."""
+def report(bench: Bench, study: Study, points: Points, there: Sequence[There]) -> Report:
+    """What the study tells."""
     found = changes(study, points)
     said = [text for text in answer.paragraphs(study, points, found) if text]
     if not_held := answer.refuted(points):
@@ -30,7 +45,6 @@ def write(folder: Path, bench: Bench, study: Study, points: Points, there: Seque
             "Best points sought on the more complete circuit itself, since it refuted all good "
             f"settings of the cheapest one: {len(sought)}."
         )
-    write_csv(folder / "limits.csv", [row(bench, study, point) for point in points.values()])
     tables: dict[str, Sequence[Row]] = {
         "What is achievable": achieved(study, points),
         "What lifting each limit changes, in per cent of the frontier": lifted(found),
@@ -49,9 +63,11 @@ def write(folder: Path, bench: Bench, study: Study, points: Points, there: Seque
         if point.name == OWN
     ]
     tables["How the points of the own circuit are repeated; limits.csv has those of all"] = commands
-    write_page(folder / "limits.md", "What is achievable, and which limit binds", said, tables)
-    names = figures.draw(folder, study, points, found, there)
-    return "\n\n".join([*said, f"Written to {folder}: limits.csv, limits.md, {', '.join(names)}"])
+    return Report(
+        "limits", "What is achievable, and which limit binds",
+        [row(bench, study, point) for point in points.values()], said, tables,
+        figures.drawn(study, points, found, there), "\n\n".join(said),
+    )  # fmt: skip
 
 
 def row(bench: Bench, study: Study, point: Point) -> Row:
@@ -150,37 +166,53 @@ def cost(there: There, limit: Limit) -> float:
 
 STORE = "limits.sqlite"
 
+TRIALS = tuple(f"trial-{number:02d}" for number in range(1, 11))
 
-def run(
-    folder: Path,
-    scene: Scene,
-    asked: str,
-    rigs: Sequence[Settings] = (),
-    there: Sequence[Scene] = (),
+
+def limits(
+    scene: Scene | str | os.PathLike[str] = "paper",
+    overrides: Overrides | None = None,
     *,
+    rigs: str | os.PathLike[str] | None = None,
+    at: Sequence[Scene | str | os.PathLike[str]] | None = None,
     seed: int = 0,
-    efforts: Efforts = FULL,
-    limits: Sequence[Limit] = LIMITS,
+    quick: bool = False,
+    out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     dask: str | None = None,
-    told: Callable[[int, str], object] = lambda steps, name: None,
-    progress: Callable[[], object] = lambda: None,
-) -> str:
-    """Search, confirm, lift at the scenes ``there``, and write ``limits.*`` into ``folder``; gives
-    what is printed. The store beside them, from which a killed study goes on, is gone at the end.
+    progress: Progress = silent,
+) -> Report:
+    """What the three knobs can achieve on a scene's rig, and which limit of the circuit binds.
 
-    ``asked`` are the words after ``cosim run`` that stand for the scene; ``told`` hears of each
-    step, and how many there are, ``progress`` of each run. Raises BadInput.
+    The best settings are searched with each limit as it is, eased, tightened and gone, and judged
+    by circuits with more in them. ``rigs`` is a file of others that may be meant, such as
+    ``identify.json``: JSON or TOML whose list ``ensemble`` has tables of keys and values. At the
+    scenes ``at`` (the trials') each limit is lifted at their own settings. ``quick`` searches
+    coarsely. The same for the same ``seed``, on any number of ``workers`` or on the Dask cluster at
+    the address ``dask``.
+
+    In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
+    study has left there. Raises BadInput.
     """
-    steps = told_count(limits, efforts, len(rigs)) + 2 + len(there)
-
-    def done(name: str) -> None:
-        told(steps, name)
-
-    with Bench(scene, asked, folder / STORE, workers, dask, progress) as bench:
-        found = study(bench, rigs, limits, seed, efforts, done)
-        points = confirmed(bench, found, done)
-        points |= judged(bench, found, points, done)
-        words = write(folder, bench, found, points, at(bench, there, limits, done))
-        bench.evaluator.forget()
-    return words
+    if seed < 0:
+        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
+    words = [scene.name if isinstance(scene, Scene) else str(scene)]
+    if overrides:
+        pairs = overrides.items() if isinstance(overrides, Mapping) else ()
+        texts = [f"{key}={value}" for key, value in pairs] or list(overrides)
+        words += [f"--set {text}" for text in texts]
+    base, there = load(scene, overrides), [load(one) for one in at or TRIALS]
+    efforts = QUICK if quick else FULL
+    others = ensemble(Path(rigs), efforts.rigs) if rigs is not None else []
+    checked(base, others, rigs)
+    told = counted(progress, told_count(LIMITS, efforts, len(others)) + 2 + len(there))
+    path = None if out is None else Path(out) / STORE
+    with Bench(base, " ".join(words), path, workers, dask) as bench:
+        found = study(bench, others, LIMITS, seed, efforts, told)
+        points = confirmed(bench, found, told)
+        points |= judged(bench, found, points, told)
+        made = report(bench, found, points, lifted_at(bench, there, LIMITS, told))
+        if out is not None:
+            made.save(out)
+        bench.forget()
+    return made

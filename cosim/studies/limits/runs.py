@@ -1,6 +1,6 @@
 """What the runs of machines tell: scores, heat, and what coil and power amplifier bear."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, inf
 from pathlib import Path
@@ -46,7 +46,7 @@ class Case:
         return {**there, **times}
 
 
-class Bench:
+class Bench(Evaluator):
     """Runs settings on top of ``scene``; to be used in a ``with`` block.
 
     ``asked`` are the words after ``cosim run`` that stand for the scene.
@@ -56,10 +56,9 @@ class Bench:
         self,
         scene: Scene,
         asked: str,
-        path: Path,
+        path: Path | None,
         workers: int | None = None,
         dask: str | None = None,
-        progress: Callable[[], object] = lambda: None,
     ) -> None:
         own = aims.FREE | {
             "circuit.model": "limited", "drive.pwm_ripple": False, "drive.quantised": False,
@@ -72,22 +71,12 @@ class Bench:
             for key, value in own.items()
             if isinstance(value, bool) and tables["drive"][key.split(".")[1]] != value
         }
-        self._asked, self._progress = asked, progress
-        self.evaluator = Evaluator(self.scene, path, kept=NEEDED, workers=workers, dask=dask)
-
-    def __enter__(self) -> "Bench":
-        self.evaluator.__enter__()
-        return self
-
-    def __exit__(self, *failure: object) -> None:
-        self.evaluator.__exit__(*failure)
+        self._asked = asked
+        super().__init__(self.scene, path, kept=NEEDED, workers=workers, dask=dask)
 
     def outcomes(self, every: Sequence[Settings]) -> list[Outcome]:
         """What becomes of each settings, on the circuit that they name."""
-        found: dict[int, Outcome] = {}
-        for number, outcome in self.evaluator.run(enumerate(every)):
-            found[number] = outcome
-            self._progress()
+        found = dict(self.run(enumerate(every)))
         return [found[number] for number in range(len(every))]
 
     def scores(self, case: Case, places: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -5,6 +5,7 @@ machines is not the luck of two searches.
 """
 
 import json
+import os
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -284,7 +285,7 @@ def ensemble(path: Path, most: int) -> list[Settings]:
     return [{key: value for key, value in rig.items() if "." in key} for rig in rigs]
 
 
-def checked(scene: Scene, rigs: Sequence[Settings], path: Path) -> None:
+def checked(scene: Scene, rigs: Sequence[Settings], file: str | os.PathLike[str] | None) -> None:
     """Refuse a scene or a rig that cannot be studied. Raises BadInput."""
     if not scene.rung.on_ladder:
         raise BadInput(
@@ -296,4 +297,4 @@ def checked(scene: Scene, rigs: Sequence[Settings], path: Path) -> None:
             f'scene {scene.name}: drive.waveform = "{scene.drive.waveform}" has no knobs to search.'
         )
     for number, rig in enumerate(rigs):
-        changed(scene, rig, f"{plain(str(path))}, ensemble {number}")
+        changed(scene, rig, f"{plain(str(file))}, ensemble {number}")

@@ -5,8 +5,8 @@ The whole machine knows neither: of a trial it has the drive, the start and the 
 identified scenes, and makes the surface's motion itself.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,8 @@ from cosim.studies.fit.cases import FIRST_ROW
 from cosim.studies.fit.fit import fit
 from cosim.studies.fit.results import Shown
 from cosim.studies.paper.figures import DASHED, PART, SURFACE
-from cosim.studies.tables import Row, write_csv
+from cosim.studies.report import Progress, Report, counted, silent
+from cosim.studies.tables import Row
 from cosim.trials.periods import drift
 
 TRIAL = 5
@@ -70,22 +71,33 @@ class Trial:
         }
 
 
-def trials(folder: Path, done: Callable[[], object]) -> list[Trial]:
-    """The published trials of a folder, simulated in three ways; ``done`` is called after each.
+def paper(trials: Path, *, out: Path | None = None, progress: Progress = silent) -> Report:
+    """The published trials of a folder, simulated in three ways; saved in ``out``.
 
     Raises BadInput where they are not the published ones.
     """
-    theirs = fit(folder, evaluate="published", solver="published").shown
-    exact = fit(folder, evaluate="published", solver="exact").shown
-    machine = each.each(each.pairs(folder), done)
-    together = zip(theirs, exact, machine, strict=True)
-    return [Trial(number, *sides) for number, sides in enumerate(together, start=1)]
+    theirs = fit(trials, evaluate="published", solver="published").shown
+    exact = fit(trials, evaluate="published", solver="exact").shown
+    every = each.pairs(trials)
+    together = zip(theirs, exact, each.each(every, counted(progress, len(every))), strict=True)
+    found = report([Trial(number, *sides) for number, sides in enumerate(together, start=1)])
+    if out is not None:
+        found.save(out)
+    return found
 
 
-def write(folder: Path, found: list[Trial]) -> None:
-    """Write ``figure7.csv`` and ``figure7.png``."""
+def report(found: list[Trial]) -> Report:
+    """The paths of one trial, and the mean velocities of all."""
     rows = [trial.row() for trial in found]
-    write_csv(folder / "figure7.csv", rows)
+    said = (
+        "The ten published trials as they were measured, by the authors' solver and by the exact "
+        "one on the tracked surface, and by the whole chain from the command to the part."
+    )
+    figures = {"": partial(_draw, found, rows)}
+    return Report("figure7", "The paper's figure 7", rows, [said], {"Trials": rows}, figures)
+
+
+def _draw(found: list[Trial], rows: list[Row], path: Path) -> None:
     figure = Picture(13.0, 5.6, "constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
     _paths(left, next(trial for trial in found if trial.number == TRIAL))
@@ -95,7 +107,7 @@ def write(folder: Path, found: list[Trial]) -> None:
         Line2D([], [], color=c, marker=m, lw=1.3, label=f"part: {w}") for _, c, m, w in SIDES
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9, frameon=False)
-    figure.write(folder / "figure7.png")
+    figure.write(path)
 
 
 def _paths(axis: Axes, trial: Trial) -> None:

@@ -1,12 +1,15 @@
 """The stability study: the limits of the coupling methods, their page and their figure."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 from cosim.coupling.rewind.methods import ORDERS
 from cosim.evaluate.store import Store
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, End, label_ends, panels
+from cosim.studies.report import Progress, Report, silent
 from cosim.studies.stability.limits import (
     LONGEST,
     METHODS,
@@ -17,29 +20,41 @@ from cosim.studies.stability.limits import (
     with_limits,
 )
 from cosim.studies.stability.machines import DIRECT
-from cosim.studies.tables import Row, span, write_csv, write_page
+from cosim.studies.tables import Row, span
+
+STORE = "stability.sqlite"
 
 _COLORS = {1: ORANGE, 2: BLUE, 3: GREEN}
 """By the order of a method."""
 
 
-def run(out: Path, quick: bool) -> None:
-    """Write ``stability`` as png, csv and md into ``out``, and print what it shows."""
+def stability(
+    *,
+    quick: bool = False,
+    out: str | os.PathLike[str] | None = None,
+    progress: Progress = silent,
+) -> Report:
+    """The largest stable macro step of every coupling method, predicted and observed; ``quick``: of
+    few machines.
+
+    In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
+    study has left there. Raises BadInput.
+    """
     regimes = [*(REGIMES[:1] if quick else REGIMES), *over_strength(3 if quick else 9)]
-    with Store(out / "stability.sqlite", quick) as store:
-        found = list(limits(regimes, store))
-        _report(out, found)
+    with Store(None if out is None else Path(out) / STORE, quick) as store:
+        found: list[Limit] = []
+        for limit in limits(regimes, store):
+            found.append(limit)
+            progress(len(found), len(METHODS) * len(regimes), limit.method)
+        made = report(found, list(with_limits((4e-3, 5e-3, 6e-3))))
+        if out is not None:
+            made.save(out)
         store.remove()
+    return made
 
 
-def _report(out: Path, found: Sequence[Limit]) -> None:
-    write_csv(out / "stability.csv", [asdict(limit) for limit in found])
-    print(write(out, found, list(with_limits((4e-3, 5e-3, 6e-3)))))
-    print(f"Written to {out}: stability.{{csv,md,png}}")
-
-
-def write(out: Path, found: Sequence[Limit], clamped: Sequence[Row]) -> str:
-    """Write ``stability.md`` and ``stability.png`` into ``out``; gives the message.
+def report(found: Sequence[Limit], clamped: Sequence[Row]) -> Report:
+    """What the limits show.
 
     ``clamped`` is the table of what becomes of the current behind an amplifier's limits.
     """
@@ -49,7 +64,6 @@ def write(out: Path, found: Sequence[Limit], clamped: Sequence[Row]) -> str:
     if free:
         have = "has" if len(free) == 1 else "have"
         message += f"; only {' and '.join(free)} {have} no limit below {LONGEST:g} s"
-    draw(driven, free, message, out / "stability.png")
     worst = max(abs(x.observed / x.predicted - 1.0) for x in found)
     swept = [x for x in driven if x.strength != DIRECT.strength]
     notes = [
@@ -72,8 +86,10 @@ def write(out: Path, found: Sequence[Limit], clamped: Sequence[Row]) -> str:
         for cut in dict.fromkeys(x.cut for x in found)
     }
     tables["Gauss-Seidel k = 1 on Bl 3 N/A, behind the limit of a clamped amplifier"] = clamped
-    write_page(out / "stability.md", "Stability of the coupling methods", notes, tables)
-    return message
+    return Report(
+        "stability", "Stability of the coupling methods", [asdict(limit) for limit in found],
+        notes, tables, {"": partial(draw, driven, free, message)}, message,
+    )  # fmt: skip
 
 
 def by_method(limits: Sequence[Limit]) -> list[Row]:

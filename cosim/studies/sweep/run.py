@@ -71,7 +71,6 @@ def sweep(
         with TemporaryDirectory() as folder:
             return _sweep(scene, design, Path(folder), workers, dask, progress)
     folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
     data = _sweep(scene, design, folder, workers, dask, progress)
     from cosim.studies.sweep import figure
 

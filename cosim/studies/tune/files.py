@@ -27,7 +27,7 @@ def write(folder: Path, tuning: Search) -> None:
         "runs": len(tuning.runs),
         "failed": tuning.failed,
         "seed": tuning.seed,
-        "search": "Latin hypercube, then the cross-entropy method",
+        "search": "Latin hypercube, then CMA-ES",
         "scouts": tuning.scouts,
         "turns": list(TURNS),
         "neighbours": tuning.neighbours,

@@ -119,10 +119,7 @@ def tune(
             f"--budget {budget}: must be a whole number from {least}, for these keys, to "
             f"{MOST_RUNS}."
         )
-    path = None
-    if out is not None:
-        path = Path(out) / STORE
-        Path(out).mkdir(parents=True, exist_ok=True)
+    path = None if out is None else Path(out) / STORE
     whole_periods = any(key in FREQUENCIES for key in ranges)
     aim = quantity, largest, ranges, budget, seed, whole_periods
     with Evaluator(scene, path, whole_periods=whole_periods, workers=workers, dask=dask) as bench:
