@@ -63,16 +63,9 @@ def killed(command: list[str], dice: random.Random, longest: float) -> bool:
     return True
 
 
-@pytest.mark.parametrize(
-    ("name", "kills"),
-    [
-        ("run", 3),
-        *(
-            pytest.param(name, kills, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])
-            for name, kills in KILLS.items()
-        ),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize(("name", "kills"), KILLS.items())
 def test_killed(name: str, kills: int, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     trials = request.getfixturevalue("trials") if name == "identify" else ""
     calm, wild = tmp_path / "calm", tmp_path / "wild"

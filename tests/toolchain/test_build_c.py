@@ -57,6 +57,15 @@ def test_the_same_sources_give_the_same_bytes(copy: Path) -> None:
     assert [path.name for path in (copy / "cosim").glob(".*")] == []
 
 
+@pytest.fixture
+def hasty(tmp_path: Path) -> str:
+    """The compiler, in a hurry: where what it makes is not run."""
+    script = tmp_path / "hasty"
+    script.write_text(f'#!/bin/sh\nexec {shlex.join(build_c.compiler())} "$@" -O0\n')
+    script.chmod(0o755)
+    return str(script)
+
+
 @posix
 def test_hardening_where_the_compiler_has_it(copy: Path, tmp_path: Path) -> None:
     """One that does not know a flag builds without it."""
@@ -67,7 +76,7 @@ def test_hardening_where_the_compiler_has_it(copy: Path, tmp_path: Path) -> None
     old = tmp_path / "oldcc"
     old.write_text(
         '#!/bin/sh\ncase "$*" in *-strong*|*SOURCE=3*|*-Wl,*) echo "error: what?" >&2; exit 1;; '
-        f'esac\nexec {shlex.join(build_c.compiler())} "$@"\n'
+        f'esac\nexec {shlex.join(build_c.compiler())} "$@" -O0\n'
     )
     old.chmod(0o755)
     done = make(copy, CC=str(old))
@@ -76,11 +85,12 @@ def test_hardening_where_the_compiler_has_it(copy: Path, tmp_path: Path) -> None
     assert made[len(build_c.FLAGS) :] in ([], ["-U_FORTIFY_SOURCE", "-D_FORTIFY_SOURCE=2"])
 
 
-def test_changed_sources_are_another_fmu(copy: Path) -> None:
+@posix
+def test_changed_sources_are_another_fmu(copy: Path, hasty: str) -> None:
     definition = copy / "fmu/src/physics/variables.def"
     text = definition.read_text()
     definition.write_text(text.replace("Mass of the ram", r"\"A\" < B & C > 'D'"))
-    assert make(copy).returncode == 0
+    assert make(copy, CC=hasty).returncode == 0
     tokens = set()
     for version in (2, 3):
         folder = str(copy / f"cosim/_compiled/fmi{version}")
@@ -95,13 +105,14 @@ def test_changed_sources_are_another_fmu(copy: Path) -> None:
     assert made["sources"] != build_c.digest()
 
 
-def test_a_failure_leaves_the_last_build(copy: Path) -> None:
+@posix
+def test_a_failure_leaves_the_last_build(copy: Path, hasty: str) -> None:
     old = copy / "cosim/_compiled"
     old.mkdir()
     (old / "build.json").write_text("old")
     definition = copy / "fmu/src/physics/variables.def"
     definition.write_text(definition.read_text().replace('"kg"', '"lb"'))
-    done = make(copy)
+    done = make(copy, CC=hasty)
     assert done.returncode and "cannot read the unit lb" in done.stderr
     assert contents(copy / "cosim/_compiled") == {"build.json": b"old"}
     assert [path.name for path in (copy / "cosim").glob(".*")] == []
