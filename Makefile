@@ -89,13 +89,13 @@ charts: setup
 		--over drive.pot_frequency=0.1:0.95:18 --over drive.pot_offset=0:0.7:15
 	@cp results/paper-limited-sweep/figure.png results/sweep.png
 	@$(VENV)/bin/cosim chart stability
-	@$(VENV)/bin/cosim chart accuracy
+	@$(PY) -m benchmarks.charts
 	@$(VENV)/bin/cosim chart limits --rigs results/identify.json
 	@$(VENV)/bin/cosim chart ladder paper trial-05 gripper
 	@test -z '$(TRIALS)' || { $(VENV)/bin/cosim chart trials '$(TRIALS)' && $(VENV)/bin/cosim chart paper '$(TRIALS)'; }
 
 bench: setup
-	@$(VENV)/bin/cosim bench $(ARGS)
+	@$(PY) -m benchmarks $(ARGS)
 	@cp results/bench/bench.json results/bench.json
 
 # In an environment of its own, without what is compiled: it takes the tables from the sources.

@@ -4,7 +4,6 @@
 
     loop.so and other  libraries of the package, loaded by cosim.toolchain.libraries
     fmi2/, fmi3/       the FMU of the mechanics for FMI 2.0 and 3.0, as its .fmu files hold it
-    replay             the program in which `cosim bench` counts the FMU's instructions
     build.json         a hash of all that this was made of, the compiler and its flags, and the size
                        and hash of each file, by which a damaged one is told from a whole one
 
@@ -37,7 +36,6 @@ LIBRARIES = {
     "chain": (ROOT / "cosim/studies/identify/chain",),
 }
 """The package's libraries; each is made of all C files of its folders."""
-REPLAY = ROOT / "cosim/studies/bench/replay.c"
 DESCRIBE = FMU / "src/fmi/describe.c"
 FMU_LICENSE = FMU / "LICENSE"
 
@@ -75,7 +73,7 @@ class BuildFailed(Exception):
 def sources() -> list[Path]:
     """All files that the products depend on."""
     code = [path for folders in LIBRARIES.values() for path in _code(folders, "*.[ch]")]
-    return sorted([*code, REPLAY, *_fmu_files(), DESCRIBE, FMU_LICENSE, Path(__file__)])
+    return sorted([*code, *_fmu_files(), DESCRIBE, FMU_LICENSE, Path(__file__)])
 
 
 def digest() -> str:
@@ -95,8 +93,6 @@ def make(folder: Path) -> None:
         for library, folders in LIBRARIES.items():
             objects = _objects(_code(folders, "*.c"), work)
             link(objects, new / (library + SUFFIX), "-shared", *THREADS)
-        if sys.platform != "win32":
-            link([REPLAY], new / "replay", "-ldl")
         _make_fmu(new, work)
         made = {"sources": digest(), "compiler": compiler_version()}
         made["flags"] = [*FLAGS, *hardening()]

@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from cosim.scene import load
     from cosim.simulation.simulate import run
     from cosim.studies.accuracy.accuracy import accuracy
-    from cosim.studies.circuit.ladder_report import ladder
     from cosim.studies.compare.run import compare
     from cosim.studies.fit.fit import fit
     from cosim.studies.identify.run import identify
     from cosim.studies.limits.report import limits
     from cosim.studies.paper.theory import theory
+    from cosim.studies.speed.ladder import ladder
     from cosim.studies.spread import spread
     from cosim.studies.stability.stability import stability
     from cosim.studies.sweep import sweep
@@ -60,7 +60,7 @@ _HOMES = {
     "identify": "cosim.studies.identify.run",
     "theory": "cosim.studies.paper.theory",
     "accuracy": "cosim.studies.accuracy.accuracy",
-    "ladder": "cosim.studies.circuit.ladder_report",
+    "ladder": "cosim.studies.speed.ladder",
     "limits": "cosim.studies.limits.report",
     "stability": "cosim.studies.stability.stability",
 }

@@ -123,7 +123,7 @@ def test_an_accelerated_iteration_has_no_limit_and_a_plain_one_has() -> None:
     plain = largest(lambda: Iterated(*direct_drive(), "plain"))
     gauss_seidel = largest(lambda: Joint(*direct_drive(), GaussSeidel(0)))
     assert plain < 2.0 * gauss_seidel
-    accelerations: tuple[Acceleration, ...] = ("aitken", "anderson", "newton")
+    accelerations: tuple[Acceleration, ...] = ("Aitken", "Anderson", "Newton")
     for acceleration in accelerations:
 
         def accelerated(by: Acceleration = acceleration) -> Joint:

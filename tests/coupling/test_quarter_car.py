@@ -19,9 +19,9 @@ Steps come within 3 % of all six, rejections within 9.
 import numpy as np
 import pytest
 
+from benchmarks.error_control import ErrorControlled
 from cosim.coupling.methods.jacobi import Jacobi
 from cosim.coupling.participants.linear import LinearParticipant
-from cosim.coupling.rewind.error_control import ErrorControlled
 from cosim.coupling.rewind.joint import Joint
 
 pytestmark = pytest.mark.physics
@@ -60,7 +60,7 @@ def quarter_car() -> tuple[LinearParticipant, LinearParticipant]:
 def test_steps_on_the_quarter_car(order: int) -> None:
     undivided = GUESSED_TOLERANCE / (2.0 ** (order + 1) - 1.0)
     joint = Joint(*quarter_car(), Jacobi(order, slopes=False))
-    control = ErrorControlled(joint, order, 1e-4, 0.0, undivided, safety=0.9)
+    control = ErrorControlled(joint, 1e-4, 0.0, undivided, safety=0.9)
     control.run(DURATION)
     for published in PUBLISHED[order]:
         assert control.accepted / 2 == pytest.approx(published, rel=0.05)

@@ -1,5 +1,5 @@
-"""Writes cosim/studies/bench/reference.json: the part's path in the scene `reference`, which `cosim
-bench` takes for the truth.
+"""Writes benchmarks/reference.json: the part's path in the scene `reference`, which errors are
+measured against beside speeds.
 
     python -m tests.reference.generate_bench
 """
@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-import cosim
 from tests.reference.monolithic import simulate
 
 COMMAND = "python -m tests.reference.generate_bench"
@@ -33,7 +32,7 @@ def main() -> None:
             "z_part": path.tolist(),
             "spread": float(np.abs(path - other).max() / np.ptp(path)),
         }
-    target = Path(cosim.__file__).parent / "studies" / "bench" / "reference.json"
+    target = Path(__file__).parents[2] / "benchmarks" / "reference.json"
     target.write_text(json.dumps(found) + "\n", encoding="utf-8")
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.memory import peak
 from cosim.coupling.loop import agenda, lead
 from cosim.drive import straights
 from cosim.files import spill as tape
 from cosim.scene import load
 from cosim.simulation import simulate
 from cosim.simulation.elsewhere import on_disk_in
-from cosim.studies.bench.memory import peak
 from cosim.toolchain import processes
 from cosim.waveforms import storage
 

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.__main__ import TARGETS, TITLES
+from benchmarks.errors import brief, error, own_error, times
+from benchmarks.instructions import per_period
+from benchmarks.parts import coupled_over_parts
+from benchmarks.peers import lsoda, naive, ngspice_alone
 from cosim.scene import load
-from cosim.simulation.peers import lsoda, naive, ngspice_alone
-from cosim.studies.bench import bars
-from cosim.studies.bench.instructions import compiler_version, per_period
-from cosim.studies.bench.measures import brief, error, own_error, ratios, take_turns, times
-from cosim.studies.bench.parts import coupled_over_parts
+from cosim.studies.speed.bench import compiler_version, judged, ratios, table, take_turns
 
 RECORDED = Path(__file__).parents[2] / "results" / "bench.json"
 
@@ -54,7 +55,7 @@ def numbers(ratio: float) -> dict:
         "naive_over_ours": {**spread, "error": 1e-4, "error_of_peer": 2e-4},
         "cost_exponent": dict(spread),
         "instructions_per_period": None,
-        "part": {"ratio": 0.5},
+        "part": {"exact": 0.5},
         "machine": {"processor": "some", "cores": 1, "python": "3"},
     }
 
@@ -62,15 +63,15 @@ def numbers(ratio: float) -> dict:
 @pytest.mark.parametrize(
     ("ratio", "holds"), [(1.0, (True, False, True)), (4.0, (False, True, False))]
 )
-def test_bars(ratio: float, holds: tuple[bool, ...]) -> None:
-    found = bars.held(numbers(ratio))
+def test_targets(ratio: float, holds: tuple[bool, ...]) -> None:
+    found = judged(numbers(ratio), TARGETS)
     spreads = (
         found["coupled_over_parts"]["full"],
         found["naive_over_ours"],
         found["cost_exponent"],
     )
     assert tuple(spread["holds"] for spread in spreads) == holds
-    lines = bars.table(found).splitlines()
+    lines = table(found, TITLES).splitlines()
     assert sum("MISSED" in line for line in lines) == holds.count(False)
     assert any("error 1.0e-04, theirs 2.0e-04" in line for line in lines)
 

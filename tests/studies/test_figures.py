@@ -13,13 +13,15 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
+from benchmarks import charts
 from cosim.files.picture import Picture
 from cosim.studies.accuracy import accuracy
+from cosim.studies.accuracy import solvers as methods
 from cosim.studies.accuracy.runs import FALSE_CYCLE, Run
-from cosim.studies.accuracy.solvers import SOLVERS
 from cosim.studies.stability import stability
 from cosim.studies.stability.limits import METHODS, Limit
 
+SOLVERS = (*methods.SOLVERS, *charts.SOLVERS)
 RESULTS = Path(__file__).parents[2] / "results"
 
 
@@ -60,7 +62,7 @@ def assert_legible(figure: Figure) -> None:
 def test_every_method_is_a_line_or_the_page_says_why(drawn: list[Figure], tmp_path: Path) -> None:
     runs = read(Run, "accuracy.csv")
     assert {run.method for run in runs} == {solver.name for solver in SOLVERS}
-    accuracy.report(runs).save(tmp_path)
+    accuracy.report(runs, SOLVERS).save(tmp_path)
     page = (tmp_path / "accuracy.md").read_text(encoding="utf-8").splitlines()
     assert len(page) <= 60
     assert_legible(drawn[0])
@@ -75,11 +77,11 @@ def test_every_method_is_a_line_or_the_page_says_why(drawn: list[Figure], tmp_pa
 
 def test_a_false_limit_cycle_is_marked_and_not_joined(drawn: list[Figure], tmp_path: Path) -> None:
     runs = [run for run in read(Run, "accuracy.csv") if run.scene == "reference"]
-    accuracy.report(runs).save(tmp_path)
+    accuracy.report(runs, SOLVERS).save(tmp_path)
     method = next(solver for solver in SOLVERS if solver.takes_macro_steps)
     given = ("reference", method.name, method.setting, 1e-6)
     false = Run(*given, float("nan"), 0.123, 0, FALSE_CYCLE)
-    accuracy.report([*runs, false]).save(tmp_path)
+    accuracy.report([*runs, false], SOLVERS).save(tmp_path)
     before, after = (figure.axes[0].lines for figure in drawn)
     marks = [line for line in after if list(line.get_xdata()) == [0.123]]  # pyright: ignore
     assert len(after) == len(before) + 1 and [line.get_marker() for line in marks] == ["x"]

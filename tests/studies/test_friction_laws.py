@@ -4,9 +4,8 @@ from math import atanh
 
 import pytest
 
+from benchmarks.friction import COULOMB, CREEP, creep
 from cosim.scene import load
-from cosim.studies.accuracy.figures import CREEP
-from cosim.studies.accuracy.friction import COULOMB, creep
 
 pytestmark = pytest.mark.physics
 

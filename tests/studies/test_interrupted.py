@@ -10,7 +10,7 @@ from cosim.cli.main import main
 from cosim.evaluate.store import Store
 from cosim.studies.accuracy.cases import CASES
 from cosim.studies.accuracy.runs import measure
-from cosim.studies.circuit import ladder
+from cosim.studies.speed import ladder
 from cosim.studies.stability import limits
 from tests.studies.test_tables import solver
 

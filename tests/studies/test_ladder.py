@@ -10,7 +10,7 @@ from cosim.cli.main import main
 from cosim.evaluate.store import Store
 from cosim.scene import Scene, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.circuit.ladder import RUNGS, cheapest, ladder
+from cosim.studies.speed.ladder import RUNGS, cheapest, each_rung
 
 QUICK = ["run.duration=0.2", "run.settle=0.1"]
 
@@ -25,7 +25,7 @@ def on(model: str, *changes: str) -> Any:
 
 def test_ladder() -> None:
     scene = load("reference", [*QUICK, "run.tolerance=0.2"])
-    rungs = ladder(scene, Store(None))
+    rungs = each_rung(scene, Store(None))
     assert [rung.model for rung in rungs] == list(RUNGS)
     for rung in rungs[:3]:
         assert rung.v_average == pytest.approx(on(rung.model, *QUICK)["v_average"], rel=1e-9)

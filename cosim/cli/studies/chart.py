@@ -89,7 +89,7 @@ CHARTS = [
         *("error of every coupling method over its run time", _part),
     ),
     _chart(
-        *("ladder", "circuit.ladder_report.ladder"),
+        *("ladder", "speed.ladder.ladder"),
         *("what each rung of a circuit costs, and how far it is from the top", add_scenes),
     ),
     _chart(

@@ -4,7 +4,7 @@ Order k + 1 with inputs extrapolated by polynomials of degree k (Busch, "Continu
 techniques for co-simulation methods", ZAMM 96 (2016) 1061; Kübler and Schiehlen, "Two methods of
 simulator coupling", Math. Comp. Model. Dyn. Syst. 6 (2000) 93). Known limits: stable only up to a
 macro step of about m R/Bl² for a ram on a voltage-driven coil, less with higher k; nothing restarts
-the extrapolation at an event (see :mod:`cosim.coupling.rewind.event_aware`).
+the extrapolation at an event (see :class:`cosim.coupling.rewind.joint.EventAware`).
 """
 
 from functools import partial

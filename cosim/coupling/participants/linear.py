@@ -6,6 +6,7 @@ constant, or the two states of a sine.
 """
 
 from functools import lru_cache
+from math import factorial
 from typing import Any
 
 import numpy as np
@@ -34,16 +35,11 @@ class LinearParticipant:
         self._propagator = lru_cache(_REMEMBERED)(self._new_propagator)
 
     def advance(self, h: float, inputs: Array, gain: float = 0.0) -> None:
-        n, degree = len(self._a), len(inputs) - 1
-        outputs = len(self._c)
-        propagator = self._propagator(h, degree, gain)
         # The integral of the output starts from 0; the input and its derivatives are states.
-        derivatives = [inputs[0], inputs[1]] if degree else [inputs[0]]
-        derivatives += [2.0 * inputs[2]] if degree > 1 else []
+        derivatives = [factorial(k) * c for k, c in enumerate(inputs)]
         start = np.concatenate([self.state, np.zeros_like(self.mean), *derivatives])
-        end = propagator @ start
-        self.state = end[:n]
-        total = end[n : n + outputs]
+        end = self._propagator(h, len(inputs) - 1, gain) @ start
+        self.state, total = np.split(end, [len(self._a)])
         self.mean = total / h
         self._input, self._input_slope = value(inputs, h), slope(inputs, h)
         if gain:

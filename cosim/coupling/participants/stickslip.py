@@ -1,17 +1,17 @@
 """The FMU as a participant: input the current of one coil (A), output its back-EMF (V)."""
 
-from ctypes import c_double, c_int, c_void_p
+from ctypes import c_int, c_void_p
 from typing import Any
 
 import numpy as np
 
-from cosim.coupling.polynomials import Array, Signal, projected, value
-from cosim.coupling.polynomials import slope as slope_of
+from cosim.coupling.polynomials import Array, Signal, projected, slope, value
 from cosim.errors import SimulationFailed
-from cosim.mechanics.stickslip import Mechanics
+from cosim.mechanics.stickslip import STEP_OUTPUTS, Mechanics
 from cosim.scene import Scene
 
 _EVENTS = ("impacts", "stick_slip_events", "wall_contact")
+_EMF, _SLOPE, _FLUX = map(STEP_OUTPUTS.index, ("back_emf", "back_emf_slope", "motional_flux"))
 
 
 class FmuMechanics(Mechanics):
@@ -25,12 +25,8 @@ class FmuMechanics(Mechanics):
         super().__init__(scene, fmi_version)
         if self.normal_force is not None:
             raise NotImplementedError("a normal force that changes in time")
-        coil = scene.coil
-        self._flux_terms = (coil.force_factor, coil.b1, coil.b2)
         self.time = 0.0
         """Time that the mechanics have reached, s."""
-        self._q_place = self.instance.places(["q"])
-        self._q = (c_double * 1)()
         self._event_places = self.instance.places(_EVENTS)
         self._event_counts = (c_int * len(_EVENTS))()
         self._touches = 0
@@ -41,45 +37,31 @@ class FmuMechanics(Mechanics):
     def advance(self, h: float, inputs: Array, gain: float = 0.0) -> None:
         if gain:
             raise NotImplementedError("the companion belongs to the circuit's side")
-        before, was = self._flux(), self._read_events()
+        before, was = self.step_outputs[_FLUX], self._read_events()
         first, *rise = projected(tuple(inputs), h, 1)
-        self._step(h, float(first[0]), float(rise[0][0]) if rise else 0.0)
+        self._exchange(first[0], rise[0][0] if rise else 0.0, h)
         if len(inputs) > 2:
             # The slope of the output answers to the current itself, not to the line in its stead.
-            self._refresh(float(value(inputs, h)[0]), float(slope_of(inputs, h)[0]))
-        self.mean = np.array([(self._flux() - before) / h])
+            self._exchange(value(inputs, h)[0], slope(inputs, h)[0])
+        self.mean = np.array([(self.step_outputs[_FLUX] - before) / h])
         self._touches += self._read_events() != was
 
     def outputs(self, inputs: Signal | None = None) -> Signal:
         if inputs is not None:
-            self._refresh(float(inputs[0][0]), float(inputs[1][0]))
-        return np.array([self.step_outputs[0]]), np.array([self.step_outputs[1]])
+            self._exchange(inputs[0][0], inputs[1][0])
+        return np.array([self.step_outputs[_EMF]]), np.array([self.step_outputs[_SLOPE]])
 
-    def _step(self, h: float, value: float, slope: float) -> None:
-        """Advance by ``h`` (s) with the current (A) at the start and its slope (A/s)."""
+    def _exchange(self, current: float, rate: float, h: float = 0.0) -> None:
+        """Set the current (A) and its slope (A/s), go on by ``h`` (s), read the outputs."""
         try:
-            self.inputs[:] = value, slope
+            self.inputs[:] = current, rate
             self.instance.set_reals(self.places["inputs"], self.inputs)
-            self.instance.do_step(self.time, h)
+            if h:
+                self.instance.do_step(self.time, h)
             self.instance.get_reals(self.places["step_outputs"], self.step_outputs)
         except Exception as error:
             raise self.failed(error, self.time) from error
         self.time += h
-
-    def _refresh(self, value: float, slope: float) -> None:
-        """Calculate the outputs anew with this current, which the last step did not end with."""
-        try:
-            self.inputs[:] = value, slope
-            self.instance.set_reals(self.places["inputs"], self.inputs)
-            self.instance.get_reals(self.places["step_outputs"], self.step_outputs)
-        except Exception as error:
-            raise self.failed(error, self.time) from error
-
-    def _flux(self) -> float:
-        """∫ Bl(q) dq from the centre, V s."""
-        self.instance.get_reals(self._q_place, self._q)
-        q, (bl, b1, b2) = self._q[0], self._flux_terms
-        return bl * q * (1.0 + q * (b1 / 2.0 + q * b2 / 3.0))
 
     def _read_events(self) -> tuple[int, ...]:
         """Counters of impacts and stick-slip changes, and which wall is touched."""

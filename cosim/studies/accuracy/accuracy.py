@@ -1,4 +1,4 @@
-"""Speed against accuracy: every method and setting on four scenes; friction laws; chaos.
+"""Speed against accuracy: every method and setting on four scenes.
 
 What the runs say: orders, errors at equal run time, and the page.
 """
@@ -11,19 +11,22 @@ from functools import partial
 from itertools import accumulate
 from math import exp, inf, isfinite, log, nan
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 
 from cosim.evaluate.store import Store
-from cosim.studies.accuracy import chaos, figures, friction
+from cosim.studies.accuracy import figures
 from cosim.studies.accuracy.cases import CASES
 from cosim.studies.accuracy.runs import Run, measure, reference
-from cosim.studies.accuracy.solvers import ALL_IN_NGSPICE, DEFAULT, LSODA, SOLVERS, Solver
+from cosim.studies.accuracy.solvers import DEFAULT, SOLVERS, Solver
 from cosim.studies.report import Progress, Report, silent
 from cosim.studies.tables import Row, brief, span
 
 EQUAL_TIME, EQUAL_ERROR = 0.5, 1e-3
 """CPU seconds, and error over range, at which methods are compared."""
+CHAOTIC = 1e4
+"""Growth of a small difference from which on single paths are not compared."""
 _HALVINGS = 4  # over which an order is fitted
 STORE = "accuracy.sqlite"
 
@@ -61,19 +64,19 @@ def time_to(runs: Sequence[Run], error: float) -> float:
     return exp(np.interp(-log(error), [-e for e in errors], times))
 
 
-class Study:
+class Comparison:
     """The runs by scene and method, and which methods stand out."""
 
-    def __init__(self, runs: Sequence[Run]) -> None:
-        self.runs = runs
+    def __init__(self, runs: Sequence[Run], solvers: Sequence[Solver]) -> None:
+        self.runs, self.solvers = runs, solvers
         self.scenes = list(dict.fromkeys(run.scene for run in runs))
         self.strong = {"step-locked\n(default)": DEFAULT}
         """Names of the methods that are compared, by their labels."""
-        macro = [solver for solver in SOLVERS if solver.takes_macro_steps]
-        for p in sorted({solver.order or 0 for solver in macro}):
-            best = min((solver for solver in macro if solver.order == p), key=self._mean)
+        self._stepping = [solver for solver in solvers if solver.takes_macro_steps]
+        for p in sorted({solver.order or 0 for solver in self._stepping}):
+            best = min((s for s in self._stepping if s.order == p), key=self._mean)
             self.strong[f"order {p}:\n{best.name}"] = best.name
-        self.strong |= {"all in\nngspice": ALL_IN_NGSPICE, "LSODA": LSODA}
+        self.strong |= {fill(one.name, 14): one.name for one in solvers if one.peer}
 
     def of(self, scene: str, method: str) -> list[Run]:
         return [run for run in self.runs if run.scene == scene and run.method == method]
@@ -88,7 +91,7 @@ class Study:
 
     def lead(self, scene: str) -> float:
         """How many times the default is as accurate as the best macro-step method in equal time."""
-        others = (self._error(scene, s.name) for s in SOLVERS if s.takes_macro_steps)
+        others = (self._error(scene, solver.name) for solver in self._stepping)
         return min(filter(isfinite, others), default=nan) / self._error(scene, DEFAULT)
 
     @property
@@ -118,26 +121,21 @@ class Study:
 
     def methods(self) -> list[Row]:
         """Every method: its order, and fitted on each scene; its failures; where it is no line."""
-        rows: list[Row] = []
-        for solver in SOLVERS:
-            own = {scene: self.of(scene, solver.name) for scene in self.scenes}
-            failures = Counter(run.failure for runs in own.values() for run in runs if run.failure)
-            absent: dict[str, list[str]] = {}
-            for scene, runs in own.items():
-                if not any(run.counts for run in runs):
-                    why = "every run failed" if runs else solver.limits
-                    absent.setdefault(why, []).append(scene)
-            rows.append(
-                {"method": solver.name, "order if smooth": solver.order or "-"}
-                | {scene: round(order(runs), 2) for scene, runs in own.items()}
-                | {
-                    "marked runs": ", ".join(f"{n} {text}" for text, n in failures.items()),
-                    "not drawn": "; ".join(
-                        f"{', '.join(scenes)}: {why}" for why, scenes in absent.items()
-                    ),
-                }
-            )
-        return rows
+        return [self._method(solver) for solver in self.solvers]
+
+    def _method(self, solver: Solver) -> Row:
+        own = {scene: self.of(scene, solver.name) for scene in self.scenes}
+        failures = Counter(run.failure for runs in own.values() for run in runs if run.failure)
+        absent: dict[str, list[str]] = {}
+        for scene, runs in own.items():
+            if not any(run.counts for run in runs):
+                absent.setdefault("every run failed" if runs else solver.limits, []).append(scene)
+        return {
+            **{"method": solver.name, "order if smooth": solver.order or "-"},
+            **{scene: round(order(runs), 2) for scene, runs in own.items()},
+            "marked runs": ", ".join(f"{n} {text}" for text, n in failures.items()),
+            "not drawn": "; ".join(f"{', '.join(at)}: {why}" for why, at in absent.items()),
+        }
 
 
 def accuracy(
@@ -145,31 +143,31 @@ def accuracy(
     quick: bool = False,
     out: str | os.PathLike[str] | None = None,
     progress: Progress = silent,
-) -> tuple[Report, Report, Report]:
-    """The error of every coupling method over its run time, of laws of friction, and of statistics
-    where motion is chaotic; ``quick``: on one scene.
+    more: Sequence[Solver] = (),
+) -> Report:
+    """The error of every coupling method over its run time; ``quick``: on one scene; ``more``:
+    other solvers that are to be lines besides.
 
-    In the folder ``out`` it leaves what each ``Report.save`` writes, and takes up what an
+    In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an
     interrupted study has left there. Raises BadInput.
     """
+    solvers = (*SOLVERS, *more)
     cases = [case for case in CASES.values() if not case.netlist][-1 if quick else 0 :]
-    rounds = 1 if quick else _ROUNDS
     with Store(None if out is None else Path(out) / STORE, quick) as store:
         runs: list[Run] = []
         for done, case in enumerate(cases, 1):
-            runs += measure(case, SOLVERS, rounds, store)
+            runs += measure(case, solvers, 1 if quick else _ROUNDS, store)
             progress(done, len(cases), case.title)
-        found = report(runs), friction.report(store), chaos.report(store)
+        found = report(runs, solvers)
         if out is not None:
-            for one in found:
-                one.save(out)
+            found.save(out)
         store.remove()
     return found
 
 
-def report(runs: Sequence[Run]) -> Report:
+def report(runs: Sequence[Run], solvers: Sequence[Solver] = SOLVERS) -> Report:
     """What the runs show."""
-    study = Study(runs)
+    study = Comparison(runs, solvers)
     trust = max(reference(name).other_method for name in study.scenes)
     growth = max(reference(name).growth for name in study.scenes)
     notes = [
@@ -182,7 +180,7 @@ def report(runs: Sequence[Run]) -> Report:
         "each of these groups only. Every run is in accuracy.csv.",
         "Scenes: " + "; ".join(CASES[name].title for name in study.scenes) + ". A change of the "
         f"normal force by 1e-9 of itself moves their paths by at most {growth:.2g} times as much: "
-        f"none is chaotic. From {chaos.CHAOTIC:g} on only statistics are compared (chaos.md).",
+        f"none is chaotic. From {CHAOTIC:g} on only statistics are compared (chaos.md).",
         f"{study.message}.",
     ]
     tables = {

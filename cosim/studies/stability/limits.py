@@ -7,15 +7,14 @@ the FMU as the mechanics or, at the other cut, with the same linear participants
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from cosim.coupling.participants.amplifier import Amplifier
 from cosim.coupling.participants.stickslip import FmuMechanics
-from cosim.coupling.rewind import methods
-from cosim.coupling.rewind.iterated import Iterated
 from cosim.coupling.rewind.joint import Joint
+from cosim.coupling.rewind.methods import variants
 from cosim.coupling.rewind.stability import largest_stable_step, observed_limit
 from cosim.drive.command import command
 from cosim.evaluate.store import Store
@@ -28,7 +27,6 @@ from cosim.studies.stability.machines import (
     Regime,
     circuit_of,
     linear_sides,
-    scene_of,
 )
 from cosim.studies.tables import Row
 
@@ -39,11 +37,14 @@ _SEEN, _MOST_STEPS = 0.15, 6000
 """s, and macro steps, that a run is watched for."""
 _WATCHED = 120  # macro steps behind the limit
 
-METHODS = methods.METHODS | {
-    # What dies away soon lies below the noise of the FMU's own solver, on which nothing agrees.
-    "iterated, plain": lambda a, b: Iterated(a, b, "plain", tolerance=1e-7),
-    "iterated, Newton": lambda a, b: Iterated(a, b, "newton", tolerance=1e-7),
+METHODS = {
+    # An error that dies away sooner lies below the noise of the FMU's own solver.
+    name: variant
+    for name, variant in variants(tolerance=1e-7).items()
+    if name not in ("event-aware", "predictor-corrector", "iterated, Aitken", "iterated, Anderson")
 }
+"""Methods whose step is one linear map wherever nothing jumps; of the iterations, the limits of the
+others are those of Newton's."""
 
 REGIMES = (
     Regime(DIRECT, "saturated"),
@@ -61,9 +62,9 @@ REGIMES = (
 
 
 def over_strength(points: int) -> list[Regime]:
-    """The direct drive with other force factors."""
-    factors = np.geomspace(0.5, 12.0, points)
-    return [Regime(replace(DIRECT, force_factor=float(f)), "saturated") for f in factors]
+    """The direct drive with other force factors, N/A."""
+    factors = np.geomspace(0.5, 12.0, points).tolist()
+    return [Regime(DIRECT.but(DIRECT.name, {"coil.force_factor": f}), "saturated") for f in factors]
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class Limit:
 
 def predicted(method: str, regime: Regime) -> float:
     """Largest stable macro step, s; LONGEST where there is no limit below it."""
-    sides = lambda: METHODS[method](*linear_sides(regime))  # noqa: E731
+    sides = lambda: METHODS[method].make(*linear_sides(regime))  # noqa: E731
     return largest_stable_step(sides, _SHORTEST[regime.cut], LONGEST, leap=1.1)
 
 
@@ -92,7 +93,7 @@ def observed(method: str, regime: Regime, expected: float) -> float:
 
     Near a resonance of the mechanics an unstable interval may be narrow: hence the small leaps.
     """
-    make = METHODS[method]
+    make = METHODS[method].make
     low, high = 0.8 * expected, min(1.2 * expected, LONGEST)
     steps = int(min(max(600.0, _SEEN / low), _MOST_STEPS))
     with ExitStack() as alive:
@@ -101,7 +102,7 @@ def observed(method: str, regime: Regime, expected: float) -> float:
             if regime.cut == "coil in mechanics":
                 return make(*linear_sides(regime))
             alive.close()
-            mechanics = alive.enter_context(closing(FmuMechanics(scene_of(regime))))
+            mechanics = alive.enter_context(closing(FmuMechanics(regime.scene)))
             # A push: a current alone might die away without having moved anything.
             mechanics.advance(1e-3, np.array([[1e-3]]))
             return make(circuit_of(regime), mechanics)
@@ -126,19 +127,19 @@ def limits(regimes: Sequence[Regime], store: Store) -> Iterator[Limit]:
 def with_limits(steps: Sequence[float]) -> Iterator[Row]:
     """Gauss-Seidel k = 1 on ``STRONG`` behind an amplifier that a steady command keeps at its
     swing limit: what becomes of the current after macro steps of these lengths, s."""
-    strong = Regime(STRONG, "saturated")
+    strong, method = Regime(STRONG, "saturated"), "Gauss-Seidel k = 1"
     drive = {"waveform": "square", "offset": 8.0, "amplitude": 1e-6, "frequency": 0.2}
     scene = changed(
-        scene_of(strong), {f"drive.{key}": value for key, value in drive.items()}, "stability"
+        strong.scene, {f"drive.{key}": value for key, value in drive.items()}, "stability"
     )
-    limit = predicted("Gauss-Seidel k = 1", strong)
+    limit = predicted(method, strong)
     for h in steps:
         with closing(FmuMechanics(scene)) as mechanics:
-            method = METHODS["Gauss-Seidel k = 1"](Amplifier(scene, command(scene)), mechanics)
+            joint = METHODS[method].make(Amplifier(scene, command(scene)), mechanics)
             currents = np.empty(_WATCHED)
             for k in range(_WATCHED):
-                method.step(h)
-                currents[k] = method.past.current.value[0]
+                joint.step(h)
+                currents[k] = joint.past.current.value[0]
         late = currents[_WATCHED // 2 :]
         yield {
             "macro step [s]": h,

@@ -6,7 +6,6 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from cosim.coupling.rewind.methods import ORDERS
 from cosim.evaluate.store import Store
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, End, label_ends, panels
 from cosim.studies.report import Progress, Report, silent
@@ -118,15 +117,14 @@ def draw(limits: Sequence[Limit], free: Sequence[str], title: str, path: Path) -
         known = [x for x in own if x.predicted < LONGEST]
         if method in free:
             continue
-        x, color = [limit.strength for limit in known], _COLORS[ORDERS[method]]
+        p = METHODS[method].order
+        x, color = [limit.strength for limit in known], _COLORS[p]
         axis.plot(x, [limit.predicted * 1e3 for limit in known], color=color, lw=1.6)
         axis.plot(x, [limit.observed * 1e3 for limit in known], "o", color=color, ms=4)
-        ends.append(
-            End(x[-1], known[-1].predicted * 1e3, f"{method} (order {ORDERS[method]})", color)
-        )
+        ends.append(End(x[-1], known[-1].predicted * 1e3, f"{method} (order {p})", color))
     axis.axvline(DIRECT.strength, color="0.4", lw=0.9, ls=":")
     axis.annotate(
-        f"direct drive, {DIRECT.force_factor:g} N/A",
+        f"direct drive, {DIRECT.scene.coil.force_factor:g} N/A",
         (DIRECT.strength, 40.0),
         (5, 0),
         textcoords="offset points",

@@ -9,17 +9,27 @@ from ctypes import byref
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from benchmarks.errors import BRIEF
+from cosim.arrays import Array
 from cosim.coupling.loop.lead import Lead
 from cosim.coupling.loop.recorder import Recorder
 from cosim.coupling.loop.structures import LeadState, loop
 from cosim.drive.command import command
 from cosim.mechanics.stickslip import Mechanics
-from cosim.scene import Scene
-from cosim.studies.bench.measures import ratios, take_turns
+from cosim.scene import Scene, load
+from cosim.studies.speed.bench import BRIEF_FULL, ratios, take_turns
 
-Log = dict[str, npt.NDArray[np.float64]]
+Log = dict[str, Array]
+
+
+def measure(rounds: int) -> dict[str, Any]:
+    """The ratio on two rungs of the scene `reference`."""
+    circuits = {"amplifier": BRIEF, "full": BRIEF_FULL}
+    return {
+        name: coupled_over_parts(load("reference", settings), rounds)
+        for name, settings in circuits.items()
+    }
 
 
 def coupled_over_parts(scene: Scene, rounds: int) -> dict[str, Any]:
@@ -42,7 +52,7 @@ def coupled_over_parts(scene: Scene, rounds: int) -> dict[str, Any]:
     }
 
 
-def _coupled(scene: Scene, replay: npt.NDArray[np.float64] | None = None) -> Lead:
+def _coupled(scene: Scene, replay: Array | None = None) -> Lead:
     with closing(Mechanics(scene)) as mechanics:
         recorder = Recorder(scene, mechanics, lambda _: None)
         circuit = Lead(scene, command(scene), recorder, replay=replay)
@@ -57,7 +67,7 @@ def _mechanics(scene: Scene, log: Log) -> None:
         recorder.follow(log["time"][1:], current[:-1, np.newaxis], current[1:, np.newaxis])
 
 
-def _replay(scene: Scene) -> npt.NDArray[np.float64]:
+def _replay(scene: Scene) -> Array:
     """Back-EMF, slope and next impact that the circuit was told of after each step, the last ones
     twice."""
     with closing(Mechanics(scene)) as mechanics:

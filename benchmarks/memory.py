@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from cosim.studies.bench.measures import spread
+from cosim.studies.speed.bench import spread
 
 _RUN = """
 import sys

@@ -8,14 +8,13 @@ from functools import partial
 from math import inf
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
-from cosim.simulation.peers import lsoda, naive, ngspice_alone
+from benchmarks.errors import brief, error, own_error, times
+from benchmarks.peers import lsoda, naive, ngspice_alone
+from cosim.arrays import Array
 from cosim.simulation.simulate import simulate
-from cosim.studies.bench.measures import brief, cpu, error, own_error, ratios, times
+from cosim.studies.speed.bench import cpu, ratios
 
-Peer = Callable[[], tuple[float, npt.NDArray[np.float64]]]
+Peer = Callable[[], tuple[float, Array]]
 """Gives the CPU seconds of a run and the part's heights, m."""
 
 LSODA_ERROR = 5e-4

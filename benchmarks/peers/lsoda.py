@@ -11,8 +11,9 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+from scipy.integrate import solve_ivp
 
+from cosim.arrays import Array
 from cosim.drive.command import Command, command
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
@@ -147,10 +148,8 @@ def run(
     times: Sequence[float],
     rtol: float,
     make: Callable[[Scene, Command], Machine] = Machine,
-) -> tuple[float, npt.NDArray[np.float64]]:
+) -> tuple[float, Array]:
     """CPU seconds, and the part's height (m) at ``times`` (s)."""
-    from scipy.integrate import solve_ivp
-
     with closing(Mechanics(scene)) as mechanics:
         rest = mechanics.sample()
     began = process_time()

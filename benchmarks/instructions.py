@@ -1,10 +1,9 @@
 """Instructions that the FMU executes, counted by callgrind: a measure without noise.
 
 The mechanics of the scene `reference` get its command as a current, in fixed steps about as long as
-ngspice's.
+ngspice's; ``replay.c`` drives them.
 """
 
-import json
 import re
 import shutil
 import subprocess
@@ -14,12 +13,12 @@ from pathlib import Path
 import fmpy
 import numpy as np
 
+import build_c
 from cosim.drive.command import command
 from cosim.mechanics.fmi import references
 from cosim.mechanics.package import MODEL, token, unpacked
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import load
-from cosim.toolchain.libraries import compiled
 
 PERIODS, STEPS_PER_PERIOD = 4, 1600
 
@@ -29,16 +28,16 @@ def per_period() -> int | None:
     valgrind = shutil.which("valgrind")
     if valgrind is None:
         return None
+    library = unpacked(3) / "binaries" / fmpy.platform_tuple / (MODEL + fmpy.sharedLibraryExtension)
     with tempfile.TemporaryDirectory() as folder:
-        points = Path(folder) / "points"
+        points, program = Path(folder) / "points", Path(folder) / "replay"
         _write(points)
-        library = unpacked(3) / "binaries" / fmpy.platform_tuple
-        library /= MODEL + fmpy.sharedLibraryExtension
+        build_c.link([Path(__file__).with_name("replay.c")], program, "-ldl")
         done = subprocess.run(
             [
                 *(valgrind, "--tool=callgrind", "--callgrind-out-file=/dev/null"),
                 *("--collect-atstart=no", "--toggle-collect=replay"),
-                *(str(compiled("replay")), str(library), token(), str(points)),
+                *(str(program), str(library), token(), str(points)),
             ],
             capture_output=True,
             text=True,
@@ -50,12 +49,8 @@ def per_period() -> int | None:
     return round(int(found[1]) / PERIODS)
 
 
-def compiler_version() -> str:
-    """What made the FMU: the first line that the C compiler says of itself."""
-    return json.loads(compiled("build.json").read_text())["compiler"]
-
-
 def _write(path: Path) -> None:
+    """The file of communication points that ``replay.c`` describes."""
     scene = load("reference")
     drive, known = command(scene), references(3)
     reals, integers = parameters(scene)

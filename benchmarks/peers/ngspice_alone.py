@@ -10,8 +10,8 @@ from contextlib import closing
 from time import process_time
 
 import numpy as np
-import numpy.typing as npt
 
+from cosim.arrays import Array
 from cosim.circuit.netlist import prepare
 from cosim.coupling.loop.lead import Lead
 from cosim.coupling.loop.recorder import Recorder
@@ -61,7 +61,7 @@ def _netlist(scene: Scene, rest: dict[str, float]) -> tuple[str, tuple[str, ...]
     return "\n".join(f"{x} uic" if x.startswith(".tran ") else x for x in lines), saved
 
 
-def run(scene: Scene, times: Sequence[float]) -> tuple[float, npt.NDArray[np.float64]]:
+def run(scene: Scene, times: Sequence[float]) -> tuple[float, Array]:
     """CPU seconds, and the part's height (m) at ``times`` (s)."""
     began = process_time()
     with closing(Mechanics(scene)) as mechanics:

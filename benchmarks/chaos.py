@@ -1,30 +1,29 @@
 """Where a scene is chaotic: statistics over an ensemble in the place of single paths.
 
 A scene is chaotic where a change of the normal force by 1e-9 of itself moves the part's path by
-more than :data:`CHAOTIC` times as much. No method can follow such a path, whatever its steps. What
-can be compared is an ensemble: the same runs from normal forces a little apart, of which each
-method must give the same mean velocity, share of sticking and counts of events, within what the
+more than ``CHAOTIC`` times as much. No method can follow such a path, whatever its steps. What can
+be compared is an ensemble: the same runs from normal forces a little apart, of which each method
+must give the same mean velocity, share of sticking and counts of events, within what the
 ensemble's own spread leaves open.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from math import hypot, sqrt
+from pathlib import Path
 from statistics import mean, stdev
 from typing import Any
 
 import numpy as np
 
-from cosim.evaluate.store import Store
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.accuracy.figures import draw_chaos
+from cosim.studies.accuracy.accuracy import CHAOTIC
+from cosim.studies.plots import BLUE, panels
 from cosim.studies.report import Report
 from cosim.studies.tables import Row
 from cosim.waveforms.result import Result
 
-CHAOTIC = 1e4
-"""Growth of a small difference from which on single paths are not compared."""
 NUDGE, APART = 1e-9, 1e-6
 """Relative changes of the normal force: of the run that tells of chaos, and between the ensemble's
 members."""
@@ -69,23 +68,21 @@ def growth(scene: Sequence[str], more: Sequence[str] = ()) -> float:
     return float(np.abs(nudged - path).max() / np.ptp(path)) / NUDGE
 
 
-def ensemble(scene: Sequence[str], more: Sequence[str], members: int, store: Store) -> Ensemble:
+def ensemble(scene: Sequence[str], more: Sequence[str], members: int) -> Ensemble:
     """The statistics of runs with normal forces apart by :data:`APART`."""
 
     def member(k: int) -> dict[str, float]:
         summary: Any = solved(scene, more, APART * k).summary
         return {name: float(summary[name]) for name in STATISTICS}
 
-    found = [
-        store.once(f"chaos, {[*scene, *more]}, {k}", lambda k=k: member(k)) for k in range(members)
-    ]
+    found = [member(k) for k in range(members)]
     return {name: [one[name] for one in found] for name in STATISTICS}
 
 
-def report(store: Store) -> Report:
+def report() -> Report:
     """Whether methods agree in the statistics of a chaotic scene."""
-    grown = store.once("chaos, growth", lambda: growth(SCENE))
-    ensembles = {name: ensemble(SCENE, more, MEMBERS, store) for name, more in METHODS.items()}
+    grown = growth(SCENE)
+    ensembles = {name: ensemble(SCENE, more, MEMBERS) for name, more in METHODS.items()}
     first = next(iter(ensembles.values()))
     most = max(apart(first[name], one[name]) for one in ensembles.values() for name in STATISTICS)
     message = (
@@ -112,10 +109,35 @@ def report(store: Store) -> Report:
     ]
     return Report(
         "chaos", "A chaotic scene", raw, notes, {"Ensembles": table},
-        {"": partial(draw_chaos, ensembles, average, message)}, message,
+        {"": partial(draw, ensembles, message)}, message,
     )  # fmt: skip
 
 
 def _cell(values: Sequence[float], first: Sequence[float]) -> str:
     middle, error = average(values)
     return f"{middle:.4g} ± {error:.2g} ({apart(values, first):.1f})"
+
+
+_STATISTICS = {
+    "v_average": ("mean velocity [mm/s]", 1e3),
+    "stick_fraction": ("share of sticking [%]", 1e2),
+    "impacts": ("impacts", 1.0),
+    "stick_slip_events": ("changes of stick and slip", 1.0),
+}
+"""Labels, and factors to their units."""
+
+
+def draw(ensembles: Mapping[str, Ensemble], title: str, path: Path) -> None:
+    """Draw each method's values of each statistic: a tick a run, and their average."""
+    note = "One tick a run; dot and bar: their mean with two standard errors."
+    figure, axes = panels(title, note, (11.0, 3.4), 1, len(_STATISTICS), sharey=True)
+    for axis, (statistic, (label, scale)) in zip(axes, _STATISTICS.items(), strict=True):
+        for place, one in enumerate(ensembles.values()):
+            values = [scale * v for v in one[statistic]]
+            middle, error = average(values)
+            axis.plot(values, [place] * len(values), "|", color="0.55", ms=11)
+            axis.errorbar(middle, place, xerr=2 * error, fmt="o", color=BLUE, capsize=4, lw=2)
+        axis.locator_params(axis="x", nbins=4)
+        axis.set(xlabel=label, ylim=(len(ensembles) - 0.4, -0.6))
+    axes[0].set_yticks(range(len(ensembles)), list(ensembles))
+    figure.write(path)

@@ -16,7 +16,7 @@ the step shrinks to what the jump allows, so wrap no more than is smooth, or cut
 
 import numpy as np
 
-from cosim.coupling.polynomials import Array
+from cosim.coupling.polynomials import Array, projected
 from cosim.coupling.rewind.joint import Joint
 from cosim.errors import SimulationFailed
 
@@ -29,7 +29,6 @@ class ErrorControlled:
     def __init__(
         self,
         method: Joint,
-        order: int,
         step: float,
         relative: float,
         absolute: float | Array,
@@ -37,13 +36,13 @@ class ErrorControlled:
         safety: float = 0.8,
         shortest: float = 1e-12,
     ) -> None:
-        """``order`` is the method's degree k of extrapolation, ``step`` (s) the first to try.
+        """``step`` (s) is the first to try.
 
         The error of each output counts against ``absolute + relative |y|``; an infinite entry of an
         array ``absolute`` leaves that output out. With ``energy_share`` the audit is on.
         """
         self.method = method
-        self._order = order
+        self._order = method.method.degree + 1
         self._h = step
         self._relative, self._absolute = relative, absolute
         self._energy_share = energy_share
@@ -72,10 +71,12 @@ class ErrorControlled:
         method.step(h)
         residual = max(residual, self._residual(h))
         twice = self._outputs()
-        error = self._weighed((twice - once) / (2.0 ** (self._order + 1) - 1.0), twice)
+        off = (twice - once) / (2.0**self._order - 1.0)
+        share = off / (self._absolute + self._relative * np.abs(twice))
+        error = float(np.sqrt(np.mean(share**2)))
         # The first step from rest has nothing to be compared with: all of its power is residual.
         honest = not self._energy_share or not known or residual <= self._energy_share * self._power
-        factor = self._safety * error ** (-1.0 / (self._order + 2)) if error else _MOST_CHANGE
+        factor = self._safety * error ** (-1.0 / (self._order + 1)) if error else _MOST_CHANGE
         self._h = h * min(_MOST_CHANGE, max(_LEAST_CHANGE, factor))
         if error <= 1.0 and honest:
             self.accepted += 2
@@ -94,20 +95,12 @@ class ErrorControlled:
     def _outputs(self) -> Array:
         return np.concatenate([self.method.past.current.value, self.method.past.emf.value]).ravel()
 
-    def _weighed(self, error: Array, reference: Array) -> float:
-        share = error / (self._absolute + self._relative * np.abs(reference))
-        return float(np.sqrt(np.mean(share**2)))
-
     def _residual(self, h: float) -> float:
         """Power (W) that one side gave and the other did not take, in the mean over the step."""
         first, second = self.method.first.mean, self.method.second.mean
         if first.shape != second.shape:
             return 0.0
-        believed = np.sum(_mean(self.method.for_first, h) * first)
-        taken = np.sum(second * _mean(self.method.for_second, h))
+        believed = np.sum(projected(self.method.for_first, h, 0)[0] * first)
+        taken = np.sum(second * projected(self.method.for_second, h, 0)[0])
         self._power = max(self._power, abs(float(believed)), abs(float(taken)))
         return abs(float(believed - taken))
-
-
-def _mean(coefficients: Array, h: float) -> Array:
-    return sum(c * (h**k / (k + 1)) for k, c in enumerate(coefficients))  # type: ignore[return-value]

@@ -13,23 +13,28 @@ still slips: by set-valued Coulomb friction, nothing.
             control of systems with friction", IEEE Trans. Autom. Control 40 (1995) 419)
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from math import cos, exp, isfinite, nan, pi, sqrt, tanh
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
+from benchmarks.peers.lsoda import Machine, U
+from benchmarks.peers.lsoda import run as run_machine
 from cosim.drive.command import Command
-from cosim.evaluate.store import Store
 from cosim.scene import Scene, load
-from cosim.simulation.peers.lsoda import Machine, U
-from cosim.simulation.peers.lsoda import run as run_machine
 from cosim.studies.accuracy.cases import CASES
-from cosim.studies.accuracy.figures import CREEP, ERROR, draw_friction
 from cosim.studies.accuracy.runs import reference
+from cosim.studies.plots import BLUE, GREEN, VERMILION, panels
 from cosim.studies.report import Report
 from cosim.studies.tables import Row, span
+
+CREEP, ERROR = "creep of a held part [µm/s]", "error in the machine / range"
+"""Columns, and the labels of the figure's axes."""
 
 FREQUENCY, ACCELERATION, SLIP = 40.0, 15.0, 0.02
 """Of the surface, Hz and m/s²; of the surface against the part at first, m/s."""
@@ -47,9 +52,9 @@ COULOMB = "set-valued Coulomb"
 _RTOL_IN_THE_MACHINE = 1e-6
 
 
-def report(store: Store) -> Report:
+def report() -> Report:
     """What smoothed laws of friction do to a held part, and to the machine."""
-    moved = {(row["law"], row["width"]): row for row in in_the_machine(store)}
+    moved = {(row["law"], row["width"]): row for row in in_the_machine()}
     nothing = {ERROR: nan, "CPU time [s]": nan}
     rows = [row | moved.get((row["law"], row["width"]), nothing) for row in creep()]
     exact, *smoothed = rows
@@ -72,7 +77,7 @@ def report(store: Store) -> Report:
     ]
     return Report(
         "friction", "Laws of friction", rows, notes, {"Each law": rows},
-        {"": partial(draw_friction, rows, message)}, message,
+        {"": partial(draw, rows, message)}, message,
     )  # fmt: skip
 
 
@@ -121,7 +126,7 @@ class _Smoothed(Machine):
         return 1.0
 
 
-def in_the_machine(store: Store) -> Iterator[Row]:
+def in_the_machine() -> Iterator[Row]:
     """Of each law: error of the part's path on the scene ``stick-slip`` over its range, CPU s."""
     case = CASES["stick-slip"]
     scene = load("reference", [*case.overrides, f"run.duration={case.duration!r}"])
@@ -130,14 +135,11 @@ def in_the_machine(store: Store) -> Iterator[Row]:
         seconds, path = run_machine(scene, case.times(), _RTOL_IN_THE_MACHINE, make)
         return {ERROR: reference(case.name).error(path[np.newaxis]), "CPU time [s]": seconds}
 
-    yield {"law": COULOMB, "width": ""} | store.once(COULOMB, lambda: measured(Machine))
+    yield {"law": COULOMB, "width": ""} | measured(Machine)
     for name in ("tanh", "LuGre"):
         for width in LAWS[name]:
             law = law_of(name, width, scene)
-            found = store.once(
-                f"{name}, {width:g}",
-                lambda law=law: measured(lambda s, d: _Smoothed(s, d, law)),
-            )
+            found = measured(lambda s, d, law=law: _Smoothed(s, d, law))
             yield {"law": name, "width": _width(name, width)} | found
 
 
@@ -167,8 +169,6 @@ def _stops(scene: Scene) -> float:
 
     With Ω the surface's angular frequency u = u0 + (A/Ω) sin Ωt - (force/m - g) t.
     """
-    from scipy.optimize import brentq
-
     friction, mechanics, omega = scene.friction, scene.mechanics, 2.0 * pi * FREQUENCY
     rate = friction.mu_k * friction.normal_force / mechanics.part_mass - mechanics.gravity
 
@@ -185,8 +185,6 @@ def _stops(scene: Scene) -> float:
 
 def _solved(law: Law, scene: Scene) -> tuple[float, float, int]:
     """Slip (m) once settled and at the end, and the number of evaluations."""
-    from scipy.integrate import solve_ivp
-
     m, g = scene.mechanics.part_mass, scene.mechanics.gravity
 
     def rates(t: float, y: Any) -> list[float]:
@@ -206,3 +204,25 @@ def _solved(law: Law, scene: Scene) -> tuple[float, float, int]:
         max_step=1e-3,
     )
     return float(found.y[0][0]), float(found.y[0][1]), int(found.nfev)
+
+
+def draw(rows: Sequence[Row], title: str, path: Path) -> None:
+    """Draw what a held part creeps with each law, and the error in the whole machine."""
+    note = "µm/s: width of the smoothed law; kN/m: stiffness of its bristle."
+    figure, axes = panels(title, note, (11.0, 4.2), 1, 2, sharey=True)
+    places = range(len(rows))
+    laws = dict.fromkeys(row["law"] for row in rows)
+    colors = dict(zip(laws, ("black", VERMILION, BLUE, GREEN), strict=True))
+    for axis, column in zip(axes, (CREEP, ERROR), strict=True):
+        values = [row[column] for row in rows]
+        axis.set(xscale="log", ylim=(len(rows) - 0.5, -0.5), xlabel=column)
+        known = [value for value in values if value > 0.0]
+        axis.set_xlim(min(known) / 3.0, max(known) * 3.0)
+        for place, row, value in zip(places, rows, values, strict=True):
+            if value > 0.0:
+                axis.plot(value, place, "o", color=colors[row["law"]], ms=8)
+            else:
+                said = "none" if value == 0.0 else "not solvable by LSODA"
+                axis.annotate(said, (0.02, place), xycoords=axis.get_yaxis_transform(), va="center")
+    axes[0].set_yticks(places, [f"{row['law']}  {row['width']}" for row in rows])
+    figure.write(path)

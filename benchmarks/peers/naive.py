@@ -11,10 +11,10 @@ from time import process_time
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 from fmpy.fmi3 import FMU3Slave
 from PySpice.Spice.NgSpice.Shared import NgSpiceShared
 
+from cosim.arrays import Array
 from cosim.circuit.netlist import prepare
 from cosim.mechanics.fmi import references
 from cosim.mechanics.package import MODEL, token, unpacked
@@ -27,7 +27,7 @@ _FALL = 1e-9
 """s; time of the sawtooth's fall, which ngspice's own source wants above 0."""
 
 
-def run(scene: Scene, times: Sequence[float]) -> tuple[float, npt.NDArray[np.float64]]:
+def run(scene: Scene, times: Sequence[float]) -> tuple[float, Array]:
     """CPU seconds, and the part's height (m) at ``times`` (s)."""
     return isolated(partial(_run, times=times), scene, lambda _: None)
 
@@ -66,9 +66,7 @@ class Shared(NgSpiceShared):
         return 0
 
 
-def _run(
-    scene: Scene, _: Callable[[float], None], times: Sequence[float]
-) -> tuple[float, npt.NDArray[np.float64]]:
+def _run(scene: Scene, _: Callable[[float], None], times: Sequence[float]) -> tuple[float, Array]:
     shared, deck = Shared(), _deck(scene)
     began = process_time()
     shared.begin(_instance(scene))

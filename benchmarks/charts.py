@@ -1,0 +1,97 @@
+"""Charts of the methods: ``accuracy`` with further lines, laws of friction, a chaotic scene.
+
+    python -m benchmarks.charts [--quick] [--out DIR]
+
+The further lines are other programs and error-controlled macro steps. Besides what ``cosim chart
+accuracy`` writes, it writes ``friction`` and ``chaos``, ``.csv``, ``.md`` and ``.png``.
+"""
+
+import argparse
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks import chaos, friction
+from benchmarks.error_control import ErrorControlled
+from benchmarks.peers import lsoda, ngspice_alone
+from cosim.coupling.methods.jacobi import Jacobi
+from cosim.coupling.rewind.joint import Joint
+from cosim.scene import Scene
+from cosim.studies.accuracy.accuracy import accuracy
+from cosim.studies.accuracy.cases import Case
+from cosim.studies.accuracy.solvers import (
+    SAME_TIME,
+    Jumps,
+    Outcome,
+    Solver,
+    of_case,
+    rewinding,
+    tenths,
+)
+
+
+def _all_in_ngspice(scene: Scene, case: Case, reltol: float) -> Outcome:
+    chosen = of_case(case, "circuit.max_step=1e-4", f"circuit.reltol={reltol!r}")
+    seconds, path = ngspice_alone.run(chosen, case.times())
+    return Outcome(path[np.newaxis], seconds, 0)
+
+
+def _solve_ivp(scene: Scene, case: Case, rtol: float) -> Outcome:
+    seconds, path = lsoda.run(of_case(case), case.times(), rtol)
+    return Outcome(path[np.newaxis], seconds, 0)
+
+
+def _values(first: int, last: int, case: Case) -> list[float]:
+    return tenths(first, last) if case.name in ("stick-slip", "reference") else []
+
+
+def _controlled(
+    joint: Joint, jumps: Jumps, case: Case, tolerance: float, audited: bool
+) -> Iterator[int]:
+    """With Richardson's estimate, cut at jumps of the command and at samples.
+
+    An audit lets half of the tolerance's power of 2/3 be lost of the power: a residual is of order
+    2 in a step that goes with the cube root of the tolerance.
+    """
+    share = 0.5 * tolerance ** (2.0 / 3.0) if audited else None
+    control = ErrorControlled(joint, 1e-5, tolerance, tolerance, shortest=1e-9, energy_share=share)
+    for time in case.times():
+        while joint.time < time - SAME_TIME:
+            control.run(min(time, jumps.next))
+            jumps.meet(joint)
+        yield 3 * (control.accepted // 2 + control.rejected)
+
+
+def _with_control(name: str, audited: bool) -> Solver:
+    run = rewinding(
+        lambda a, b: Joint(a, b, Jacobi(1, slopes=False)), partial(_controlled, audited=audited)
+    )
+    return Solver(name, "tolerance", run, lambda case: tenths(1, 4))
+
+
+_peer = partial(Solver, peer=True, limits="knows compliant walls and the sawtooth only")
+
+SOLVERS = (
+    _with_control("error-controlled", audited=False),
+    _with_control("error-controlled, audited", audited=True),
+    _peer("all in ngspice", "circuit.reltol", _all_in_ngspice, partial(_values, 4, 9)),
+    _peer("SciPy's LSODA with events", "tolerance", _solve_ivp, partial(_values, 3, 6)),
+)
+"""The further lines."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser("benchmarks.charts", description="Charts of the methods.")
+    parser.add_argument("--quick", action="store_true", help="accuracy on one scene")
+    parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
+    asked = parser.parse_args()
+    accuracy(quick=asked.quick, out=asked.out, more=SOLVERS)
+    for report in (friction.report(), chaos.report()):
+        report.save(asked.out)
+        print(f"{report}\n\n{report.written(asked.out)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,165 @@
+"""``cosim bench``: how fast each rung is, as ratios that are taken side by side in one run.
+
+An absolute time means nothing on another machine, so whatever is compared takes turns, and ratios
+are formed round by round: changes of the machine's speed cancel. What errors the rungs have at
+these speeds, ``cosim chart ladder`` and ``accuracy`` tell.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from itertools import groupby
+from math import inf
+from pathlib import Path
+from statistics import median
+from time import process_time
+from typing import Any
+
+from cosim.files.atomic import write_json
+from cosim.scene import load
+from cosim.simulation.simulate import simulate
+from cosim.studies.tables import machine
+from cosim.toolchain.libraries import compiled
+from cosim.toolchain.processes import in_place
+
+BRIEF_FULL = ("circuit.model=full", "run.duration=0.1", "run.settle=0.05")
+"""Settings that make the scene `reference` short on the rung `full`, thirty times as slow."""
+
+LONG_PART = ("run.duration=100", "run.output_step=1e-2")
+"""So long, and so few rows, that starting and writing rows cost next to nothing."""
+
+TITLES = {
+    "real_time": "Simulated seconds per second of one core",
+    "over_amplifier": "The same, over that of the rung amplifier",
+}
+
+Targets = dict[str, tuple[float, float]]
+"""Least and greatest median of a number, by its dotted name."""
+
+TARGETS: Targets = {
+    "real_time.amplifier": (3.0, inf),
+    "real_time.limited": (30.0, inf),
+    "real_time.ideal": (60.0, inf),
+    "real_time.part": (5000.0, inf),
+}
+
+
+def run(out: Path, quick: bool) -> dict[str, Any]:
+    """Measure, write ``bench.json`` into ``out`` and print each number with its target.
+
+    A ``quick`` bench takes fewer rounds and shorter runs.
+    """
+    with in_place():  # CPU times are those of one process
+        numbers = measure(quick)
+    write_json(out / "bench.json", judged(numbers, TARGETS))
+    print(f"{table(numbers, TITLES)}\nWritten to {out}: bench.json")
+    return numbers
+
+
+def measure(quick: bool) -> dict[str, Any]:
+    """All numbers: of each ratio the median over the rounds, ``low`` and ``high``."""
+    host = machine()
+    return {
+        **real_time(3 if quick else 11),
+        "quick": quick,
+        "machine": {
+            **{name: host[name] for name in ("processor", "cores", "python")},
+            "compiler": compiler_version(),
+        },
+    }
+
+
+def compiler_version() -> str:
+    """What made the FMU: the first line that the C compiler says of itself."""
+    return json.loads(compiled("build.json").read_text())["compiler"]
+
+
+def real_time(rounds: int) -> dict[str, Any]:
+    """Simulated seconds per CPU second of whole runs of each rung, and their ratios."""
+    scenes = {
+        "full": load("reference", BRIEF_FULL),
+        "amplifier": load("reference"),
+        "ideal": load("reference", ["circuit.model=ideal"]),
+        "part": load("optimal", LONG_PART),
+        "limited": load("reference", ["circuit.model=limited"]),
+    }
+    taken = take_turns({name: partial(simulate, scene) for name, scene in scenes.items()}, rounds)
+    speeds = {
+        name: [scene.run.duration / seconds for seconds in taken[name]]
+        for name, scene in scenes.items()
+    }
+    others = ("full", "limited", "ideal")
+    return {
+        "real_time": {name: spread(found) for name, found in speeds.items()},
+        "over_amplifier": {name: ratios(speeds[name], speeds["amplifier"]) for name in others},
+    }
+
+
+def take_turns(calls: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
+    """CPU seconds of each call in each round, after one round that warms up."""
+    taken: dict[str, list[float]] = {name: [] for name in calls}
+    for turn in range(rounds + 1):
+        for name, call in calls.items():
+            seconds = cpu(call)
+            if turn:
+                taken[name].append(seconds)
+    return taken
+
+
+def cpu(call: Callable[[], object]) -> float:
+    """CPU seconds of this process that a call takes."""
+    began = process_time()
+    call()
+    return process_time() - began
+
+
+def spread(values: Sequence[float]) -> dict[str, float]:
+    """Median, ``low`` and ``high``."""
+    return {"median": median(values), "low": min(values), "high": max(values)}
+
+
+def ratios(over: Sequence[float], under: Sequence[float]) -> dict[str, float]:
+    """The spread of the ratios of two calls, round by round."""
+    return spread([a / b for a, b in zip(over, under, strict=True)])
+
+
+def judged(numbers: dict[str, Any], targets: Targets) -> dict[str, Any]:
+    """The numbers, with ``target`` and ``holds`` (is the median within it?) where there is one."""
+    for name, found in _spreads(numbers):
+        if name in targets:
+            low, high = targets[name]
+            one_sided = f"<= {high:g}" if low == -inf else f">= {low:g}"
+            found["target"] = one_sided if inf in (-low, high) else f"{low:g} ... {high:g}"
+            found["holds"] = low <= found["median"] <= high
+    return numbers
+
+
+def table(numbers: dict[str, Any], titles: Mapping[str, str]) -> str:
+    """All numbers for people: median, low, high, error, target, and whether it holds."""
+    host = numbers["machine"]
+    lines = [f"{host['processor']}, {host['cores']} cores, Python {host['python']}"]
+    for group, entries in groupby(_spreads(numbers), lambda entry: entry[0].partition(".")[0]):
+        lines.append(f"{titles[group]}:")
+        lines += [f"  {name.partition('.')[2]:<10}{_cells(found)}" for name, found in entries]
+    return "\n".join(lines)
+
+
+def _spreads(numbers: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Each spread with its dotted name."""
+    for name, value in numbers.items():
+        if isinstance(value, dict):
+            if "median" in value:
+                yield name, value
+            else:
+                yield from ((f"{name}.{key}", found) for key, found in _spreads(value))
+
+
+def _cells(found: dict[str, Any]) -> str:
+    told = f"{found['median']:.4g} ({found['low']:.4g} ... {found['high']:.4g})"
+    if "error" in found:
+        told += f"  error {found['error']:.1e}"
+    if "error_of_peer" in found:
+        told += f", theirs {found['error_of_peer']:.1e}"
+    if "target" in found:
+        told += f"  target {found['target']}: {'holds' if found['holds'] else 'MISSED'}"
+    return told
