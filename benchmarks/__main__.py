@@ -1,4 +1,4 @@
-"""What measures this project itself: its coupling, its overhead, and other programs beside it.
+"""What measures this project itself: what coupling costs, and other programs beside it.
 
     python -m benchmarks [NAME ...] [--quick] [--trials DIR] [--out DIR]
 
@@ -13,7 +13,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from benchmarks import compare, errors, instructions, memory, overhead, parts
+from benchmarks import compare, errors, instructions, part, parts
 from cosim.files.atomic import write_json
 from cosim.studies.speed import bench
 from cosim.toolchain.processes import in_place
@@ -24,19 +24,15 @@ TITLES = bench.TITLES | {
     "all_in_ngspice_over_ours": "The whole machine in one netlist, over ours",
     "naive_over_ours": "PySpice's and fmpy's plain calls, over ours",
     "solve_ivp_over_ours": "SciPy's solve_ivp (LSODA, events), over ours",
-    "memory_growth": "Peak memory of a run ten times as long, over that of the shorter",
     "part": "The part on a given surface",
-    "map_over_bare_calls": "CPU time of a sweep over that of bare calls of the compiled loop",
 }
 TARGETS: bench.Targets = bench.TARGETS | {
     "cost_exponent": (0.97, 1.03),
     "coupled_over_parts.amplifier": (-inf, 1.25),
     "coupled_over_parts.full": (-inf, 1.25),
-    "memory_growth": (-inf, 1.25),
     "all_in_ngspice_over_ours": (5.0, inf),
     "naive_over_ours": (4.0, inf),
     "solve_ivp_over_ours": (3.0, inf),
-    "map_over_bare_calls": (-inf, 1.1),
 }
 
 Measure = Callable[[bool, Path | None], Any]
@@ -50,14 +46,8 @@ MEASURES: dict[str, Measure] = {
             2 if quick else 5, (20, 60, 200) if quick else (10, 100, 1000)
         )
     },
-    "memory": lambda quick, _: {
-        "memory_growth": memory.growth(1 if quick else 3, (20, 200) if quick else (100, 1000))
-    },
     "instructions": lambda *_: {"instructions_per_period": instructions.per_period()},
-    "overhead": lambda quick, trials: {
-        "part": overhead.solvers(trials, 11 if quick else 51),
-        "map_over_bare_calls": overhead.map_over_bare_calls(3 if quick else 7),
-    },
+    "part": lambda quick, trials: {"part": part.solvers(trials, 11 if quick else 51)},
 }
 
 

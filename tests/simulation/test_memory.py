@@ -4,12 +4,14 @@ Counted is all that is in RAM at a time, mapped files included.
 """
 
 import os
+import subprocess
+import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 
-from benchmarks.memory import peak
 from cosim.coupling.loop import agenda, lead
 from cosim.drive import straights
 from cosim.files import spill as tape
@@ -20,6 +22,31 @@ from cosim.toolchain import processes
 from cosim.waveforms import storage
 
 pytestmark = pytest.mark.reliability
+
+_RUN = """
+import sys
+from pathlib import Path
+from cosim.cli.main import main
+from cosim.toolchain.processes import in_place
+with in_place():
+    code = main()
+lines = Path("/proc/self/status").read_text().splitlines()
+print(next(line.split()[1] for line in lines if line.startswith("VmHWM")), file=sys.stderr)
+sys.exit(code)
+"""
+
+
+def peak(*overrides: str) -> float:
+    """Most memory (MiB) that a process had in RAM that ran `reference`, mapped files included."""
+    settings = [word for override in overrides for word in ("--set", override)]
+    with TemporaryDirectory() as folder:
+        done = subprocess.run(
+            [sys.executable, "-c", _RUN, "run", "reference", *settings, "--out", folder],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    return float(done.stderr.split()[-1]) / 1024
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")

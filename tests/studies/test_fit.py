@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import differential_evolution
 
-from benchmarks.overhead import solvers
+from benchmarks.part import solvers
 from cosim.errors import BadInput
 from cosim.mechanics import part
 from cosim.studies.fit.cases import Case

@@ -19,7 +19,7 @@ from cosim.simulation.choose_rung import relative_error
 from cosim.simulation.simulate import simulate
 from cosim.studies.plots import GREEN, panels
 from cosim.studies.report import Progress, Report, counted, silent
-from cosim.studies.tables import Row, brief
+from cosim.studies.tables import Row, brief, markdown
 
 RUNGS = ("ideal", "limited", "amplifier", "full")
 """Cheapest first. "full" has the data sheet's output stage and the firmware's staircase besides."""
@@ -145,18 +145,10 @@ def report(found: Found) -> Report:
     """Which circuit each scene needs, and what it costs."""
     said = [words(scene, rungs) for scene, rungs in found]
     table = [row for pair in found for row in rows(*pair)]
-    printed: list[str] = []
-    for (_, rungs), sentence in zip(found, said, strict=True):
-        lines = [
-            f"  {rung.model:<10}{rung.cost[0]:9.3g} s per simulated s {rung.v_average * 1e3:+9.3f} "
-            f"mm/s {rung.off_amplifier:9.3%} off the amplifier {rung.off_top:9.3%} off the top"
-            for rung in rungs
-        ]
-        printed += [sentence, "", *lines, ""]
     notes, figures = [f"{message(found)}.", *said], {"": partial(draw, found)}
     return Report(
         "ladder", "The ladder of circuits", table, notes, {"Each rung": table}, figures,
-        "\n".join(printed),
+        "\n".join([*said, "", *markdown(table)]),
     )  # fmt: skip
 
 

@@ -1,25 +1,14 @@
-"""What little work costs beside what does it: the part's two solvers, a sweep beside bare calls."""
+"""The part on a given surface: the exact solution beside the published trials' own scheme."""
 
-from collections.abc import Callable, Sequence
-from contextlib import closing
-from ctypes import addressof
+from collections.abc import Callable
 from pathlib import Path
 from statistics import median
-from tempfile import TemporaryDirectory
-from time import process_time
 from typing import Any
 
 import numpy as np
 
-from cosim.arrays import Array
-from cosim.coupling.loop.recorder import Recorder
-from cosim.coupling.loop.structures import loop
-from cosim.evaluate.evaluator import Evaluator
-from cosim.evaluate.point import point
 from cosim.mechanics import part
-from cosim.mechanics.stickslip import Mechanics
-from cosim.scene import Scene, load
-from cosim.simulation.rungs.rung import rungs
+from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.speed.bench import ratios, take_turns
 from cosim.trials import published
@@ -30,8 +19,6 @@ FRAMES = 312
 """Of a made-up trial: as many as the published ones have."""
 OTHER_FORCE = 14.0
 """Weights of the part; its normal force on a trial that is not among the published."""
-OFFSETS = [-2.0 + 0.05 * k for k in range(40)]
-"""V; ``drive.offset`` of the points of the sweep."""
 
 
 def solvers(folder: Path | None, rounds: int) -> dict[str, Any]:
@@ -90,42 +77,3 @@ def _made_up(number: int) -> Trial:
     surface = Track(frames.z_surface, frames.v_surface, nothing, nothing)
     moved = Track(frames.z_part, frames.v_part, nothing, nothing)
     return Trial(f"made up {number}", None, frames.time, surface, moved, None)
-
-
-def map_over_bare_calls(rounds: int, offsets: Sequence[float] = OFFSETS) -> dict[str, float]:
-    """CPU time of many runs, from their settings to the numbers in a file, over that of
-    bare calls of the compiled loop, whose preparation does not count: median, ``low``, ``high``.
-
-    The points are a second of `paper-limited` with each of the ``offsets`` (V). Both take turns.
-    """
-    scene = load("paper-limited", ["run.duration=1"])
-    points = [*enumerate({"drive.offset": offset} for offset in offsets)]
-    bare, swept = [], []
-    for _ in range(rounds + 1):
-        bare.append(sum(_bare(point(scene, values, False)) for _, values in points))
-        with (
-            TemporaryDirectory() as folder,
-            Evaluator(scene, Path(folder) / "store", workers=1) as bench,
-        ):
-            began = process_time()
-            assert len(list(bench.run(points))) == len(points)
-            swept.append(process_time() - began)
-    return ratios(swept[1:], bare[1:])  # the first round warms up
-
-
-def _bare(scene: Scene) -> float:
-    """CPU seconds of the compiled loop alone for a scene whose inputs are known beforehand."""
-    seconds = 0.0
-
-    class Bare(Recorder):
-        def follow(self, edges: Array, start: Array, end: Array) -> None:
-            nonlocal seconds
-            block = [np.ascontiguousarray(values) for values in (edges, start, end)]
-            at = [values.ctypes.data for values in block]
-            began = process_time()
-            loop().recorder_follow(addressof(self.state), len(edges), *at, 1 << 40)
-            seconds += process_time() - began
-
-    with closing(Mechanics(scene)) as mechanics:
-        rungs()[scene.circuit.model].drive(scene, Bare(scene, mechanics, lambda _: None))
-    return seconds
