@@ -183,7 +183,7 @@ def report(runs: Sequence[Run], solvers: Sequence[Solver] = SOLVERS) -> Report:
         "each of these groups only. Every run is in accuracy.csv.",
         "Scenes: " + "; ".join(CASES[name].title for name in study.scenes) + ". A change of the "
         f"normal force by 1e-9 of itself moves their paths by at most {growth:.2g} times as much: "
-        f"none is chaotic. From {CHAOTIC:g} on only statistics are compared (chaos.md).",
+        f"none is chaotic. From {CHAOTIC:g} on only statistics can be compared.",
         f"{study.message}.",
     ]
     tables = {

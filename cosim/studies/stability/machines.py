@@ -30,9 +30,8 @@ class Machine:
 
     @cached_property
     def scene(self) -> Scene:
-        """Its part held."""
-        held = {"friction.mu_s": 1000.0, "friction.normal_force": 1e9}
-        return changed(load("reference"), {**_LINEAR, **held, **self.settings}, "stability")
+        """Its rig."""
+        return changed(load("reference"), {**_LINEAR, **self.settings}, "stability")
 
     @property
     def loop(self) -> float:
@@ -87,7 +86,8 @@ class Regime:
     def scene(self) -> Scene:
         """The part is held, or, if it ``slips``, let go."""
         free = {"friction.mu_k": 0.0, "friction.mu_s": 0.0}
-        return changed(self.machine.scene, free if self.slips else {}, "stability")
+        held = {"friction.mu_s": 1000.0, "friction.normal_force": 1e9}
+        return changed(self.machine.scene, free if self.slips else held, "stability")
 
 
 def _bodies(regime: Regime) -> tuple[list[list[float]], list[float]]:
