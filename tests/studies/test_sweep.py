@@ -18,9 +18,10 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import Outcome, evaluate
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.sweep import figure, sweep
+from cosim.studies.sweep import figure
 from cosim.studies.sweep.dataset import read
 from cosim.studies.sweep.design import Design, grid, sample
+from cosim.studies.sweep.run import sweep
 from cosim.toolchain import processes
 
 SHORT = ["run.duration=0.1", "run.settle=0.05"]
