@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 from cosim.cli import simulation, studies
 from cosim.cli.command import add_commands
 from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain
-from cosim.files.door import watched
+from cosim.files.reader import watched
 from cosim.toolchain import memory
 from cosim.toolchain.interrupts import ended_alike
 from cosim.version import __version__

@@ -47,10 +47,11 @@ def _run(study: Study, out: Path | None = None, **asked: Any) -> None:
     with writable(out, shared=not study.writes), bar as shown:
         shows = {name: partial(_show, shown, means) for name, means in study.tells.items()}
         found = study.function(**asked, **shows, **({"out": out} if study.saves else {}))
-        if not study.saves:
-            found.save(out)
+        results = found if isinstance(found, tuple) else (found,)
+        for result in () if study.saves else results:
+            result.save(out)
     if not study.writes:
-        for report in found if isinstance(found, tuple) else (found,):
+        for report in results:
             print(f"{report}\n\n{report.written(out)}")
         return
     print(loaded(study.told)(found) if study.told else found)

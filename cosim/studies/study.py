@@ -129,11 +129,13 @@ class Study:
         return loaded(self.home)
 
 
-def chart(home: str, help: str, *options: Option, library: bool = True) -> Study:
+def chart(
+    home: str, help: str, *options: Option, library: bool = True, saves: bool = True
+) -> Study:
     """A study that gives reports, and tells steps done, of how many, and which was the last."""
     tells: dict[str, Told] = {"progress": lambda done, total, what="": (done, total, what)}
     command = f"chart {home.rpartition('.')[2]}"
-    return Study(home, help, options, command, library, "results", tells=tells)
+    return Study(home, help, options, command, library, "results", saves, tells=tells)
 
 
 @cache

@@ -138,7 +138,8 @@ def test_worker_that_keeps_dying() -> None:
         while 0 not in outcomes:
             for worker in [each() for each in list(processes._living.values())]:
                 # Only that point takes so long.
-                if worker is not None and worker.alive and worker.reached > 1.0:
+                begun = hasattr(worker, "_process")
+                if worker is not None and begun and worker.alive and worker.reached > 1.0:
                     worker._process.kill()
             time.sleep(0.05)
 

@@ -25,5 +25,6 @@ STUDIES = (
         folder_of_trials("folder of the published trials' CSVs"),
         OVERRIDES,
         library=False,
+        saves=False,
     ),
 )

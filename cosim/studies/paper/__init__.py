@@ -48,5 +48,6 @@ STUDIES = (
         "the paper's figure 7: its trials, measured and simulated",
         folder_of_trials("folder of the published trials' CSVs"),
         library=False,
+        saves=False,
     ),
 )
