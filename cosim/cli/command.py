@@ -68,7 +68,8 @@ def add_options(parser: ArgumentParser, command: Command) -> None:
         if option.name.startswith("-"):
             how |= {"dest": option.argument, "required": option.needed}
         if option.kind is bool:
-            place.add_argument(option.name, action="store_const", const=True, **how)
+            how["const"] = not option.name.startswith("--no-")
+            place.add_argument(option.name, action="store_const", **how)
             continue
         how |= {"type": option.kind, "metavar": option.metavar, "choices": option.choices or None}
         if option.many == "repeat":

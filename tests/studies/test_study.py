@@ -65,14 +65,15 @@ def test_a_declaration_is_a_command(
         def __repr__(self) -> str:
             return "found it"
 
-    def look(many: list[str], *, times: int = 3, far: bool = False) -> Found:
-        heard.append((many, times, far))
+    def look(many: list[str], *, times: int = 3, far: bool = False, near: bool = True) -> Found:
+        heard.append((many, times, far, near))
         return Found()
 
     options = (
         Option("many", "words", "WORD", many="some"),
         Option("--times", "how often", "N", int, 3),
         Option("--far", "in the distance", kind=bool),
+        Option("--no-near", "not what is close", kind=bool, parameter="near"),
     )
     declared = Study(
         *("here.look", "look", options, "look"), saves=False, out="found", writes="found.txt"
@@ -83,7 +84,7 @@ def test_a_declaration_is_a_command(
     assert main(["look", "a", "b", f"--out={out}"]) == 0
     assert capsys.readouterr().out == f"found it\nWritten to {out}: found.txt\n"
     assert (out / "found.txt").read_text() == "yes"
-    assert main(["look", "c", "--far", "--times=4", f"--out={out}"]) == 0
-    assert heard == [(["a", "b"], 3, False), (["c"], 4, True)]
+    assert main(["look", "c", "--far", "--times=4", "--no-near", f"--out={out}"]) == 0
+    assert heard == [(["a", "b"], 3, False, True), (["c"], 4, True, False)]
     assert main(["look", "c", "--times=x"]) == 2
     assert "argument --times: invalid int value: 'x'" in capsys.readouterr().err
