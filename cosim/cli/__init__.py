@@ -1,5 +1,4 @@
-"""The command ``cosim``: one file a command, one file a chart.
+"""The command ``cosim``, a thin user of the library.
 
-Each module declares its :class:`cosim.cli.command.Command` as ``COMMAND``, and imports libraries,
-and rooms that do, only in the functions that need them: ``--help`` imports all modules.
+Its modules import libraries, and rooms that do, only in the functions that need them.
 """

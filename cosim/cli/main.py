@@ -13,10 +13,10 @@ import warnings
 from io import TextIOWrapper
 from typing import Any, NoReturn
 
+from cosim.cli import simulation, studies
 from cosim.cli.command import add_commands
 from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain
-from cosim.files.declared import declared
-from cosim.files.door import watched
+from cosim.files.reader import watched
 from cosim.toolchain import memory
 from cosim.toolchain.interrupts import ended_alike
 from cosim.version import __version__
@@ -38,18 +38,15 @@ class _Parser(argparse.ArgumentParser):
         raise BadInput(f"{message} (see {self.prog} --help).")
 
 
-_FOLDERS = ("cosim.cli.simulation", "cosim.cli.studies")
-
-
-def _parser(arguments: list[str]) -> argparse.ArgumentParser:
-    """The parser, with the options of the commands that ``arguments`` name."""
+def _parser(arguments: list[str] | None) -> argparse.ArgumentParser:
+    """The parser, with the options of the commands that ``arguments`` name; None: of all."""
     parser = _Parser(
         prog="cosim",
         description="Runs a vibrating gripper: its circuit in ngspice, its mechanics in an FMU.",
     )
     parser.add_argument("--version", action="version", version=f"cosim {__version__}")
-    commands = [one for folder in _FOLDERS for one in declared(folder, "COMMAND").values()]
-    add_commands(parser, "COMMAND", commands, arguments)
+    commands = sorted([*simulation.COMMANDS, *studies.commands()], key=lambda one: one.name)
+    add_commands(parser, commands, arguments, "COMMAND")
     return parser
 
 
@@ -124,7 +121,7 @@ class _Reading:
                 self._bar.close()
             self._path, self._began, self._bar = path, time.monotonic(), None
         if self._bar is None and share < 1.0 and time.monotonic() - self._began > _LONG:
-            from cosim.cli.options import progress_bar
+            from cosim.cli.work import progress_bar
 
             name = os.path.basename(path)
             self._bar = progress_bar(f"reading {plain(name, 40)}", 1.0, "", bar_format=_BAR)

@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
-from cosim.files import door
+from cosim.files import reader
 
 LARGEST = 50_000_000
 """Bytes of a table."""
@@ -113,7 +113,7 @@ class Cells:
 
 def read_cells(path: Path, most: int = LARGEST) -> Cells:
     """The cells of a text file. Raises BadInput, with the row, for what is no table."""
-    text = _decoded(door.read(path, most))
+    text = _decoded(reader.read(path, most))
     name = plain(str(path))
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if odd := _CONTROL.search(text):
@@ -135,8 +135,8 @@ def read_cells(path: Path, most: int = LARGEST) -> Cells:
             raise BadInput(f"{name}: row {n}: it has more than {MOST_CELLS} cells.")
         rows.append((n, [*_cells(line, separator, name, n)]))
         if len(rows) % _TOLD == 0:
-            door.tell(path, 0.5 + 0.5 * len(rows) / len(kept))
-    door.tell(path, 1.0)
+            reader.tell(path, 0.5 + 0.5 * len(rows) / len(kept))
+    reader.tell(path, 1.0)
     return Cells(path, separator, rows, comments)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from cosim.errors import BadInput, NoEffect, plain
-from cosim.files import door
+from cosim.files import reader
 from cosim.scene import messages, toml
 from cosim.scene.describe import acts, keys
 from cosim.scene.methods import METHODS
@@ -120,8 +120,8 @@ def _layers(source: str) -> list[_Layer]:
 def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
     """The content of a scene file."""
     try:
-        raw = door.contents(source, MAX_BYTES)
-    except door.Refused as refused:
+        raw = reader.contents(source, MAX_BYTES)
+    except reader.Refused as refused:
         if not isinstance(refused.__cause__, FileNotFoundError):
             raise BadInput(f"{origin}: cannot be read ({refused}).") from refused.__cause__
         hint = messages.suggestion(Path(source).stem, builtin, "the built-in scene ")

@@ -9,7 +9,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.files.atomic import whole
-from cosim.files.door import opened
+from cosim.files.reader import opened
 from cosim.files.spill import blocks
 from cosim.waveforms.columns import COLUMNS
 

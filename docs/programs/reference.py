@@ -1,4 +1,4 @@
-"""Writes docs/reference/ from the tables that the program itself uses.
+"""Writes docs/reference/ and cosim/__init__.pyi from the tables that the program itself uses.
 
 So a page and the program cannot part: a test holds the one against the other.
 """
@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import cosim
 from cosim.cli.main import _parser
 from cosim.scene.describe import Key, keys
 from cosim.scene.loading import list_scenes
@@ -201,8 +202,7 @@ def command(parser: argparse.ArgumentParser, text: str, level: int) -> list[str]
 
 
 def command_line() -> str:
-    commands = "run sweep tune export scenes compare fit identify theory bench chart fmu"
-    parser = _parser([*commands.split()])
+    parser = _parser(None)
     about = "`python -m cosim` is the same command. `--help` after any of these prints its options."
     codes = table(
         ["exit code", "meaning"],
@@ -217,6 +217,27 @@ def command_line() -> str:
     return "\n\n".join(["# Command line", about, codes, *rest])
 
 
+# --- the library ----------------------------------------------------------------------------------
+
+ERRORS = ("BadInput", "SimulationFailed")
+
+
+def python() -> str:
+    about = (
+        "Everything that the command does, from a script, a notebook or standard input. Scenes are "
+        "given by name, as a path of a TOML file, or as what `load` returned. Overrides are a "
+        'mapping `{"table.key": value}`, SI.'
+    )
+    return "\n\n".join(["# Python", about, *(f"::: cosim.{n}" for n in (*cosim.homes(), *ERRORS))])
+
+
+def stub() -> str:
+    """What `import cosim` has, for editors and type checkers."""
+    homes = dict.fromkeys(ERRORS, "cosim.errors") | {"__version__": "cosim.version"} | cosim.homes()
+    lines = [f"from {home} import {name} as {name}" for name, home in homes.items()]
+    return "\n".join([*sorted(lines), "", "def homes() -> dict[str, str]: ..."])
+
+
 PAGES = {
     "scene": scene,
     "scenes": scenes,
@@ -224,16 +245,21 @@ PAGES = {
     "summary": summary,
     "exports": exports,
     "command-line": command_line,
+    "python": python,
 }
 """The pages by the names of their files."""
 
+NOTE = "made by docs/programs/reference.py"
 
-def written(name: str) -> str:
-    """The text of a page."""
-    return f"<!-- made by docs/programs/reference.py -->\n{PAGES[name]()}".rstrip() + "\n"
+
+def files() -> dict[Path, str]:
+    """All that is written, by its place."""
+    pages = {FOLDER / f"{name}.md": f"<!-- {NOTE} -->\n{page()}" for name, page in PAGES.items()}
+    every = pages | {Path(cosim.__file__).with_name("__init__.pyi"): f"# {NOTE}\n{stub()}"}
+    return {path: text.rstrip() + "\n" for path, text in every.items()}
 
 
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
-    for page in PAGES:
-        (FOLDER / f"{page}.md").write_text(written(page), encoding="utf-8")
+    for path, text in files().items():
+        path.write_text(text, encoding="utf-8")

@@ -234,7 +234,7 @@ def test_unreadable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     path = tmp_path / "secret.toml"
     path.touch()
-    monkeypatch.setattr("cosim.files.door.open", refuse, raising=False)
+    monkeypatch.setattr("cosim.files.reader.open", refuse, raising=False)
     assert complaint(path) == f"{path}: cannot be read (Permission denied)."
 
 

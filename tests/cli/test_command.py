@@ -483,15 +483,6 @@ def folder_of(*parts: str) -> Path:
     return Path(cosim.__file__).parent.joinpath(*parts)
 
 
-def test_every_file_of_the_folders_is_a_command(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    listed = set(re.findall(r"(?m)^    (\w+) ", capsys.readouterr().out))
-    folders = [folder_of("cli", name) for name in ("simulation", "studies")]
-    files = {path.stem for folder in folders for path in folder.glob("*.py")}
-    assert listed == files - {"__init__"}
-
-
 def test_export_tells_every_format(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["export", "--help"])

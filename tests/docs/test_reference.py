@@ -1,20 +1,21 @@
 """The pages of docs/reference/ say what the program's tables say, and these what a run has."""
 
+from pathlib import Path
+
 import pytest
 
 import cosim
 from cosim.waveforms.quantities import SUMMARY
-from docs.programs.reference import FOLDER, PAGES, written
+from docs.programs.reference import files
 
 BRIEF = {"run.duration": 0.06, "run.settle": 0.03}
 OTHERS = {"spread"}
 """Entries that `cosim run` adds to the file."""
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_page_is_up_to_date(name: str) -> None:
-    text = (FOLDER / f"{name}.md").read_text(encoding="utf-8")
-    assert text == written(name), "run `make docs`"
+@pytest.mark.parametrize(("path", "text"), files().items(), ids=[path.name for path in files()])
+def test_page_is_up_to_date(path: Path, text: str) -> None:
+    assert path.read_text(encoding="utf-8") == text, "run `make docs`"
 
 
 @pytest.mark.filterwarnings("ignore")

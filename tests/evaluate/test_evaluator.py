@@ -17,7 +17,7 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import Outcome
 from cosim.scene import load
 from cosim.studies.limits import report
-from cosim.studies.sweep import sweep
+from cosim.studies.sweep.run import sweep
 from tests.helpers import needs
 
 SHORT = {"run.duration": 0.02, "run.settle": 0.0}

@@ -33,8 +33,9 @@ from cosim.drive.surface.waveforms import (
     quaid_velocity,
 )
 from cosim.errors import BadInput
-from cosim.studies.paper import errata_text, exact, figure7, figures, theory
-from cosim.studies.paper.errata import errata
+from cosim.studies.paper import exact, figure7, figures
+from cosim.studies.paper.errata import errata, errata_text
+from cosim.studies.paper.theory import theory
 from tests.helpers import needs
 from tests.helpers.examples import examples
 
@@ -498,7 +499,7 @@ def test_there_is_no_theory_without_transport():
 
 
 def test_formulas_do_without_matplotlib():
-    code = "import sys, cosim.studies.paper; sys.exit('matplotlib' in sys.modules)"
+    code = "import sys, cosim.studies.paper.theory; sys.exit('matplotlib' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
@@ -531,7 +532,8 @@ def test_the_figures_show_the_line_of_optima_and_what_is_printed():
 @needs.ngspice_library
 def test_figure_7_has_the_published_errors_and_the_machines_own(trials: Path, tmp_path: Path):
     told: list[int] = []
-    figure7.paper(trials, out=tmp_path, progress=lambda done, total, what: told.append(total))
+    found = figure7.paper(trials, progress=lambda done, total, what: told.append(total))
+    found.save(tmp_path)
     assert told == [10] * 10
     rows = list(csv.DictReader((tmp_path / "figure7.csv").read_text().splitlines()))
     numbers = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}

@@ -18,9 +18,10 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import Outcome, evaluate
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.sweep import figure, sweep
+from cosim.studies.sweep import figure
 from cosim.studies.sweep.dataset import read
 from cosim.studies.sweep.design import Design, grid, sample
+from cosim.studies.sweep.run import sweep
 from cosim.toolchain import processes
 
 SHORT = ["run.duration=0.1", "run.settle=0.05"]
@@ -137,7 +138,8 @@ def test_worker_that_keeps_dying() -> None:
         while 0 not in outcomes:
             for worker in [each() for each in list(processes._living.values())]:
                 # Only that point takes so long.
-                if worker is not None and worker.alive and worker.reached > 1.0:
+                begun = hasattr(worker, "_process")
+                if worker is not None and begun and worker.alive and worker.reached > 1.0:
                     worker._process.kill()
             time.sleep(0.05)
 

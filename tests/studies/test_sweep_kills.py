@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from cosim.studies.sweep import sweep
+from cosim.studies.sweep.run import sweep
 from tests.helpers import needs
 
 pytestmark = pytest.mark.reliability

@@ -13,7 +13,7 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import periods_made_whole
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.tune import tune
+from cosim.studies.tune.run import tune
 
 
 def test_theory_s_optimum() -> None:

@@ -14,7 +14,7 @@ from typing import NoReturn
 from unicodedata import category
 
 from cosim.errors import BadInput, plain
-from cosim.files import door
+from cosim.files import reader
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ class _Reader:
             text = self._opened(self.path)
             self.folder = self.path.parent.resolve(strict=True)
             return text
-        except door.Refused as refused:
+        except reader.Refused as refused:
             missing = isinstance(refused.__cause__, FileNotFoundError | NotADirectoryError)
             reason = "there is no such file" if missing else f"cannot be read ({refused})"
             raise BadInput(f"{name}: {reason}.") from refused.__cause__
@@ -206,11 +206,11 @@ class _Reader:
         """The text of an included file."""
         try:
             return self._opened(path)
-        except door.Refused as refused:
+        except reader.Refused as refused:
             refuse(line, f"{shown(path.name)} cannot be read ({refused})")
 
     def _opened(self, path: Path) -> str:
-        data = door.contents(path, MAX_BYTES - self.bytes_read)
+        data = reader.contents(path, MAX_BYTES - self.bytes_read)
         self.bytes_read += len(data)
         return _decoded(data, path.name)
 

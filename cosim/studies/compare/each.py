@@ -2,7 +2,7 @@
 from the command to the part, can be trusted.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from math import nan
 from pathlib import Path
@@ -12,19 +12,21 @@ from typing import Any
 from matplotlib.axes import Axes
 
 from cosim.errors import BadInput, plain
-from cosim.scene import Scene, load
+from cosim.scene import load
 from cosim.scene.loading import Overrides, list_scenes
 from cosim.studies.compare.run import Comparison, compare
 from cosim.studies.plots import BLUE, VERMILION, panels
-from cosim.studies.report import Progress, Report, counted, silent
+from cosim.studies.report import Progress, Report, silent
 from cosim.studies.tables import Row
 from cosim.trials.tracked import number_of, trial_files
 
 
-def pairs(folder: Path, overrides: Overrides | None = None) -> list[tuple[Scene, Path]]:
-    """The files of a folder's trials, each with its scene. Raises BadInput."""
+def each(
+    folder: Path, overrides: Overrides | None = None, progress: Progress = silent
+) -> list[Comparison]:
+    """The trials of a folder, each compared with its scene. Raises BadInput."""
     known = {name for name, _ in list_scenes()}
-    found = []
+    pairs = []
     for path in trial_files(folder):
         name = f"trial-{number_of(path) or 0:02d}"
         if name not in known:
@@ -32,18 +34,11 @@ def pairs(folder: Path, overrides: Overrides | None = None) -> list[tuple[Scene,
                 f"{plain(str(path))}: there is no built-in scene {name}; the last number in the "
                 "file's name must be that of one of the scenes trial-01 to trial-10."
             )
-        found.append((load(name, overrides), path))
-    return found
-
-
-def each(
-    trials: Sequence[tuple[Scene, Path]], told: Callable[[], object] = lambda: None
-) -> list[Comparison]:
-    """The comparisons; ``told`` hears of each."""
+        pairs.append((load(name, overrides), path))
     found = []
-    for scene, path in trials:
+    for scene, path in pairs:
         found.append(compare(scene, path, aligned=True))
-        told()
+        progress(len(found), len(pairs), scene.name)
     return found
 
 
@@ -74,18 +69,10 @@ def row(found: Comparison) -> Row:
 
 
 def trials(
-    trials: Path,
-    overrides: Overrides | None = None,
-    *,
-    out: Path | None = None,
-    progress: Progress = silent,
+    trials: Path, overrides: Overrides | None = None, *, progress: Progress = silent
 ) -> Report:
-    """Compare the published trials of a folder with their scenes; saved in ``out``."""
-    every = pairs(trials, overrides)
-    found = report(each(every, counted(progress, len(every))))
-    if out is not None:
-        found.save(out)
-    return found
+    """Compare the published trials of a folder with their scenes. Raises BadInput."""
+    return report(each(trials, overrides, progress))
 
 
 def report(found: Sequence[Comparison]) -> Report:

@@ -3,7 +3,51 @@
 The formulas themselves, with source and symbols, are in :mod:`cosim.drive.surface.formulas`.
 """
 
-from cosim.studies.paper.errata import errata_text
-from cosim.studies.paper.theory import theory
+import math
+from argparse import ArgumentTypeError
 
-__all__ = ["errata_text", "theory"]
+from cosim.studies.study import Option, Study, chart, folder_of_trials
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ArgumentTypeError(f"{text} is not a finite number")
+    return value
+
+
+_GIVEN = (
+    ("--mu-s", "static coefficient of friction", "MU"),
+    ("--mu-k", "kinetic coefficient of friction", "MU"),
+    ("--a-max", "greatest acceleration of the surface, m/s²", "M/S2"),
+    ("--f-n", "normal force over the part's weight", "RATIO"),
+    ("--period", "period, s", "S"),
+)
+_ERRATA = Option(
+    *("--errata", "the paper's misprints, each proven"),
+    kind=bool,
+    prints="paper.errata.errata_text",
+)
+
+STUDIES = (
+    Study(
+        "paper.theory.theory",
+        "the paper's closed forms: theory.json, figure3.png, figure4.png",
+        (
+            *(Option(n, f"{t} (default: the paper's)", unit, _number) for n, t, unit in _GIVEN),
+            _ERRATA,
+        ),
+        command="theory",
+        out="results/theory",
+        saves=False,
+        writes="theory.json, knife_edge.csv",
+        figures=("figure3.png", "figure4.png", "knife_edge.png"),
+    ),
+    chart(
+        "paper.figure7.paper",
+        "the paper's figure 7: its trials, measured and simulated",
+        folder_of_trials("folder of the published trials' CSVs"),
+        library=False,
+        saves=False,
+    ),
+)

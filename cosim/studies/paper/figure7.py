@@ -15,13 +15,13 @@ from matplotlib.lines import Line2D
 
 from cosim.arrays import Array
 from cosim.files.picture import Picture
-from cosim.studies.compare import each
+from cosim.studies.compare.each import each
 from cosim.studies.compare.run import Comparison
 from cosim.studies.fit.cases import FIRST_ROW
 from cosim.studies.fit.fit import fit
 from cosim.studies.fit.results import Shown
 from cosim.studies.paper.figures import DASHED, PART, SURFACE
-from cosim.studies.report import Progress, Report, counted, silent
+from cosim.studies.report import Progress, Report, silent
 from cosim.studies.tables import Row
 from cosim.trials.periods import drift
 
@@ -71,19 +71,14 @@ class Trial:
         }
 
 
-def paper(trials: Path, *, out: Path | None = None, progress: Progress = silent) -> Report:
-    """The published trials of a folder, simulated in three ways; saved in ``out``.
-
-    Raises BadInput where they are not the published ones.
+def paper(trials: Path, *, progress: Progress = silent) -> Report:
+    """The published trials of a folder, simulated in three ways. Raises BadInput where they are not
+    the published ones.
     """
     theirs = fit(trials, evaluate="published", solver="published").shown
     exact = fit(trials, evaluate="published", solver="exact").shown
-    every = each.pairs(trials)
-    together = zip(theirs, exact, each.each(every, counted(progress, len(every))), strict=True)
-    found = report([Trial(number, *sides) for number, sides in enumerate(together, start=1)])
-    if out is not None:
-        found.save(out)
-    return found
+    together = zip(theirs, exact, each(trials, progress=progress), strict=True)
+    return report([Trial(number, *sides) for number, sides in enumerate(together, start=1)])
 
 
 def report(found: list[Trial]) -> Report:

@@ -6,6 +6,7 @@ these speeds, ``cosim chart ladder`` and ``accuracy`` tell.
 """
 
 import json
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import groupby
@@ -44,16 +45,27 @@ TARGETS: Targets = {
 }
 
 
-def run(out: Path, quick: bool) -> dict[str, Any]:
-    """Measure, write ``bench.json`` into ``out`` and print each number with its target.
+class Bench:
+    """What was measured: ``numbers``, as ``bench.json`` holds them."""
+
+    def __init__(self, numbers: dict[str, Any]) -> None:
+        self.numbers = numbers
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Write ``bench.json``."""
+        write_json(Path(folder) / "bench.json", self.numbers)
+
+    def __repr__(self) -> str:
+        return table(self.numbers, TITLES)
+
+
+def bench(*, quick: bool = False) -> Bench:
+    """Speed ratios of this machine, each with its target.
 
     A ``quick`` bench takes fewer rounds and shorter runs.
     """
     with in_place():  # CPU times are those of one process
-        numbers = measure(quick)
-    write_json(out / "bench.json", judged(numbers, TARGETS))
-    print(f"{table(numbers, TITLES)}\nWritten to {out}: bench.json")
-    return numbers
+        return Bench(judged(measure(quick), TARGETS))
 
 
 def measure(quick: bool) -> dict[str, Any]:

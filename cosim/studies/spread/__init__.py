@@ -1,5 +1,8 @@
-"""How rugged a run's answer is: what a small turn of each knob makes of it."""
+"""How rugged a run's answer is: what a small turn of each knob makes of it.
 
-from cosim.studies.spread.run import spread
+``cosim run --spread`` tells it with the run.
+"""
 
-__all__ = ["spread"]
+from cosim.studies.study import Study
+
+STUDIES = (Study("spread.run.spread"),)

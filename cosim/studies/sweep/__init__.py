@@ -1,5 +1,40 @@
 """Sweeps: one scene at many settings of its keys."""
 
-from cosim.studies.sweep.run import sweep
+from cosim.studies.study import DASK, OVERRIDES, SCENE, WORKERS, Option, Study
 
-__all__ = ["sweep"]
+OVER = Option(
+    "--over",
+    "a numeric key and its values; repeatable, the last one runs fastest. Where the frequency is "
+    "swept, each point lasts whole periods",
+    "TABLE.KEY=START:STOP:N|A,B,C",
+    many="repeat",
+    read="sweep.design.parse",
+)
+SAMPLES = "N settings from the ranges of the keys, a Latin hypercube, instead of the grid"
+
+STUDIES = (
+    Study(
+        "sweep.run.sweep",
+        "run a scene over a grid or a sample of settings",
+        (
+            *(SCENE, OVERRIDES, OVER),
+            Option("--samples", SAMPLES, "N", int),
+            Option("--random", "independent samples instead of it", kind=bool),
+            Option("--seed", "of the samples", "N", int, 0),
+            *(WORKERS, DASK),
+        ),
+        command="sweep",
+        out="results/<scene>-sweep",
+        writes="sweep.nc",
+        figures=("figure.png",),
+        unit="point",
+        tells={
+            "progress": lambda done, failed, total: (
+                *(done, total),
+                f"{failed} failed" if failed else "",
+            )
+        },
+        told="sweep.report.table",
+        check="sweep.report.check",
+    ),
+)

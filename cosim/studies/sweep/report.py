@@ -5,16 +5,18 @@ from collections import Counter
 import numpy as np
 import xarray as xr
 
+from cosim.errors import SimulationFailed
 from cosim.studies.sweep.dataset import FAILURE, swept
 from cosim.waveforms.quantities import with_unit
 
 MOST_REASONS = 5
 
 
-def table(name: str, data: xr.Dataset) -> str:
+def table(data: xr.Dataset) -> str:
     """The greatest transport up and down, with the settings, and why points failed."""
     reasons = Counter(str(text) for text in data[FAILURE].values.ravel() if text)
     count = data[FAILURE].size
+    name = str(data.attrs["title"]).removeprefix("Sweep of ")
     lines = [f"{name}: {count} points, {sum(reasons.values())} failed"]
     if "v_average" in data and np.isfinite(data["v_average"].values).any():
         v = data["v_average"].values
@@ -28,6 +30,13 @@ def table(name: str, data: xr.Dataset) -> str:
             f"  and for {len(reasons) - MOST_REASONS} more reasons: see {FAILURE} in sweep.nc"
         )
     return "\n".join(lines)
+
+
+def check(data: xr.Dataset) -> None:
+    """Raise SimulationFailed where no point could be run."""
+    reasons = [str(reason) for reason in data[FAILURE].values.flat]
+    if all(reasons):
+        raise SimulationFailed(f"No point could be run; the first one: {reasons[0]}")
 
 
 def _at(data: xr.Dataset, place: np.intp) -> str:

@@ -1,5 +1,39 @@
 """Finds the settings that transport best, as the operator does by ear."""
 
-from cosim.studies.tune.run import Tuning, tune
+from cosim.studies.study import DASK, OVERRIDES, SCENE, SEED, WORKERS, Option, Study
 
-__all__ = ["Tuning", "tune"]
+OVER = Option(
+    "--over",
+    "a numeric key and its range; repeatable (default: the three knobs, end to end)",
+    "TABLE.KEY=LOW:HIGH",
+    many="repeat",
+    read="tune.files.ranges_of",
+)
+
+STUDIES = (
+    Study(
+        "tune.run.tune",
+        "find the settings that transport best",
+        (
+            *(SCENE, OVERRIDES),
+            Option("--maximise", "a number of the summary: v_average, …", "NAME", one_of="goal"),
+            Option("--minimise", "the same, downwards", "NAME", one_of="goal"),
+            OVER,
+            Option("--budget", "runs in all", "N", int, 200),
+            *(SEED, WORKERS, DASK),
+        ),
+        command="tune",
+        out="results/<scene>-tune",
+        writes="tune.json, tune.csv, best.toml",
+        figures=("figure.png",),
+        unit="run",
+        total="budget",
+        tells={
+            "progress": lambda run, best: (None, None, f"{best.value:.4g}" if best else ""),
+            "scouting": lambda run, best: (
+                *(0, None),
+                "without ngspice" + (f", {best.value:.4g}" if best else ""),
+            ),
+        },
+    ),
+)

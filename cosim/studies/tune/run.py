@@ -122,9 +122,19 @@ def tune(
     path = None if out is None else Path(out) / STORE
     whole_periods = any(key in FREQUENCIES for key in ranges)
     aim = quantity, largest, ranges, budget, seed, whole_periods
+    heard: list[Run] = []
+
+    def told(run: Run, best: Run | None) -> None:
+        heard.append(run)
+        progress(run, best)
+
     with Evaluator(scene, path, whole_periods=whole_periods, workers=workers, dask=dask) as bench:
         try:
-            found = _tuned(scene, *aim, bench, progress, scouting)
+            found = _tuned(scene, *aim, bench, told, scouting)
+        except KeyboardInterrupt:
+            if out is not None:
+                files.write_runs(Path(out) / "tune.csv", heard, quantity)
+            raise
         except BadInput:
             if not bench.resumed:
                 bench.forget()  # there is nothing to go on with

@@ -1,7 +1,7 @@
-"""The door through which every file comes in that a scene, a command or a file names.
+"""The safe reader of every file that a scene, a command or another file names.
 
-Only regular files pass, of a size that memory holds: a device or a pipe would never end, and some
-do something when they are merely opened. Long reading is told.
+It reads regular files only, of a size that memory holds: a device or a pipe would never end, and
+some do something when they are merely opened. Who watches is told how far long reading is.
 """
 
 import os

@@ -11,7 +11,7 @@ import cosim
 from cosim.circuit.lint import deck
 from cosim.cli.main import main
 from cosim.errors import BadInput
-from cosim.files import door
+from cosim.files import reader
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from tests.helpers import needs
@@ -77,8 +77,8 @@ def test_one_that_takes_the_place_of_a_regular_file(
     path.unlink()
     os.mkfifo(path)
     monkeypatch.setattr(os, "stat", lambda *_, **__: seen)
-    with pytest.raises(door.Refused, match="not a regular file"):
-        door.contents(path, 100)
+    with pytest.raises(reader.Refused, match="not a regular file"):
+        reader.contents(path, 100)
 
 
 def test_one_that_grows(tmp_path: Path) -> None:
@@ -89,8 +89,8 @@ def test_one_that_grows(tmp_path: Path) -> None:
         with open(path, "ab") as file:
             file.write(bytes(1 << 20))
 
-    with door.watched(grow), pytest.raises(door.Refused, match="larger than"):
-        door.contents(path, 20 << 20)
+    with reader.watched(grow), pytest.raises(reader.Refused, match="larger than"):
+        reader.contents(path, 20 << 20)
 
 
 def test_long_reading_is_told(tmp_path: Path) -> None:
@@ -98,7 +98,7 @@ def test_long_reading_is_told(tmp_path: Path) -> None:
     rows = "".join(f"{k}e-5,0.5\n" for k in range(150_000))
     path.write_text("time [s],normal_force [N]\n" + rows)
     shares: list[float] = []
-    with door.watched(lambda _, share: shares.append(share)):
+    with reader.watched(lambda _, share: shares.append(share)):
         simulate(load("held", [*RUN, f"friction.normal_force_file={path}"]))
     assert len(shares) > 10 and shares == sorted(shares) and shares[-1] == 1.0
 
@@ -114,7 +114,7 @@ def test_readers_meet_no_lock(tmp_path: Path) -> None:
 
     writer = threading.Thread(target=write)
     writer.start()
-    with pytest.raises(door.Refused, match="not a regular file"):
-        door.contents(tmp_path / "pipe", 100)
+    with pytest.raises(reader.Refused, match="not a regular file"):
+        reader.contents(tmp_path / "pipe", 100)
     writer.join(10)
     assert not writer.is_alive()

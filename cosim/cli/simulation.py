@@ -1,0 +1,157 @@
+"""The commands that simulate a scene, and what goes with that."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cosim.cli.command import Command
+from cosim.cli.work import progress_bar, writable
+from cosim.studies.study import OVERRIDES, SCENE, Option
+
+if TYPE_CHECKING:
+    from cosim.scene import Scene
+    from cosim.studies.spread.run import Spread
+
+_BAR = "{desc} {percentage:3.0f}% |{bar}| {n:.2f} of {total:g} s, {remaining} left"
+
+
+def _run(
+    scene: str, overrides: Sequence[str] = (), spread: bool = False, out: Path | None = None
+) -> None:
+    from cosim.scene import load
+
+    base = load(scene, overrides)
+    folder = out or Path("results") / base.name
+    if spread:
+        from cosim.studies.spread.run import turns
+
+        turns(base)  # refuses a scene without knobs before it is run
+    with writable(folder):
+        import cosim
+        from cosim.files.atomic import write_json
+        from cosim.simulation.elsewhere import on_disk_in
+        from cosim.waveforms.report import table
+
+        def progress(time: float) -> None:
+            bar.update(time - bar.n)
+
+        with (
+            progress_bar(base.name, base.run.duration, "s", delay=1.0, bar_format=_BAR) as bar,
+            on_disk_in(folder),
+        ):
+            result = cosim.run(base, progress=progress)
+        result.save(folder)
+        found = _spread(result.scene) if spread else None
+        if found is not None:
+            path = folder / "summary.json"
+            saved = json.loads(path.read_text(encoding="utf-8"))
+            write_json(path, saved | {"spread": found.summary()})
+    print(f"{base.name}: {base.description}" if base.description else base.name)
+    print(table(result.scene, result.summary))
+    if found is not None:
+        print(found)
+    print(f"Written to {folder}: waveforms.csv, waveforms.nc, summary.json, scene.toml")
+    print(f"Figure: {folder / 'figure.png'}")
+
+
+def _spread(scene: "Scene") -> "Spread":
+    import cosim
+
+    def progress(runs: int) -> None:
+        bar.update(runs - bar.n)
+
+    with progress_bar("spread", None, "run") as bar:
+        return cosim.spread(scene, progress=progress)
+
+
+def _scenes() -> None:
+    from cosim.scene import list_scenes
+
+    found = list_scenes()
+    width = max(len(name) for name, _ in found)
+    for name, description in found:
+        print(f"{name:<{width}}  {description}")
+
+
+def _export_options() -> list[Option]:
+    from cosim.waveforms.formats import formats
+
+    known = ", ".join(f"{one.name} ({one.help})" for one in formats().values())
+    return [
+        Option("run", "a folder that cosim run wrote", "DIR", Path),
+        Option(
+            *("--as", f"{known}; repeatable", "FORM,..."),
+            parameter="forms",
+            many="repeat",
+            needed=True,
+        ),
+    ]
+
+
+def _export(run: Path, forms: list[str], out: Path | None = None) -> None:
+    from cosim.waveforms import formats
+
+    chosen = formats.parse(forms)
+    result = formats.read(run)
+    folder = out or run
+    with writable(folder):
+        files = formats.export(result, chosen, folder)
+    width = max(map(len, files))
+    print(f"Written to {folder}:")
+    for name, note in files.items():
+        print(f"  {name:<{width}}  {note}")
+
+
+_FMU = "results/fmu"
+
+
+def _build(out: Path = Path(_FMU)) -> None:
+    from cosim.mechanics import package
+
+    with writable(out):
+        paths = package.pack(out)
+    for path in paths.values():
+        print(path)
+
+
+def _check() -> int:
+    from cosim.mechanics import package
+
+    return 1 if package.check() else 0
+
+
+COMMANDS = (
+    Command(
+        "export",
+        "write a finished run in other programs' formats",
+        _export,
+        _export_options,
+        "the run",
+    ),
+    Command(
+        "fmu",
+        "write or check the FMU files of the mechanics",
+        commands=(
+            Command("build", "write stickslip-fmi2.fmu and stickslip-fmi3.fmu", _build, out=_FMU),
+            Command("check", "validate the FMU files and run them", _check),
+        ),
+    ),
+    Command(
+        "run",
+        "run a scene; write waveforms, summary and figure",
+        _run,
+        (
+            SCENE,
+            OVERRIDES,
+            Option(
+                "--spread",
+                "also tell how rugged the answer is: v_average with each of the three knobs turned "
+                "by 1 % either way",
+                kind=bool,
+            ),
+        ),
+        "results/<scene>",
+    ),
+    Command("scenes", "list the built-in scenes", _scenes),
+)

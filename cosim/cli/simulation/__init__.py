@@ -1,1 +1,0 @@
-"""Commands that simulate scenes, and what goes with that."""

@@ -1,0 +1,73 @@
+"""The commands that studies are."""
+
+from contextlib import nullcontext
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from cosim.cli.command import Command
+from cosim.cli.work import progress_bar, writable
+from cosim.studies.study import Study, Told, loaded, studies
+
+CHART = "chart"
+"""The group of those that leave a table, a page and figures in one folder."""
+
+
+def commands() -> list[Command]:
+    """A command for each study that is one."""
+    found = [(study.command.split(), study) for study in studies() if study.command]
+    alone = [_command(words[0], study) for words, study in found if len(words) == 1]
+    charts = [_command(words[1], study) for words, study in found if words[0] == CHART]
+    charts.sort(key=lambda command: command.name)
+    return [*alone, Command(CHART, "the studies, as tables and a figure", commands=charts)]
+
+
+def _command(name: str, study: Study) -> Command:
+    return Command(name, study.help, partial(_run, study), study.options, study.out)
+
+
+def _run(study: Study, out: Path | None = None, **asked: Any) -> None:
+    """Run a study with what was asked, save and tell what it finds."""
+    for option in study.options:
+        if option.prints and asked.pop(option.argument, False):
+            print(loaded(option.prints)())
+            return
+    title = study.name
+    if "<scene>" in study.out:
+        from cosim.scene import load
+
+        scene = asked["scene"] = load(asked["scene"], asked.pop("overrides", ()))
+        title = scene.name
+    out = out or Path(study.out.replace("<scene>", title))
+    for option in study.options:
+        if option.read:
+            asked[option.argument] = loaded(option.read)(asked.get(option.argument, []))
+    known = {option.argument: option.default for option in study.options} | asked
+    bar = progress_bar(title, known.get(study.total), study.unit) if study.tells else nullcontext()
+    with writable(out, shared=not study.writes), bar as shown:
+        shows = {name: partial(_show, shown, means) for name, means in study.tells.items()}
+        found = study.function(**asked, **shows, **({"out": out} if study.saves else {}))
+        results = found if isinstance(found, tuple) else (found,)
+        for result in () if study.saves else results:
+            result.save(out)
+    if not study.writes:
+        for report in results:
+            print(f"{report}\n\n{report.written(out)}")
+        return
+    print(loaded(study.told)(found) if study.told else found)
+    print(f"Written to {out}: {study.writes}")
+    if study.figures:
+        paths = ", ".join(str(out / name) for name in study.figures)
+        print(f"Figure{'s' * (len(study.figures) > 1)}: {paths}")
+    if study.check:
+        loaded(study.check)(found)
+
+
+def _show(bar: Any, means: Told, *told: Any) -> None:
+    """Move the bar as ``means`` makes of what was ``told``."""
+    done, total, words = means(*told)
+    if total is not None and bar.total is None:
+        bar.reset(total)
+        bar.initial = done or 0  # steps of an earlier study tell nothing of the rate
+    bar.set_postfix_str(words, refresh=False)
+    bar.update(1 if done is None else done - bar.n)

@@ -1,1 +1,0 @@
-"""Commands that study: closed forms, trials, charts, speed."""
