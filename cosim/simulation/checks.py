@@ -7,15 +7,15 @@ the run's own history that tells it, since that obeys the solver's own equations
 less tolerance alone, since both would then err alike in whatever has a fixed length.
 
 The kind is that of the scene on the circuit "limited", which is much cheaper: as it is, from a
-height 1e-9 m aside, and with the drive a quarter period ahead. Where the first two part, motion is
-chaotic, and no path and no mean over a given time is right by itself. Where the third comes to
-another motion, the start decides between several.
+height 1e-9 m aside, and with the drive a quarter period ahead and behind. Where the first two part,
+motion is chaotic, and no path and no mean over a given time is right by itself. Where the others
+come to another motion, the start decides between several.
 
-Not seen: several answers that a quarter period does not part; a kind that the simpler circuit does
+Not seen: several answers that these starts do not part; a kind that the simpler circuit does
 not have, near a border between two of them; and chaos that dies out before the averages begin.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from math import isinf
 from threading import Event
@@ -44,6 +44,12 @@ STRICT = 2.4
 PERIODS, LONG = 60, 2.0
 """Of the drive, and s: how long a run is at least that tells the kind of motion; its second half
 counts."""
+
+LONGER = 4
+"""Times as long where motion is not yet periodic."""
+
+AHEAD = (0.25, 0.75)
+"""Of a period, by which the drive begins later in its course in the other runs."""
 
 LONGEST = 10.0
 """Times the scene's own duration that such a run may last."""
@@ -123,39 +129,59 @@ def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
     repeats, there is no simpler circuit, or too few periods are run.
 
     ``motion`` is "regular", "no transport" (below LEAST), "several answers", "chaotic" or
-    "unsettled": not periodic by then.
-    ``motion_periods`` are those of the drive after which regular motion repeats, and
-    ``motion_settled`` is when it does so, s. ``v_average_range`` holds the least and the greatest
-    mean velocity, m/s: of all answers, or of chaotic motion in stretches as long as the average.
+    "unsettled": not periodic by then. ``motion_periods`` are those of the drive after which it
+    repeats, and ``motion_settled`` is from when on it does so, s. ``v_average_answers`` are the
+    mean velocities, m/s, that several starts come to; ``v_average_range`` holds the least and the
+    greatest one of chaotic motion in stretches as long as the average.
     """
     length = scene.period
     simple = without_ngspice(scene) if scene.rung.ngspice else scene
     if simple is None or not scene.rung.driven or isinf(length) or normal_force(scene) is not None:
         return {}
-    periods = max(PERIODS, round(LONG / length))
     if PERIODS * length > LONGEST * scene.run.duration:
         return {}
-    times = {"duration": periods * length, "settle": periods * length / 2.0, "output_step": length}
-    base = simple.model_copy(update={"run": scene.run.model_copy(update=times)})
-    starts = [base, _aside(base), _started(base, 0.25)]
-    try:
-        ways = [_ways(start, progress) for start in starts if start is not None]
-    except CosimError:
-        return {}
-    means = [float(np.mean(way[periods // 2 :])) / length for way in ways]
-    repeats = _repeats(ways[0])
-    scale = max(abs(means[0]), LEAST)
-    if abs(means[1] - means[0]) > PARTED * scale:
-        count = max(1, round((scene.run.duration - scene.run.settle) / length))
-        every = np.concatenate([_stretches(way[periods // 2 :], count) for way in ways]) / length
-        return {"motion": "chaotic", "v_average_range": [float(every.min()), float(every.max())]}
+    averaged = max(1, round((scene.run.duration - scene.run.settle) / length))
+    found: dict[str, Any] = {}
+    for longer in (1, LONGER):
+        end = longer * max(PERIODS, round(LONG / length)) * length
+        times = {"duration": end, "settle": end / 2.0, "output_step": length}
+        base = simple.model_copy(update={"run": scene.run.model_copy(update=times)})
+        starts = [base, _aside(base), *(_started(base, ahead) for ahead in AHEAD)]
+        try:
+            ways = [_ways(start, progress) for start in starts if start is not None]
+        except CosimError:
+            return {}
+        found = _kind(ways, length, averaged)
+        if found["motion"] != "unsettled":
+            break
+    return found
+
+
+def _kind(ways: Sequence[Array], length: float, averaged: int) -> dict[str, Any]:
+    """The kind of a motion whose part goes ``ways`` (m) in the periods of ``length`` (s): from the
+    scene's own start, from one ASIDE, and from others. The average is over ``averaged`` periods."""
+    late = [way[len(way) // 2 :] for way in ways]
+    means = [float(way.mean()) / length for way in late]
     if max(map(abs, means)) < LEAST:
         return {"motion": "no transport"}
-    if repeats is None:
-        return {"motion": "unsettled"}
-    found = {"motion_periods": repeats, "motion_settled": _settled(ways[0], repeats) * length}
-    if len(means) > 2 and relative_error(means[2], means[0]) > SAME:
-        return {"motion": "several answers", "v_average_range": sorted(means[::2]), **found}
+    repeats = [_repeats(way) for way in ways]
+    if None in repeats[:2] and relative_error(means[1], means[0]) > PARTED:
+        every = np.concatenate([_stretches(way, averaged) for way in late]) / length
+        return {"motion": "chaotic", "v_average_range": [float(every.min()), float(every.max())]}
+    answers: list[float] = []
+    for way, count in zip(ways, repeats, strict=True):
+        if count is None:
+            return {"motion": "unsettled"}
+        answer = float(way[-count:].mean()) / length
+        if all(relative_error(answer, other) > SAME for other in answers):
+            answers.append(answer)
+    assert repeats[0] is not None
+    found = {
+        "motion_periods": repeats[0],
+        "motion_settled": _settled(ways[0], repeats[0]) * length,
+    }
+    if len(answers) > 1:
+        return {"motion": "several answers", "v_average_answers": answers, **found}
     return {"motion": "regular", **found}
 
 

@@ -26,8 +26,9 @@ SUMMARY: dict[str, Quantity] = {
     ),
     "motion_periods": Quantity("1", "periods of the drive after which regular motion repeats"),
     "motion_settled": Quantity("s", "when the part's way in a period begins to repeat to 0.1 %"),
+    "v_average_answers": Quantity("m/s", "each v_average that other starts come to, or this one"),
     "v_average_range": Quantity(
-        "m/s", "least and greatest v_average of several answers, or of stretches of chaotic motion"
+        "m/s", "least and greatest v_average of chaotic motion in stretches as long as the average"
     ),
     "v_average_other_starts": Quantity(
         "m/s", "with --error: v_average with the drive begun 1/4, 1/2 and 3/4 of a period later"

@@ -74,10 +74,11 @@ def _motion(summary: dict[str, Any]) -> str:
         return "the part shakes in its place, from other starts too"
     if kind == "regular":
         return _repeating(summary)
-    low, high = (1e3 * value for value in summary["v_average_range"])
     if kind == "chaotic":
+        low, high = (1e3 * value for value in summary["v_average_range"])
         return f"chaotic: means over as many periods lie between {low:+.3f} and {high:+.3f} mm/s"
-    return f"other starts come to another mean: {low:+.3f} or {high:+.3f} mm/s"
+    answers = " or ".join(f"{1e3 * value:+.3f}" for value in summary["v_average_answers"])
+    return f"the start decides: {answers} mm/s"
 
 
 def _repeating(summary: dict[str, Any]) -> str:
