@@ -17,7 +17,11 @@ _BAR = "{desc} {percentage:3.0f}% |{bar}| {n:.2f} of {total:g} s, {remaining} le
 
 
 def _run(
-    scene: str, overrides: Sequence[str] = (), spread: bool = False, out: Path | None = None
+    scene: str,
+    overrides: Sequence[str] = (),
+    spread: bool = False,
+    strict: bool = False,
+    out: Path | None = None,
 ) -> None:
     from cosim.scene import load
 
@@ -40,7 +44,7 @@ def _run(
             progress_bar(base.name, base.run.duration, "s", delay=1.0, bar_format=_BAR) as bar,
             on_disk_in(folder),
         ):
-            result = cosim.run(base, progress=progress)
+            result = cosim.run(base, progress=progress, strict=strict)
         result.save(folder)
         found = _spread(result.scene) if spread else None
         if found is not None:
@@ -149,6 +153,13 @@ COMMANDS = (
                 "also tell how rugged the answer is: v_average with each of the three knobs turned "
                 "by 1 % either way",
                 kind=bool,
+            ),
+            Option(
+                "--error",
+                "tell how far v_average is off by two finer runs, and what it is from three more "
+                "starts; about ten times the time",
+                kind=bool,
+                parameter="strict",
             ),
         ),
         "results/<scene>",

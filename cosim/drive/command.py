@@ -55,15 +55,6 @@ class Switched(Command):
         return self._command.piece(t)
 
 
-def period(scene: Scene) -> float:
-    """Period of what drives a scene, s; infinite where nothing does. That of the firmware's
-    staircase differs from 1 / ``drive.frequency``, and a surface moved by a file has none: inf.
-    """
-    if scene.surface_is_given:
-        return inf if scene.drive.waveform == "file" else 1.0 / scene.drive.frequency
-    return command(scene).period
-
-
 def commands(scene: Scene) -> list[Command]:
     """The commands of a scene's surfaces: one, or two where they move by themselves."""
     first = command(scene)

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from math import ceil, isinf, nan
 from typing import Any
 
-from cosim.drive.command import period
 from cosim.errors import CosimError
 from cosim.scene import Scene, changed
 from cosim.toolchain.processes import TRIES, ProcessLost
@@ -104,7 +103,7 @@ def periods_made_whole(scene: Scene) -> dict[str, Number]:
     The mean over a broken period is off by per cents, which differ from frequency to frequency.
     They stay as they are where nothing repeats.
     """
-    length = period(scene)
+    length = scene.period
     if isinf(length):
         return {"run.settle": scene.run.settle, "run.duration": scene.run.duration}
     times = scene.run.settle, scene.run.duration - scene.run.settle

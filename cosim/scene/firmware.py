@@ -78,6 +78,20 @@ def staircase(maximum: int, frequency: float) -> tuple[int, ...]:
     return tuple(maximum * (q - k * p) // q for k in range(steps))
 
 
+def period(frequency: float, loop_time: float | None) -> float:
+    """Of the staircase for a commanded ``frequency`` in Hz, s; with ``loop_time``, s, that of the
+    passes."""
+    steps = ceil(1 / (Fraction(frequency) / STEPS_PER_SECOND))
+    if not loop_time:
+        return steps / STEPS_PER_SECOND
+    each = _passes_a_step(loop_time)
+    return (max(2, each - 1) + (steps - 1) * each + 1) * loop_time
+
+
+def _passes_a_step(loop_time: float) -> int:
+    return ceil(round(1 / (STEPS_PER_SECOND * loop_time), 9))
+
+
 def passes(codes: tuple[int, ...], loop_time: float) -> tuple[int, ...]:
     """The DAC codes of one period, one each pass of a loop of ``loop_time`` in s.
 
@@ -85,6 +99,6 @@ def passes(codes: tuple[int, ...], loop_time: float) -> tuple[int, ...]:
     maximum is written one pass after the code 0, the counter set to it in the next, and the first
     decrement made from the one after that on, once a step has passed since the code 0.
     """
-    each = ceil(round(1 / (STEPS_PER_SECOND * loop_time), 9))
+    each = _passes_a_step(loop_time)
     falling = (code for code in codes[1:] for _ in range(each))
     return (*(codes[0],) * max(2, each - 1), *falling, 0)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from math import inf
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -62,6 +63,19 @@ class Scene(BaseModel):
         model = circuit.get("model") if isinstance(circuit, dict) else None
         rung = RUNGS.get(model) if isinstance(model, str) else None
         return data | {"circuit": _CAREFUL | circuit} if rung and rung.own_netlist else data
+
+    @model_validator(mode="after")
+    def _settle(self) -> "Scene":
+        """The mean over a broken period is off by per cents, so whole ones are the default."""
+        if "settle" not in self.run.model_fields_set:
+            length, duration = self.period, self.run.duration
+            count = max(int(duration / 2 / length * (1 + 1e-9)), int(duration >= length))
+            settle = max(0.0, duration - count * length) if count else duration / 2
+            given = {name: getattr(self.run, name) for name in self.run.model_fields_set}
+            # Not as one that was given: another drive has another default.
+            run = Run.model_construct(self.run.model_fields_set, **given, settle=settle)
+            object.__setattr__(self, "run", run)
+        return self
 
     @model_validator(mode="after")
     def _check_speed(self) -> "Scene":
@@ -198,6 +212,18 @@ class Scene(BaseModel):
                 *others,
             )
         return self
+
+    @property
+    def period(self) -> float:
+        """Of what drives the scene, s; infinite where nothing does, and with a surface moved by a
+        file. That of the firmware's staircase differs from 1 / ``drive.frequency``.
+        """
+        drive = self.drive
+        if not self.rung.driven and (not self.surface_is_given or drive.waveform == "file"):
+            return inf
+        if self.rung.driven and drive.quantised:
+            return firmware.period(drive.frequency, drive.loop_time)
+        return 1.0 / drive.frequency
 
     @property
     def files(self) -> dict[str, str]:

@@ -236,10 +236,10 @@ class Circuit(Table):
         None, "F", 1e-12, 1.0, "Capacitance in series with snubber_resistance; give both or neither"
     )
     reltol: float = _number(
-        1e-4, "1", 1e-9, 1e-2, "Relative tolerance of ngspice; 1e-05 by default with file"
+        3e-5, "1", 1e-9, 1e-2, "Relative tolerance of ngspice; 1e-05 by default with file"
     )
     max_step: float = _number(
-        2e-4, "s", 1e-9, 1e-2, "Largest step of ngspice; 2e-05 by default with file"
+        1.4e-4, "s", 1e-9, 1e-2, "Largest step of ngspice; 2e-05 by default with file"
     )
 
     @model_validator(mode="after")
@@ -372,7 +372,12 @@ class Run(Table):
 
     duration: float = _number(2.0, "s", 1e-6, 1e5, "Simulated time")
     settle: float = _number(
-        1.0, "s", 0.0, 1e5, "Start of the averages; half of the duration by default"
+        1.0,
+        "s",
+        0.0,
+        1e5,
+        "Start of the averages; by default whole periods of the drive, about half of the duration, "
+        "before the end",
     )
     output_step: float = _number(5e-5, "s", 1e-9, 1e3, "Time between rows of the waveforms")
     shutter: float = _number(
@@ -390,16 +395,9 @@ class Run(Table):
         "Relative error of v_average that a simpler circuit may make: auto, ladder",
     )
 
-    @model_validator(mode="before")
-    @classmethod
-    def _settle(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "settle" not in data and is_number(data.get("duration")):
-            return data | {"settle": data["duration"] / 2}
-        return data
-
     @model_validator(mode="after")
     def _check(self) -> "Run":
-        for key in ("settle", "output_step"):
+        for key in self.model_fields_set & {"settle", "output_step"}:
             if (value := getattr(self, key)) >= self.duration:
                 raise fault(
                     f"run.{key} = {value:g} s must be below run.duration = {self.duration:g} s"

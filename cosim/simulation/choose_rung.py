@@ -16,7 +16,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
-from cosim.drive.command import period
 from cosim.errors import BadInput
 from cosim.scene import Scene, changed
 from cosim.simulation.here import summary_here
@@ -114,7 +113,7 @@ def _few_rows(scene: Scene) -> Scene:
 
 def _part(scene: Scene) -> dict[str, float | str]:
     """Settings for the first whole periods of a run alone."""
-    length = period(scene)
+    length = scene.period
     count = max(FEWEST_PERIODS, round(0.5 * PART * scene.run.duration / length))
     if 2 * count * length >= scene.run.duration:
         return {}

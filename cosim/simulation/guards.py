@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from cosim.arrays import Array
-from cosim.drive.command import commands, period
+from cosim.drive.command import commands
 from cosim.files.spill import blocks
 from cosim.mechanics.normal_force import NormalForce
 from cosim.scene import Scene
@@ -97,7 +97,7 @@ def coil_heat(
 
 
 def _coil(scene: Scene, summary: Mapping[str, Any]) -> Iterator[str]:
-    if scene.mechanics.actuator != "ram" or scene.run.duration < period(scene):
+    if scene.mechanics.actuator != "ram" or scene.run.duration < scene.period:
         return
     coil = scene.coil
     # energy_copper has the sense resistor's share, unless that is the affair of a user's netlist.

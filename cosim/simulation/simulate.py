@@ -5,7 +5,7 @@ import time
 import warnings
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 from cosim.errors import BeyondModel
 from cosim.scene import Scene, changed, load
@@ -19,12 +19,17 @@ def run(
     scene: Scene | str | os.PathLike[str],
     overrides: Overrides | None = None,
     progress: Progress = lambda time: None,
+    strict: bool = False,
 ) -> Result:
     """Run a scene: a built-in name, a TOML file, or what :func:`cosim.load` gave.
 
     ``overrides`` are values for its keys, SI: ``{"drive.frequency": 30}``. ``progress`` is told the
     simulated time, s, now and then. Circuits run in worker processes, as many at once as there are
     processors; any thread may call this.
+
+    ``summary["v_average_error"]`` and ``summary["motion"]`` tell how far its numbers hold; what
+    they are from is in :mod:`cosim.simulation.checks`. With ``strict`` they come from more and
+    finer runs, which takes about ten times as long.
 
     Where the run leaves what the model or a data sheet holds for, ``summary["notes"]`` says so, a
     sentence each, and a warning :class:`cosim.errors.BeyondModel` is given.
@@ -36,21 +41,31 @@ def run(
     >>> result.waveforms.z_part.units
     'm'
     """
-    result = simulate(load(scene, overrides), progress)
+    result = simulate(load(scene, overrides), progress, checks="strict" if strict else "usual")
     for sentence in result.summary["notes"]:
         warnings.warn(sentence, BeyondModel, stacklevel=2)
     return result
 
 
-def simulate(scene: Scene, progress: Progress = lambda _: None, fmi_version: int = 3) -> Result:
-    """Run a scene. ``progress`` is told the simulated time (s) now and then.
+def simulate(
+    scene: Scene,
+    progress: Progress = lambda _: None,
+    fmi_version: int = 3,
+    checks: Literal["none", "usual", "strict"] = "none",
+) -> Result:
+    """Run a scene. ``progress`` is told the simulated time (s) now and then. With ``checks`` the
+    summary also tells what :mod:`cosim.simulation.checks` finds out.
 
     Every circuit in ngspice runs in a worker process, behind a fence. Raises BadInput for a netlist
     that cannot be used, SimulationFailed with where, when, and what to try.
     """
     again = partial(simulate, progress=progress, fmi_version=fmi_version)
     if scene.rung.automatic:
-        return _cheapest(scene, again)
+        return _cheapest(scene, partial(again, checks=checks))
+    if checks != "none":
+        from cosim.simulation.checks import checked
+
+        return checked(scene, partial(again, scene), checks == "strict")
     if scene.coupling.method == "auto" and scene.rung.ngspice:
         from cosim.simulation.choose_steps import simulate_within_tolerance
 

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.coupling.loop.recorder import Recorder
-from cosim.drive.command import period
 from cosim.files.spill import blocks
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Electrics
@@ -38,7 +37,7 @@ def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[
     seen_max, seen_min = _seen(motion.frames, run.shutter / FRAME_RATE)
     a_max, a_min = extremes["a_surface_max"], extremes["a_surface_min"]
     bounded = math.isfinite(a_max) and math.isfinite(a_min)
-    cycle = period(scene)
+    cycle = scene.period
     result: dict[str, Any] = {
         "v_average": v_average,
         "transport_per_cycle": v_average * cycle if math.isfinite(cycle) else None,
@@ -143,7 +142,6 @@ def numbers(
 ) -> dict[str, Any]:
     """The summary but for its notes. ``steps`` are those of the FMU; the run began at ``began`` on
     the clock."""
-    error = {"v_average_error": driven.v_average_error} if scene.rung.ngspice else {}
     return summarise(scene, motion, driven.electric) | {
         "circuit_steps": driven.circuit_steps,
         "circuit_rejected": driven.circuit_rejected,
@@ -151,5 +149,4 @@ def numbers(
         "wall_time": time.perf_counter() - began,
         "method": driven.method,
         "versions": {**versions(), **driven.versions},
-        **error,
     }

@@ -11,7 +11,6 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from cosim.arrays import Array
-from cosim.drive.command import period
 from cosim.files.picture import Picture
 from cosim.files.spill import release
 from cosim.scene import Scene
@@ -69,7 +68,7 @@ def draw(scene: Scene, waves: dict[str, Array], numbers: dict[str, Any]) -> Pict
 def _last_periods(scene: Scene, time: Array) -> slice:
     """The rows of the last few periods; of the last part of the run where nothing is driven."""
     run = scene.run
-    length = period(scene)
+    length = scene.period
     if math.isfinite(length):
         span = PERIODS_SHOWN * length
     else:
@@ -104,7 +103,7 @@ def _title(scene: Scene, numbers: dict[str, Any]) -> str:
     if not scene.rung.driven:
         return f"{words}; no drive"
     late = "" if drive.phase_deg is None else f", second coil {drive.phase_deg:.4g}° late"
-    commanded, real = f"{drive.frequency:.4g}", f"{1.0 / period(scene):.4g}"
+    commanded, real = f"{drive.frequency:.4g}", f"{1.0 / scene.period:.4g}"
     rate = f"{real} Hz" if real == commanded else f"{real} Hz ({commanded} Hz commanded)"
     return (
         f"{words}; {drive.waveform} {rate}, {drive.amplitude:.3g} V "

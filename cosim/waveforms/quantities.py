@@ -14,7 +14,24 @@ SUMMARY: dict[str, Quantity] = {
     "run": Quantity("", "which run it is: the files of one run bear the same mark"),
     "v_average": Quantity("m/s", "mean velocity of the part after run.settle, up positive"),
     "v_average_error": Quantity(
-        "m/s", "estimate of what ngspice's steps did to v_average; only where ngspice runs"
+        "m/s",
+        "difference of v_average to a run with steps three times as long: twice it and a millionth "
+        "of v_average hold the true error of regular motion; null where that is not known",
+    ),
+    "motion": Quantity(
+        "",
+        "regular, no transport, several answers (the start decides), chaotic, or unsettled (not "
+        "periodic after 60 periods and 2 s), as on circuit limited; absent where nothing repeats "
+        "or too few periods are run",
+    ),
+    "motion_periods": Quantity("1", "periods of the drive after which regular motion repeats"),
+    "motion_settled": Quantity("s", "when the part's way in a period begins to repeat to 0.1 %"),
+    "v_average_answers": Quantity("m/s", "each v_average that other starts come to, or this one"),
+    "v_average_range": Quantity(
+        "m/s", "least and greatest v_average of chaotic motion in stretches as long as the average"
+    ),
+    "v_average_other_starts": Quantity(
+        "m/s", "with --error: v_average with the drive begun 1/4, 1/2 and 3/4 of a period later"
     ),
     "transport_per_cycle": Quantity("m", "v_average times the period of the drive"),
     "stick_fraction": Quantity("1", "share of the time in which the part sticks to the surface"),

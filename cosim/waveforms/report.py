@@ -1,10 +1,8 @@
 """A run's numbers for a reader: the table that is printed."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from cosim.drive.command import period
 from cosim.scene import Scene
 from cosim.trials.measured import measured
 
@@ -17,7 +15,8 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
     rows = [
         ("part's mean velocity", _scaled(summary["v_average"], 1e3, "mm/s", "+.3f")),
         ("  off by its own steps", _own_error(summary)),
-        ("", _broken_periods(scene)),
+        ("  averaged over", _periods(scene)),
+        ("motion", _motion(summary)),
         ("transport per cycle", _scaled(summary["transport_per_cycle"], 1e6, "µm", "+.1f")),
         ("sticking", _scaled(summary["stick_fraction"], 100, "% of the time", ".1f")),
         ("surface, peak-to-peak", _scaled(summary["z_surface_pp"], 1e3, "mm", ".3f")),
@@ -59,9 +58,33 @@ def _measured(scene: Scene) -> dict[str, str]:
 
 
 def _own_error(summary: dict[str, Any]) -> str:
-    """The estimate of what the circuit's steps did to the mean velocity."""
+    """How far the mean velocity may be off by the steps of the run."""
     error = summary.get("v_average_error")
-    return "" if error is None else f"about {abs(error) * 1e3:.1g} mm/s"
+    return "" if error is None else f"not more than about {2e3 * error:.1g} mm/s"
+
+
+def _motion(summary: dict[str, Any]) -> str:
+    """The kind of motion, and what it means for the mean velocity."""
+    kind = summary.get("motion")
+    if kind is None:
+        return ""
+    if kind == "unsettled":
+        return "not periodic after 60 periods and 2 s: the mean is that of this stretch"
+    if kind == "no transport":
+        return "the part shakes in its place, from other starts too"
+    if kind == "regular":
+        return _repeating(summary)
+    if kind == "chaotic":
+        low, high = (1e3 * value for value in summary["v_average_range"])
+        return f"chaotic: means over as many periods lie between {low:+.3f} and {high:+.3f} mm/s"
+    answers = " or ".join(f"{1e3 * value:+.3f}" for value in summary["v_average_answers"])
+    return f"the start decides: {answers} mm/s"
+
+
+def _repeating(summary: dict[str, Any]) -> str:
+    count, settled = summary["motion_periods"], summary["motion_settled"]
+    each = "every period" if count == 1 else f"every {count} periods"
+    return f"repeats {each}, to 0.1 % from {settled:.2g} s on"
 
 
 def _error(summary: dict[str, Any]) -> str:
@@ -73,15 +96,15 @@ def _error(summary: dict[str, Any]) -> str:
     return f"{summary['error_estimate']:.1e} of its range, with {', '.join(words)}"
 
 
-def _broken_periods(scene: Scene) -> str:
-    """A word where the averages end within a period, which makes them untrue."""
-    length = period(scene)
-    if math.isinf(length):
+def _periods(scene: Scene) -> str:
+    """How many periods the averages are over, where something repeats."""
+    periods = (scene.run.duration - scene.run.settle) / scene.period
+    if not periods:
         return ""
-    periods = (scene.run.duration - scene.run.settle) / length
-    if abs(periods - round(periods)) < 1e-6 or periods > MANY:
-        return ""
-    return f"over {periods:.4g} periods; whole ones give a truer mean"
+    if abs(periods - round(periods)) < 1e-6:
+        return f"{periods:.0f} period{'s' if periods > 1.5 else ''}"
+    hint = "" if periods > MANY else "; whole ones give a truer mean"
+    return f"{periods:.4g} periods{hint}"
 
 
 def _scaled(value: float | None, factor: float, unit: str, form: str) -> str:

@@ -59,6 +59,7 @@ def test_it_gives_the_voltage_of_the_scenes_source(pots: tuple[float, ...], tmp_
                 f"Voffset pwm 0 {points(drive, drive.v_offset, pin, pin_before, end)}",
             ),
             tran=tran,
+            options="reltol=1e-6 method=gear",
         ),
     )
     middles = np.arange(0.5 * STEP, end - STEP, STEP)

@@ -93,8 +93,8 @@ def test_same_bits_through_fmi_2(method: str) -> None:
 def test_same_bits_with_a_netlist_of_ones_own(tmp_path: Path) -> None:
     netlist = tmp_path / "own.cir"
     netlist.write_text(AMPLIFIER)
-    own = ["circuit.model=file", f"circuit.netlist={netlist}", "circuit.max_step=2e-4"]
-    own.append("circuit.reltol=1e-4")
+    own = ["circuit.model=file", f"circuit.netlist={netlist}", "circuit.max_step=1.4e-4"]
+    own.append("circuit.reltol=3e-5")
     found = simulate(load("reference", [*BRIEF, *own]))
     expected = simulate(load("reference", BRIEF))
     for name, values in expected.columns.items():

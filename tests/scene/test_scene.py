@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from cosim.errors import BadInput, NoEffect
 from cosim.mechanics import package
-from cosim.scene import RUNGS, Key, Scene, keys, list_scenes, load, to_toml
+from cosim.scene import RUNGS, Key, Scene, changed, keys, list_scenes, load, to_toml
 from cosim.scene.methods import METHODS
 from cosim.scene.tables import Circuit, Coupling
 from tests.helpers.examples import examples
@@ -54,8 +54,8 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "output_resistance": 0,
         "snubber_resistance": None,
         "snubber_capacitance": None,
-        "reltol": 1e-4,
-        "max_step": 2e-4,
+        "reltol": 3e-5,
+        "max_step": 1.4e-4,
     },
     "coil": {
         "resistance": 7.1,
@@ -246,9 +246,31 @@ def test_last_override_wins() -> None:
     assert load("paper", ["run.duration=3", "run.duration=4"]).run.duration == 4.0
 
 
-def test_settle_is_half_of_the_duration_unless_given() -> None:
-    assert load("paper", ["run.duration=0.5"]).run.settle == 0.25
+@pytest.mark.parametrize(
+    "overrides, periods, length",
+    [
+        (["drive.frequency=20.78"], 20, 1 / 20.78),
+        (["drive.frequency=30", "run.duration=0.5"], 7, 1 / 30),
+        (["drive.frequency=3", "run.duration=0.5"], 1, 1 / 3),
+        # The firmware's staircase: 1/30 s in whole steps of 50 us
+        (["drive.frequency=30", "drive.quantised=true"], 29, 0.03335),
+    ],
+)
+def test_averages_are_over_whole_periods(overrides: list[str], periods: int, length: float) -> None:
+    scene = load("paper", overrides)
+    assert scene.period == pytest.approx(length, rel=1e-12)
+    assert scene.run.duration - scene.run.settle == pytest.approx(periods * length, rel=1e-12)
+
+
+def test_a_given_settle_stays() -> None:
     assert load("paper", ["run.duration=0.5", "run.settle=0.1"]).run.settle == 0.1
+    assert load("paper", ["run.duration=0.02"]).run.settle == 0.01  # less than a period
+
+
+def test_another_frequency_moves_only_a_settle_that_was_not_given() -> None:
+    for own, settle in (([], 2.0 - 30 / 30.5), (["run.settle=1"], 1.0)):
+        scene = changed(load("paper", own), {"drive.frequency": 30.5}, "here")
+        assert scene.run.settle == pytest.approx(settle, rel=1e-12)
 
 
 def test_knobs_stand_for_values() -> None:

@@ -11,6 +11,9 @@
 #include <stddef.h>
 #include <string.h>
 
+/* The lengths of steps and changes below hold for a fineness of 1; finer runs divide all of them by
+   it, so that no fixed one makes runs of different tolerances err alike. */
+
 static const double ON_TIME = 1e-13;
 /* s; ngspice's own sums of steps reach a time of ours only within rounding */
 
@@ -215,7 +218,7 @@ static double longest_step(Lead *c, const double *values, double h)
         step = c->near_step;
     const Piece *p = &c->pieces[c->piece];
     if (p->kind == SINE)
-        step = fmin(step, 1.0 / (STEPS_OF_SINE * p->rate));
+        step = fmin(step, 1.0 / (c->fineness * STEPS_OF_SINE * p->rate));
     if (c->at_jump)
         step = fmin(step, c->restart_step);
     if (c->time >= c->impact - ON_TIME)
@@ -265,7 +268,7 @@ static double accepted(Lead *c, double time, double next_step)
         next_step = c->segment.end - time;
     /* A limit that a passing back-EMF touches is not to be stepped over. */
     const double room = fmin(c->output_high - c->output, c->output - c->output_low);
-    const double change = fmax(c->emf_change, EMF_OF_ROOM * room);
+    const double change = fmax(c->emf_change, EMF_OF_ROOM * room) / c->fineness;
     next_step = fmin(next_step, fmax(change / fabs(c->segment.c[1]), c->answer_step));
     if (c->impact - time < next_step)
         next_step = c->impact - time;
@@ -341,9 +344,9 @@ void lead_begin(Lead *c)
 {
     c->jump = piece_at(c, 0.0)->jump;
     c->impact = INFINITY;
-    c->answer_step = c->time_constant / 28.0;
-    c->limited_step = c->time_constant / 5.0;
-    c->near_step = c->time_constant;
+    c->answer_step = c->time_constant / 28.0 / c->fineness;
+    c->limited_step = c->time_constant / 5.0 / c->fineness;
+    c->near_step = c->time_constant / c->fineness;
     c->answered = c->time_constant * log(1.0 / SETTLED_SHARE); /* V1 leaves 0 at once */
     late = loop_milliseconds() + LOOP_PATIENCE;
     run = c;

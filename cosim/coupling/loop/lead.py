@@ -36,6 +36,11 @@ _AFTER_JUMP, _SHARE_AFTER_JUMP = 1e-7, 1e-2
 remembers of the slopes before it misleads its choice of the step. The start is one too: V1 leaves 0
 at once. This step is of first order and nothing judges it, so finer runs must shorten it too."""
 
+_COARSEST = 1e-4
+"""``circuit.reltol`` at which the lengths of steps in ``lead.c`` are used as they stand. Another
+divides them by the cube root of the ratio, with which the steps that ngspice chooses by their
+truncation error, of second order, go too."""
+
 _EMF_CHANGE = 3e-3
 """What the back-EMF may change in a step where the output is at its limits, too, in units of the
 supply."""
@@ -80,6 +85,7 @@ class Lead:
         self._pieces: list[Piece] = []
         self._row: Any = None
         self._time = 0.0
+        fineness = (_COARSEST / scene.circuit.reltol) ** (1.0 / 3.0)
         coil, loop_resistance = scene.coil, scene.circuit.sense_resistance * scene.coil.count
         motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else -1
         swing = self._saved.index("v(swing)") if "v(swing)" in self._saved else -1
@@ -90,7 +96,8 @@ class Lead:
             gain=GAIN,
             v_offset=command.v_offset,
             count=coil.count,
-            after_jump=min(_AFTER_JUMP, _SHARE_AFTER_JUMP * scene.circuit.max_step),
+            after_jump=min(_AFTER_JUMP / fineness, _SHARE_AFTER_JUMP * scene.circuit.max_step),
+            fineness=fineness,
             time_constant=coil.inductance / (coil.resistance + loop_resistance),
             range=scene.drive.amplitude or 1.0,
             emf_change=_EMF_CHANGE * scene.circuit.supply,

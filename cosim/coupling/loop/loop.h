@@ -132,6 +132,7 @@ typedef struct Lead {
     double gain, v_offset;        /* of the difference amplifier; mean voltage of the pin, V */
     double count;                 /* of coils */
     double after_jump;            /* s; longest step after a jump of the command */
+    double fineness;              /* 1: as coarse as the lengths in lead.c; they are divided by it */
     double time_constant;         /* s; of the current in coil and sense resistor */
     double range;                 /* V; from the least to the largest command */
     double answer_step;           /* s; longest step while the current answers a jump */

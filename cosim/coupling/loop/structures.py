@@ -76,7 +76,7 @@ class LeadState(Structure):
         *(("recorder", POINTER(RecorderState)), ("macro_point", c_void_p)),
         *(("segment", Segment), ("replay", c_void_p), ("pieces", POINTER(Piece))),
         *_of(c_int64, "n_pieces", "piece"),
-        *_of(c_double, "gain", "v_offset", "count", "after_jump"),
+        *_of(c_double, "gain", "v_offset", "count", "after_jump", "fineness"),
         *_of(c_double, "time_constant", "range", "answer_step", "limited_step", "near_step"),
         *_of(c_double, "restart_step", "max_step", "output_high", "output_low", "output"),
         *_of(c_double, "emf_change", "answered"),

@@ -27,8 +27,6 @@ class Driven:
     """The account of the coil; None where there is none."""
     method: str = "uncoupled"
     """How circuit and mechanics were joined."""
-    v_average_error: float | None = None
-    """Estimated error of v_average by the steps of the circuit, m/s; None where it is not known."""
     circuit_steps: int = 0
     circuit_rejected: int = 0
     versions: Mapping[str, str] = field(default_factory=dict)

@@ -14,7 +14,6 @@ from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
 from cosim.scene.rungs import RUNGS
 from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
-from cosim.simulation.rungs.own_error import own_error
 from cosim.simulation.rungs.rung import Driven, Rung
 
 
@@ -35,14 +34,10 @@ class Spice(Rung):
         refuse_false(scene, log, lambda finer: _log_alone(finer, version))
         if scene.circuit.netlist is not None:
             _refuse_foreign_coil(scene, log)
-        # Other methods may keep a part of the circuit's charge from the mechanics.
-        locked = scene.coupling.method == "step-locked"
-        error = own_error(scene, _points(log), version) if locked else None
         electric, waves = _electrics(scene, command(scene), log, recorder.time)
         return Driven(
             electric,
             method=scene.coupling.method,
-            v_average_error=error,
             circuit_steps=lead.steps,
             circuit_rejected=lead.state.attempts - lead.steps,
             versions={"ngspice": lead.ngspice},

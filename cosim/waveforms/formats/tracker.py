@@ -10,7 +10,6 @@ from math import isfinite
 
 import numpy as np
 
-from cosim.drive.command import period
 from cosim.errors import BadInput, plain
 from cosim.scene import Scene, load
 from cosim.trials.camera import (
@@ -68,7 +67,7 @@ def laid_over(scene: Scene) -> tuple[float, float | None]:
     """
     if scene.drive.file is not None:
         return 0.0, None
-    length = period(scene)
+    length = scene.period
     return scene.run.settle, length if isfinite(length) else None
 
 

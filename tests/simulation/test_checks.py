@@ -1,0 +1,161 @@
+"""What a run tells of its own numbers: its error against true ones, its kind of motion."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cosim
+from cosim.scene import load
+from cosim.simulation.checks import motion
+from cosim.simulation.simulate import simulate
+from tests.simulation.test_against_reference import CASES, scene_of
+
+pytestmark = pytest.mark.physics
+
+EXAMPLES = Path(__file__).parents[2] / "circuits" / "examples"
+
+GRAZING = {
+    "circuit.model": "full",
+    "drive.quantised": False,
+    "drive.frequency": 45.0,
+    "drive.amplitude": 9.0,
+    "drive.offset": -1.5,
+    "run.duration": 0.5,
+    "run.settle": 0.25,
+}
+"""After each reset of paper the output grazes its rail, which hangs on the current."""
+
+BORDER = {
+    "mechanics.contact": "rigid",
+    "drive.frequency": 40.0,
+    "drive.amplitude": 6.0,
+    "drive.offset": -1.0,
+}
+"""Of reference: of two motions, 10.59 and 12.86 mm/s, the start from rest lies between."""
+
+
+def within_twice_the_told(value: float, told: float, true: float) -> bool:
+    return abs(value - true) <= 2.0 * told + 1e-6 * abs(true)
+
+
+SETS = [n for n, c in CASES.items() if c["circuit"] == "amplifier" and not c["chaotic"]]
+
+
+@pytest.mark.parametrize("name", ["bent-bl", "pressed", "asymmetric"])
+def test_twice_what_is_told_holds_the_true_error(name: str) -> None:
+    """Against the monolithic reference; these sets feel the circuit's steps most."""
+    found = cosim.run(scene_of(CASES[name])).summary
+    true = CASES[name]["result"]["v_average"]
+    assert within_twice_the_told(found["v_average"], found["v_average_error"], true)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_it_holds_and_is_not_too_large_on_the_sets_of_the_reference() -> None:
+    held, fair = [], []
+    for name in SETS:
+        found, true = cosim.run(scene_of(CASES[name])).summary, CASES[name]["result"]["v_average"]
+        told, off = found["v_average_error"], abs(found["v_average"] - true)
+        held.append(within_twice_the_told(found["v_average"], told, true))
+        fair.append(told <= 20.0 * off + 1e-4 * abs(true))
+    assert np.mean(held) >= 0.95
+    assert np.mean(fair) >= 0.8
+
+
+def test_steps_are_right_where_the_output_grazes_its_rail() -> None:
+    """With the trapezoidal rule it was 14 % off there, by steps of any tolerance down to 1e-5."""
+    found = simulate(load("paper", GRAZING)).summary
+    finer = GRAZING | {"circuit.reltol": 1e-6, "circuit.max_step": 5e-5}
+    true = simulate(load("paper", finer)).summary["v_average"]
+    assert true == pytest.approx(-18.67e-3, rel=1e-3)
+    assert found["v_average"] == pytest.approx(true, rel=5e-3)
+
+
+def test_on_a_border_between_two_motions_the_told_error_spans_both() -> None:
+    """With coarser steps than the default ones both runs may come to the same wrong motion."""
+    found = cosim.run("reference", BORDER).summary
+    assert within_twice_the_told(found["v_average"], found["v_average_error"], 10.5937e-3)
+
+
+def test_it_is_null_where_nothing_tells_it() -> None:
+    macro = {"coupling.method": "gauss-seidel", "run.duration": 0.1}
+    assert cosim.run("reference", macro).summary["v_average_error"] is None
+    assert cosim.run("optimal").summary["v_average_error"] is None
+
+
+@pytest.mark.parametrize("model", ["limited", "ideal"])
+def test_without_ngspice(model: str) -> None:
+    """Against the monolithic reference."""
+    name = next(n for n, c in CASES.items() if c["circuit"] == model and not c["chaotic"])
+    found = cosim.run(scene_of(CASES[name])).summary
+    true = CASES[name]["result"]["v_average"]
+    assert within_twice_the_told(found["v_average"], found["v_average_error"], true)
+
+
+def test_a_netlist_of_ones_own() -> None:
+    bridge = {
+        "circuit.model": "file",
+        "circuit.netlist": str(EXAMPLES / "h_bridge.cir"),
+        "drive.amplitude": 9.0,
+        "run.duration": 0.3,
+    }
+    found = cosim.run("reference", bridge).summary
+    fine = {"circuit.max_step": 5e-6, "circuit.reltol": 3e-7}
+    true = simulate(load("reference", bridge | fine)).summary["v_average"]
+    assert within_twice_the_told(found["v_average"], found["v_average_error"], true)
+    assert "motion" not in found  # there is no simpler circuit of it
+
+
+def kind(scene: str, **drive: Any) -> dict[str, Any]:
+    settings = {f"drive.{key}": value for key, value in drive.items()}
+    return motion(load(scene, settings), lambda _: None)
+
+
+def test_regular_motion_with_its_period() -> None:
+    found = kind("paper-limited")
+    assert (found["motion"], found["motion_periods"]) == ("regular", 1)
+    assert 0.2 < found["motion_settled"] < 0.5
+    found = kind("reference", frequency=53.33, amplitude=6.0, offset=-1.32)
+    assert (found["motion"], found["motion_periods"]) == ("regular", 3)
+
+
+def test_several_answers_are_all_told() -> None:
+    found = kind("reference", frequency=34.54, amplitude=6.13, offset=-0.95)
+    assert found["motion"] == "several answers"
+    answers = []
+    for phase in (0.0, 0.25):
+        settings = {"circuit.model": "limited", "drive.frequency": 34.54, "drive.amplitude": 6.13}
+        settings |= {"drive.offset": -0.95, "drive.start_phase": phase, "run.duration": 4.0}
+        answers.append(simulate(load("reference", settings)).summary["v_average"])
+    np.testing.assert_allclose(sorted(found["v_average_answers"]), sorted(answers), rtol=1e-3)
+
+
+def test_chaotic_motion_has_a_range_of_means() -> None:
+    found = kind("reference", frequency=61.38, amplitude=5.21, offset=2.56)
+    assert found["motion"] == "chaotic"
+    low, high = found["v_average_range"]
+    assert low < -21e-3 < high < 0.0
+    assert high - low > 1e-3
+
+
+def test_no_transport() -> None:
+    """Too weak a drive for the part to slip."""
+    assert kind("paper-limited", amplitude=1.0, offset=0.0)["motion"] == "no transport"
+
+
+def test_where_nothing_repeats_no_kind_is_told() -> None:
+    for scene in ("held", "optimal", "closed-loop-grasp"):
+        assert kind(scene) == {}
+
+
+def test_the_strict_error_is_from_other_runs_of_the_same_circuit(tmp_path: Path) -> None:
+    command = ["run", "reference", "--error", "--set", "run.duration=0.3", "--out", str(tmp_path)]
+    from cosim.cli.main import main
+
+    assert main(command) == 0
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert 0.0 < summary["v_average_error"] < 1e-4 * abs(summary["v_average"]) + 1e-6
+    assert len(summary["v_average_other_starts"]) == 3
