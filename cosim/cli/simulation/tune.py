@@ -35,7 +35,7 @@ def _options(parser: ArgumentParser) -> None:
 
 def _run(arguments: Namespace) -> None:
     import cosim
-    from cosim.studies.tune.files import ranges_of, write_runs
+    from cosim.studies.tune.found import ranges_of, write_runs
 
     scene, ranges = scene_of(arguments), ranges_of(arguments.over)
     quantity = arguments.maximise or arguments.minimise

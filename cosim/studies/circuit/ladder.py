@@ -11,7 +11,7 @@ from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.point import periods_made_whole
 from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene, changed
-from cosim.simulation.choose_rung import relative_error
+from cosim.simulation.fidelity import relative_error
 from cosim.simulation.simulate import simulate
 
 RUNGS = ("ideal", "limited", "amplifier", "full")

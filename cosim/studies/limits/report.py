@@ -38,7 +38,7 @@ def report(bench: Bench, study: Study, points: Points, there: Sequence[There]) -
     if not_held := answer.refuted(points):
         said.append(
             f"Of {len(points)} points the more complete circuit does not confirm {len(not_held)} "
-            "within 2 %; limits.csv has both values."
+            f"within {bench.fidelity.tolerance:.1%}; limits.csv has both values."
         )
     if sought := answer.sought(points):
         said.append(
@@ -93,8 +93,8 @@ def row(bench: Bench, study: Study, point: Point) -> Row:
         "heat of a coil [W]": point.heat,
         "found on": point.settings["circuit.model"],
         "judged on": point.rung,
-        "there": point.confirmed * scale,
-        "off [%]": 100.0 * point.off,
+        "there": point.judged * scale,
+        "off [%]": 100.0 * abs(point.judged / setting.value - 1.0),
         "confirmed": point.holds,
         "on full": point.full * scale,
         "refuted before it": point.refuted,
@@ -126,7 +126,7 @@ def achieved(study: Study, points: Points) -> list[Row]:
                 if others
                 else "-",
                 "needed": needed_acceleration(study.scene) if quantity.falls else nan,
-                "best on amplifier": best.confirmed * scale if best else nan,
+                "best on amplifier": best.judged * scale if best else nan,
                 "best on full": best.full * scale if best else nan,
             }
         )
