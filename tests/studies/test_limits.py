@@ -507,6 +507,7 @@ def repeats(row: dict[str, str], folder: Path) -> None:
         (["held"], 'scene held: circuit.model = "none" has no limits to lift'),
         (["square"], 'scene square: drive.waveform = "square" has no knobs'),
         (["paper", "--rigs", "rigs.json"], "rigs.json: cannot be read"),
+        (["paper", "--effort", "nan"], "--effort nan: must be from 0.01 to 100"),
         (["paper", "--seed", "-1"], "--seed -1: must be a whole number from 0"),
     ],
 )

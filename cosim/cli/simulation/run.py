@@ -21,7 +21,7 @@ def _options(parser: ArgumentParser) -> None:
         "--spread",
         action="store_true",
         help="also tell how rugged the answer is: v_average with each of the three knobs turned "
-        "by 1 %% either way",
+        "by 2 %% either way",
     )
     add_out(parser, "results/<scene>", known=False)
 

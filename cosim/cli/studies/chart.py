@@ -79,6 +79,13 @@ def _limits(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="of the search (default: 0)"
     )
+    parser.add_argument(
+        "--effort",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="times the runs that each search may make (default: 1)",
+    )
     add_workers(parser)
     add_quick(parser, "a coarse search, in a fraction of the time")
 

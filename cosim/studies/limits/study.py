@@ -8,8 +8,9 @@ import json
 import os
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
+from math import ceil
 from pathlib import Path
 from types import MappingProxyType
 
@@ -38,6 +39,17 @@ class Efforts:
     """Of the other rigs of an ensemble, whose searches begin with what is best on the own one."""
     rigs: int
     """Of an ensemble, spread over their order, which is that of their cost."""
+
+    def times(self, factor: float) -> "Efforts":
+        """So many times the runs, roughly, of each search."""
+
+        def more(effort: Effort) -> Effort:
+            numbers = ("design", "first", "later")
+            return replace(
+                effort, **{name: ceil(factor * getattr(effort, name)) for name in numbers}
+            )
+
+        return replace(self, own=more(self.own), again=more(self.again), others=more(self.others))
 
 
 FULL = Efforts(
