@@ -13,7 +13,7 @@ from cosim.search.protocol import Feasible
 SAMPLES = 4
 """About each point; every other one lies along the ridge that it is on."""
 
-STARTS, APART = 130.0, 0.06
+STARTS, APART = 200.0, 0.06
 """Points about which samples lie, for a standard deviation of 1, one at least; how far apart."""
 
 ELITE, NEAR, INFLATION = 6, 0.1, 2.0

@@ -61,7 +61,7 @@ FULL = Efforts(
 _FEW = Effort(design=32, first=1, later=0, rounds=1)
 QUICK = Efforts(Effort(design=64, first=1, later=1, rounds=1), _FEW, _FEW, rigs=1)
 
-FIRST, LATER = 0.06, 0.02
+FIRST, LATER = 0.06, 0.03
 """Standard deviations with which samples begin, as shares of a knob's turn."""
 
 CLOSE, HINTS = 0.02, 24
