@@ -130,3 +130,43 @@ def test_circuit_and_mechanics_do_not_know_each_other() -> None:
         for (start, end), places in arrows().items()
         if {side for side in sides for name in (start, end) if name.startswith(side)} == sides
     ]
+
+
+def test_one_class_each_runs_keeps_searches_and_judges() -> None:
+    """Evaluator, store, search interface and fidelity policy; and what they stand on is used by
+    nothing else, so that no second one grows under another name."""
+    trees = {module: ast.parse(path.read_text("utf-8")) for module, path in MODULES.items()}
+    classes: dict[str, list[str]] = defaultdict(list)
+    searches, interfaces = set(), set()
+    for module, tree in trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                classes[node.name].append(module)
+                methods = {part.name for part in node.body if isinstance(part, ast.FunctionDef)}
+                if {"ask", "tell"} <= methods:
+                    searches.add(module)
+                    if [ast.unparse(base) for base in node.bases] == ["Protocol"]:
+                        interfaces.add(f"{module}.{node.name}")
+    assert classes["Evaluator"] == ["cosim.evaluate.evaluator"]
+    assert classes["Store"] == ["cosim.evaluate.store"]
+    assert classes["Fidelity"] == ["cosim.simulation.fidelity"]
+    assert interfaces == {"cosim.search.protocol.Search"}
+    assert {module.rpartition(".")[0] for module in searches} == {"cosim.search"}
+    alone = {
+        "sqlite3": "cosim.evaluate.store",
+        "cosim.simulation.many": "cosim.evaluate.evaluator",
+    }
+    for package, user in alone.items():
+        users = {module for module, tree in trees.items() if package in _names(tree)}
+        assert users == {user}, package
+
+
+def _names(tree: ast.AST) -> set[str]:
+    """The modules that a file names in its imports."""
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.add(node.module)
+    return found

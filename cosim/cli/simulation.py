@@ -151,7 +151,7 @@ COMMANDS = (
             Option(
                 "--spread",
                 "also tell how rugged the answer is: v_average with each of the three knobs turned "
-                "by 1 % either way",
+                "by 2 % either way",
                 kind=bool,
             ),
             Option(

@@ -27,7 +27,8 @@ class Cluster:
         if not self._threads:
             self._client.close()
             raise BadInput(f"--dask {address}: this cluster has no workers.")
-        self._base = self._client.scatter(base, broadcast=True)
+        # What a task gave is made again where the workers that had it die, scattered data is not.
+        self._base = self._client.submit(_same, base, pure=False)
 
     def __enter__(self) -> "Cluster":
         return self
@@ -52,10 +53,10 @@ class Cluster:
         first = islice(points, _IN_FLIGHT * self._threads)
         running = as_completed([submit(point) for point in first])
         for future in running:
-            number, failure = numbers.pop(future.key), future.exception()
-            if failure is None:
+            number = numbers.pop(future.key)
+            try:
                 outcome = future.result()
-            else:
+            except Exception as failure:
                 # Its worker died with it, again and again, or something that no scene explains.
                 words = " ".join(str(failure).split())
                 words = f"The cluster gave it up: {type(failure).__name__}: {words}"
@@ -64,6 +65,10 @@ class Cluster:
             if following is not None:
                 running.add(submit(following))
             yield number, outcome
+
+
+def _same(base: Scene) -> Scene:
+    return base
 
 
 def _client(address: str) -> Any:

@@ -1,7 +1,9 @@
 """What long work has found, in a file from which a killed one goes on.
 
 The file is SQLite's, in its write-ahead mode: whatever moment a kill strikes, what was written
-stays, and others may read the file while it grows. One process at a time may write.
+stays, and others may read the file while it grows. It is written every PAUSE, since a transaction
+costs as much as a short run: a kill loses at most what was added within that time. One process at a
+time may write.
 """
 
 import hashlib
@@ -11,7 +13,9 @@ import sqlite3
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from math import inf
 from pathlib import Path
+from time import monotonic
 from typing import Any, TypeVar
 
 from cosim.errors import BadInput, Note, plain
@@ -24,6 +28,9 @@ except ImportError:  # Windows
     fcntl = None
 
 T = TypeVar("T")
+
+PAUSE = 0.1
+"""s between two transactions, at least."""
 
 MOST_OWED = 64 << 20
 """Bytes that are kept for a disk that takes them later."""
@@ -46,7 +53,11 @@ class Store:
     def __init__(self, path: Path | None, *asked: Any) -> None:
         self._path, self._file = path, None if path is None else _locked(path)
         self._owed: dict[str, str] = {}
-        """What the disk did not take."""
+        """What is not written yet."""
+        self._refused = False
+        """Whether the disk did not take it."""
+        self._written = -inf
+        """When it was written last, by the monotonic clock, s."""
         try:
             where = ":memory:" if path is None else str(path)
             self._base = sqlite3.connect(where, isolation_level=None)
@@ -62,12 +73,13 @@ class Store:
 
     def __exit__(self, *_: object) -> None:
         with suppress(sqlite3.Error, BadInput):
+            self._write()
             if not len(self):
                 self.remove()
         self._close()
 
     def __len__(self) -> int:
-        """How much was found."""
+        """How much was found and written."""
         return self._told(self._base.execute, "SELECT count(*) - 1 FROM found").fetchone()[0]
 
     def get(self, key: str) -> Any:
@@ -84,12 +96,16 @@ class Store:
             return None  # somebody has changed it
 
     def add(self, key: str, found: Any) -> None:
-        """Write down what was found.
+        """Keep what was found; it is written with what was found up to PAUSE before or after it.
 
-        What the disk does not take is kept and tried again with the next one; a note tells it.
-        Raises BadInput where that is too much.
+        What the disk does not take is tried again with the next one; a note tells it. Raises
+        BadInput where that is too much.
         """
         self._owed[key] = json.dumps(found)
+        if monotonic() - self._written >= PAUSE:
+            self._write()
+
+    def _write(self) -> None:
         try:
             with self._base:  # all of them or none
                 self._base.execute("BEGIN")
@@ -97,16 +113,19 @@ class Store:
                     "INSERT OR REPLACE INTO found VALUES (?, ?)", self._owed.items()
                 )
             self._owed.clear()
+            self._refused = False
         except sqlite3.OperationalError as error:
             words = f"{plain(str(self._path))}: cannot be written ({error})"
             if sum(map(len, self._owed.values())) > MOST_OWED:
                 raise BadInput(f"{words}.") from error
-            if len(self._owed) == 1:
+            if not self._refused:
                 warnings.warn(
                     f"{words}; the work goes on, and a kill now would lose what is not written.",
                     Note,
-                    stacklevel=2,
+                    stacklevel=3,
                 )
+            self._refused = True
+        self._written = monotonic()
 
     def once(self, key: str, work: Callable[[], T]) -> T:
         """What stands under ``key``, or else what ``work`` finds, which is added."""

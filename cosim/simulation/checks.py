@@ -27,8 +27,8 @@ from cosim.arrays import Array
 from cosim.errors import BadInput, CosimError
 from cosim.mechanics.normal_force import normal_force
 from cosim.scene import Scene, changed
-from cosim.simulation.choose_rung import LEAST, relative_error, without_ngspice
 from cosim.simulation.elsewhere import summary_elsewhere
+from cosim.simulation.fidelity import LEAST, Fidelity, relative_error
 from cosim.simulation.here import simulate_here, summary_here
 from cosim.waveforms.result import Result
 
@@ -135,8 +135,13 @@ def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
     greatest one of chaotic motion in stretches as long as the average.
     """
     length = scene.period
-    simple = without_ngspice(scene) if scene.rung.ngspice else scene
-    if simple is None or not scene.rung.driven or isinf(length) or normal_force(scene) is not None:
+    simple = Fidelity.of(scene).simple
+    if (
+        (scene.rung.ngspice and simple is None)
+        or not scene.rung.driven
+        or isinf(length)
+        or normal_force(scene) is not None
+    ):
         return {}
     if PERIODS * length > LONGEST * scene.run.duration:
         return {}
@@ -145,7 +150,9 @@ def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
     for longer in (1, LONGER):
         end = longer * max(PERIODS, round(LONG / length)) * length
         times = {"duration": end, "settle": end / 2.0, "output_step": length}
-        base = simple.model_copy(update={"run": scene.run.model_copy(update=times)})
+        base = changed(scene, simple or {}, "limited").model_copy(
+            update={"run": scene.run.model_copy(update=times)}
+        )
         starts = [base, _aside(base), *(_started(base, ahead) for ahead in AHEAD)]
         try:
             ways = [_ways(start, progress) for start in starts if start is not None]

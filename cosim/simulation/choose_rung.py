@@ -18,11 +18,10 @@ from functools import partial
 
 from cosim.errors import BadInput
 from cosim.scene import Scene, changed
+from cosim.simulation.fidelity import JUDGES, SEARCHES, Fidelity, relative_error
 from cosim.simulation.here import summary_here
 from cosim.toolchain.processes import processors
 from cosim.waveforms.result import Result
-
-TOP = "amplifier"
 
 PART = 0.25
 """Share of the run that the amplifier is tried for; averages leave out its first half."""
@@ -34,14 +33,8 @@ MARGIN = 2.0
 """By how much the whole run may differ more than the trial."""
 
 TREMBLE = 1e-4
-"""Relative change of the coil's force that regular motion answers with no more than its like."""
-
-LEAST = 1e-4
-"""m/s: errors of v_average are relative to no less than this."""
-
-
-WITHOUT_NGSPICE = {"circuit.model": "limited", "drive.pwm_ripple": False}
-"""What makes a scene one that ngspice need not run."""
+"""Relative perturbation of the coil's force in the test of sensitivity: regular motion answers with
+no more than its like."""
 
 
 @dataclass(frozen=True)
@@ -58,20 +51,20 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
 
     ``run`` runs a scene with ngspice; the others are run at once. Raises what a run raises.
     """
-    tolerance = scene.run.tolerance
+    tolerance = Fidelity.of(scene).tolerance
     try:
-        limited = _few_rows(changed(scene, {"circuit.model": "limited"}, "auto"))
+        limited = _few_rows(changed(scene, {"circuit.model": SEARCHES}, "auto"))
     except BadInput:  # too fast a coil
-        return Choice(TOP, "the rung limited cannot solve this coil", {})
+        return Choice(JUDGES, "the rung limited cannot solve this coil", {})
     force = scene.coil.force_factor
     near = [{"coil.force_factor": force * (1.0 + change)} for change in (-TREMBLE, TREMBLE)]
     own, *others = _v_averages(limited, [{}, *near])
     moved = max(relative_error(other, own) for other in others)
     if moved > tolerance:
         why = f"a ten-thousandth of the coil's force moves v_average by {moved:.2%}"
-        return Choice(TOP, why, {"limited": moved, "ideal": moved})
+        return Choice(JUDGES, why, {"limited": moved, "ideal": moved})
     part = _part(limited)
-    top = changed(limited, {**part, "circuit.model": TOP}, "auto")
+    top = changed(limited, {**part, "circuit.model": JUDGES}, "auto")
     expected = run(top).summary["v_average"]
     tried, ideal = _v_averages(limited, [part, {"circuit.model": "ideal"}])
     trial = relative_error(tried, expected)
@@ -81,7 +74,7 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
         if errors[model] <= tolerance:
             return Choice(model, f"at most about {errors[model]:.2%} off the amplifier", errors)
     why = f"limited may be {errors['limited']:.2%} off, ideal {errors['ideal']:.2%}"
-    return Choice(TOP, why, errors)
+    return Choice(JUDGES, why, errors)
 
 
 def _v_averages(scene: Scene, settings: Sequence[Mapping[str, float | str]]) -> list[float]:
@@ -90,21 +83,6 @@ def _v_averages(scene: Scene, settings: Sequence[Mapping[str, float | str]]) -> 
     with ThreadPoolExecutor(processors()) as threads:
         found = threads.map(lambda make: summary_here(make(), lambda _: None), scenes)
         return [summary["v_average"] for summary in found]
-
-
-def relative_error(value: float, reference: float) -> float:
-    """Of a mean velocity, m/s, relative to ``reference`` or LEAST."""
-    return abs(value - reference) / max(abs(reference), LEAST)
-
-
-def without_ngspice(scene: Scene) -> Scene | None:
-    """The scene on the rung "limited"; None where ngspice does not run it, or it cannot be."""
-    if scene.rung.own_netlist or not scene.rung.ngspice:
-        return None
-    try:
-        return changed(scene, WITHOUT_NGSPICE, "limited")
-    except BadInput:
-        return None
 
 
 def _few_rows(scene: Scene) -> Scene:

@@ -79,7 +79,7 @@ SUMMARY: dict[str, Quantity] = {
     "error_estimate": Quantity(
         "1", "with these, the error of the part's height, relative to its range"
     ),
-    "spread": Quantity("", "what --spread found with each knob turned by 1 %"),
+    "spread": Quantity("", "what --spread found with each knob turned by 2 %"),
     "notes": Quantity("", "sentences on where the run leaves the model or a data sheet"),
 }
 """Every entry by its name. Absent participants have none of theirs."""

@@ -21,20 +21,19 @@ from cosim.evaluate.point import Outcome
 from cosim.evaluate.store import Store
 from cosim.files.picture import Picture
 from cosim.scene import changed, load
+from cosim.simulation.fidelity import Fidelity
 from cosim.simulation.simulate import simulate
-from cosim.studies.limits import aims, confirm, report, runs, search, study
+from cosim.studies.limits import aims, confirm, report, runs, study
 from cosim.studies.limits.aims import QUANTITIES
 from cosim.studies.limits.answer import BINDS, NOTHING, UNTOLD, Change
 from cosim.studies.limits.report import STORE
 from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import NOWHERE, Clouds, Effort, Leads, Search
+from cosim.studies.limits.search import Effort, Frontiers, Leads
 from cosim.studies.limits.table import LIMITS, Machine, needed_acceleration
 from tests.studies.test_figures import assert_legible
 
 BY_NAME = {limit.name: limit for limit in LIMITS}
 NUMBER = {quantity.name: number for number, quantity in enumerate(QUANTITIES)}
-FEW = (Clouds(0.05, 1, 2), Clouds(0.02, 1, 2))
-SMALL = Effort(16, FEW, FEW, rounds=1)
 
 
 @pytest.fixture
@@ -81,10 +80,10 @@ def test_every_setting_of_the_knobs_can_be_quantised() -> None:
 
 
 def test_sense_resistor_leaves_the_current(tmp_path: Path) -> None:
-    place = np.array([0.6, 0.8, 0.2])
+    point = np.array([0.6, 0.8, 0.2])
     with bench(tmp_path) as made:
         machines = Machine(), BY_NAME["sense resistor"].machine(made.scene, 0.1)
-        every = [Case({}, machine, "ideal").settings(place) for machine in machines]
+        every = [Case({}, machine, "ideal").settings(point) for machine in machines]
         own, less = made.outcomes(every)
     for name in ("v_average", "current_max"):
         assert less.numbers[name] == pytest.approx(own.numbers[name], rel=1e-5)
@@ -98,12 +97,11 @@ def test_needed_acceleration() -> None:
 
 
 def test_the_cube_is_what_the_potentiometers_set() -> None:
-    """Each is read in 1024 steps, 0 to 1023; a place between two of them is none."""
+    """Each is read in 1024 steps, 0 to 1023."""
     for steps in ([0, 0, 0], [1023, 1023, 1023], [307, 716, 921]):
         pots = dict(zip(("pot_max", "pot_frequency", "pot_offset"), steps, strict=True))
         drive = load("reference", {f"drive.{name}": n / 1024 for name, n in pots.items()}).drive
-        place = aims.rounded((np.array(steps) + 0.3) / 1023)
-        for key, value in aims.settings(place).items():
+        for key, value in aims.settings(np.array(steps) / 1023).items():
             assert value == pytest.approx(getattr(drive, key.split(".")[1]), abs=1e-6)
 
 
@@ -116,11 +114,11 @@ LINEAR = {
 
 def test_ideal_current_without_walls_is_the_linear_surface(tmp_path: Path) -> None:
     """Two masses on springs under a sawtooth, by matrix exponentials; the part sticks."""
-    place = np.array([0.4, 0.5, 0.3])
+    point = np.array([0.4, 0.5, 0.3])
     with bench(tmp_path) as made:
         case = Case(dict(LINEAR), Machine(), "ideal")
-        there = case.settings(place)
-        found, _ = made.scores(case, place[None])
+        there = case.settings(point)
+        found, _ = made.scores(case, point[None])
         scene = changed(made.scene, there, "test")
     mechanics, drive, period = scene.mechanics, scene.drive, 1.0 / scene.drive.frequency
     ram, body = mechanics.ram_mass, mechanics.surface_mass + mechanics.part_mass
@@ -158,31 +156,32 @@ def test_search_finds_what_an_exhaustive_grid_finds(tmp_path: Path) -> None:
     grid = np.stack(np.meshgrid(*[np.linspace(0.04, 0.96, 7)] * 3), axis=-1).reshape(-1, 3)
     case = Case({}, Machine())
     with bench(tmp_path) as made:
-        scores, borne = made.scores(case, aims.rounded(grid))
-        one = Search(lambda places: made.scores(case, places), (0,))
+        scores, feasible = made.scores(case, np.round(grid * aims.STEPS) / aims.STEPS)
+        one = Frontiers(lambda points: made.scores(case, points), (0,))
         searched(one, 256)
-        best = np.where(borne[:, None], scores, -np.inf).max(axis=0)
-        found = [one.found(number) for number in range(len(QUANTITIES))]
-        again = Search(lambda places: made.scores(case, places), (0,))
+        best = np.where(feasible[:, None], scores, -np.inf).max(axis=0)
+        found = one.bests()
+        again = Frontiers(lambda points: made.scores(case, points), (0,))
         searched(again, 256)
-        assert [again.found(number) for number in range(len(QUANTITIES))] == found
+        assert again.bests() == found
         for number, top in enumerate(found):
             if best[number] > 0.0:
                 assert top.settings[0].value >= 0.95 * best[number], QUANTITIES[number].name
         steady = found[NUMBER["v_up"]].robust[0]
         assert 0.0 < steady.worst <= steady.median <= found[NUMBER["v_up"]].settings[0].value
-        every = [case.settings(np.array(top.settings[0].place)) for top in found[3:]]
+        every = [case.settings(np.array(top.settings[0].point)) for top in found[3:]]
         for settings, outcome in zip(every, made.outcomes(every), strict=True):
             assert made.heat(case, settings, outcome.numbers) <= case.machine.heat
-        independent(case.settings(np.array(steady.place)), steady.value)
+        independent(case.settings(np.array(steady.point)), steady.value)
 
 
-def searched(one: Search, design: int = 1024, quantities: int = len(QUANTITIES)) -> None:
-    """With the effort of a study, but for the places that fill the cube."""
+def searched(one: Frontiers, design: int = 1024) -> None:
+    """With the effort of a study, but for the points that fill the cube."""
+    own = study.FULL.own
     one.fill(design)
-    hints, own = Leads(NOWHERE, np.empty((0, quantities))), study.FULL.own
-    for clouds in (own.first, *[own.next] * own.rounds):
-        one.climb(clouds, hints)
+    one.climb(study.FIRST, own.first)
+    for _ in range(own.rounds):
+        one.climb(study.LATER, own.later)
 
 
 def independent(settings: dict[str, Any], v_average: float) -> None:
@@ -196,101 +195,83 @@ def independent(settings: dict[str, Any], v_average: float) -> None:
     assert v_average == pytest.approx(found.v_average, rel=2e-3)
 
 
-def ridge(places: Array) -> tuple[Array, Any]:
+def ridge(points: Array) -> tuple[Array, Any]:
     """A narrow ridge aslant to the knobs with ripples, and a second one that is forbidden."""
-    x, y, z = (places - 0.5).T
+    x, y, z = (points - 0.5).T
     along, across, up = x + y, x - y, z - 0.3 * x
     first = np.exp(-((across / 0.05) ** 2) - (along / 0.5) ** 2 - (up / 0.1) ** 2)
     first *= 1.0 + 0.05 * np.cos(80.0 * along)
-    second = np.exp(-((places - 0.3) ** 2).sum(axis=1) / 0.02)
-    return np.stack([first, second], axis=1), places[:, 0] > 0.35
+    second = np.exp(-((points - 0.3) ** 2).sum(axis=1) / 0.02)
+    return np.stack([first, second], axis=1), points[:, 0] > 0.35
 
 
 def test_search_climbs_ridges_and_keeps_out_of_what_is_forbidden() -> None:
     best = 1.05, np.exp(-(0.05**2) / 0.02)  # in the middle; where what is allowed begins
     for seed in range(3):
-        one = Search(ridge, (seed,), 2)
-        searched(one, quantities=2)
+        one = Frontiers(ridge, (seed,), 2)
+        searched(one)
         for number in range(2):
             top = one.found(number).settings[0]
-            assert top.place[0] > 0.35 and 0.95 * best[number] <= top.value <= best[number]
+            assert top.point[0] > 0.35 and 0.95 * best[number] <= top.value <= best[number]
 
 
-def test_places_that_fill_the_cube_keep_to_what_can_be_borne() -> None:
-    """A ninth of it; and they are dense where a knob is near an end of its turn."""
-    asked: list[Array] = []
+def test_a_machine_on_which_nothing_is_feasible_stops_no_other() -> None:
+    def evaluate(points: Array) -> tuple[Array, Any]:
+        return np.zeros((len(points), len(QUANTITIES))), np.zeros(len(points), bool)
 
-    def ask(places: Array) -> tuple[Array, Any]:
-        asked.append(places)
-        return np.zeros((len(places), 1)), (places[:, :2] < 1 / 3).all(axis=1)
-
-    Search(ask, (0,), 1).fill(256)
-    first, later = asked[0], np.vstack(asked[1:])
-    assert len(first) + len(later) == 256
-    # By the arcsine law 0.39 lie in the first third of a turn, and 0.20 in either tenth.
-    assert 0.08 < (first[:, :2] < 1 / 3).all(axis=1).mean() < 0.25
-    assert (later[:, :2] < 1 / 3).all(axis=1).mean() > 0.6
-    assert 0.15 < (later[:, 2] > 0.9).mean() < 0.26
-
-
-def test_a_machine_that_bears_nothing_stops_no_other() -> None:
-    def ask(places: Array) -> tuple[Array, Any]:
-        return np.zeros((len(places), len(QUANTITIES))), np.zeros(len(places), bool)
-
-    one = Search(ask, (0,))
+    one = Frontiers(evaluate, (0,))
     searched(one, 16)
     assert not any(best.settings for best in one.bests())
-    assert len(one.leads().places) == 0
+    assert len(one.leads().points) == 0
 
 
-def salt(places: Array) -> tuple[Array, Any]:
-    """A hill on which all but a scattered tenth of the places are worth nothing."""
-    steps = np.round(places * aims.STEPS).astype(np.int64)
+def salt(points: Array) -> tuple[Array, Any]:
+    """A hill on which all but a scattered tenth of the points are worth nothing."""
+    steps = np.round(points * aims.STEPS).astype(np.int64)
     scattered = (steps @ [7919, 104729, 1299709]) % 211 < 20
-    hill = np.exp(-((places - [0.3, 0.95, 0.05]) ** 2).sum(axis=1) / 0.05)
-    return np.where(scattered, hill, -1.0)[:, None], np.ones(len(places), bool)
+    hill = np.exp(-((points - [0.3, 0.95, 0.05]) ** 2).sum(axis=1) / 0.05)
+    return np.where(scattered, hill, -1.0)[:, None], np.ones(len(points), bool)
 
 
 def test_what_is_rugged_is_asked_more_often() -> None:
-    """Places that are worth something lie closer than the last clouds are wide, but far between."""
+    """Points that are worth something lie closer than the last samples, but far between."""
     for seed in range(3):
-        one = Search(salt, (seed,), 1)
-        searched(one, quantities=1)
+        one = Frontiers(salt, (seed,), 1)
+        searched(one)
         assert one.found(0).settings[0].value > 0.9
 
 
 def test_a_ridge_that_runs_beside_a_hint_is_found() -> None:
     """What is best on another machine is worth nothing here, a few steps beside it."""
 
-    def needle(places: Array) -> tuple[Array, Any]:
-        off = np.abs(places - [0.5, 0.5, 0.5]).max(axis=1)
-        return np.where(off < 0.004, 2.0, -1.0)[:, None], np.ones(len(places), bool)
+    def needle(points: Array) -> tuple[Array, Any]:
+        off = np.abs(points - [0.5, 0.5, 0.5]).max(axis=1)
+        return np.where(off < 0.004, 2.0, -1.0)[:, None], np.ones(len(points), bool)
 
-    hint = aims.rounded(np.array([[0.5, 0.5044, 0.5]]))
+    hint = np.array([[0.5, 0.5044, 0.5]])
     for there, found in ((2.0, True), (-1.0, False)):
-        one = Search(needle, (0,), 1)
+        one = Frontiers(needle, (0,), 1)
         one.fill(16)
-        one.climb((), Leads(hint, np.array([[there]])))
+        one.heed(Leads(hint, np.array([[there]])))
         assert bool(one.found(0).settings) is found
 
 
 def test_what_does_not_grow_is_left_alone_until_a_hint_raises_it() -> None:
     count = [0]
 
-    def ask(places: Array) -> tuple[Array, Any]:
-        count[0] += len(places)
-        low, high = (((places - middle) ** 2).sum(axis=1) for middle in (0.3, 0.8))
+    def evaluate(points: Array) -> tuple[Array, Any]:
+        count[0] += len(points)
+        low, high = (((points - middle) ** 2).sum(axis=1) for middle in (0.3, 0.8))
         heights = np.maximum(np.exp(-low / 0.02), 2.0 * np.exp(-high / 1e-4))
-        return heights[:, None], np.ones(len(places), bool)
+        return heights[:, None], np.ones(len(points), bool)
 
-    one, clouds = Search(ask, (0,), 1), study.FULL.own.next
-    searched(one, 64, 1)
-    none = Leads(NOWHERE, np.empty((0, 1)))
-    one.climb(clouds, none)
+    one = Frontiers(evaluate, (0,), 1)
+    searched(one, 64)
     before = count[0]
-    one.climb(clouds, none)
+    one.climb(study.LATER, 6)
     assert count[0] == before and one.found(0).settings[0].value < 1.01
-    one.climb(clouds, Leads(aims.rounded(np.full((1, 3), 0.805)), np.array([[2.0]])))
+    one.heed(Leads(np.full((1, 3), 0.805), np.array([[2.0]])))
+    one.climb(study.LATER, 6)
     assert count[0] > before and one.found(0).settings[0].value > 1.9
 
 
@@ -298,14 +279,16 @@ class Judge:
     """A more complete circuit that bears out nothing near the best that a search has found, and has
     the ridge a few steps beside there."""
 
+    fidelity = Fidelity(0.02, None)
+
     def __init__(self, middle: float, width: float) -> None:
         self.middle, self.width = middle, width
 
-    def scores(self, case: Case, places: Array) -> tuple[Array, Any]:
-        near = np.abs(places[:, 0] - self.middle) < self.width
-        found, borne = ridge(places)
-        beside, _ = ridge(places - [0.012, -0.012, 0.0])
-        return np.where(near[:, None], 0.8 * beside, 1.01 * found), borne
+    def scores(self, case: Case, points: Array) -> tuple[Array, Any]:
+        near = np.abs(points[:, 0] - self.middle) < self.width
+        found, feasible = ridge(points)
+        beside, _ = ridge(points - [0.012, -0.012, 0.0])
+        return np.where(near[:, None], 0.8 * beside, 1.01 * found), feasible
 
     def outcomes(self, every: Any) -> list[Outcome]:
         return [Outcome({}) for _ in every]
@@ -319,11 +302,11 @@ def test_what_is_refuted_gives_way_to_the_best_that_is_confirmed(
     width: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where all that is confirmed is much poorer, the circuit that refutes is searched itself."""
-    one = Search(ridge, (0,), 2)
-    searched(one, quantities=2)
+    one = Frontiers(ridge, (0,), 2)
+    searched(one)
     rig = study.Rig("its own rig", {}, {study.OWN: Case({}, Machine())})
     rig.searches[study.OWN], rig.found[study.OWN] = one, one.bests()
-    middle = rig.found[study.OWN][0].settings[0].place[0]
+    middle = rig.found[study.OWN][0].settings[0].point[0]
     judge: Any = Judge(middle, width)
     tried: list[float] = []
 
@@ -331,19 +314,20 @@ def test_what_is_refuted_gives_way_to_the_best_that_is_confirmed(
         return {key: point(key, setting) for key, setting in chosen.items()}
 
     def point(key: confirm.Key, setting: Any) -> confirm.Point:
-        there = judge.scores(None, np.array([setting.place]))[0][0, key[1]]
+        there = judge.scores(None, np.array([setting.point]))[0][0, key[1]]
         if key[1] == 0:
             tried.append(there)
-        return confirm.Point(*key, setting, 0.0, {}, "amplifier", there)
+        holds = judge.fidelity.agrees(setting.value, there)
+        return confirm.Point(*key, setting, 0.0, {}, "amplifier", there, holds)
 
-    monkeypatch.setattr(confirm, "_points", judged)
-    monkeypatch.setattr(confirm, "_on_full", lambda bench, cases, points: points)
+    monkeypatch.setattr(confirm, "_judged", judged)
+    monkeypatch.setattr(confirm, "_on_full", lambda bench, points: points)
     known = study.Study(load("reference"), [], [rig], one.bests())
     top = confirm.confirmed(judge, known, lambda said: None)[study.OWN, 0, "best"]
     assert top.holds and top.refuted > 0
     if width == 0.3:
         assert top.settings["circuit.model"] == "amplifier"
-        assert max(tried) * 1.02 < top.confirmed <= 0.8 * 1.05
+        assert max(tried) * 1.02 < top.judged <= 0.8 * 1.05
         return
     x = np.linspace(0.351, 1.0, 1299)
     heights = ridge(np.stack([x, x, 0.5 + 0.3 * (x - 0.5)], axis=1))[0][:, 0]
@@ -354,8 +338,7 @@ def test_a_current_limit_that_acts_is_judged_on_the_circuit_that_has_one(tmp_pat
     with bench(tmp_path) as made:
         made.scene = changed(made.scene, {"circuit.current_limit": 2.0}, "test")
         judges = {
-            (amperes, limit): confirm._more_complete(
-                made,
+            (amperes, limit): made.judge(
                 Case({}, Machine()),
                 {"circuit.current_limit": limit} if limit else {},
                 {"current_max": 0.1, "current_min": -amperes},
@@ -364,7 +347,7 @@ def test_a_current_limit_that_acts_is_judged_on_the_circuit_that_has_one(tmp_pat
             for limit in (0.4, None)
             if amperes <= (limit or 2.0)
         }
-        ideal = confirm._more_complete(made, Case({}, Machine(), "ideal"), {}, {})
+        ideal = made.judge(Case({}, Machine(), "ideal"), {}, {})
     assert judges == {
         **{(0.39, 0.4): "amplifier", (0.4, 0.4): "full"},
         **{(0.39, None): "amplifier", (0.4, None): "amplifier", (2.0, None): "full"},
@@ -377,17 +360,17 @@ def test_a_limit_that_costs_is_climbed_on_from_what_the_own_circuit_does_best() 
     middle, asked = 0.5, dict.fromkeys((1e5, 1e9, None), 0)
 
     class Beside(Judge):
-        def scores(self, case: Case, places: Array) -> tuple[Array, Any]:
+        def scores(self, case: Case, points: Array) -> tuple[Array, Any]:
             slew: Any = case.machine.settings.get("circuit.slew_rate")
-            asked[slew] += len(places)
-            off = places - middle - (0.006 if slew == 1e5 else 0.0)
+            asked[slew] += len(points)
+            off = points - middle - (0.006 if slew == 1e5 else 0.0)
             heights = np.exp(-(off**2).sum(axis=1) / 2e-4)
-            return np.stack([heights] * len(QUANTITIES), axis=1), np.ones(len(places), bool)
+            return np.stack([heights] * len(QUANTITIES), axis=1), np.ones(len(points), bool)
 
     judge: Any = Beside(middle, 0.0)
     judge.scene = load("reference")
-    one = Search(lambda places: judge.scores(Case({}, Machine()), places), (0,))
-    one.scores(aims.rounded(np.full((1, 3), middle)))
+    one = Frontiers(lambda points: judge.scores(Case({}, Machine()), points), (0,))
+    one.known.rows(np.full((1, 3), middle))
     rig = study.Rig("its own rig", {}, searches={study.OWN: one})
     found = rig.found[study.OWN] = one.bests()
     slew = replace(BY_NAME["slew rate"], values=(1e5,))
@@ -395,7 +378,7 @@ def test_a_limit_that_costs_is_climbed_on_from_what_the_own_circuit_does_best() 
     points = confirm.judged(judge, known, {}, lambda said: None)
     start = np.exp(-3 * 0.006**2 / 2e-4)
     for quantity in range(len(QUANTITIES)):
-        acts, lifted = (points[("slew rate", v), quantity, "best"].confirmed for v in (1e5, 1e9))
+        acts, lifted = (points[("slew rate", v), quantity, "best"].judged for v in (1e5, 1e9))
         assert acts > 1.2 * start and lifted > 0.99
     assert asked[1e9] < 20 < asked[1e5]
 
@@ -409,23 +392,23 @@ def test_other_rigs_begin_with_what_is_best_on_the_own_one() -> None:
         def amperes(self, case: Case) -> float:
             return 2.0 if case.rig else 1.0
 
-        def scores(self, case: Case, places: Array) -> tuple[Array, Any]:
-            turned = places * [self.amperes(case), 1.0, self.amperes(case)]
-            heights = np.exp(-((turned - [0.31, 0.42, 0.63]) ** 2).sum(axis=1) / 1e-3)
-            return np.stack([heights] * len(QUANTITIES), axis=1), np.ones(len(places), bool)
+        def scores(self, case: Case, points: Array) -> tuple[Array, Any]:
+            turned = points * [self.amperes(case), 1.0, self.amperes(case)]
+            heights = np.exp(-((turned - [0.31, 0.42, 0.63]) ** 2).sum(axis=1) / 4e-4)
+            return np.stack([heights] * len(QUANTITIES), axis=1), np.ones(len(points), bool)
 
     needle: Any = Needle()
-    few = Effort(8, (Clouds(0.001, 1, 2),), (), rounds=0)
-    efforts = study.Efforts(Effort(512, study.FULL.own.first, (), rounds=0), few, few, 1)
+    few = Effort(8, 0, 0, rounds=0)
+    efforts = study.Efforts(Effort(512, 8, 0, rounds=0), few, few, 1)
     found = study.study(needle, [{"mechanics.surface_mass": 0.02}], [], efforts=efforts)
     own, other = (rig.found[study.OWN][0].settings[0].value for rig in found.rigs)
     assert own > 0.8 and other > 0.8
-    assert all(best.settings[0].value < 0.1 for best in found.again)
+    assert found.again[0].settings[0].value < 0.1
 
 
 @pytest.mark.usefixtures("brief")
 def test_a_killed_study_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    places = aims.rounded(np.random.default_rng(0).random((12, 3)))
+    points = np.random.default_rng(0).random((12, 3))
     case, count, add = Case({}, Machine()), [0], Store.add
 
     def counted(store: Store, key: str, found: Any) -> None:
@@ -436,12 +419,12 @@ def test_a_killed_study_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(Store, "add", counted)
     with pytest.raises(KeyboardInterrupt), bench(tmp_path) as made:
-        made.scores(case, places)
+        made.scores(case, points)
     with bench(tmp_path) as made:
         assert made.resumed == 5
-        found, _ = made.scores(case, places)
+        found, _ = made.scores(case, points)
     with Bench(load("reference"), "", tmp_path / "other", 1) as made:
-        np.testing.assert_array_equal(made.scores(case, places)[0], found)
+        np.testing.assert_array_equal(made.scores(case, points)[0], found)
 
 
 def test_verdicts() -> None:
@@ -463,7 +446,6 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Picture, "write", lambda figure, *where: drawn.append(figure))
     monkeypatch.setattr(runs, "SETTLE", 0.02)
     monkeypatch.setattr(runs, "SPAN", 0.05)
-    monkeypatch.setattr(search, "STEADY", 1)
     values: dict[str, tuple[float, ...]] = {
         "supply voltage": (24.0,),
         "coil heat": (),
@@ -471,7 +453,9 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "slew rate": (),
     }
     limits = [replace(BY_NAME[name], values=few) for name, few in values.items()]
-    efforts = study.Efforts(SMALL, Effort(8, (), (), rounds=1), Effort(8, (), (), rounds=0), 1)
+    efforts = study.Efforts(
+        Effort(16, 1, 1, rounds=1), Effort(8, 0, 0, rounds=1), Effort(8, 0, 0, rounds=0), 1
+    )
     scene = load("reference", {"run.duration": 0.2})
     rigs = tmp_path / "rigs.json"
     rigs.write_text('{"ensemble": [{}, {"mechanics.surface_mass": 0.02}]}')
@@ -523,6 +507,7 @@ def repeats(row: dict[str, str], folder: Path) -> None:
         (["held"], 'scene held: circuit.model = "none" has no limits to lift'),
         (["square"], 'scene square: drive.waveform = "square" has no knobs'),
         (["paper", "--rigs", "rigs.json"], "rigs.json: cannot be read"),
+        (["paper", "--effort", "nan"], "--effort nan: must be from 0.01 to 100"),
         (["paper", "--seed", "-1"], "--seed -1: must be a whole number from 0"),
     ],
 )

@@ -27,7 +27,7 @@ def test_theory_s_optimum() -> None:
     assert 0.3356265876 * (1 - 2e-4) < reached < 0.3356265876 * (1 + 1e-9)
     ratio = found.best.values["friction.normal_force"] / weight
     assert ratio == pytest.approx(6.7083044169, rel=0.03)  # flat, so less sharp
-    assert 0.0 < (found.lost(0.01) or 0.0) < (found.lost(0.05) or 0.0) < 0.2
+    assert 0.0 < (found.lost or 0.0) < 0.05
 
 
 def test_same_for_any_number_of_workers() -> None:
@@ -38,7 +38,7 @@ def test_same_for_any_number_of_workers() -> None:
     )
     assert first == second
     assert first.best.value is not None
-    searched = [run.value for run in first.runs[:-8]]  # the last round turns two keys
+    searched = [run.value for run in first.runs[:-4]]  # the last round turns two keys
     assert first.best.value <= min(value for value in searched if value is not None)
     assert all(isinstance(run.values["mechanics.n_surfaces"], int) for run in first.runs)
     assert first != tune(scene, minimise="v_average", over=over, budget=60, seed=5, workers=2)
@@ -52,7 +52,7 @@ def test_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out
     numbers = json.loads((tmp_path / "tune.json").read_text(encoding="utf-8"))
     assert (
-        "turning one key by 1% of its range" in said or "budget ended" in said
+        "turning one key by 2% of its range" in said or "budget ended" in said
     ) and " Hz)" in said
     best: Any = simulate(load(tmp_path / "best.toml")).summary
     assert best["v_average"] == pytest.approx(numbers["value"], rel=1e-6)
@@ -106,7 +106,7 @@ def test_bad_input(
 
 def test_keys_twice() -> None:
     with pytest.raises(BadInput, match="twice"):
-        from cosim.studies.tune.files import ranges_of
+        from cosim.studies.tune.found import ranges_of
 
         ranges_of(["drive.offset=0:1", "drive.offset=0:2"])
 

@@ -20,6 +20,7 @@ STUDIES = (
         Option("--rigs", RIGS, "FILE", Path),
         Option("--at", AT, "SCENE", many="some"),
         *(SEED, WORKERS, DASK),
+        Option("--effort", "times the runs that each search may make", "X", float, 1.0),
         quick("a coarse search, in a fraction of the time"),
     ),
 )

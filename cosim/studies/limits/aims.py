@@ -4,7 +4,6 @@ wanted large.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import product
 from math import inf
 
 import numpy as np
@@ -18,9 +17,6 @@ RANGE = firmware.GAIN * firmware.volts(firmware.COUNTS - 1)
 
 KNOB_COUNT = len(KNOBS)
 
-TURN = 0.02
-"""Of a knob's whole turn: how well a hand finds a setting again."""
-
 STEPS = firmware.COUNTS - 1
 """Of a knob's whole turn: the firmware reads each in so many, and nothing between them can be set.
 """
@@ -29,33 +25,18 @@ FREE = {f"drive.{knob}": None for knob in KNOBS}
 """Lets amplitude, frequency and offset stand for themselves."""
 
 
-def settings(place: Array, reach: float = 1.0) -> dict[str, float]:
-    """Amplitude (V), frequency (Hz) and offset (V) of a place in the cube, as the firmware maps its
+def settings(point: Array, reach: float = 1.0) -> dict[str, float]:
+    """Amplitude (V), frequency (Hz) and offset (V) of a point of the cube, as the firmware maps its
     potentiometers; ``reach`` multiplies both volts.
 
     The third knob sets where the ramp ends, so the mean moves with the amplitude.
     """
-    amplitude, top = reach * RANGE * place[0], reach * RANGE * place[2]
+    amplitude, top = reach * RANGE * point[0], reach * RANGE * point[2]
     return {
         "drive.amplitude": _typed(amplitude),
-        "drive.frequency": _typed(firmware.knob_frequency(place[1] * STEPS / firmware.COUNTS)),
+        "drive.frequency": _typed(firmware.knob_frequency(point[1] * STEPS / firmware.COUNTS)),
         "drive.offset": _typed(top - amplitude / 2.0),
     }
-
-
-def rounded(places: Array) -> Array:
-    """Places (rows) that can be set, inside the cube."""
-    return np.round(np.clip(places, 0.0, 1.0) * STEPS) / STEPS
-
-
-def faces(place: Array) -> Array:
-    """Each knob turned by TURN either way, by itself."""
-    return rounded(place + TURN * np.vstack([np.eye(KNOB_COUNT), -np.eye(KNOB_COUNT)]))
-
-
-def corners(place: Array) -> Array:
-    """All knobs turned by TURN together, in every combination."""
-    return rounded(place + TURN * np.array(list(product((-1.0, 1.0), repeat=KNOB_COUNT))))
 
 
 def _typed(value: float) -> float:

@@ -9,6 +9,9 @@ from cosim.scene.tables import KNOBS
 from cosim.studies.limits.runs import Bench
 from cosim.studies.limits.table import Limit, Settings
 
+OWN = "own"
+"""The key of a scene as it is."""
+
 WITHOUT = ("knobs' range", "coil heat")
 """Limits that only bound the choice of a setting."""
 
@@ -36,6 +39,7 @@ def at(
     runs: dict[tuple[int, str, bool], Settings] = {}
     for number, scene in enumerate(scenes):
         own = _apart(scene, bench.scene)
+        runs[number, OWN, False] = own | {"circuit.model": "amplifier"}
         for limit in acting(limits):
             rung = _rung(limit)
             here = limit.machine(scene, limit.at_work(scene)).settings
@@ -51,8 +55,8 @@ def at(
     outcomes = dict(zip(runs, bench.outcomes(list(runs.values())), strict=True))
     found = []
     for number, scene in enumerate(scenes):
-        own = outcomes[number, "supply voltage", False]
-        settings = runs[number, "supply voltage", False]
+        own = outcomes[number, OWN, False]
+        settings = runs[number, OWN, False]
         heat = bench.mean_heat(settings, own.numbers) if own.numbers else float("nan")
         there = There(scene, own, heat)
         for limit in acting(limits):

@@ -38,7 +38,7 @@ def report(bench: Bench, study: Study, points: Points, there: Sequence[There]) -
     if not_held := answer.refuted(points):
         said.append(
             f"Of {len(points)} points the more complete circuit does not confirm {len(not_held)} "
-            "within 2 %; limits.csv has both values."
+            f"within {bench.fidelity.tolerance:.1%}; limits.csv has both values."
         )
     if sought := answer.sought(points):
         said.append(
@@ -93,8 +93,8 @@ def row(bench: Bench, study: Study, point: Point) -> Row:
         "heat of a coil [W]": point.heat,
         "found on": point.settings["circuit.model"],
         "judged on": point.rung,
-        "there": point.confirmed * scale,
-        "off [%]": 100.0 * point.off,
+        "there": point.judged * scale,
+        "off [%]": 100.0 * abs(point.judged / setting.value - 1.0),
         "confirmed": point.holds,
         "on full": point.full * scale,
         "refuted before it": point.refuted,
@@ -126,7 +126,7 @@ def achieved(study: Study, points: Points) -> list[Row]:
                 if others
                 else "-",
                 "needed": needed_acceleration(study.scene) if quantity.falls else nan,
-                "best on amplifier": best.confirmed * scale if best else nan,
+                "best on amplifier": best.judged * scale if best else nan,
                 "best on full": best.full * scale if best else nan,
             }
         )
@@ -166,6 +166,8 @@ def cost(there: There, limit: Limit) -> float:
 
 STORE = "limits.sqlite"
 
+LEAST_EFFORT, MOST_EFFORT = 0.01, 100.0
+
 TRIALS = tuple(f"trial-{number:02d}" for number in range(1, 11))
 
 
@@ -177,6 +179,7 @@ def limits(
     at: Sequence[Scene | str | os.PathLike[str]] | None = None,
     seed: int = 0,
     quick: bool = False,
+    effort: float = 1.0,
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     dask: str | None = None,
@@ -188,21 +191,23 @@ def limits(
     by circuits with more in them. ``rigs`` is a file of others that may be meant, such as
     ``identify.json``: JSON or TOML whose list ``ensemble`` has tables of keys and values. At the
     scenes ``at`` (the trials') each limit is lifted at their own settings. ``quick`` searches
-    coarsely. The same for the same ``seed``, on any number of ``workers`` or on the Dask cluster at
-    the address ``dask``.
+    coarsely, ``effort`` multiplies what the searches may cost. The same for the same ``seed``, on
+    any number of ``workers`` or on the Dask cluster at the address ``dask``.
 
     In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
     study has left there. Raises BadInput.
     """
     if seed < 0:
         raise BadInput(f"--seed {seed}: must be a whole number from 0.")
+    if not LEAST_EFFORT <= effort <= MOST_EFFORT:
+        raise BadInput(f"--effort {effort:g}: must be from {LEAST_EFFORT:g} to {MOST_EFFORT:g}.")
     words = [scene.name if isinstance(scene, Scene) else str(scene)]
     if overrides:
         pairs = overrides.items() if isinstance(overrides, Mapping) else ()
         texts = [f"{key}={value}" for key, value in pairs] or list(overrides)
         words += [f"--set {text}" for text in texts]
     base, there = load(scene, overrides), [load(one) for one in at or TRIALS]
-    efforts = QUICK if quick else FULL
+    efforts = (QUICK if quick else FULL).times(effort)
     others = ensemble(Path(rigs), efforts.rigs) if rigs is not None else []
     checked(base, others, rigs)
     told = counted(progress, told_count(LIMITS, efforts, len(others)) + 2 + len(there))

@@ -6,12 +6,13 @@ from math import ceil, inf
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cosim.arrays import Array
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import Outcome
 from cosim.scene import Scene, changed, firmware
+from cosim.search.protocol import Feasible
+from cosim.simulation.fidelity import SEARCHES, Fidelity
 from cosim.simulation.guards import coil_heat
 from cosim.studies.limits import aims
 from cosim.studies.limits.aims import NEEDED, QUANTITIES, Numbers, scores
@@ -30,11 +31,11 @@ class Case:
 
     rig: Settings
     machine: Machine
-    rung: str = "limited"
+    rung: str = SEARCHES
 
-    def settings(self, place: Array) -> Settings:
-        """All that differs from the scene at a place in the knobs' cube; whole periods are run."""
-        turned = aims.settings(place, self.machine.reach)
+    def settings(self, point: Array) -> Settings:
+        """All that differs from the scene at a point of the cube; whole periods are run."""
+        turned = aims.settings(point, self.machine.reach)
         there = {**self.rig, **self.machine.settings, **turned, "circuit.model": self.rung}
         period = 1.0 / turned["drive.frequency"]
         if there.get("drive.quantised"):
@@ -61,10 +62,11 @@ class Bench(Evaluator):
         dask: str | None = None,
     ) -> None:
         own = aims.FREE | {
-            "circuit.model": "limited", "drive.pwm_ripple": False, "drive.quantised": False,
+            "circuit.model": SEARCHES, "drive.pwm_ripple": False, "drive.quantised": False,
             "run.settle": SETTLE, "run.duration": SETTLE + SPAN,
         }  # fmt: skip
         self.scene = changed(scene, own, f"scene {scene.name}")
+        self.fidelity = Fidelity.of(scene)
         tables = scene.as_dict()
         self._unlike: Settings = {
             key: value
@@ -79,22 +81,32 @@ class Bench(Evaluator):
         found = dict(self.run(enumerate(every)))
         return [found[number] for number in range(len(every))]
 
-    def scores(self, case: Case, places: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """The scores of places (rows), -inf where a run fails, and which of them are bearable."""
-        every = [case.settings(place) for place in places]
+    def scores(self, case: Case, points: Array) -> tuple[Array, Feasible]:
+        """The scores of points (rows), -inf where a run fails, and which of them are feasible."""
+        every = [case.settings(point) for point in points]
         found = np.full((len(every), len(QUANTITIES)), -inf)
-        borne = np.zeros(len(every), bool)
+        feasible = np.zeros(len(every), bool)
         for row, (settings, outcome) in enumerate(zip(every, self.outcomes(every), strict=True)):
             if not outcome.failure:
                 found[row] = scores(outcome.numbers)
-                borne[row] = self.bearable(case, settings, outcome.numbers)
-        return found, borne
+                feasible[row] = self.feasible(case, settings, outcome.numbers)
+        return found, feasible
 
-    def bearable(self, case: Case, settings: Settings, numbers: Numbers) -> bool:
+    def feasible(self, case: Case, settings: Settings, numbers: Numbers) -> bool:
         """Whether a run keeps within what the coil and the power amplifier bear."""
-        peak = max(numbers["current_max"], -numbers["current_min"]) * case.machine.coil_scale
-        within = peak * self.scene.coil.count <= OPA548_CURRENT
-        return within and self.heat(case, settings, numbers) <= case.machine.heat
+        current = self.peak(numbers) * case.machine.coil_scale
+        return current <= OPA548_CURRENT and self.heat(case, settings, numbers) <= case.machine.heat
+
+    def peak(self, numbers: Numbers) -> float:
+        """The greatest current of all coils together of a run, A."""
+        return max(numbers["current_max"], -numbers["current_min"]) * self.scene.coil.count
+
+    def judge(self, case: Case, settings: Settings, numbers: Numbers) -> str:
+        """The circuit model that judges a run."""
+        if case.rung == "ideal":
+            return case.rung
+        limit = float(settings.get("circuit.current_limit", self.scene.circuit.current_limit))
+        return self.fidelity.judge(self.peak(numbers), limit)
 
     def amperes(self, case: Case) -> float:
         """The knobs' range, A."""

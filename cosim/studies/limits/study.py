@@ -8,8 +8,9 @@ import json
 import os
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
+from math import ceil
 from pathlib import Path
 from types import MappingProxyType
 
@@ -18,18 +19,11 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.scene import Scene, changed
-from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES, rounded
+from cosim.search.local import STEADY_APART
+from cosim.search.protocol import apart
+from cosim.studies.limits.aims import KNOB_COUNT, QUANTITIES
 from cosim.studies.limits.runs import Bench, Case
-from cosim.studies.limits.search import (
-    NOWHERE,
-    STEADY_APART,
-    Bests,
-    Clouds,
-    Effort,
-    Leads,
-    Search,
-    apart,
-)
+from cosim.studies.limits.search import NOWHERE, Bests, Effort, Frontiers, Leads
 from cosim.studies.limits.table import LIMITS, Limit, Machine, Settings
 
 
@@ -46,39 +40,32 @@ class Efforts:
     rigs: int
     """Of an ensemble, spread over their order, which is that of their cost."""
 
+    def times(self, factor: float) -> "Efforts":
+        """So many times the runs, roughly, of each search."""
 
-def _clouds(*every: tuple[float, int, int, int]) -> tuple[Clouds, ...]:
-    return tuple(Clouds(*one) for one in every)
+        def more(effort: Effort) -> Effort:
+            numbers = ("design", "first", "later")
+            return replace(
+                effort, **{name: ceil(factor * getattr(effort, name)) for name in numbers}
+            )
+
+        return replace(self, own=more(self.own), again=more(self.again), others=more(self.others))
 
 
-_LATER = _clouds((0.02, 2, 4, 1), (0.005, 1, 4, 2), (0.001, 1, 4, 2))
 FULL = Efforts(
-    Effort(
-        1024,
-        _clouds(
-            *((0.06, 8, 4, 1), (0.04, 6, 4, 1), (0.02, 4, 4, 4), (0.01, 2, 4, 8)),
-            *((0.005, 1, 4, 8), (0.002, 1, 4, 6), (0.001, 1, 4, 6)),
-        ),
-        _clouds((0.03, 3, 4, 1), (0.01, 2, 4, 4), (0.003, 1, 4, 6), (0.001, 1, 4, 6)),
-        rounds=2,
-        looks=2,
-    ),
-    Effort(
-        128,
-        _clouds((0.05, 4, 4, 1), (0.02, 2, 4, 2), (0.005, 1, 4, 4), (0.001, 1, 4, 3)),
-        _LATER,
-        rounds=1,
-    ),
-    Effort(64, _clouds((0.02, 2, 4, 1), (0.005, 1, 4, 4), (0.001, 1, 4, 3)), _LATER, rounds=1),
-    3,
+    own=Effort(design=1024, first=8, later=6, rounds=2, looks=2),
+    again=Effort(design=128, first=4, later=2, rounds=1),
+    others=Effort(design=64, first=3, later=2, rounds=1),
+    rigs=3,
 )
-_COARSE = _clouds((0.05, 2, 2, 1), (0.02, 1, 4, 1))
-_FEW = Effort(32, _COARSE, _COARSE, rounds=1)
-QUICK = Efforts(Effort(64, _COARSE, _COARSE, rounds=1), _FEW, _FEW, 1)
+_FEW = Effort(design=32, first=1, later=0, rounds=1)
+QUICK = Efforts(Effort(design=64, first=1, later=1, rounds=1), _FEW, _FEW, rigs=1)
 
-CLOSE_BY, HINTS = 0.02, 24
-"""Of places of other machines closer than this, of a knob's turn, one is tried; and how many for
-each quantity."""
+FIRST, LATER = 0.06, 0.03
+"""Standard deviations with which samples begin, as shares of a knob's turn."""
+
+CLOSE, HINTS = 0.02, 24
+"""Warm starts closer than this to a better one are dropped; so many are kept for each quantity."""
 
 Name = tuple[str, float]
 """A limit and its value; OWN and IDEAL besides."""
@@ -94,7 +81,7 @@ class Rig:
     settings: Settings
     cases: dict[Name, Case] = field(default_factory=dict[Name, Case])
     found: dict[Name, Bests] = field(default_factory=dict[Name, Bests])
-    searches: dict[Name, Search] = field(default_factory=dict[Name, Search])
+    searches: dict[Name, Frontiers] = field(default_factory=dict[Name, Frontiers])
 
 
 @dataclass
@@ -185,31 +172,30 @@ def _search(
     searches = rig.searches
     leads: dict[Name, Leads] = {}
     for number, (name, case) in enumerate(rig.cases.items()):
-        search = searches[name] = Search(partial(bench.scores, case), (*seed, number))
+        search = searches[name] = Frontiers(partial(bench.scores, case), (*seed, number))
         search.fill(effort.design)
         if known:
             there = known.searches[name].leads()
-            places = moved(bench, there.places, known.cases[name], case)
-            search.heed(Leads(places, there.scores))
+            points = moved(bench, there.points, known.cases[name], case)
+            search.heed(Leads(points, there.scores))
         leads[name] = search.leads()
     for number in range(1 + effort.rounds):
-        # What is best on one machine is tried on all, and climbed on from where it is better.
+        # The others' optima are run too, so that relaxing a limit never lowers what is found.
         for name, search in searches.items():
-            hints = _hints(bench, rig, leads, name)
-            search.climb(effort.next if number else effort.first, hints)
+            search.heed(_hints(bench, rig, leads, name))
+            search.climb(*((LATER, effort.later) if number else (FIRST, effort.first)))
             leads[name] = search.leads()
             told(f"{rig.name}, round {number}: {name[0]} {name[1]:.3g}")
     for name, case in late.items():
         rig.cases[name] = case
         hints = _hints(bench, rig, leads, name)
-        if len(hints.places):
-            searches[name] = Search(partial(bench.scores, case), (*seed, len(rig.cases)))
-            searches[name].climb(effort.next, hints)
+        if len(hints.points):
+            searches[name] = Frontiers(partial(bench.scores, case), (*seed, len(rig.cases)))
+            searches[name].heed(hints)
+            searches[name].climb(LATER, effort.later)
         told(f"{rig.name}: {name[0]} {name[1]:.3g}")
     rig.found = {name: search.bests(effort.looks) for name, search in searches.items()}
     for name, search in searches.items():
-        # What its kin does best is looked at closely: no machine is the worse for a lifted limit
-        # only because its search has missed that.
         rig.found[name] = search.bests(effort.looks, _of_kin(bench, rig, name))
 
 
@@ -223,29 +209,29 @@ def _of_kin(bench: Bench, rig: Rig, name: Name) -> list[Array]:
     ]
     every = []
     for quantity in range(len(QUANTITIES)):
-        places = [NOWHERE]
+        points = [NOWHERE]
         for other in kin:
-            tops = np.array([one.place for one in rig.found[other][quantity].tops])
-            places.append(moved(bench, tops, rig.cases[other], rig.cases[name]))
-        tried = np.vstack(places)
+            tops = np.array([one.point for one in rig.found[other][quantity].tops])
+            points.append(moved(bench, tops, rig.cases[other], rig.cases[name]))
+        tried = np.vstack(points)
         every.append(tried[apart(tried, STEADY_APART, len(tried))])
     return every
 
 
 def _hints(bench: Bench, rig: Rig, leads: dict[Name, Leads], name: Name) -> Leads:
-    """The leads of all other machines as places of one, for each quantity without those that lie
+    """The leads of all other machines as points of one, for each quantity without those that lie
     close to one that does better on its own machine."""
     others = [other for other in leads if other != name]
-    places = np.vstack(
-        [moved(bench, leads[x].places, rig.cases[x], rig.cases[name]) for x in others]
+    points = np.vstack(
+        [moved(bench, leads[x].points, rig.cases[x], rig.cases[name]) for x in others]
     )
     relative = np.vstack([_relative(leads[x].scores) for x in others])
     kept: set[int] = set()
     for quantity in range(len(QUANTITIES)):
         order = np.argsort(-relative[:, quantity], kind="stable")
-        kept |= set(order[apart(places[order], CLOSE_BY, HINTS)].tolist())
+        kept |= set(order[apart(points[order], CLOSE, HINTS)].tolist())
     rows = sorted(kept)
-    return Leads(places[rows], np.vstack([leads[x].scores for x in others])[rows])
+    return Leads(points[rows], np.vstack([leads[x].scores for x in others])[rows])
 
 
 def _relative(scores: Array) -> Array:
@@ -255,10 +241,10 @@ def _relative(scores: Array) -> Array:
     return found
 
 
-def moved(bench: Bench, places: Array, there: Case, here: Case) -> Array:
-    """Places (rows) of one machine as places of another, with the same currents."""
+def moved(bench: Bench, points: Array, there: Case, here: Case) -> Array:
+    """Points (rows) of one machine as points of another, with the same currents."""
     ratio = bench.amperes(there) / bench.amperes(here)
-    return rounded(places.reshape(-1, KNOB_COUNT) * [ratio, 1.0, ratio])
+    return np.clip(points.reshape(-1, KNOB_COUNT) * [ratio, 1.0, ratio], 0.0, 1.0)
 
 
 def ensemble(path: Path, most: int) -> list[Settings]:

@@ -15,7 +15,7 @@ from cosim.evaluate.point import periods_made_whole
 from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
-from cosim.simulation.choose_rung import relative_error
+from cosim.simulation.fidelity import relative_error
 from cosim.simulation.simulate import simulate
 from cosim.studies.plots import GREEN, panels
 from cosim.studies.report import Progress, Report, counted, silent

@@ -1,22 +1,20 @@
 """Runs a scene with each knob turned a little, on the cheapest circuit that suffices."""
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.evaluator import Evaluator
-from cosim.scene import Scene, changed, keys, load
+from cosim.scene import Scene, keys, load
 from cosim.scene.loading import Overrides
 from cosim.scene.tables import KNOBS
-from cosim.simulation.choose_rung import WITHOUT_NGSPICE, relative_error, without_ngspice
+from cosim.search.turns import TURN
+from cosim.simulation.fidelity import Fidelity
 from cosim.waveforms.quantities import with_unit
 
 UNITS = {key.full: key.unit for key in keys()}
-
-TURN = 0.01
-"""Of a knob's whole turn, or of the value that a scene gives instead of it."""
 
 Settings = dict[str, float]
 """Values of keys, ``table.key``, SI."""
@@ -90,14 +88,12 @@ def spread(
     workers: int | None = None,
     progress: Callable[[int], None] = lambda runs: None,
 ) -> Spread:
-    """Run a scene as it is and with each of the three knobs turned a hundredth either way.
+    """Run a scene as it is and with each of the three knobs turned by TURN either way.
 
     The runs last whole periods, at least as long as the scene's own. Where ngspice solves its
-    circuit, all are made without it first, on the rung "limited"; the scene itself and the two
-    ends are then run as they are. Where one of these is off by more than ``run.tolerance``, so are
-    the others. (The rung "ideal" is hardly cheaper, and blind to what the limits of the amplifier
-    do at a turn's other end.) ``workers`` processes, by default one for each processor;
-    ``progress`` is told the runs done.
+    circuit, all are made without it first; the scene itself and the two ends are then run as they
+    are, and all others where one of these differs by more than ``run.tolerance``. ``workers`` runs
+    at once, by default one for each processor; ``progress`` is told the runs done.
 
     Raises BadInput for a scene without knobs, SimulationFailed where every run failed.
 
@@ -109,18 +105,11 @@ def spread(
     every: list[Settings] = [{}, *turns(scene)]
     done = 0
 
-    def run(numbers: Iterable[int], circuit: Mapping[str, str | bool]) -> dict[int, Turned]:
+    def run(numbers: Collection[int], circuit: Mapping[str, str | bool]) -> dict[int, Turned]:
         nonlocal done
-        found: dict[int, Turned] = {}
-        points: dict[int, dict[str, float | str]] = {}
+        points = {n: {**every[n], **circuit} for n in numbers}
         model = str(circuit.get("circuit.model", scene.circuit.model))
-        for n in numbers:
-            try:
-                changed(scene, {**every[n], **circuit}, "--spread")
-            except BadInput as error:
-                found[n] = Turned(every[n], model, None, str(error))
-            else:
-                points[n] = {**every[n], **circuit}
+        found: dict[int, Turned] = {}
         for n, outcome in bench.run(points.items()):
             value = None if outcome.failure else outcome.numbers["v_average"]
             found[n] = Turned(every[n], model, value, outcome.failure)
@@ -128,18 +117,15 @@ def spread(
             progress(done)
         return found
 
-    numbers = set(range(len(every)))
+    def ends(found: dict[int, Turned]) -> set[int]:
+        """The scene itself, the slowest and the fastest."""
+        known = [n for n, one in found.items() if one.v_average is not None]
+        return {0, *(end(known, key=lambda n: _speed(found[n])) for end in (min, max) if known)}
+
     with Evaluator(scene, whole_periods=True, workers=workers) as bench:
-        if without_ngspice(scene) is None:
-            found = run(numbers, {})
-        else:
-            found = run(numbers, WITHOUT_NGSPICE)
-            known = [n for n, one in found.items() if one.v_average is not None]
-            ends = {0, *(end(known, key=lambda n: _speed(found[n])) for end in (min, max) if known)}
-            exact = run(ends, {})
-            if any(_off(found[n], exact[n]) > scene.run.tolerance for n in ends):
-                exact |= run(numbers - ends, {})
-            found |= exact
+        found = Fidelity.of(scene).run(
+            range(len(every)), run, ends, lambda turned: turned.v_average
+        )
     made = Spread([found[n] for n in sorted(found)])
     if not made.known:
         raise SimulationFailed(f"No setting could be run; the first one: {made.runs[0].failure}")
@@ -151,18 +137,11 @@ def _speed(run: Turned) -> float:
     return run.v_average
 
 
-def _off(simple: Turned, exact: Turned) -> float:
-    """Relative error of the simpler circuit's v_average; without bound where either failed."""
-    if simple.v_average is None or exact.v_average is None:
-        return float("inf")
-    return relative_error(simple.v_average, exact.v_average)
-
-
 def turns(scene: Scene) -> list[Settings]:
-    """The settings with one knob turned a little either way, not beyond the end of its range.
+    """The settings with one knob turned either way, not beyond the end of its range.
 
-    A knob that the scene gives as ``pot_…`` is turned by a hundredth of its whole turn; amplitude,
-    frequency and offset by a hundredth of themselves, an offset of 0 by one of the amplitude.
+    A knob that the scene gives as ``pot_…`` is turned by TURN of its whole turn; amplitude,
+    frequency and offset by TURN of themselves, an offset of 0 by that of the amplitude.
     Raises BadInput for a scene whose knobs move nothing.
     """
     if not scene.rung.driven:

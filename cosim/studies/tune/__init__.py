@@ -7,7 +7,7 @@ OVER = Option(
     "a numeric key and its range; repeatable (default: the three knobs, end to end)",
     "TABLE.KEY=LOW:HIGH",
     many="repeat",
-    read="tune.files.ranges_of",
+    read="tune.found.ranges_of",
 )
 
 STUDIES = (

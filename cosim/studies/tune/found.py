@@ -1,13 +1,28 @@
-"""What a search has found."""
+"""What a search leaves: every run, the best settings, and a sentence on how safe they are."""
 
+import os
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
+from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from cosim.errors import BadInput, plain
+from cosim.evaluate.keys import numeric_key, split
 from cosim.evaluate.point import Number, Outcome
-from cosim.scene import Scene
+from cosim.files.atomic import write_json, write_text
+from cosim.files.picture import Picture
+from cosim.scene import Scene, to_toml
+from cosim.scene.tables import KNOBS
+from cosim.search.turns import TURN
+from cosim.studies.tables import write_csv
+from cosim.waveforms.quantities import bench_unit, label, with_unit
 
-TURNS = (-0.05, -0.01, 0.01, 0.05)
-"""How far each key is turned about the best, as shares of its range."""
+COLORS = ("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#8d99ae", "#6a4c93")
+MOST_KEYS = 4
+"""Whose settings the figure shows."""
 
 
 @dataclass(frozen=True)
@@ -19,13 +34,13 @@ class Run:
     value: float | None
 
 
-@dataclass(frozen=True)
-class Search:
-    """What a search has found.
+@dataclass(frozen=True, repr=False)
+class Tuning:
+    """A finished search.
 
-    ``neighbours`` gives for each key the value at each of TURNS about the best run, None beyond the
-    end of its range or where the run failed; empty where turning led on to this best run and the
-    budget ended there.
+    ``neighbours`` gives for each key the value where it is turned by TURN of its range, down and
+    up, None beyond the end of the range or where the run failed; empty where turning led on to this
+    best run and the budget ended there.
     """
 
     quantity: str
@@ -45,8 +60,9 @@ class Search:
         """How many runs have no value."""
         return sum(run.value is None for run in self.runs)
 
-    def lost(self, turn: float) -> float | None:
-        """Greatest loss when one key is turned by ``turn`` of its range either way.
+    @property
+    def lost(self) -> float | None:
+        """Greatest loss when one key is turned by TURN of its range either way.
 
         As a share of the best value; inf where such a run failed; None where there is none.
         """
@@ -54,9 +70,162 @@ class Search:
         losses = []
         for key, values in self.neighbours.items():
             low, high = self.ranges[key]
-            for place, value in zip(TURNS, values, strict=True):
-                there = self.best.values[key] + place * (high - low)
-                if abs(place) == turn and low <= there <= high:
+            for turn, value in zip((-TURN, TURN), values, strict=True):
+                if low <= self.best.values[key] + turn * (high - low) <= high:
                     change = inf if value is None else self.best.value - value
                     losses.append(change if self.largest or value is None else -change)
         return max(losses) / (abs(self.best.value) or 1.0) if losses else None
+
+    def plot(self) -> Picture:
+        """The path of the search, where it listened, and what a small turn costs."""
+        return _figure(self)
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Write ``tune.json``, ``tune.csv``, ``best.toml`` and ``figure.png``."""
+        _write(Path(folder), self)
+        self.plot().write(Path(folder) / "figure.png")
+
+    def __repr__(self) -> str:
+        return _table(self)
+
+
+def _write(folder: Path, tuning: Tuning) -> None:
+    drive, summary = tuning.scene.drive, tuning.best.outcome.numbers
+    numbers = {
+        "quantity": tuning.quantity,
+        "largest": tuning.largest,
+        "value": tuning.best.value,
+        "settings": tuning.best.values,
+        "drive": {name: getattr(drive, name) for name in ("frequency", "amplitude", "offset")},
+        "ranges": tuning.ranges,
+        "runs": len(tuning.runs),
+        "failed": tuning.failed,
+        "seed": tuning.seed,
+        "search": "Sobol sequence, then CMA-ES",
+        "scouts": tuning.scouts,
+        "turns": [-TURN, TURN],
+        "neighbours": tuning.neighbours,
+        "robustness": _robustness(tuning),
+        "summary": {name: x if isfinite(x) else None for name, x in summary.items()},
+    }
+    write_runs(folder / "tune.csv", tuning.runs, tuning.quantity)
+    aim = f"{'largest' if tuning.largest else 'least'} {tuning.quantity}"
+    found = {"name": f"{tuning.scene.name}-tuned"[:64], "description": f"Tuned for the {aim}"}
+    write_json(folder / "tune.json", numbers)
+    write_text(folder / "best.toml", to_toml(tuning.scene.model_copy(update=found)))
+
+
+def write_runs(path: Path, runs: Sequence[Run], quantity: str) -> None:
+    """The runs in order: their settings (SI), the value asked for, and why one failed."""
+    if runs:
+        heads = {name: f"{name} [{numeric_key(name).unit}]" for name in runs[0].values}
+        rows = [
+            {heads[name]: setting for name, setting in run.values.items()}
+            | {quantity: run.value, "failure": run.outcome.failure}
+            for run in runs
+        ]
+        write_csv(path, rows)
+
+
+def _robustness(tuning: Tuning) -> str:
+    """What it costs to turn a key a little, in words."""
+    if not tuning.neighbours:
+        return "the budget ended before its neighbourhood was heard: a larger one may help"
+    if (lost := tuning.lost) is None:
+        return ""
+    cost = "loses it altogether" if lost >= 1.0 else f"costs at most {max(lost, 0.0):.1%}"
+    if lost == inf:
+        cost = "leads to a run that fails"
+    return f"turning one key by {TURN:.0%} of its range {cost}"
+
+
+def ranges_of(over: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """The ranges that ``--over table.key=low:high`` options give. Raises BadInput."""
+    ranges: dict[str, tuple[float, float]] = {}
+    for text, name, ends in split(over, "table.key=low:high"):
+        try:
+            low, high = (float(end) for end in ends.split(":"))
+        except ValueError:
+            raise BadInput(f"--over {plain(text)}: must be table.key=low:high.") from None
+        ranges[name] = (low, high)
+    return ranges
+
+
+def _table(tuning: Tuning) -> str:
+    """The best settings for a reader."""
+    value = tuning.best.value
+    assert value is not None
+    unit, scale = bench_unit(tuning.quantity)
+    ahead = f" ({tuning.scouts} ahead without ngspice)" if tuning.scouts else ""
+    lines = [
+        f"{tuning.quantity} = {with_unit(value * scale, unit, 5)} after {len(tuning.runs)} runs"
+        f"{ahead}, {tuning.failed} failed, at"
+    ]
+    for name, setting in tuning.best.values.items():
+        line = f"  {name} = {with_unit(setting, numeric_key(name).unit)}"
+        if key := KNOBS.get(name.removeprefix("drive.")):
+            meant = with_unit(getattr(tuning.scene.drive, key), numeric_key(f"drive.{key}").unit, 4)
+            line += f" ({key} {meant})"
+        lines.append(line)
+    if words := _robustness(tuning):
+        lines.append(f"  {words}")
+    return "\n".join(lines)
+
+
+def _figure(tuning: Tuning) -> Picture:
+    from matplotlib.ticker import MaxNLocator
+
+    figure = Picture(13.0, 8.0, "constrained")
+    rows: Any = figure.subfigures(2, 1)
+    top, bottom = rows
+    unit, scale = bench_unit(tuning.quantity)
+    ylabel = label(tuning.quantity, unit)
+    values = np.array([np.nan if run.value is None else run.value for run in tuning.runs]) * scale
+    number = np.arange(1, len(values) + 1)
+
+    path_axis, turn_axis = top.subplots(1, 2)
+    path_axis.scatter(number, values, c=number, cmap="viridis", s=14)
+    ranked = values if tuning.largest else -values
+    so_far = np.fmax.accumulate(ranked)
+    path_axis.step(number, so_far if tuning.largest else -so_far, where="post", color="#d1495b")
+    failed = number[~np.isfinite(values)]
+    path_axis.plot(
+        failed, np.full(len(failed), 0.02), "x", color="#d1495b", ms=6,
+        transform=path_axis.get_xaxis_transform(),
+    )  # fmt: skip
+    path_axis.set(xlabel="run", ylabel=ylabel)
+    words = "Every run, and the best so far" + (
+        f"; {len(failed)} failed (×)" if len(failed) else ""
+    )
+    path_axis.set_title(words, loc="left", fontsize=10.5)
+
+    assert tuning.best.value is not None
+    turns = 100 * np.array([-TURN, 0.0, TURN])
+    for (key, row), color in zip(tuning.neighbours.items(), COLORS * 3, strict=False):
+        low, high = (np.nan if value is None else value * scale for value in row)
+        heights = [low, tuning.best.value * scale, high]
+        turn_axis.plot(turns, heights, color=color, marker="o", ms=4, label=key)
+    turn_axis.set(xlabel="turned by [% of the key's range]", ylabel=ylabel)
+    turn_axis.set_title("The neighbourhood of the best", loc="left", fontsize=10.5)
+    if tuning.neighbours:
+        turn_axis.legend(fontsize=8.5)
+
+    keys = list(tuning.ranges)[:MOST_KEYS]
+    for axis, key in zip(np.atleast_1d(bottom.subplots(1, len(keys))), keys, strict=True):
+        settings = [run.values[key] for run in tuning.runs]
+        shown = axis.scatter(settings, values, c=number, cmap="viridis", s=14)
+        axis.axvline(tuning.best.values[key], color="#d1495b", lw=0.9)
+        axis.set(xlabel=label(key, numeric_key(key).unit), ylabel=ylabel)
+        axis.xaxis.set_major_locator(MaxNLocator(6))
+        if key == keys[-1]:
+            bottom.colorbar(shown, ax=axis, label="run")
+    for axis in figure.axes:
+        if axis.get_label() != "<colorbar>":
+            axis.grid(alpha=0.25)
+    best = with_unit(tuning.best.value * scale, unit, 4)
+    figure.suptitle(
+        f"{tuning.scene.name}: {tuning.quantity} {best} after {len(values)} runs"
+        + (f", and {tuning.scouts} ahead without ngspice" if tuning.scouts else ""),
+        fontsize=12,
+    )
+    return figure

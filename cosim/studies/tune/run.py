@@ -1,9 +1,9 @@
 """Tunes a scene: searches its settings, then turns each key a little about the best."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 
@@ -14,13 +14,15 @@ from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.evaluator import Evaluator, Settings
 from cosim.evaluate.keys import FREQUENCIES, numeric_key
 from cosim.evaluate.point import Number, Outcome, periods_made_whole
-from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
-from cosim.search.climb import POPULATION, Climb, apart
-from cosim.simulation.choose_rung import WITHOUT_NGSPICE, without_ngspice
-from cosim.studies.tune import files
-from cosim.studies.tune.found import TURNS, Run, Search
+from cosim.search.climb import POPULATION, Climb
+from cosim.search.design import Design
+from cosim.search.known import Known
+from cosim.search.protocol import Feasible
+from cosim.search.turns import TURN, faces
+from cosim.simulation.fidelity import Fidelity
+from cosim.studies.tune.found import Run, Tuning, write_runs
 
 KNOBS: dict[str, tuple[float, float]] = {
     f"drive.{knob}": (0.0, 1.0) for knob in ("pot_max", "pot_frequency", "pot_offset")
@@ -30,42 +32,22 @@ KNOBS: dict[str, tuple[float, float]] = {
 SEARCHED = 0.93
 """Most that the search has of the runs; the rest turns one key after another about its best."""
 
+EXPLORED = 0.4
+"""Share of the search's runs that fills the whole range, before it climbs."""
+
 STORE = "tune.sqlite"
 
-FEWEST_RUNS = 20
-"""Of the search."""
-
-MOST_RUNS = 1_000_000
-
-EXPLORED = 0.4
-"""Share of the search's runs that listens to the whole range."""
-
-IDLE = 50
-"""Generations without a new point after which whole numbers leave no more to ask for."""
+FEWEST_RUNS, MOST_RUNS = 20, 1_000_000
+"""Of the search, and of all."""
 
 SCOUTS = 5
 """Runs without ngspice that go ahead of each run with it: some ten times cheaper each."""
 
-HINTS, HINTS_APART = 25, 0.02
+WARM, WARM_APART = 25, 0.02
 """Best scouts that are run again with ngspice, and how far apart, as a share of the ranges."""
 
-
-class Tuning(Search):
-    """A finished search: ``best`` and ``runs``, and ``scene``, which is the one at the best."""
-
-    def plot(self) -> Picture:
-        """The path of the search, where it listened, and what a small turn costs."""
-        from cosim.studies.tune import figure
-
-        return figure.draw(self)
-
-    def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write ``tune.json``, ``tune.csv``, ``best.toml`` and ``figure.png``."""
-        files.write(Path(folder), self)
-        self.plot().write(Path(folder) / "figure.png")
-
-    def __repr__(self) -> str:
-        return files.table(self)
+FINE = 10**9
+"""Steps of a key's range that are told apart."""
 
 
 def tune(
@@ -112,7 +94,7 @@ def tune(
             "what to tune with --over table.key=low:high."
         )
     ranges = _checked(over or KNOBS)
-    turned = len(TURNS) * len(ranges)
+    turned = 2 * len(ranges)
     least = FEWEST_RUNS + turned
     if not least <= budget <= MOST_RUNS:
         raise BadInput(
@@ -121,7 +103,6 @@ def tune(
         )
     path = None if out is None else Path(out) / STORE
     whole_periods = any(key in FREQUENCIES for key in ranges)
-    aim = quantity, largest, ranges, budget, seed, whole_periods
     heard: list[Run] = []
 
     def told(run: Run, best: Run | None) -> None:
@@ -130,58 +111,24 @@ def tune(
 
     with Evaluator(scene, path, whole_periods=whole_periods, workers=workers, dask=dask) as bench:
         try:
-            found = _tuned(scene, *aim, bench, told, scouting)
+            aim = _Aim(bench, quantity, largest, ranges)
+            best, neighbours, runs, scouts = _searched(aim, scene, budget, seed, told, scouting)
         except KeyboardInterrupt:
             if out is not None:
-                files.write_runs(Path(out) / "tune.csv", heard, quantity)
+                write_runs(Path(out) / "tune.csv", heard, quantity)
             raise
         except BadInput:
             if not bench.resumed:
                 bench.forget()  # there is nothing to go on with
             raise
+        tuned = changed(scene, best.values, "tune")
+        if whole_periods:
+            tuned = changed(tuned, periods_made_whole(tuned), "tune")
+        found = Tuning(quantity, largest, ranges, runs, best, neighbours, tuned, scouts, seed)
         if out is not None:
             found.save(out)
             bench.forget()
     return found
-
-
-def _tuned(
-    scene: Scene,
-    quantity: str,
-    largest: bool,
-    ranges: dict[str, tuple[float, float]],
-    budget: int,
-    seed: int,
-    whole_periods: bool,
-    bench: Evaluator,
-    progress: Callable[[Run, Run | None], None],
-    scouting: Callable[[Run, Run | None], None],
-) -> Tuning:
-    turned = len(TURNS) * len(ranges)
-    searched = min(round(SEARCHED * budget), budget - turned)
-    scouts, hints = 0, np.empty((0, len(ranges)))
-    # Quantities that only the scene's own rung has find no scouts.
-    with suppress(BadInput):
-        if without_ngspice(scene) is not None:
-            trial = _Trial(bench, WITHOUT_NGSPICE, quantity, largest, ranges, scouting)
-            trial.search(SCOUTS * searched, seed)
-            ranked = trial.ranked()
-            scouts, hints = len(trial.known), ranked[apart(ranked, HINTS_APART, HINTS)]
-    trial = _Trial(bench, {}, quantity, largest, ranges, progress)
-    trial.search(searched, seed, hints)
-    if trial.best is None:
-        reason = next(iter(trial.known.values())).outcome.failure
-        raise SimulationFailed(f"No setting could be run; the first one: {reason}")
-    best, neighbours = trial.best, _turned(trial, trial.best)
-    while trial.best is not best and len(trial.known) + turned <= budget:
-        best, neighbours = trial.best, _turned(trial, trial.best)
-    if trial.best is not best:
-        best, neighbours = trial.best, {}
-    runs = list(trial.known.values())
-    tuned = changed(scene, best.values, "tune")
-    if whole_periods:
-        tuned = changed(tuned, periods_made_whole(tuned), "tune")
-    return Tuning(quantity, largest, ranges, runs, best, neighbours, tuned, scouts, seed)
 
 
 def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
@@ -193,64 +140,100 @@ def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, 
     return dict(over)
 
 
-@dataclass
-class _Trial:
-    """Runs settings, each once, and remembers them in the order in which they were asked for."""
+@dataclass(frozen=True)
+class _Aim:
+    """What is run, and what for."""
 
     bench: Evaluator
-    circuit: Settings
-    """What makes the scene one of the circuit that is run."""
     quantity: str
     largest: bool
     ranges: dict[str, tuple[float, float]]
-    progress: Callable[[Run, Run | None], None]
-    known: dict[tuple[float, ...], Run] = field(default_factory=dict)
+
+
+Progress = Callable[[Run, Run | None], None]
+
+
+def _searched(
+    aim: _Aim, scene: Scene, budget: int, seed: int, progress: Progress, scouting: Progress
+) -> tuple[Run, dict[str, list[float | None]], list[Run], int]:
+    """The best run, its neighbours, all runs, and how many scouts went ahead."""
+    turned = 2 * len(aim.ranges)
+    searched = min(round(SEARCHED * budget), budget - turned)
+    scouts, warm = 0, np.empty((0, len(aim.ranges)))
+    simple = Fidelity.of(scene).simple
+    # Quantities that only the scene's own rung has find no scouts.
+    with suppress(BadInput):
+        if simple is not None:
+            ahead = _Trial(aim, simple, scouting)
+            ahead.search(SCOUTS * searched, seed)
+            scouts, warm = len(ahead.runs), ahead.known.ranked(0, WARM_APART, WARM)
+    trial = _Trial(aim, {}, progress)
+    trial.search(searched, seed, warm)
+    if trial.best is None:
+        raise SimulationFailed(
+            f"No setting could be run; the first one: {trial.runs[0].outcome.failure}"
+        )
+    best, neighbours = trial.best, trial.neighbours()
+    while trial.best is not best and len(trial.runs) + turned <= budget:
+        best, neighbours = trial.best, trial.neighbours()
+    if trial.best is not best:
+        best, neighbours = trial.best, {}
+    return best, neighbours, trial.runs, scouts
+
+
+class _Trial:
+    """A search on one circuit model, which ``circuit`` makes of the scene."""
+
+    def __init__(self, aim: _Aim, circuit: Settings, progress: Progress) -> None:
+        self._aim, self._circuit, self._progress = aim, circuit, progress
+        self.runs: list[Run] = []
+        """In the order of the points that are known."""
+        self.known = Known(len(aim.ranges), 1, FINE, self._run)
 
     @property
     def best(self) -> Run | None:
         """The first of the best runs."""
-        found = [run for run in self.known.values() if run.value is not None]
-        return min(found, key=lambda run: self._cost(run.value), default=None)
+        found = self.known.scores[: len(self.runs), 0]
+        return self.runs[int(found.argmax())] if len(found) and found.max() > -inf else None
 
-    def ranked(self) -> Array:
-        """Points of the unit cube that have a value, the best first."""
-        found = [place for place, run in self.known.items() if run.value is not None]
-        found.sort(key=lambda place: self._cost(self.known[place].value))
-        return np.array(found).reshape(-1, len(self.ranges))
-
-    def search(self, runs: int, seed: int, hints: Array | None = None) -> None:
-        """Ask for at most ``runs`` points; for ``hints`` (rows) first, in place of most of the
+    def search(self, runs: int, seed: int, warm: Array | None = None) -> None:
+        """Run at most ``runs`` points; ``warm`` starts (rows) first, in place of most of the
         exploration."""
-        explored = round(EXPLORED * runs)
-        hints = np.empty((0, len(self.ranges))) if hints is None else hints[:explored]
-        climb = Climb(len(self.ranges), max(explored, len(hints) + POPULATION), seed)
-        left, idle = runs, 0
-        points = hints if len(hints) else climb.ask(left)
-        while len(points) and idle < IDLE:
-            found, taken = self.costs(points)
-            climb.tell(points, found)
-            left, idle = left - taken, 0 if taken else idle + 1
-            points = climb.ask(left)
+        keys, explored = len(self._aim.ranges), round(EXPLORED * runs)
+        if warm is not None:
+            self.known.rows(warm[:explored])
+            explored = max(explored, len(self.runs) + POPULATION)
+        design = Design(keys, explored, seed)
+        self.known.search({0: design}, explored - len(self.runs))
+        self.known.search({0: Climb(keys, seed)}, runs - len(self.runs))
 
-    def costs(self, points: Array) -> tuple[Array, int]:
-        """The cost of each point of the unit cube (rows), and how many of them were run for it."""
-        # The search comes back with what it has heard, but for rounding.
-        places = [tuple(float(x) for x in np.round(row, 9)) for row in points]
-        new = [place for place in dict.fromkeys(places) if place not in self.known]
-        runs: dict[int, Run] = {}
-        settings = [self.settings(place) for place in new]
-        asked = ({**self.circuit, **values} for values in settings)
-        for number, outcome in self.bench.run(enumerate(asked)):
-            runs[number] = Run(settings[number], outcome, self._value(outcome))
-            self.progress(runs[number], self.best)
-        for number, place in enumerate(new):
-            self.known[place] = runs[number]
-        return np.array([self._cost(self.known[place].value) for place in places]), len(new)
+    def neighbours(self) -> dict[str, list[float | None]]:
+        """The value asked for with each key turned down and up from the best."""
+        keys = list(self._aim.ranges)
+        best = self.known.points[int(self.known.scores[:, 0].argmax())]
+        turned = faces(best)
+        off = np.abs(turned - best).max(axis=1)
+        inside = np.isclose(off, TURN)
+        rows = iter(self.known.rows(turned[inside]))
+        values = [self.runs[next(rows)].value if there else None for there in inside]
+        return {key: [values[len(keys) + k], values[k]] for k, key in enumerate(keys)}
 
-    def settings(self, place: tuple[float, ...]) -> dict[str, Number]:
+    def _run(self, points: Array) -> tuple[Array, Feasible]:
+        settings = [self._settings(point.tolist()) for point in points]
+        found: dict[int, Run] = {}
+        asked = ({**self._circuit, **values} for values in settings)
+        for number, outcome in self._aim.bench.run(enumerate(asked)):
+            found[number] = Run(settings[number], outcome, self._value(outcome))
+            self._progress(found[number], self.best)
+        runs = [found[number] for number in range(len(points))]
+        self.runs += runs
+        scores = np.array([[self._score(run.value)] for run in runs])
+        return scores, np.isfinite(scores[:, 0])
+
+    def _settings(self, point: Sequence[float]) -> dict[str, Number]:
         """The keys' values at a point of the unit cube."""
         settings: dict[str, Number] = {}
-        for (name, (low, high)), share in zip(self.ranges.items(), place, strict=True):
+        for (name, (low, high)), share in zip(self._aim.ranges.items(), point, strict=True):
             value = min(max(low + share * (high - low), low), high)
             settings[name] = round(value) if numeric_key(name).kind is int else value
         return settings
@@ -258,26 +241,15 @@ class _Trial:
     def _value(self, outcome: Outcome) -> float | None:
         if outcome.failure:
             return None
-        if self.quantity not in outcome.numbers:
+        if self._aim.quantity not in outcome.numbers:
             names = ", ".join(outcome.numbers)
-            raise BadInput(f"{self.quantity} is not a number of this scene's summary ({names}).")
-        value = outcome.numbers[self.quantity]
+            raise BadInput(
+                f"{self._aim.quantity} is not a number of this scene's summary ({names})."
+            )
+        value = outcome.numbers[self._aim.quantity]
         return value if isfinite(value) else None
 
-    def _cost(self, value: float | None) -> float:
+    def _score(self, value: float | None) -> float:
         if value is None:
-            return inf
-        return -value if self.largest else value
-
-
-def _turned(trial: _Trial, best: Run) -> dict[str, list[float | None]]:
-    """The value asked for with each key turned about the best."""
-    place = next(place for place, run in trial.known.items() if run is best)
-    found: dict[str, list[float | None]] = {}
-    for k, key in enumerate(trial.ranges):
-        row = [(*place[:k], round(place[k] + turn, 9), *place[k + 1 :]) for turn in TURNS]
-        inside = [point for point in row if 0.0 <= point[k] <= 1.0]
-        if inside:
-            trial.costs(np.array(inside))
-        found[key] = [trial.known[point].value if point in inside else None for point in row]
-    return found
+            return -inf
+        return value if self._aim.largest else -value

@@ -1,0 +1,106 @@
+"""The points of a search that were run, for several quantities at once."""
+
+from collections.abc import Mapping
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from cosim.arrays import Array
+from cosim.search.protocol import Evaluate, Feasible, Search, apart
+from cosim.search.turns import TURN
+
+NEAR, FEWEST, MOST = 1.5 * TURN, 5, 100
+"""What is known of a point's surroundings: how far they reach, from how many points at least, and
+of how many of the best points they are looked at."""
+
+
+class Known:
+    """Runs points, each once, and keeps their scores, -inf where they are not feasible. Only
+    multiples of 1/``steps`` can be set."""
+
+    def __init__(self, keys: int, quantities: int, steps: int, evaluate: Evaluate) -> None:
+        self._steps, self._evaluate = steps, evaluate
+        self._rows: dict[bytes, int] = {}
+        self.points, self.scores = np.empty((0, keys)), np.empty((0, quantities))
+        self.feasible: Feasible = np.empty(0, bool)
+        self._raw = self.scores
+        self._tree: KDTree | None = None
+
+    def set_at(self, points: Array) -> Array:
+        """The nearest points (rows) that can be set, inside the cube."""
+        return np.round(np.clip(points, 0.0, 1.0) * self._steps) / self._steps
+
+    def rows(self, points: Array) -> list[int]:
+        """The rows of points here, which are run where they are not known."""
+        points = self.set_at(points)
+        keys = [point.tobytes() for point in points]
+        new = [n for n, key in enumerate(keys) if key not in self._rows]
+        new = [n for n in new if keys.index(keys[n]) == n]
+        if new:
+            found, feasible = self._evaluate(points[new])
+            first = len(self.points)
+            self._rows |= {keys[n]: first + k for k, n in enumerate(new)}
+            self.points = np.vstack([self.points, points[new]])
+            self._raw = np.vstack([self._raw, found])
+            self.feasible = np.concatenate([self.feasible, feasible])
+            self.scores = np.where(self.feasible[:, None], self._raw, -inf)
+            self._tree = None
+        return [self._rows[key] for key in keys]
+
+    def own(self, points: Array) -> Array:
+        """The scores of points (rows), whether they are feasible or not."""
+        rows = self.rows(points)
+        return self._raw[rows]
+
+    def search(self, searches: Mapping[int, Search], runs: float = inf) -> None:
+        """Let searches, by the number of the quantity that each is for, ask for ``runs`` points
+        each, side by side, so that many workers have something to do."""
+        for quantity, search in searches.items():
+            search.tell(self.points, self.scores[:, quantity], self.feasible)
+        left = dict.fromkeys(searches, runs)
+        while asked := {
+            quantity: points
+            for quantity, search in searches.items()
+            if left[quantity] > 0 and len(points := _first(search.ask(), left[quantity]))
+        }:
+            rows = self.rows(np.vstack([*asked.values()]))
+            for quantity, points in asked.items():
+                mine, rows = rows[: len(points)], rows[len(points) :]
+                left[quantity] -= len(points)
+                searches[quantity].tell(points, self.scores[mine, quantity], self.feasible[mine])
+
+    def tops(self) -> Array:
+        """The best score of each quantity; -inf where there is none."""
+        top: Array = self.scores.max(axis=0, initial=-inf)
+        return top
+
+    def ranked(self, quantity: int, distance: float, count: int) -> Array:
+        """Feasible points with a score, the best first, each ``distance`` from those before it."""
+        order = self._order(quantity)
+        best = self.points[order]
+        return best[apart(best, distance, count)]
+
+    def steady(self, quantity: int, distance: float, count: int) -> Array:
+        """The same among the best ones by the lower quartile of what is known about them, as far as
+        that tells: those that are likely to be robust."""
+        order = self._order(quantity)[:MOST]
+        self._tree = self._tree or KDTree(self.points)
+        column = self.scores[:, quantity]
+        near = self._tree.query_ball_point(self.points[order], NEAR, p=inf)
+        quartile = [
+            np.sort(column[rows])[(len(rows) - 1) // 4] if len(rows) >= FEWEST else -inf
+            for rows in near
+        ]
+        best = self.points[order[np.argsort(-np.array(quartile), kind="stable")]]
+        return best[apart(best, distance, count)]
+
+    def _order(self, quantity: int) -> NDArray[np.intp]:
+        column = self.scores[:, quantity]
+        order = np.argsort(-column, kind="stable")
+        return order[np.isfinite(column[order])]
+
+
+def _first(points: Array, most: float) -> Array:
+    return points if len(points) <= most else points[: int(most)]
