@@ -14,7 +14,7 @@ SUMMARY: dict[str, Quantity] = {
     "run": Quantity("", "which run it is: the files of one run bear the same mark"),
     "v_average": Quantity("m/s", "mean velocity of the part after run.settle, up positive"),
     "v_average_error": Quantity(
-        "m/s", "estimate of what ngspice's steps did to v_average; only where ngspice runs"
+        "m/s", "estimate of what the steps of ngspice, or of the fast solver, did to v_average"
     ),
     "transport_per_cycle": Quantity("m", "v_average times the period of the drive"),
     "stick_fraction": Quantity("1", "share of the time in which the part sticks to the surface"),
