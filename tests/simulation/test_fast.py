@@ -113,6 +113,16 @@ def test_a_sweep_is_judged_by_the_fmu(capsys: pytest.CaptureFixture[str]) -> Non
     assert "fast solver against the FMU at 6 points: median error" in told
 
 
+def test_what_tune_reports_is_the_fmu_s() -> None:
+    few = {"run.duration": 0.2, "run.settle": 0.1}
+    over = {"drive.pot_max": (0.5, 0.8)}
+    found = cosim.tune("paper-limited", few | FAST, maximise="v_average", over=over, budget=40)
+    assert found.scene.run.solver == "fmu"
+    assert found.best.value == pytest.approx(summary(found.scene)["v_average"], rel=1e-6)
+    assert found.scouts > 20
+    assert "by the FMU" in repr(found) or found.by_fast is None
+
+
 @pytest.mark.reliability
 @pytest.mark.parametrize(
     ("changes", "told"),

@@ -67,7 +67,7 @@ def draw(tuning: Search) -> Picture:
     best = with_unit(tuning.best.value * scale, unit, 4)
     figure.suptitle(
         f"{tuning.scene.name}: {tuning.quantity} {best} after {len(values)} runs"
-        + (f", and {tuning.scouts} ahead without ngspice" if tuning.scouts else ""),
+        + (f", and {tuning.scouts} ahead, cheaper" if tuning.scouts else ""),
         fontsize=12,
     )
     return figure

@@ -29,6 +29,7 @@ def write(folder: Path, tuning: Search) -> None:
         "seed": tuning.seed,
         "search": "Latin hypercube, then CMA-ES",
         "scouts": tuning.scouts,
+        "value_by_fast_solver": tuning.by_fast,
         "turns": list(TURNS),
         "neighbours": tuning.neighbours,
         "robustness": robustness(tuning),
@@ -86,11 +87,14 @@ def table(tuning: Search) -> str:
     value = tuning.best.value
     assert value is not None
     unit, scale = bench_unit(tuning.quantity)
-    ahead = f" ({tuning.scouts} ahead without ngspice)" if tuning.scouts else ""
+    ahead = f" ({tuning.scouts} ahead, cheaper)" if tuning.scouts else ""
     lines = [
         f"{tuning.quantity} = {with_unit(value * scale, unit, 5)} after {len(tuning.runs)} runs"
         f"{ahead}, {tuning.failed} failed, at"
     ]
+    if tuning.by_fast is not None:
+        told = with_unit(tuning.by_fast * scale, unit, 5)
+        lines.append(f"  by the FMU; the fast solver, which searched, has {told}")
     for name, setting in tuning.best.values.items():
         line = f"  {name} = {with_unit(setting, numeric_key(name).unit)}"
         if key := KNOBS.get(name.removeprefix("drive.")):

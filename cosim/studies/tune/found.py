@@ -37,8 +37,10 @@ class Search:
     scene: Scene
     """The scene at the best settings."""
     scouts: int
-    """Runs on the rung "limited" that went ahead; 0 where the scene needs no ngspice itself."""
+    """Runs on the rung "limited", or with the fast solver, that went ahead."""
     seed: int
+    by_fast: float | None = None
+    """The value at the best run by the fast solver, where that searched: the FMU has judged."""
 
     @property
     def failed(self) -> int:

@@ -22,6 +22,9 @@ from cosim.simulation.choose_rung import WITHOUT_NGSPICE, without_ngspice
 from cosim.studies.tune import files
 from cosim.studies.tune.found import TURNS, Run, Search
 
+FMU: Settings = {"run.solver": "fmu"}
+"""What makes the scene one that the FMU solves."""
+
 KNOBS: dict[str, tuple[float, float]] = {
     f"drive.{knob}": (0.0, 1.0) for knob in ("pot_max", "pot_frequency", "pot_offset")
 }
@@ -87,10 +90,11 @@ def tune(
 
     ``maximise`` or ``minimise`` names the number; ``over`` gives the range of each ``table.key``,
     SI; by default the three knobs. Where the scene needs ngspice, SCOUTS times as many runs on the
-    rung "limited" look first where it is worth while. After the search each key is turned a little
-    about the best, which moves on while that helps and the budget lasts. The same for the same
-    ``seed``, whatever the number of ``workers``, local ones or those of the Dask cluster at the
-    address ``dask``. ``progress`` is told each run and the best so far,
+    rung "limited" look first where it is worth while. Where its solver is the fast one, that one
+    searches, and the FMU judges the best HINTS and what follows. After the search each key is
+    turned a little about the best, which moves on while that helps and the budget lasts. The same
+    for the same ``seed``, whatever the number of ``workers``, local ones or those of the cluster at
+    the address ``dask``. ``progress`` is told each run and the best so far,
     as they finish, ``scouting`` each one ahead. Where the frequency is tuned, each run lasts whole
     periods.
 
@@ -157,10 +161,19 @@ def _tuned(
             trial.search(SCOUTS * searched, seed)
             ranked = trial.ranked()
             scouts, hints = len(trial.known), ranked[apart(ranked, HINTS_APART, HINTS)]
-    trial = _Trial(bench, {}, quantity, largest, ranges, progress)
-    trial.search(searched, seed, hints)
+    scout, judge = None, {}
+    if scene.run.solver == "fast":
+        scout, judge = _Trial(bench, {}, quantity, largest, ranges, scouting), FMU
+        scout.search(searched, seed)
+        ranked = scout.ranked()
+        scouts, hints = len(scout.known), ranked[apart(ranked, HINTS_APART, HINTS)]
+    trial = _Trial(bench, judge, quantity, largest, ranges, progress)
+    if scout is None:
+        trial.search(searched, seed, hints)
+    elif len(hints):
+        trial.costs(hints)  # the FMU judges what the fast solver has found
     if trial.best is None:
-        reason = next(iter(trial.known.values())).outcome.failure
+        reason = next(iter((trial.known or (scout or trial).known).values())).outcome.failure
         raise SimulationFailed(f"No setting could be run; the first one: {reason}")
     best, neighbours = trial.best, _turned(trial, trial.best)
     while trial.best is not best and len(trial.known) + turned <= budget:
@@ -168,10 +181,11 @@ def _tuned(
     if trial.best is not best:
         best, neighbours = trial.best, {}
     runs = list(trial.known.values())
-    tuned = changed(scene, best.values, "tune")
+    tuned = changed(scene, {**best.values, **judge}, "tune")
     if whole_periods:
         tuned = changed(tuned, periods_made_whole(tuned), "tune")
-    return Tuning(quantity, largest, ranges, runs, best, neighbours, tuned, scouts, seed)
+    found = quantity, largest, ranges, runs, best, neighbours, tuned, scouts, seed
+    return Tuning(*found, None if scout is None else scout.value(best.values))
 
 
 def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
@@ -201,6 +215,11 @@ class _Trial:
         """The first of the best runs."""
         found = [run for run in self.known.values() if run.value is not None]
         return min(found, key=lambda run: self._cost(run.value), default=None)
+
+    def value(self, settings: Mapping[str, Number]) -> float | None:
+        """What was found at settings; None where they were not asked for."""
+        found = (run.value for run in self.known.values() if run.values == settings)
+        return next(found, None)
 
     def ranked(self) -> Array:
         """Points of the unit cube that have a value, the best first."""
