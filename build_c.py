@@ -33,7 +33,7 @@ LIBRARIES = {
         ROOT / "cosim" / folder for folder in ("coupling/loop", "drive", "simulation/rungs")
     ),
     "part": (ROOT / "cosim/mechanics",),
-    "chain": (ROOT / "cosim/studies/identify/chain",),
+    "stepper": tuple(ROOT / "cosim" / folder for folder in ("stepper", "studies/identify/chain")),
 }
 """The package's libraries; each is made of all C files of its folders."""
 DESCRIBE = FMU / "src/fmi/describe.c"
@@ -72,7 +72,8 @@ class BuildFailed(Exception):
 
 def sources() -> list[Path]:
     """All files that the products depend on."""
-    code = [path for folders in LIBRARIES.values() for path in _code(folders, "*.[ch]")]
+    kinds = ("*.[ch]", "*.def")
+    code = [path for of in LIBRARIES.values() for kind in kinds for path in _code(of, kind)]
     return sorted([*code, *_fmu_files(), DESCRIBE, FMU_LICENSE, Path(__file__)])
 
 

@@ -3,6 +3,7 @@
 What all studies of many runs stand on. A point that crashes or hangs costs only itself.
 """
 
+import itertools
 from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from cosim.errors import BadInput
-from cosim.evaluate.point import Number, Outcome, evaluate, failed, outcome_of, point
+from cosim.evaluate.point import Number, Outcome, evaluate, evaluate_many, failed, outcome_of, point
 from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene
 from cosim.simulation.many import each
@@ -18,6 +19,11 @@ from cosim.toolchain.processes import Progress, processors
 
 Settings = Mapping[str, Number | str]
 """``table.key`` and value, SI."""
+
+TOGETHER = 64
+"""Points that are solved side by side, at most: some lanes full of runs of like duration."""
+
+_Task = list[tuple[int, Settings]]
 
 
 class Evaluator:
@@ -104,11 +110,42 @@ class Evaluator:
                 self._cluster = self._stack.enter_context(cluster)
             yield from self._cluster.run(points)
             return
-        for number, found in each(self._evaluate, points, self._workers):
-            yield number, failed(found) if isinstance(found, Exception) else found
+        tasks: dict[int, _Task] = {}
+        for number, found in each(self._evaluate, self._tasks(points, tasks), self._workers):
+            task = tasks.pop(number)
+            if isinstance(found, Exception):
+                found = [failed(found)] * len(task)
+            yield from zip((number for number, _ in task), found, strict=True)
 
-    def _evaluate(self, settings: Settings, progress: Progress) -> Outcome:
-        return evaluate(self._scene, settings, self._whole_periods, progress)
+    def _tasks(
+        self, points: Iterator[tuple[int, Settings]], known: dict[int, _Task]
+    ) -> Iterator[tuple[int, _Task]]:
+        """The points as tasks with numbers, which are ``known`` from then on: those that are solved
+        side by side together, all others one by one."""
+        together: _Task = []
+
+        def task(of: _Task) -> tuple[int, _Task]:
+            number = next(numbers)
+            known[number] = of
+            return number, of
+
+        numbers = itertools.count()
+        for one in points:
+            if one[1].get("run.solver", self._scene.run.solver) != "fast":
+                yield task([one])
+                continue
+            together.append(one)
+            if len(together) == TOGETHER:
+                yield task(together)
+                together = []
+        if together:
+            yield task(together)
+
+    def _evaluate(self, task: _Task, progress: Progress) -> list[Outcome]:
+        settings = [settings for _, settings in task]
+        if settings[0].get("run.solver", self._scene.run.solver) == "fast":
+            return evaluate_many(self._scene, settings, self._whole_periods)
+        return [evaluate(self._scene, settings[0], self._whole_periods, progress)]
 
 
 def workers_asked(workers: int | None) -> int:

@@ -1,8 +1,8 @@
 """One point of a study: the scene with some keys changed, run for the numbers of its summary."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, isinf, nan
+from math import ceil, isfinite, isinf, nan
 from typing import Any
 
 from cosim.errors import CosimError
@@ -52,6 +52,24 @@ def evaluate(
         except CosimError as error:
             return failed(error)
     return lost
+
+
+def evaluate_many(
+    base: Scene, each: Sequence[Mapping[str, Number | str]], whole_periods: bool
+) -> list[Outcome]:
+    """The same of several settings, all with ``run.solver`` fast, side by side."""
+    from cosim.simulation.fast import LOST, summaries
+
+    outcomes: list[Outcome] = [Outcome({})] * len(each)
+    scenes: dict[int, Scene] = {}
+    for place, values in enumerate(each):
+        try:
+            scenes[place] = point(base, values, whole_periods)
+        except CosimError as error:
+            outcomes[place] = failed(error)
+    for place, found in zip(scenes, summaries([*scenes.values()]), strict=True):
+        outcomes[place] = outcome(found) if isfinite(found["v_average"]) else Outcome({}, LOST)
+    return outcomes
 
 
 def point(base: Scene, values: Mapping[str, Number | str], whole_periods: bool) -> Scene:

@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 
 from cosim.errors import BadInput, Note, plain
 from cosim.mechanics import package
+from cosim.toolchain.libraries import digest
 from cosim.toolchain.versions import versions
 
 try:
@@ -61,7 +62,7 @@ class Store:
         try:
             where = ":memory:" if path is None else str(path)
             self._base = sqlite3.connect(where, isolation_level=None)
-            self._told(self._take_up, hashed(asked, versions(), package.token()))
+            self._told(self._take_up, hashed(asked, versions(), package.token(), digest("stepper")))
             self.resumed = len(self)
             """How much stood in the file."""
         except BaseException:

@@ -24,6 +24,7 @@ from cosim.scene.tables import (
     Run,
     fault,
 )
+from cosim.stepper.stepper import VARIABLES
 
 _CAREFUL = {"max_step": 2e-5, "reltol": 1e-5}
 """For circuits that nobody here knows; s, 1."""
@@ -36,6 +37,28 @@ FASTEST_NEAR, FASTEST_FAR, FAR = 1e-13, 1e-8, 2.0
 """Least time constants, s, of a coil in ngspice: where a drive takes the output FAR times beyond
 its limits, which it then is at for a third of the time and more, and else, where a step's rounding
 is taken for a course towards them. Faster ones take above a minute for 0.1 s."""
+
+_FAST = {*VARIABLES.values(), "n_surfaces", "coil_count", "initial_lift"} | {
+    *("restitution", "tolerance"),  # of rigid walls, and of the FMU's own steps
+}
+"""Variables of the FMU that the fast solver takes, or that say nothing to it."""
+
+_FAST_NEEDS: list[tuple[str, Sequence[object], str]] = [
+    ("circuit.model", ("limited", "ideal"), '"limited" or "ideal"'),
+    ("drive.waveform", ("sawtooth",), '"sawtooth"'),
+    ("drive.reset_time", (0.0,), "0"),
+    ("drive.quantised", (False,), "false"),
+    ("drive.phase_deg", (None,), "absent"),
+    ("mechanics.actuator", ("ram",), '"ram"'),
+    ("mechanics.contact", ("compliant",), '"compliant"'),
+    ("friction.normal_force_file", (None,), "absent"),
+    *(
+        (key.full, (key.default,), "absent" if key.default is None else f"{key.default:g}")
+        for key in keys()
+        if key.variable and key.variable not in _FAST
+    ),
+]
+"""What the fast solver models: keys, their allowed values, and these in words."""
 
 
 class Scene(BaseModel):
@@ -149,22 +172,42 @@ class Scene(BaseModel):
         if self.drive.phase_deg is None:
             return self
         able = sorted(name for name, rung in RUNGS.items() if rung.two_surfaces)
-        needed: list[tuple[str, Sequence[object], str]] = [
+        self._need(
+            "drive.phase_deg lets two surfaces move by themselves",
             ("circuit.model", able, " or ".join(f'"{name}"' for name in able)),
             ("coil.count", (1,), "1: each surface has a source of its own"),
             ("mechanics.n_surfaces", (2,), "2"),
             ("mechanics.actuator", ("ram",), '"ram"'),
             ("friction.mu_plate", (0.0,), "0"),
-        ]
+        )
+        return self
+
+    def _need(self, why: str, *needed: tuple[str, Sequence[object], str]) -> None:
+        """Raise where a key has no allowed value; what is needed is a key, these, and the same in
+        words."""
         for full, allowed, words in needed:
             table, _, key = full.partition(".")
             value = getattr(getattr(self, table), key)
             if value not in allowed:
-                shown = f'"{value}"' if isinstance(value, str) else f"{value:g}"
-                raise fault(
-                    f"drive.phase_deg lets two surfaces move by themselves; with it {full} = "
-                    f"{shown} must be {words}"
-                )
+                shown = f"{value:g}" if type(value) in (int, float) else toml_value(value)
+                raise fault(f"{why}; with it {full} = {shown} must be {words}")
+
+    @model_validator(mode="after")
+    def _check_solver(self) -> "Scene":
+        """The fast solver has the machine's common case, and takes no variable of the FMU that is
+        not in its own table."""
+        if self.run.solver != "fast":
+            return self
+        why = 'run.solver = "fast" has fixed steps for one free ram under a sharp sawtooth'
+        self._need(why, *_FAST_NEEDS)
+        if self.mechanics.initial_lift and not self.friction.mu_plate * self.friction.normal_force:
+            self._need(why, ("mechanics.initial_lift", (0.0,), "0 without friction.mu_plate"))
+        most = 0.1 / self.run.step
+        if self.drive.frequency > most:
+            raise fault(
+                f"drive.frequency = {self.drive.frequency:g} Hz must be at most {most:g} Hz with "
+                f"run.step = {self.run.step:g} s of the fast solver"
+            )
         return self
 
     @model_validator(mode="after")

@@ -394,6 +394,10 @@ class Run(Table):
         1.0,
         "Relative error of v_average that a simpler circuit may make: auto, ladder",
     )
+    solver: Literal["fmu", "fast"] = _choice(
+        "fmu", "fmu: finds each event; fast: fixed steps, many scenes side by side, in sweeps"
+    )
+    step: float = _number(5e-5, "s", 1e-7, 1e-3, "Step of the solver fast")
 
     @model_validator(mode="after")
     def _check(self) -> "Run":

@@ -59,6 +59,10 @@ def simulate(
     Every circuit in ngspice runs in a worker process, behind a fence. Raises BadInput for a netlist
     that cannot be used, SimulationFailed with where, when, and what to try.
     """
+    if scene.run.solver == "fast":
+        from cosim.simulation.fast import simulate_fast
+
+        return simulate_fast(scene, progress)
     again = partial(simulate, progress=progress, fmi_version=fmi_version)
     if scene.rung.automatic:
         return _cheapest(scene, partial(again, checks=checks))
@@ -79,6 +83,10 @@ def simulate(
 
 def summary(scene: Scene, progress: Progress = lambda _: None) -> dict[str, Any]:
     """The summary of a run alone, without notes. Raises as a run does."""
+    if scene.run.solver == "fast":
+        from cosim.simulation.fast import summary_fast
+
+        return summary_fast(scene, progress)
     if scene.rung.automatic or (scene.rung.ngspice and scene.coupling.method == "auto"):
         return simulate(scene, progress).summary
     if scene.rung.ngspice and not in_a_worker():

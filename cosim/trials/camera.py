@@ -57,9 +57,10 @@ def instants(frames: Array, exposure: float) -> Array:
 
 
 def shown(heights: Array, exposure: float) -> Array:
-    """What frames show of the heights at their instants: the mean of each exposure (s)."""
+    """What frames show of the heights (or rows of them) at their instants: the mean of each
+    exposure (s)."""
     n = instants_a_frame(exposure)
-    return heights.reshape(-1, n).mean(axis=1) if n > 1 else heights
+    return heights.reshape(-1, n, *heights.shape[1:]).mean(axis=1) if n > 1 else heights
 
 
 def heights(waveforms: Mapping[str, Array], body: str, frames: Array, exposure: float) -> Array:
@@ -88,10 +89,10 @@ def velocities(time: Array, z: Array) -> Array:
 
 
 def accelerations(z: Array) -> Array:
-    """Five-point differences of heights at FRAME_RATE, m/s² for m; NaN in the first two and the
-    last two frames.
+    """Five-point differences of heights (or rows of them) at FRAME_RATE, m/s² for m; NaN in the
+    first two and the last two frames.
     """
-    a = np.full(len(z), np.nan)
+    a = np.full(z.shape, np.nan)
     a[2:-2] = (2 * z[4:] - z[3:-1] - 2 * z[2:-2] - z[1:-3] + 2 * z[:-4]) * FRAME_RATE**2 / 7.0
     return a
 

@@ -16,7 +16,8 @@ SUMMARY: dict[str, Quantity] = {
     "v_average_error": Quantity(
         "m/s",
         "difference of v_average to a run with steps three times as long: twice it and a millionth "
-        "of v_average hold the true error of regular motion; null where that is not known",
+        "of v_average hold the true error of regular motion; null where that is not known; with "
+        "the fast solver that to half the step",
     ),
     "motion": Quantity(
         "",

@@ -9,8 +9,8 @@ from cosim.trials.measured import measured
 
 def table(scene: Scene, summary: dict[str, Any]) -> str:
     """The summary in a few lines, in the units of the bench."""
-    lost = summary["energy_residual"]
-    warning = ": too much, take finer steps" if lost > SUSPICIOUS else ""
+    lost = summary.get("energy_residual")
+    warning = ": too much, take finer steps" if lost and lost > SUSPICIOUS else ""
     taken = "{circuit_model}: {circuit_model_why}" if "circuit_model" in summary else ""
     rows = [
         ("part's mean velocity", _scaled(summary["v_average"], 1e3, "mm/s", "+.3f")),
@@ -30,10 +30,10 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
             ("amplifier at a limit", _limits(summary) if scene.rung.has_limits else ""),
         ]
     rows += [
-        ("impacts", f"{summary['impacts']}"),
-        ("stick-slip events", f"{summary['stick_slip_events']}"),
+        ("impacts", f"{summary.get('impacts', '')}"),
+        ("stick-slip events", f"{summary.get('stick_slip_events', '')}"),
         ("circuit taken", taken.format_map(summary)),
-        ("energy unaccounted for", f"{lost:.1e} of the total{warning}"),
+        ("energy unaccounted for", "" if lost is None else f"{lost:.1e} of the total{warning}"),
         ("error of the path", _error(summary)),
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
     ]
@@ -150,4 +150,6 @@ def _limits(summary: dict[str, Any]) -> str:
 def _acceleration(scene: Scene, summary: dict[str, Any]) -> str:
     if scene.mechanics.contact == "rigid" and not scene.surface_is_given:
         return 'without bound at a rigid impact (mechanics.contact = "compliant" has a peak)'
+    if "a_surface_max" not in summary:
+        return ""
     return _range(summary, "a_surface", 1, "m/s²", "+.0f") or "without bound: velocity jumps"

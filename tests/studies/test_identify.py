@@ -14,6 +14,7 @@ from cosim.arrays import Array
 from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.evaluate.store import Store
+from cosim.stepper import stepper
 from cosim.studies.identify import run
 from cosim.studies.identify.chain import chain
 from cosim.studies.identify.problem.space import read_space
@@ -129,7 +130,7 @@ def test_steps_agree_with_the_exact_rung(label: str) -> None:
     space, own = read_space(), np.array(OWN[label])
     apart = {}
     for step in (SEARCH_STEP, FINE_STEP):
-        zeros = np.zeros(len(chain.OWN))
+        zeros = np.zeros(len(stepper.OWN))
         target = chain.Target(exact["time"], {}, {}, frozenset(), zeros, zeros, zeros, step)
         found = chain.simulate(target, space.rigs(place()[None]), own[None])[0]
         apart[step] = [
@@ -147,7 +148,7 @@ def test_each_lane_has_its_own_machine() -> None:
     """Whatever stands in the other lanes, and in whichever lane."""
     rng = np.random.default_rng(1)
     space, time = read_space(), np.arange(60) / FRAME_RATE
-    zeros = np.zeros(len(chain.OWN))
+    zeros = np.zeros(len(stepper.OWN))
     target = chain.Target(time, {}, {}, frozenset(), zeros, zeros, zeros, SEARCH_STEP)
     rigs = space.rigs(rng.random((11, len(space.free))))
     own = np.array(
@@ -182,7 +183,7 @@ def test_own_numbers_are_found_on_the_true_rig(search: Search) -> None:
     assert found.costs.mean() < 5e-3
     truth = np.array([OWN[label] for label in OWN])
     for name, tolerance in (("offset", 0.2), ("phase", 0.02), ("normal_force", 0.1)):
-        k = chain.OWN.index(name)
+        k = stepper.OWN.index(name)
         assert np.abs(found.own[:, k] - truth[:, k]).max() < tolerance
 
 

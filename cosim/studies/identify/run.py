@@ -13,7 +13,7 @@ from cosim.evaluate.evaluator import workers_asked
 from cosim.evaluate.store import Store
 from cosim.files.picture import Picture
 from cosim.scene import keys
-from cosim.studies.identify.chain.chain import OWN
+from cosim.stepper.stepper import OWN
 from cosim.studies.identify.problem.space import Space, read_space
 from cosim.studies.identify.problem.targets import (
     TRANSPORT,
@@ -161,7 +161,7 @@ def _asked(space: Space, trials: Sequence[Measured], effort: object) -> Any:
         ]
         for trial in trials
     ]
-    return [entries, sums, repr((effort, WEIGHTS, TRANSPORT)), digest("chain")]
+    return [entries, sums, repr((effort, WEIGHTS, TRANSPORT)), digest("stepper")]
 
 
 def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[HeldOut]]:

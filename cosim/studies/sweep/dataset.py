@@ -19,6 +19,10 @@ from cosim.waveforms.quantities import meaning
 FAILURE = "failure"
 """The variable that says why a point failed; empty where it did not."""
 
+JUDGED = "v_average_fmu"
+"""The variable with v_average as the FMU has it, at the points of a fast sweep that it judged."""
+_JUDGED = {"units": "m/s", "long_name": "v_average by the FMU, where it judged the fast solver"}
+
 POINT = "point"
 """The dimension of a sample."""
 
@@ -47,10 +51,16 @@ class Numbers:
                 values[name] = np.full(self._count, np.nan)
             values[name][index] = value
 
+    def judge(self, index: int, outcome: Outcome) -> None:
+        """Take up what the FMU makes of a point that the fast solver has run."""
+        values = self._values.setdefault(JUDGED, np.full(self._count, np.nan))
+        values[index] = outcome.numbers.get("v_average", np.nan)
+
     def by_name(self) -> dict[str, Array]:
         """NaN where a point has none. The order is that of the points, in whichever they ran."""
         order = sorted(self._first, key=lambda names: self._first[names])
-        return {name: self._values[name] for names in order for name in names}
+        found = {name: self._values[name] for names in order for name in names}
+        return found | {name: self._values[name] for name in (JUDGED,) if name in self._values}
 
 
 def dataset(scene: Scene, design: Design, found: Numbers, versions: dict[str, str]) -> xr.Dataset:
@@ -75,7 +85,7 @@ def dataset(scene: Scene, design: Design, found: Numbers, versions: dict[str, st
         for name, column, axis in zip(axes, columns, design.axes, strict=True)
     }
     variables = {
-        name: (dims, values.reshape(design.shape), meaning(name))
+        name: (dims, values.reshape(design.shape), _JUDGED if name == JUDGED else meaning(name))
         for name, values in numbers.items()
     }
     about = {"long_name": "Why the point failed; empty where it did not"}

@@ -6,10 +6,16 @@ import numpy as np
 import xarray as xr
 
 from cosim.errors import SimulationFailed
-from cosim.studies.sweep.dataset import FAILURE, swept
+from cosim.studies.sweep.dataset import FAILURE, JUDGED, swept
 from cosim.waveforms.quantities import with_unit
 
 MOST_REASONS = 5
+
+LEAST = 1e-3
+"""m/s: errors of v_average are relative to no less than this."""
+
+BEYOND = 0.02
+"""Error of v_average that is told of a fast sweep by the share of points beyond it."""
 
 
 def table(data: xr.Dataset) -> str:
@@ -23,7 +29,13 @@ def table(data: xr.Dataset) -> str:
         for way, place in (("up", np.nanargmax(v)), ("down", np.nanargmin(v))):
             speed = v.ravel()[place]
             if (speed > 0) == (way == "up"):
-                lines.append(f"  fastest {way:<5}{speed * 1e3:+10.3f} mm/s at {_at(data, place)}")
+                judged = ""
+                if JUDGED in data:
+                    judged = f" (by the FMU {data[JUDGED].values.ravel()[place] * 1e3:+.3f})"
+                lines.append(
+                    f"  fastest {way:<5}{speed * 1e3:+10.3f} mm/s{judged} at {_at(data, place)}"
+                )
+        lines += _judgement(data) if JUDGED in data else []
     lines += [f"  {n} failed: {reason}" for reason, n in reasons.most_common(MOST_REASONS)]
     if len(reasons) > MOST_REASONS:
         lines.append(
@@ -37,6 +49,24 @@ def check(data: xr.Dataset) -> None:
     reasons = [str(reason) for reason in data[FAILURE].values.flat]
     if all(reasons):
         raise SimulationFailed(f"No point could be run; the first one: {reasons[0]}")
+
+
+def _judgement(data: xr.Dataset) -> list[str]:
+    """How far the fast solver is from the FMU at the points that this has judged."""
+    fast, fmu = (data[name].values.ravel() for name in ("v_average", JUDGED))
+    known = np.flatnonzero(np.isfinite(fmu))
+    if not len(known):
+        return []
+    scale = np.maximum(np.abs(fmu[known]), LEAST)
+    error = np.abs(fast[known] - fmu[known]) / scale
+    worst = known[error.argmax()]
+    return [
+        f"  fast solver against the FMU at {len(known)} points: median error "
+        f"{np.median(error) * 100:.2g} %, beyond {BEYOND * 100:g} % at "
+        f"{(error > BEYOND).mean() * 100:.3g} % of them (of v_average, at least {LEAST * 1e3:g} "
+        "mm/s)",
+        f"  furthest off {error.max() * 100:.2g} % at {_at(data, worst)}",
+    ]
 
 
 def _at(data: xr.Dataset, place: np.intp) -> str:

@@ -3,14 +3,15 @@
 import os
 import time
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
 import xarray as xr
 
 from cosim.errors import BadInput, Note
-from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.evaluator import Evaluator, Settings
 from cosim.evaluate.point import Number
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene, load
@@ -22,6 +23,9 @@ from cosim.toolchain.versions import versions
 STORE = "sweep.sqlite"
 RESULT = "sweep.nc"
 FIGURE = "figure.png"
+
+JUDGED = 50
+"""Random points of a sweep with the fast solver that the FMU runs again."""
 
 _REFRESH = 10.0
 """s between two writings of the dataset, and at least _RARELY times as long as one takes."""
@@ -120,4 +124,18 @@ def _sweep(
                     warnings.warn(f"{error} The sweep goes on.", Note, stacklevel=2)
                 ended = time.monotonic()
                 due = ended + max(_REFRESH, _RARELY * (ended - began))
+        if scene.run.solver == "fast":
+            for number, outcome in bench.run(_judged(design, numbers)):
+                numbers.judge(number, outcome)
         return refreshed()
+
+
+def _judged(design: Design, numbers: dataset.Numbers) -> Iterator[tuple[int, Settings]]:
+    """The points of a fast sweep that the FMU runs again: the fastest both ways, and a random few
+    by which its error is told."""
+    v = numbers.by_name().get("v_average", np.full(len(design), np.nan))
+    known = np.flatnonzero(np.isfinite(v))
+    few = np.random.default_rng(0).permutation(known)[:JUDGED].tolist()
+    ends = [int(known[end(v[known])]) for end in (np.argmax, np.argmin)] if len(known) else []
+    for number in sorted({*few, *ends}):
+        yield number, {**design.point(number), "run.solver": "fmu"}

@@ -52,8 +52,10 @@ class Tuning:
     scene: Scene
     """The scene at the best settings."""
     scouts: int
-    """Runs on the rung "limited" that went ahead; 0 where the scene needs no ngspice itself."""
+    """Runs on the rung "limited", or with the fast solver, that went ahead."""
     seed: int
+    by_fast: float | None = None
+    """The value at the best run by the fast solver, where that searched: the FMU has judged."""
 
     @property
     def failed(self) -> int:
@@ -103,6 +105,7 @@ def _write(folder: Path, tuning: Tuning) -> None:
         "seed": tuning.seed,
         "search": "Sobol sequence, then CMA-ES",
         "scouts": tuning.scouts,
+        "value_by_fast_solver": tuning.by_fast,
         "turns": [-TURN, TURN],
         "neighbours": tuning.neighbours,
         "robustness": _robustness(tuning),
@@ -156,11 +159,14 @@ def _table(tuning: Tuning) -> str:
     value = tuning.best.value
     assert value is not None
     unit, scale = bench_unit(tuning.quantity)
-    ahead = f" ({tuning.scouts} ahead without ngspice)" if tuning.scouts else ""
+    ahead = f" ({tuning.scouts} ahead, cheaper)" if tuning.scouts else ""
     lines = [
         f"{tuning.quantity} = {with_unit(value * scale, unit, 5)} after {len(tuning.runs)} runs"
         f"{ahead}, {tuning.failed} failed, at"
     ]
+    if tuning.by_fast is not None:
+        told = with_unit(tuning.by_fast * scale, unit, 5)
+        lines.append(f"  by the FMU; the fast solver, which searched, has {told}")
     for name, setting in tuning.best.values.items():
         line = f"  {name} = {with_unit(setting, numeric_key(name).unit)}"
         if key := KNOBS.get(name.removeprefix("drive.")):
@@ -225,7 +231,7 @@ def _figure(tuning: Tuning) -> Picture:
     best = with_unit(tuning.best.value * scale, unit, 4)
     figure.suptitle(
         f"{tuning.scene.name}: {tuning.quantity} {best} after {len(values)} runs"
-        + (f", and {tuning.scouts} ahead without ngspice" if tuning.scouts else ""),
+        + (f", and {tuning.scouts} ahead, cheaper" if tuning.scouts else ""),
         fontsize=12,
     )
     return figure

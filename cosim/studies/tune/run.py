@@ -69,10 +69,11 @@ def tune(
 
     ``maximise`` or ``minimise`` names the number; ``over`` gives the range of each ``table.key``,
     SI; by default the three knobs. Where the scene needs ngspice, SCOUTS times as many runs on the
-    rung "limited" look first where it is worth while. After the search each key is turned a little
-    about the best, which moves on while that helps and the budget lasts. The same for the same
-    ``seed``, whatever the number of ``workers``, local ones or those of the Dask cluster at the
-    address ``dask``. ``progress`` is told each run and the best so far,
+    rung "limited" look first where it is worth while. Where its solver is the fast one, that one
+    searches, and the FMU judges the best HINTS and what follows. After the search each key is
+    turned a little about the best, which moves on while that helps and the budget lasts. The same
+    for the same ``seed``, whatever the number of ``workers``, local ones or those of the cluster at
+    the address ``dask``. ``progress`` is told each run and the best so far,
     as they finish, ``scouting`` each one ahead. Where the frequency is tuned, each run lasts whole
     periods.
 
@@ -112,7 +113,7 @@ def tune(
     with Evaluator(scene, path, whole_periods=whole_periods, workers=workers, dask=dask) as bench:
         try:
             aim = _Aim(bench, quantity, largest, ranges)
-            best, neighbours, runs, scouts = _searched(aim, scene, budget, seed, told, scouting)
+            best, neighbours, runs, ahead = _searched(aim, scene, budget, seed, told, scouting)
         except KeyboardInterrupt:
             if out is not None:
                 write_runs(Path(out) / "tune.csv", heard, quantity)
@@ -121,10 +122,15 @@ def tune(
             if not bench.resumed:
                 bench.forget()  # there is nothing to go on with
             raise
-        tuned = changed(scene, best.values, "tune")
+        tuned = changed(scene, {**best.values, **_judge(scene)}, "tune")
         if whole_periods:
             tuned = changed(tuned, periods_made_whole(tuned), "tune")
-        found = Tuning(quantity, largest, ranges, runs, best, neighbours, tuned, scouts, seed)
+        scouts, by_fast = 0 if ahead is None else len(ahead.runs), None
+        if ahead is not None and _judge(scene):
+            by_fast = ahead.value(best.values)
+        found = Tuning(
+            *(quantity, largest, ranges, runs, best, neighbours, tuned, scouts, seed, by_fast)
+        )
         if out is not None:
             found.save(out)
             bench.forget()
@@ -153,32 +159,44 @@ class _Aim:
 Progress = Callable[[Run, Run | None], None]
 
 
+def _judge(scene: Scene) -> Settings:
+    """What makes of a scene the one whose numbers count: the FMU judges the fast solver."""
+    return {"run.solver": "fmu"} if scene.run.solver == "fast" else {}
+
+
 def _searched(
     aim: _Aim, scene: Scene, budget: int, seed: int, progress: Progress, scouting: Progress
-) -> tuple[Run, dict[str, list[float | None]], list[Run], int]:
-    """The best run, its neighbours, all runs, and how many scouts went ahead."""
+) -> tuple[Run, dict[str, list[float | None]], list[Run], "_Trial | None"]:
+    """The best run, its neighbours, all runs, and the scouts that went ahead."""
     turned = 2 * len(aim.ranges)
     searched = min(round(SEARCHED * budget), budget - turned)
-    scouts, warm = 0, np.empty((0, len(aim.ranges)))
-    simple = Fidelity.of(scene).simple
-    # Quantities that only the scene's own rung has find no scouts.
-    with suppress(BadInput):
-        if simple is not None:
-            ahead = _Trial(aim, simple, scouting)
-            ahead.search(SCOUTS * searched, seed)
-            scouts, warm = len(ahead.runs), ahead.known.ranked(0, WARM_APART, WARM)
-    trial = _Trial(aim, {}, progress)
-    trial.search(searched, seed, warm)
+    ahead, warm = None, np.empty((0, len(aim.ranges)))
+    simple, judge = Fidelity.of(scene).simple, _judge(scene)
+    if judge:
+        ahead = _Trial(aim, {}, scouting)
+        ahead.search(searched, seed)
+    elif simple is not None:
+        # Quantities that only the scene's own rung has find no scouts.
+        with suppress(BadInput):
+            scouts = _Trial(aim, simple, scouting)
+            scouts.search(SCOUTS * searched, seed)
+            ahead = scouts
+    if ahead is not None:
+        warm = ahead.known.ranked(0, WARM_APART, WARM)
+    trial = _Trial(aim, judge, progress)
+    if judge:
+        trial.known.rows(warm)  # the search is over
+    else:
+        trial.search(searched, seed, warm)
     if trial.best is None:
-        raise SimulationFailed(
-            f"No setting could be run; the first one: {trial.runs[0].outcome.failure}"
-        )
+        first = (trial.runs or (ahead or trial).runs)[0]
+        raise SimulationFailed(f"No setting could be run; the first one: {first.outcome.failure}")
     best, neighbours = trial.best, trial.neighbours()
     while trial.best is not best and len(trial.runs) + turned <= budget:
         best, neighbours = trial.best, trial.neighbours()
     if trial.best is not best:
         best, neighbours = trial.best, {}
-    return best, neighbours, trial.runs, scouts
+    return best, neighbours, trial.runs, ahead
 
 
 class _Trial:
@@ -195,6 +213,10 @@ class _Trial:
         """The first of the best runs."""
         found = self.known.scores[: len(self.runs), 0]
         return self.runs[int(found.argmax())] if len(found) and found.max() > -inf else None
+
+    def value(self, settings: Mapping[str, Number]) -> float | None:
+        """What was found at settings; None where they were not asked for."""
+        return next((run.value for run in self.runs if run.values == settings), None)
 
     def search(self, runs: int, seed: int, warm: Array | None = None) -> None:
         """Run at most ``runs`` points; ``warm`` starts (rows) first, in place of most of the

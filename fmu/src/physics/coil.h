@@ -6,6 +6,12 @@
 
 #include "state.h"
 
+/* Bl(q) over Bl, for those who wait for it: few operations after one another. */
+static inline double force_factor_shape(const Model *m, double q)
+{
+    return (1.0 + q * m->r.b1) + q * q * m->r.b2;
+}
+
 /* N/A */
 static inline double force_factor_at(const Model *m, double q)
 {

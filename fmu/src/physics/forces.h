@@ -6,6 +6,7 @@
 #include <math.h>
 
 #include "coil.h"
+#include "elements.h"
 #include "mechanics.h"
 #include "source.h"
 
@@ -34,30 +35,20 @@ typedef struct {
     double load;                    /* force on it, N */
 } Load;
 
-static inline double suspension_force(const Model *m, double q, double u)
-{
-    const Reals *p = &m->r;
-    return -(p->suspension_damping * u + q * p->suspension_k1) -
-           q * q * (p->suspension_k2 + q * p->suspension_k3);
-}
-
 static inline void load_on(const Model *m, const Mode *mode, const double y[N_STATES], int s, double tau,
                     Load *l)
 {
     const Reals *p = &m->r;
     const double q = y[Q], u = y[U];
     const int rest = mode->wall == WALL_REST;
-    l->suspension = suspension_force(m, q, u);
+    l->suspension = suspension_force(p, q, u);
     l->drive = force_factor_at(m, q) * stickslip_coil_current(m, y, s, tau);
     l->wall = 0.0;
-    if (mode->wall == WALL_TOUCH) {
-        double depth = penetration(m, mode, y);
-        l->wall = -mode->side * p->contact_stiffness * depth * sqrt(depth) *
-                  (1.0 + p->contact_damping * mode->side * u);
-    }
+    if (mode->wall == WALL_TOUCH)
+        l->wall = wall_force(p, mode->side, penetration(m, mode, y), u);
     const double on_ram = l->drive + l->suspension + l->wall;
     l->body = rest ? p->surface_mass + p->ram_mass : p->surface_mass;
-    l->load = (-p->flexure_stiffness * y[Z] - p->flexure_damping * y[V] - l->body * p->gravity) -
+    l->load = (-flexure_spring(p, y[Z]) - flexure_damper(p, y[V]) - l->body * p->gravity) -
               (rest ? 0.0 : on_ram);
 }
 
@@ -76,8 +67,8 @@ STICKSLIP_INLINE void forces_of(const int plain, const Model *m, const Mode mode
     if (!plain && mode->wall == WALL_REST && m->n.ram_fixed) {
         stickslip_forces_on_part(m, mode, tau, 0.0, f);
         f->drive = force_factor_at(m, y[Q]) * stickslip_coil_current(m, y, s, tau);
-        f->wall = -p->flexure_stiffness * y[Z] - p->surface_mass * p->gravity - f->friction -
-                  f->drive - suspension_force(m, y[Q], y[U]);
+        f->wall = -flexure_spring(p, y[Z]) - p->surface_mass * p->gravity - f->friction -
+                  f->drive - suspension_force(p, y[Q], y[U]);
         return;
     }
     Load l;

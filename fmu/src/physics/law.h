@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: BSD-2-Clause */
 /* The rates of the states as the integration takes them: what the mode and the inputs decide is
- * decided once a step and not at each of its stages. The formulas are those of mechanics.c, which
- * has all cases; here is the one that most steps are of. In a header, for speed. */
+ * decided once a step and not at each of its stages. The laws are those of elements.h and coil.h;
+ * forces.h puts them together in all cases, here is the one that most steps are of. In a header, for
+ * speed. */
 #ifndef STICKSLIP_LAW_H
 #define STICKSLIP_LAW_H
 
 #include <math.h>
 
+#include "elements.h"
 #include "mechanics.h"
 #include "source.h"
 
@@ -66,17 +68,16 @@ stickslip_law_rates(const Law *l, const int source, const double y[N_STATES], do
 {
     const Model *m = l->m;
     const Reals *p = &m->r;
-    const double q = y[Q], u = y[U], v = y[V], w = y[W], square = q * q;
-    const double shape = (1.0 + q * p->b1) + square * p->b2;
+    const double q = y[Q], u = y[U], v = y[V], w = y[W];
+    const double shape = force_factor_shape(m, q);
     const double i = source ? y[I_COIL] : p->current + p->current_slope * tau;
     const double drive = (p->force_factor * i) * shape;
-    const double suspension =
-        q * p->suspension_k1 + square * (p->suspension_k2 + q * p->suspension_k3);
-    double on_ram = (drive - p->suspension_damping * u) - suspension;
+    const double suspension = suspension_linear(p, q) + suspension_bent(p, q);
+    double on_ram = (drive - suspension_damper(p, u)) - suspension;
     double lost = 0.0;
     if (l->touch) {
-        const double spring = (p->contact_stiffness * root) * (root * root), closing = l->side * u;
-        const double damped = spring * (p->contact_damping * closing);
+        const double spring = wall_spring_of_root(p, root), closing = l->side * u;
+        const double damped = wall_damper(p, spring, closing);
         on_ram -= l->side * (spring + damped);
         lost = damped * closing;
     }
@@ -87,7 +88,7 @@ stickslip_law_rates(const Law *l, const int source, const double y[N_STATES], do
     }
     /* Acceleration of the surface but for what the ram does to it. */
     const double alone =
-        ((l->load - friction) - p->flexure_stiffness * y[Z] - p->flexure_damping * v) * l->per_moving;
+        ((l->load - friction) - flexure_spring(p, y[Z]) - flexure_damper(p, v)) * l->per_moving;
     const double a = l->rest ? alone : alone - on_ram * l->per_moving;
     dy[Z] = per * v;
     dy[V] = per * a;
@@ -98,7 +99,7 @@ stickslip_law_rates(const Law *l, const int source, const double y[N_STATES], do
     dy[E_IN] = per * (drive * u);
     dy[E_FRICTION] = per * (-friction * w); /* of sticking, w is 0 */
     dy[E_IMPACT] = per * lost;
-    dy[E_DAMPING] = per * (p->flexure_damping * v * v + p->suspension_damping * u * u);
+    dy[E_DAMPING] = per * damping_power(p, v, u);
     if (!source) {
         dy[I_COIL] = dy[I_EDDY] = dy[E_OUTPUT] = dy[E_COPPER] = 0.0;
         return;

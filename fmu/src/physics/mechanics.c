@@ -94,8 +94,7 @@ static double ram_rate(const Model *m, const Mode *mode, const double y[N_STATES
     const double q = y[Q], u = y[U];
     return force_factor_rate(m, q, u) * stickslip_coil_current(m, y, s, tau) +
            force_factor_at(m, q) * stickslip_coil_current_rate(m, mode, y, s) -
-           (p->suspension_k1 + q * (2.0 * p->suspension_k2 + q * 3.0 * p->suspension_k3)) * u -
-           p->suspension_damping * f->a_q;
+           suspension_stiffness(p, q) * u - suspension_damper(p, f->a_q);
 }
 
 /* Rate of Load.load; *wall receives that of the wall's force. */
@@ -104,13 +103,9 @@ static double load_rate(const Model *m, const Mode *mode, const double y[N_STATE
 {
     const Reals *p = &m->r;
     *wall = 0.0;
-    if (mode->wall == WALL_TOUCH) {
-        double depth = penetration(m, mode, y), speed = mode->side * y[U];
-        *wall = -mode->side * p->contact_stiffness * sqrt(depth) *
-                (1.5 * speed * (1.0 + p->contact_damping * speed) +
-                 depth * p->contact_damping * mode->side * f->a_q);
-    }
-    return -p->flexure_stiffness * y[V] - p->flexure_damping * f->a_surface -
+    if (mode->wall == WALL_TOUCH)
+        *wall = wall_force_rate(p, mode->side, penetration(m, mode, y), y[U], f->a_q);
+    return flexure_force_rate(p, y[V], f->a_surface) -
            (mode->wall == WALL_REST ? 0.0 : own + *wall);
 }
 
@@ -192,15 +187,12 @@ void stickslip_state_rates(const Model *m, const Mode modes[N_MOVING], const dou
         dy[W] = f.a_slip;
         dy[E_IN] = m->n.prescribed ? f.friction * y[V] : f.drive * y[U];
         dy[E_FRICTION] = -f.friction * y[W] - f.plate * (y[V] + y[W]);
-        dy[E_DAMPING] = m->n.prescribed ? 0.0
-                                        : p->flexure_damping * y[V] * y[V] +
-                                              p->suspension_damping * y[U] * y[U];
+        dy[E_DAMPING] = m->n.prescribed ? 0.0 : damping_power(p, y[V], y[U]);
         stickslip_source_rates(m, mode, y, s, dy);
         dy[E_IMPACT] = 0.0;
         if (mode->wall == WALL_TOUCH) {
             /* What the wall takes, less what its spring stores. */
-            double depth = penetration(m, mode, y);
-            double spring = p->contact_stiffness * depth * sqrt(depth);
+            double spring = wall_spring(p, penetration(m, mode, y));
             dy[E_IMPACT] = -(f.wall * mode->side + spring) * mode->side * y[U];
         }
     }
@@ -210,8 +202,7 @@ double stickslip_wall_energy(const Model *m, const Mode *mode, const double y[N_
 {
     if (mode->wall != WALL_TOUCH && mode->wall != WALL_PARTING)
         return 0.0;
-    double depth = penetration(m, mode, y);
-    return 0.4 * m->r.contact_stiffness * depth * depth * sqrt(depth);
+    return wall_spring_energy(&m->r, penetration(m, mode, y));
 }
 
 /* With the given mass of the part, kg. */
@@ -227,9 +218,7 @@ static double energy_of_surface(const Model *m, const Mode *mode, const double y
                             part * v_part * v_part);
     double weight = p->gravity * (ram * (y[Z] + q) + p->surface_mass * y[Z] +
                                   part * (y[Z] + y[D]));
-    double springs = 0.5 * p->flexure_stiffness * y[Z] * y[Z] +
-                     q * q * (p->suspension_k1 / 2.0 +
-                              q * (p->suspension_k2 / 3.0 + q * p->suspension_k3 / 4.0));
+    double springs = flexure_energy(p, y[Z]) + suspension_energy(p, q);
     return kinetic + weight + springs + stickslip_wall_energy(m, mode, y);
 }
 

@@ -116,9 +116,8 @@ static double ram_balance(const Model *m, double q)
 {
     const Reals *p = &m->r;
     double depth = -p->travel - q;
-    double force = -q * (p->suspension_k1 + q * (p->suspension_k2 + q * p->suspension_k3)) -
-                   p->ram_mass * p->gravity;
-    return depth > 0.0 ? force + p->contact_stiffness * depth * sqrt(depth) : force;
+    double force = suspension_at_rest(p, q) - p->ram_mass * p->gravity;
+    return depth > 0.0 ? force + wall_spring(p, depth) : force;
 }
 
 static void hang_ram(Model *m)

@@ -1,5 +1,6 @@
 """The compiled chain: what the machine does with given numbers, how far that is from measured
-trials, and the fit of each trial's own numbers. See ``stepper.h`` and ``refine.h``.
+trials, and the fit of each trial's own numbers. See ``refine.h`` and
+``cosim/stepper/stepper.h``.
 """
 
 import ctypes
@@ -15,24 +16,8 @@ import numpy.typing as npt
 
 from cosim.arrays import Array
 from cosim.errors import SimulationFailed
+from cosim.stepper.stepper import LANES, OWN
 from cosim.toolchain.libraries import library
-
-LANES = 8
-
-RIG = (
-    *("force_factor", "surface_mass", "flexure_stiffness", "flexure_damping"),
-    *("suspension_k1", "suspension_k2", "suspension_k3", "suspension_damping"),
-    *("travel_up", "travel_down", "wall_up", "wall_down", "wall_damping"),
-    *("mu_plate", "mu_k", "mu_s", "ram_mass", "part_mass"),
-    *("plate_mass", "plate_stiffness", "plate_damping"),
-    *("resistance", "inductance", "sense_resistance"),
-    *("output_high", "output_low", "current_limit", "gravity"),
-)
-"""Numbers that all trials of a rig share, SI; ``stepper.h`` has them in this order."""
-
-OWN = ("amplitude", "offset", "phase", "start", "lift", "normal_force", "frequency")
-"""Numbers of one trial: V, V, share of a period at time 0, s, share of what the plate's friction
-holds, N, Hz."""
 
 OUTPUTS = ("z_surface", "v_surface", "z_part", "v_part", "z_plate")
 """What is simulated, m and m/s."""
@@ -64,7 +49,7 @@ class _Job(Structure):
 @cache
 def compiled() -> Any:
     """The functions of ``refine.c``."""
-    found = library("chain")
+    found = library("stepper")
     found.chain_work.restype = found.chain_look.restype = found.chain_sizes.restype = c_int64
     found.chain_work.argtypes = (c_void_p, c_int64, POINTER(c_longlong))
     found.chain_look.argtypes = (c_void_p, c_void_p, c_void_p, c_void_p)

@@ -3,15 +3,9 @@
 #ifndef CHAIN_REFINE_H
 #define CHAIN_REFINE_H
 
-#include "stepper.h"
+#include "../../../stepper/stepper.h"
 
 #include <stdatomic.h>
-
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
 
 /* chain.py has the structures with the same fields in the same order. */
 

@@ -16,7 +16,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.scene import keys
-from cosim.studies.identify.chain.chain import OWN, RIG
+from cosim.stepper.stepper import OWN, RIG
 
 SHIPPED = Path(__file__).parent / "bounds.toml"
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput
-from cosim.studies.identify.chain.chain import OWN, Target
+from cosim.stepper.stepper import OWN
+from cosim.studies.identify.chain.chain import Target
 from cosim.studies.identify.problem.space import Space, own_bounds
 from cosim.trials.camera import velocities
 from cosim.trials.periods import period_of

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.studies.identify.chain.chain import OWN, simulate
+from cosim.stepper.stepper import OWN
+from cosim.studies.identify.chain.chain import simulate
 from cosim.studies.identify.problem.targets import Measured
 from cosim.trials.camera import velocities
 

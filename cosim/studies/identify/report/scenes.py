@@ -9,7 +9,7 @@ from cosim.arrays import Array
 from cosim.errors import BadInput, Note, SimulationFailed
 from cosim.scene import Scene, keys, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.identify.chain.chain import OWN
+from cosim.stepper.stepper import OWN
 from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import DRIVE, Measured
 from cosim.studies.identify.report.measures import slope

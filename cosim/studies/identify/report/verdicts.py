@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.studies.identify.chain.chain import OWN
+from cosim.stepper.stepper import OWN
 from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.search.search import Found
 

@@ -16,7 +16,8 @@ import numpy as np
 from cmaes import CMA
 
 from cosim.arrays import Array
-from cosim.studies.identify.chain.chain import OWN, RIG, Target, look_around, refine, simulate
+from cosim.stepper.stepper import OWN, RIG
+from cosim.studies.identify.chain.chain import Target, look_around, refine, simulate
 from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import draws
 

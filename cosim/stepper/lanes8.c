@@ -3,6 +3,6 @@
 #ifdef __x86_64__
 #define WIDTH 8
 #define INLINE static inline __attribute__((always_inline, target("avx512f,avx512dq")))
-#define RUN __attribute__((target("avx512f,avx512dq"))) void chain_lanes_8
+#define FUNCTION(name) __attribute__((target("avx512f,avx512dq"))) void name##_8
 #include "lanes.h"
 #endif

@@ -2,5 +2,5 @@
 
 #define WIDTH 2
 #define INLINE static inline __attribute__((always_inline))
-#define RUN void chain_lanes_2
+#define FUNCTION(name) void name##_2
 #include "lanes.h"

@@ -1,5 +1,5 @@
 /* The steps of WIDTH lanes side by side, for each kind of processor: lanes2.c, lanes4.c and lanes8.c
- * include this with WIDTH, INLINE and RUN defined. Without branches between lanes, and without
+ * include this with WIDTH, INLINE and FUNCTION defined. Without branches between lanes, and without
  * contraction, each width gives the same bits.
  *
  * Moreau's time stepping with the midpoint rule: of second order, since what is not smooth is either
@@ -56,11 +56,20 @@ INLINE Wide of_surface(const Contact *c, Wide bound, Wide *plate)
     return choose(*plate == wanted, resting, rubbing);
 }
 
+/* What acted within a step. */
+typedef struct {
+    Wide current;         /* mean, A */
+    Wide high, low;       /* share of the step that the output was at its highest, lowest */
+    Wide limited;         /* share at the current limit */
+    Wide friction, plate; /* impulses of surface and plate on the part, N s */
+    Wide wall, wall_damping; /* force of the walls' springs, down, N; their dampers, N s/m */
+} Effect;
+
 /* One step of all lanes, whose plate is moving or stands on the ground. It ends at `edge`, or where
  * the command jumps, if that lies between `low` and `high`. i0 and i1 give the current at both ends
- * where it is measured. */
-INLINE void step(const Wide p[N_ALL], State *m, double low, double edge,
-                 double high, int moving, int measured, double i0, double i1)
+ * where it is measured; then the effect has no limits. What of it nobody reads costs nothing. */
+INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double high, int moving,
+                 int measured, double i0, double i1, Effect *effect)
 {
     const Wide zero = {0}, one = zero + 1.0;
     const Wide start = p[START], jump = m->jump, t = m->t;
@@ -95,7 +104,13 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge,
         const Wide met = target0 + share * (target1 - target0);
         const Wide meeting = 0.5 * (share * (i + met) + (1.0 - share) * (met + target1));
         mean = choose(now == target1, meeting, 0.5 * (i + now));
+        const Wide clamped = choose(now == target1, share, one);
+        effect->high = choose((now < target1) | ((now == target1) & (gap > 0.0)), clamped, zero);
+        effect->low = clamped - effect->high;
+        const Wide asked = gain * (v1 + half * slope);
+        effect->limited = choose(on & ((asked > limit) | (asked < -limit)), one - clamped, zero);
     }
+    effect->current = mean;
 
     /* Forces on the ram in the middle of the step, the dampers' as a coefficient. */
     const Wide zm = m->z + half * v, ym = m->y + half * r, q = ym - zm;
@@ -107,6 +122,8 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge,
     const Wide force = p[FORCE_FACTOR] * mean + below - above -
                        q * (p[SUSPENSION_K1] + q * (p[SUSPENSION_K2] + q * p[SUSPENSION_K3]));
     const Wide c = half * (p[SUSPENSION_DAMPING] + damping * (above + below));
+    effect->wall = above - below;
+    effect->wall_damping = damping * (above + below);
 
     /* Velocities without friction: of the surface with the ram eliminated. */
     const Wide ram = p[RAM_MASS], body = p[SURFACE_MASS], g = p[GRAVITY];
@@ -147,6 +164,8 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge,
     const Mask sticks = (sticking < firm) & (sticking > -firm) & ~goes_on;
     const Wide impulse = choose(sticks, sticking, slipping);
     const Wide plate = choose(sticks, plate_stick, plate_slip);
+    effect->friction = impulse;
+    effect->plate = plate;
 
     const Wide v1 = k.surface - k.b * impulse, r1 = (on_ram + c * v1) * inverse_ram;
     const Wide w1 = k.part + k.a * (impulse + plate), s1 = k.plate - k.d * plate;
@@ -164,7 +183,7 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge,
     m->jump = choose(drops, jump + 1.0 / p[FREQUENCY], jump);
 }
 
-RUN(const Schedule *c, const Parameters all, const Rest *rest, int from, double *out)
+FUNCTION(chain_lanes)(const Schedule *c, const Parameters all, const Rest *rest, int from, double *out)
 {
     Wide p[N_ALL];
     for (int k = 0; k < N_ALL; k++)
@@ -185,14 +204,15 @@ RUN(const Schedule *c, const Parameters all, const Rest *rest, int from, double 
             const double high = 0.5 * (edge + chain_edge(c, k + 1));
             const double i1 = c->current ? c->current[k < 0 ? 0 : k] : 0.0;
             const double i0 = c->current ? c->current[k < 1 ? 0 : k - 1] : 0.0;
+            Effect e;
             if (!c->current && !moving)
-                step(p, &m, low, edge, high, 0, 0, i0, i1);
+                step(p, &m, low, edge, high, 0, 0, i0, i1, &e);
             else if (!c->current)
-                step(p, &m, low, edge, high, 1, 0, i0, i1);
+                step(p, &m, low, edge, high, 1, 0, i0, i1, &e);
             else if (!moving)
-                step(p, &m, low, edge, high, 0, 1, i0, i1);
+                step(p, &m, low, edge, high, 0, 1, i0, i1, &e);
             else
-                step(p, &m, low, edge, high, 1, 1, i0, i1);
+                step(p, &m, low, edge, high, 1, 1, i0, i1, &e);
         }
         if (k < 0 || c->sample[k] < 0)
             continue;
@@ -204,4 +224,152 @@ RUN(const Schedule *c, const Parameters all, const Rest *rest, int from, double 
         for (int n = 0; n < N_OUTPUTS; n++)
             memcpy(row + n * LANES, shown + n, sizeof *shown);
     }
+}
+
+/* ---- the runs of scenes ---- */
+
+typedef struct {
+    Wide x_settle, x_end;                        /* height of the part, m */
+    Wide i_end;                                  /* current of the coil, A */
+    Wide sticking, high, low, limited;           /* s after settling: in sticking, at each limit */
+    Wide v_max, v_min, z_max, z_min;             /* of the surface after settling */
+    Wide i_max, i_min;                           /* of the coil after settling */
+    Wide coil, copper, friction, impact, damping; /* J, done or lost since the start */
+} Sums;
+
+_Static_assert(sizeof(State) == N_STATE * sizeof(Wide), "a state is N_STATE numbers");
+_Static_assert(sizeof(Sums) == N_SUMS * sizeof(Wide), "the sums are N_SUMS numbers");
+
+/* A quantity at a time `late` after the step's end (before it: negative), within the step, of its
+ * value and rate there and its rate's slope. */
+INLINE Wide read(Wide value, Wide rate, Wide slope, Wide late)
+{
+    return value + late * (rate + 0.5 * late * slope);
+}
+
+/* What the step from `a` to `b`, until `until` (s), takes in energy. */
+INLINE void add_energies(const Wide p[N_ALL], const State *a, const State *b, const Effect *e,
+                         Wide until, Sums *sum)
+{
+    const Wide zero = {0}, h = choose(b->t <= until, b->t - a->t, zero);
+    const Wide v = 0.5 * (a->v + b->v), u = 0.5 * (a->r + b->r) - v, w = 0.5 * (a->w + b->w);
+    const Wide rise = b->i - a->i, square = u * u;
+    sum->coil += h * p[FORCE_FACTOR] * e->current * u;
+    sum->copper += h * (p[RESISTANCE] + p[SENSE_RESISTANCE]) *
+                   (e->current * e->current + rise * rise * (1.0 / 12.0));
+    sum->friction += choose(h > zero, e->friction * (v - w) - e->plate * w, zero);
+    /* A ram that leaves a wall faster than its spring unbends leaves the spring's energy there. */
+    sum->impact += h * (e->wall * u + e->wall_damping * square);
+    sum->damping += h * (p[FLEXURE_DAMPING] * v * v + p[SUSPENSION_DAMPING] * square);
+}
+
+/* What the step adds to times and extremes after settling. */
+INLINE void add_settled(const State *a, const State *b, const Effect *e, Wide settle, Wide until,
+                        Sums *sum)
+{
+    const Wide zero = {0};
+    const Wide counted = most(least(b->t, until) - most(a->t, settle), zero); /* s */
+    const Mask counts = counted > zero;
+    sum->sticking += choose(b->slip == zero, counted, zero);
+    sum->high += counted * e->high;
+    sum->low += counted * e->low;
+    sum->limited += counted * e->limited;
+    sum->v_max = choose(counts, most(b->v, sum->v_max), sum->v_max);
+    sum->v_min = choose(counts, least(b->v, sum->v_min), sum->v_min);
+    sum->z_max = choose(counts, most(b->z, sum->z_max), sum->z_max);
+    sum->z_min = choose(counts, least(b->z, sum->z_min), sum->z_min);
+    sum->i_max = choose(counts, most(b->i, sum->i_max), sum->i_max);
+    sum->i_min = choose(counts, least(b->i, sum->i_min), sum->i_min);
+}
+
+/* What is asked for where settling or the run ends, if it does within the step. */
+INLINE void note_ends(const State *a, const State *b, Wide settle, Wide until, Sums *sum)
+{
+    const Wide per = 1.0 / (b->t - a->t), slope = (b->w - a->w) * per;
+    sum->x_settle = choose((a->t <= settle) & (b->t > settle),
+                           read(b->x, b->w, slope, settle - b->t), sum->x_settle);
+    const Mask ends = (a->t <= until) & (b->t > until);
+    sum->x_end = choose(ends, read(b->x, b->w, slope, until - b->t), sum->x_end);
+    sum->i_end = choose(ends, b->i + (until - b->t) * (b->i - a->i) * per, sum->i_end);
+}
+
+/* The least and the largest number. */
+INLINE void ends_of(Wide x, double *low, double *high)
+{
+    *low = *high = x[0];
+    for (int l = 1; l < WIDTH; l++) {
+        *low = x[l] < *low ? x[l] : *low;
+        *high = x[l] > *high ? x[l] : *high;
+    }
+}
+
+/* A row of the first lane at a time `late` after the end of the step from `a` to `b`; forces and
+ * accelerations are their means over the step. */
+INLINE void write_row(const Wide p[N_ALL], const State *a, const State *b, const Effect *e,
+                      Wide late, double row[N_COLUMNS])
+{
+    const Wide per = 1.0 / (b->t - a->t);
+    const Wide surface = (b->v - a->v) * per, ram = (b->r - a->r) * per, part = (b->w - a->w) * per;
+    const Wide rise = (b->i - a->i) * per, i = b->i + late * rise;
+    const Wide v = b->v + late * surface, r = b->r + late * ram;
+    const Wide emf = p[FORCE_FACTOR] * (r - v);
+    row[ROW_CURRENT] = i[0];
+    row[ROW_COIL_VOLTAGE] = (p[RESISTANCE] * i + p[INDUCTANCE] * rise + emf)[0];
+    row[ROW_BACK_EMF] = emf[0];
+    row[ROW_Z_SURFACE] = read(b->z, b->v, surface, late)[0];
+    row[ROW_V_SURFACE] = v[0];
+    row[ROW_A_SURFACE] = surface[0];
+    row[ROW_Z_RAM] = read(b->y, b->r, ram, late)[0];
+    row[ROW_V_RAM] = r[0];
+    row[ROW_Z_PART] = read(b->x, b->w, part, late)[0];
+    row[ROW_V_PART] = (b->w + late * part)[0];
+    row[ROW_FRICTION_FORCE] = (e->friction * per)[0];
+    row[ROW_STICKING] = b->slip[0] == 0.0;
+}
+
+FUNCTION(stepper_follow)(const Stretch *c, const Parameters all, const Span *span, int from,
+                         Kept *kept, double *out)
+{
+    Wide p[N_ALL], settle, until;
+    for (int k = 0; k < N_ALL; k++)
+        memcpy(p + k, all[k] + from, sizeof *p);
+    memcpy(&settle, span->settle + from, sizeof settle);
+    memcpy(&until, span->until + from, sizeof until);
+    State m;
+    Sums sum;
+    for (int k = 0; k < N_STATE; k++)
+        memcpy((Wide *)&m + k, kept->state[k] + from, sizeof(Wide));
+    for (int k = 0; k < N_SUMS; k++)
+        memcpy((Wide *)&sum + k, kept->sums[k] + from, sizeof(Wide));
+    double settled, all_settled, ended, all_ended;
+    ends_of(settle, &settled, &all_settled);
+    ends_of(until, &ended, &all_ended);
+    int64_t sample = 0;
+    for (int64_t k = c->first + 1; k <= c->last; k++) {
+        const State before = m;
+        const double edge = (double)k * c->step, half = 0.5 * c->step;
+        Effect e;
+        step(p, &m, edge - half, edge, edge + half, 0, 0, 0.0, 0.0, &e);
+        add_energies(p, &before, &m, &e, until, &sum);
+        /* No step ends further than a half one from its edge. */
+        if (edge + c->step > settled)
+            add_settled(&before, &m, &e, settle, until, &sum);
+        if ((edge + c->step > settled && edge - 2.0 * c->step < all_settled) ||
+            edge + c->step > ended)
+            note_ends(&before, &m, settle, until, &sum);
+        for (; sample < c->samples && c->times[sample] <= edge; sample++) {
+            const Wide late = c->times[sample] - m.t;
+            if (c->rows) {
+                write_row(p, &before, &m, &e, late, out + sample * N_COLUMNS);
+                continue;
+            }
+            const Wide slope = (m.v - before.v) / (m.t - before.t);
+            const Wide height = read(m.z, m.v, slope, late);
+            memcpy(out + sample * LANES + from, &height, sizeof height);
+        }
+    }
+    for (int k = 0; k < N_STATE; k++)
+        memcpy(kept->state[k] + from, (Wide *)&m + k, sizeof(Wide));
+    for (int k = 0; k < N_SUMS; k++)
+        memcpy(kept->sums[k] + from, (Wide *)&sum + k, sizeof(Wide));
 }

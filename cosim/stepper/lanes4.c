@@ -3,6 +3,6 @@
 #ifdef __x86_64__
 #define WIDTH 4
 #define INLINE static inline __attribute__((always_inline, target("avx2")))
-#define RUN __attribute__((target("avx2"))) void chain_lanes_4
+#define FUNCTION(name) __attribute__((target("avx2"))) void name##_4
 #include "lanes.h"
 #endif

@@ -1,0 +1,283 @@
+"""``run.solver = "fast"``: scenes in fixed steps, as many side by side as the processor has lanes.
+
+The stepper of ``cosim/stepper`` solves source, coil and mechanics in steps of ``run.step``; the FMU
+finds each event. Forces and accelerations are means over a step, so a peak within an impact, the
+number of impacts and that of slips are not known.
+"""
+
+import ctypes
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from ctypes import Structure, byref, c_double, c_int64, c_void_p
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.coupling.loop.agenda import count, exposures
+from cosim.drive.command import command
+from cosim.errors import SimulationFailed
+from cosim.files.spill import BLOCK, Tape
+from cosim.mechanics.stickslip import parameters
+from cosim.scene import Scene
+from cosim.simulation.guards import notes
+from cosim.simulation.rungs.electrics import commanded
+from cosim.stepper.stepper import LANES, OWN, RIG, VARIABLES
+from cosim.toolchain.libraries import library
+from cosim.toolchain.processes import Progress
+from cosim.toolchain.versions import versions
+from cosim.trials.camera import FRAME_RATE, accelerations, instants_a_frame, shown
+from cosim.waveforms.columns import COLUMNS
+from cosim.waveforms.result import Result
+
+AT_ONCE = 1 << 16
+"""Steps between two looks at what Python has to do, some ten milliseconds."""
+
+LOST = (
+    "The motion left the numbers: run.step is too long for this machine; take a shorter one, or "
+    'run.solver = "fmu".'
+)
+"""Of a scene whose v_average is not finite."""
+
+UNLIMITED = 1e9
+"""V and A: the limits of a source that has none."""
+
+_STATES, _COLUMNS = 12, tuple(name for name in COLUMNS if name not in ("time", "command"))[:12]
+_SUMS = (
+    *("x_settle", "x_end", "i_end", "sticking", "swing_high", "swing_low", "current_limit"),
+    *("v_max", "v_min", "z_max", "z_min", "i_max", "i_min"),
+    *("coil", "copper", "friction", "impact", "damping"),
+)
+"""As ``Sums`` of ``lanes.h`` has them."""
+
+
+class _Kept(Structure):
+    _fields_ = (
+        ("state", c_double * LANES * _STATES),
+        ("sums", c_double * LANES * len(_SUMS)),
+    )
+
+
+class _Stretch(Structure):
+    _fields_ = (
+        *(("step", c_double), ("first", c_int64), ("last", c_int64), ("samples", c_int64)),
+        *(("times", c_void_p), ("rows", c_int64)),
+    )
+
+
+@cache
+def _library() -> Any:
+    found = library("stepper")
+    found.stepper_begin.restype = found.stepper_run.restype = None
+    found.stepper_begin.argtypes = (c_void_p, c_double, c_void_p)
+    found.stepper_run.argtypes = (c_void_p,) * 5
+    return found
+
+
+def simulate_fast(scene: Scene, progress: Progress) -> Result:
+    """The run of a scene, with its rows. Raises SimulationFailed.
+
+    ``v_average_error`` is how far v_average is from that of steps half as long.
+    """
+    began = time.perf_counter()
+    summary = summary_fast(scene, progress)
+    (finer,) = summaries([scene], 0.5, progress)
+    error = summary["v_average"] - finer["v_average"]
+    columns = _waveforms(scene, progress)
+    summary |= {"v_average_error": error, "wall_time": time.perf_counter() - began}
+    return Result(scene, columns, summary | {"notes": notes(scene, columns, summary)})
+
+
+def summary_fast(scene: Scene, progress: Progress = lambda _: None) -> dict[str, Any]:
+    """The summary of a run alone. Raises SimulationFailed."""
+    (found,) = summaries([scene], 1.0, progress)
+    if not math.isfinite(found["v_average"]):
+        raise SimulationFailed(LOST)
+    return found
+
+
+def summaries(
+    scenes: Sequence[Scene], share: float = 1.0, progress: Progress = lambda _: None
+) -> list[dict[str, Any]]:
+    """The summaries of scenes, without notes, LANES of them side by side, in steps of this share of
+    ``run.step``; v_average is not finite where the motion left the numbers."""
+    found: list[dict[str, Any]] = [{}] * len(scenes)
+    alike: dict[tuple[float, float], list[int]] = {}
+    for place, scene in enumerate(scenes):
+        alike.setdefault((scene.run.step, scene.run.shutter), []).append(place)
+    for (step, _), all_places in alike.items():
+        all_places.sort(key=lambda k: scenes[k].run.duration)
+        for first in range(0, len(all_places), LANES):
+            places = all_places[first : first + LANES]
+            told = _batch([scenes[k] for k in places], share * step, progress)
+            for place, numbers in zip(places, told, strict=True):
+                found[place] = numbers
+    return found
+
+
+def _batch(scenes: Sequence[Scene], step: float, progress: Progress) -> list[dict[str, Any]]:
+    began, runs = time.perf_counter(), _Runs(scenes, step)
+    settle, until, n = runs.settle, runs.until, len(scenes)
+    exposure = scenes[0].run.shutter / FRAME_RATE
+    each = instants_a_frame(exposure)
+    instants = exposures(until.max(), settle.min(), scenes[0].run.shutter)
+    left, at = np.empty((0, LANES)), np.empty(0)
+    seen = np.full((2, n), -np.inf)  # largest acceleration, and largest against it
+    for times, heights in runs.go(lambda low, high: instants[_between(instants, low, high)]):
+        left, at = np.concatenate([left, heights]), np.concatenate([at, times])
+        whole = len(at) // each * each
+        frames = at[:whole].reshape(-1, each).mean(axis=1)[:, np.newaxis]
+        # The first and last two frames have no acceleration: those of a run, and of what is left.
+        lost = exposure / 2.0 + 2.0 / FRAME_RATE - 1e-9
+        counts = (frames - lost >= settle) & (frames + lost <= until)
+        read = accelerations(shown(left[:whole, :n], exposure))[2:-2]
+        for row, side in zip(seen, (read, -read), strict=True):
+            most = np.where(counts[2:-2], side, -np.inf).max(axis=0, initial=-np.inf)
+            np.maximum(row, most, out=row)
+        kept = max(0, whole - 4 * each)
+        left, at = left[kept:], at[kept:]
+        progress(min(runs.reached, float(until.max())))
+    told = time.perf_counter() - began
+    sums = dict(zip(_SUMS, runs.sums, strict=True))
+    return [
+        _numbers(scene, {name: row[k] for name, row in sums.items()}, seen[:, k].tolist(), told / n)
+        for k, scene in enumerate(scenes)
+    ]
+
+
+def _numbers(
+    scene: Scene, sums: dict[str, float], seen: Sequence[float], wall_time: float
+) -> dict[str, Any]:
+    run, coils = scene.run, scene.coil.count
+    span, length = run.duration - run.settle, scene.period
+    whole = all(map(math.isfinite, sums.values()))
+    v_average = (sums["x_end"] - sums["x_settle"]) / span if whole else math.nan
+    share = {
+        name: _clear(sums[name] / span) for name in ("swing_high", "swing_low", "current_limit")
+    }
+    if not scene.rung.has_limits:
+        share = {}
+    held = 0.5 * scene.coil.inductance * sums["i_end"] ** 2
+    lost = {name: coils * sums[name] for name in ("copper", "friction", "impact", "damping")}
+    moved = math.isfinite(seen[0])
+    return {
+        "v_average": v_average,
+        "transport_per_cycle": v_average * length,
+        "stick_fraction": min(1.0, sums["sticking"] / span),
+        "a_camera_max": seen[0] if moved else None,
+        "a_camera_min": -seen[1] if moved else None,
+        "v_surface_max": sums["v_max"],
+        "v_surface_min": sums["v_min"],
+        "z_surface_pp": sums["z_max"] - sums["z_min"],
+        "current_max": sums["i_max"],
+        "current_min": sums["i_min"],
+        **{f"{name}_fraction": value for name, value in share.items()},
+        "saturated_fraction": sum(share.values()),
+        "energy_in": lost["copper"] + coils * (held + sums["coil"]),
+        **{f"energy_{name}": value for name, value in lost.items()},
+        "wall_time": wall_time,
+        "method": "fast",
+        "versions": versions(),
+    }
+
+
+def _clear(share: float) -> float:
+    """A share without what rounding leaves where a limit is touched."""
+    return share if share > 1e-9 else 0.0
+
+
+def _waveforms(scene: Scene, progress: Progress) -> dict[str, Array]:
+    step, runs = scene.run.output_step, _Runs([scene], scene.run.step)
+    total = count(step, scene.run.duration)
+    rows, at = Tape(len(_COLUMNS), total), Tape(1, total)
+
+    def times(low: float, high: float) -> Array:
+        stop = min(total, len(at) + int((high - low) / step) + 2)
+        known = step * np.arange(len(at), stop, dtype=np.float64)
+        return known[known <= high]
+
+    for taken, block in runs.go(times, rows=True):
+        rows.append(block)
+        at.append(taken)
+        progress(min(runs.reached, scene.run.duration))
+    waves = {"time": at.column(), "command": commanded(command(scene), at.column())}
+    return waves | {name: rows.column(k) for k, name in enumerate(_COLUMNS)}
+
+
+class _Runs:
+    """At most LANES scenes at time 0, at rest, in steps of ``step`` (s)."""
+
+    def __init__(self, scenes: Sequence[Scene], step: float) -> None:
+        filled = [*scenes, *[scenes[-1]] * (LANES - len(scenes))]
+        self._step, self._kept = step, _Kept()
+        self._parameters = np.array([_row(scene) for scene in filled]).T.copy()
+        self._span = np.array([(scene.run.settle, scene.run.duration) for scene in filled]).T.copy()
+        self.settle, self.until = self._span[:, : len(scenes)]
+        """When settling and the runs end, s."""
+        self._row_step = scenes[0].run.output_step
+        self.reached = 0.0
+        """s."""
+        _library().stepper_begin(self._parameters.ctypes.data, step, byref(self._kept))
+
+    @property
+    def sums(self) -> list[list[float]]:
+        """The values of _SUMS (rows) in each lane."""
+        return np.ctypeslib.as_array(self._kept.sums).tolist()
+
+    def go(
+        self, when: Callable[[float, float], Array], rows: bool = False
+    ) -> Iterator[tuple[Array, Array]]:
+        """Step all runs to their ends; the times (s) that ``when`` gives within each piece, and the
+        heights of the surface then (a column for each lane), or rows of the first scene."""
+        steps = int(np.ceil(self._span[1].max() / self._step)) + 1
+        at_once = AT_ONCE
+        if rows:
+            at_once = max(1, min(at_once, int(BLOCK * self._row_step / self._step)))
+        for first in range(0, steps, at_once):
+            last = min(steps, first + at_once)
+            low, self.reached = self.reached, last * self._step
+            times = np.ascontiguousarray(when(low, self.reached))
+            out = np.empty((len(times), len(_COLUMNS) if rows else LANES))
+            piece = _Stretch(self._step, first, last, len(times), times.ctypes.data, int(rows))
+            _library().stepper_run(
+                *(byref(piece), self._parameters.ctypes.data, self._span.ctypes.data),
+                *(byref(self._kept), out.ctypes.data),
+            )
+            yield times, out
+
+
+def _between(times: Array, low: float, high: float) -> slice:
+    """Those after ``low`` until ``high``; at 0, too."""
+    ends = times.searchsorted((low, high), "right")
+    return slice(ends[0] if low else 0, ends[1])
+
+
+def known_numbers(scene: Scene) -> dict[str, float]:
+    """The FMU's variables of a scene, with the limits of a source that has none."""
+    return {"output_high": UNLIMITED, "output_low": -UNLIMITED} | parameters(scene)[0]
+
+
+def _row(scene: Scene) -> list[float]:
+    """The stepper's numbers of a scene, RIG and OWN."""
+    known = known_numbers(scene)
+    drive, coils = scene.drive, scene.coil.count
+    found = {name: known[variable] for name, variable in VARIABLES.items()}
+    found["part_mass"] /= scene.mechanics.n_surfaces
+    found["sense_resistance"] *= coils  # of the current of all coils
+    found["current_limit"] = found["current_limit"] / coils if scene.rung.has_limits else UNLIMITED
+    phase = drive.start_phase - drive.frequency * drive.start_time
+    found |= {"amplitude": drive.amplitude, "offset": drive.offset, "frequency": drive.frequency}
+    found |= {"phase": phase, "start": drive.start_time}
+    if lift := scene.mechanics.initial_lift:
+        held = found["mu_plate"] * found["normal_force"]
+        found["lift"] = lift * found["flexure_stiffness"] / held
+    return [found.get(name, 0.0) for name in (*RIG, *OWN)]
+
+
+def sizes() -> tuple[tuple[int, int], tuple[int, int]]:
+    """Bytes of the two structures, here and in the compiled code."""
+    there = _library().stepper_sizes
+    there.restype, there.argtypes = c_int64, (c_int64,)
+    return (ctypes.sizeof(_Kept), there(0)), (ctypes.sizeof(_Stretch), there(1))
