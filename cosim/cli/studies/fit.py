@@ -18,23 +18,17 @@ def _options(parser: ArgumentParser) -> None:
         "mass, or a TOML with a table for each trial; or “published”",
     )
     parser.add_argument(
-        "--mu-s",
+        "--mu-k",
         type=_number_or_free,
         default=None,
-        metavar="MU_S",
-        help="static friction, or “free” to fit it within the bounds of the forces "
-        "(default: 0.72, as published)",
+        metavar="MU_K",
+        help="kinetic friction, by which normal forces follow from µ_k F_n, or “free” to find it "
+        "from the bounds of the forces (default: 0.59, as measured)",
     )
     parser.add_argument(
-        "--plate",
+        "--no-plate",
         action="store_true",
-        help="fit the friction of the springed plate too, which moves as tracked",
-    )
-    parser.add_argument(
-        "--mass-ratio",
-        type=float,
-        metavar="R",
-        help="mass of the part over that of the surface with what moves with it (default: fitted)",
+        help="no friction at the springed plate, which else moves as tracked and rubs",
     )
     parser.add_argument(
         "--evaluate",
@@ -62,13 +56,12 @@ def _number_or_free(text: str) -> float | str:
 def _run(arguments: Namespace) -> None:
     import cosim
 
-    given = {} if arguments.mu_s is None else {"mu_s": arguments.mu_s}
+    given = {} if arguments.mu_k is None else {"mu_k": arguments.mu_k}
     with writable(arguments.out):
         found = cosim.fit(
             arguments.trials,
             forces=arguments.forces,
-            plate=arguments.plate,
-            mass_ratio=arguments.mass_ratio,
+            plate=not arguments.no_plate,
             evaluate=arguments.evaluate,
             solver=arguments.solver,
             **given,
