@@ -32,7 +32,7 @@ INSTANTS, REACH = 12, 2.5
 begins or ends slowly, its first or last interval is lost in the noise."""
 ACCELERATION = 80.0  # m/s², deviation of what the part has before and after a slide
 ROUGHNESSES = (1e4, 1e5, 1e6)  # m²/s⁵, spectral density of its change there; the likeliest is taken
-NOISES = (1.0, 3.0, 10.0)  # times that of still tracks; the likeliest is taken
+NOISES = (1.0, 10.0)  # times that of still tracks; the likeliest is taken
 LEAST_NOISE = 2e-7  # m; the digits of a table make as much
 LEAST_SIZE = 1.0  # (s/m)², of what the part's velocity makes of its path; it is some 1e6
 CHUNK = 32  # laws at once
