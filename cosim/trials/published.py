@@ -10,6 +10,7 @@ weights of the part, m g, for the trials 1…10.
 GRAVITY = 9.81  # m/s²
 
 MU_S = 0.72  # measured, and kept in the fit
+MU_K = 0.59  # measured
 MU_K_FITTED = 0.6234
 
 TRIALS = tuple(f"Trial #{n}" for n in range(1, 11))

@@ -108,7 +108,7 @@ def test_a_sweep_is_judged_by_the_fmu(capsys: pytest.CaptureFixture[str]) -> Non
     assert "v_average_fmu" not in exact
     from cosim.studies.sweep.report import table
 
-    told = table("any", data)
+    told = table(data)
     assert "by the FMU" in told
     assert "fast solver against the FMU at 6 points: median error" in told
 

@@ -18,12 +18,11 @@ FORCES = (
     "what is known of normal forces: a CSV with the columns trial, force, lower, upper, mass, or a "
     "TOML with a table for each trial; or “published”"
 )
-MU_S = (
-    "static friction, or “free” to fit it within the bounds of the forces (default: 0.72, as "
-    "published)"
+MU_K = (
+    "kinetic friction, by which normal forces follow from µ_k F_n, or “free” to find it from the "
+    "bounds of the forces (default: 0.59, as measured)"
 )
-PLATE = "fit the friction of the springed plate too, which moves as tracked"
-RATIO = "mass of the part over that of the surface with what moves with it (default: fitted)"
+NO_PLATE = "no friction at the springed plate, which else moves as tracked and rubs"
 EVALUATE = "take the paper's parameters, by its procedure, instead of a fit"
 SOLVER = "of the paper's parameters: exact, or the authors' fixed-step scheme"
 
@@ -34,9 +33,8 @@ STUDIES = (
         (
             folder_of_trials("folder of the trials' CSVs"),
             Option("--forces", FORCES, "FILE"),
-            Option("--mu-s", MU_S, "MU_S", _number_or_free),
-            Option("--plate", PLATE, kind=bool),
-            Option("--mass-ratio", RATIO, "R", float),
+            Option("--mu-k", MU_K, "MU_K", _number_or_free),
+            Option("--no-plate", NO_PLATE, kind=bool, parameter="plate"),
             Option("--evaluate", EVALUATE, choices=("published",)),
             Option("--solver", SOLVER, choices=("exact", "published"), default="exact"),
         ),

@@ -13,8 +13,8 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.mechanics import part
-from cosim.studies.fit.between.together import plate_velocity
 from cosim.studies.fit.results import STEP, Shown
+from cosim.studies.fit.slides import plate_velocity
 from cosim.trials import published
 from cosim.trials.tracked import Trial
 
@@ -33,9 +33,9 @@ class Parameters:
 
 
 class Case:
-    """One trial, ready to be simulated; SI units. ``plate_moves``: as tracked, if it was."""
+    """One trial, ready to be simulated; SI units."""
 
-    def __init__(self, trial: Trial, plate_moves: bool = False) -> None:
+    def __init__(self, trial: Trial) -> None:
         rows = slice(FIRST_ROW, len(trial.time) - LAST_ROWS)
         self.trial = trial
         self.time: Array = np.ascontiguousarray(trial.time[rows] - trial.time[FIRST_ROW])
@@ -46,7 +46,7 @@ class Case:
         steps = int(np.floor(self.time[-1] / STEP + 1e-6))
         self.grid: Array = np.arange(steps + 1, dtype=np.float64) * STEP
         self.measured: Array = np.interp(self.grid, self.time, self.z_part)
-        self._v_plate = plate_velocity(trial)[rows] if plate_moves else np.zeros(len(self.time))
+        self._v_plate = plate_velocity(trial)[rows]
 
     def motion(self, parameters: Parameters, solver: Solver) -> part.PartMotion:
         """The part's simulated motion, every 0.1 ms; the plate at rest."""
@@ -62,21 +62,16 @@ class Case:
             output=self.grid,
         )
 
-    def heights(self, laws: Array) -> Array:
-        """The part's heights [m] every 0.1 ms, a row for each law (as in `part.heights`)."""
-        if not self._v_plate.any():
-            return part.heights(self.time, self.v_surface, laws, self.grid, self.v0)
+    def heights(self, law: Array) -> Array:
+        """The part's heights [m] every 0.1 ms with a law (a row of `part.heights`), over a plate
+        that moves as tracked."""
         steps = np.diff(self.time)
         # Seen from the plate, and back.
         v, v0 = self.v_surface - self._v_plate, self.v0 - float(self._v_plate[0])
         pull = np.diff(self._v_plate) / steps
         means = (self._v_plate[1:] + self._v_plate[:-1]) / 2
         plate = np.interp(self.grid, self.time, np.append(0.0, np.cumsum(steps * means)))
-        return part.heights(self.time, v, laws, self.grid, v0, pull) + plate
-
-    def errors(self, laws: Array) -> Array:
-        """The mean errors [m], one for each law."""
-        return np.abs(self.heights(laws) - self.measured).mean(axis=1)
+        return part.heights(self.time, v, law[None], self.grid, v0, pull)[0] + plate
 
     def shown(self, z: Array) -> Shown:
         """The trial with the part's simulated heights ``z`` [m] every 0.1 ms."""

@@ -1,25 +1,19 @@
-"""The figures of a fit: each trial, how good each µ_k is, normal forces with their intervals."""
+"""The figures of a fit: each trial, how good each friction is, normal forces with intervals."""
 
 import math
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
 
 from cosim.files.picture import Picture
-from cosim.studies.fit.results import Shown, Solved
+from cosim.studies.fit.forces import Force
+from cosim.studies.fit.results import Shown
+from cosim.studies.fit.search import LOSS
 
 SURFACE, MEASURED, SIMULATED = "#8fb8da", "0.15", "#d1495b"
 DASHED = (0, (4, 1.2))
 LARGEST_LOSS = 12.0  # on the axis
-
-
-def draw_all(results: Solved, folder: Path) -> None:
-    """Write every figure into a folder; a profile only where something was fitted."""
-    trials(results).write(folder / "fit-trials.png")
-    forces(results).write(folder / "fit-forces.png")
-    if "profile" in results.numbers:
-        profile(results).write(folder / "fit-profile.png")
 
 
 def _words(result: dict[str, Any]) -> str:
@@ -27,16 +21,15 @@ def _words(result: dict[str, Any]) -> str:
     return f"{result['parameters']} parameters: µ_k {result['mu_k']:.3g}{plate}"
 
 
-def trials(results: Solved) -> Picture:
+def trials(shown: Sequence[Shown], result: dict[str, Any]) -> Picture:
     """Measured and simulated height of the part, and the surface's, a panel for each trial."""
-    columns = min(2, len(results.shown))
-    rows = math.ceil(len(results.shown) / columns)
+    columns = min(2, len(shown))
+    rows = math.ceil(len(shown) / columns)
     figure = Picture(13.0, 1.0 + 2.35 * rows, "constrained")
     axes = figure.subplots(rows, columns, squeeze=False)
-    result = results.numbers
-    for panel in zip(axes.flat, results.shown, result["trials"], strict=False):
+    for panel in zip(axes.flat, shown, result["trials"], strict=False):
         _trial(*panel)
-    for axis in list(axes.flat)[len(results.shown) :]:
+    for axis in list(axes.flat)[len(shown) :]:
         axis.set_visible(False)
     for axis in axes[-1]:
         axis.set_xlabel("time [ms]")
@@ -68,40 +61,36 @@ def _trial(axis: Axes, shown: Shown, row: dict[str, Any]) -> None:
     )
 
 
-def profile(results: Solved) -> Picture:
-    """How much worse than the best each µ_k is, all else fitted anew."""
-    result = results.numbers
+def profiles(result: dict[str, Any]) -> Picture:
+    """How much less likely than the best each µ_k F_n of a trial is, all else fitted anew."""
     figure = Picture(9.0, 5.2, "constrained")
     axis = figure.subplots()
-    line = result["profile"]["mu_k"]
-    axis.plot(line, result["profile"]["loss"], color=SIMULATED, lw=1.8, marker=".", ms=4)
-    low, high = result["mu_k_95_percent"]
-    axis.axvspan(low, high, color="#f4e3c1", alpha=0.6, lw=0, label=f"95 %: {low:.3f} … {high:.3f}")
-    axis.axvline(result["mu_k"], color="0.3", lw=0.9, ls=":", label=f"best: {result['mu_k']:.3f}")
-    impacts = result["between_frames"] == "impacts"
-    bound = "what bounds 95 %" if impacts else "5 % more error than the least"
-    axis.axhline(1.0, color=SURFACE, lw=1.2, ls="--", label=bound)
-    loss = "loss of log-likelihood" if impacts else "mean error above the least"
-    axis.set(xlabel="µ_k", ylabel=f"{loss}, relative", xlim=(line[0], line[-1]))
-    axis.set_ylim(0, LARGEST_LOSS)
+    for name, profile in result["profiles"].items():
+        axis.plot(
+            profile["kinetic_friction_weights"],
+            profile["loss"],
+            lw=1.4,
+            marker=".",
+            ms=4,
+            label=name,
+        )
+    axis.axhline(LOSS, color="0.3", lw=1.0, ls="--", label="90 %, of slides that do not scatter")
+    axis.set(xlabel="µ_k F_n [m g]", ylabel="loss of log-likelihood", ylim=(0, LARGEST_LOSS))
     axis.grid(alpha=0.25)
-    axis.legend(fontsize=9, frameon=False, loc="upper left")
-    axis.set_title(
-        f"How well each µ_k explains the trials, all else fitted; {_words(result)}", fontsize=11
-    )
+    axis.legend(fontsize=8, frameon=False, ncols=2)
+    axis.set_title("How well each friction explains its trial, all else fitted", fontsize=11)
     return figure
 
 
-def forces(results: Solved) -> Picture:
+def forces(known: Sequence[Force], result: dict[str, Any]) -> Picture:
     """Normal forces, trial by trial, with their intervals, measured ones and bounds."""
-    result = results.numbers
     rows = result["trials"]
     figure = Picture(8.0, 4.6, "constrained")
     axis = figure.subplots()
     bounds: dict[str, Any] = {"color": SURFACE, "lw": 7.0, "alpha": 0.5}
     measured: dict[str, Any] = {"marker": "D", "ls": "", "mfc": "none", "color": MEASURED}
     drawn = set()
-    for x, (force, row) in enumerate(zip(results.forces, rows, strict=True)):
+    for x, (force, row) in enumerate(zip(known, rows, strict=True)):
         if force.lower is not None and force.upper is not None:
             axis.plot([x, x], [force.lower, force.upper], solid_capstyle="butt", **bounds)
             drawn.add("bounds")
@@ -109,7 +98,7 @@ def forces(results: Solved) -> Picture:
             axis.plot(x, force.measured, **measured)
             drawn.add("measured")
         found = row["normal_force_weights"]
-        low, high = row.get("normal_force_95_percent", (found, found))
+        low, high = row.get("normal_force_90_percent", (found, found))
         axis.errorbar(
             x,
             found,
@@ -121,7 +110,7 @@ def forces(results: Solved) -> Picture:
         )
     if "measured" in drawn:
         axis.plot([], [], label="measured", **measured)
-    interval = " and 95 %" if "profile" in result else ""
+    interval = " and 90 %" if "profiles" in result else ""
     axis.plot([], [], "o", color=SIMULATED, ms=6, label=result["parameters"] + interval)
     if "bounds" in drawn:
         axis.plot([], [], label="bounds of the fit", **bounds)

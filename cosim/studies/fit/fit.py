@@ -1,11 +1,7 @@
 """Friction and normal forces from tracked trials, or what the published parameters make of them.
 
-A camera smears an impact over the frames about it, and what the part did on the surface meanwhile.
-So the motion between frames is reconstructed with its impacts (`cosim.studies.fit.between`), and
-the law is the one that makes the tracks likeliest (`cosim.studies.fit.search`). That presumes
-impacts that are short against the time between frames and a part that only slides. Where whole
-paths of the part follow better from the tracked velocities as they are, joined by straight lines,
-it does not hold, and the law is fitted to these paths (`cosim.studies.fit.paths`).
+Tracks know no force, only accelerations: what they tell is µ_k F_n/m of each trial and µ_p/µ_k of
+all. With a given µ_k that is each trial's normal force; with known forces it is µ_k.
 """
 
 import os
@@ -19,33 +15,35 @@ from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.files.atomic import write_json
 from cosim.files.picture import Picture
-from cosim.studies.fit import paths, words
-from cosim.studies.fit.between.motion import Lasting
-from cosim.studies.fit.between.together import TYPICAL, Frames, Together, frames
 from cosim.studies.fit.cases import Case, Parameters, Solver
 from cosim.studies.fit.forces import Force, read_forces
-from cosim.studies.fit.intervals import FRICTIONS, Interval, Law, laws, own, shared
-from cosim.studies.fit.results import Shown, Solved
-from cosim.studies.fit.search import Fit, search
-from cosim.studies.fit.stretches import Stretches
+from cosim.studies.fit.results import Shown, together, told
+from cosim.studies.fit.search import FRICTIONS, Fit, Found, Interval, search
 from cosim.studies.tables import write_csv
 from cosim.trials import published
 from cosim.trials.tracked import Trial, read_folder
 
-FORCES: Interval = (1.0, 60.0)
-"""Bounds of a normal force of which nothing is known, in weights of the part."""
 
-_Found = tuple[Law, list[Shown], dict[str, Any]]
-
-
-class TrialResults(Solved):
+class TrialResults:
     """Trials with their parameters and simulated motions: ``numbers``, figures and files."""
+
+    def __init__(
+        self,
+        shown: Sequence[Shown],
+        forces: Sequence[Force],
+        numbers: dict[str, Any],
+        found: Sequence[dict[str, Any]],
+    ) -> None:
+        self.shown, self.forces = shown, forces
+        """What is known of each trial's normal force beside it."""
+        self.numbers = numbers | together(shown, forces, found)
+        """What ``fit.json`` holds; units as the names say, forces in weights of the part."""
 
     def plot(self) -> Picture:
         """Measured and simulated height of the part, a panel for each trial."""
         from cosim.studies.fit import figures
 
-        return figures.trials(self)
+        return figures.trials(self.shown, self.numbers)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``fit.json``, ``fit.csv`` and the figures ``fit-*.png``."""
@@ -54,29 +52,30 @@ class TrialResults(Solved):
         out = Path(folder)
         write_json(out / "fit.json", self.numbers)
         write_csv(out / "fit.csv", [_cells(row) for row in self.numbers["trials"]])
-        figures.draw_all(self, out)
+        self.plot().write(out / "fit-trials.png")
+        figures.forces(self.forces, self.numbers).write(out / "fit-forces.png")
+        if "profiles" in self.numbers:
+            figures.profiles(self.numbers).write(out / "fit-profile.png")
 
     def __repr__(self) -> str:
-        return words.told(self.numbers)
+        return told(self.numbers)
 
 
 def fit(
     trials: str | os.PathLike[str],
     *,
     forces: str | os.PathLike[str] | None = None,
-    mu_s: float | Literal["free"] = published.MU_S,
-    plate: bool = False,
-    mass_ratio: float | None = None,
+    mu_k: float | Literal["free"] = published.MU_K,
+    plate: bool = True,
     evaluate: Literal["published"] | None = None,
     solver: Solver = "exact",
 ) -> TrialResults:
-    """Fit µ_k and the normal forces to the tracked trials (CSVs) of a folder.
+    """Fit µ_k F_n of each tracked trial (CSV) of a folder, and µ_plate.
 
     ``forces`` is a file with what is known of normal forces (:mod:`cosim.studies.fit.forces`), or
-    “published”. ``mu_s`` is kept, or, “free”, fitted too, which needs bounds of forces; ``plate``
-    fits the friction of the springed plate, which moves as tracked, or rests where it was not;
-    ``mass_ratio`` is the part's mass over that of the surface with what moves with it, fitted where
-    it is not known.
+    “published”. The normal forces follow from ``mu_k``, or, “free”, it follows from bounds of
+    forces. The springed plate moves as tracked, or rests where it was not; without ``plate`` it has
+    no friction.
 
     ``evaluate="published"`` takes the paper's µ_k and forces instead, by the authors' procedure,
     with the exact solution or with their scheme (``solver``). Raises BadInput.
@@ -101,99 +100,81 @@ def fit(
     read = {} if forces is None else read_forces(forces, names)
     known = [read.get(name, Force()) for name in names]
     if evaluate:
-        if (mu_s, plate, mass_ratio) != (published.MU_S, False, None):
-            raise BadInput(
-                "The published parameters know no friction of the springed plate, no other µ_s and "
-                "no ratio of masses."
-            )
+        if mu_k != published.MU_K or not plate:
+            raise BadInput("The published parameters have a µ_k of their own, and no plate.")
         return _evaluated(found, known, solver)
-    if mu_s != "free" and not (isinstance(mu_s, int | float) and 0 < mu_s <= 10):
-        raise BadInput(f"mu_s must be above 0 and at most 10, or “free”, and is {mu_s}.")
-    if mu_s == "free" and not any(force.lower or force.upper for force in known):
+    if mu_k != "free" and not (isinstance(mu_k, int | float) and 0 < mu_k <= 10):
+        raise BadInput(f"mu_k must be above 0 and at most 10, or “free”, and is {mu_k}.")
+    if mu_k == "free" and not any(force.lower or force.upper for force in known):
         raise BadInput(
-            "µ_s can only be fitted where bounds of normal forces are known: name a file."
+            "µ_k can only be fitted where bounds of normal forces are known: name a file."
         )
-    if mass_ratio is not None and not 0 <= mass_ratio <= 10:
-        raise BadInput(f"mass_ratio must lie between 0 and 10, and is {mass_ratio}.")
-    return _fitted(found, known, None if mu_s == "free" else float(mu_s), plate, mass_ratio)
+    return _fitted(found, known, None if mu_k == "free" else float(mu_k), plate)
 
 
 def _fitted(
-    found: list[Trial],
-    known: list[Force],
-    mu_s: float | None,
-    plate: bool,
-    mass_ratio: float | None,
+    trials: list[Trial], known: list[Force], given: float | None, plate: bool
 ) -> TrialResults:
-    normal = [(force.lower or FORCES[0], force.upper or FORCES[1]) for force in known]
-    # Of µ_s F_n.
-    limits = [(a * mu_s, b * mu_s) for a, b in normal] if mu_s else [FRICTIONS] * len(normal)
-    seen = [frames(trial, plate) for trial in found]
-    cases = [Case(trial, plate) for trial in found]
-    straight = paths.least_error([case.errors for case in cases], limits)
-    impacts = paths.least_error([_typical(one).errors for one in seen], limits)
-    result = None
-    if impacts <= straight:  # else the likeliest law need not be sought
-        result = _with_impacts(search(seen, limits, plate, mass_ratio), seen)
-        impacts = float(np.mean([one.error for one in result[1]]))
-    if result is None or impacts > straight:
-        result = _with_straight_lines(paths.search([c.errors for c in cases], limits, plate), cases)
-    law, shown, numbers = result
-    numbers |= {
-        "parameters": "fitted",
-        "paths_mean_error_mm": {"impacts": impacts * 1e3, "straight lines": straight * 1e3},
-        "mass_ratio_given": mass_ratio is not None,
-        **shared(law, normal, mu_s, plate),
-    }
-    static = tuple(numbers.get("mu_s_95_percent", (mu_s, mu_s)))
-    each = [
-        own(law, i, limit, static, numbers["mu_s"], mu_s is not None)
-        for i, limit in enumerate(normal)
-    ]
-    return TrialResults(shown, known, numbers, each)
-
-
-def _with_impacts(law: Fit, seen: list[Frames]) -> _Found:
-    """The law with each trial and what is told of the motion between frames."""
-    shown: list[Shown] = []
-    for i, (stretches, one) in enumerate(zip(law.stretches, seen, strict=True)):
-        # From the first frame at which the part sticks, in one run.
-        time, z = stretches.whole(_law(law, i))
-        first = stretches.starts[0]
-        begin, rows = one.time[first], slice(first, None)
-        z_surface, z_part = (track[rows] - track[first] for track in (one.z_surface, one.z_part))
-        shown.append(
-            Shown(one.name, one.time[rows] - begin, z_surface, z_part, (time - begin, z[0]))
+    lowest, highest = FRICTIONS
+    limits = [FRICTIONS] * len(trials)
+    if given:  # bounds of the force are such of the friction
+        limits = [
+            ((force.lower or lowest / given) * given, (force.upper or highest / given) * given)
+            for force in known
+        ]
+    law = search(trials, limits, plate)
+    mu_k, mu_k_range = (given, (given, given)) if given else _from_forces(law, known)
+    static = max(1.0, published.MU_S / mu_k)
+    shown, rows = [], []
+    for trial, kinetic, count, limit in zip(trials, law.kinetic, law.slides, limits, strict=True):
+        case = Case(trial)
+        friction = np.array([static, 1.0, law.ratio.value]) * kinetic.value
+        shown.append(case.shown(case.heights(np.append(friction, 1.0) * published.GRAVITY)))
+        rows.append(
+            {
+                "normal_force_weights": kinetic.value / mu_k,
+                "normal_force_90_percent": [
+                    kinetic.low / mu_k_range[1],
+                    kinetic.high / mu_k_range[0],
+                ],
+                "kinetic_friction_weights": kinetic.value,
+                "kinetic_friction_90_percent": [kinetic.low, kinetic.high],
+                "kinetic_friction_determined": kinetic.determined(limit),
+                "slides": count,
+            }
         )
-    numbers = {
-        "between_frames": "impacts",
-        "mass_ratio": law.mass_ratio,
-        "impact_duration_s": law.lasting.impact,
-        "force_step_duration_s": law.lasting.step,
-        "dispersion": law.dispersion,
+    numbers: dict[str, Any] = {
+        "parameters": "fitted",
+        "mu_k": mu_k,
+        "mu_k_given": given is not None,
+        "mu_plate": law.ratio.value * mu_k,
+        "plate_over_kinetic": law.ratio.value,
+        "plate_over_kinetic_90_percent": [law.ratio.low, law.ratio.high] if plate else None,
+        "profiles": {
+            trial.name: {"kinetic_friction_weights": x.tolist(), "loss": y.tolist()}
+            for trial, (x, y) in zip(trials, law.profile, strict=True)
+        },
     }
-    return law, shown, numbers
+    if not given:
+        numbers["mu_k_90_percent"] = list(mu_k_range)
+    return TrialResults(shown, known, numbers, rows)
 
 
-def _with_straight_lines(law: paths.Paths, cases: list[Case]) -> _Found:
-    shown = [case.shown(case.heights(_law(law, i))[0]) for i, case in enumerate(cases)]
-    left_out, _ = law.leave_one_out()
-    numbers = {
-        "between_frames": "straight lines",
-        "leave_one_out_mean_error_mm": float(left_out.mean() * 1e3),
-    }
-    return law, shown, numbers
+def _from_forces(law: Fit, known: Sequence[Force]) -> tuple[float, Interval]:
+    """µ_k and its interval, from bounds of the normal forces.
 
+    It is the geometric middle of what all bounds leave, or, where they contradict each other, of
+    what lies between the two that do so most.
+    """
 
-def _typical(seen: Frames) -> Stretches:
-    """With impacts between the frames, before anything is fitted."""
-    both = Together(seen, TYPICAL, False, None)
-    return Stretches(both, both.motion(), Lasting(2e-4, 0.0))
+    def least_and_most(end: str) -> tuple[float, float]:
+        frictions: list[tuple[Found, Force]] = [*zip(law.kinetic, known, strict=True)]
+        least = [getattr(x, end) / force.upper for x, force in frictions if force.upper]
+        most = [getattr(x, end) / force.lower for x, force in frictions if force.lower]
+        return max(least, default=0.01), min(most, default=10.0)
 
-
-def _law(law: Law, trial: int) -> Array:
-    """The best one of a trial, a row."""
-    return laws(law.frictions(trial)[[law.best]], *law.ratios[law.best])
+    ends: Array = np.array([least_and_most(end) for end in ("low", "value", "high")])
+    return float(np.sqrt(ends[1].prod())), (float(ends.min()), float(ends.max()))
 
 
 def _evaluated(found: list[Trial], known: Sequence[Force], solver: Solver) -> TrialResults:

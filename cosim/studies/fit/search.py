@@ -1,329 +1,181 @@
-"""The search for the likeliest law of friction: ratios shared by all trials, a friction for each.
+"""The likeliest law of friction: µ_p/µ_k of all trials, µ_k F_n of each; how certain both are.
 
-Given the ratios µ_k/µ_s and µ_p/µ_k the trials have nothing in common, and each is a search in one
-dimension. How much a change of the ratios harms is summed over the trials. Beforehand the mass of
-the part over the surface's and the time that an impact lasts are found by the same likelihood, that
-of the tracks of part and surface together.
-
-How certain all this is, the profile of the likelihood tells, its logarithm divided by how much more
-the trials differ than it allows: it knows little of what the reconstruction misses.
+Given the ratio the trials have nothing in common, so that each is a search in one dimension, and
+all laws on a grid are looked at: the likelihood has steps, where a part just sticks, and no slope
+to follow. Slides are judged by Student's distribution of their deviance residuals, so that a few
+may be off. How certain a number is, the slides tell by their scatter, drawn again and again (the
+bootstrap of independent blocks), and the profile of the likelihood; the wider one holds.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import t as student
 
 from cosim.arrays import Array
-from cosim.studies.fit.between.breaks import MOST_FRAMES
-from cosim.studies.fit.between.motion import Lasting, Motion
-from cosim.studies.fit.between.together import Frames, Together
-from cosim.studies.fit.intervals import FRICTIONS as EDGES
-from cosim.studies.fit.intervals import Interval, Rows, laws
-from cosim.studies.fit.stretches import SPREADS, Stretches
+from cosim.studies.fit import slides
+from cosim.studies.fit.slides import Slide, marginal
+from cosim.trials.published import GRAVITY
+from cosim.trials.tracked import Trial
 
-RATIOS = np.arange(0.0, 1.45, 0.1)  # the part's mass over the surface's
-WIDTHS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.9]) * 1e-3  # s, that a break lasts
-GUESS = (0.82, 0.2)  # µ_k/µ_s, and µ_p/µ_k if it is fitted, while masses and impacts are sought
-FRICTIONS = np.geomspace(*EDGES, 49)  # µ_k F_n in weights of the part
-NEAR_FRICTION = np.linspace(-0.1, 0.1, 17)  # relative
-SLIP_STEPS = (0.1, 0.0125, 0.0025)  # of µ_k/µ_s, up to 1: all, then finer and finer
-NEAR_SLIP = (1.0, 0.0125)  # on either side of the likeliest before; the law may stick or slip as a
-# step, so all is looked through finely
-PLATE_STEPS = (0.1, 0.025, 0.0125)  # of µ_p/µ_k
-NEAR_PLATE = (0.05, 0.0125)
-LARGEST_PLATE = 0.6
-MOVES = 2  # of the frictions that are looked at
-ALIKE = 2.0  # as a logarithm; no less likely, for what the tables can tell
-LIKELY = 1.92  # half of what Χ² with one degree of freedom exceeds in 5 % of the cases
-FEWEST_PARTS = 4
-LEAST_DISPERSION = 26.0
-"""What the reconstruction misses alike in all trials they cannot tell. On runs of this bench whose
-trials agree the true law is up to 19 in log-likelihood off the likeliest with 5 µm of noise, and 49
-where the shutter is open half the time: 26 times LIKELY."""
+Interval = tuple[float, float]
+Rows = npt.NDArray[np.intp]
+
+FRICTIONS: Interval = (0.3, 60.0)
+"""µ_k F_n that is looked at, in weights of the part."""
+COARSE, FINE, AROUND = 37, 25, 1.2  # frictions of the first grid and of the second, and its reach
+RATIOS, NEAR = np.linspace(0.0, 0.9, 7), np.linspace(-0.12, 0.12, 9)  # of µ_p/µ_k
+FREEDOM = 8.0  # degrees of, of Student's distribution
+FEWEST = 5  # slides of which an interval is told
+DRAWS = 400
+LEVEL = 0.9
+LOSS = 1.353
+"""Half of what Χ² with one degree of freedom exceeds in 10 % of the cases."""
+SYSTEMATIC = 0.05
+"""By which intervals are wider on either side, relative: what the model of the motion before and
+after a slide may be wrong by. On trials of this bench, whose friction is known, it is 0.045 (rms
+of 16)."""
 
 
 @dataclass(frozen=True)
-class Table:
-    """What one trial says: minus the logarithm of the likelihood, stretches by laws' ratios by
-    frictions; and the kinetic frictions [weights], ratios by frictions."""
+class Bounds:
+    """Numbers that are sought, by name, and between which values."""
 
-    unlikelihood: Array
-    friction: Array
+    names: list[str]
+    low: float
+    high: float
 
-    def best(self) -> tuple[Array, Array]:
-        """For each pair of ratios the likeliest friction, and its unlikelihood."""
-        summed = self.unlikelihood.sum(axis=0)
-        every, least = np.arange(len(summed)), summed.argmin(axis=1)
-        return self.friction[every, least], summed[every, least]
+
+class Friction:
+    """The friction of the part alone, a problem (`cosim.studies.identify.problem.problem`) of
+    tracked trials: they share µ_p/µ_k, and each has its µ_k F_n in weights of the part."""
+
+    def __init__(self, trials: Sequence[Trial]) -> None:
+        self.shared = Bounds(["plate_over_kinetic"], float(RATIOS[0]), float(RATIOS[-1]))
+        self.own = Bounds(["kinetic_friction_weights"], *FRICTIONS)
+        self.coarse = np.stack(
+            np.meshgrid(np.geomspace(*FRICTIONS, COARSE), RATIOS, indexing="ij"), axis=-1
+        )
+        kinetic, ratio = self.coarse.reshape(-1, 2).T
+        laws = kinetic * GRAVITY, kinetic * ratio * GRAVITY
+        self.slides: list[list[Slide]] = [slides.slides(trial, *laws) for trial in trials]
+
+    def residuals(self, trial: int, shared: Array, own: Array) -> Array:
+        """Deviance residuals of the slides of a trial (slides by laws), for laws (…) with the
+        ratios ``shared`` and the kinetic frictions ``own``."""
+        kinetic, ratio = (x.ravel() for x in np.broadcast_arrays(own, shared))
+        laws = kinetic * GRAVITY, kinetic * ratio * GRAVITY
+        found = [marginal(one.log_likelihoods(*laws)) for one in self.slides[trial]]
+        return slides.residuals(found) if found else np.empty((0, len(kinetic)))
+
+    def losses(self, trial: int, shared: Array, own: Array) -> Array:
+        """Negative log-likelihood of each slide (slides by frictions by ratios)."""
+        found = self.residuals(trial, shared[None], own[:, None])
+        loss = (FREEDOM + 1) / 2 * np.log1p(found**2 / FREEDOM)
+        return loss.reshape(-1, len(own), len(shared))
+
+
+@dataclass(frozen=True)
+class Found:
+    """A number and its interval of ``LEVEL``."""
+
+    value: float
+    low: float
+    high: float
+
+    def determined(self, limits: Interval) -> str:
+        """“yes”, “at least” or “at most” the one end of the interval, or “no”."""
+        below, above = self.low <= limits[0] * 1.05 + 1e-9, self.high >= limits[1] * 0.95
+        if below:
+            return "no" if above else "at most"
+        return "at least" if above else "yes"
 
 
 @dataclass(frozen=True)
 class Fit:
-    """What was found. ``ratios`` holds rows (µ_k/µ_s, µ_p/µ_k) that were tried, ``best`` the row of
-    the likeliest, ``profile`` how much less likely each row is, as a logarithm."""
+    """What was found: the ``ratio`` µ_p/µ_k, each trial's ``kinetic`` friction µ_k F_n [weights],
+    its number of ``slides``, and its ``profile``: frictions, and how much less likely each is."""
 
-    ratios: Array
-    tables: list[Table]
-    best: int
-    profile: Array
-    dispersion: float
-    mass_ratio: float
-    lasting: Lasting
-    together: list[Together]
-    stretches: list[Stretches]
-    wide: list[Array]
-    """The unlikelihood of each of ``FRICTIONS`` with the likeliest ratios, for each trial."""
-
-    @property
-    def loss(self) -> Array:
-        """How much less likely each row is than the likeliest, over what is possible yet."""
-        return self.profile / self._threshold
-
-    @property
-    def possible(self) -> npt.NDArray[np.bool_]:
-        """The rows that are."""
-        return self.loss <= 1
-
-    @property
-    def _threshold(self) -> float:
-        return LIKELY * self.dispersion
-
-    def frictions(self, trial: int) -> Array:
-        """The kinetic friction [weights] of a trial with each row."""
-        return self.tables[trial].best()[0]
-
-    def possible_frictions(self, trial: int) -> tuple[Rows, Array]:
-        """Rows and the kinetic frictions [weights] that are possible with them."""
-        table = self.tables[trial]
-        summed = table.unlikelihood.sum(axis=0)
-        worse = self.profile[:, None] + summed - summed.min(axis=1, keepdims=True)
-        rows, columns = np.nonzero(worse <= self._threshold)
-        far = FRICTIONS[self.wide[trial] - summed[self.best].min() <= self._threshold]
-        return (
-            np.append(rows, np.full(len(far), self.best)),
-            np.append(table.friction[rows, columns], far),
-        )
+    ratio: Found
+    kinetic: list[Found]
+    slides: list[int]
+    profile: list[tuple[Array, Array]]
 
 
-def search(
-    seen: Sequence[Frames],
-    limits: Sequence[Interval],
-    plate: bool,
-    mass_ratio: float | None = None,
-) -> Fit:
-    """Fit the law to tracked trials, each µ_s F_n [weights] within its limits."""
-    short = [_cut(frames) for frames in seen]
-    ratio = _masses(short, plate) if mass_ratio is None else mass_ratio
-    both = [Together(frames, ratio, plate, None) for frames in short]
-    motions = [one.motion() for one in both]
-    guess = np.array([GUESS[0], GUESS[1] if plate else 0.0])
-    lasting = _lasting(both, motions, [None] * len(both), guess)
-    rough = _Tables(both, motions, lasting, limits, guess)
-    rough.look(*_wide(plate))
-    rough.look(*_near(rough.best, plate, 0))
-    lasting = _lasting(both, motions, rough.frictions, rough.best)
-    both = [Together(frames, ratio, plate, None) for frames in seen]
-    tables = _Tables(both, [one.motion() for one in both], lasting, limits, rough.best)
-    for stage in range(2):
-        tables.look(*_near(tables.best, plate, stage))
-    total, best = tables.total, tables.middle
-    return Fit(
-        *(tables.ratios, tables.tables, best, total - total.min()),
-        *(_dispersion(tables.tables, best, 2 if plate else 1), ratio, lasting),
-        *(both, tables.stretches, tables.wide(best)),
-    )
-
-
-def _wide(plate: bool) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    return (0.0, 1.0, SLIP_STEPS[0]), (0.0, LARGEST_PLATE * plate, PLATE_STEPS[0])
-
-
-def _near(
-    centre: Array, plate: bool, stage: int
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """From, to and step of µ_k/µ_s and µ_p/µ_k about ``centre``."""
-    slip, rub = NEAR_SLIP[stage], NEAR_PLATE[stage]
-    low, high = max(0.0, centre[0] - slip), min(1.0, centre[0] + slip)
-    return (low, high, SLIP_STEPS[stage + 1]), (
-        *(max(0.0, centre[1] - rub), (centre[1] + rub) * plate, PLATE_STEPS[stage + 1]),
-    )
-
-
-class _Tables:
-    """The tables of all trials, for the ratios that have been looked at."""
-
-    def __init__(
-        self,
-        both: Sequence[Together],
-        motions: Sequence[Motion],
-        lasting: Lasting,
-        limits: Sequence[Interval],
-        guess: Array,
-    ) -> None:
-        pairs = zip(both, motions, strict=True)
-        self.stretches = [Stretches(*pair, lasting) for pair in pairs]
-        self._limits, self.best = limits, guess
-        scanned = [_scan(one, guess, None) for one in self.stretches]
-        self._spreads = [spread for _, spread, _ in scanned]
-        self.ratios = guess[None]
-        self._start = [np.array([friction]) for _, _, friction in scanned]
-        self.tables: list[Table] = []
-        self.total = np.zeros(0)
-
-    def look(self, slip: tuple[float, float, float], plate: tuple[float, float, float]) -> None:
-        """At more pairs of ratios, the frictions near those of the nearest pair before."""
-        pairs = _pairs(slip, plate)
-        nearest = (np.abs(pairs[:, None] - self.ratios) / (1, 0.3)).sum(axis=2).argmin(axis=1)
-        known = [table.best()[0] for table in self.tables] or self._start
-        every = zip(self.stretches, self._spreads, self._limits, known, strict=True)
-        new = [
-            _table(one, spread, limit, pairs, friction[nearest])
-            for one, spread, limit, friction in every
-        ]
-        self.ratios = np.concatenate([self.ratios, pairs]) if self.tables else pairs
-        joined = zip(self.tables, new, strict=True) if self.tables else ()
-        self.tables = [_joined(*pair) for pair in joined] or new
-        self.total = np.sum([table.best()[1] for table in self.tables], axis=0)
-        self.best = self.ratios[self.total.argmin()]
-
-    @property
-    def frictions(self) -> list[float | None]:
-        """The likeliest of each trial."""
-        return [float(table.best()[0][self.total.argmin()]) for table in self.tables]
-
-    def wide(self, row: int) -> list[Array]:
-        """The unlikelihood of all frictions with a row of ratios, for each trial."""
-        found = zip(self.stretches, self._spreads, strict=True)
-        law = laws(FRICTIONS, *self.ratios[row])
-        return [one.unlikelihoods(one.misses(law), spread).sum(axis=0) for one, spread in found]
-
-    @property
-    def middle(self) -> int:
-        """Rows that are about as likely as the likeliest are one broad optimum: its middle."""
-        likely = np.flatnonzero(self.total < self.total.min() + ALIKE)
-        middle = self.ratios[likely].min(axis=0) / 2 + self.ratios[likely].max(axis=0) / 2
-        return int(likely[((self.ratios[likely] - middle) ** 2).sum(axis=1).argmin()])
-
-
-def _pairs(slip: tuple[float, float, float], plate: tuple[float, float, float]) -> Array:
-    """All pairs of µ_k/µ_s and µ_p/µ_k, each from, to and step; µ_k/µ_s not 0."""
-    lines = [
-        np.linspace(low, high, round((high - low) / step) + 1) for low, high, step in (slip, plate)
-    ]
-    pairs = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 2)
-    return pairs[pairs[:, 0] > 0]
-
-
-def _cut(seen: Frames) -> Frames:
-    rows = slice(0, MOST_FRAMES)
-    arrays = {k: v[rows] for k, v in vars(seen).items() if isinstance(v, np.ndarray)}
-    return replace(seen, **arrays)
-
-
-def _scan(stretches: Stretches, ratios: Array, near: float | None) -> tuple[float, float, float]:
-    """The least unlikelihood, and spread and friction with it: of all frictions, first coarse, then
-    fine, or of those near a known one."""
-    frictions = FRICTIONS if near is None else near * (1 + NEAR_FRICTION)
-    while True:
-        found = stretches.misses(laws(frictions, *ratios))
-        values = np.array([stretches.unlikelihoods(found, s).sum(axis=0) for s in SPREADS])
-        spread, best = np.unravel_index(values.argmin(), values.shape)
-        if frictions is not FRICTIONS:
-            return float(values.min()), float(SPREADS[spread]), float(frictions[best])
-        frictions = frictions[best] * (1 + NEAR_FRICTION)
-
-
-def _masses(seen: Sequence[Frames], plate: bool) -> float:
-    """The likeliest ratio of masses: that with which both together move most smoothly."""
-    last: list[Together | None] = [None] * len(seen)
-    costs = []
-    for ratio in RATIOS:
-        last = [Together(one, float(ratio), plate, b) for one, b in zip(seen, last, strict=True)]
-        costs.append(sum(one.unlikelihood for one in last if one))
-    return max(0.0, _vertex(RATIOS, np.array(costs)))
-
-
-def _lasting(
-    both: Sequence[Together],
-    motions: Sequence[Motion],
-    frictions: Sequence[float | None],
-    ratios: Array,
-) -> Lasting:
-    """The likeliest durations of impacts and of steps of the driving force."""
-    lasting = Lasting(2e-4, 0.0)
-    for name in lasting._fields:
-        costs: list[float] = []
-        for width in WIDTHS:
-            tried = lasting._replace(**{name: float(width)})
-            costs.append(0.0)
-            for one, motion, friction in zip(both, motions, frictions, strict=True):
-                costs[-1] += _scan(Stretches(one, motion, tried), ratios, friction)[0]
-            if len(costs) > 2 and costs[-1] > min(costs):
-                break
-        found = max(0.0, _vertex(WIDTHS[: len(costs)], np.array(costs)))
-        lasting = lasting._replace(**{name: found})
-    return lasting
-
-
-def _vertex(x: Array, y: Array) -> float:
-    """Where a parabola through the least of ``y`` and its neighbours, two on a side, is least."""
-    i = int(y.argmin())
-    near = slice(max(0, i - 2), i + 3)
-    a, b, _ = np.polyfit(x[near] - x[i], y[near], 2)
-    if a <= 0 or i in (0, len(x) - 1):
-        return float(x[i])
-    return float((x[i] - b / (2 * a)).clip(x[i - 1], x[i + 1]))
-
-
-def _table(
-    stretches: Stretches,
-    spread: float,
-    limit: Interval,
-    ratios: Array,
-    centre: Array,
-) -> Table:
-    """Of the frictions about ``centre``, one for each pair of ratios; if these end at the edge of
-    what was looked at, about the edge."""
-    low, high = (edge * ratios[:, :1] for edge in limit)
-
-    def about(centre: Array) -> Table:
-        friction = (centre[:, None] * (1 + NEAR_FRICTION)).clip(low, high)
-        slip, plate = (np.broadcast_to(ratio[:, None], friction.shape) for ratio in ratios.T)
-        found = stretches.misses(laws(friction, slip, plate).reshape(-1, 4))
-        values = stretches.unlikelihoods(found, spread)
-        return Table(values.reshape(-1, *friction.shape), friction)
-
-    table = about(centre)
-    for _ in range(MOVES):
-        summed = table.unlikelihood.sum(axis=0)
-        ends, least = summed[:, [0, -1]], summed.min(axis=1, keepdims=True)
-        if not ((ends == least) & (ends < summed[:, [1, -2]])).any():
+def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> Fit:
+    """The likeliest law, each trial's µ_k F_n [weights] within its limits; without ``plate`` the
+    springed plate has no friction."""
+    problem, every = Friction(trials), range(len(trials))
+    ratios = RATIOS if plate else np.zeros(1)
+    grids = [problem.coarse[:, 0, 0].clip(*limit) for limit in limits]
+    tables = [problem.losses(k, ratios, grids[k]) for k in every]
+    row, best = _best(_summed(tables))
+    if plate:
+        ratios = np.unique((ratios[row] + NEAR).clip(0.0))
+    middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
+    around = np.geomspace(1 / AROUND, AROUND, FINE)
+    for _ in range(2):
+        grids = [(x * around).clip(*limit) for x, limit in zip(middles, limits, strict=True)]
+        tables = [problem.losses(k, ratios, grids[k]) for k in every]
+        row, best = _best(_summed(tables))
+        middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
+        if not {0, FINE - 1} & set(best):  # none is at the edge of its grid
             break
-        table = about(table.best()[0])
-    return table
+    rows, drawn = _drawn(tables)
+    sums = _summed(tables)
+    whole = np.sum([one.min(axis=0) for one in sums], axis=0)
+    count = [len(table) for table in tables]
+    found, profiles = [], []
+    for k, (grid, limit) in enumerate(zip(grids, limits, strict=True)):
+        others = whole - sums[k].min(axis=0)
+        profile = (sums[k] + others).min(axis=1) - whole.min()
+        profiles.append((grid, profile))
+        value = float(grid[best[k]])
+        if count[k] < FEWEST:  # too few to tell their scatter
+            value = value if count[k] else float(np.sqrt(limit[0] * limit[1]))
+            found.append(Found(value, *limit))
+            continue
+        likely = grid[profile <= LOSS]
+        found.append(_interval(value, likely, grid[drawn[:, k]], count[k], limit))
+    likely = ratios[whole - whole.min() <= LOSS]
+    ratio = _interval(float(ratios[row]), likely, ratios[rows], sum(count), (0.0, 9.0))
+    return Fit(ratio, found, count, profiles)
 
 
-def _joined(one: Table, other: Table) -> Table:
-    return Table(
-        np.concatenate([one.unlikelihood, other.unlikelihood], axis=1),
-        np.concatenate([one.friction, other.friction]),
-    )
+def _summed(tables: Sequence[Array]) -> list[Array]:
+    """The slides of each trial together: frictions by ratios."""
+    return [table.sum(axis=0) for table in tables]
 
 
-def _dispersion(tables: Sequence[Table], best: int, shared: int) -> float:
-    """How much more the trials differ about the shared ratios than their likelihoods allow.
+def _best(sums: Sequence[Array]) -> tuple[int, list[int]]:
+    """The likeliest ratio, and with it the likeliest friction of each trial; their numbers."""
+    row = int(np.sum([one.min(axis=0) for one in sums], axis=0).argmin())
+    return row, [int(one[:, row].argmin()) for one in sums]
 
-    Twice the sum of what each loses to its own best ratios has as many degrees of freedom as there
-    are ratios of trials but one. Few trials are taken in parts. Source: P. McCullagh, J. A. Nelder,
-    *Generalized Linear Models*, 2nd edition 1989, section 4.5.
-    """
-    split = -(-FEWEST_PARTS // len(tables))
-    parts = [
-        part.sum(axis=0).min(axis=1)
-        for table in tables
-        for part in np.array_split(table.unlikelihood, min(split, len(table.unlikelihood)))
-    ]
-    lost = sum(float(part[best] - part.min()) for part in parts)
-    return max(LEAST_DISPERSION, 2 * lost / (shared * max(1, len(parts) - 1)))
+
+def _drawn(tables: Sequence[Array]) -> tuple[Rows, Rows]:
+    """The same of slides drawn anew, ``DRAWS`` times: ratios, and frictions by trials."""
+    rng = np.random.default_rng(0)
+    sums = []
+    for table in tables:
+        n = max(1, len(table))
+        weights = rng.multinomial(n, np.full(n, 1 / n), DRAWS)[:, : len(table)]
+        sums.append(np.tensordot(weights, table, 1))
+    rows = np.sum([one.min(axis=1) for one in sums], axis=0).argmin(axis=1)
+    return rows, np.stack([one[np.arange(DRAWS), :, rows].argmin(axis=1) for one in sums], 1)
+
+
+def _interval(value: float, likely: Array, drawn: Array, count: int, limit: Interval) -> Found:
+    """From what is likely and what was drawn; few slides scatter less than many would."""
+    few = float(student.ppf((1 + LEVEL) / 2, max(1, count - 1)) / student.ppf((1 + LEVEL) / 2, 1e9))
+    ends = []
+    for end, share, side in (
+        (likely.min(), (1 - LEVEL) / 2, -1),
+        (likely.max(), (1 + LEVEL) / 2, 1),
+    ):
+        scatter = few * (float(np.quantile(drawn, share)) - value)
+        far = max(side * scatter, side * (float(end) - value), 0.0)
+        ends.append(value + side * float(np.hypot(far, SYSTEMATIC * value)))
+    return Found(value, max(ends[0], limit[0]), min(ends[1], limit[1]))

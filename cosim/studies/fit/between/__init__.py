@@ -1,1 +1,0 @@
-"""The motion of the surface between the frames of a camera."""

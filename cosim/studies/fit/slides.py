@@ -1,0 +1,243 @@
+"""The part's path while it slides on the tracked surface, and how likely a law makes it.
+
+While the part slides its acceleration is known but for the law: ±µ_k F_n/m − g, and µ_p F_n/m
+against its velocity over the springed plate. Before and after, it moves with the surface, smoothly.
+The tracked surface tells between which frames a slide begins and ends, and its sign; the instants
+between the frames are not known, least of all where an impact begins the slide. So all instants
+count, each by the likelihood of the part's heights about the slide (the marginal likelihood), and
+the surface's motion between the frames need not be reconstructed.
+
+Where part and surface move together the acceleration is a random walk, as in a smoothing spline;
+source: G. Wahba, *Spline Models for Observational Data*, SIAM 1990, chapter 1. Units: s, m.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.arrays import Array
+from cosim.trials.published import GRAVITY
+from cosim.trials.tracked import Trial
+
+Rows = npt.NDArray[np.intp]
+
+CLEAR = 4.0
+"""Deviations by which the way from frame to frame must exceed its noise to be a slide."""
+BESIDE = 7  # frames at most on either side, in which the part does not slide
+INSTANTS, REACH = 12, 2.5
+"""Instants at which a slide may begin or end, and over how many intervals between frames: where it
+begins or ends slowly, its first or last interval is lost in the noise."""
+ACCELERATION = 80.0  # m/s², deviation of what the part has before and after a slide
+ROUGHNESSES = (1e4, 1e5, 1e6)  # m²/s⁵, spectral density of its change there; the likeliest is taken
+NOISES = (1.0, 10.0)  # times that of still tracks; the likeliest is taken
+LEAST_NOISE = 2e-7  # m; the digits of a table make as much
+LEAST_SIZE = 1.0  # (s/m)², of what the part's velocity makes of its path; it is some 1e6
+CHUNK = 32  # laws at once
+PASSES = 3  # until the instant is known at which the part's velocity passes the plate's
+FEW = 7  # of so many laws one, by which the roughness is chosen
+IMPROBABLE = 12.0  # a logarithm: instants that are so much less likely with every law are left out
+
+
+@dataclass(frozen=True)
+class Slide:
+    """One slide, with what of the likelihood does not depend on the law.
+
+    ``time`` and ``z`` hold n frames about it; rows of the others are pairs of instants (its
+    ``begin`` and ``end``, g of them): the n × n factor ``whiten`` that makes errors independent and
+    of size one, what it makes of a height that is free (``level``, g × n, of length one), and
+    ``fixed``, the logarithm's constant.
+    """
+
+    sign: int
+    time: Array
+    z: Array
+    v_plate: float
+    begin: Array
+    end: Array
+    whiten: Array
+    fixed: Array
+    level: Array
+
+    def log_likelihoods(self, kinetic: Array, plate: Array) -> Array:
+        """Of laws (µ_k F_n/m and µ_p F_n/m, m/s²) by pairs of instants."""
+        parts = [slice(k, k + CHUNK) for k in range(0, len(kinetic), CHUNK)]
+        return np.concatenate([self._of_few(kinetic[few], plate[few]) for few in parts])
+
+    def _of_few(self, kinetic: Array, plate: Array) -> Array:
+        """The same, of laws few enough for a processor's cache.
+
+        The part begins at a height and with a velocity that are free; so they are found by least
+        squares, the velocity by Gauss–Newton, since the plate's friction turns with it. Arrays are
+        pairs by laws, or pairs by laws by frames.
+        """
+        lasts = (self.end - self.begin)[:, None]
+        since = (self.time - self.begin[:, None])[:, None]
+        early, within = np.minimum(since, 0.0), since.clip(0.0, lasts[..., None])
+        beyond = (self.time - self.end[:, None])[:, None].clip(0.0)
+        pull, rub = self.sign * kinetic - GRAVITY, 0.0 * plate
+        faster = np.zeros((len(lasts), len(kinetic)))  # than the plate, at the begin
+        level, turned = self.level[:, None], self.whiten.swapaxes(1, 2)
+        found = faster
+        for _ in range(PASSES):
+            v, way = self.v_plate + faster, np.where(faster >= 0.0, 1.0, -1.0)
+            first = pull - way * rub
+            turns = np.broadcast_to(lasts, faster.shape).copy()
+            np.divide(-faster, first, out=turns, where=first * faster < 0.0)
+            turns = np.minimum(turns, lasts)
+            # Having stopped over the plate the part goes on the other way, or is held by it.
+            second = pull + way * rub
+            second = np.where(second * way < 0.0, second, 0.0)
+            left = lasts - turns
+            v_turned = v + first * turns
+            # What a faster begin adds to the velocity after the turn: it turns later, too.
+            share = np.divide(second, first, out=np.ones_like(first), where=left > 0.0)[..., None]
+            one = np.minimum(within, turns[..., None])
+            two = within - one
+            path = (v[..., None] + first[..., None] * one / 2) * one + v[..., None] * early
+            path += (v_turned[..., None] + second[..., None] * two / 2) * two
+            path += (v_turned + second * left)[..., None] * beyond
+            error, slope = (self.z - path) @ turned, (early + one + share * (two + beyond)) @ turned
+            # The height is eliminated; then least squares in the velocity.
+            error -= (error * level).sum(axis=-1, keepdims=True) * level
+            slope -= (slope * level).sum(axis=-1, keepdims=True) * level
+            size, told = (slope**2).sum(axis=-1) + LEAST_SIZE, (slope * error).sum(axis=-1)
+            found = (told**2 / size - (error**2).sum(axis=-1)) / 2
+            faster, rub = faster + told / size, plate
+        return (self.fixed[:, None] + found).T
+
+    def only(self, pairs: npt.NDArray[np.bool_]) -> "Slide":
+        """The same with some of the pairs of instants."""
+        names = ("begin", "end", "whiten", "fixed", "level")
+        kept = {name: getattr(self, name)[pairs] for name in names}
+        return Slide(self.sign, self.time, self.z, self.v_plate, **kept)
+
+
+@dataclass(frozen=True)
+class Span:
+    """Where a slide stands: frames before, in and after it, and its possible instants, s."""
+
+    sign: int
+    before: Rows
+    inside: Rows
+    after: Rows
+    begins: Array
+    ends: Array
+
+    @property
+    def frames(self) -> Rows:
+        """All of them."""
+        return np.concatenate([self.before, self.inside, self.after])
+
+
+def noise_of(trial: Trial) -> float:
+    """The deviation of a tracked height, m: where the part sticks its distance from the surface
+    does not change, and elsewhere fourth differences of the path are nearly noise alone."""
+    apart = np.abs(np.diff(trial.platform.z - trial.part.z, 2))
+    path = np.abs(np.diff(trial.part.z, 4))
+    found = (np.quantile(apart, 0.25) / 12**0.5, np.quantile(path, 0.25) / 70**0.5)
+    return max(LEAST_NOISE, float(min(found)) / 0.3186)  # a quarter lies within so many deviations
+
+
+def spans(trial: Trial, noise: float) -> list[Span]:
+    """The slides of a trial that tell something of its law."""
+    time = trial.time - trial.time[0]
+    moved = np.diff(trial.platform.z - trial.part.z)
+    signs = np.where(np.abs(moved) > CLEAR * 2 * noise, np.sign(moved), 0).astype(int)
+    edges = np.flatnonzero(np.diff(signs, prepend=0, append=0))
+    runs = [(i, j - 1) for i, j in pairwise(edges.tolist()) if signs[i]]
+    lost = (np.arange(INSTANTS) + 0.5) / INSTANTS * REACH * float(np.median(np.diff(time)))
+    found = []
+    for k, (i, j) in enumerate(runs):
+        low = runs[k - 1][1] + 2 if k else 0
+        high = runs[k + 1][0] - 1 if k + 1 < len(runs) else len(time) - 1
+        before = np.arange(max(low, i - BESIDE + 1), i + 1)
+        inside = np.arange(i + 1, j + 1)
+        after = np.arange(j + 1, min(high, j + BESIDE) + 1)
+        # Height, velocity and acceleration are free on each side: what is left over tells. Of a
+        # single frame too much depends on how smooth the motion about it is.
+        if len(inside) < 2 or sum(max(0, len(x) - 2) for x in (before, after)) + len(inside) < 3:
+            continue
+        begins = time[i + 1] - lost if len(before) else time[[i + 1]]
+        ends = time[j] + lost if len(after) else time[[j]]
+        found.append(Span(int(signs[i]), before, inside, after, begins, ends))
+    return found
+
+
+def slide(trial: Trial, span: Span, noise: float, roughness: float) -> Slide | None:
+    """A slide, prepared; None where it has no time to last."""
+    time = trial.time - trial.time[0]
+    begin, end = (x.ravel() for x in np.meshgrid(span.begins, span.ends, indexing="ij"))
+    begin, end = begin[begin < end], end[begin < end]
+    if len(begin) == 0:
+        return None
+    at, z = time[span.frames], trial.part.z[span.frames] - trial.part.z[span.inside[0]]
+    covariance = np.repeat(noise**2 * np.eye(len(at))[None], len(begin), axis=0)
+    for away in (begin[:, None] - at, at - end[:, None]):
+        x = np.clip(away, 0.0, None)
+        x, y = x[:, :, None], x[:, None, :]
+        covariance += ACCELERATION**2 * (x * y) ** 2 / 4 + roughness * _walk(x, y)
+    factor = np.linalg.cholesky(covariance)
+    whiten = np.linalg.inv(factor)
+    level = whiten.sum(axis=2)
+    length = np.linalg.norm(level, axis=1, keepdims=True)
+    level /= length
+    along = ((at - begin[:, None])[:, None, :] @ whiten.swapaxes(1, 2))[:, 0]
+    along -= (along * level).sum(axis=1, keepdims=True) * level
+    volume = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+    volume += np.log(length[:, 0] * np.linalg.norm(along, axis=1))
+    passes = plate_velocity(trial)[span.inside].mean()
+    return Slide(
+        *(span.sign, at, z, float(passes), begin, end, whiten),
+        *(-volume - np.log(len(begin)), level),
+    )
+
+
+def _walk(x: Array, y: Array) -> Array:
+    """The covariance of heights after x and y of an acceleration that is a random walk from 0."""
+    less, more = np.minimum(x, y), np.abs(x - y)
+    return less**5 / 20 + more * less**4 / 8 + more**2 * less**3 / 12
+
+
+def plate_velocity(trial: Trial) -> Array:
+    """Of the springed plate [m/s] at the frames, as tracked, or 0 where it was not."""
+    if trial.plate is None or not np.isfinite(trial.plate.v).any():
+        return np.zeros(len(trial.time))
+    known = np.isfinite(trial.plate.v)
+    return np.interp(trial.time, trial.time[known], trial.plate.v[known])
+
+
+def marginal(log_likelihoods: Array) -> Array:
+    """The logarithm of the sum over pairs of instants (the last axis)."""
+    most = log_likelihoods.max(axis=-1)
+    return most + np.log(np.exp(log_likelihoods - most[..., None]).sum(axis=-1))
+
+
+def slides(trial: Trial, kinetic: Array, plate: Array) -> list[Slide]:
+    """All slides of a trial, with the roughness and noise that make the best of the laws likeliest,
+    and with those pairs of instants that are likely with any of the laws."""
+    noise, best = noise_of(trial), (-np.inf, [])
+    places = spans(trial, noise)
+    few = kinetic[::FEW], plate[::FEW]
+    for roughness, factor in product(ROUGHNESSES, NOISES):
+        every = [slide(trial, span, factor * noise, roughness) for span in places]
+        kept = [one for one in every if one is not None]
+        likelihood = sum((marginal(one.log_likelihoods(*few)) for one in kept), np.zeros(1)).max()
+        if likelihood > best[0]:
+            best = float(likelihood), kept
+    found = []
+    for one in best[1]:
+        told = one.log_likelihoods(kinetic, plate)
+        likely = (told - told.max(axis=1, keepdims=True)).max(axis=0) > -IMPROBABLE
+        found.append(one.only(likely))
+    return found
+
+
+def residuals(log_likelihoods: Sequence[Array]) -> Array:
+    """Deviance residuals, slides by laws, of the logarithms of the slides' likelihoods: the root of
+    twice what each law loses to the slide's own best one. Source: P. McCullagh, J. A. Nelder,
+    *Generalized Linear Models*, 2nd edition 1989, section 2.4."""
+    every = np.array(log_likelihoods)
+    return np.sqrt(2 * (every.max(axis=1, keepdims=True) - every))
