@@ -154,7 +154,7 @@ def test_one_class_each_runs_keeps_searches_and_judges() -> None:
     assert {module.rpartition(".")[0] for module in searches} == {"cosim.search"}
     alone = {
         "sqlite3": "cosim.evaluate.store",
-        "cosim.simulation.many": "cosim.evaluate.evaluator",
+        "cosim.evaluate.many": "cosim.evaluate.evaluator",
     }
     for package, user in alone.items():
         users = {module for module, tree in trees.items() if package in _names(tree)}

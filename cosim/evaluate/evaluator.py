@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any, Self
 
 from cosim.errors import BadInput
+from cosim.evaluate.many import each
 from cosim.evaluate.point import Number, Outcome, evaluate, evaluate_many, failed, outcome_of, point
 from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene
-from cosim.simulation.many import each
 from cosim.toolchain.processes import Progress, processors
 
 Settings = Mapping[str, Number | str]

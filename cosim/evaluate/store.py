@@ -13,6 +13,7 @@ import sqlite3
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from itertools import islice
 from math import inf
 from pathlib import Path
 from time import monotonic
@@ -107,26 +108,36 @@ class Store:
             self._write()
 
     def _write(self) -> None:
-        try:
-            with self._base:  # all of them or none
-                self._base.execute("BEGIN")
-                self._base.executemany(
-                    "INSERT OR REPLACE INTO found VALUES (?, ?)", self._owed.items()
-                )
-            self._owed.clear()
+        size = len(self._owed)
+        while self._owed:
+            batch = dict(islice(self._owed.items(), size))
+            try:
+                with self._base:  # all of them or none
+                    self._base.execute("BEGIN")
+                    self._base.executemany(
+                        "INSERT OR REPLACE INTO found VALUES (?, ?)", batch.items()
+                    )
+            except sqlite3.OperationalError as error:
+                if size > 1:
+                    size //= 2  # there may be room for some of them
+                    continue
+                self._tell(f"{plain(str(self._path))}: cannot be written ({error})", error)
+                break
+            for key in batch:
+                del self._owed[key]
             self._refused = False
-        except sqlite3.OperationalError as error:
-            words = f"{plain(str(self._path))}: cannot be written ({error})"
-            if sum(map(len, self._owed.values())) > MOST_OWED:
-                raise BadInput(f"{words}.") from error
-            if not self._refused:
-                warnings.warn(
-                    f"{words}; the work goes on, and a kill now would lose what is not written.",
-                    Note,
-                    stacklevel=3,
-                )
-            self._refused = True
         self._written = monotonic()
+
+    def _tell(self, words: str, error: sqlite3.OperationalError) -> None:
+        if sum(map(len, self._owed.values())) > MOST_OWED:
+            raise BadInput(f"{words}.") from error
+        if not self._refused:
+            warnings.warn(
+                f"{words}; the work goes on, and a kill now would lose what is not written.",
+                Note,
+                stacklevel=4,
+            )
+        self._refused = True
 
     def once(self, key: str, work: Callable[[], T]) -> T:
         """What stands under ``key``, or else what ``work`` finds, which is added."""

@@ -10,9 +10,9 @@ NETLIST = "circuit.netlist=circuits/examples/h_bridge.cir"
 @pytest.mark.parametrize(
     ("overrides", "step"),
     [
-        ([], 2e-4),
-        (["circuit.model=full"], 2e-4),
-        (["mechanics.contact=rigid"], 2e-4),
+        ([], 1.4e-4),
+        (["circuit.model=full"], 1.4e-4),
+        (["mechanics.contact=rigid"], 1.4e-4),
         (["circuit.model=file", NETLIST], 2e-5),
         (["circuit.model=file", NETLIST, "circuit.max_step=1e-4"], 1e-4),
     ],

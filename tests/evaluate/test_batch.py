@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from cosim.errors import CosimError
+from cosim.evaluate.many import Progress, each
 from cosim.mechanics import pace
 from cosim.scene import Scene, load
-from cosim.simulation.many import Progress, each
 from cosim.simulation.simulate import simulate, summary
 
 Summary = dict[str, Any]

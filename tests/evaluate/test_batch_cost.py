@@ -4,9 +4,9 @@ import cProfile
 import pstats
 from functools import partial
 
+from cosim.evaluate.many import each
 from cosim.evaluate.point import point
 from cosim.scene import load
-from cosim.simulation.many import each
 from cosim.simulation.simulate import summary
 
 
