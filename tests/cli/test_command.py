@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -253,7 +254,11 @@ def heed_interrupts() -> None:
 
 def worked(process: psutil.Process) -> float:
     """CPU seconds of a process and its workers."""
-    return sum(sum(one.cpu_times()[:2]) for one in (process, *process.children()))
+    spent = 0.0
+    for one in (process, *process.children()):
+        with suppress(psutil.NoSuchProcess):  # one that was needed for a moment
+            spent += sum(one.cpu_times()[:2])
+    return spent
 
 
 @needs.posix

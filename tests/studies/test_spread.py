@@ -47,7 +47,7 @@ def test_the_ends_are_those_of_runs_of_their_own(
     for place, run in found.items():
         # The ends are of the scene's own circuit, the others within run.tolerance of it.
         close = 1e-4 if run["circuit_model"] == "amplifier" else 1e-2
-        assert run["v_average"] == pytest.approx(expected[place], rel=close)
+        assert run["v_average"] == pytest.approx(expected[place], rel=close), run["failure"]
     for end, pick in (("min", min), ("max", max)):
         place = pick(expected, key=expected.__getitem__)
         assert told[f"v_average_{end}"] == pytest.approx(expected[place], rel=1e-4)
