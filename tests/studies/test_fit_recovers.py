@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import cumulative_trapezoid
 
 import cosim
 from cosim.cli.main import main
@@ -131,12 +130,17 @@ def test_mu_k_follows_from_known_forces(tmp_path: Path) -> None:
 
 def test_the_path_of_a_slide_is_the_exact_one() -> None:
     """A part that slides up on a plate, stops over it and is held, or goes on down, against
-    `part.heights`, with the true instants: nothing is misfit."""
+    `part.exact`, with the true instants: nothing is misfit."""
     for kinetic, plate in ((25.0, 4.0), (12.0, 6.0)):
         time = np.arange(16) / 960
-        law = np.array([[2 * kinetic, kinetic, plate, 9.81]])
+        law: dict[str, Any] = {
+            "mu_s": 2 * kinetic,
+            "mu_k": kinetic,
+            "mu_plate": plate,
+            "force_per_mass": 1.0,
+        }
         slow = np.array([-1.0, -1.0])  # the surface, far below the part's velocity all the while
-        z = part.heights(time[[0, -1]], slow, law, time, 0.1)[0]
+        z = part.exact(time[[0, -1]], slow, output=time, v0=0.1, gravity=9.81, **law).z
         ends = np.array([time[0]]), np.array([time[-1]])
         span = Span(-1, np.arange(0), np.arange(16), np.arange(0), *ends)
         nothing = Track(z, np.gradient(z, time), z, z)
@@ -148,36 +152,6 @@ def test_the_path_of_a_slide_is_the_exact_one() -> None:
         assert told[0] == pytest.approx(found.fixed[0], abs=0.01)
         assert told[0] > told[1:].max() + 3
         np.testing.assert_allclose(found.predicted(kinetic, plate, time), z, atol=1e-8)
-
-
-@pytest.mark.parametrize("pull_up", [0.0, 3.0])
-def test_heights_seen_from_a_plate_that_moves(pull_up: float) -> None:
-    """A part without friction at the surface: what pulls it is the plate, which rises with
-    ``pull_up`` m/s². Where µ_p F_n/m exceeds g + pull_up it rides on the plate; else it slides
-    against it with g − µ_p F_n/m."""
-    time, output = np.linspace(0.0, 0.1, 11), np.linspace(0.0, 0.1, 7)
-    v_plate = pull_up * time
-    plate = pull_up * output**2 / 2
-    for friction, expected in ((15.0, plate), (4.0, -(9.81 - 4.0) * output**2 / 2)):
-        law = np.array([[0.0, 0.0, friction, 9.81]])
-        pull = np.full(10, pull_up)
-        found = part.heights(time, -v_plate, law, output, 0.0, pull)[0] + plate
-        np.testing.assert_allclose(found, expected, atol=1e-15)
-
-
-def test_heights_without_the_plates_friction_do_not_depend_on_the_plate() -> None:
-    generator = np.random.default_rng(0)
-    time = np.linspace(0.0, 0.2, 41)
-    v, v_plate = generator.normal(0.0, 0.1, (2, len(time)))
-    laws = np.array([[60.0, 50.0, 0.0, 9.81], [25.0, 15.0, 0.0, 9.81]])
-    plate = cumulative_trapezoid(v_plate, time, initial=0.0)
-    pull = np.diff(v_plate) / np.diff(time)
-    v0 = float(v[0])
-    seen = part.heights(time, v - v_plate, laws, time, v0 - float(v_plate[0]), pull)
-    np.testing.assert_allclose(seen + plate, part.heights(time, v, laws, time, v0), atol=1e-12)
-    for law, z in zip(laws, part.heights(time, v, laws, time, v0), strict=True):
-        one = {"mu_s": law[0] / 10, "mu_k": law[1] / 10, "force_per_mass": 10.0}
-        np.testing.assert_allclose(z, part.exact(time, v, v0=v0, **one).z, atol=1e-15)
 
 
 FORCES = {
