@@ -107,7 +107,9 @@ def test_ten_trials_of_different_friction_give_it_back(tmp_path: Path) -> None:
 
 def test_a_trial_in_which_the_part_never_slips_determines_nothing(tmp_path: Path) -> None:
     truth = made(tmp_path, "held")
-    (row,) = cosim.fit(tmp_path).numbers["trials"]
+    found = cosim.fit(tmp_path).numbers
+    (row,) = found["trials"]
+    assert found["mu_plate"] is found["misfit_um"] is None
     assert row["kinetic_friction_determined"] in ("at least", "no")
     assert row["normal_force_weights"] is row["kinetic_friction_weights"] is None
     assert holds(row, truth)

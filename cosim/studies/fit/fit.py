@@ -151,13 +151,16 @@ def _fitted(
             }
         )
         errors.append({"misfit_um": misfit and misfit * 1e6, "noise_um": noise_of(trial) * 1e6})
+    untold = plate and "yes" not in told  # no trial determines its friction, let alone the plate's
     numbers: dict[str, Any] = {
         "parameters": "fitted",
         "mu_k": mu_k,
         "mu_k_given": given is not None,
-        "mu_plate": law.ratio.value * mu_k,
-        "plate_over_kinetic": law.ratio.value,
-        "plate_over_kinetic_90_percent": [law.ratio.low, law.ratio.high] if plate else None,
+        "mu_plate": None if untold else law.ratio.value * mu_k,
+        "plate_over_kinetic": None if untold else law.ratio.value,
+        "plate_over_kinetic_90_percent": (
+            [law.ratio.low, law.ratio.high] if plate and not untold else None
+        ),
         "profiles": {
             trial.name: {"kinetic_friction_weights": x.tolist(), "loss": y.tolist()}
             for trial, (x, y) in zip(trials, law.profile, strict=True)
