@@ -132,11 +132,10 @@ static void tell(const State *s, const Piece *p, const double *law, int side, do
    are a jump, and a velocity that the forces give or take within it (`least`) is zero, or an interval
    of 1e-309 s would decide whether the part slips. */
 static long follow(long knots, const double *time, const double *v_surface, long periods,
-                   const double *forces_of, const double *pull, double z, double v, double half,
-                   double turn, long outputs, const double *at, double *z_out, double *v_out,
+                   const double *law, double z, double v, double half, double turn,
+                   long outputs, const double *at, double *z_out, double *v_out,
                    double *stuck_out, double *told_out)
 {
-    double law[] = {forces_of[STATIC], forces_of[KINETIC], forces_of[PLATE], forces_of[GRAVITY]};
     const double period = time[knots - 1] - time[0], eps = DBL_EPSILON;
     const double forces = law[STATIC] + law[PLATE] + fabs(law[GRAVITY]);
     const double resolution = eps * fmax(fabs(time[0]), fabs(time[knots - 1]));
@@ -156,8 +155,6 @@ static long follow(long knots, const double *time, const double *v_surface, long
             const double start = time[i - 1], length = time[i] - start;
             const double begin = v_surface[i - 1], end = v_surface[i];
             double left = length, done = 0.0, speed = begin;
-            if (pull)
-                law[GRAVITY] = forces_of[GRAVITY] + pull[i - 1];
             if (length > resolution) {
                 const Piece piece = piece_between(time + i - 1, v_surface + i - 1, half, turn);
                 const double slope = piece.slope;
@@ -240,7 +237,7 @@ EXPORT long part_exact(long knots, const double *time, const double *v_surface, 
                        long outputs, const double *at, double *z_out, double *v_out,
                        double *stuck_out, double *told_out)
 {
-    return follow(knots, time, v_surface, periods, law, NULL, z, v, half, turn, outputs, at, z_out,
+    return follow(knots, time, v_surface, periods, law, z, v, half, turn, outputs, at, z_out,
                   v_out, stuck_out, told_out);
 }
 
@@ -259,7 +256,7 @@ typedef struct {
 EXPORT int64_t exact_run(void *call)
 {
     const Exact *c = call;
-    follow(c->knots, c->time, c->v_surface, c->periods, c->law, NULL, c->z, c->v, c->half, c->turn,
+    follow(c->knots, c->time, c->v_surface, c->periods, c->law, c->z, c->v, c->half, c->turn,
            c->outputs, c->at, c->z_out, c->v_out, c->stuck_out, c->told_out);
     return 0;
 }
@@ -373,15 +370,4 @@ EXPORT long part_moreau(long knots, const double *time, const double *v_surface,
         emit(&out, z, v, stuck, NULL);
     }
     return events;
-}
-
-/* Heights at `outputs` times, a row for each of `count` laws. In piece i gravity is larger by pull[i],
-   if there is a pull: seen from a plate that moves, its acceleration. */
-EXPORT void part_heights(long knots, const double *time, const double *v_surface, double v,
-                         long count, const double *laws, const double *pull, long outputs,
-                         const double *at, double *scratch, double *z)
-{
-    for (long i = 0; i < count; i++)
-        follow(knots, time, v_surface, 1, laws + 4 * i, pull, 0.0, v, 0.0, 0.0, outputs, at,
-               z + i * outputs, scratch, scratch + outputs, NULL);
 }

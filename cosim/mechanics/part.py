@@ -42,10 +42,6 @@ _ARGUMENTS = {
     "part_exact": _EXACT,
     "part_threshold": (*_SURFACE, _REAL, _REAL, _LONG, *_RESULT),
     "part_moreau": (*_SURFACE, _REAL, _LONG, *_RESULT),
-    "part_heights": (
-        *(_LONG, _POINTER, _POINTER, _REAL),
-        *(_LONG, _POINTER, _POINTER, _LONG, _POINTER, _POINTER, _POINTER),
-    ),
 }
 
 
@@ -62,7 +58,7 @@ def part_library() -> ctypes.CDLL:
     for name, arguments in _ARGUMENTS.items():
         function = getattr(functions, name)
         function.argtypes = arguments
-        function.restype = None if name == "part_heights" else _LONG
+        function.restype = _LONG
     return functions
 
 
@@ -190,32 +186,6 @@ def bounds(
     them than there are, as the way of the part decides which side the plate's friction is on."""
     static, _, plate, g = friction_law(mu_s, 0.0, force_per_mass, gravity, mu_plate)
     return np.array([side * static - way * plate - g for side in (1, -1) for way in (1, 0, -1)])
-
-
-def heights(
-    time: Array,
-    v_surface: Array,
-    laws: Array,
-    output: Array,
-    v0: float,
-    pull: Array | None = None,
-) -> Array:
-    """Exact heights [m] at the times ``output`` [s], a row for each of ``laws``, of a part that
-    begins at height 0 with the velocity ``v0`` [m/s]: `exact` for many laws in one call.
-
-    A law is a row as `friction_law` makes it, m/s². ``pull`` [m/s²] is added to gravity, a value
-    for each piece between two knots: what a frame of reference that moves takes. No argument is
-    checked.
-    """
-    time, v_surface, laws, output = map(np.ascontiguousarray, (time, v_surface, laws, output))
-    pull = None if pull is None else np.ascontiguousarray(pull)
-    found, scratch = np.empty((len(laws), len(output))), np.empty(2 * len(output))
-    part_library().part_heights(
-        *(len(time), time.ctypes.data, v_surface.ctypes.data, v0),
-        *(len(laws), laws.ctypes.data, None if pull is None else pull.ctypes.data),
-        *(len(output), output.ctypes.data, scratch.ctypes.data, found.ctypes.data),
-    )
-    return found
 
 
 def threshold(

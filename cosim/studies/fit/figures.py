@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Sequence
+from textwrap import fill
 from typing import Any
 
 from matplotlib.axes import Axes
 
 from cosim.files.picture import Picture
 from cosim.studies.fit.forces import Force
-from cosim.studies.fit.results import Shown
+from cosim.studies.fit.results import Shown, headline
 from cosim.studies.fit.search import LOSS
 
 SURFACE, MEASURED, SIMULATED = "#8fb8da", "0.15", "#d1495b"
@@ -22,42 +23,62 @@ def _words(result: dict[str, Any]) -> str:
 
 
 def trials(shown: Sequence[Shown], result: dict[str, Any]) -> Picture:
-    """Measured and simulated height of the part, and the surface's, a panel for each trial."""
+    """Measured heights of part and surface, and each slide as predicted, or the whole path with
+    published parameters; a panel for each trial."""
+    fitted = result["parameters"] == "fitted"
     columns = min(2, len(shown))
     rows = math.ceil(len(shown) / columns)
-    figure = Picture(13.0, 1.0 + 2.35 * rows, "constrained")
+    figure = Picture(6.5 * columns, 1.0 + 2.35 * rows, "constrained")
     axes = figure.subplots(rows, columns, squeeze=False)
-    for panel in zip(axes.flat, shown, result["trials"], strict=False):
-        _trial(*panel)
+    said = "part, predicted in each slide" if fitted else "part, simulated"
+    for axis, one, row in zip(axes.flat, shown, result["trials"], strict=False):
+        _trial(axis, one, said)
+        title = _slides(row) if fitted else _whole_path(row)
+        axis.set_title(f"{one.name}: {title}", loc="left", fontsize=10)
     for axis in list(axes.flat)[len(shown) :]:
         axis.set_visible(False)
     for axis in axes[-1]:
         axis.set_xlabel("time [ms]")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
-    figure.suptitle(
-        f"Trials with {_words(result)}; mean error {result['mean_error_mm']:.3f} mm, "
-        f"{result['mean_error_percent']:.2f} %",
-        fontsize=12,
+    title = (
+        headline(result)
+        if fitted
+        else (
+            f"Trials with {_words(result)}; mean error {result['mean_error_mm']:.3f} mm, "
+            f"{result['mean_error_percent']:.2f} %"
+        )
     )
+    figure.suptitle(fill(title, 60 * columns), fontsize=12)
     return figure
 
 
-def _trial(axis: Axes, shown: Shown, row: dict[str, Any]) -> None:
+def _trial(axis: Axes, shown: Shown, said: str) -> None:
     for time, z, label, color, width, dashes in (
         (shown.time, shown.z_surface, "surface, measured", SURFACE, 0.8, "-"),
         (shown.time, shown.z_part, "part, measured", MEASURED, 1.3, "-"),
-        (*shown.simulated, "part, simulated", SIMULATED, 1.3, DASHED),
+        (*shown.simulated, said, SIMULATED, 2.0, DASHED),
     ):
         axis.plot(time * 1e3, z * 1e3, label=label, color=color, lw=width, ls=dashes)
     axis.set_xlim(0, shown.time[-1] * 1e3)
     axis.grid(alpha=0.25)
     axis.set_ylabel("height [mm]")
-    axis.set_title(
-        f"{shown.name}: error {row['mean_error_mm']:.3f} mm, {row['mean_error_percent']:.1f} %; "
-        f"F_n {row['normal_force_weights']:.2f} m g",
-        loc="left",
-        fontsize=10,
+
+
+def _slides(row: dict[str, Any]) -> str:
+    count = f"{row['slides']} slide{'' if row['slides'] == 1 else 's'}"
+    if row["normal_force_weights"] is None:
+        return f"not determined: {count}"
+    return (
+        f"F_n {row['normal_force_weights']:.2f} m g from {count}, misfit {row['misfit_um']:.1f} µm "
+        f"(noise {row['noise_um']:.1f} µm)"
+    )
+
+
+def _whole_path(row: dict[str, Any]) -> str:
+    return (
+        f"error {row['mean_error_mm']:.3f} mm, {row['mean_error_percent']:.1f} %; "
+        f"F_n {row['normal_force_weights']:.2f} m g"
     )
 
 
@@ -65,7 +86,9 @@ def profiles(result: dict[str, Any]) -> Picture:
     """How much less likely than the best each µ_k F_n of a trial is, all else fitted anew."""
     figure = Picture(9.0, 5.2, "constrained")
     axis = figure.subplots()
-    for name, profile in result["profiles"].items():
+    for (name, profile), row in zip(result["profiles"].items(), result["trials"], strict=True):
+        if row["normal_force_weights"] is None:
+            continue
         axis.plot(
             profile["kinetic_friction_weights"],
             profile["loss"],
@@ -78,7 +101,9 @@ def profiles(result: dict[str, Any]) -> Picture:
     axis.set(xlabel="µ_k F_n [m g]", ylabel="loss of log-likelihood", ylim=(0, LARGEST_LOSS))
     axis.grid(alpha=0.25)
     axis.legend(fontsize=8, frameon=False, ncols=2)
-    axis.set_title("How well each friction explains its trial, all else fitted", fontsize=11)
+    axis.set_title(
+        "How well each friction explains its trial, all else fitted; determined trials", fontsize=11
+    )
     return figure
 
 
@@ -98,6 +123,9 @@ def forces(known: Sequence[Force], result: dict[str, Any]) -> Picture:
             axis.plot(x, force.measured, **measured)
             drawn.add("measured")
         found = row["normal_force_weights"]
+        if found is None:
+            axis.text(x, 0.0, " not determined", rotation=90, ha="center", va="bottom", fontsize=8)
+            continue
         low, high = row.get("normal_force_90_percent", (found, found))
         axis.errorbar(
             x,
@@ -115,6 +143,8 @@ def forces(known: Sequence[Force], result: dict[str, Any]) -> Picture:
     if "bounds" in drawn:
         axis.plot([], [], label="bounds of the fit", **bounds)
     axis.set_xticks(range(len(rows)), [str(row["trial"]) for row in rows], fontsize=8)
+    axis.margins(y=0.2)  # room for the legend
+    axis.set_xlim(-0.5, len(rows) - 0.5)
     axis.set_ylim(0, None)
     axis.set(xlabel="trial", ylabel="normal force [m g]")
     axis.grid(alpha=0.25)

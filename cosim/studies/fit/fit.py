@@ -15,13 +15,16 @@ from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.files.atomic import write_json
 from cosim.files.picture import Picture
-from cosim.studies.fit.cases import Case, Parameters, Solver
+from cosim.studies.fit.cases import Solver, simulated
 from cosim.studies.fit.forces import Force, read_forces
 from cosim.studies.fit.results import Shown, together, told
 from cosim.studies.fit.search import FRICTIONS, Fit, Found, Interval, search
+from cosim.studies.fit.slides import Slide, noise_of
 from cosim.studies.tables import write_csv
 from cosim.trials import published
 from cosim.trials.tracked import Trial, read_folder
+
+POINTS = 100  # of the line that is drawn for a slide
 
 
 class TrialResults:
@@ -33,14 +36,16 @@ class TrialResults:
         forces: Sequence[Force],
         numbers: dict[str, Any],
         found: Sequence[dict[str, Any]],
+        errors: Sequence[dict[str, Any]],
     ) -> None:
         self.shown, self.forces = shown, forces
         """What is known of each trial's normal force beside it."""
-        self.numbers = numbers | together(shown, forces, found)
+        names = [one.name for one in shown]
+        self.numbers = numbers | together(names, forces, found, errors)
         """What ``fit.json`` holds; units as the names say, forces in weights of the part."""
 
     def plot(self) -> Picture:
-        """Measured and simulated height of the part, a panel for each trial."""
+        """Measured and predicted heights of the part, a panel for each trial."""
         from cosim.studies.fit import figures
 
         return figures.trials(self.shown, self.numbers)
@@ -123,33 +128,39 @@ def _fitted(
             for force in known
         ]
     law = search(trials, limits, plate)
-    mu_k, mu_k_range = (given, (given, given)) if given else _from_forces(law, known)
-    static = max(1.0, published.MU_S / mu_k)
-    shown, rows = [], []
-    for trial, kinetic, count, limit in zip(trials, law.kinetic, law.slides, limits, strict=True):
-        case = Case(trial)
-        friction = np.array([static, 1.0, law.ratio.value]) * kinetic.value
-        shown.append(case.shown(case.heights(np.append(friction, 1.0) * published.GRAVITY)))
+    told = [x.determined(limit) for x, limit in zip(law.kinetic, limits, strict=True)]
+    mu_k, mu_k_range = (given, (given, given)) if given else _from_forces(law, known, told)
+    shown, rows, errors = [], [], []
+    for trial, kinetic, made, how in zip(trials, law.kinetic, law.slides, told, strict=True):
+        here, misfit = _predicted(trial, made if how == "yes" else [], kinetic, law.ratio)
+        shown.append(here)
+        value = kinetic.value if how == "yes" else None
+        low = kinetic.low if how in ("yes", "at least") else None
+        high = kinetic.high if how in ("yes", "at most") else None
         rows.append(
             {
-                "normal_force_weights": kinetic.value / mu_k,
+                "normal_force_weights": value and value / mu_k,
                 "normal_force_90_percent": [
-                    kinetic.low / mu_k_range[1],
-                    kinetic.high / mu_k_range[0],
+                    low and low / mu_k_range[1],
+                    high and high / mu_k_range[0],
                 ],
-                "kinetic_friction_weights": kinetic.value,
-                "kinetic_friction_90_percent": [kinetic.low, kinetic.high],
-                "kinetic_friction_determined": kinetic.determined(limit),
-                "slides": count,
+                "kinetic_friction_weights": value,
+                "kinetic_friction_90_percent": [low, high],
+                "kinetic_friction_determined": how,
+                "slides": len(made),
             }
         )
+        errors.append({"misfit_um": misfit and misfit * 1e6, "noise_um": noise_of(trial) * 1e6})
+    untold = plate and "yes" not in told  # no trial determines its friction, let alone the plate's
     numbers: dict[str, Any] = {
         "parameters": "fitted",
         "mu_k": mu_k,
         "mu_k_given": given is not None,
-        "mu_plate": law.ratio.value * mu_k,
-        "plate_over_kinetic": law.ratio.value,
-        "plate_over_kinetic_90_percent": [law.ratio.low, law.ratio.high] if plate else None,
+        "mu_plate": None if untold else law.ratio.value * mu_k,
+        "plate_over_kinetic": None if untold else law.ratio.value,
+        "plate_over_kinetic_90_percent": (
+            [law.ratio.low, law.ratio.high] if plate and not untold else None
+        ),
         "profiles": {
             trial.name: {"kinetic_friction_weights": x.tolist(), "loss": y.tolist()}
             for trial, (x, y) in zip(trials, law.profile, strict=True)
@@ -157,36 +168,57 @@ def _fitted(
     }
     if not given:
         numbers["mu_k_90_percent"] = list(mu_k_range)
-    return TrialResults(shown, known, numbers, rows)
+    return TrialResults(shown, known, numbers, rows, errors)
 
 
-def _from_forces(law: Fit, known: Sequence[Force]) -> tuple[float, Interval]:
-    """µ_k and its interval, from bounds of the normal forces.
+def _predicted(
+    trial: Trial, made: Sequence[Slide], kinetic: Found, ratio: Found
+) -> tuple[Shown, float | None]:
+    """A trial with each of its slides as the law predicts it, and the rms misfit [m] of the frames
+    within them; None without slides."""
+    law = kinetic.value * published.GRAVITY, kinetic.value * ratio.value * published.GRAVITY
+    # A time that is not a number ends each slide's line.
+    times = [np.append(np.linspace(one.time[0], one.time[-1], POINTS), np.nan) for one in made]
+    heights = [one.predicted(*law, time) for one, time in zip(made, times, strict=True)]
+    misfits = [one.z - one.predicted(*law, one.time) for one in made]
+    path = (np.concatenate([*times, []]), np.concatenate([*heights, []]) - trial.part.z[0])
+    surface, part = (x.z - x.z[0] for x in (trial.platform, trial.part))
+    shown = Shown(trial.name, trial.time - trial.time[0], surface, part, path)
+    return shown, float(np.sqrt(np.nanmean(np.concatenate(misfits) ** 2))) if made else None
+
+
+def _from_forces(law: Fit, known: Sequence[Force], told: Sequence[str]) -> tuple[float, Interval]:
+    """µ_k and its interval, from bounds of the normal forces of trials that determine µ_k F_n.
 
     It is the geometric middle of what all bounds leave, or, where they contradict each other, of
-    what lies between the two that do so most.
+    what lies between the two that do so most. Raises BadInput where no such bounds are known.
     """
+    every = zip(law.kinetic, known, told, strict=True)
+    pairs = [(found, force) for found, force, how in every if how == "yes"]
+    if not any(force.lower or force.upper for _, force in pairs):
+        raise BadInput(
+            "µ_k cannot be fitted: no trial whose forces are known has slides enough to determine "
+            "µ_k F_n."
+        )
 
     def least_and_most(end: str) -> tuple[float, float]:
-        frictions: list[tuple[Found, Force]] = [*zip(law.kinetic, known, strict=True)]
-        least = [getattr(x, end) / force.upper for x, force in frictions if force.upper]
-        most = [getattr(x, end) / force.lower for x, force in frictions if force.lower]
+        least = [getattr(x, end) / force.upper for x, force in pairs if force.upper]
+        most = [getattr(x, end) / force.lower for x, force in pairs if force.lower]
         return max(least, default=0.01), min(most, default=10.0)
 
     ends: Array = np.array([least_and_most(end) for end in ("low", "value", "high")])
     return float(np.sqrt(ends[1].prod())), (float(ends.min()), float(ends.max()))
 
 
-def _evaluated(found: list[Trial], known: Sequence[Force], solver: Solver) -> TrialResults:
+def _evaluated(trials: list[Trial], known: Sequence[Force], solver: Solver) -> TrialResults:
     shown: list[Shown] = []
     rows: list[dict[str, Any]] = []
-    for trial, normal in zip(found, published.FORCES_FITTED, strict=True):
-        case = Case(trial)
-        motion = case.motion(Parameters(published.MU_K_FITTED, normal), solver)
-        shown.append(case.shown(motion.z))
+    for trial, force in zip(trials, published.FORCES_FITTED, strict=True):
+        path, motion = simulated(trial, force, solver)
+        shown.append(path)
         rows.append(
             {
-                "normal_force_weights": normal,
+                "normal_force_weights": force,
                 "stick_fraction": motion.stick_fraction,
                 "stick_slip_events": motion.stick_slip_events,
             }
@@ -198,7 +230,7 @@ def _evaluated(found: list[Trial], known: Sequence[Force], solver: Solver) -> Tr
         "mu_k": published.MU_K_FITTED,
         "mu_plate": 0.0,
     }
-    return TrialResults(shown, known, numbers, rows)
+    return TrialResults(shown, known, numbers, rows, [path.errors() for path in shown])
 
 
 def _cells(row: dict[str, Any]) -> dict[str, Any]:

@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.mechanics import part
 from cosim.studies.fit.forces import Force
-
-STEP = part.PUBLISHED_STEP
-"""s, at which a measured and a simulated path are compared."""
 
 
 @dataclass(frozen=True)
 class Shown:
-    """Heights of a trial, measured and simulated, m from its first frame that counts, over s."""
+    """Heights of a trial, measured and simulated, m from its first frame that counts, over s.
+
+    What is simulated is the whole path, or each slide, NaN between them.
+    """
 
     name: str
     time: Array
@@ -26,13 +25,13 @@ class Shown:
 
     @property
     def error(self) -> float:
-        """The mean of |z measured − z simulated|, m."""
+        """Of a whole path the mean of |z measured − z simulated|, m."""
         time, z = self.simulated
         return float(np.abs(z - np.interp(time, self.time, self.z_part)).mean())
 
     def errors(self) -> dict[str, float]:
-        """The error, also as a share of the largest |z| measured, that of the straight line that
-        fits best, and the mean velocities."""
+        """Of a whole path the error, also as a share of the largest |z| measured, that of the
+        straight line that fits best, and the mean velocities."""
         time, z = self.simulated
         measured = np.interp(time, self.time, self.z_part)
         line = np.polynomial.Polynomial.fit(time, measured, 1)
@@ -45,69 +44,81 @@ class Shown:
         }
 
 
+MEANS = {
+    "mean_error_mm": "mean_error_mm",
+    "mean_error_percent": "mean_error_percent",
+    "straight_line_mean_error_mm": "straight_line_error_mm",
+    "misfit_um": "misfit_um",
+    "noise_um": "noise_um",
+}
+"""Means over trials, and of which of their numbers."""
+
+
 def together(
-    shown: Sequence[Shown], forces: Sequence[Force], found: Sequence[dict[str, Any]]
+    names: Sequence[str],
+    forces: Sequence[Force],
+    found: Sequence[dict[str, Any]],
+    errors: Sequence[dict[str, Any]],
 ) -> dict[str, Any]:
-    """``trials``, a row each: what was found, beside what is known of its normal force, and the
-    errors of its simulated path; and means over those whose friction is determined."""
+    """``trials``, a row each: what was found, beside what is known of its normal force, and how
+    far off it is; and means over the trials whose force was found."""
     rows: list[dict[str, Any]] = [
-        {"trial": one.name} | own | _change(own["normal_force_weights"], force) | one.errors()
-        for one, force, own in zip(shown, forces, found, strict=True)
+        {"trial": name} | own | _change(own["normal_force_weights"], force.measured) | off
+        for name, force, own, off in zip(names, forces, found, errors, strict=True)
     ]
-
-    told = [row for row in rows if row.get("kinetic_friction_determined", "yes") == "yes"] or rows
-
-    def every(name: str) -> list[float]:
-        return [row[name] for row in told if row[name] is not None]
-
-    changes = every("normal_force_change_percent")
+    told = [row for row in rows if row["normal_force_weights"] is not None]
+    changes = [row["normal_force_change_percent"] for row in told]
+    changes = [x for x in changes if x is not None]
+    means = {key: [row[of] for row in told] for key, of in MEANS.items() if of in rows[0]}
     return {
         "normal_force_weights": [row["normal_force_weights"] for row in rows],
-        "mean_error_mm": float(np.mean(every("mean_error_mm"))),
-        "mean_error_percent": float(np.mean(every("mean_error_percent"))),
-        "straight_line_mean_error_mm": float(np.mean(every("straight_line_error_mm"))),
+        **{key: float(np.mean(values)) if values else None for key, values in means.items()},
         "normal_force_change_mean_percent": float(np.mean(changes)) if changes else None,
         "normal_force_change_median_percent": float(np.median(changes)) if changes else None,
         "trials": rows,
     }
 
 
-def _change(found: float, force: Force) -> dict[str, Any]:
-    measured = force.measured
-    return {
-        "normal_force_measured_weights": measured,
-        "normal_force_change_percent": measured and 100 * abs(found - measured) / measured,
-    }
+def _change(found: float | None, measured: float | None) -> dict[str, Any]:
+    change = None if found is None else measured and 100 * abs(found - measured) / measured
+    return {"normal_force_measured_weights": measured, "normal_force_change_percent": change}
 
 
 def told(numbers: dict[str, Any]) -> str:
     """Fitted or published parameters, trial by trial and together."""
     fitted, rows = numbers["parameters"] == "fitted", numbers["trials"]
-    heads = ("µ_k F_n [m g], 90 %", "slides") if fitted else ("sticks", "error [%]")
-    table = [("trial", "force [m g]", "measured", "error [mm]", *heads)]
+    heads = ("error [mm]", "sticks", "error [%]")
+    if fitted:
+        heads = ("µ_k F_n [m g], 90 %", "slides", "misfit [µm]", "noise [µm]")
+    table = [("trial", "force [m g]", "measured", *heads)]
     for row in rows:
-        measured = row["normal_force_measured_weights"]
-        cells = (row["trial"], f"{row['normal_force_weights']:.2f}")
-        cells += ("–" if measured is None else f"{measured:.2f}", f"{row['mean_error_mm']:.3f}")
+        cells = (row["trial"], _or_dash(row["normal_force_weights"], ".2f"))
+        cells += (_or_dash(row["normal_force_measured_weights"], ".2f"),)
         if fitted:
-            cells += (_number(row, "kinetic_friction", "_weights", ".2f"), str(row["slides"]))
+            cells += (_friction(row), str(row["slides"]))
+            cells += (_or_dash(row["misfit_um"], ".1f"), f"{row['noise_um']:.1f}")
         else:
-            cells += (f"{row['stick_fraction']:.0%}", f"{row['mean_error_percent']:.2f}")
+            cells += (f"{row['mean_error_mm']:.3f}", f"{row['stick_fraction']:.0%}")
+            cells += (f"{row['mean_error_percent']:.2f}",)
         table.append(cells)
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     lines = ["  ".join(map(str.rjust, row, widths)) for row in table]
-    lines += _shared(numbers) if fitted else [f"µ_k {numbers['mu_k']:.4g}"]
-    lines.append(
-        f"mean error of whole simulated paths {numbers['mean_error_mm']:.4f} mm, "
-        f"{numbers['mean_error_percent']:.2f} % (best straight lines: "
-        f"{numbers['straight_line_mean_error_mm']:.4f} mm)"
-    )
+    lines += _shared(numbers) if fitted else _whole_paths(numbers)
     if numbers["normal_force_change_mean_percent"] is not None:
         mean, median = (numbers[f"normal_force_change_{x}_percent"] for x in ("mean", "median"))
         lines.append(
             f"normal force off the measured one by {mean:.2f} % mean, {median:.2f} % median"
         )
     return "\n".join(lines)
+
+
+def _whole_paths(numbers: dict[str, Any]) -> list[str]:
+    return [
+        f"µ_k {numbers['mu_k']:.4g}",
+        f"mean error of whole simulated paths {numbers['mean_error_mm']:.4f} mm, "
+        f"{numbers['mean_error_percent']:.2f} % (best straight lines: "
+        f"{numbers['straight_line_mean_error_mm']:.4f} mm)",
+    ]
 
 
 def _shared(numbers: dict[str, Any]) -> list[str]:
@@ -119,21 +130,35 @@ def _shared(numbers: dict[str, Any]) -> list[str]:
         ends = _interval(numbers["plate_over_kinetic_90_percent"], ".2f")
         found.append(f"µ_plate {numbers['mu_plate']:.3f}")
         found.append(f"µ_plate/µ_k {numbers['plate_over_kinetic']:.2f} {ends}")
+    product = "the tracks tell µ_k F_n; the normal force is that over µ_k"
+    return ["; ".join(found), product, headline(numbers)]
+
+
+def headline(numbers: dict[str, Any]) -> str:
+    """How well the slides of the determined trials are predicted."""
     rows = numbers["trials"]
-    open_ = [row["trial"] for row in rows if row["kinetic_friction_determined"] != "yes"]
-    lines = ["; ".join(found), "the tracks tell µ_k F_n; the normal force is that over µ_k"]
-    return lines + [f"not determined on both sides: {', '.join(open_)}"] * bool(open_)
+    count = sum(row["normal_force_weights"] is not None for row in rows)
+    if not count:
+        return "No trial has slides enough to determine its force"
+    return (
+        f"Slides are predicted to {numbers['misfit_um']:.1f} µm rms, noise of the tracks "
+        f"{numbers['noise_um']:.1f} µm: means over the {count} of {len(rows)} trials determined"
+    )
+
+
+def _or_dash(value: float | None, form: str) -> str:
+    return "–" if value is None else f"{value:{form}}"
 
 
 def _interval(interval: list[float], form: str) -> str:
     return f"({interval[0]:{form}} … {interval[1]:{form}})"
 
 
-def _number(numbers: dict[str, Any], name: str, unit: str, form: str) -> str:
-    """A number with its interval, or with the end of it that the trials tell."""
-    interval, determined = numbers[f"{name}_90_percent"], numbers[f"{name}_determined"]
+def _friction(row: dict[str, Any]) -> str:
+    """µ_k F_n with its interval, or with the end of it that the trial tells."""
+    interval, determined = row["kinetic_friction_90_percent"], row["kinetic_friction_determined"]
     if determined == "no":
         return "not determined"
     if determined != "yes":
-        return f"{determined} {interval[determined == 'at most']:{form}}"
-    return f"{numbers[name + unit]:{form}} {_interval(interval, form)}"
+        return f"{determined} {interval[determined == 'at most']:.2f}"
+    return f"{row['kinetic_friction_weights']:.2f} {_interval(interval, '.2f')}"

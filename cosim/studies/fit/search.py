@@ -96,11 +96,11 @@ class Found:
 @dataclass(frozen=True)
 class Fit:
     """What was found: the ``ratio`` µ_p/µ_k, each trial's ``kinetic`` friction µ_k F_n [weights],
-    its number of ``slides``, and its ``profile``: frictions, and how much less likely each is."""
+    its ``slides``, and its ``profile``: frictions, and how much less likely each is."""
 
     ratio: Found
     kinetic: list[Found]
-    slides: list[int]
+    slides: list[list[Slide]]
     profile: list[tuple[Array, Array]]
 
 
@@ -141,7 +141,7 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
         found.append(_interval(value, likely, grid[drawn[:, k]], count[k], limit))
     likely = ratios[whole - whole.min() <= LOSS]
     ratio = _interval(float(ratios[row]), likely, ratios[rows], sum(count), (0.0, 9.0))
-    return Fit(ratio, found, count, profiles)
+    return Fit(ratio, found, problem.slides, profiles)
 
 
 def _summed(tables: Sequence[Array]) -> list[Array]:

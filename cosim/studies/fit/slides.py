@@ -45,10 +45,10 @@ IMPROBABLE = 12.0  # a logarithm: instants that are so much less likely with eve
 class Slide:
     """One slide, with what of the likelihood does not depend on the law.
 
-    ``time`` and ``z`` hold n frames about it; rows of the others are pairs of instants (its
-    ``begin`` and ``end``, g of them): the n × n factor ``whiten`` that makes errors independent and
-    of size one, what it makes of a height that is free (``level``, g × n, of length one), and
-    ``fixed``, the logarithm's constant.
+    ``time`` (since the trial's first frame) and ``z`` hold n frames about it; rows of the others
+    are pairs of instants (its ``begin`` and ``end``, g of them): the n × n factor ``whiten`` that
+    makes errors independent and of size one, what it makes of a height that is free (``level``,
+    g × n, of length one), and ``fixed``, the logarithm's constant.
     """
 
     sign: int
@@ -64,10 +64,11 @@ class Slide:
     def log_likelihoods(self, kinetic: Array, plate: Array) -> Array:
         """Of laws (µ_k F_n/m and µ_p F_n/m, m/s²) by pairs of instants."""
         parts = [slice(k, k + CHUNK) for k in range(0, len(kinetic), CHUNK)]
-        return np.concatenate([self._of_few(kinetic[few], plate[few]) for few in parts])
+        return np.concatenate([self._of_few(kinetic[few], plate[few])[0] for few in parts])
 
-    def _of_few(self, kinetic: Array, plate: Array) -> Array:
-        """The same, of laws few enough for a processor's cache.
+    def _of_few(self, kinetic: Array, plate: Array) -> tuple[Array, Array]:
+        """The same, of laws few enough for a processor's cache, and the part's velocities over the
+        plate at the begin, m/s.
 
         The part begins at a height and with a velocity that are free; so they are found by least
         squares, the velocity by Gauss–Newton, since the plate's friction turns with it. Arrays are
@@ -75,38 +76,60 @@ class Slide:
         """
         lasts = (self.end - self.begin)[:, None]
         since = (self.time - self.begin[:, None])[:, None]
-        early, within = np.minimum(since, 0.0), since.clip(0.0, lasts[..., None])
-        beyond = (self.time - self.end[:, None])[:, None].clip(0.0)
         pull, rub = self.sign * kinetic - GRAVITY, 0.0 * plate
         faster = np.zeros((len(lasts), len(kinetic)))  # than the plate, at the begin
         level, turned = self.level[:, None], self.whiten.swapaxes(1, 2)
         found = faster
         for _ in range(PASSES):
-            v, way = self.v_plate + faster, np.where(faster >= 0.0, 1.0, -1.0)
-            first = pull - way * rub
-            turns = np.broadcast_to(lasts, faster.shape).copy()
-            np.divide(-faster, first, out=turns, where=first * faster < 0.0)
-            turns = np.minimum(turns, lasts)
-            # Having stopped over the plate the part goes on the other way, or is held by it.
-            second = pull + way * rub
-            second = np.where(second * way < 0.0, second, 0.0)
-            left = lasts - turns
-            v_turned = v + first * turns
-            # What a faster begin adds to the velocity after the turn: it turns later, too.
-            share = np.divide(second, first, out=np.ones_like(first), where=left > 0.0)[..., None]
-            one = np.minimum(within, turns[..., None])
-            two = within - one
-            path = (v[..., None] + first[..., None] * one / 2) * one + v[..., None] * early
-            path += (v_turned[..., None] + second[..., None] * two / 2) * two
-            path += (v_turned + second * left)[..., None] * beyond
-            error, slope = (self.z - path) @ turned, (early + one + share * (two + beyond)) @ turned
+            path, slope = self._path(since, lasts, faster, pull, rub)
+            error, slope = (self.z - path) @ turned, slope @ turned
             # The height is eliminated; then least squares in the velocity.
             error -= (error * level).sum(axis=-1, keepdims=True) * level
             slope -= (slope * level).sum(axis=-1, keepdims=True) * level
             size, told = (slope**2).sum(axis=-1) + LEAST_SIZE, (slope * error).sum(axis=-1)
             found = (told**2 / size - (error**2).sum(axis=-1)) / 2
             faster, rub = faster + told / size, plate
-        return (self.fixed[:, None] + found).T
+        return (self.fixed[:, None] + found).T, faster
+
+    def _path(
+        self, since: Array, lasts: Array, faster: Array, pull: Array, rub: Array
+    ) -> tuple[Array, Array]:
+        """The way at times ``since`` the begin, and what of it a faster begin adds, s."""
+        early, within = np.minimum(since, 0.0), since.clip(0.0, lasts[..., None])
+        beyond = (since - lasts[..., None]).clip(0.0)
+        v, way = self.v_plate + faster, np.where(faster >= 0.0, 1.0, -1.0)
+        first = pull - way * rub
+        turns = np.broadcast_to(lasts, faster.shape).copy()
+        np.divide(-faster, first, out=turns, where=first * faster < 0.0)
+        turns = np.minimum(turns, lasts)
+        # Having stopped over the plate the part goes on the other way, or is held by it.
+        second = pull + way * rub
+        second = np.where(second * way < 0.0, second, 0.0)
+        left = lasts - turns
+        v_turned = v + first * turns
+        # What a faster begin adds to the velocity after the turn: it turns later, too.
+        share = np.divide(second, first, out=np.ones_like(first), where=left > 0.0)[..., None]
+        one = np.minimum(within, turns[..., None])
+        two = within - one
+        path = (v[..., None] + first[..., None] * one / 2) * one + v[..., None] * early
+        path += (v_turned[..., None] + second[..., None] * two / 2) * two
+        path += (v_turned + second * left)[..., None] * beyond
+        return path, early + one + share * (two + beyond)
+
+    def predicted(self, kinetic: float, plate: float, time: Array) -> Array:
+        """The part's heights [m] by a law, m/s², at its likeliest instants; NaN where it does not
+        slide. It begins as the tracked frames about the slide have it."""
+        law = np.array([kinetic]), np.array([plate])
+        likeliest = self.log_likelihoods(*law)[0].argmax()
+        one = self.only(np.arange(len(self.begin)) == likeliest)
+        since = (np.concatenate([self.time, time]) - one.begin)[None, None]
+        faster, lasts = one._of_few(*law)[1], (one.end - one.begin)[:, None]
+        path = one._path(since, lasts, faster, self.sign * law[0] - GRAVITY, law[1])[0][0, 0]
+        frames = len(self.time)
+        weights = one.level[0] @ one.whiten[0]
+        start = weights @ (self.z - path[:frames]) / weights.sum()
+        slides = (time >= one.begin) & (time <= one.end)
+        return np.where(slides, start + path[frames:], np.nan)
 
     def only(self, pairs: npt.NDArray[np.bool_]) -> "Slide":
         """The same with some of the pairs of instants."""
@@ -173,7 +196,7 @@ def slide(trial: Trial, span: Span, noise: float, roughness: float) -> Slide | N
     begin, end = begin[begin < end], end[begin < end]
     if len(begin) == 0:
         return None
-    at, z = time[span.frames], trial.part.z[span.frames] - trial.part.z[span.inside[0]]
+    at, z = time[span.frames], trial.part.z[span.frames]
     covariance = np.repeat(noise**2 * np.eye(len(at))[None], len(begin), axis=0)
     for away in (begin[:, None] - at, at - end[:, None]):
         x = np.clip(away, 0.0, None)
