@@ -39,22 +39,11 @@ after a slide may be wrong by. On trials of this bench, whose friction is known,
 of 16)."""
 
 
-@dataclass(frozen=True)
-class Bounds:
-    """Numbers that are sought, by name, and between which values."""
-
-    names: list[str]
-    low: float
-    high: float
-
-
 class Friction:
-    """The friction of the part alone, a problem (`cosim.studies.identify.problem.problem`) of
-    tracked trials: they share µ_p/µ_k, and each has its µ_k F_n in weights of the part."""
+    """The friction of the part alone, of tracked trials: they share µ_p/µ_k, and each has its own
+    µ_k F_n, in weights of the part."""
 
     def __init__(self, trials: Sequence[Trial]) -> None:
-        self.shared = Bounds(["plate_over_kinetic"], float(RATIOS[0]), float(RATIOS[-1]))
-        self.own = Bounds(["kinetic_friction_weights"], *FRICTIONS)
         self.coarse = np.stack(
             np.meshgrid(np.geomspace(*FRICTIONS, COARSE), RATIOS, indexing="ij"), axis=-1
         )
