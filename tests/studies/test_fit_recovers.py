@@ -99,8 +99,9 @@ def test_ten_trials_of_different_friction_give_it_back(tmp_path: Path) -> None:
         folder.mkdir()
         truth = made(folder, name)
         (row,) = cosim.fit(folder).numbers["trials"]
-        near += abs(row["kinetic_friction_weights"] / truth["kinetic"] - 1.0) < 0.1
-        held += holds(row, truth)
+        if (found := row["kinetic_friction_weights"]) is not None:  # one has too few slides
+            near += abs(found / truth["kinetic"] - 1.0) < 0.1
+            held += holds(row, truth)
     assert near >= 9
     assert held >= 8
 
