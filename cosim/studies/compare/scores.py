@@ -145,6 +145,7 @@ def both_sides(
     if "v_surface" in simulated:
         # Rows may lie closer: what happens between two of them would depend on how close.
         apart = max(1, round(1.0 / FRAME_RATE / float(np.median(np.diff(time)))))
+        apart = min(apart, len(time) // 2)
         velocities = [signals["v_surface"] for _, signals in sides]
         kicks = [float(np.nanmax(np.abs(v[apart:] - v[:-apart]))) for v in velocities]
         words = f"largest change of the surface's velocity in {time[apart] * 1e3:.3g} ms"
