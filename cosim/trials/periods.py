@@ -1,7 +1,6 @@
 """The period of a measured signal, and what follows from it: drift, and a forecast."""
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 from scipy.signal import correlate
 
 from cosim.arrays import Array
@@ -66,15 +65,9 @@ def period_of(time: Array, values: Array, hint: float | None = None) -> float | 
     best = max(guesses, key=lambda guess: _series(time, values, guess))
     if period and best == period and period > FEW * row / 4:
         return period
-    about = np.linspace(-0.5, 0.5, 41) * best**2 / span
-    best = max(best + about, key=lambda guess: _series(time, values, guess))
-    step = about[1] - about[0]
-    found = minimize_scalar(
-        lambda guess: -_series(time, values, guess),
-        bounds=(best - step, best + step),
-        method="bounded",
-    )
-    return float(found.x) if -found.fun > ALIKE else None
+    near = best + np.linspace(-0.5, 0.5, 401) * best**2 / span
+    best = max(near, key=lambda guess: _series(time, values, guess))
+    return float(best) if _series(time, values, best) > ALIKE else None
 
 
 def _series(time: Array, values: Array, period: float) -> float:
@@ -84,14 +77,12 @@ def _series(time: Array, values: Array, period: float) -> float:
     harmonics = max(1, min(HARMONICS, len(time) // ROWS_A_HARMONIC, max(3, int(rows) - 1)))
     angles = np.outer(time, 2 * np.pi / period * np.arange(1, harmonics + 1))
     terms = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(time), -1)
-    values = values - values.mean()
-    left = [
-        float(np.sum((values - some @ np.linalg.lstsq(some, values, rcond=None)[0]) ** 2))
-        for some in (terms - terms.mean(axis=0), (terms - terms.mean(axis=0))[:, :2])
-    ]
-    whole, count = max(float(np.sum(values**2)), 1e-300), len(values) - 1
+    terms, values = terms - terms.mean(axis=0), values - values.mean()
+    whole, count = max(float(values @ values), 1e-300), len(values) - 1
+    left = values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0]
     free = count / max(count - 2 * harmonics, 1)
-    return 1.0 - free * left[0] / whole + FUNDAMENTAL * (1.0 - left[1] / whole)
+    first = np.sum((values @ terms[:, :2]) ** 2 / np.sum(terms[:, :2] ** 2, axis=0))
+    return 1.0 - free * float(left @ left) / whole + FUNDAMENTAL * float(first) / whole
 
 
 def _repeats(time: Array, values: Array) -> float | None:

@@ -14,8 +14,6 @@ from cosim.trials.table import UNDERSTOOD, WORDS, read_table
 DIGITS = 6e-7, 6e-9
 """Of a published trial's times, s: seven digits, and eight places; relative and absolute."""
 
-EVEN = 0.8
-"""Share of rows as far apart as the median, from which on longer steps are gaps."""
 GAP = 1.5
 """Of the median step, from which on a step is a gap."""
 
@@ -108,10 +106,6 @@ def _gaps(time: Array) -> list[str]:
     """What is to be told of times (s) that are not even."""
     steps = np.diff(time)
     usual = float(np.median(steps))
-    if np.mean(np.abs(steps - usual) < 0.2 * usual) < EVEN:
-        return [
-            f"The rows lie unevenly, {steps.min() * 1e3:.3g} to {steps.max() * 1e3:.3g} ms apart."
-        ]
     gaps = np.flatnonzero(steps > GAP * usual)
     if not len(gaps):
         return []

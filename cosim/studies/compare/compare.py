@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
-from cosim.studies.compare.hints import hints, time_hint
+from cosim.studies.compare.hints import hints
 from cosim.studies.compare.scores import (
     Number,
     Score,
@@ -101,25 +101,23 @@ def measure(
             f"driven at {1.0 / period:.4g} Hz (drive.frequency). At the end of the recording they "
             f"are {apart:.2g} periods apart, which spoils the scores."
         )
-        notes += filter(None, [time_hint(period / repeats)])
+        power = round(np.log10(period / repeats))
+        if power and abs(period / repeats / 10.0**power - 1.0) < APART:
+            notes.append(f"Hint: with times multiplied by {10.0**power:g} they would not differ.")
     if period and span < period:
         notes.append(
             f"The recording is {span:.3g} s long, and a period of the run {period:.3g} s: is the "
             "time's unit right?"
         )
     if not own and guide:
-        starts = np.array([start])
-        if period is not None and not aligned:
-            starts = np.concatenate([starts, start + np.linspace(-0.5, 0.5, PHASES) * period])
-            # The run has whole periods before and after, not all of them recorded.
-            starts = starts[(starts >= 0.0) & (starts + span <= end)]
-        if not len(starts) or starts[0] != start:
-            starts = np.concatenate([[start], starts])
+        phases = np.linspace(-0.5, 0.5, 0 if aligned or period is None else PHASES)
+        others = start + phases * (period or 0.0)
+        others = others[(others >= 0.0) & (others + span <= end)]
 
         def seen(at: Recording, name: str, first: float) -> Array:
             return _signal(waveforms, at, name, first, 0.0)
 
-        notes += hints(recording, seen, guide, starts)
+        notes += hints(recording, seen, guide, np.concatenate([[start], others]))
     numbers = both_sides(recording, simulated, (repeats, period or repeats))
     numbers += [
         *filter(None, [horizontal_share(recording)]),

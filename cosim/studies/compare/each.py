@@ -142,6 +142,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         axis.set_title(title, loc="left", fontsize=10.5)
     values = [one[from_first] for one in rows]
     errors.plot(range(len(rows)), values, "k.", label="from the first frame (the paper's)")
+    errors.margins(y=0.5)
     errors.legend(fontsize=8, loc="upper left")
     shares.set_ylim(min(0.0, *(one[first] for one in rows)), 1.25)
     figure.write(path)
