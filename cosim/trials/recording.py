@@ -1,23 +1,27 @@
 """What was measured of a machine, whatever its instruments: a camera, a vibrometer, a scope."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.trials.camera import FRAME_RATE, frame_times, velocities
 from cosim.trials.table import UNDERSTOOD, WORDS, read_table
 
 DIGITS = 6e-7, 6e-9
 """Of a published trial's times, s: seven digits, and eight places; relative and absolute."""
 
+GAP = 1.5
+"""Of the median step, from which on a step is a gap."""
+
 
 @dataclass(frozen=True)
 class Recording:
     """``signals`` over ``time`` (s, from the first row on) by the names of the waveforms, SI; NaN
-    where nothing is known, but heights have no gaps.
+    where nothing is known.
 
     Where there are heights there are velocities too: Tracker's, or differences as it makes them.
     """
@@ -29,14 +33,36 @@ class Recording:
     """Horizontal velocity of the surface, m/s; NaN where it was not tracked."""
     notes: tuple[str, ...]
     """What was taken for granted or left out, a sentence each."""
+    understood: dict[str, Any] = field(default_factory=dict)
+    """What was made of the file, for a JSON file: ``rows``, ``span`` (s), ``rate`` (1/s), ``gaps``
+    (sentences), and for each of ``columns`` its header, unit, and how many values are missing."""
+
+    def told(self) -> list[str]:
+        """What was understood, in lines."""
+        read = self.understood
+        if not read:
+            return []
+        lines = [f"Read from {plain(self.name)}: {read['rows']} rows, "]
+        lines[0] += f"{read['span']:.4g} s, {read['rate']:.4g} rows/s"
+        for name, one in read["columns"].items():
+            if name not in WORDS:
+                continue
+            whence = " (the published trials' unit)" if one["assumed"] else ""
+            gone = f", {one['missing']} missing" if one["missing"] else ""
+            lines.append(f"  {name:<17} {plain(one['header'], 40)}, in {one['unit']}{whence}{gone}")
+        others = [one["header"] for name, one in read["columns"].items() if name not in WORDS]
+        if others:
+            lines.append(f"  not compared: {', '.join(plain(one, 40) for one in others)}")
+        return lines + [f"  {sentence}" for sentence in read["gaps"]]
 
 
-def read_recording(path: Path) -> Recording:
-    """One recording. Raises BadInput, with file, row and column, for what is wrong with it.
+def read_recording(path: Path, asked: str = "") -> Recording:
+    """One recording; ``asked`` as :func:`read_table` has it. Raises BadInput, with file, row and
+    column, for what is wrong with it.
 
     Without a time column the rows are frames of the published trials' camera, and a note says so.
     """
-    table = read_table(path)
+    table = read_table(path, asked)
     count, notes = len(table.lines), table.notes
     time = frame_times(0.0, count)
     if "time" in table.columns:
@@ -51,11 +77,40 @@ def read_recording(path: Path) -> Recording:
         raise BadInput(f"{path}: no column to compare. Understood are: {UNDERSTOOD}.")
     for body in ("surface", "part"):
         if f"z_{body}" in signals:
-            central = velocities(time, table.complete(f"z_{body}"))
+            central = velocities(time, signals[f"z_{body}"])
             there = signals.get(f"v_{body}", central)
             signals[f"v_{body}"] = np.where(np.isnan(there), central, there)
     for name, values in signals.items():
         if np.isfinite(values).sum() < 2:
             raise BadInput(f"{path}: column {table.headers[name]}: it has fewer than two values.")
     across = table.columns.get("v_across_surface", np.full(count, np.nan))
-    return Recording(path.stem, time, signals, across, notes)
+    understood = {
+        "rows": count,
+        "span": float(time[-1]),
+        "rate": 1.0 / float(np.median(np.diff(time))),
+        "gaps": _gaps(time),
+        "columns": {
+            name: {
+                "header": column.header,
+                "unit": column.unit,
+                "assumed": column.assumed,
+                "missing": int(np.isnan(table.columns[name]).sum()),
+            }
+            for name, column in table.known.items()
+        },
+    }
+    return Recording(path.stem, time, signals, across, notes, understood)
+
+
+def _gaps(time: Array) -> list[str]:
+    """What is to be told of times (s) that are not even."""
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(steps > GAP * usual)
+    if not len(gaps):
+        return []
+    longest = int(np.argmax(steps))
+    return [
+        f"Gaps in time: {len(gaps)}, the longest of {steps[longest] * 1e3:.3g} ms at "
+        f"{time[longest]:.4g} s; rows are {usual * 1e3:.3g} ms apart."
+    ]

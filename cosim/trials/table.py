@@ -3,14 +3,14 @@
 Three forms are read, with commas, semicolons or tabs between the cells:
 
 - words with units: ``time [s]``, ``velocity [mm/s]``, ``current (mA)`` and so on, see ``WORDS``;
-  a word without a unit is in SI, and the table's notes say so;
-- the columns ``t, zp, vzp, azp, zo, vzo, azo, zs, vzs, azs`` (p the platform, that is the
+- the columns ``t, xp, zp, vzp, azp, xo, zo, vzo, azo, zs, vzs, azs`` (p the platform, that is the
   surface; o the part; s the springed plate) among others, as the published trials have them;
 - what Tracker (physlets.org/tracker) exports for several tracks: lines that begin with ``#``, a
   line with the tracks' names, and a line ``t x y v_{y} …`` with their columns; y is the height.
 
-The last two are in s and mm where no unit is given. Empty cells, ``nan``, ``?`` and U+FFFD
-(Tracker's mark for a missing value, in an encoding that was lost) stand for no value.
+The last two are in s and mm where no unit is given. Any other table must say its units, and which
+column is what, in its header or by ``MAP``: nothing is guessed. Empty cells, ``nan``, ``?`` and
+U+FFFD (Tracker's mark for a missing value, in an encoding that was lost) stand for no value.
 """
 
 import re
@@ -23,6 +23,8 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.files.cells import Cells, read_cells
+
+Notes = tuple[str, ...]
 
 MISSING = {"", "nan", "?"}  # once U+FFFD is gone
 FEWEST_ROWS = 8
@@ -41,7 +43,13 @@ WORDS = {
 
 UNDERSTOOD = "; ".join(" or ".join(words) for words in WORDS.values()) + (
     "; each with its unit, such as time [ms], velocity [mm/s], height [µm], current [mA], "
-    "voltage [V]; and the columns t, zp, vzp, zo, vzo … of tracked trials"
+    "voltage [V]; and the columns t, xp, zp, vzp, xo, zo, vzo … of tracked trials"
+)
+MAP = "surface=NAME[:unit],part=NAME[:unit],time=NAME[:unit]"
+"""Which column of a table is what; the unit may stand in the header instead."""
+HOW = (
+    "write what it is and its unit, such as time [s], surface [mm], part [mm], or name the "
+    "columns, such as --columns time=t:s,surface=zs:mm,part=zp:mm"
 )
 BODIES = {"p": "surface", "o": "part", "s": "plate"}
 TRIALS = {"t": "time"} | {
@@ -50,6 +58,8 @@ TRIALS = {"t": "time"} | {
     for quantity, name in (("z", "z"), ("vz", "v"), ("az", "a"), ("vx", "v_across"))
 }
 """Columns of the published trials."""
+PUBLISHED = {"t", "xp", "zp", "xo", "zo"}
+"""Those by which such a trial is known: then it needs no units."""
 UNUSED = {f"{quantity}{letter}" for quantity in ("x", "ax") for letter in BODIES}
 """Columns of the published trials that say nothing of the vertical motion."""
 
@@ -66,29 +76,38 @@ PREFIXES = {"": 1.0, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "k": 1e3}
 UNITS = {
     prefix + unit: (unit, factor) for unit in KINDS.values() for prefix, factor in PREFIXES.items()
 }
-MM = 1e-3  # m
+IN_TRIALS = {"z": "mm", "v": "mm/s", "a": "mm/s2"}
+"""Units of the published trials, besides the time's."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """Where a column stands, what its header says, and the factor that brings it to SI."""
+    """Where a column stands, what its header says, its unit, and what brings that to SI."""
 
     place: int
     header: str
+    unit: str
     factor: float
+    assumed: bool
+    """The unit is that of the published trials: the table does not say it."""
 
 
 @dataclass(frozen=True)
 class Table:
     """``columns`` by the names of the waveforms, and of ``TRIALS``, SI, NaN where nothing is known;
-    ``headers`` as they are written; ``notes``: what was taken for granted or left out.
+    ``known``: where they are from; ``notes``: what was left out.
     """
 
     path: Path
     columns: dict[str, Array]
-    headers: dict[str, str]
+    known: dict[str, Column]
     notes: tuple[str, ...]
     lines: tuple[int, ...]
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """The headers as they are written."""
+        return {name: column.header for name, column in self.known.items()}
 
     def complete(self, name: str) -> Array:
         """A column without gaps. Raises BadInput, with the place, where it has one."""
@@ -99,79 +118,111 @@ class Table:
         return self.columns[name]
 
 
-def read_table(path: Path) -> Table:
-    """The table of a file; its time, where it has one, increases from row to row.
+def read_table(path: Path, asked: str = "") -> Table:
+    """The table of a file; its time, where it has one, increases from row to row. ``asked`` says
+    which column is what, as ``MAP`` does, before the header's own words.
 
-    Raises BadInput, with file, row and column, for what is wrong with it.
+    Raises BadInput, with file, row and column, for what is wrong with it, or is not clear.
     """
     cells = read_cells(path)
     tracker = any(line.startswith("#multi:") for line in cells.comments)
-    known, heads, notes = _header(cells, tracker)
+    known, heads, notes = _header(cells, tracker, asked)
     cells.even(heads)
     columns = {
         name: cells.numbers(heads, column.place, column.header, MISSING) * column.factor
         for name, column in known.items()
     }
-    headers = {name: column.header for name, column in known.items()}
     lines = tuple(line for line, _ in cells.rows[heads:])
-    table = Table(path, columns, headers, tuple(notes), lines)
+    table = Table(path, columns, known, notes, lines)
     if len(lines) < FEWEST_ROWS:
         raise BadInput(f"{cells.name}: there are {len(lines)} rows, and {FEWEST_ROWS} are needed.")
     if "time" in columns:
         late = np.flatnonzero(np.diff(table.complete("time")) <= 0)
         if len(late):
-            where = f"row {table.lines[late[0] + 1]}, column {headers['time']}"
+            where = f"row {table.lines[late[0] + 1]}, column {plain(known['time'].header, 40)}"
             raise BadInput(f"{cells.name}: {where}: the time does not increase.")
     return table
 
 
-def _header(cells: Cells, tracker: bool) -> tuple[dict[str, Column], int, tuple[str, ...]]:
-    """The known columns, how many rows the header has, and notes on what was made of it."""
+def _header(cells: Cells, tracker: bool, asked: str) -> tuple[dict[str, Column], int, Notes]:
+    """The known columns, how many rows the header has, and notes on what was left out."""
     table, path = cells.rows, cells.name
     (line, head), heads = table[0], 1
+    where = f"{path}: row {line}"
     if len(table) > 1 and table[1][1][0] == "t":
         head, heads = _tracker_names(path, line, head, table[1][1]), 2
     elif tracker:
-        raise BadInput(f"{path}: row {line}: a header t x y … of Tracker's is missing.")
+        raise BadInput(f"{where}: a header t x y … of Tracker's is missing.")
+    split = [_split(cell) for cell in head]
+    words = {written for written, _ in split}
+    published = heads == 2 or words >= PUBLISHED
+    # Of p, s and o only the last is clear alone: p may be the part, s the surface.
+    bodies = {word[-1] for word in words & TRIALS.keys() if word != "t"}
+    clear = published or bodies <= {"o"} or bodies >= {"p", "o"}
+    chosen = _chosen(where, asked, head)
     known: dict[str, Column] = {}
-    unknown, without = [], []
-    for place, cell in enumerate(head):
-        written, unit = _split(cell)
-        name = TRIALS.get(written) or _WORDS.get(written.lower())
-        if name is None:
+    unknown: list[str] = []
+    unclear: list[str] = []
+    for place, (cell, (written, unit)) in enumerate(zip(head, split, strict=True)):
+        letters = TRIALS.get(written)
+        name, given = chosen.get(place, (letters or _WORDS.get(written.lower()), ""))
+        if name is None or (place not in chosen and name in (one for one, _ in chosen.values())):
             unknown += [cell] if cell and written not in UNUSED else []
+            continue
+        unit, assumed = given or unit, False
+        if not unit and published and letters:
+            unit, assumed = IN_TRIALS.get(name[0], "s"), True
+        if not unit or (letters and letters != "time" and not clear and place not in chosen):
+            (unknown if asked and place not in chosen else unclear).append(cell)
             continue
         if name in known:
             raise BadInput(
-                f"{path}: row {line}: the column {cell} stands there twice."
+                f"{where}: the column {cell} stands there twice."
                 if known[name].header == cell
-                else f"{path}: row {line}: {known[name].header} and {cell} are the same column."
+                else f"{where}: {known[name].header} and {cell} are the same column."
             )
-        kind = KINDS.get(name) or KINDS[name[0]]
-        if unit:
-            factor = _factor(f"{path}: row {line}, column {plain(cell)}", unit, kind)
-        elif written in TRIALS:
-            factor = 1.0 if name == "time" else MM
-        else:
-            factor = 1.0
-            without.append(f"{cell} in {kind}")
-        known[name] = Column(place, cell, factor)
+        factor = _factor(f"{where}, column {plain(cell)}", unit, KINDS.get(name) or KINDS[name[0]])
+        known[name] = Column(place, cell, unit, factor, assumed)
     left_out = ", ".join(plain(cell, 40) for cell in unknown[:12])
+    if unclear:
+        cells_said = ", ".join(plain(cell, 40) for cell in unclear[:12])
+        raise BadInput(f"{where}: what {cells_said} is, or its unit, is not clear: {HOW}.")
     if not known:
         # What is no table may be any file, of which nothing is to be told.
         numeric = [cell for _, row in table[heads : heads + 2] for cell in row if cell]
         table_like = numeric and all(re.match(r"[+-]?[.,]?\d", cell) for cell in numeric)
         found = left_out if table_like and left_out else "none"
         raise BadInput(
-            f"{path}: row {line}: no column is understood (found: {found}). "
-            f"Understood are: {UNDERSTOOD}."
+            f"{where}: no column is understood (found: {found}). Understood are: {UNDERSTOOD}."
         )
-    notes = []
-    if without:
-        notes.append(f"No unit in the header, so it is taken for SI: {', '.join(without)}.")
-    if unknown:
-        notes.append(f"Left out, not understood: {left_out}. Understood are: {UNDERSTOOD}.")
-    return known, heads, tuple(notes)
+    if unknown and "time" not in known:
+        raise BadInput(f"{where}: which column is the time is not clear ({left_out}): {HOW}.")
+    note = f"Left out, not understood: {left_out}. Understood are: {UNDERSTOOD}."
+    return known, heads, (note,) if unknown else ()
+
+
+def _chosen(where: str, asked: str, head: list[str]) -> dict[int, tuple[str, str]]:
+    """What ``MAP`` says: for the places of columns the name of a waveform, and the unit or ""."""
+    found: dict[int, tuple[str, str]] = {}
+    for item in filter(None, re.split(r",(?=[\w ]+=)", asked)):
+        word, _, column = item.partition("=")
+        name, column = _WORDS.get(_bare(word).lower()), column.strip()
+        if name is None or not column or name in (one for one, _ in found.values()):
+            raise BadInput(
+                f"--columns {plain(item, 60)}: write {MAP}, each once; besides these three "
+                "v_surface, v_part, current, voltage, command."
+            )
+        unit, places = "", [place for place, cell in enumerate(head) if cell == column]
+        if not places:
+            column, _, unit = column.rpartition(":") if ":" in column else (column, "", "")
+            alike = (column, _bare(column))
+            places = [p for p, cell in enumerate(head) if cell in alike or _split(cell)[0] in alike]
+        if len(places) != 1 or places[0] in found:
+            there = ", ".join(plain(cell, 40) for cell in head[:20])
+            few = "there is no column" if not places else "not one column of its own is"
+            raise BadInput(f"{where}: --columns: {few} {plain(column, 40)} (found: {there}).")
+        found[places[0]] = name, unit.strip()
+    return found
 
 
 def _bare(name: str) -> str:

@@ -138,9 +138,9 @@ def test_long_lines_and_many_cells_take_no_long_time(tmp_path: Path) -> None:
     path.write_text("," * 5_000_000 + '"')
     with pytest.raises(BadInput, match="cells"):
         read_cells(path)
-    path.write_text("time,velocity\n0," + " " * 5_000_000 + '"')
+    path.write_text("time [s],v_surface [m/s]\n0," + " " * 5_000_000 + '"')
     with pytest.raises(BadInput, match="quotation mark"):
         read_cells(path)
-    path.write_text("time,velocity\n0,1\n0," + "1" * 5_000_000 + "x")
+    path.write_text("time [s],v_surface [m/s]\n0,1\n0," + "1" * 5_000_000 + "x")
     with pytest.raises(BadInput, match="not a number"):
         read_surface(path)

@@ -204,10 +204,13 @@ def test_own_waveforms_move_the_part_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text, told",
     [
-        ("time,velocity\n0,0\n1e-3,x\n", "row 3, column velocity: “x” is not a number"),
-        ("time,velocity\n0,0\n", "at least two rows"),
-        ("time,velocity\n0,0\n2,1\n1,1\n", "row 4: the time must not fall"),
-        ("time,velocity\n0,0\n0.01,1\n", "run.duration = 0.32 s must be at most 0.01 s"),
+        (
+            "time [s],v_surface [m/s]\n0,0\n1e-3,x\n",
+            "row 3, column v_surface .*: “x” is not a number",
+        ),
+        ("time [s],v_surface [m/s]\n0,0\n", "at least two rows"),
+        ("time [s],v_surface [m/s]\n0,0\n2,1\n1,1\n", "row 4: the time must not fall"),
+        ("time [s],v_surface [m/s]\n0,0\n0.01,1\n", "run.duration = 0.32 s must be at most 0.01 s"),
     ],
 )
 def test_bad_surface_files(text: str, told: str, tmp_path: Path) -> None:
@@ -267,7 +270,7 @@ def test_rows_are_of_one_side_of_a_corner(tmp_path: Path) -> None:
     times = np.insert(knots, 11, knots[10])  # a jump
     speeds = np.insert(speeds, 11, speeds[10] + 0.1)
     table = "\n".join(f"{t!r},{v!r}" for t, v in zip(times.tolist(), speeds.tolist(), strict=True))
-    (tmp_path / "own.csv").write_text(f"time,velocity\n{table}\n")
+    (tmp_path / "own.csv").write_text(f"time [s],v_surface [m/s]\n{table}\n")
     settings = [f"drive.file={tmp_path / 'own.csv'}", "friction.mu_plate=0.05"]
     times_of_run = ["run.duration=0.2", "run.settle=0", "run.output_step=1e-3"]
     scene = load("reference", [*GIVEN, *settings, *times_of_run])

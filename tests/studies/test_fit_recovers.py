@@ -194,7 +194,7 @@ def test_what_is_wrong_with_a_file_of_forces(
 ) -> None:
     """One sentence, before anything is fitted, and nothing written."""
     rows = [f"{i / 960},{i},{i}" for i in range(12)]
-    (tmp_path / "a.csv").write_text("\n".join(["t,zp,zo", *rows]), encoding="utf-8")
+    (tmp_path / "a.csv").write_text("\n".join(["t [s],zp [mm],zo [mm]", *rows]), encoding="utf-8")
     (tmp_path / name).write_text(text, encoding="utf-8")
     out = tmp_path / "out"
     arguments = ["fit", str(tmp_path), "--forces", str(tmp_path / name), "--out", str(out)]
@@ -206,7 +206,7 @@ def test_what_is_wrong_with_a_file_of_forces(
 
 def test_options_that_cannot_be(tmp_path: Path) -> None:
     rows = [f"{i / 960},{i},{i}" for i in range(12)]
-    (tmp_path / "a.csv").write_text("\n".join(["t,zp,zo", *rows]), encoding="utf-8")
+    (tmp_path / "a.csv").write_text("\n".join(["t [s],zp [mm],zo [mm]", *rows]), encoding="utf-8")
     with pytest.raises(BadInput, match="bounds of normal forces are known"):
         cosim.fit(tmp_path, mu_k="free")
     with pytest.raises(BadInput, match="mu_k must be above 0"):

@@ -97,7 +97,7 @@ def test_decimal_commas(tmp_path: Path, separator: str):
 
 
 def test_the_columns_needed_suffice_in_any_order(tmp_path: Path):
-    lines = ["zo,t,extra,zp"]
+    lines = ["zo [mm],t [s],extra,zp [mm]"]
     lines += [f"{height(i) + i},{i / 1000},x,{height(i)}" for i in range(ROWS)]
     path = write(tmp_path / "a.csv", "\n".join(lines))
     check(path)  # velocities by central differences, exact on a parabola
@@ -137,8 +137,11 @@ def changed(row: int, column: str, value: str) -> str:
         ("# only a comment\n", "holds no table"),
         (b"\x00\x01\x02\x03", "row 1: the control character U+0000"),
         ("a,b\n1,2\n", "row 1: no column is understood (found: a, b)"),
-        ("t,zp\n" + "".join(f"{i},0\n" for i in range(9)), "no column zo (found: t, zp)"),
-        ("t,zp,zo,zp\n0,0,0,0\n", "row 1: the column zp stands there twice"),
+        ("t [s],surface [mm]\n" + "".join(f"{i},0\n" for i in range(9)), "no column zo (found: t"),
+        (
+            "t [s],zp [mm],zo [m],zp [mm]\n0,0,0,0\n",
+            "row 1: the column zp [mm] stands there twice",
+        ),
         (changed(5, "zp", "abc"), "row 6, column zp: “abc” is not a number"),
         (changed(5, "vzo", "1_0"), "row 6, column vzo: “1_0” is not a number"),
         (changed(5, "vzo", "1,5"), "row 6: it has 20 cells, the header 19"),

@@ -71,11 +71,11 @@ def force_per_mass(scene: Scene) -> float:
 def read_surface(path: Path) -> tuple[Array, Array]:
     """Time from 0 (s) and velocity (m/s) of a surface: a tracked trial, or a CSV with both.
 
-    The CSV has a header with ``time [s]`` and ``v_surface [m/s]`` (as ``waveforms.csv`` has), or
-    ``time`` and ``velocity``; other columns do not matter. Other units and heights are understood
-    as :mod:`cosim.trials.table` has them.
+    The CSV has a header with ``time [s]`` and ``v_surface [m/s]`` (as ``waveforms.csv`` has); other
+    columns do not matter. Other names with their units, and heights, are understood as
+    :mod:`cosim.trials.table` has them.
     """
-    table = read_timetable(path, ("time [s]", "time"), ("v_surface [m/s]", "velocity"))
+    table = read_timetable(path, ("time [s]",), ("v_surface [m/s]",))
     if table is None:
         return _trial(path)
     times, velocities = table.T

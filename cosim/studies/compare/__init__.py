@@ -11,6 +11,7 @@ STUDIES = (
         (
             Option("run", "a folder that cosim run wrote or a scene", "RUN|SCENE"),
             Option("trial", "a tracked trial, or other measurements", "TRIAL.csv", Path),
+            Option("--columns", "which column of TRIAL.csv is what", "surface=NAME[:unit],…"),
             OVERRIDES,
         ),
         command="compare",

@@ -13,6 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
+from cosim.studies.compare.hints import hints
 from cosim.studies.compare.scores import (
     Number,
     Score,
@@ -32,6 +33,9 @@ SHIFTS = 400
 
 GUIDES = ("v_surface", "current", "coil_voltage", "command", "v_part")
 """The first of these that was measured tells the period, and where in it the run is laid over."""
+
+PHASES = 101
+"""Of a period, at which hints are looked for."""
 
 APART = 0.05
 """Of a period by which run and recording may drift apart before their frequencies differ."""
@@ -68,7 +72,8 @@ def measure(
     A run that is ``aligned`` is not shifted.
     """
     recording, notes = _comparable(recording, waveforms)
-    exposure = shutter * float(np.median(np.diff(recording.time)))
+    row = float(np.median(np.diff(recording.time)))
+    exposure = shutter * row
     own = made_of(waveforms, recording, earliest, exposure)
     end = float(waveforms["time"][-1])
     if period is None and not own:
@@ -85,20 +90,38 @@ def measure(
         latest = max(earliest, min(end - span, earliest + period))
         start = _laid_over(waveforms, recording, earliest, latest, exposure)
     simulated = observe(waveforms, recording, start, exposure)
-    repeats = _period(recording)
+    guide, repeats = _period(recording, period)
     if repeats is None:
         notes.append("The recording does not repeat: there is no ceiling, and no whole period.")
-    elif period and (apart := abs(1.0 / repeats - 1.0 / period) * span) > APART:
+    elif (
+        period and (apart := abs(1.0 / repeats - 1.0 / period) * span) > APART + 0.5 * row / repeats
+    ):
         notes.append(
             f"The frequencies differ: the recording repeats at {1.0 / repeats:.4g} Hz, the run is "
             f"driven at {1.0 / period:.4g} Hz (drive.frequency). At the end of the recording they "
             f"are {apart:.2g} periods apart, which spoils the scores."
         )
+        power = round(np.log10(period / repeats))
+        if power and abs(period / repeats / 10.0**power - 1.0) < APART:
+            notes.append(f"Hint: with times multiplied by {10.0**power:g} they would not differ.")
+    if period and span < period:
+        notes.append(
+            f"The recording is {span:.3g} s long, and a period of the run {period:.3g} s: is the "
+            "time's unit right?"
+        )
+    if not own and guide:
+        phases = np.linspace(-0.5, 0.5, 0 if aligned or period is None else PHASES)
+        others = start + phases * (period or 0.0)
+        others = others[(others >= 0.0) & (others + span <= end)]
+
+        def seen(at: Recording, name: str, first: float) -> Array:
+            return _signal(waveforms, at, name, first, 0.0)
+
+        notes += hints(recording, seen, guide, np.concatenate([[start], others]))
     numbers = both_sides(recording, simulated, (repeats, period or repeats))
-    rate = 1.0 / float(np.median(np.diff(recording.time)))
     numbers += [
         *filter(None, [horizontal_share(recording)]),
-        Number("rate", rate, "1/s", "rows of the recording in a second, the median"),
+        Number("rate", 1.0 / row, "1/s", "rows of the recording in a second, the median"),
         Number("start", start, "s", "time of the run that is laid over the recording's first row"),
     ]
     if own:
@@ -186,9 +209,11 @@ def _laid_over(
     return min((float(starts[best]), float(finer.x)), key=missed)
 
 
-def _period(recording: Recording) -> float | None:
-    guides = (recording.signals[name] for name in GUIDES if name in recording.signals)
-    return next((found for found in (period_of(recording.time, v) for v in guides) if found), None)
+def _period(recording: Recording, hint: float | None) -> tuple[str, float | None]:
+    """The first guide, "" where there is none, and the first period (s) that one tells."""
+    guides = [name for name in GUIDES if name in recording.signals]
+    found = (period_of(recording.time, recording.signals[name], hint) for name in guides)
+    return next(iter(guides), ""), next(filter(None, found), None)
 
 
 def made_of(
@@ -202,7 +227,11 @@ def made_of(
     if not bodies or at[-1] > waveforms["time"][-1] + 1e-9:
         return False
     return all(
-        np.allclose(heights(waveforms, body, at, exposure), signals[f"z_{body}"], 6e-7, 6e-12)
+        np.allclose(
+            heights(waveforms, body, at, exposure)[known := np.isfinite(signals[f"z_{body}"])],
+            signals[f"z_{body}"][known],
+            *(6e-7, 6e-12),
+        )
         for body in bodies
     )
 

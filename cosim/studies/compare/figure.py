@@ -1,5 +1,6 @@
 """The figure of a comparison: every measured signal with the run's, over time."""
 
+import numpy as np
 from matplotlib.axes import Axes
 
 from cosim.files.picture import Picture
@@ -47,7 +48,7 @@ def _panel(axis: Axes, name: str, color: str, found: Found) -> None:
         (measured, {"color": "0.25", "ls": "", "marker": ".", "ms": size, "label": "measured"}),
         (simulated, {"color": color, "lw": 1.4, "label": "simulated"}),
     ):
-        first = values[0] if name.startswith("z") else 0.0
+        first = values[np.isfinite(measured)][0] if name.startswith("z") else 0.0
         axis.plot(time, (values - first) * scale, **style)
     axis.grid(alpha=0.25)
     axis.set_ylabel(f"{COLUMNS[name].long_name} [{unit}]")
@@ -62,7 +63,7 @@ def _words(name: str, found: Found) -> str:
         + ("" if score.values[1] is None else f" (ceiling {score.values[1]:{form}})")
         for score in found.scores
         for wanted, words, form, unit in (
-            ("mean_error_mm", "mean error", ".3f", " mm"),
+            ("mean_error_mm", "mean error from the first row", ".3f", " mm"),
             (R2.get(name, ("",))[0], "R²", ".2f", ""),
         )
         if score.name == wanted and (wanted != "mean_error_mm" or name == "z_part")

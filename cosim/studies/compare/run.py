@@ -4,6 +4,8 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.files.atomic import write_json
@@ -54,7 +56,9 @@ class Comparison:
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``compare.json``, ``compare.csv``, ``frames.csv`` and ``compare.png``."""
         out = Path(folder)
-        write_json(out / "compare.json", {"run": self.run, "trial": self.trial, **self.numbers})
+        about = {"understood": self.found.recording.understood, "notes": self.found.notes}
+        told = {"run": self.run, "trial": self.trial, **self.numbers, **about}
+        write_json(out / "compare.json", told)
         columns = ("name", "value", "unit", "meaning")
         rows = [(n.name, n.value, n.unit, n.meaning) for n in self._all()]
         write_rows(out / "compare.csv", [dict(zip(columns, row, strict=True)) for row in rows])
@@ -72,7 +76,8 @@ class Comparison:
             (f"{score.name} [{score.unit}]", score.values, score.meaning)
             for score in self.found.scores
         ]
-        lines = [*_table(heads, rows), *LEGEND, ""]
+        read = self.found.recording.told()
+        lines = [*read, *[""] * bool(read), *_table(heads, rows), *LEGEND, ""]
         numbers = {number.name: number for number in self.found.numbers}
         pairs, alone = [], []
         for name, number in numbers.items():
@@ -92,6 +97,9 @@ OF = {
     "no_motion": "; of nothing that moves",
     "straight_line": "; of the best straight line",
 }
+FEWEST_ROWS = 2.1
+"""In a period of the run."""
+
 LEGEND = (
     "  ceiling: the measured motion's forecast of itself one period later",
     "  no motion: of a signal that stays 0, or a height that stays the first",
@@ -113,10 +121,13 @@ def compare(
     trial: str | os.PathLike[str],
     overrides: Overrides | None = None,
     *,
+    columns: str = "",
     aligned: bool = False,
 ) -> Comparison:
     """Compare a run with a recording (a CSV): a tracked trial, or what any instrument measured of
-    surface, part, current or voltage (:mod:`cosim.trials.table` has the columns and units).
+    surface, part, current or voltage (:mod:`cosim.trials.table` has the columns and units), or
+    ``columns`` names them: ``"time=t:s,surface=zs:mm,part=zp:mm"``. What was understood is printed
+    first; what is not clear is refused.
 
     ``run`` is a result, a folder that ``Result.save`` wrote, or a scene, which is then run, with
     ``overrides`` for its keys, long enough to cover the recording. Where in its period the run
@@ -126,7 +137,7 @@ def compare(
 
     Raises BadInput for files that cannot be read, and for a run that is too short.
     """
-    measured = read_recording(Path(trial))
+    measured = read_recording(Path(trial), columns)
     name, waveforms, scene = _run(run, overrides, measured)
     start, period = laid_over(scene)
     found = measure(waveforms, measured, start, period, scene.run.shutter, aligned)
@@ -142,15 +153,29 @@ def _run(
         name = run.scene.name if isinstance(run, Result) else str(run)
         if overrides:
             raise BadInput(f"--set cannot change {plain(name)}, which is a finished run.")
+        scene = run.scene if isinstance(run, Result) else load(Path(name) / "scene.toml")
+        _check_rate(scene, trial)
         if isinstance(run, Result):
             return name, run.columns, run.scene
-        return name, formats.read(Path(name)).waveforms, load(Path(name) / "scene.toml")
+        return name, formats.read(Path(name)).waveforms, scene
     name = run.name if isinstance(run, Scene) else str(run)
     scene = load(run, overrides)
-    _, period = laid_over(scene)
+    period = _check_rate(scene, trial)
     span = float(trial.time[-1]) * len(trial.time) / (len(trial.time) - 1) + (period or 0.0)
     longer = {"duration": max(scene.run.duration, scene.run.settle + span)}
     if scene.drive.waveform == "file":
         longer = {"duration": float(surface(scene).times[-1]), "settle": 0.0}
     scene = scene.model_copy(update={"run": scene.run.model_copy(update=longer)})
     return name, simulate(scene).columns, scene
+
+
+def _check_rate(scene: Scene, trial: Recording) -> float | None:
+    """The period of a scene, s. Raises BadInput where a trial has too few rows in it."""
+    _, period = laid_over(scene)
+    rate = 1.0 / float(np.median(np.diff(trial.time)))
+    if period and rate * period < FEWEST_ROWS:
+        raise BadInput(
+            f"{plain(trial.name)}: {rate:.4g} rows/s are too few for a run that repeats at "
+            f"{1.0 / period:.4g} Hz: is the time's unit right?"
+        )
+    return period

@@ -74,18 +74,20 @@ def scores(recording: Recording, simulated: Signals, period: float | None) -> li
     found, time = [], recording.time
     if "z_part" in simulated:
         measured, run = (side["z_part"] for side in (recording.signals, simulated))
-        moved = measured - measured[0]
+        first = int(np.argmax(np.isfinite(measured)))
+        measured, run = measured - measured[first], run - run[first]
+        moved = measured
         gained = drift(time, moved, period) * period if period else 0.0
-        values = _lines(time, moved, run - run[0], period, gained, mean_distance)
+        values = _lines(time, moved, run, period, gained, mean_distance)
         apart = "mean distance of the part's heights, both from their first"
-        largest = float(np.abs(moved).max())
+        largest = float(np.nanmax(np.abs(moved)))
         for name, unit, scale, words in (
             ("mean_error_mm", "mm", 1e3, f"{apart}: the paper's error"),
             ("mean_error_percent", "%", 100.0 / largest, "the same, of the part's greatest height"),
         ):
             scaled = tuple(value and value * scale for value in values)
             found.append(Score(name, unit, words, scaled))
-        values = _lines(time, moved, run - run[0], period, gained, centred_distance)
+        values = _lines(time, moved, run, period, gained, centred_distance)
         words = "the same, both from their means: what the first frame is does not count"
         in_mm = tuple(value and value * 1e3 for value in values)
         found.append(Score("centred_error_mm", "mm", words, in_mm))
@@ -143,6 +145,7 @@ def both_sides(
     if "v_surface" in simulated:
         # Rows may lie closer: what happens between two of them would depend on how close.
         apart = max(1, round(1.0 / FRAME_RATE / float(np.median(np.diff(time)))))
+        apart = min(apart, len(time) // 2)
         velocities = [signals["v_surface"] for _, signals in sides]
         kicks = [float(np.nanmax(np.abs(v[apart:] - v[:-apart]))) for v in velocities]
         words = f"largest change of the surface's velocity in {time[apart] * 1e3:.3g} ms"

@@ -79,6 +79,8 @@ def measured(recording: Recording, path: Path, space: Space) -> Measured:
     differenced = set()
     for body in ("surface", "part"):
         if f"z_{body}" in signals:
+            if np.isnan(signals[f"z_{body}"]).any():
+                raise BadInput(f"{path}: heights of the {body} are missing, which are needed here.")
             heights = signals[f"z_{body}"] - signals[f"z_{body}"][0]
             signals |= {f"z_{body}": heights, f"v_{body}": velocities(recording.time, heights)}
             differenced.add(f"v_{body}")

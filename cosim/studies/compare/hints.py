@@ -1,0 +1,110 @@
+"""What a user may have written wrong in a recording's file: told, never applied.
+
+Each guess is one change of the file: a power of ten, a sign, exchanged columns, a clock. It is
+worth a sentence where it leaves at most half of what the run does not explain without it.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.errors import plain
+from cosim.studies.compare.scores import R2, explained
+from cosim.trials.recording import Recording
+from cosim.waveforms.columns import COLUMNS
+
+FACTORS = [sign * 10.0**power for power in range(-6, 7) for sign in (1, -1)]
+CLOCKS = np.linspace(0.988, 1.012, 25)
+"""Factors of the recording's times."""
+
+ROWS = 4000
+"""Of a recording, as many as are looked at."""
+
+WELL = 0.5
+"""R² that a guess must reach at least."""
+
+Observe = Callable[[Recording, str, float], Array]
+"""A signal of the run at a recording's times, from a time (s) of the run on."""
+
+
+def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> Iterator[str]:
+    """A sentence for each guess that explains the misfit. ``starts`` (s) are the times at which the
+    run may meet the first row, the first of them that at which it does; ``guide`` tells which."""
+    signals = {name: values[:ROWS] for name, values in recording.signals.items()}
+    recording = replace(recording, time=recording.time[:ROWS], signals=signals)
+    laid = [observe(recording, guide, start) for start in starts]
+    if {"z_surface", "v_surface", "z_part", "v_part"} <= signals.keys():
+        before, after = (
+            _heights(recording, observe, laid, starts, bodies)
+            for bodies in (("surface", "part"), ("part", "surface"))
+        )
+        if _better(after, before):
+            agree = _agree("both heights", after, before)
+            yield f"{agree} with the columns of surface and part exchanged: which is which?"
+            return
+    start, fine = starts[0], True
+    for name in [guide, *(R2.keys() & signals.keys() - {guide})]:
+        runs = laid if name == guide else [observe(recording, name, start)]
+        shares = {
+            factor: [explained(run, factor * signals[name]) for run in runs] for factor in FACTORS
+        }
+        factor = max(shares, key=lambda factor: max(shares[factor]))
+        before, after = max(shares[1.0]), max(shares[factor])
+        if factor != 1.0 and _better(after, before):
+            fine = False
+            start = starts[int(np.argmax(shares[factor]))] if name == guide else start
+            yield _agree(COLUMNS[name].long_name, after, before) + _scaled(recording, name, factor)
+    if fine:
+        near = starts[np.argsort(np.abs(starts - start))[:17]]
+        clocks = {
+            clock: max(
+                explained(
+                    observe(replace(recording, time=recording.time * clock), guide, first),
+                    signals[guide],
+                )
+                for first in near
+            )
+            for clock in (1.0, *CLOCKS)
+        }
+        clock = max(clocks, key=lambda clock: clocks[clock])
+        if _better(clocks[clock], clocks[1.0]) and clocks[clock] - clocks[1.0] > 0.02:
+            agree = _agree(COLUMNS[guide].long_name, clocks[clock], clocks[1.0])
+            yield f"{agree} with times multiplied by {clock:.3f}: is its frame rate right?"
+
+
+def _better(after: float, before: float) -> bool:
+    return after >= WELL and 1.0 - after <= 0.5 * (1.0 - before)
+
+
+def _agree(what: str, after: float, before: float) -> str:
+    return (
+        f"Hint: the recording's {what} would agree much better (R² {after:.2f}, not {before:.2g})"
+    )
+
+
+def _scaled(recording: Recording, name: str, factor: float) -> str:
+    columns = recording.understood.get("columns", {})
+    column = columns.get(name.replace("v_", "z_", 1)) or columns.get(name)
+    header, unit = (column["header"], column["unit"]) if column else (name, "SI")
+    asks = [f"is it in {unit}"] if abs(factor) != 1.0 else []
+    asks += ["is its positive direction the run's"] if factor < 0.0 else []
+    return f" with column {plain(header, 40)} times {factor:g}: {' and '.join(asks)}?"
+
+
+def _heights(
+    recording: Recording,
+    observe: Observe,
+    laid: list[Array],
+    starts: Array,
+    bodies: tuple[str, str],
+) -> float:
+    """The lower R² of the heights from their means, where the columns of ``bodies`` are taken for
+    surface and part, and the run meets the first of them best."""
+    shares = [explained(run, recording.signals[f"v_{bodies[0]}"]) for run in laid]
+    start, found = starts[int(np.argmax(shares))], []
+    for body, other in zip(("surface", "part"), bodies, strict=True):
+        run, wanted = observe(recording, f"z_{body}", start), recording.signals[f"z_{other}"]
+        found.append(explained(run - np.nanmean(run), wanted - np.nanmean(wanted)))
+    return min(found)

@@ -1,0 +1,203 @@
+"""Trials that are written wrong: each is refused, or what is wrong is told; none is only scored.
+
+The truth is a run's own trial, film and all: an unspoilt one scores R² 1 and is told nothing.
+"""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import cosim
+from cosim.cli.main import main
+from cosim.trials.camera import hermite
+
+Array = npt.NDArray[np.float64]
+HEADER = "time [s],surface [mm],part [mm]"
+FRAMES = np.arange(300) / 960.0
+
+
+@pytest.fixture(scope="module")
+def run() -> cosim.Result:
+    """A run that repeats, with impacts, at 20 Hz, and moves the part."""
+    settings = {"circuit.model": "ideal", "run.duration": 0.8, "run.settle": 0.3}
+    return cosim.run("reference", settings)
+
+
+def table(run: cosim.Result, time: Array = FRAMES) -> list[Array]:
+    """Times (s) and heights of surface and part (mm), with a camera's noise of 2 µm."""
+    noise = np.random.default_rng(1).normal(0.0, 2e-3, (2, len(time)))
+    bodies = ("surface", "part")
+    z = [
+        hermite(0.3125 + time, *(run.columns[c] for c in ("time", f"z_{body}", f"v_{body}")))
+        for body in bodies
+    ]
+    return [time, *(1e3 * one + more for one, more in zip(z, noise, strict=True))]
+
+
+def write(path: Path, header: str, columns: list[Array]) -> Path:
+    rows = [
+        ",".join("" if np.isnan(x) else f"{x:.9g}" for x in row)
+        for row in zip(*columns, strict=True)
+    ]
+    path.write_text("\n".join([header, *rows]), encoding="utf-8")
+    return path
+
+
+Spoil = Callable[[list[Array]], list[Array]]
+
+
+def scaled(time: float = 1.0, surface: float = 1.0, part: float = 1.0) -> Spoil:
+    factors = time, surface, part
+    return lambda columns: [f * c for f, c in zip(factors, columns, strict=True)]
+
+
+def same(columns: list[Array]) -> list[Array]:
+    return columns
+
+
+def without(rows: slice, of: int) -> Spoil:
+    """Empty cells of a column."""
+
+    def spoil(columns: list[Array]) -> list[Array]:
+        columns = [c.copy() for c in columns]
+        columns[of][rows] = np.nan
+        return columns
+
+    return spoil
+
+
+REFUSED = {
+    "no units": ("time,surface,part", same, "what time, surface, part is, or its unit"),
+    "letters without units": ("t,zs,zp", same, "what t, zs, zp is, or its unit, is not clear"),
+    "letters that mean two things": ("t [s],zs [mm],zp [mm]", same, "what zs [mm], zp [mm] is"),
+    "the platform or the part": ("t [s],zp [mm],x", same, "what zp [mm] is"),
+    "one unit forgotten": ("time [s],surface [mm],part", same, "what part is, or its unit"),
+    "the time's unit forgotten": ("time,surface [mm],part [mm]", same, "what time is, or its"),
+    "published letters without units": ("t,zp,zo", same, "what t, zp, zo is, or its unit"),
+    "a unit of another kind": ("time [s],surface [mm/s],part [mm]", same, "the unit mm/s is not m"),
+    "an unknown unit": ("time [s],surface [inch],part [mm]", same, "the unit inch is not m"),
+    "an unknown time": ("Zeit [s],surface [mm],part [mm]", same, "which column is the time is not"),
+    "one body twice": ("time [s],surface [mm],height [mm]", same, "are the same column"),
+    "times in ms as s": (
+        HEADER,
+        scaled(time=1e3),
+        "0.96 rows/s are too few for a run that repeats",
+    ),
+    "times that go back": (HEADER, lambda c: [c[0][::-1], *c[1:]], "the time does not increase"),
+    "a missing time": (HEADER, without(slice(7, 8), 0), "row 9, column time [s]: the value is"),
+}
+
+
+@pytest.mark.parametrize("spoilt", REFUSED)
+def test_what_is_not_clear_is_refused(spoilt: str, run: cosim.Result, tmp_path: Path) -> None:
+    header, spoil, words = REFUSED[spoilt]
+    file = write(tmp_path / "a.csv", header, spoil(table(run)))
+    with pytest.raises(cosim.BadInput) as caught:
+        cosim.compare(run, file)
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+EXCHANGED = "the columns of surface and part exchanged"
+TOLD = {
+    "mm as m": (HEADER.replace("mm", "m"), same, ["surface [m] times 0.001", "part [m] times"]),
+    "µm as mm": (HEADER, scaled(1, 1e3, 1e3), ["surface [mm] times 0.001", "part [mm] times"]),
+    "cm as mm": (HEADER, scaled(1, 0.1, 0.1), ["surface [mm] times 10:", "part [mm] times 10:"]),
+    "m as mm": (HEADER, scaled(1, 1e-3, 1e-3), ["surface [mm] times 1000", "part [mm] times"]),
+    "the part alone in m": (HEADER, scaled(part=1e-3), ["part [mm] times 1000: is it in mm"]),
+    "the part alone in cm": (HEADER, scaled(part=0.1), ["column part [mm] times 10: is it in mm"]),
+    "up is negative": (HEADER, scaled(1, -1, -1), ["surface [mm] times -1: is its"]),
+    "the part downwards": (HEADER, scaled(part=-1), ["part [mm] times -1: is its"]),
+    "µm downwards": (HEADER, scaled(1, -1e3, -1e3), ["surface [mm] times -0.001: is it in mm and"]),
+    "exchanged": (HEADER, lambda c: [c[0], c[2], c[1]], [EXCHANGED]),
+    "a clock 1 % fast": (HEADER, scaled(time=1 / 1.01), ["times multiplied by 1.010"]),
+    "a clock 0.5 % slow": (HEADER, scaled(time=1 / 0.995), ["times multiplied by 0.99"]),
+    "a rate of 1000 for 960": (HEADER, scaled(time=0.96), ["the recording repeats at 20.8"]),
+    "times ten times as long": (HEADER, scaled(time=10), ["with times multiplied by 0.1 they"]),
+    "s as ms": (HEADER.replace("[s]", "[ms]"), same, ["is the time's unit right?"]),
+    "empty cells": (HEADER, without(slice(40, 45), 2), ["part [mm], in mm, 5 missing"]),
+    "an empty first cell": (HEADER, without(slice(0, 1), 1), ["surface [mm], in mm, 1 missing"]),
+    "dropped frames": (
+        *(HEADER, lambda c: [np.delete(x, [50, 51, 52, 120]) for x in c]),
+        ["Gaps in time: 2, the longest of 4.17 ms"],
+    ),
+    "no times": ("surface [mm],part [mm]", lambda c: c[1:], ["No time column: read at 960"]),
+    "a column of something else": (
+        *(HEADER + ",foo", lambda c: [*c, c[0]]),
+        ["Left out, not understood: foo."],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("spoilt", TOLD)
+def test_what_may_be_wrong_is_told(spoilt: str, run: cosim.Result, tmp_path: Path) -> None:
+    header, spoil, words = TOLD[spoilt]
+    columns = spoil(table(run))
+    span = columns[0][-1] if "time [s]" in header else 0.0
+    if span > 0.45:
+        run = cosim.run(run.scene, {"run.duration": 0.5 + float(span)})
+    compared = cosim.compare(run, write(tmp_path / "a.csv", header, columns))
+    for sentence in words:
+        assert sentence in repr(compared)
+    numbers = compared.numbers
+    if "cell" in spoilt or "frames" in spoilt:  # what is missing spoils nothing
+        assert numbers["velocity_r2"] == pytest.approx(1.0, abs=0.01)
+        assert numbers["mean_error_mm"] == pytest.approx(0.0, abs=0.01)
+        assert numbers["drift_simulated"] == pytest.approx(numbers["drift_measured"], rel=0.02)
+
+
+@pytest.mark.parametrize("rate", [120, 240, 480, 960, 4000])
+def test_a_clean_trial_is_told_nothing_and_keeps_its_frequency(
+    rate: int, run: cosim.Result, tmp_path: Path
+) -> None:
+    columns = table(run, np.arange(0.0, 0.32, 1.0 / rate))
+    compared = cosim.compare(run, write(tmp_path / "a.csv", HEADER, columns))
+    assert compared.found.notes == []
+    assert compared.numbers["frequency_measured"] == pytest.approx(20.0, rel=3e-3)
+
+
+def test_a_map_names_the_columns_and_all_that_was_understood_is_written(
+    run: cosim.Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run.save(tmp_path / "run")
+    columns = table(run)
+    clear = write(tmp_path / "clear.csv", HEADER, columns)
+    letters = write(tmp_path / "letters.csv", "t,zs,zp (mm)", columns)
+    asked = "time=t:s, surface=zs:mm, part=zp"
+    for file, more in ((clear, []), (letters, ["--columns", asked])):
+        out = ["--out", str(tmp_path / file.stem)]
+        assert main(["compare", str(tmp_path / "run"), str(file), *more, *out]) == 0
+    said = capsys.readouterr().out
+    assert said.index("zp (mm), in mm") < said.rindex("mean_error_mm")
+    found = [
+        json.loads((tmp_path / name / "compare.json").read_text()) for name in ("clear", "letters")
+    ]
+    for name in ("velocity_r2", "mean_error_mm", "drift_measured"):
+        assert found[0][name] == found[1][name]
+    read = found[1]["understood"]
+    assert read["rows"] == 300 and read["rate"] == pytest.approx(960.0, rel=1e-6)
+    assert read["columns"]["z_part"] == {
+        **{"header": "zp (mm)", "unit": "mm", "assumed": False, "missing": 0}
+    }
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ("surface=nothing:mm", "there is no column nothing (found: t, zs, zp)"),
+        ("colour=zs:mm", "--columns colour=zs:mm: write surface=NAME[:unit],part=NAME[:unit]"),
+        ("surface=zs:mm,part=zs:mm", "not one column of its own is zs"),
+        ("surface=zs:mm,surface=zp:mm", "each once"),
+        ("surface=zs,part=zp:mm,time=t:s", "what zs is, or its unit, is not clear"),
+        ("surface=zs:kg,part=zp:mm,time=t:s", "the unit kg is not m"),
+        ("surface=zs:mm,part=zp:mm", "which column is the time is not clear (t)"),
+    ],
+)
+def test_bad_maps(asked: str, words: str, run: cosim.Result, tmp_path: Path) -> None:
+    file = write(tmp_path / "a.csv", "t,zs,zp", table(run))
+    with pytest.raises(cosim.BadInput) as caught:
+        cosim.compare(run, file, columns=asked)
+    assert words in str(caught.value) and "\n" not in str(caught.value)
