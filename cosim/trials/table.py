@@ -58,8 +58,8 @@ TRIALS = {"t": "time"} | {
     for quantity, name in (("z", "z"), ("vz", "v"), ("az", "a"), ("vx", "v_across"))
 }
 """Columns of the published trials."""
-PUBLISHED = {"t", "xp", "zp", "xo", "zo"}
-"""Those by which such a trial is known: then it needs no units."""
+PUBLISHED, BESIDE = {"t", "zp", "zo"}, {"xp", "xo", "zs"}
+"""Those by which such a trial is known, and one of the others: then it needs no units."""
 UNUSED = {f"{quantity}{letter}" for quantity in ("x", "ax") for letter in BODIES}
 """Columns of the published trials that say nothing of the vertical motion."""
 
@@ -155,7 +155,7 @@ def _header(cells: Cells, tracker: bool, asked: str) -> tuple[dict[str, Column],
         raise BadInput(f"{where}: a header t x y … of Tracker's is missing.")
     split = [_split(cell) for cell in head]
     words = {written for written, _ in split}
-    published = heads == 2 or words >= PUBLISHED
+    published = heads == 2 or (words >= PUBLISHED and words & BESIDE)
     # Of p, s and o only the last is clear alone: p may be the part, s the surface.
     bodies = {word[-1] for word in words & TRIALS.keys() if word != "t"}
     clear = published or bodies <= {"o"} or bodies >= {"p", "o"}
