@@ -25,6 +25,7 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, CosimError
+from cosim.mechanics.fmi import borrow, give_back
 from cosim.mechanics.normal_force import normal_force
 from cosim.scene import Scene, changed
 from cosim.simulation.elsewhere import summary_elsewhere
@@ -92,6 +93,8 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
         except CosimError:
             return None
 
+    # fmpy changes the process's folder while it loads an FMU, which no other thread must meet.
+    give_back(borrow(3))
     with ThreadPoolExecutor(2) as threads:
         try:
             others: list[Future[float | None]] = []
