@@ -5,8 +5,10 @@ Both go through fmpy's own functions, which check every return code.
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
+from copy import copy
 from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_uint, c_void_p, cast
 from functools import cache, cached_property, partial
+from threading import Lock
 from typing import Any, ClassVar
 
 import fmpy
@@ -24,6 +26,7 @@ _FUNCTIONS = {
     "derivative": ("fmi2GetDirectionalDerivative", "fmi3GetDirectionalDerivative"),
     "get_state": ("fmi2GetFMUstate", "fmi3GetFMUState"),
     "set_state": ("fmi2SetFMUstate", "fmi3SetFMUState"),
+    "free_instance": ("fmi2FreeInstance", "fmi3FreeInstance"),
     "free_state": ("fmi2FreeFMUstate", "fmi3FreeFMUState"),
 }
 """Their names here, in FMI 2.0 and in FMI 3.0."""
@@ -56,13 +59,7 @@ class Interface(ABC):
         self.messages: list[str] = []
         """What the FMU has said, the newest last."""
         self._running = False
-        folder = str(unpacked(self.version))
-        try:
-            self._fmu = self._slave(
-                instanceName="cosim", guid=token(), modelIdentifier=MODEL, unzipDirectory=folder
-            )
-        except Exception as error:
-            raise BadInput(f"The FMU in {folder} cannot be loaded: {error}") from error
+        self._fmu = copy(load(self.version))
         self._begin(new=True)
         self._names = {name: names[self.version - 2] for name, names in _FUNCTIONS.items()}
         self._call = {
@@ -133,10 +130,10 @@ class Interface(ABC):
         return {"instance": self._fmu.component, **where}
 
     def close(self) -> None:
-        """Free the instance."""
+        """Free the instance; fmpy's own way to do so unloads the library, too."""
         if self._running:
             self._fmu.terminate()
-        self._fmu.freeInstance()
+        self._call["free_instance"]()
 
 
 class Fmi2(Interface):
@@ -195,6 +192,27 @@ def _text(message: bytes | None) -> str:
 
 
 INTERFACES: dict[int, type[Interface]] = {2: Fmi2, 3: Fmi3}
+
+_loading = Lock()
+_loaded: dict[int, Any] = {}
+
+
+def load(version: int) -> Any:
+    """fmpy's object of the FMU, which each instance copies. Raises BadInput.
+
+    fmpy changes the process's folder while it loads a library, which other threads would meet: so
+    it does so once, and a caller with threads loads it before they start.
+    """
+    with _loading:
+        if version not in _loaded:
+            folder = str(unpacked(version))
+            names = {"instanceName": "cosim", "guid": token(), "modelIdentifier": MODEL}
+            try:
+                _loaded[version] = INTERFACES[version]._slave(**names, unzipDirectory=folder)
+            except Exception as error:
+                raise BadInput(f"The FMU in {folder} cannot be loaded: {error}") from error
+        return _loaded[version]
+
 
 _idle: dict[int, list[Interface]] = {version: [] for version in INTERFACES}
 

@@ -72,16 +72,19 @@ def offset_pin(offset: float, amplitude: float) -> float:
 
 def staircase(maximum: int, frequency: float) -> tuple[int, ...]:
     """The DAC codes of one period, one each 50 µs, for a commanded ``frequency`` in Hz."""
-    ratio = Fraction(frequency) / STEPS_PER_SECOND
-    p, q = ratio.numerator, ratio.denominator
-    steps = -(-q // p)
-    return tuple(maximum * (q - k * p) // q for k in range(steps))
+    p, q = _share(frequency).as_integer_ratio()
+    return tuple(maximum * (q - k * p) // q for k in range(ceil(Fraction(q, p))))
+
+
+def _share(frequency: float) -> Fraction:
+    """Of a period that a step takes."""
+    return Fraction(frequency) / STEPS_PER_SECOND
 
 
 def period(frequency: float, loop_time: float | None) -> float:
     """Of the staircase for a commanded ``frequency`` in Hz, s; with ``loop_time``, s, that of the
     passes."""
-    steps = ceil(1 / (Fraction(frequency) / STEPS_PER_SECOND))
+    steps = ceil(1 / _share(frequency))
     if not loop_time:
         return steps / STEPS_PER_SECOND
     each = _passes_a_step(loop_time)

@@ -15,7 +15,7 @@ Not seen: several answers that these starts do not part; a kind that the simpler
 not have, near a border between two of them; and chaos that dies out before the averages begin.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from math import isinf
 from threading import Event
@@ -25,12 +25,12 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, CosimError
-from cosim.mechanics.fmi import borrow, give_back
+from cosim.mechanics.fmi import load
 from cosim.mechanics.normal_force import normal_force
 from cosim.scene import Scene, changed
 from cosim.simulation.elsewhere import summary_elsewhere
 from cosim.simulation.fidelity import LEAST, Fidelity, relative_error
-from cosim.simulation.here import simulate_here, summary_here
+from cosim.simulation.here import few_rows, simulate_here, summary_here
 from cosim.waveforms.result import Result
 
 COARSER = 3.0
@@ -38,6 +38,9 @@ COARSER = 3.0
 
 LOOSER = 1e-6
 """``mechanics.tolerance`` of that run where no steps of ngspice are made."""
+
+LEAST_TOLD = 5e-5
+"""Of v_average, with ngspice: two runs may err alike by chance, and this much was seen."""
 
 STRICT = 2.4
 """How much shorter they are for an error in the strict sense, of both runs."""
@@ -89,12 +92,11 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
     def mean(of: Scene | None) -> float | None:
         alone = summary_elsewhere if scene.rung.ngspice else summary_here
         try:
-            return None if of is None else alone(_few_rows(of), going)["v_average"]
+            return None if of is None else alone(few_rows(of), going)["v_average"]
         except CosimError:
             return None
 
-    # fmpy changes the process's folder while it loads an FMU, which no other thread must meet.
-    give_back(borrow(3))
+    load(3)
     with ThreadPoolExecutor(2) as threads:
         try:
             others: list[Future[float | None]] = []
@@ -118,13 +120,10 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
         means = [value for value in from_elsewhere if value is not None]
         found["v_average_other_starts"] = means
     else:
-        error = None if told[0] is None else abs(own - told[0])
-    return replace_summary(result, {"v_average_error": error, **found})
-
-
-def replace_summary(result: Result, more: Mapping[str, Any]) -> Result:
-    """The result with more numbers."""
-    return Result(result.scene, result.columns, {**result.summary, **more})
+        least = LEAST_TOLD * abs(own) if scene.rung.ngspice else 0.0
+        error = None if told[0] is None else max(abs(own - told[0]), least)
+    told_of = {"v_average_error": error, **found}
+    return Result(result.scene, result.columns, result.summary | told_of)
 
 
 def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
@@ -259,8 +258,3 @@ def _started(scene: Scene, ahead: float) -> Scene | None:
         return changed(scene, {"drive.start_phase": (scene.drive.start_phase + ahead) % 1.0}, "it")
     except BadInput:
         return None  # the drive has no such start
-
-
-def _few_rows(scene: Scene) -> Scene:
-    rows = {"output_step": scene.run.duration / 2.0}
-    return scene.model_copy(update={"run": scene.run.model_copy(update=rows)})

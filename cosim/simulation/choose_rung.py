@@ -19,7 +19,7 @@ from functools import partial
 from cosim.errors import BadInput
 from cosim.scene import Scene, changed
 from cosim.simulation.fidelity import JUDGES, SEARCHES, Fidelity, relative_error
-from cosim.simulation.here import summary_here
+from cosim.simulation.here import few_rows, summary_here
 from cosim.toolchain.processes import processors
 from cosim.waveforms.result import Result
 
@@ -53,7 +53,7 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
     """
     tolerance = Fidelity.of(scene).tolerance
     try:
-        limited = _few_rows(changed(scene, {"circuit.model": SEARCHES}, "auto"))
+        limited = few_rows(changed(scene, {"circuit.model": SEARCHES}, "auto"))
     except BadInput:  # too fast a coil
         return Choice(JUDGES, "the rung limited cannot solve this coil", {})
     force = scene.coil.force_factor
@@ -83,10 +83,6 @@ def _v_averages(scene: Scene, settings: Sequence[Mapping[str, float | str]]) -> 
     with ThreadPoolExecutor(processors()) as threads:
         found = threads.map(lambda make: summary_here(make(), lambda _: None), scenes)
         return [summary["v_average"] for summary in found]
-
-
-def _few_rows(scene: Scene) -> Scene:
-    return changed(scene, {"run.output_step": scene.run.duration / 2.0}, "auto")
 
 
 def _part(scene: Scene) -> dict[str, float | str]:

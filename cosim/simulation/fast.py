@@ -84,7 +84,7 @@ def simulate_fast(scene: Scene, progress: Progress) -> Result:
     began = time.perf_counter()
     summary = summary_fast(scene, progress)
     (finer,) = summaries([scene], 0.5, progress)
-    error = summary["v_average"] - finer["v_average"]
+    error = abs(summary["v_average"] - finer["v_average"])
     columns = _waveforms(scene, progress)
     summary |= {"v_average_error": error, "wall_time": time.perf_counter() - began}
     return Result(scene, columns, summary | {"notes": notes(scene, columns, summary)})

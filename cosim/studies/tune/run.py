@@ -70,12 +70,11 @@ def tune(
     ``maximise`` or ``minimise`` names the number; ``over`` gives the range of each ``table.key``,
     SI; by default the three knobs. Where the scene needs ngspice, SCOUTS times as many runs on the
     rung "limited" look first where it is worth while. Where its solver is the fast one, that one
-    searches, and the FMU judges the best HINTS and what follows. After the search each key is
-    turned a little about the best, which moves on while that helps and the budget lasts. The same
-    for the same ``seed``, whatever the number of ``workers``, local ones or those of the cluster at
-    the address ``dask``. ``progress`` is told each run and the best so far,
-    as they finish, ``scouting`` each one ahead. Where the frequency is tuned, each run lasts whole
-    periods.
+    searches, and the FMU judges the best WARM and what follows. After the search each key is turned
+    a little about the best, which moves on while that helps and the budget lasts. The same for the
+    same ``seed``, whatever the number of ``workers``, local ones or those of the cluster at the
+    address ``dask``. ``progress`` is told each run and the best so far, as they finish,
+    ``scouting`` each one ahead. Where the frequency is tuned, each run lasts whole periods.
 
     In the folder ``out`` it leaves what ``Tuning.save`` writes, and takes up what an interrupted
     search has left there.
