@@ -75,7 +75,7 @@ def evaluate_many(
 def point(base: Scene, values: Mapping[str, Number | str], whole_periods: bool) -> Scene:
     """The scene of a point. Raises BadInput."""
     few_rows = float(values.get("run.duration", base.run.duration)) / 2.0
-    if few_rows != base.run.output_step:
+    if few_rows != base.run.output_step and base.run.average == "ends":
         values = {"run.output_step": few_rows, **values}
     scene = changed(base, values, "--over")
     return changed(scene, periods_made_whole(scene), "--over") if whole_periods else scene

@@ -50,6 +50,7 @@ _FAST_NEEDS: list[tuple[str, Sequence[object], str]] = [
     ("drive.quantised", (False,), "false"),
     ("drive.phase_deg", (None,), "absent"),
     ("mechanics.actuator", ("ram",), '"ram"'),
+    ("run.average", ("ends",), '"ends"'),
     ("mechanics.contact", ("compliant",), '"compliant"'),
     ("friction.normal_force_file", (None,), "absent"),
     *(
@@ -88,16 +89,18 @@ class Scene(BaseModel):
         return data | {"circuit": _CAREFUL | circuit} if rung and rung.own_netlist else data
 
     @model_validator(mode="after")
-    def _settle(self) -> "Scene":
+    def _fit_times(self) -> "Scene":
         """The mean over a broken period is off by per cents, so whole ones are the default."""
-        if "settle" not in self.run.model_fields_set:
-            length, duration = self.period, self.run.duration
+        given, duration = self.run.model_fields_set, self.run.duration
+        fitted = {"output_step": min(self.run.output_step, duration / 2)}
+        if "settle" not in given:
+            length = self.period
             count = max(int(duration / 2 / length * (1 + 1e-9)), int(duration >= length))
-            settle = max(0.0, duration - count * length) if count else duration / 2
-            given = {name: getattr(self.run, name) for name in self.run.model_fields_set}
-            # Not as one that was given: another drive has another default.
-            run = Run.model_construct(self.run.model_fields_set, **given, settle=settle)
-            object.__setattr__(self, "run", run)
+            fitted["settle"] = max(0.0, duration - count * length) if count else duration / 2
+        # Not as what was given: another drive or duration has another default.
+        known = {name: getattr(self.run, name) for name in given}
+        run = Run.model_construct(given, **fitted | known)
+        object.__setattr__(self, "run", run)
         return self
 
     @model_validator(mode="after")

@@ -387,6 +387,11 @@ class Run(Table):
         1.0,
         "Exposure of the camera that reads the run, as a share of the time between its frames",
     )
+    average: Literal["ends", "slope"] = _choice(
+        "ends",
+        "v_average: from end to end over the time; or the slope of the straight line through the "
+        "part's heights in the frames of a camera, as a trial's record has it",
+    )
     tolerance: float = _number(
         0.01,
         "1",

@@ -12,7 +12,7 @@ from cosim.coupling.loop.recorder import Recorder
 from cosim.files.spill import blocks
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Electrics
-from cosim.simulation.rungs.rung import Driven, Motion
+from cosim.simulation.rungs.rung import Driven, Motion, average_slope
 from cosim.toolchain.versions import versions
 from cosim.trials.camera import FRAME_RATE, accelerations, instants_a_frame, shown
 
@@ -33,7 +33,8 @@ def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[
     """
     run, totals, before, extremes = scene.run, motion.totals, motion.at_settle, motion.extremes
     span = run.duration - run.settle
-    v_average = (totals["z_part"] - before["z_part"]) / span
+    ends = (totals["z_part"] - before["z_part"]) / span
+    v_average = ends if motion.slope is None else motion.slope
     seen_max, seen_min = _seen(motion.frames, run.shutter / FRAME_RATE)
     a_max, a_min = extremes["a_surface_max"], extremes["a_surface_min"]
     bounded = math.isfinite(a_max) and math.isfinite(a_min)
@@ -125,7 +126,9 @@ def motion(scene: Scene, recorder: Recorder) -> Motion:
         last = dict(zip(recorder.mechanics.columns, recorder.rows[-1].tolist(), strict=True))
         ram = last["z_ram"] - last["z_surface"]
     return Motion(
-        recorder.at_end, recorder.at_settle, _extremes(scene, recorder), recorder.frames, ram
+        *(recorder.at_end, recorder.at_settle, _extremes(scene, recorder), recorder.frames),
+        average_slope(scene.run, recorder.time, recorder.column("z_part")),
+        ram,
     )
 
 

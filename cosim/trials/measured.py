@@ -2,9 +2,8 @@
 
 Source: the trials tracked by C. Yako, J. Nowak, S. Yuan and K. Salisbury, repository
 clyako/vertical-vibratory-transport-of-grasped-parts-using-impacts. ``measured.csv`` holds, in SI,
-the slope of the straight line through the part's heights (``v_average``), the way from the first
-to the last of them over the time (``v_end_to_end``), and the extremes of the surface's columns;
-accelerations are Tracker's five-point ones at 960 frames/s.
+the slope of the straight line through the part's heights (``v_average``), and the extremes of the
+surface's columns; accelerations are Tracker's five-point ones at 960 frames/s.
 """
 
 import csv
@@ -27,11 +26,7 @@ def measured(scene: Scene) -> tuple[int, dict[str, float]] | None:
     if number is None or _moved(scene) != _moved(load(scene.name)):
         return None
     numbers = dict(_table()[number])
-    end_to_end = numbers.pop("v_end_to_end")
-    if scene.name != "paper":
-        # The run is as long as the record, and its average goes from end to end, too.
-        numbers["v_average"] = end_to_end
-    else:
+    if scene.name == "paper":
         # The record shows the start from rest, in which the surface sinks: not comparable.
         del numbers["z_surface_pp"]
     return number, numbers

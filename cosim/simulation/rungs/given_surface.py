@@ -16,7 +16,7 @@ from cosim.files.columns import read_timetable
 from cosim.mechanics import part
 from cosim.mechanics.surface import Surface
 from cosim.scene import Scene
-from cosim.simulation.rungs.rung import Motion
+from cosim.simulation.rungs.rung import Motion, average_slope
 
 NO_GRAVITY = 1e-9  # m/s²; the theory divides by it
 
@@ -133,6 +133,7 @@ def move_part(scene: Scene) -> tuple[dict[str, Array], Motion]:
         at_settle={name: values[settled].item() for name, values in totals.items()} | none,
         extremes=moved.extremes(run.settle, run.duration),
         frames=found.z_surface[np.searchsorted(wanted, frames)],
+        slope=average_slope(run, wanted, found.z),
     )
     return {name: values[at] for name, values in columns.items()}, motion
 

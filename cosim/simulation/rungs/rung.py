@@ -16,7 +16,10 @@ from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
 from cosim.files.declared import modules
 from cosim.scene import Scene
+from cosim.scene.tables import Run
 from cosim.simulation.rungs.electrics import Electrics
+from cosim.trials.camera import FRAME_RATE, frame_times
+from cosim.trials.periods import slope
 
 
 @dataclass(frozen=True)
@@ -51,8 +54,20 @@ class Motion:
     where there is none."""
     frames: npt.NDArray[np.float64]
     """The surface's height at each instant of the camera's frames after settling."""
+    slope: float | None
+    """Of the straight line through the part's heights after settling, m/s; None where
+    ``run.average`` does not ask for it."""
     ram: float | None = None
     """Where the ram is in its actuator in the last row, m; None where there is no ram."""
+
+
+def average_slope(run: Run, time: Array, heights: Array) -> float | None:
+    """``slope`` of a motion whose part has ``heights`` (m) at ``time`` (s)."""
+    if run.average == "ends":
+        return None
+    # A record's length in a scene is rounded, to less than a hundredth of a frame.
+    frames = frame_times(run.settle, int((run.duration - run.settle) * FRAME_RATE + 0.01) + 1)
+    return slope(frames, np.interp(frames, time, heights))
 
 
 class Rung(ABC):

@@ -15,6 +15,7 @@ from cosim.stepper.stepper import OWN
 from cosim.studies.identify.chain.chain import simulate
 from cosim.studies.identify.problem.targets import Measured
 from cosim.trials.camera import velocities
+from cosim.trials.periods import slope
 
 LATE = 5
 """Whole cycles from which on the first ones, of the start, are left out of the repeatability."""
@@ -91,11 +92,6 @@ def nrmse(simulated: Array, measured: Array) -> float:
     """Rms difference over the standard deviation of what was measured, where both are known."""
     apart = simulated - measured
     return float(np.sqrt(np.nanmean(apart**2)) / np.nanstd(measured))
-
-
-def slope(time: Array, heights: Array) -> float:
-    """Of the straight line through heights, m/s."""
-    return float(np.polynomial.Polynomial.fit(time, heights, 1).convert().coef[1])
 
 
 def bands(trial: Measured, rig: Array, own: Array) -> list[Row]:

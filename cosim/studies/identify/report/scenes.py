@@ -12,8 +12,8 @@ from cosim.simulation.simulate import simulate
 from cosim.stepper.stepper import OWN
 from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import DRIVE, Measured
-from cosim.studies.identify.report.measures import slope
 from cosim.trials.camera import hermite
+from cosim.trials.periods import slope
 
 Settings = dict[str, float | str]
 
@@ -49,6 +49,7 @@ def trial_settings(
         found |= {"drive.start_time": max(0.0, numbers["start"])}
     lasts = float(trial.recording.time[-1])
     found |= {"run.duration": first + lasts, "run.settle": first}
+    found["run.average"] = "slope"
     return {key: _rounded(value, 9) for key, value in found.items()}, first
 
 
