@@ -190,9 +190,7 @@ def test_failing_run_keeps_the_older_one(tmp_path: Path) -> None:
 
 @needs.posix
 @pytest.mark.parametrize(("size", "file"), [(3000, "out"), (40_000, "out/figure.png")])
-def test_full_disk(
-    size: int, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_full_disk(size: int, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import resource
 
     run = ("run", "held", *QUICK, "--set", "run.output_step=2e-4", "--out", "out")
@@ -510,9 +508,7 @@ def test_help_and_version(option: str, tmp_path: Path) -> None:
     assert "cosim" in done.stdout
 
 
-def test_a_key_without_effect_is_a_note(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_key_without_effect_is_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     without = ["--set", "drive.amplitude=9"]
     assert main(["run", "held", *QUICK, *without, "--out", str(tmp_path / "out")]) == 0
     (said,) = capsys.readouterr().err.splitlines()
