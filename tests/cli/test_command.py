@@ -354,7 +354,7 @@ def test_interrupt_while_writing(
         path.write_bytes(b"half")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("cosim.files.picture.Picture.savefig", interrupted)
+    monkeypatch.setattr("cosim.files.picture.FigureCanvasAgg.print_png", interrupted)
     assert main(["run", "held", *QUICK, "--out", str(tmp_path / "out")]) == 130
     assert capsys.readouterr().err == "cosim: interrupted.\n"
     kept = {path.name for path in (tmp_path / "out").iterdir()}
