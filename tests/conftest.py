@@ -28,6 +28,12 @@ def pytest_configure() -> None:
         providers._get_local_constants = lambda: providers._local_constants
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than there are processors: the tests of processes wait for them."""
+    return processes.processors() + 1
+
+
 def pytest_sessionstart() -> None:
     """Refuse to test what was compiled from other sources."""
     try:

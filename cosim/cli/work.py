@@ -8,7 +8,7 @@ from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from cosim.errors import BadInput, plain
-from cosim.files.atomic import alone
+from cosim.files.atomic import alone, tidy
 
 if TYPE_CHECKING:
     from tqdm import tqdm
@@ -33,6 +33,8 @@ def writable(folder: Path, shared: bool = False) -> Iterator[None]:
         except OSError as error:
             reason = error.strerror
             raise BadInput(f"{plain(str(folder))}: cannot be written to ({reason}).") from error
+        if shared:
+            tidy(folder)
         with nullcontext() if shared else alone(folder):
             yield
     except BaseException:

@@ -20,7 +20,7 @@ except ImportError:  # Windows
     fcntl = None
 
 _YOUNG = 60.0
-"""s that a folder stays although nobody has locked it: somebody may be about to."""
+"""s that what is temporary stays although nobody has locked it: somebody may be about to."""
 
 _PREFIX = ".cosim-"
 """Of what takes the place of a file later: a kill leaves it, and :func:`tidy` finds it."""
@@ -105,19 +105,22 @@ def alone(folder: Path) -> Iterator[None]:
             ) from None
         except OSError:  # a file system without locks
             pass
-        tidy(folder)
+        tidy(folder, ours=True)
         yield
     finally:
         os.close(handle)
 
 
-def tidy(folder: Path) -> None:
-    """Remove temporary files and folders of processes that have ended."""
+def tidy(folder: Path, ours: bool = False) -> None:
+    """Remove temporary files and folders of processes that have ended. Young ones stay, but for
+    files where the folder is ``ours``: another process may be about to lock them."""
     if fcntl is None:
         return
     for path in folder.glob(f"{_PREFIX}*"):
         with suppress(OSError):
-            whole = path.is_dir() and time.time() - path.stat().st_mtime > _YOUNG
+            whole = path.is_dir()
+            if time.time() - path.stat().st_mtime <= _YOUNG and (whole or not ours):
+                continue
             handle = os.open(
                 path, (os.O_RDONLY if whole else os.O_RDWR) | os.O_NOFOLLOW | os.O_NONBLOCK
             )

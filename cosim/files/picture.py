@@ -17,17 +17,17 @@ class Picture(Figure):
         self, width: float, height: float, layout: Literal["constrained"] | None = None
     ) -> None:
         super().__init__(figsize=(width, height), dpi=110, layout=layout)
-        FigureCanvasAgg(self)
+        self._agg = FigureCanvasAgg(self)  # savefig would draw twice
 
     def write(self, path: Path, texts: dict[str, str] | None = None) -> None:
         """Write the figure as a PNG with ``texts``, whole or not at all. Raises BadInput."""
         with whole(path) as temporary:
-            self.savefig(temporary, format="png", metadata=texts)
+            self._agg.print_png(temporary, metadata=texts)
 
     def png(self) -> bytes:
         """The figure as a PNG."""
         content = BytesIO()
-        self.savefig(content, format="png")
+        self._agg.print_png(content)
         return content.getvalue()
 
     _repr_png_ = png

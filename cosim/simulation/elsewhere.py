@@ -3,12 +3,12 @@
 What only the worker needs is not imported here, since it takes a while.
 """
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from cosim.circuit.lint.deck import named
 from cosim.files import spill
 from cosim.files.resources import circuits
 from cosim.files.spill import Packed, place
@@ -47,10 +47,11 @@ def bounds(scene: Scene) -> Bounds:
     """Of a worker for the scene, and for others with the same files. Raises BadInput where ngspice
     is missing."""
     files = scene.files
-    # A netlist may include files of its own folder.
-    folder = os.path.dirname(files.pop("netlist", "")) or str(circuits())
+    netlist = files.pop("netlist", None)
+    circuit = named(Path(netlist)) if netlist else [circuits()]
     first = _load, scene.rung.own_netlist
-    return Bounds((folder, *files.values()), place(), ngspice_library(), first)
+    reads = *map(str, circuit), *files.values()
+    return Bounds(reads, place(), ngspice_library(), first)
 
 
 def _load(code_models: bool) -> None:

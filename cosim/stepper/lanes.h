@@ -11,6 +11,10 @@
 
 #include "stepper.h"
 
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("schedule-insns") /* or nothing is computed while a group waits: see follow */
+#endif
+
 /* WIDTH numbers, and as many masks: all bits or none. */
 typedef double Wide __attribute__((vector_size(8 * WIDTH)));
 typedef int64_t Mask __attribute__((vector_size(8 * WIDTH)));
@@ -293,16 +297,6 @@ INLINE void note_ends(const State *a, const State *b, Wide settle, Wide until, S
     sum->i_end = choose(ends, b->i + (until - b->t) * (b->i - a->i) * per, sum->i_end);
 }
 
-/* The least and the largest number. */
-INLINE void ends_of(Wide x, double *low, double *high)
-{
-    *low = *high = x[0];
-    for (int l = 1; l < WIDTH; l++) {
-        *low = x[l] < *low ? x[l] : *low;
-        *high = x[l] > *high ? x[l] : *high;
-    }
-}
-
 /* A row of the first lane at a time `late` after the end of the step from `a` to `b`; forces and
  * accelerations are their means over the step. */
 INLINE void write_row(const Wide p[N_ALL], const State *a, const State *b, const Effect *e,
@@ -327,49 +321,74 @@ INLINE void write_row(const Wide p[N_ALL], const State *a, const State *b, const
     row[ROW_STICKING] = b->slip[0] == 0.0;
 }
 
-FUNCTION(stepper_follow)(const Stretch *c, const Parameters all, const Span *span, int from,
-                         Kept *kept, double *out)
+/* As many groups of WIDTH lanes, step by step in turn: while one waits for its quotients, the other
+ * is computed. */
+INLINE void follow(const Stretch *c, const Parameters all, const Span *span, const int groups,
+                   Kept *kept, double *out)
 {
-    Wide p[N_ALL], settle, until;
-    for (int k = 0; k < N_ALL; k++)
-        memcpy(p + k, all[k] + from, sizeof *p);
-    memcpy(&settle, span->settle + from, sizeof settle);
-    memcpy(&until, span->until + from, sizeof until);
-    State m;
-    Sums sum;
-    for (int k = 0; k < N_STATE; k++)
-        memcpy((Wide *)&m + k, kept->state[k] + from, sizeof(Wide));
-    for (int k = 0; k < N_SUMS; k++)
-        memcpy((Wide *)&sum + k, kept->sums[k] + from, sizeof(Wide));
-    double settled, all_settled, ended, all_ended;
-    ends_of(settle, &settled, &all_settled);
-    ends_of(until, &ended, &all_ended);
-    int64_t sample = 0;
-    for (int64_t k = c->first + 1; k <= c->last; k++) {
-        const State before = m;
-        const double edge = (double)k * c->step, half = 0.5 * c->step;
-        Effect e;
-        step(p, &m, edge - half, edge, edge + half, 0, 0, 0.0, 0.0, &e);
-        add_energies(p, &before, &m, &e, until, &sum);
-        /* No step ends further than a half one from its edge. */
-        if (edge + c->step > settled)
-            add_settled(&before, &m, &e, settle, until, &sum);
-        if ((edge + c->step > settled && edge - 2.0 * c->step < all_settled) ||
-            edge + c->step > ended)
-            note_ends(&before, &m, settle, until, &sum);
-        for (; sample < c->samples && c->times[sample] <= edge; sample++) {
-            const Wide late = c->times[sample] - m.t;
-            if (c->rows) {
-                write_row(p, &before, &m, &e, late, out + sample * N_COLUMNS);
-                continue;
-            }
-            const Wide slope = (m.v - before.v) / (m.t - before.t);
-            const Wide height = read(m.z, m.v, slope, late);
-            memcpy(out + sample * LANES + from, &height, sizeof height);
+    Wide p[LANES / WIDTH][N_ALL], settle[LANES / WIDTH], until[LANES / WIDTH];
+    State m[LANES / WIDTH], before[LANES / WIDTH];
+    Sums sum[LANES / WIDTH];
+    Effect e[LANES / WIDTH];
+    double settled = INFINITY, all_settled = 0.0, ended = INFINITY;
+    for (int g = 0, from = 0; g < groups; g++, from += WIDTH) {
+        for (int k = 0; k < N_ALL; k++)
+            memcpy(p[g] + k, all[k] + from, sizeof(Wide));
+        memcpy(settle + g, span->settle + from, sizeof(Wide));
+        memcpy(until + g, span->until + from, sizeof(Wide));
+        for (int k = 0; k < N_STATE; k++)
+            memcpy((Wide *)(m + g) + k, kept->state[k] + from, sizeof(Wide));
+        for (int k = 0; k < N_SUMS; k++)
+            memcpy((Wide *)(sum + g) + k, kept->sums[k] + from, sizeof(Wide));
+        for (int l = 0; l < WIDTH; l++) {
+            settled = fmin(settled, settle[g][l]);
+            all_settled = fmax(all_settled, settle[g][l]);
+            ended = fmin(ended, until[g][l]);
         }
     }
-    for (int k = 0; k < N_STATE; k++)
-        memcpy(kept->state[k] + from, (Wide *)&m + k, sizeof(Wide));
-    for (int k = 0; k < N_SUMS; k++)
-        memcpy(kept->sums[k] + from, (Wide *)&sum + k, sizeof(Wide));
+    int64_t sample = 0;
+    for (int64_t k = c->first + 1; k <= c->last; k++) {
+        const double edge = (double)k * c->step, half = 0.5 * c->step;
+#pragma GCC unroll 4
+        for (int g = 0; g < groups; g++) {
+            before[g] = m[g];
+            step(p[g], m + g, edge - half, edge, edge + half, 0, 0, 0.0, 0.0, e + g);
+            add_energies(p[g], before + g, m + g, e + g, until[g], sum + g);
+        }
+        /* No step ends further than a half one from its edge. */
+        if (edge + c->step > settled)
+            for (int g = 0; g < groups; g++)
+                add_settled(before + g, m + g, e + g, settle[g], until[g], sum + g);
+        if ((edge + c->step > settled && edge - 2.0 * c->step < all_settled) ||
+            edge + c->step > ended)
+            for (int g = 0; g < groups; g++)
+                note_ends(before + g, m + g, settle[g], until[g], sum + g);
+        for (; sample < c->samples && c->times[sample] <= edge; sample++) {
+            if (c->rows) {
+                const Wide late = c->times[sample] - m->t;
+                write_row(p[0], before, m, e, late, out + sample * N_COLUMNS);
+                continue;
+            }
+            for (int g = 0; g < groups; g++) {
+                const Wide slope = (m[g].v - before[g].v) / (m[g].t - before[g].t);
+                const Wide height = read(m[g].z, m[g].v, slope, c->times[sample] - m[g].t);
+                memcpy(out + sample * LANES + g * WIDTH, &height, sizeof height);
+            }
+        }
+    }
+    for (int g = 0, from = 0; g < groups; g++, from += WIDTH) {
+        for (int k = 0; k < N_STATE; k++)
+            memcpy(kept->state[k] + from, (Wide *)(m + g) + k, sizeof(Wide));
+        for (int k = 0; k < N_SUMS; k++)
+            memcpy(kept->sums[k] + from, (Wide *)(sum + g) + k, sizeof(Wide));
+    }
+}
+
+FUNCTION(stepper_follow)(const Stretch *c, const Parameters all, const Span *span, Kept *kept,
+                         double *out)
+{
+    if (c->rows) /* of which only the first lane's are asked for */
+        follow(c, all, span, 1, kept, out);
+    else
+        follow(c, all, span, LANES / WIDTH, kept, out);
 }

@@ -97,10 +97,7 @@ void stepper_begin(const Parameters p, double step, Kept *kept)
 
 void stepper_run(const Stretch *piece, const Parameters p, const Span *span, Kept *kept, double *out)
 {
-    StepperFollow *follow = OF_WIDTH(stepper_follow);
-    const int lanes = piece->rows ? width() : LANES; /* of rows only the first is asked for */
-    for (int from = 0; from < lanes; from += width())
-        follow(piece, p, span, from, kept, out);
+    OF_WIDTH(stepper_follow)(piece, p, span, kept, out);
 }
 
 int64_t stepper_sizes(int64_t which)

@@ -112,7 +112,7 @@ typedef void ChainLanes(const Schedule *schedule, const Parameters parameters, c
 ChainLanes chain_lanes_2, chain_lanes_4, chain_lanes_8;
 
 typedef void StepperFollow(const Stretch *piece, const Parameters parameters, const Span *span,
-                           int from, Kept *kept, double *out);
+                           Kept *kept, double *out);
 StepperFollow stepper_follow_2, stepper_follow_4, stepper_follow_8;
 
 #endif

@@ -164,7 +164,7 @@ def rc_ripple(duty):
     return 3.3 * (1 - rise) * (1 - fall) / (1 - rise * fall)
 
 
-@pytest.mark.parametrize("code", [512, 272])
+@pytest.mark.parametrize("code", [pytest.param(512, marks=pytest.mark.slow), 272])
 def test_pwm_ripple(tmp_path, code):
     """The edges of cosim.drive.command at the schematic's filter, against the closed form."""
     mean, stop = volts(code), 0.06

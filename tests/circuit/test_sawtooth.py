@@ -40,7 +40,9 @@ def points(drive: Command, start: float, at: Voltage, before: Voltage, end: floa
     return f"PWL({' '.join(f'{time!r} {value!r}' for time, value in pairs)})"
 
 
-@pytest.mark.parametrize("pots", KNOBS)
+@pytest.mark.parametrize(
+    "pots", [*KNOBS[:2], *(pytest.param(pots, marks=pytest.mark.slow) for pots in KNOBS[2:])]
+)
 def test_it_gives_the_voltage_of_the_scenes_source(pots: tuple[float, ...], tmp_path: Path) -> None:
     knobs: dict[str, float] = dict(zip(NAMES, pots, strict=True))
     plain, drive = scene_source(knobs)

@@ -98,7 +98,7 @@ TABLE: dict[str, dict[str, str]] = {
         "build": "tests/toolchain/test_build_c.py: what a killed build left goes",
     },
     "SIGTERM": {
-        "run": QUICK, "sweep": QUICK, "tune": SLOW, "chart": SLOW, "identify": SLOW,
+        "run": QUICK, "sweep": SLOW, "tune": SLOW, "chart": SLOW, "identify": SLOW,
         "export": BRIEF, "compare": BRIEF, "fit": SLOW, "build": COMPILER,
     },
     "SIGHUP": {
@@ -116,7 +116,7 @@ TABLE: dict[str, dict[str, str]] = {
     },
     "disk full": {
         "run": QUICK, "sweep": "tests/studies/test_sweep_kills.py", "tune": QUICK, "chart": SLOW,
-        "identify": SLOW, "export": QUICK, "compare": SLOW, "fit": QUICK, "build": QUICK,
+        "identify": SLOW, "export": QUICK, "compare": SLOW, "fit": SLOW, "build": QUICK,
     },
     "read-only": {
         "run": QUICK, "sweep": QUICK, "tune": QUICK, "chart": QUICK, "identify": QUICK,
@@ -127,12 +127,12 @@ TABLE: dict[str, dict[str, str]] = {
         "export": QUICK, "compare": SLOW, "fit": SLOW, "build": QUICK,
     },
     "same folder twice": {
-        "run": QUICK, "sweep": QUICK, "tune": QUICK, "chart": QUICK, "identify": SLOW,
-        "export": QUICK, "compare": QUICK, "fit": QUICK, "build": QUICK,
+        "run": QUICK, "sweep": QUICK, "tune": SLOW, "chart": QUICK, "identify": SLOW,
+        "export": QUICK, "compare": QUICK, "fit": SLOW, "build": QUICK,
     },
     "damaged files of its own": {
         "run": QUICK, "sweep": QUICK, "tune": QUICK, "chart": SLOW, "identify": SLOW,
-        "export": QUICK, "compare": QUICK, "fit": QUICK,
+        "export": QUICK, "compare": QUICK, "fit": SLOW,
         "build": "tests/toolchain/test_libraries.py: what is damaged is not loaded, nor packed",
     },
     "devices and pipes": {

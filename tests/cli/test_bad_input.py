@@ -298,7 +298,7 @@ OPTION = st.one_of(
 )
 
 
-@examples(500)
+@examples(250)
 @given(scene=st.sampled_from(list_scenes()), options=st.lists(OPTION, max_size=4))
 def test_any_override(scene: tuple[str, str], options: list[str]) -> None:
     loads_or_complains(scene[0], options)

@@ -5,6 +5,7 @@ import threading
 import time
 from collections import Counter
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import Outcome
 from cosim.scene import load
 from cosim.studies.limits import report
+from cosim.studies.limits.search import Effort
+from cosim.studies.limits.study import Efforts
 from cosim.studies.sweep.run import sweep
 from tests.helpers import needs
 
@@ -63,7 +66,9 @@ def test_dask_workers_that_are_killed(
     study: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The cluster starts others, and the result is that of this machine alone."""
-    monkeypatch.setattr(report, "LIMITS", [])
+    few = Effort(8, 0, 0, rounds=0)
+    monkeypatch.setattr(report, "LIMITS", [replace(report.LIMITS[0], values=())])
+    monkeypatch.setattr(report, "QUICK", Efforts(Effort(16, 1, 0, rounds=0), few, few, 1))
     cluster = pytest.importorskip("distributed").LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address="", host="127.0.0.1"
     )
@@ -71,7 +76,7 @@ def test_dask_workers_that_are_killed(
     def made(out: Path, **where: Any) -> bytes:
         if study == "sweep":
             over = {"drive.offset": [-0.02 * k for k in range(120)]}
-            changes = {"run.duration": 0.3, "run.settle": 0.1}
+            changes = {"run.duration": 10.0, "run.settle": 0.1}
             sweep("ideal-current", over, changes, out=out, **where)
             return (out / "sweep.nc").read_bytes()
         cosim.limits("paper", at=["trial-05"], quick=True, out=out, **where)

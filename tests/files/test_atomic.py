@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from cosim.cli.work import writable
 from cosim.errors import BadInput
 from cosim.files.atomic import alone, together, whole
 from tests.helpers import needs
@@ -32,6 +33,18 @@ def test_what_a_kill_left_goes_with_the_next_run(tmp_path: Path) -> None:
     with whole(tmp_path / "other.csv") as mine, alone(tmp_path):  # mine is at work
         assert {*tmp_path.iterdir()} == {mine, tmp_path / ".mine"}
     assert {*tmp_path.iterdir()} == {tmp_path / "other.csv", tmp_path / ".mine"}
+
+
+def test_old_leftovers_go_where_others_may_be_at_work(tmp_path: Path) -> None:
+    """As in a folder that charts share; a young file may be one that is about to be locked."""
+    old, young = (tmp_path / f".cosim-{age}.png" for age in ("old", "young"))
+    for path in (old, young):
+        path.touch()
+    os.utime(old, (0, 0))
+    with whole(tmp_path / "other.png") as locked:
+        os.utime(locked, (0, 0))
+        with writable(tmp_path, shared=True):
+            assert {*tmp_path.iterdir()} == {young, locked}
 
 
 def test_two_at_once_are_told(tmp_path: Path) -> None:

@@ -230,7 +230,7 @@ def floats(law: dict[str, Fraction]) -> dict[str, Any]:
     }
 
 
-@examples(1500)
+@examples(700)
 @given(cases())
 @example(
     (  # all at rest, friction at its limit, and a surface that turns back on a knot

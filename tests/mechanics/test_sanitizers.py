@@ -13,7 +13,7 @@ from tests.helpers.examples import examples
 
 pytestmark = pytest.mark.reliability
 
-SANITIZE = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O1"]
+SANITIZE = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g1", "-O0"]
 HARNESS = Path(__file__).with_name("fmu_harness.c")
 LEAK = "#include <stdlib.h>\nint main(void) { char *volatile p = malloc(9); p = 0; return !!p; }\n"
 

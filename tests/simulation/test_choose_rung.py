@@ -66,7 +66,8 @@ def test_ringing_that_reaches_the_slip_is_seen(changes: list[str]) -> None:
 
 
 def test_coil_too_fast_for_the_limited_rung() -> None:
-    found = summary("coil.inductance=1e-6", "circuit.model=auto", "run.duration=0.52")
+    brief = "run.duration=0.12", "run.settle=0.1"
+    found = summary("coil.inductance=1e-6", "circuit.model=auto", *brief)
     assert found["circuit_model"] == "amplifier"
 
 

@@ -80,27 +80,33 @@ SIMULATIONS = {
 }
 
 
-def own(tmp_path: Path, text: str) -> list[str]:
-    path = tmp_path / "own.cir"
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of the netlists of one's own: one worker may read what lies there."""
+    return tmp_path_factory.mktemp("home")
+
+
+def own(home: Path, text: str) -> list[str]:
+    path = home / "own.cir"
     path.write_text(text, encoding="utf-8")
     return ["circuit.model=file", f"circuit.netlist={path}", *SHORT]
 
 
 @pytest.mark.parametrize("name", NETLISTS)
-def test_bad_netlist(name: str, tmp_path: Path, before: np.ndarray) -> None:
+def test_bad_netlist(name: str, home: Path, before: np.ndarray) -> None:
     text, told = NETLISTS[name]
     with pytest.raises(BadInput, match=rf"(?i){told}") as caught:
-        simulate(load("reference", own(tmp_path, text)))
+        simulate(load("reference", own(home, text)))
     assert caught.value.exit_code == 2
     assert "\n" not in str(caught.value)
     assert np.array_equal(good_run(), before)
 
 
 @pytest.mark.parametrize("name", SIMULATIONS)
-def test_failing_circuit(name: str, tmp_path: Path, before: np.ndarray) -> None:
+def test_failing_circuit(name: str, home: Path, before: np.ndarray) -> None:
     text, told = SIMULATIONS[name]
     with pytest.raises(SimulationFailed, match=told) as caught:
-        simulate(load("reference", own(tmp_path, text)))
+        simulate(load("reference", own(home, text)))
     assert caught.value.exit_code == 3
     assert np.array_equal(good_run(), before)
 
@@ -157,14 +163,14 @@ def _spoil_or_run(spoil: int, progress: object) -> object:
 POLY = "E9 x9 0 POLY(1) v1 0 0 1\nR9 x9 0 1k"
 
 
-def test_code_models_are_there_for_a_netlist_of_ones_own_alone(tmp_path: Path) -> None:
+def test_code_models_are_there_for_a_netlist_of_ones_own_alone(home: Path) -> None:
     """Each kind that ngspice knows costs time in each step."""
     deck = f"poly\nVcommand v1 0 1\n{POLY}\n.tran 1u 1m\n.end"
     with_them = processes.isolated(_said, (deck, True), lambda _: None)
     if "not parsed" in with_them:
         pytest.skip("ngspice's library lacks its code models here")
     assert "not parsed" in processes.isolated(_said, (deck, False), lambda _: None)
-    simulate(load("reference", own(tmp_path, edited(SENSE, f"{SENSE}\n{POLY}"))))
+    simulate(load("reference", own(home, edited(SENSE, f"{SENSE}\n{POLY}"))))
 
 
 def _said(given: tuple[str, bool], progress: object) -> str:
@@ -237,10 +243,10 @@ def test_early_end_is_no_result(monkeypatch: pytest.MonkeyPatch, before: np.ndar
     ],
     ids=["a node called error_amp", "a node called aborted"],
 )
-def test_false_alarms_do_not_fail_a_run(text: str, tmp_path: Path, before: np.ndarray) -> None:
+def test_false_alarms_do_not_fail_a_run(text: str, home: Path, before: np.ndarray) -> None:
     # Which a netlist of one's own has finer.
     as_built_in = ["circuit.max_step=1.4e-4", "circuit.reltol=3e-5"]
-    result = simulate(load("reference", [*own(tmp_path, text), *as_built_in]))
+    result = simulate(load("reference", [*own(home, text), *as_built_in]))
     assert np.allclose(result.columns["z_part"], before, rtol=0, atol=1e-9)
 
 

@@ -192,7 +192,7 @@ def test_summary_has_every_key(run: Run) -> None:
 def test_written_scene_repeats_the_run(
     name: str, runs: dict[str, Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cosim.files.picture.Picture.savefig", lambda *_, **__: None)
+    monkeypatch.setattr("cosim.files.picture.FigureCanvasAgg.print_png", lambda *_, **__: None)
     again = cosim_run(tmp_path, str(runs[name].folder / "scene.toml"))
     for file in ("waveforms.csv", "waveforms.nc", "scene.toml"):
         assert (again.folder / file).read_bytes() == (runs[name].folder / file).read_bytes(), file

@@ -105,8 +105,11 @@ def solve(scene: Scene, times: Array) -> Solution:
         [],
         ["coil.count=2", "drive.amplitude=10", "drive.offset=-2.5"],
         ["circuit.gain_bandwidth=3e4", "circuit.slew_rate=5e4"],
-        ["circuit.swing_loss_high=9", "circuit.swing_loss_low=2", "coil.inductance=3e-3"],
-        ["circuit.open_loop_gain=40"],
+        pytest.param(
+            ["circuit.swing_loss_high=9", "circuit.swing_loss_low=2", "coil.inductance=3e-3"],
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(["circuit.open_loop_gain=40"], marks=pytest.mark.slow),
     ],
     ids=["reference", "two-coils", "slewing", "lopsided", "little-gain"],
 )

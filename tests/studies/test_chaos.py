@@ -23,9 +23,9 @@ def test_a_chaotic_scene_is_told_from_one_that_is_not() -> None:
 )
 def test_methods_agree_in_what_an_ensemble_leaves_certain(other: Sequence[str]) -> None:
     """And a coil a third weaker does not: the spread does not hide everything."""
-    default = ensemble(SCENE, (), 6)
+    default = ensemble(SCENE, (), 4)
     assert max(default["v_average"]) > min(default["v_average"])
-    same = ensemble(SCENE, other, 6)
-    weaker = ensemble(SCENE, ("coil.force_factor=0.4",), 6)
+    same = ensemble(SCENE, other, 4)
+    weaker = ensemble(SCENE, ("coil.force_factor=0.4",), 4)
     assert apart(default["stick_fraction"], same["stick_fraction"]) < 5.0
     assert apart(default["stick_fraction"], weaker["stick_fraction"]) > 5.0

@@ -244,11 +244,16 @@ def test_r2() -> None:
     ("header", "column", "scale", "score"),
     [
         ("time [s],velocity [m/s]", "v_surface", 1.0, "velocity_r2"),
-        ("time [ms],velocity (mm/s)", "v_surface", 1e3, "velocity_r2"),
+        pytest.param(
+            *("time [ms],velocity (mm/s)", "v_surface", 1e3, "velocity_r2"),
+            marks=pytest.mark.slow,
+        ),
         ("time [s],height [µm]", "z_surface", 1e6, "velocity_r2"),
         ("time [s],part [mm]", "z_part", 1e3, "mean_error_mm"),
         ("time [ms],current [mA]", "current", 1e3, "current_r2"),
-        ("time [s],voltage [V]", "coil_voltage", 1.0, "voltage_r2"),
+        pytest.param(
+            *("time [s],voltage [V]", "coil_voltage", 1.0, "voltage_r2"), marks=pytest.mark.slow
+        ),
     ],
 )
 def test_what_one_instrument_measured(

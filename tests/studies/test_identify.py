@@ -28,8 +28,9 @@ from cosim.studies.identify.report.measures import nrmse
 from cosim.studies.identify.report.scenes import Settings, scene, trial_settings
 from cosim.studies.identify.report.verdicts import judge
 from cosim.studies.identify.run import identify
+from cosim.studies.identify.search import plan
 from cosim.studies.identify.search.finish import finish
-from cosim.studies.identify.search.plan import QUICK
+from cosim.studies.identify.search.plan import QUICK, Effort
 from cosim.studies.identify.search.search import Found, Search
 from cosim.trials.camera import FRAME_RATE, hermite
 from cosim.trials.recording import Recording
@@ -261,6 +262,11 @@ def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(
     given = (f'[rig."{key}"]\nvalue = {value}\n' for key, value in RIG.items() if key not in free)
     bounds = tmp_path / "bounds.toml"
     bounds.write_text("".join(given))
+    brief = Effort(1, 12, ((2, 15, 0.12), (1, 30, 0.06)), ((1, 15, 0.1),), 1, 4)
+    monkeypatch.setattr(run, "QUICK", brief)
+    monkeypatch.setattr(plan, "SCREENED", 32)
+    monkeypatch.setattr(plan, "AGAIN", (64, 8, 3))
+    monkeypatch.setattr(plan, "CAREFUL", (128, 8, 3))
     more: dict[str, Any] = {"bounds": bounds, "quick": True, "seed": 4}
     whole = identify(tmp_path, workers=2, out=tmp_path / "out", **more)
     plain, done = Store.add, [0]

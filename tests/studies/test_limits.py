@@ -446,6 +446,8 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Picture, "write", lambda figure, *where: drawn.append(figure))
     monkeypatch.setattr(runs, "SETTLE", 0.02)
     monkeypatch.setattr(runs, "SPAN", 0.05)
+    monkeypatch.setattr(study, "HINTS", 2)
+    monkeypatch.setattr("cosim.studies.limits.search.LOOKED_AT", 0)
     values: dict[str, tuple[float, ...]] = {
         "supply voltage": (24.0,),
         "coil heat": (),
@@ -454,7 +456,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     }
     limits = [replace(BY_NAME[name], values=few) for name, few in values.items()]
     efforts = study.Efforts(
-        Effort(16, 1, 1, rounds=1), Effort(8, 0, 0, rounds=1), Effort(8, 0, 0, rounds=0), 1
+        Effort(16, 1, 0, rounds=1), Effort(8, 0, 0, rounds=0), Effort(8, 0, 0, rounds=0), 1
     )
     scene = load("reference", {"run.duration": 0.2})
     rigs = tmp_path / "rigs.json"

@@ -59,14 +59,19 @@ def test_a_large_energy_residual_is_told() -> None:
     assert "too much" in table(scene, summary | {"energy_residual": 0.02})
 
 
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("home")  # of all netlists: one worker may read them
+
+
 @pytest.mark.parametrize("climit", [None, 0, 1])
 def test_limits_that_a_netlist_does_not_tell_of_are_not_known(
-    climit: int | None, tmp_path: Path
+    climit: int | None, home: Path
 ) -> None:
     """Not 0, nor never."""
     bridge = Path("circuits/examples/h_bridge.cir").read_text(encoding="utf-8")
     told = re.sub(r"(?m)^Bswing.*\n", "" if climit is None else f"Vc climit 0 {climit}\n", bridge)
-    netlist = tmp_path / "silent.cir"
+    netlist = home / "silent.cir"
     netlist.write_text(told, encoding="utf-8")
     own = ["circuit.model=file", f"circuit.netlist={netlist}", *SHORT, "run.duration=0.06"]
     scene = load("reference", own)

@@ -6,8 +6,10 @@ a list of what is allowed: files are read and joined here, and only lines, words
 a circuit needs pass. ngspice sees neither comments nor file names.
 """
 
+import os
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
@@ -31,6 +33,8 @@ MAX_LINES = 100_000
 MAX_LINE = 200_000
 MAX_WORD = 4_000
 MAX_DEPTH = 10
+MAX_NAMES = 1_000
+"""Of files, in one file."""
 
 
 def word_set(text: str) -> frozenset[str]:
@@ -78,6 +82,9 @@ _OPTION = re.compile(r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+))?[\s,]
 _MODEL = re.compile(r"\.model\s+([^\s=(){}']+)\s+([a-z]\w*)(?![\w:])", re.IGNORECASE)
 _LEVEL = re.compile(r"(?<![\w.])level\s*(=?)\s*([^\s,()]*)", re.IGNORECASE)
 _PATH = re.compile(r"""\s*(?:"([^"]*)"|'([^']*)'|([^\s"']+))\s*([^\s"']*)\s*""")
+_NAMED = re.compile(
+    rb"""^[ \t]*\.(?:include|inc|lib)[\s+]+(?:"([^"\n]+)|'([^'\n]+)|([^\s"']+))""", re.I | re.M
+)
 
 
 def refuse(line: Line, reason: str) -> NoReturn:
@@ -88,6 +95,25 @@ def refuse(line: Line, reason: str) -> NoReturn:
 def shown(text: str) -> str:
     """A piece of a netlist as it may stand in a message: short and printable."""
     return ascii(text if len(text) <= 40 else f"{text[:37]}...")[1:-1]
+
+
+def named(path: Path) -> list[Path]:
+    """The netlist, and the files of its folder that it and they name: all that a process which
+    reads it must be let read. A name that is not found here is refused there."""
+    folder, found, size = path.parent.resolve(), [path], 0
+    for one in found:
+        try:
+            text = reader.contents(one, MAX_BYTES - size)
+        except (reader.Refused, OSError):
+            continue
+        size += len(text)
+        names = {next(filter(None, groups)) for groups in _NAMED.findall(text)}
+        for name in sorted(names)[:MAX_NAMES]:
+            with suppress(OSError, ValueError, RuntimeError):
+                file = (one.parent / os.fsdecode(name)).resolve()
+                if file not in found and file.is_relative_to(folder) and file.is_file():
+                    found.append(file)
+    return found
 
 
 def read(path: Path) -> list[Line]:

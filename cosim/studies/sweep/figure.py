@@ -77,8 +77,9 @@ def _row(rows: Any, number: int, count: int) -> list[Axes]:
 
 
 def _values(data: xr.Dataset, quantity: Quantity) -> xr.DataArray:
-    absent = xr.full_like(data[FAILURE], np.nan, dtype=np.float64)
-    return data.get(quantity.name, absent) * quantity.scale
+    if quantity.name not in data:
+        return xr.full_like(data[FAILURE], np.nan, dtype=np.float64)
+    return data[quantity.name] * quantity.scale
 
 
 def _curves(figure: Figure, data: xr.Dataset, name: str) -> None:
