@@ -1,6 +1,11 @@
-"""Arrays as the package's signatures name them."""
+"""Arrays as the package's signatures name them, and what is asked of them in several places."""
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+
+
+def slope(time: Array, heights: Array) -> float:
+    """Of the straight line through heights (m) at some times (s), m/s."""
+    return float(np.polynomial.Polynomial.fit(time, heights, 1).convert().coef[1])

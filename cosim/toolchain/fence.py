@@ -98,7 +98,7 @@ def _lock(system: ctypes.CDLL, reads: Iterable[str]) -> bool:
     reading = {*_libraries(), *_FILES, *_DEVICES, *reads}
     allowed = [(path, _READ | _LIST) for path in reading] + [("/dev/null", _WRITE)]
     for path, rights in [*allowed, (os.getcwd(), every & ~_EXECUTE)]:
-        with suppress(OSError):  # there is no such path
+        with suppress(OSError, ValueError):  # there is no such path, or can be none
             place = os.open(path, os.O_PATH | os.O_CLOEXEC)
             rights &= every if os.path.isdir(path) else _ON_FILES
             system.syscall(_ADD, rules, 1, struct.pack("=Qi", rights, place), 0)

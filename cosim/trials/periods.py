@@ -131,11 +131,6 @@ def whole_periods(time: Array, period: float) -> int:
     return int(float(time[-1] - time[0]) / period + 1e-6)
 
 
-def slope(time: Array, heights: Array) -> float:
-    """Of the straight line through heights (m) at some times (s), m/s."""
-    return float(np.polynomial.Polynomial.fit(time, heights, 1).convert().coef[1])
-
-
 def drift(time: Array, heights: Array, period: float | None) -> float:
     """Mean velocity over whole periods (s): the mean over all spans of that length in the
     recording; over the whole recording where it has no whole period. NaN are left out.

@@ -14,7 +14,7 @@ from cosim.simulation import fast
 from cosim.simulation.simulate import summary
 from cosim.stepper.stepper import OWN, RIG, VARIABLES
 
-FAST = {"run.solver": "fast"}
+FAST = {"run.solver": "fast", "run.average": "ends"}
 STILL = {"circuit.model": "limited"}
 SCENES: list[tuple[str, dict[str, Any]]] = [
     ("paper-limited", {}),
@@ -29,7 +29,7 @@ PERIODS = {"run.settle": 0.5, "run.duration": 1.5}
 
 def both(name: str, changes: dict[str, Any], step: float) -> tuple[dict[str, Any], dict[str, Any]]:
     own = {} if name.startswith("trial") else PERIODS
-    known = summary(load(name, own | changes))
+    known = summary(load(name, own | changes | {"run.average": "ends"}))
     return known, summary(load(name, own | changes | FAST | {"run.step": step}))
 
 

@@ -104,7 +104,7 @@ def named(path: Path) -> list[Path]:
     for one in found:
         try:
             text = reader.contents(one, MAX_BYTES - size)
-        except (reader.Refused, OSError):
+        except (reader.Refused, OSError, ValueError):  # a NUL in its name
             continue
         size += len(text)
         names = {next(filter(None, groups)) for groups in _NAMED.findall(text)}

@@ -12,14 +12,13 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from cosim.arrays import Array
+from cosim.arrays import Array, slope
 from cosim.coupling.loop.recorder import Recorder
 from cosim.files.declared import modules
 from cosim.scene import Scene
 from cosim.scene.tables import Run
 from cosim.simulation.rungs.electrics import Electrics
 from cosim.trials.camera import FRAME_RATE, frame_times
-from cosim.trials.periods import slope
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from cosim.arrays import Array
+from cosim.arrays import Array, slope
 from cosim.stepper.stepper import OWN
 from cosim.studies.identify.chain.chain import simulate
 from cosim.studies.identify.problem.targets import Measured
 from cosim.trials.camera import velocities
-from cosim.trials.periods import slope
 
 LATE = 5
 """Whole cycles from which on the first ones, of the start, are left out of the repeatability."""

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.arrays import Array
+from cosim.arrays import Array, slope
 from cosim.errors import BadInput, Note, SimulationFailed
 from cosim.scene import Scene, keys, load
 from cosim.simulation.simulate import simulate
@@ -13,7 +13,6 @@ from cosim.stepper.stepper import OWN
 from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import DRIVE, Measured
 from cosim.trials.camera import hermite
-from cosim.trials.periods import slope
 
 Settings = dict[str, float | str]
 
