@@ -7,11 +7,20 @@ where the highest command needs V_DAC = 0. In truth it is a PWM, of which ``v_of
 
 from math import inf, nextafter
 
-from cosim.drive.periodic import Constant, Sawtooth, Sine, Square
+from cosim.drive.periodic import Constant, Lines, Sawtooth, Sine, Square, held
 from cosim.drive.pieces import Command, Piece, level
 from cosim.drive.staircase import Staircase, WithPwm
 from cosim.scene import Scene
-from cosim.scene.firmware import GAIN, nearest_code, offset_pin, passes, staircase, volts
+from cosim.scene.firmware import (
+    GAIN,
+    nearest_code,
+    offset_pin,
+    passes,
+    sampled,
+    staircase,
+    volts,
+)
+from cosim.scene.tables import Drive
 
 
 class Lagging(Command):
@@ -75,13 +84,26 @@ def command(scene: Scene) -> Command:
 
 def _shape(scene: Scene) -> Command:
     drive = scene.drive
-    if drive.quantised:
-        codes = staircase(nearest_code(drive.amplitude / GAIN), drive.frequency)
-        pin = volts(nearest_code(offset_pin(drive.offset, drive.amplitude)))
-        if drive.loop_time:
-            return Staircase(passes(codes, drive.loop_time), pin, 1 / drive.loop_time)
-        return Staircase(codes, pin)
+    if not drive.quantised:
+        return _smooth(drive, drive.amplitude, drive.offset)
+    top = nearest_code(drive.amplitude / GAIN)
     if drive.waveform == "sawtooth":
-        return Sawtooth(drive.frequency, drive.amplitude, drive.offset, drive.reset_time)
-    shape = {"sine": Sine, "square": Square}[drive.waveform]
-    return shape(drive.frequency, drive.amplitude, drive.offset)
+        codes = staircase(top, drive.frequency)
+    else:
+        shape = _smooth(drive, 1.0, 0.0)
+        codes = sampled(lambda t: 0.5 - shape.value(t), top, drive.frequency)
+    pin = volts(nearest_code(offset_pin(drive.offset, drive.amplitude)))
+    if drive.loop_time:
+        return Staircase(passes(codes, drive.loop_time), pin, 1 / drive.loop_time)
+    return Staircase(codes, pin)
+
+
+def _smooth(drive: Drive, amplitude: float, offset: float) -> Command:
+    volts_at = (drive.frequency, amplitude, offset)
+    if drive.table is not None:
+        return Lines(*volts_at, held(drive.table) if drive.waveform == "steps" else drive.table)
+    if drive.waveform == "sine":
+        return Sine(*volts_at)
+    if drive.waveform == "square":
+        return Square(*volts_at, drive.duty)
+    return Sawtooth(*volts_at, drive.reset_time, drive.waveform == "falling-sawtooth")

@@ -5,6 +5,7 @@ A key that is a variable of the FMU has them from ``variables.def``.
 
 import re
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -84,6 +85,27 @@ NORMAL_FORCES = ("normal_force", "normal_force_file")
 KNOBS = {"pot_max": "amplitude", "pot_frequency": "frequency", "pot_offset": "offset"}
 """The knobs of the device and the keys of ``[drive]`` that each replaces."""
 
+_Waveform = Literal[
+    "sawtooth", "falling-sawtooth", "sine", "square", "steps", "pieces", "optimal", "quaid", "file"
+]  # fmt: skip
+
+COMMANDS = ("sawtooth", "falling-sawtooth", "sine", "square", "steps", "pieces")
+"""Waveforms of ``[drive]`` that drive a coil."""
+
+_SHAPES = {
+    **dict.fromkeys(("quantised", *KNOBS), COMMANDS),
+    **{"reset_time": COMMANDS[:2], "loop_time": COMMANDS[:1], "duty": ("square",)},
+    "table": ("steps", "pieces"),
+}
+"""Keys of ``[drive]`` and the waveforms that they are for."""
+
+MOST_CORNERS, CORNERS_APART = 64, 1e-9
+"""Of a table; and the least time between two, s: less could not be told from a jump after hours of
+simulated time."""
+
+LEVEL_KEY = re.compile(r"table\.([1-9]\d?)")
+"""The level of a pair of ``drive.table``, the first being 1, as a key of its own."""
+
 
 class Drive(Table):
     """The command V1 at the power amplifier's input.
@@ -91,16 +113,24 @@ class Drive(Table):
     Where a knob is given, ``amplitude``, ``frequency`` and ``offset`` hold what it stands for.
     """
 
-    waveform: Literal["sawtooth", "sine", "square", "optimal", "quaid", "file"] = _choice(
-        "sawtooth", "Shape of the command; of the surface's velocity for optimal, quaid and file"
+    waveform: _Waveform = _choice(
+        "sawtooth",
+        "Shape of the command; of the surface's velocity for optimal, quaid and file. That of "
+        "table are steps, whose levels are held, or pieces, straight lines from one to the next",
     )
+    table: list[list[float]] | None = _choice(
+        None,
+        "Shape of steps and pieces: 1 to 64 pairs of phase, 0 to 1, and level, -0.5 to 0.5, that "
+        "of the offset being 0; two of one phase make a jump",
+    )
+    duty: float = _number(0.5, "1", 0.0, 1.0, "Share of the period that the square wave is high")
     frequency: float = _number(
         20.0, "Hz", 0.01, 1e5, "Frequency; the staircase rounds its period up to whole 50 us steps"
     )
     amplitude: float = _number(8.0, "V", 0.0, 100.0, "Peak-to-peak voltage at V1")
     offset: float = _number(-1.2, "V", -100.0, 100.0, "Mean voltage at V1")
     reset_time: float = _number(
-        0.0, "s", 0.0, 100.0, "Length of the sawtooth's linear fall, at the end of the period"
+        0.0, "s", 0.0, 100.0, "Length of the sawtooth's linear reset, at the end of the period"
     )
     start_time: float = _number(
         0.0, "s", 0.0, 1e5, "When the drive is switched on; the command is 0 V before"
@@ -162,27 +192,28 @@ class Drive(Table):
         amplitude = data.get("amplitude", cls.model_fields["amplitude"].default)
         if "pot_offset" in pots and is_number(amplitude):
             data["offset"] = firmware.knob_offset(pots["pot_offset"], amplitude)
-        return data
+        return _with_levels(data)
 
     @model_validator(mode="after")
     def _check(self) -> "Drive":
         # The other way round is told when it is run, so that a scene can leave the file open.
         if self.file is not None and self.waveform != "file":
             raise fault(f'drive.file is for drive.waveform = "file", not for "{self.waveform}"')
-        if self.waveform != "sawtooth":
-            for key in ("quantised", "reset_time", "loop_time", *KNOBS):
-                if getattr(self, key):
-                    raise fault(
-                        f'drive.{key} is for drive.waveform = "sawtooth" only, '
-                        f'not for "{self.waveform}"'
-                    )
+        for key, able in _SHAPES.items():
+            if getattr(self, key) != type(self).model_fields[key].default and (
+                self.waveform not in able
+            ):
+                quoted = " or ".join(f'"{name}"' for name in able)
+                raise fault(f'drive.{key} is for drive.waveform = {quoted}, not "{self.waveform}"')
         period = 1 / self.frequency
-        # shorter than this the fall could not be told from a jump after hours of simulated time
-        if self.reset_time and not 1e-9 <= self.reset_time < period:
+        if self.reset_time and not CORNERS_APART <= self.reset_time < period:
             raise fault(
-                f"drive.reset_time = {self.reset_time:g} s must be 0, or at least 1e-09 s and "
-                f"below the period of {period:g} s at drive.frequency = {self.frequency:g} Hz"
+                f"drive.reset_time = {self.reset_time:g} s must be 0, or at least "
+                f"{CORNERS_APART:g} s and below the period of {period:g} s at drive.frequency = "
+                f"{self.frequency:g} Hz"
             )
+        if self.waveform in _SHAPES["table"]:
+            self._check_table(self.table or [])
         if self.quantised and self.reset_time:
             raise fault(
                 f"drive.reset_time = {self.reset_time:g} s must be 0 with drive.quantised = true, "
@@ -199,6 +230,38 @@ class Drive(Table):
                 "with drive.quantised = true"
             )
         return self
+
+    def _check_table(self, table: list[list[float]]) -> None:
+        if not 1 <= len(table) <= MOST_CORNERS or any(len(pair) != 2 for pair in table):
+            raise fault(
+                f'drive.waveform = "{self.waveform}" needs as drive.table 1 to {MOST_CORNERS} '
+                "pairs [phase, level]"
+            )
+        phases = [phase for phase, _ in table]
+        if not all(0.0 <= phase <= 1.0 for phase in phases) or phases != sorted(phases):
+            raise fault("drive.table must have phases from 0 to 1 that do not fall")
+        if max(phases.count(phase) for phase in phases) > 2:
+            raise fault("drive.table must have at most two pairs of one phase")
+        if not all(abs(level) <= 0.5 for _, level in table):
+            raise fault("drive.table must have levels from -0.5 to 0.5")
+        gaps = [q - p for p, q in pairwise([*phases, 1.0 + phases[0]]) if q > p]
+        if min(gaps) < CORNERS_APART * self.frequency:
+            raise fault(
+                f"drive.table must have pairs of one phase, or at least {CORNERS_APART:g} s apart "
+                f"at drive.frequency = {self.frequency:g} Hz"
+            )
+
+
+def _with_levels(data: dict[str, Any]) -> dict[str, Any]:
+    """The keys of a drive with those of single levels written into its table."""
+    levels = {name: data.pop(name) for name in [*data] if LEVEL_KEY.fullmatch(name)}
+    table = data.get("table")
+    for name, value in levels.items():
+        place = int(name.partition(".")[2]) - 1
+        if not (isinstance(table, list) and place < len(table) and is_number(value)):
+            raise fault(f"drive.{name} needs a number, and a drive.table with as many pairs")
+        table = [[*pair[:1], value] if k == place else pair for k, pair in enumerate(table)]
+    return data | {"table": table} if levels else data
 
 
 class Circuit(Table):
@@ -264,6 +327,11 @@ class Coil(Table):
     eddy_inductance: float | None = _of_fmu("eddy_inductance", least=1e-9)
     eddy_resistance: float | None = _of_fmu("eddy_resistance", least=1e-3)
     force_factor: float = _of_fmu("force_factor")
+    polarity: Literal[-1, 1] = Field(
+        1,
+        description="Sign of the force factor; -1 is the coil with its two wires exchanged",
+        json_schema_extra={"unit": "1"},
+    )
     b1: float = _of_fmu("b1")
     b2: float = _of_fmu("b2")
     count: int = _of_fmu("coil_count")
