@@ -76,13 +76,14 @@ def command(scene: Scene) -> Command:
     """The command of a scene; 0 V for ever where nothing drives the coil."""
     if not scene.rung.driven:
         return Constant()
-    made, drive = _shape(scene), scene.drive
+    made, drive = shape(scene), scene.drive
     if drive.start_time or drive.start_phase:
         made = Switched(made, drive.start_time, drive.start_phase)
     return WithPwm(made) if drive.pwm_ripple else made
 
 
-def _shape(scene: Scene) -> Command:
+def shape(scene: Scene) -> Command:
+    """The command of a scene's drive as if it had begun long ago."""
     drive = scene.drive
     if not drive.quantised:
         return _smooth(drive, drive.amplitude, drive.offset)
@@ -90,8 +91,8 @@ def _shape(scene: Scene) -> Command:
     if drive.waveform == "sawtooth":
         codes = staircase(top, drive.frequency)
     else:
-        shape = _smooth(drive, 1.0, 0.0)
-        codes = sampled(lambda t: 0.5 - shape.value(t), top, drive.frequency)
+        levels = _smooth(drive, 1.0, 0.0)
+        codes = sampled(lambda t: 0.5 - levels.value(t), top, drive.frequency)
     pin = volts(nearest_code(offset_pin(drive.offset, drive.amplitude)))
     if drive.loop_time:
         return Staircase(passes(codes, drive.loop_time), pin, 1 / drive.loop_time)
