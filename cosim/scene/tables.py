@@ -335,6 +335,18 @@ class Coil(Table):
     b1: float = _of_fmu("b1")
     b2: float = _of_fmu("b2")
     count: int = _of_fmu("coil_count")
+    winding_to_body: float = _number(
+        10.0, "K/W", 1e-3, 1e6, "Thermal resistance from winding to body; assumed, 5 to 20"
+    )
+    winding_capacity: float = _number(
+        0.75, "J/K", 1e-6, 1e6, "Heat capacity of the winding; 0.4 to 1.4 by its copper"
+    )
+    body_to_air: float = _number(
+        40.0, "K/W", 1e-3, 1e6, "Thermal resistance from body to air; 33 to 49 by its surface"
+    )
+    body_capacity: float = _number(
+        7.8, "J/K", 1e-6, 1e6, "Heat capacity of the actuator's body; 6 to 10 by its mass"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> "Coil":

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.circuit.heat import heats
 from cosim.coupling.loop.agenda import count, exposures
 from cosim.drive.command import command, shape
 from cosim.drive.periodic import Sine
@@ -26,6 +27,7 @@ from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
 from cosim.simulation.guards import notes
 from cosim.simulation.rungs.electrics import commanded
+from cosim.simulation.summary import slips
 from cosim.stepper.stepper import LANES, OWN, RIG, VARIABLES
 from cosim.toolchain.libraries import library
 from cosim.toolchain.processes import Progress
@@ -168,12 +170,12 @@ def _numbers(
     held = 0.5 * scene.coil.inductance * sums["i_end"] ** 2
     lost = {name: coils * sums[name] for name in ("copper", "friction", "impact", "damping")}
     moved = math.isfinite(seen[0])
+    camera = {"a_camera_max": seen[0], "a_camera_min": -seen[1]} if moved else {}
     return {
         "v_average": v_average,
         "transport_per_cycle": v_average * length,
         "stick_fraction": min(1.0, sums["sticking"] / span),
-        "a_camera_max": seen[0] if moved else None,
-        "a_camera_min": -seen[1] if moved else None,
+        **(camera or {"a_camera_max": None, "a_camera_min": None}),
         "v_surface_max": sums["v_max"],
         "v_surface_min": sums["v_min"],
         "z_surface_pp": sums["z_max"] - sums["z_min"],
@@ -183,6 +185,8 @@ def _numbers(
         "saturated_fraction": sum(share.values()),
         "energy_in": lost["copper"] + coils * (held + sums["coil"]),
         **{f"energy_{name}": value for name, value in lost.items()},
+        **slips(scene, camera),
+        **heats(scene, lost["copper"]),
         "wall_time": wall_time,
         "method": "fast",
         "versions": versions(),

@@ -68,6 +68,10 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "b1": 0,
         "b2": 0,
         "polarity": 1,
+        "winding_to_body": 10.0,
+        "winding_capacity": 0.75,
+        "body_to_air": 40.0,
+        "body_capacity": 7.8,
         "count": 1,
     },
     "mechanics": {

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
 
+from cosim.circuit.heat import DRIVE_RANGE_HEAT
 from cosim.scene import Scene
-from cosim.simulation.guards import CARLTON_HEAT
 from cosim.studies.limits.aims import RANGE
 
 Settings = dict[str, float | int | str]
@@ -19,7 +19,7 @@ class Machine:
     settings: Settings = field(default_factory=dict[str, float | int | str])
     reach: float = 1.0
     """Times the knobs' own range in volts."""
-    heat: float = CARLTON_HEAT
+    heat: float = DRIVE_RANGE_HEAT
     """W: what the coil bears."""
     coil_scale: float = 1.0
     """Times its true heat and true current, of a coil that was scaled, that of the run."""
@@ -140,7 +140,7 @@ LIMITS = (
         _back_emf, more_is_better=False, real=False,
     ),
     Limit(
-        "coil heat", "W", 1.0, lambda _: CARLTON_HEAT, (0.9, 1.8, 7.0), inf,
+        "coil heat", "W", 1.0, lambda _: DRIVE_RANGE_HEAT, (0.9, 1.8, 7.0), inf,
         lambda _, value: Machine(heat=value), real=False,
     ),
     Limit(
