@@ -88,7 +88,7 @@ def shape(scene: Scene) -> Command:
     if not drive.quantised:
         return _smooth(drive, drive.amplitude, drive.offset)
     top = nearest_code(drive.amplitude / GAIN)
-    if drive.waveform == "sawtooth":
+    if drive.waveform == "sawtooth" and not drive.reset_time:
         codes = staircase(top, drive.frequency)
     else:
         levels = _smooth(drive, 1.0, 0.0)

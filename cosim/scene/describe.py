@@ -64,7 +64,7 @@ def _key(table: str, name: str) -> Key:
         name=name,
         unit=str(extra["unit"]),
         default=field.default,
-        kind=get_origin(kind) or kind,
+        kind=kind if isinstance(kind, type) else list,
         choices=choices,
         low=limits.get("ge"),
         high=limits.get("le"),

@@ -33,8 +33,8 @@ def _of_fmu(name: str, least: float | None = None) -> Any:
     return _number(start, known.unit, low, known.high, known.text, name)
 
 
-def _choice(default: Any, text: str) -> Any:
-    return Field(default, description=text, json_schema_extra={"unit": ""})
+def _choice(default: Any, text: str, unit: str = "") -> Any:
+    return Field(default, description=text, json_schema_extra={"unit": unit})
 
 
 def _declared(default: str, lead: str, registry: Mapping[str, Rung | CouplingMethod]) -> Any:
@@ -214,15 +214,11 @@ class Drive(Table):
             )
         if self.waveform in _SHAPES["table"]:
             self._check_table(self.table or [])
-        if self.quantised and self.reset_time:
-            raise fault(
-                f"drive.reset_time = {self.reset_time:g} s must be 0 with drive.quantised = true, "
-                "whose reset is sharp"
-            )
-        if self.loop_time and not (self.quantised and self.loop_time >= 5e-6):
+        plain = self.quantised and not self.reset_time
+        if self.loop_time and not (plain and self.loop_time >= 5e-6):
             raise fault(
                 f"drive.loop_time = {self.loop_time:g} s must be 0, or at least 5e-06 s with "
-                "drive.quantised = true"
+                "drive.quantised = true and drive.reset_time = 0"
             )
         if self.quantised and not 0.1 <= self.frequency <= 1e4:
             raise fault(
@@ -327,10 +323,8 @@ class Coil(Table):
     eddy_inductance: float | None = _of_fmu("eddy_inductance", least=1e-9)
     eddy_resistance: float | None = _of_fmu("eddy_resistance", least=1e-3)
     force_factor: float = _of_fmu("force_factor")
-    polarity: Literal[-1, 1] = Field(
-        1,
-        description="Sign of the force factor; -1 is the coil with its two wires exchanged",
-        json_schema_extra={"unit": "1"},
+    polarity: Literal[-1, 1] = _choice(
+        1, "Sign of the force factor; -1 is the coil with its two wires exchanged", "1"
     )
     b1: float = _of_fmu("b1")
     b2: float = _of_fmu("b2")

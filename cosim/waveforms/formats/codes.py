@@ -1,0 +1,36 @@
+"""The drive as the device's firmware plays it: a C header with one period of DAC codes."""
+
+from io import BytesIO
+
+from cosim.drive.command import shape
+from cosim.drive.staircase import Staircase
+from cosim.scene import changed
+from cosim.scene.firmware import nearest_code, volts
+from cosim.waveforms.formats.source import Format, Run, driven
+
+PER_LINE = 16
+
+
+def write(run: Run, file: BytesIO) -> str:
+    """10-bit codes, each for 50 µs, and the offset pin's: V1 = 3.191 (V_offset - V_DAC), with
+    3.3 V for the code 1024. Those of a scene with ``drive.quantised``, which any scene is made.
+    """
+    scene = driven(run, "codes")
+    quantised = changed(scene, {"drive.quantised": True, "drive.loop_time": 0.0}, str(run.folder))
+    made = shape(quantised)
+    assert isinstance(made, Staircase)
+    codes, pin = made.codes, nearest_code(made.v_offset)
+    rows = [codes[k : k + PER_LINE] for k in range(0, len(codes), PER_LINE)]
+    header = [
+        f"/* {scene.name}: {scene.drive.waveform}, a code every 50 us, {1 / made.period:.6g} Hz */",
+        f"#define OFFSET_CODE {pin} /* {volts(pin):.4g} V, PWM */",
+        f"#define CODES {len(codes)}",
+        "static const unsigned short codes[CODES] = {",
+        *(f"    {', '.join(map(str, row))}," for row in rows),
+        "};\n",
+    ]
+    file.write("\n".join(header).encode())
+    return f"{len(codes)} codes, {1 / made.period:.6g} Hz"
+
+
+FORMAT = Format("codes", "codes.h", "the drive as the firmware's DAC codes", write)
