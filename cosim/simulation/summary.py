@@ -68,23 +68,28 @@ def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[
     return result if electric is None else result | heats(scene, result["energy_copper"])
 
 
+def budget(scene: Scene) -> dict[str, tuple[float, float]]:
+    """:func:`slip_budget` of a scene with a constant normal force."""
+    friction, mechanics = scene.friction, scene.mechanics
+    force = friction.normal_force * mechanics.n_surfaces / mechanics.part_mass
+    return slip_budget(friction.mu_s, force, mechanics.gravity, friction.mu_plate)
+
+
 def slips(scene: Scene, read: Mapping[str, Any]) -> dict[str, Any]:
     """Beyond which accelerations of the surface a part that sticks to it slips, m/s², as the part
     goes up or down, and which a run with these numbers reached: by the camera's reading, a mean,
     and by instants where these are known. Nothing where the normal force changes in time."""
-    friction, mechanics = scene.friction, scene.mechanics
-    if friction.normal_force_file is not None:
+    if scene.friction.normal_force_file is not None:
         return {}
-    force = friction.normal_force * mechanics.n_surfaces / mechanics.part_mass
-    budget = slip_budget(friction.mu_s, force, mechanics.gravity, friction.mu_plate)
-    found: dict[str, Any] = {f"slip_{way}": [*ends] for way, ends in budget.items()}
+    ways = budget(scene)
+    found: dict[str, Any] = {f"slip_{way}": [*ends] for way, ends in ways.items()}
     for by in ("a_surface", "a_camera"):
         low, high = read.get(f"{by}_min"), read.get(f"{by}_max")
         if low is None or high is None:
             continue
         found[f"slip_by_{by[2:]}"] = [
             f"{what}, part going {way}"
-            for way, (fall, rise) in budget.items()
+            for way, (fall, rise) in ways.items()
             for what, there in (("fall", low < fall), ("rise", high > rise))
             if there
         ]

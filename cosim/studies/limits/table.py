@@ -6,6 +6,7 @@ from math import inf
 
 from cosim.circuit.heat import DRIVE_RANGE_HEAT
 from cosim.scene import Scene
+from cosim.simulation.summary import budget
 from cosim.studies.limits.aims import RANGE
 
 Settings = dict[str, float | int | str]
@@ -159,8 +160,7 @@ LIMITS = (
 )  # fmt: skip
 
 
-def needed_acceleration(scene: Scene) -> float:
-    """mu_s F_n / m_p + g, m/s²: downwards, where the part begins to slip (the paper, section 2)."""
-    friction, mechanics = scene.friction, scene.mechanics
-    pull = friction.mu_s * friction.normal_force * mechanics.n_surfaces
-    return pull / mechanics.part_mass + mechanics.gravity
+def slip_falls(scene: Scene) -> dict[str, float]:
+    """The surface's downward accelerations, m/s² at an instant, from which on a part that goes up
+    or down slips."""
+    return {f"going {way}": -fall for way, (fall, _) in budget(scene).items()}
