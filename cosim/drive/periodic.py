@@ -47,58 +47,48 @@ class Lines(_Periodic):
     def __init__(self, frequency: float, amplitude: float, offset: float, corners: Corners) -> None:
         super().__init__(frequency, amplitude, offset)
         (first, low), *_ = corners
-        each = [
-            (p, q, a, b) for (p, a), (q, b) in pairwise([*corners, (1.0 + first, low)]) if q > p
+        ends = pairwise([*corners, (1.0 + first, low)])
+        each = [(p, q - p, a, b) for (p, a), (q, b) in ends if q > p]
+        self._phases = [phase for phase, *_ in each]
+        self._shape = [
+            (span, offset + amplitude * (0.5 * (a + b)), amplitude * (b - a))
+            for _, span, a, b in each
         ]
-        self._phases = [p for p, *_ in each]
-        self._spans = [q - p for p, q, *_ in each]
-        self._middles = [offset + amplitude * (0.5 * (a + b)) for *_, a, b in each]
-        self._rises = [amplitude * (b - a) for *_, a, b in each]
-        both = [*zip(self._middles, self._rises, strict=True)]
-        self._starts = [middle - 0.5 * rise for middle, rise in both]
-        self._ends = [middle + 0.5 * rise for middle, rise in both]
-        # How many lines from each on until V1 jumps; 0 where it never does.
-        count = len(each)
-        jumps = [
-            abs(amplitude * (each[k][3] - each[(k + 1) % count][2])) > 0.0 for k in range(count)
-        ]
-        self._until_jump = [
-            next((n + 1 for n in range(count) if jumps[(k + n) % count]), 0) for k in range(count)
-        ]
+        after = [a for _, _, a, _ in each[1:] + each[:1]]
+        self._jumps = [amplitude * (b - a) != 0.0 for (*_, b), a in zip(each, after, strict=True)]
 
     def piece(self, t: float) -> Piece:
-        number = self._number(t)
-        count, k = len(self._phases), number % len(self._phases)
-        ahead = self._until_jump[k]
-        jump = self._corner(number + ahead) if ahead else inf
-        if not self._rises[k]:
-            until = inf if count == 1 and not ahead else self._corner(number + 1)
-            flat = level(until, self._middles[k], self.v_offset)
-            flat.jump = jump
-            return flat
+        number, count = self._number(t), len(self._phases)
+        place = number % count
+        jumps = (n + 1 for n in range(number, number + count) if self._jumps[n % count])
+        jump = self._corner(next(jumps)) if any(self._jumps) else inf
+        span, middle, rise = self._shape[place]
+        if not rise:
+            found = level(self._corner(number + 1), middle, self.v_offset)
+            found.jump = jump
+            return found
         return Piece(
             until=self._corner(number + 1),
             kind=RAMP,
-            offset=self._middles[k],
-            amplitude=self._rises[k],
+            offset=middle,
+            amplitude=rise,
             origin=self._corner(number),
             rate=self.frequency,
-            span=self._spans[k],
-            end=self._ends[k],
+            span=span,
+            end=middle + 0.5 * rise,
             jump=jump,
             pin=self.v_offset,
         )
 
     def lines(self, begin: float, end: float, most: int) -> tuple[Array, Array, Array] | None:
-        count, number = len(self._phases), self._number(begin)
-        if count == 1 and not self._rises[0]:
-            return None
+        count = len(self._phases)
         most = min(most, (ceil((end - begin) * self.frequency) + 1) * count)
-        periods, places = np.divmod(number + np.arange(most + 1), count)
+        periods, places = np.divmod(self._number(begin) + np.arange(most + 1), count)
         corners = (periods + np.array(self._phases)[places]) / self.frequency
-        start, stop = (np.array(ends)[places[:-1]] for ends in (self._starts, self._ends))
+        _, middle, rise = np.array(self._shape)[places[:-1]].T
+        start = middle - 0.5 * rise
         corners[0], start[0] = begin, self.piece(begin).value(begin)
-        return corners, start, stop
+        return corners, start, middle + 0.5 * rise
 
     def _corner(self, number: int) -> float:
         period, place = divmod(number, len(self._phases))

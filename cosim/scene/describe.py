@@ -41,7 +41,7 @@ class Key:
         if self.kind is bool:
             return "true or false"
         if self.kind is list:
-            return "a list of pairs of numbers, [[phase, level], ...]"
+            return "a list of 1 to 64 pairs of numbers, [[phase, level], ...]"
         number = "a whole number" if self.kind is int else "a number"
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"{number} from {self.low:g} to {self.high:g}{unit}"

@@ -6,7 +6,7 @@ A key that is a variable of the FMU has them from ``variables.def``.
 import re
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -89,6 +89,12 @@ _Waveform = Literal[
     "sawtooth", "falling-sawtooth", "sine", "square", "steps", "pieces", "optimal", "quaid", "file"
 ]  # fmt: skip
 
+MOST_CORNERS = 64
+"""Of a table."""
+
+_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+_Table = Annotated[list[_Pair], Field(min_length=1, max_length=MOST_CORNERS)]
+
 COMMANDS = ("sawtooth", "falling-sawtooth", "sine", "square", "steps", "pieces")
 """Waveforms of ``[drive]`` that drive a coil."""
 
@@ -99,9 +105,8 @@ _SHAPES = {
 }
 """Keys of ``[drive]`` and the waveforms that they are for."""
 
-MOST_CORNERS, CORNERS_APART = 64, 1e-9
-"""Of a table; and the least time between two, s: less could not be told from a jump after hours of
-simulated time."""
+CORNERS_APART = 1e-9
+"""s, at least: less could not be told from a jump after hours of simulated time."""
 
 LEVEL_KEY = re.compile(r"table\.([1-9]\d?)")
 """The level of a pair of ``drive.table``, the first being 1, as a key of its own."""
@@ -118,7 +123,7 @@ class Drive(Table):
         "Shape of the command; of the surface's velocity for optimal, quaid and file. That of "
         "table are steps, whose levels are held, or pieces, straight lines from one to the next",
     )
-    table: list[list[float]] | None = _choice(
+    table: _Table | None = _choice(
         None,
         "Shape of steps and pieces: 1 to 64 pairs of phase, 0 to 1, and level, -0.5 to 0.5, that "
         "of the offset being 0; two of one phase make a jump",
@@ -213,7 +218,7 @@ class Drive(Table):
                 f"{self.frequency:g} Hz"
             )
         if self.waveform in _SHAPES["table"]:
-            self._check_table(self.table or [])
+            self._check_table()
         plain = self.quantised and not self.reset_time
         if self.loop_time and not (plain and self.loop_time >= 5e-6):
             raise fault(
@@ -227,19 +232,16 @@ class Drive(Table):
             )
         return self
 
-    def _check_table(self, table: list[list[float]]) -> None:
-        if not 1 <= len(table) <= MOST_CORNERS or any(len(pair) != 2 for pair in table):
+    def _check_table(self) -> None:
+        if self.table is None:
+            raise fault(f'drive.waveform = "{self.waveform}" needs drive.table')
+        phases = [phase for phase, _ in self.table]
+        sorted_ = phases == sorted(phases) and phases[0] >= 0.0 and phases[-1] <= 1.0
+        if not (sorted_ and all(abs(level) <= 0.5 for _, level in self.table)):
             raise fault(
-                f'drive.waveform = "{self.waveform}" needs as drive.table 1 to {MOST_CORNERS} '
-                "pairs [phase, level]"
+                "drive.table must have phases from 0 to 1 that do not fall, and levels from -0.5 "
+                "to 0.5"
             )
-        phases = [phase for phase, _ in table]
-        if not all(0.0 <= phase <= 1.0 for phase in phases) or phases != sorted(phases):
-            raise fault("drive.table must have phases from 0 to 1 that do not fall")
-        if max(phases.count(phase) for phase in phases) > 2:
-            raise fault("drive.table must have at most two pairs of one phase")
-        if not all(abs(level) <= 0.5 for _, level in table):
-            raise fault("drive.table must have levels from -0.5 to 0.5")
         gaps = [q - p for p, q in pairwise([*phases, 1.0 + phases[0]]) if q > p]
         if min(gaps) < CORNERS_APART * self.frequency:
             raise fault(

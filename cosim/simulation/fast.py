@@ -19,7 +19,6 @@ from cosim.arrays import Array
 from cosim.circuit.heat import heats
 from cosim.coupling.loop.agenda import count, exposures
 from cosim.drive.command import command, shape
-from cosim.drive.periodic import Sine
 from cosim.drive.straights import straights
 from cosim.errors import SimulationFailed
 from cosim.files.spill import BLOCK, Tape
@@ -170,12 +169,13 @@ def _numbers(
     held = 0.5 * scene.coil.inductance * sums["i_end"] ** 2
     lost = {name: coils * sums[name] for name in ("copper", "friction", "impact", "damping")}
     moved = math.isfinite(seen[0])
-    camera = {"a_camera_max": seen[0], "a_camera_min": -seen[1]} if moved else {}
+    high, low = (seen[0], -seen[1]) if moved else (None, None)
+    camera = {"a_camera_max": high, "a_camera_min": low}
     return {
         "v_average": v_average,
         "transport_per_cycle": v_average * length,
         "stick_fraction": min(1.0, sums["sticking"] / span),
-        **(camera or {"a_camera_max": None, "a_camera_min": None}),
+        **camera,
         "v_surface_max": sums["v_max"],
         "v_surface_min": sums["v_min"],
         "z_surface_pp": sums["z_max"] - sums["z_min"],
@@ -302,14 +302,11 @@ def _lines(scene: Scene) -> Array:
     """A period of the scene's command as straight lines: where each begins, as a share of the
     period, and V1 (V) where it begins and ends. Lines of less than half a step become jumps."""
     made, step = shape(scene), scene.run.step
-    if isinstance(made, Sine):
-        count = max(8, min(_LINES_OF_SINE, int(made.period / step / 2.0)))
-        times, first, last = next(straights([made], made.period, count))
-        return np.array([times[:-1] / made.period, first[:, 0], last[:, 0]])
-    pieces = made.pieces(0.0, math.nextafter(made.period, 0.0))
-    long = [piece for piece in pieces if piece.until - piece.begin >= 0.5 * step] or pieces
-    rows = [(p.begin / made.period, p.value(p.begin), p.end) for p in long]
-    return np.array(rows).T.copy()
+    chords = max(8, min(_LINES_OF_SINE, int(made.period / step / 2.0)))
+    times, first, last = next(straights([made], made.period, chords))
+    long = np.diff(times) >= 0.5 * step
+    lines = np.array([times[:-1] / made.period, first[:, 0], last[:, 0]])
+    return np.ascontiguousarray(lines[:, long] if long.any() else lines)
 
 
 def sizes() -> tuple[tuple[int, int], tuple[int, int]]:

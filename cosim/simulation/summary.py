@@ -87,12 +87,10 @@ def slips(scene: Scene, read: Mapping[str, Any]) -> dict[str, Any]:
         low, high = read.get(f"{by}_min"), read.get(f"{by}_max")
         if low is None or high is None:
             continue
-        found[f"slip_by_{by[2:]}"] = [
-            f"{what}, part going {way}"
+        found[f"slip_by_{by[2:]}"] = {
+            way: [what for what, there in (("fall", low < fall), ("rise", high > rise)) if there]
             for way, (fall, rise) in ways.items()
-            for what, there in (("fall", low < fall), ("rise", high > rise))
-            if there
-        ]
+        }
     return found
 
 

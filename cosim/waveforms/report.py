@@ -64,11 +64,11 @@ def _slip(summary: dict[str, Any], way: str) -> str:
     if f"slip_{way}" not in summary:
         return ""
     low, high = summary[f"slip_{way}"]
-    reached = []
-    for by, words in (("surface", "instants"), ("camera", "the camera's mean over 4 ms")):
-        if (passed := summary.get(f"slip_by_{by}")) is not None:
-            sides = [what.partition(",")[0] for what in passed if what.endswith(way)]
-            reached.append(f"{' and '.join(sides) or 'neither'} by {words}")
+    reached = [
+        f"{' and '.join(summary[f'slip_by_{by}'][way]) or 'neither'} by {words}"
+        for by, words in (("surface", "instants"), ("camera", "the camera's mean over 4 ms"))
+        if f"slip_by_{by}" in summary
+    ]
     told = f"; reached: {', '.join(reached)}" if reached else ""
     return f"beyond {low:+.1f} … {high:+.1f} m/s²{told}"
 

@@ -25,7 +25,7 @@ STUDIES = (
                 "search each of these by itself, with the numbers of its shape: sawtooth, "
                 "falling-sawtooth, sine, square, steps:N, pieces:N with N levels",
                 "NAME,...",
-                read="tune.families.named",
+                kind=lambda names: names.split(","),
             ),
             Option("--polarity", "search both polarities of the coil", kind=bool),
             Option(

@@ -13,11 +13,6 @@ Ranges = Mapping[str, tuple[float, float]]
 TABLES = ("steps", "pieces")
 
 
-def named(names: str) -> list[str]:
-    """The names of ``--waveform a,b,…``."""
-    return [name.strip() for name in names.split(",")] if names else []
-
-
 def family(name: str) -> tuple[dict[str, Any], Ranges]:
     """Values of keys that give a scene the waveform ``name``, and the ranges of its shape's
     numbers: of "steps:N" and "pieces:N" N levels at even phases, of "square" its duty. BadInput.

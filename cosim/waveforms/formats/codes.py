@@ -1,14 +1,13 @@
 """The drive as the device's firmware plays it: a C header with one period of DAC codes."""
 
 from io import BytesIO
+from textwrap import fill
 
 from cosim.drive.command import shape
 from cosim.drive.staircase import Staircase
 from cosim.scene import changed
 from cosim.scene.firmware import nearest_code, volts
 from cosim.waveforms.formats.source import Format, Run, driven
-
-PER_LINE = 16
 
 
 def write(run: Run, file: BytesIO) -> str:
@@ -20,13 +19,12 @@ def write(run: Run, file: BytesIO) -> str:
     made = shape(quantised)
     assert isinstance(made, Staircase)
     codes, pin = made.codes, nearest_code(made.v_offset)
-    rows = [codes[k : k + PER_LINE] for k in range(0, len(codes), PER_LINE)]
     header = [
         f"/* {scene.name}: {scene.drive.waveform}, a code every 50 us, {1 / made.period:.6g} Hz */",
         f"#define OFFSET_CODE {pin} /* {volts(pin):.4g} V, PWM */",
         f"#define CODES {len(codes)}",
         "static const unsigned short codes[CODES] = {",
-        *(f"    {', '.join(map(str, row))}," for row in rows),
+        fill(", ".join(map(str, codes)), 100, initial_indent="    ", subsequent_indent="    "),
         "};\n",
     ]
     file.write("\n".join(header).encode())
