@@ -7,7 +7,7 @@ where the highest command needs V_DAC = 0. In truth it is a PWM, of which ``v_of
 
 from math import inf, nextafter
 
-from cosim.drive.periodic import Constant, Lines, Sawtooth, Sine, Square, held
+from cosim.drive.periodic import Constant, Corners, Lines, Sine, held
 from cosim.drive.pieces import Command, Piece, level
 from cosim.drive.staircase import Staircase, WithPwm
 from cosim.scene import Scene
@@ -100,11 +100,18 @@ def shape(scene: Scene) -> Command:
 
 
 def _smooth(drive: Drive, amplitude: float, offset: float) -> Command:
-    volts_at = (drive.frequency, amplitude, offset)
-    if drive.table is not None:
-        return Lines(*volts_at, held(drive.table) if drive.waveform == "steps" else drive.table)
     if drive.waveform == "sine":
-        return Sine(*volts_at)
+        return Sine(drive.frequency, amplitude, offset)
+    return Lines(drive.frequency, amplitude, offset, corners(drive))
+
+
+def corners(drive: Drive) -> Corners:
+    """Those of a shape of straight lines: a sawtooth is V1 = offset + amplitude (t/T - 1/2) on
+    [0, T), then a sharp fall; with a reset time the rise takes T less that, a linear fall the rest.
+    """
+    if drive.table is not None:
+        return held(drive.table) if drive.waveform == "steps" else drive.table
     if drive.waveform == "square":
-        return Square(*volts_at, drive.duty)
-    return Sawtooth(*volts_at, drive.reset_time, drive.waveform == "falling-sawtooth")
+        return held([(0.0, 0.5), (drive.duty, -0.5)])
+    end = -0.5 if drive.waveform == "falling-sawtooth" else 0.5
+    return [(0.0, -end), (1.0 - drive.reset_time * drive.frequency, end)]

@@ -106,36 +106,6 @@ class Lines(_Periodic):
         return number
 
 
-class Sawtooth(Lines):
-    """V1 = offset + amplitude (t/T - 1/2) on [0, T), then a sharp fall; upside down ``falling``.
-
-    With ``reset_time`` (s) the rise takes T - reset_time and a linear fall the rest of the period;
-    the peak-to-peak voltage stays ``amplitude``.
-    """
-
-    def __init__(
-        self,
-        frequency: float,
-        amplitude: float,
-        offset: float,
-        reset_time: float = 0.0,
-        falling: bool = False,
-    ) -> None:
-        self.reset_time = reset_time
-        end = 0.5 if not falling else -0.5
-        corners = [(0.0, -end), (1.0 - reset_time * frequency, end)]
-        super().__init__(frequency, amplitude, offset, corners)
-
-
-class Square(Lines):
-    """V1 = offset + amplitude/2 for a share ``duty`` of each period, offset - amplitude/2 after."""
-
-    def __init__(
-        self, frequency: float, amplitude: float, offset: float, duty: float = 0.5
-    ) -> None:
-        super().__init__(frequency, amplitude, offset, held([(0.0, 0.5), (duty, -0.5)]))
-
-
 def held(corners: Corners) -> Corners:
     """Corners between which each level is held until the next."""
     ends = [*(phase for phase, _ in corners[1:]), 1.0 + corners[0][0]]

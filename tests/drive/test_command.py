@@ -17,9 +17,7 @@ from cosim.drive.command import (
     Constant,
     Lagging,
     Lines,
-    Sawtooth,
     Sine,
-    Square,
     Staircase,
     WithPwm,
     command,
@@ -33,6 +31,17 @@ from cosim.scene.firmware import passes, staircase
 from tests.helpers.pins import pin, pin_before, v_dac, v_dac_before, value_before
 
 GAIN = 15 / 4.7
+
+
+class Sawtooth(Lines):
+    def __init__(self, frequency: float, amplitude: float, offset: float, reset_time: float = 0.0):
+        self.reset_time = reset_time
+        shape = [(0.0, -0.5), (1.0 - reset_time * frequency, 0.5)]
+        super().__init__(frequency, amplitude, offset, shape)
+
+
+def square(frequency: float, amplitude: float, offset: float, duty: float = 0.5) -> Lines:
+    return Lines(frequency, amplitude, offset, held([(0.0, 0.5), (duty, -0.5)]))
 
 
 def made(*overrides: str, scene: str = "reference") -> Command:
@@ -474,7 +483,7 @@ def test_pwm_edges_are_exact(code: int, inner: str, t: float) -> None:
     mean = code / 1024 * 3.3
     command: Command = {
         "sawtooth": Sawtooth(20.0, 8.0, -1.2),
-        "square": Square(31.7, 8.0, -1.2),
+        "square": square(31.7, 8.0, -1.2),
         "staircase": Staircase(staircase(778, 20.0), mean),
     }[inner]
     command.v_offset = mean
@@ -533,12 +542,12 @@ COMMANDS = st.one_of(
     st.builds(lambda f, a, o, r: Sawtooth(f, a, o, r / f), FREQUENCY, AMPLITUDE, OFFSET,
               st.floats(1e-3, 0.9)),
     st.builds(Sine, FREQUENCY, AMPLITUDE, OFFSET),
-    st.builds(Square, FREQUENCY, AMPLITUDE, OFFSET, st.floats(0.01, 0.99)),
+    st.builds(square, FREQUENCY, AMPLITUDE, OFFSET, st.floats(0.01, 0.99)),
     st.builds(lambda f, a, o, levels: Lines(f, a, o, held(evenly(levels))), FREQUENCY, AMPLITUDE,
               OFFSET, st.lists(st.sampled_from([-0.5, -0.1, 0.3, 0.5]), min_size=2, max_size=9)),
     st.builds(lambda m, f, v: Staircase(staircase(m, f), v), st.integers(0, 1023), FREQUENCY,
               st.floats(0, 3.3)),
-    st.builds(lambda f, a, o, lag: Lagging(Square(f, a, o), lag / f), FREQUENCY, AMPLITUDE, OFFSET,
+    st.builds(lambda f, a, o, lag: Lagging(square(f, a, o), lag / f), FREQUENCY, AMPLITUDE, OFFSET,
               st.floats(0, 1)),
 )  # fmt: skip
 TIME = st.floats(0, 1e4)
