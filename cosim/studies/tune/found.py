@@ -224,16 +224,17 @@ def _figure(tuning: Tuning) -> Picture:
     )  # fmt: skip
     path_axis.set(xlabel="run", ylabel=ylabel)
     words = "Every run, and the best so far" + (
-        f"; {len(failed)} failed (×)" if len(failed) else ""
+        f"; {len(failed)} failed or too hot (×)" if len(failed) else ""
     )
     path_axis.set_title(words, loc="left", fontsize=10.5)
 
     assert tuning.best.value is not None
     turns = 100 * np.array([-TURN, 0.0, TURN])
-    for (key, row), color in zip(tuning.neighbours.items(), COLORS * 3, strict=False):
+    styles = [(color, style) for style in ("-", "--", ":") for color in COLORS]
+    for (key, row), (color, style) in zip(tuning.neighbours.items(), styles, strict=False):
         low, high = (np.nan if value is None else value * scale for value in row)
         heights = [low, tuning.best.value * scale, high]
-        turn_axis.plot(turns, heights, color=color, marker="o", ms=4, label=key)
+        turn_axis.plot(turns, heights, color=color, ls=style, marker="o", ms=4, label=key)
     turn_axis.set(xlabel="turned by [% of the key's range]", ylabel=ylabel)
     turn_axis.set_title("The neighbourhood of the best", loc="left", fontsize=10.5)
     if tuning.neighbours:
@@ -253,7 +254,8 @@ def _figure(tuning: Tuning) -> Picture:
             axis.grid(alpha=0.25)
     best = with_unit(tuning.best.value * scale, unit, 4)
     figure.suptitle(
-        f"{tuning.scene.name}: {tuning.quantity} {best} after {len(values)} runs"
+        f"{tuning.scene.name}{tuning.waveform and f', {tuning.waveform}'}: "
+        f"{'robust ' * tuning.robust}{tuning.quantity} {best} after {len(values)} runs"
         + (f", and {tuning.scouts} ahead, cheaper" if tuning.scouts else ""),
         fontsize=12,
     )
