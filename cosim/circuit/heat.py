@@ -10,7 +10,7 @@ Winding, assumed: the 0.9 to 3.6 g of copper that make 7.1 Ohm of wire of 0.14 t
 of a few tenths of a millimetre.
 """
 
-from math import exp, inf, sqrt
+from math import expm1, inf, sqrt
 from typing import Any
 
 from cosim.errors import BadInput
@@ -35,14 +35,14 @@ SPREAD = {
 def modes(
     winding_to_body: float, body_to_air: float, winding_capacity: float, body_capacity: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Resistance (K/W) and time constant (s) of the two exponentials of the coil's rise, which is
+    """Resistance (K/W) and time constant (s) of both exponentials of the winding's rise, which is
     P Σ r (1 − exp(−t/τ)) under a constant heat from t = 0 on."""
     both = winding_to_body + body_to_air
     zero = winding_to_body * body_to_air * body_capacity
     sum_of_both = winding_capacity * both + body_capacity * body_to_air
     slow = 0.5 * (sum_of_both + sqrt(sum_of_both**2 - 4.0 * winding_capacity * zero))
     fast = winding_capacity * zero / slow
-    # Z(s) = (R_c + R_b + s R_c R_b C_b) / ((1 + s slow)(1 + s fast)), in partial fractions.
+    # Z(s) = (R_w + R_b + s R_w R_b C_b) / ((1 + s slow)(1 + s fast)), in partial fractions.
     share = (both * slow - zero) / (slow - fast)
     return (share, slow), (both - share, fast)
 
@@ -55,12 +55,8 @@ def rise(coil: Coil, on_time: float = inf, duty: float = 1.0, side: int = 0) -> 
     given = {name: getattr(coil, name) for name in SPREAD}
     for name, factor in SPREAD.items():
         given[name] *= factor ** (-side if name.endswith("capacity") else side)
-    found = 0.0
-    for resistance, tau in modes(**given):
-        cycle = on_time / duty if duty else inf
-        left = exp(-on_time / tau)
-        found += resistance * (1.0 - left) / (1.0 - exp(-cycle / tau))
-    return found
+    cycle = on_time / duty if duty else inf
+    return sum(r * expm1(-on_time / tau) / expm1(-cycle / tau) for r, tau in modes(**given))
 
 
 def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float = LIFT) -> float:

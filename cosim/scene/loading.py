@@ -201,7 +201,7 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
         if isinstance(value, os.PathLike):
             value = os.fspath(value)
         # numpy's numbers are no Python numbers
-        tables.setdefault(table, {})[key] = value.item() if hasattr(value, "item") else value
+        tables.setdefault(table, {})[key] = value.tolist() if hasattr(value, "tolist") else value
     _find_files(tables, Path())
     return tables
 

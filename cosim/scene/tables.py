@@ -258,7 +258,9 @@ def _with_levels(data: dict[str, Any]) -> dict[str, Any]:
         place = int(name.partition(".")[2]) - 1
         if not (isinstance(table, list) and place < len(table) and is_number(value)):
             raise fault(f"drive.{name} needs a number, and a drive.table with as many pairs")
-        table = [[*pair[:1], value] if k == place else pair for k, pair in enumerate(table)]
+        pair = table[place]
+        new = [*pair[:1], value] if isinstance(pair, list) else pair
+        table = [*table[:place], new, *table[place + 1 :]]
     return data | {"table": table} if levels else data
 
 

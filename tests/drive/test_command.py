@@ -238,6 +238,7 @@ def test_tables_that_are_refused(shape: str, table: str, why: str) -> None:
         (["drive.waveform=sine", "drive.reset_time=1e-3"], '"sawtooth" or "falling-sawtooth"'),
         (["drive.waveform=pieces", "drive.table=[[0, 0.5]]", "drive.table.2=0.1"], "as many pairs"),
         (["drive.table.1=0.1"], "as many pairs"),
+        (["drive.waveform=steps", "drive.table=[1, 2]", "drive.table.1=0.1"], "pairs of numbers"),
         (["coil.polarity=0"], "must be one of -1, 1"),
     ],
 )
@@ -249,6 +250,8 @@ def test_keys_of_another_shape_are_refused(settings: list[str], why: str) -> Non
 def test_a_level_is_a_key() -> None:
     base = load("reference", ["drive.waveform=pieces", "drive.table=[[0, 0.5], [0.5, -0.5]]"])
     assert changed(base, {"drive.table.2": 0.25}, "test").drive.table == [[0, 0.5], [0.5, 0.25]]
+    array = np.array([[0.0, 0.5], [0.5, 0.25]])
+    assert load(base, {"drive.table": array}).drive.table == array.tolist()
 
 
 def test_no_drive() -> None:

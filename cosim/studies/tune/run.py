@@ -64,7 +64,7 @@ def tune(
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     dask: str | None = None,
-    waveform: Sequence[str] = (),
+    waveform: str | Sequence[str] = (),
     polarity: bool = False,
     robust: bool = False,
     heat: float | str | None = None,
@@ -109,7 +109,17 @@ def tune(
     keys = _checked(over or KNOBS)
     most = most_heat(scene, heat)
     both = {"coil.polarity": (-1.0, 1.0)} if polarity else {}
-    families = {name: family(name) for name in waveform} or {"": ({}, {})}
+    families: dict[str, tuple[Scene, dict[str, tuple[float, float]]]] = {}
+    for name in ([waveform] if isinstance(waveform, str) else waveform) or [""]:
+        changes, shape = family(name) if name else ({}, {})
+        ranges = {**keys, **both, **shape}
+        least = FEWEST_RUNS + 2 * len(ranges)
+        if not least <= budget <= MOST_RUNS:
+            raise BadInput(
+                f"--budget {budget}: must be a whole number from {least}, for these keys, to "
+                f"{MOST_RUNS}."
+            )
+        families[name] = changed(scene, changes, "--waveform"), ranges
     heard: list[Run] = []
     path = None if out is None else Path(out)
 
@@ -119,15 +129,7 @@ def tune(
 
     tunings, benches = [], []
     with ExitStack() as stack:
-        for name, (changes, shape) in families.items():
-            ranges = {**keys, **both, **shape}
-            least = FEWEST_RUNS + 2 * len(ranges)
-            if not least <= budget <= MOST_RUNS:
-                raise BadInput(
-                    f"--budget {budget}: must be a whole number from {least}, for these keys, to "
-                    f"{MOST_RUNS}."
-                )
-            base = changed(scene, changes, "--waveform")
+        for name, (base, ranges) in families.items():
             store = path and path / (f"{name.replace(':', '-')}-{STORE}" if name else STORE)
             whole = any(key in FREQUENCIES for key in ranges)
             bench = Evaluator(base, store, whole_periods=whole, workers=workers, dask=dask)
@@ -305,9 +307,8 @@ class _Trial:
             return Run(settings, own, None)
         scores = [self._score(self._value(outcome)) for outcome in outcomes]
         score = float(np.median(scores)) if min(scores) > 0.0 else min(scores)
-        return Run(
-            settings, own, (score if self._aim.largest else -score) if score > -inf else None
-        )
+        value = score if self._aim.largest else -score
+        return Run(settings, own, value if isfinite(value) else None)
 
     def _settings(self, point: Sequence[float]) -> dict[str, Number]:
         """The keys' values at a point of the unit cube."""
