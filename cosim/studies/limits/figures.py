@@ -81,7 +81,8 @@ def answer(path: Path, study: Study, points: Points, found: Sequence[Change]) ->
                 axis.axvline(fall, color=VERMILION, lw=1.4, ls="--")
                 axis.annotate(
                     f"slips, {way}", (fall, len(order) - 0.35 - 0.3 * k), color=VERMILION,
-                    fontsize=8.5, ha="left", xytext=(3, 0), textcoords="offset points",
+                    fontsize=8.5, ha=("left", "right")[k], xytext=(3 - 6 * k, 0),
+                    textcoords="offset points",
                 )  # fmt: skip
     axes[0].set_yticks(range(len(order)), list(reversed(order)), fontsize=10)
     axes[0].set_ylim(-0.7, len(order) - 0.1)
