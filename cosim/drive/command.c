@@ -8,20 +8,11 @@ static const double SAME_TIME = 1e-12; /* s; as in the recorder, which rows are 
 static inline double value_of(const Piece *p, const int64_t kind, double t)
 {
     const double phase = (t - p->origin) * p->rate;
-    double shape;
-    switch (kind) {
-    case RISE:
-        shape = phase / p->span;
-        break;
-    case FALL:
-        shape = (1.0 - phase) / p->span;
-        shape = shape > 0.0 ? shape : 0.0;
-        break;
-    case SINE:
+    if (kind == SINE)
         return p->offset + 0.5 * p->amplitude * sin(2 * PI * (t - p->origin) * p->rate);
-    default:
+    if (kind == LEVEL)
         return p->offset;
-    }
+    const double shape = phase / p->span;
     return p->offset + p->amplitude * ((shape < 1.0 ? shape : 1.0) - 0.5);
 }
 
@@ -34,9 +25,9 @@ double command_value(const Piece *p, double t)
 static void values_within(const Piece piece, int64_t n, const double *restrict times,
                           double *restrict values)
 {
-    if (piece.kind == RISE)
+    if (piece.kind == RAMP)
         for (int64_t k = 0; k < n; k++)
-            values[k] = value_of(&piece, RISE, times[k]);
+            values[k] = value_of(&piece, RAMP, times[k]);
     else
         for (int64_t k = 0; k < n; k++)
             values[k] = value_of(&piece, piece.kind, times[k]);

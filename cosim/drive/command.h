@@ -11,7 +11,7 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-enum { LEVEL, RISE, FALL, SINE };
+enum { LEVEL, RAMP, SINE };
 
 typedef struct {
     double begin, until; /* s; the piece holds in [begin, until) */
@@ -25,8 +25,8 @@ typedef struct {
 } Piece;
 
 /* V1 (V) at `t` (s) in [begin, until). With the phase (t - origin) rate it is `offset` for a LEVEL,
-   offset + amplitude/2 sin(2π phase) for a SINE, and offset + amplitude (shape - 1/2) otherwise, with
-   the shape phase / span in a RISE and (1 - phase) / span in a FALL, kept within 0 and 1. */
+   offset + amplitude/2 sin(2π phase) for a SINE, and offset + amplitude (phase / span - 1/2) in a RAMP,
+   of which no more than its end is taken. */
 EXPORT double command_value(const Piece *p, double t);
 
 /* V1 at each of `n` times, which do not fall, from pieces that cover them; or its left limits there,

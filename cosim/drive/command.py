@@ -7,11 +7,20 @@ where the highest command needs V_DAC = 0. In truth it is a PWM, of which ``v_of
 
 from math import inf, nextafter
 
-from cosim.drive.periodic import Constant, Sawtooth, Sine, Square
+from cosim.drive.periodic import Constant, Corners, Lines, Sine, held
 from cosim.drive.pieces import Command, Piece, level
 from cosim.drive.staircase import Staircase, WithPwm
 from cosim.scene import Scene
-from cosim.scene.firmware import GAIN, nearest_code, offset_pin, passes, staircase, volts
+from cosim.scene.firmware import (
+    GAIN,
+    nearest_code,
+    offset_pin,
+    passes,
+    sampled,
+    staircase,
+    volts,
+)
+from cosim.scene.tables import Drive
 
 
 class Lagging(Command):
@@ -67,21 +76,42 @@ def command(scene: Scene) -> Command:
     """The command of a scene; 0 V for ever where nothing drives the coil."""
     if not scene.rung.driven:
         return Constant()
-    made, drive = _shape(scene), scene.drive
+    made, drive = shape(scene), scene.drive
     if drive.start_time or drive.start_phase:
         made = Switched(made, drive.start_time, drive.start_phase)
     return WithPwm(made) if drive.pwm_ripple else made
 
 
-def _shape(scene: Scene) -> Command:
+def shape(scene: Scene) -> Command:
+    """The command of a scene's drive as if it had begun long ago."""
     drive = scene.drive
-    if drive.quantised:
-        codes = staircase(nearest_code(drive.amplitude / GAIN), drive.frequency)
-        pin = volts(nearest_code(offset_pin(drive.offset, drive.amplitude)))
-        if drive.loop_time:
-            return Staircase(passes(codes, drive.loop_time), pin, 1 / drive.loop_time)
-        return Staircase(codes, pin)
-    if drive.waveform == "sawtooth":
-        return Sawtooth(drive.frequency, drive.amplitude, drive.offset, drive.reset_time)
-    shape = {"sine": Sine, "square": Square}[drive.waveform]
-    return shape(drive.frequency, drive.amplitude, drive.offset)
+    if not drive.quantised:
+        return _smooth(drive, drive.amplitude, drive.offset)
+    top = nearest_code(drive.amplitude / GAIN)
+    if drive.waveform == "sawtooth" and not drive.reset_time:
+        codes = staircase(top, drive.frequency)
+    else:
+        levels = _smooth(drive, 1.0, 0.0)
+        codes = sampled(lambda t: 0.5 - levels.value(t), top, drive.frequency)
+    pin = volts(nearest_code(offset_pin(drive.offset, drive.amplitude)))
+    if drive.loop_time:
+        return Staircase(passes(codes, drive.loop_time), pin, 1 / drive.loop_time)
+    return Staircase(codes, pin)
+
+
+def _smooth(drive: Drive, amplitude: float, offset: float) -> Command:
+    if drive.waveform == "sine":
+        return Sine(drive.frequency, amplitude, offset)
+    return Lines(drive.frequency, amplitude, offset, corners(drive))
+
+
+def corners(drive: Drive) -> Corners:
+    """Those of a shape of straight lines: a sawtooth is V1 = offset + amplitude (t/T - 1/2) on
+    [0, T), then a sharp fall; with a reset time the rise takes T less that, a linear fall the rest.
+    """
+    if drive.table is not None:
+        return held(drive.table) if drive.waveform == "steps" else drive.table
+    if drive.waveform == "square":
+        return held([(0.0, 0.5), (drive.duty, -0.5)])
+    end = -0.5 if drive.waveform == "falling-sawtooth" else 0.5
+    return [(0.0, -end), (1.0 - drive.reset_time * drive.frequency, end)]

@@ -1,11 +1,14 @@
-"""Commands with a shape of their own: constant, sawtooth, sine and square."""
+"""Commands with a shape of their own: constant, sine, and straight lines between corners."""
 
+from bisect import bisect_right
+from collections.abc import Sequence
+from itertools import pairwise
 from math import ceil, inf
 
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.drive.pieces import FALL, RISE, SINE, Command, Piece, edge_before, level
+from cosim.drive.pieces import RAMP, SINE, Command, Piece, edge_before, level
 from cosim.scene.firmware import GAIN, offset_pin
 
 
@@ -30,48 +33,87 @@ class _Periodic(Command):
         self.period = 1.0 / frequency
 
 
-class Sawtooth(_Periodic):
-    """V1 = offset + amplitude (t/T - 1/2) on [0, T), then a sharp fall.
+Corners = Sequence[Sequence[float]]
+"""Phases of a period, which do not fall, from 0 to 1, and the levels there, as shares of the
+peak-to-peak voltage about the offset."""
 
-    With ``reset_time`` the rise takes T - reset_time and a linear fall the rest of the period;
-    the peak-to-peak voltage stays ``amplitude``.
+
+class Lines(_Periodic):
+    """Straight lines between ``corners``, and from the last to the first of the next period.
+
+    V1 = offset + amplitude level. It jumps where two corners have one phase, 0 and 1 being one.
     """
 
-    def __init__(
-        self, frequency: float, amplitude: float, offset: float, reset_time: float = 0.0
-    ) -> None:
+    def __init__(self, frequency: float, amplitude: float, offset: float, corners: Corners) -> None:
         super().__init__(frequency, amplitude, offset)
-        self.reset_time = reset_time
-        self._fall = reset_time * frequency
-        self._rise = 1.0 - self._fall
-        self._jumps = amplitude != 0.0 and reset_time == 0.0
+        (first, low), *_ = corners
+        ends = pairwise([*corners, (1.0 + first, low)])
+        each = [(p, q - p, a, b) for (p, a), (q, b) in ends if q > p]
+        self._phases = [phase for phase, *_ in each]
+        self._shape = [
+            (span, offset + amplitude * (0.5 * (a + b)), amplitude * (b - a))
+            for _, span, a, b in each
+        ]
+        after = [a for _, _, a, _ in each[1:] + each[:1]]
+        self._jumps = [amplitude * (b - a) != 0.0 for (*_, b), a in zip(each, after, strict=True)]
 
     def piece(self, t: float) -> Piece:
-        f = self.frequency
-        n = edge_before(t, f)
-        peak, edge = (n + self._rise) / f, (n + 1) / f
-        falls = self._fall > 0.0 and t >= peak
-        half = 0.5 * self.amplitude
+        number, count = self._number(t), len(self._phases)
+        place = number % count
+        jumps = (n + 1 for n in range(number, number + count) if self._jumps[n % count])
+        jump = self._corner(next(jumps)) if any(self._jumps) else inf
+        span, middle, rise = self._shape[place]
+        if not rise:
+            found = level(self._corner(number + 1), middle, self.v_offset)
+            found.jump = jump
+            return found
         return Piece(
-            until=peak if self._fall > 0.0 and not falls else edge,
-            kind=FALL if falls else RISE,
-            offset=self.offset,
-            amplitude=self.amplitude,
-            origin=n / f,
-            rate=f,
-            span=self._fall if falls else self._rise,
-            end=self.offset - half if falls else self.offset + half,
-            jump=edge if self._jumps else inf,
+            until=self._corner(number + 1),
+            kind=RAMP,
+            offset=middle,
+            amplitude=rise,
+            origin=self._corner(number),
+            rate=self.frequency,
+            span=span,
+            end=middle + 0.5 * rise,
+            jump=jump,
             pin=self.v_offset,
         )
 
     def lines(self, begin: float, end: float, most: int) -> tuple[Array, Array, Array] | None:
-        if self._fall > 0.0:
-            return None
-        f, half = self.frequency, 0.5 * self.amplitude
-        count = min(most, ceil((end - begin) * f) + 1)
-        corners = (edge_before(begin, f) + np.arange(count + 1)) / f
-        return corners, np.full(count, self.offset - half), np.full(count, self.offset + half)
+        count = len(self._phases)
+        most = min(most, (ceil((end - begin) * self.frequency) + 1) * count)
+        periods, places = np.divmod(self._number(begin) + np.arange(most + 1), count)
+        corners = (periods + np.array(self._phases)[places]) / self.frequency
+        _, middle, rise = np.array(self._shape)[places[:-1]].T
+        start = middle - 0.5 * rise
+        corners[0], start[0] = begin, self.piece(begin).value(begin)
+        return corners, start, middle + 0.5 * rise
+
+    def _corner(self, number: int) -> float:
+        period, place = divmod(number, len(self._phases))
+        return (period + self._phases[place]) / self.frequency
+
+    def _number(self, t: float) -> int:
+        """Of the last corner at or before ``t``, counted from the first one of the period 0."""
+        period = edge_before(t, self.frequency)
+        place = bisect_right(self._phases, t * self.frequency - period) - 1
+        number = period * len(self._phases) + place
+        while self._corner(number + 1) <= t:
+            number += 1
+        while self._corner(number) > t:
+            number -= 1
+        return number
+
+
+def held(corners: Corners) -> Corners:
+    """Corners between which each level is held until the next."""
+    ends = [*(phase for phase, _ in corners[1:]), 1.0 + corners[0][0]]
+    return [
+        corner
+        for (phase, high), end in zip(corners, ends, strict=True)
+        for corner in ((phase, high), (end, high))
+    ]
 
 
 class Sine(_Periodic):
@@ -91,23 +133,3 @@ class Sine(_Periodic):
             jump=inf,
             pin=self.v_offset,
         )
-
-
-class Square(_Periodic):
-    """V1 = offset + amplitude/2 in the first half of each period, offset - amplitude/2 after."""
-
-    def piece(self, t: float) -> Piece:
-        rate = 2 * self.frequency
-        half = edge_before(t, rate)
-        until = (half + 1) / rate if self.amplitude else inf
-        high = self.offset + self.amplitude * (-0.5 if half % 2 else 0.5)
-        return level(until, high, self.v_offset)
-
-    def lines(self, begin: float, end: float, most: int) -> tuple[Array, Array, Array] | None:
-        if not self.amplitude:
-            return None
-        rate = 2 * self.frequency
-        count = min(most, ceil((end - begin) * rate) + 1)
-        halves = edge_before(begin, rate) + np.arange(count + 1)
-        levels = self.offset + self.amplitude * np.where(halves[:-1] % 2, -0.5, 0.5)
-        return halves / rate, levels, levels

@@ -16,7 +16,7 @@ from cosim.arrays import Array
 from cosim.scene.firmware import GAIN
 from cosim.toolchain.libraries import library
 
-LEVEL, RISE, FALL, SINE = range(4)
+LEVEL, RAMP, SINE = range(3)
 """Kinds of pieces."""
 
 

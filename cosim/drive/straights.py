@@ -16,17 +16,16 @@ from cosim.drive.pieces import SINE, Command, Piece
 _CHORDS = 4000
 """Straights a period of a sine: within 2.1e-7 of half its peak-to-peak voltage."""
 
-_OUTSIDE = tan(pi / _CHORDS) / (pi / _CHORDS)
-"""The straights' deviation from the mean of the sine where they meet, over the sine's own."""
-
 _TOGETHER = 4096
 """How many straights are prepared at a time; of a sine those of a period."""
 
 
-def straights(commands: Sequence[Command], duration: float) -> Iterator[tuple[Array, Array, Array]]:
+def straights(
+    commands: Sequence[Command], duration: float, chords: int = _CHORDS
+) -> Iterator[tuple[Array, Array, Array]]:
     """Times (s), the first one where the last ones ended, and V1 (V, a column a command) at the
     start and the end of each interval between two of them, until ``duration``, block after block.
-    The commands are of one shape.
+    The commands are of one shape; of a sine there are ``chords`` a period.
     """
     if len(commands) == 1 and commands[0].lines(0.0, 0.0, 1) is not None:
         yield from _lines(commands[0], duration)
@@ -38,8 +37,8 @@ def straights(commands: Sequence[Command], duration: float) -> Iterator[tuple[Ar
         begin = edges[-1]
         stop = min(duration, *(piece.until for piece in pieces))
         if pieces[0].kind == SINE:
-            times = _times(pieces[0].rate, begin, stop)
-            values = np.stack([_on_straights(piece, times) for piece in pieces], axis=1)
+            times = _times(chords * pieces[0].rate, begin, stop)
+            values = np.stack([_on_straights(piece, times, chords) for piece in pieces], axis=1)
             yield times, values[:-1], values[1:]
             edges = [stop]
         else:
@@ -77,22 +76,24 @@ def straight(piece: Piece, begin: float) -> tuple[float, float, float]:
     if piece.kind != SINE:
         return piece.until, piece.value(begin), piece.before(piece.until)
     stop = min(piece.until, begin + 1.0 / _CHORDS / piece.rate)
-    first, last = _on_straights(piece, np.array([begin, stop])).tolist()
+    first, last = _on_straights(piece, np.array([begin, stop]), _CHORDS).tolist()
     return stop, first, last
 
 
 def _times(rate: float, begin: float, stop: float) -> Array:
-    """Where the straights of a sine of ``rate`` (Hz) meet from ``begin`` to ``stop``, s: equally
-    far apart but for the last ones."""
-    step = 1.0 / (_CHORDS * rate)
+    """Where straights, ``rate`` in a second, meet from ``begin`` to ``stop``, s: equally far apart
+    but for the last ones."""
+    step = 1.0 / rate
     count = max(1, ceil((stop - begin) / step - 1e-6))
     return np.append(begin + step * np.arange(count), stop)
 
 
-def _on_straights(piece: Piece, times: Array) -> Array:
-    """V1 (V) on the straights of one piece where they meet, at ``times`` (s); at the last one the
-    left limit."""
+def _on_straights(piece: Piece, times: Array, chords: int) -> Array:
+    """V1 (V) on the straights of one piece, of a sine ``chords`` a period, where they meet, at
+    ``times`` (s); at the last one the left limit."""
     values = np.append(piece.values(times[:-1]), piece.before(float(times[-1])))
     if piece.kind == SINE:
-        values = piece.offset + _OUTSIDE * (values - piece.offset)
+        # The straights' deviation from the mean of the sine where they meet, over the sine's own.
+        outside = tan(pi / chords) / (pi / chords)
+        values = piece.offset + outside * (values - piece.offset)
     return values

@@ -5,15 +5,20 @@ from collections.abc import Iterator, Sequence
 from cosim.errors import BadInput, plain
 from cosim.scene import Key, keys
 from cosim.scene.messages import ended, suggestion
+from cosim.scene.tables import LEVEL_KEY
 
 FREQUENCIES = ("drive.frequency", "drive.pot_frequency", "drive.loop_time")
 
 
 def numeric_key(name: str) -> Key:
     """The key with this full name. Raises BadInput for one that is unknown or no number."""
-    numeric = {key.full: key for key in keys() if key.kind in (int, float) and not key.choices}
+    numeric = {key.full: key for key in keys() if key.kind in (int, float)}
     if name in numeric:
         return numeric[name]
+    table, _, bare = name.partition(".")
+    if table == "drive" and LEVEL_KEY.fullmatch(bare):
+        text = f"Level of pair {bare.partition('.')[2]} of drive.table"
+        return Key(table, bare, "1", None, float, None, -0.5, 0.5, text, "")
     if any(key.full == name for key in keys()):
         raise BadInput(f"--over {plain(name)}: this key is not a number.")
     bare = [full for full, key in numeric.items() if key.name == name]

@@ -188,6 +188,16 @@ def bounds(
     return np.array([side * static - way * plate - g for side in (1, -1) for way in (1, 0, -1)])
 
 
+def slip_budget(
+    mu_s: float, force_per_mass: float, gravity: float = 9.81, mu_plate: float = 0.0
+) -> dict[str, tuple[float, float]]:
+    """Between which accelerations of the surface, m/s², a part goes with it that sticks and goes
+    "up" or "down". The springed plate, which rubs against the part's way, helps one side and costs
+    the other: (µ_s ± µ_p) F_n/m -+ g."""
+    every = bounds(mu_s, force_per_mass, gravity, mu_plate).reshape(2, 3).tolist()
+    return {way: (every[1][k], every[0][k]) for way, k in (("up", 0), ("down", 2))}
+
+
 def threshold(
     time: Real,
     v_surface: Real,

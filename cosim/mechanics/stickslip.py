@@ -220,6 +220,7 @@ def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
     for group, (names, values) in zip((reals, integers), _VARIABLES, strict=True):
         pairs = zip(names, values(scene), strict=True)
         group.update([pair for pair in pairs if pair[1] is not None])
+    reals["force_factor"] *= scene.coil.polarity
     if scene.rung.source_in_fmu:
         circuit = scene.circuit
         reals["output_high"] = circuit.supply - circuit.swing_loss_high

@@ -18,7 +18,7 @@ class Key:
     unit: str
     default: float | int | bool | str | None
     kind: type
-    choices: tuple[str, ...] | None
+    choices: tuple[str | int, ...] | None
     low: float | None
     high: float | None
     text: str
@@ -34,12 +34,14 @@ class Key:
     def allowed(self) -> str:
         """What may stand there, as the end of "… must be …"."""
         if self.choices:
-            quoted = [f'"{choice}"' for choice in self.choices]
+            quoted = [f'"{one}"' if isinstance(one, str) else str(one) for one in self.choices]
             return quoted[0] if len(quoted) == 1 else f"one of {', '.join(quoted)}"
         if self.kind is str:
             return "the path of a file"
         if self.kind is bool:
             return "true or false"
+        if self.kind is list:
+            return "a list of 1 to 64 pairs of numbers, [[phase, level], ...]"
         number = "a whole number" if self.kind is int else "a number"
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"{number} from {self.low:g} to {self.high:g}{unit}"
@@ -53,12 +55,16 @@ def _key(table: str, name: str) -> Key:
     limits = {k: getattr(m, k) for m in field.metadata for k in ("ge", "le") if hasattr(m, k)}
     extra: Any = field.json_schema_extra
     choices = get_args(kind) if get_origin(kind) is Literal else extra.get("choices")
+    if choices and isinstance(choices[0], int):
+        kind, limits = int, {"ge": min(choices), "le": max(choices)}
+    elif choices:
+        kind = str
     return Key(
         table=table,
         name=name,
         unit=str(extra["unit"]),
         default=field.default,
-        kind=str if choices else kind if isinstance(kind, type) else str,
+        kind=kind if isinstance(kind, type) else list,
         choices=choices,
         low=limits.get("ge"),
         high=limits.get("le"),

@@ -18,6 +18,7 @@ about 22 µs, a step three of them, and the real frequency is three quarters of 
 Nobody has published a measurement; hence a parameter, and the plain 50 µs without it.
 """
 
+from collections.abc import Callable
 from fractions import Fraction
 from math import ceil
 
@@ -79,6 +80,13 @@ def staircase(maximum: int, frequency: float) -> tuple[int, ...]:
 def _share(frequency: float) -> Fraction:
     """Of a period that a step takes."""
     return Fraction(frequency) / STEPS_PER_SECOND
+
+
+def sampled(share: Callable[[float], float], maximum: int, frequency: float) -> tuple[int, ...]:
+    """The DAC codes of one period of any shape, as many as :func:`staircase` has: the nearest ones
+    to ``share`` (of ``maximum``) at the beginning of each 50 µs step, s."""
+    steps = len(staircase(1, frequency))
+    return tuple(round(maximum * share(k / STEPS_PER_SECOND)) for k in range(steps))
 
 
 def period(frequency: float, loop_time: float | None) -> float:

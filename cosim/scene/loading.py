@@ -17,7 +17,7 @@ from cosim.scene import messages, toml
 from cosim.scene.describe import acts, keys
 from cosim.scene.methods import METHODS
 from cosim.scene.model import Scene
-from cosim.scene.tables import KNOBS, NORMAL_FORCES, PATHS, TABLES
+from cosim.scene.tables import KNOBS, LEVEL_KEY, NORMAL_FORCES, PATHS, TABLES
 
 _FULL = frozenset(key.full for key in keys())
 
@@ -166,7 +166,7 @@ def _check_names(data: dict[str, Any], origin: str) -> None:
             raise BadInput(f"{origin}: {name} = {messages.shown(content)} must be a table.")
         known = TABLES[name].model_fields
         for key in content:
-            if key not in known:
+            if key not in known and not (name == "drive" and LEVEL_KEY.fullmatch(key)):
                 raise messages.bad(f"{origin}: {messages.unknown_key(name, key)}")
 
 
@@ -201,7 +201,7 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
         if isinstance(value, os.PathLike):
             value = os.fspath(value)
         # numpy's numbers are no Python numbers
-        tables.setdefault(table, {})[key] = value.item() if hasattr(value, "item") else value
+        tables.setdefault(table, {})[key] = value.tolist() if hasattr(value, "tolist") else value
     _find_files(tables, Path())
     return tables
 

@@ -108,9 +108,9 @@ def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], defa
         layers = [origins[key] for key in first["ctx"]["keys"] if key in origins]
         origin = max(layers)[1] if layers else default
         return f"{origin}: {ended(first['ctx']['sentence'])}"
-    full = ".".join(str(part) for part in first["loc"])
+    full = ".".join(str(part) for part in first["loc"][:2])  # not the place in a list
     key = next((key for key in keys() if key.full == full), None)
     allowed = key.allowed if key else ALLOWED_TOP.get(full, "a table")
-    hint = suggestion(shown(first["input"]).strip('"'), (key and key.choices) or ())
+    hint = suggestion(shown(first["input"]).strip('"'), map(str, (key and key.choices) or ()))
     origin = origins.get(full, (0, default))[1]
     return ended(f"{origin}: {full} = {shown(first['input'])} must be {allowed}{hint}")

@@ -11,6 +11,7 @@ from cosim.scene import firmware
 from cosim.scene.describe import Key, keys
 from cosim.scene.rungs import RUNGS, Rung
 from cosim.scene.tables import (
+    COMMANDS,
     GIVEN_SURFACES,
     KNOBS,
     PATHS,
@@ -45,8 +46,7 @@ _FAST = {*VARIABLES.values(), "n_surfaces", "coil_count", "initial_lift"} | {
 
 _FAST_NEEDS: list[tuple[str, Sequence[object], str]] = [
     ("circuit.model", ("limited", "ideal"), '"limited" or "ideal"'),
-    ("drive.waveform", ("sawtooth",), '"sawtooth"'),
-    ("drive.reset_time", (0.0,), "0"),
+    ("drive.waveform", COMMANDS, "one that drives a coil"),
     ("drive.quantised", (False,), "false"),
     ("drive.phase_deg", (None,), "absent"),
     ("mechanics.actuator", ("ram",), '"ram"'),
@@ -201,7 +201,7 @@ class Scene(BaseModel):
         not in its own table."""
         if self.run.solver != "fast":
             return self
-        why = 'run.solver = "fast" has fixed steps for one free ram under a sharp sawtooth'
+        why = 'run.solver = "fast" has fixed steps for one free ram'
         self._need(why, *_FAST_NEEDS)
         if self.mechanics.initial_lift and not self.friction.mu_plate * self.friction.normal_force:
             self._need(why, ("mechanics.initial_lift", (0.0,), "0 without friction.mu_plate"))
@@ -303,8 +303,10 @@ class Scene(BaseModel):
         return values
 
 
-def toml_value(value: bool | float | int | str) -> str:
+def toml_value(value: bool | float | int | str | list[Any]) -> str:
     """A value as TOML spells it."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(toml_value, value))}]"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

@@ -5,7 +5,8 @@ A key that is a variable of the FMU has them from ``variables.def``.
 
 import re
 from collections.abc import Mapping
-from typing import Any, Literal
+from itertools import pairwise
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -32,8 +33,8 @@ def _of_fmu(name: str, least: float | None = None) -> Any:
     return _number(start, known.unit, low, known.high, known.text, name)
 
 
-def _choice(default: Any, text: str) -> Any:
-    return Field(default, description=text, json_schema_extra={"unit": ""})
+def _choice(default: Any, text: str, unit: str = "") -> Any:
+    return Field(default, description=text, json_schema_extra={"unit": unit})
 
 
 def _declared(default: str, lead: str, registry: Mapping[str, Rung | CouplingMethod]) -> Any:
@@ -84,6 +85,32 @@ NORMAL_FORCES = ("normal_force", "normal_force_file")
 KNOBS = {"pot_max": "amplitude", "pot_frequency": "frequency", "pot_offset": "offset"}
 """The knobs of the device and the keys of ``[drive]`` that each replaces."""
 
+_Waveform = Literal[
+    "sawtooth", "falling-sawtooth", "sine", "square", "steps", "pieces", "optimal", "quaid", "file"
+]  # fmt: skip
+
+MOST_CORNERS = 64
+"""Of a table."""
+
+_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+_Table = Annotated[list[_Pair], Field(min_length=1, max_length=MOST_CORNERS)]
+
+COMMANDS = ("sawtooth", "falling-sawtooth", "sine", "square", "steps", "pieces")
+"""Waveforms of ``[drive]`` that drive a coil."""
+
+_SHAPES = {
+    **dict.fromkeys(("quantised", *KNOBS), COMMANDS),
+    **{"reset_time": COMMANDS[:2], "loop_time": COMMANDS[:1], "duty": ("square",)},
+    "table": ("steps", "pieces"),
+}
+"""Keys of ``[drive]`` and the waveforms that they are for."""
+
+CORNERS_APART = 1e-9
+"""s, at least: less could not be told from a jump after hours of simulated time."""
+
+LEVEL_KEY = re.compile(r"table\.([1-9]\d?)")
+"""The level of a pair of ``drive.table``, the first being 1, as a key of its own."""
+
 
 class Drive(Table):
     """The command V1 at the power amplifier's input.
@@ -91,16 +118,24 @@ class Drive(Table):
     Where a knob is given, ``amplitude``, ``frequency`` and ``offset`` hold what it stands for.
     """
 
-    waveform: Literal["sawtooth", "sine", "square", "optimal", "quaid", "file"] = _choice(
-        "sawtooth", "Shape of the command; of the surface's velocity for optimal, quaid and file"
+    waveform: _Waveform = _choice(
+        "sawtooth",
+        "Shape of the command; of the surface's velocity for optimal, quaid and file. That of "
+        "table are steps, whose levels are held, or pieces, straight lines from one to the next",
     )
+    table: _Table | None = _choice(
+        None,
+        "Shape of steps and pieces: 1 to 64 pairs of phase, 0 to 1, and level, -0.5 to 0.5, that "
+        "of the offset being 0; two of one phase make a jump",
+    )
+    duty: float = _number(0.5, "1", 0.0, 1.0, "Share of the period that the square wave is high")
     frequency: float = _number(
         20.0, "Hz", 0.01, 1e5, "Frequency; the staircase rounds its period up to whole 50 us steps"
     )
     amplitude: float = _number(8.0, "V", 0.0, 100.0, "Peak-to-peak voltage at V1")
     offset: float = _number(-1.2, "V", -100.0, 100.0, "Mean voltage at V1")
     reset_time: float = _number(
-        0.0, "s", 0.0, 100.0, "Length of the sawtooth's linear fall, at the end of the period"
+        0.0, "s", 0.0, 100.0, "Length of the sawtooth's linear reset, at the end of the period"
     )
     start_time: float = _number(
         0.0, "s", 0.0, 1e5, "When the drive is switched on; the command is 0 V before"
@@ -162,36 +197,33 @@ class Drive(Table):
         amplitude = data.get("amplitude", cls.model_fields["amplitude"].default)
         if "pot_offset" in pots and is_number(amplitude):
             data["offset"] = firmware.knob_offset(pots["pot_offset"], amplitude)
-        return data
+        return _with_levels(data)
 
     @model_validator(mode="after")
     def _check(self) -> "Drive":
         # The other way round is told when it is run, so that a scene can leave the file open.
         if self.file is not None and self.waveform != "file":
             raise fault(f'drive.file is for drive.waveform = "file", not for "{self.waveform}"')
-        if self.waveform != "sawtooth":
-            for key in ("quantised", "reset_time", "loop_time", *KNOBS):
-                if getattr(self, key):
-                    raise fault(
-                        f'drive.{key} is for drive.waveform = "sawtooth" only, '
-                        f'not for "{self.waveform}"'
-                    )
+        for key, able in _SHAPES.items():
+            if getattr(self, key) != type(self).model_fields[key].default and (
+                self.waveform not in able
+            ):
+                quoted = " or ".join(f'"{name}"' for name in able)
+                raise fault(f'drive.{key} is for drive.waveform = {quoted}, not "{self.waveform}"')
         period = 1 / self.frequency
-        # shorter than this the fall could not be told from a jump after hours of simulated time
-        if self.reset_time and not 1e-9 <= self.reset_time < period:
+        if self.reset_time and not CORNERS_APART <= self.reset_time < period:
             raise fault(
-                f"drive.reset_time = {self.reset_time:g} s must be 0, or at least 1e-09 s and "
-                f"below the period of {period:g} s at drive.frequency = {self.frequency:g} Hz"
+                f"drive.reset_time = {self.reset_time:g} s must be 0, or at least "
+                f"{CORNERS_APART:g} s and below the period of {period:g} s at drive.frequency = "
+                f"{self.frequency:g} Hz"
             )
-        if self.quantised and self.reset_time:
-            raise fault(
-                f"drive.reset_time = {self.reset_time:g} s must be 0 with drive.quantised = true, "
-                "whose reset is sharp"
-            )
-        if self.loop_time and not (self.quantised and self.loop_time >= 5e-6):
+        if self.waveform in _SHAPES["table"]:
+            self._check_table()
+        plain = self.quantised and not self.reset_time
+        if self.loop_time and not (plain and self.loop_time >= 5e-6):
             raise fault(
                 f"drive.loop_time = {self.loop_time:g} s must be 0, or at least 5e-06 s with "
-                "drive.quantised = true"
+                "drive.quantised = true and drive.reset_time = 0"
             )
         if self.quantised and not 0.1 <= self.frequency <= 1e4:
             raise fault(
@@ -199,6 +231,37 @@ class Drive(Table):
                 "with drive.quantised = true"
             )
         return self
+
+    def _check_table(self) -> None:
+        if self.table is None:
+            raise fault(f'drive.waveform = "{self.waveform}" needs drive.table')
+        phases = [phase for phase, _ in self.table]
+        sorted_ = phases == sorted(phases) and phases[0] >= 0.0 and phases[-1] <= 1.0
+        if not (sorted_ and all(abs(level) <= 0.5 for _, level in self.table)):
+            raise fault(
+                "drive.table must have phases from 0 to 1 that do not fall, and levels from -0.5 "
+                "to 0.5"
+            )
+        gaps = [q - p for p, q in pairwise([*phases, 1.0 + phases[0]]) if q > p]
+        if min(gaps) < CORNERS_APART * self.frequency:
+            raise fault(
+                f"drive.table must have pairs of one phase, or at least {CORNERS_APART:g} s apart "
+                f"at drive.frequency = {self.frequency:g} Hz"
+            )
+
+
+def _with_levels(data: dict[str, Any]) -> dict[str, Any]:
+    """The keys of a drive with those of single levels written into its table."""
+    levels = {name: data.pop(name) for name in [*data] if LEVEL_KEY.fullmatch(name)}
+    table = data.get("table")
+    for name, value in levels.items():
+        place = int(name.partition(".")[2]) - 1
+        if not (isinstance(table, list) and place < len(table) and is_number(value)):
+            raise fault(f"drive.{name} needs a number, and a drive.table with as many pairs")
+        pair = table[place]
+        new = [*pair[:1], value] if isinstance(pair, list) else pair
+        table = [*table[:place], new, *table[place + 1 :]]
+    return data | {"table": table} if levels else data
 
 
 class Circuit(Table):
@@ -264,9 +327,24 @@ class Coil(Table):
     eddy_inductance: float | None = _of_fmu("eddy_inductance", least=1e-9)
     eddy_resistance: float | None = _of_fmu("eddy_resistance", least=1e-3)
     force_factor: float = _of_fmu("force_factor")
+    polarity: Literal[-1, 1] = _choice(
+        1, "Sign of the force factor; -1 is the coil with its two wires exchanged", "1"
+    )
     b1: float = _of_fmu("b1")
     b2: float = _of_fmu("b2")
     count: int = _of_fmu("coil_count")
+    winding_to_body: float = _number(
+        10.0, "K/W", 1e-3, 1e6, "Thermal resistance from winding to body; assumed, 5 to 20"
+    )
+    winding_capacity: float = _number(
+        0.75, "J/K", 1e-6, 1e6, "Heat capacity of the winding; 0.4 to 1.4 by its copper"
+    )
+    body_to_air: float = _number(
+        40.0, "K/W", 1e-3, 1e6, "Thermal resistance from body to air; 33 to 49 by its surface"
+    )
+    body_capacity: float = _number(
+        7.8, "J/K", 1e-6, 1e6, "Heat capacity of the actuator's body; 6 to 10 by its mass"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> "Coil":

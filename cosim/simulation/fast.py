@@ -16,14 +16,17 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.circuit.heat import heats
 from cosim.coupling.loop.agenda import count, exposures
-from cosim.drive.command import command
+from cosim.drive.command import command, shape
+from cosim.drive.straights import straights
 from cosim.errors import SimulationFailed
 from cosim.files.spill import BLOCK, Tape
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
 from cosim.simulation.guards import notes
 from cosim.simulation.rungs.electrics import commanded
+from cosim.simulation.summary import slips
 from cosim.stepper.stepper import LANES, OWN, RIG, VARIABLES
 from cosim.toolchain.libraries import library
 from cosim.toolchain.processes import Progress
@@ -44,7 +47,7 @@ LOST = (
 UNLIMITED = 1e9
 """V and A: the limits of a source that has none."""
 
-_STATES, _COLUMNS = 12, tuple(name for name in COLUMNS if name not in ("time", "command"))[:12]
+_STATES, _COLUMNS = 15, tuple(name for name in COLUMNS if name not in ("time", "command"))[:12]
 _SUMS = (
     *("x_settle", "x_end", "i_end", "sticking", "swing_high", "swing_low", "current_limit"),
     *("v_max", "v_min", "z_max", "z_min", "i_max", "i_min"),
@@ -63,15 +66,19 @@ class _Kept(Structure):
 class _Stretch(Structure):
     _fields_ = (
         *(("step", c_double), ("first", c_int64), ("last", c_int64), ("samples", c_int64)),
-        *(("times", c_void_p), ("rows", c_int64)),
+        *(("times", c_void_p), ("rows", c_int64), ("drives", c_void_p)),
     )
+
+
+class _Drive(Structure):
+    _fields_ = (("lines", c_int64), *((name, c_void_p) for name in ("phase", "first", "last")))
 
 
 @cache
 def _library() -> Any:
     found = library("stepper")
     found.stepper_begin.restype = found.stepper_run.restype = None
-    found.stepper_begin.argtypes = (c_void_p, c_double, c_void_p)
+    found.stepper_begin.argtypes = (c_void_p, c_void_p, c_double, c_void_p)
     found.stepper_run.argtypes = (c_void_p,) * 5
     return found
 
@@ -162,12 +169,13 @@ def _numbers(
     held = 0.5 * scene.coil.inductance * sums["i_end"] ** 2
     lost = {name: coils * sums[name] for name in ("copper", "friction", "impact", "damping")}
     moved = math.isfinite(seen[0])
+    high, low = (seen[0], -seen[1]) if moved else (None, None)
+    camera = {"a_camera_max": high, "a_camera_min": low}
     return {
         "v_average": v_average,
         "transport_per_cycle": v_average * length,
         "stick_fraction": min(1.0, sums["sticking"] / span),
-        "a_camera_max": seen[0] if moved else None,
-        "a_camera_min": -seen[1] if moved else None,
+        **camera,
         "v_surface_max": sums["v_max"],
         "v_surface_min": sums["v_min"],
         "z_surface_pp": sums["z_max"] - sums["z_min"],
@@ -177,6 +185,8 @@ def _numbers(
         "saturated_fraction": sum(share.values()),
         "energy_in": lost["copper"] + coils * (held + sums["coil"]),
         **{f"energy_{name}": value for name, value in lost.items()},
+        **slips(scene, camera),
+        **heats(scene, lost["copper"]),
         "wall_time": wall_time,
         "method": "fast",
         "versions": versions(),
@@ -216,10 +226,16 @@ class _Runs:
         self._span = np.array([(scene.run.settle, scene.run.duration) for scene in filled]).T.copy()
         self.settle, self.until = self._span[:, : len(scenes)]
         """When settling and the runs end, s."""
+        self._lines = [_lines(scene) for scene in filled]  # which the drives point into
+        self._drives = (_Drive * LANES)(
+            *((lines.shape[1], *(row.ctypes.data for row in lines)) for lines in self._lines)
+        )
         self._row_step = scenes[0].run.output_step
         self.reached = 0.0
         """s."""
-        _library().stepper_begin(self._parameters.ctypes.data, step, byref(self._kept))
+        _library().stepper_begin(
+            self._parameters.ctypes.data, self._drives, step, byref(self._kept)
+        )
 
     @property
     def sums(self) -> list[list[float]]:
@@ -240,7 +256,10 @@ class _Runs:
             low, self.reached = self.reached, last * self._step
             times = np.ascontiguousarray(when(low, self.reached))
             out = np.empty((len(times), len(_COLUMNS) if rows else LANES))
-            piece = _Stretch(self._step, first, last, len(times), times.ctypes.data, int(rows))
+            piece = _Stretch(
+                *(self._step, first, last, len(times), times.ctypes.data, int(rows)),
+                ctypes.addressof(self._drives),
+            )
             _library().stepper_run(
                 *(byref(piece), self._parameters.ctypes.data, self._span.ctypes.data),
                 *(byref(self._kept), out.ctypes.data),
@@ -268,12 +287,26 @@ def _row(scene: Scene) -> list[float]:
     found["sense_resistance"] *= coils  # of the current of all coils
     found["current_limit"] = found["current_limit"] / coils if scene.rung.has_limits else UNLIMITED
     phase = drive.start_phase - drive.frequency * drive.start_time
-    found |= {"amplitude": drive.amplitude, "offset": drive.offset, "frequency": drive.frequency}
-    found |= {"phase": phase, "start": drive.start_time}
+    found |= {"frequency": drive.frequency, "phase": phase, "start": drive.start_time}
     if lift := scene.mechanics.initial_lift:
         held = found["mu_plate"] * found["normal_force"]
         found["lift"] = lift * found["flexure_stiffness"] / held
     return [found.get(name, 0.0) for name in (*RIG, *OWN)]
+
+
+_LINES_OF_SINE = 1024
+"""Most straight lines that a period of a sine becomes: each lasts two steps at least."""
+
+
+def _lines(scene: Scene) -> Array:
+    """A period of the scene's command as straight lines: where each begins, as a share of the
+    period, and V1 (V) where it begins and ends. Lines of less than half a step become jumps."""
+    made, step = shape(scene), scene.run.step
+    chords = max(8, min(_LINES_OF_SINE, int(made.period / step / 2.0)))
+    times, first, last = next(straights([made], made.period, chords))
+    long = np.diff(times) >= 0.5 * step
+    lines = np.array([times[:-1] / made.period, first[:, 0], last[:, 0]])
+    return np.ascontiguousarray(lines[:, long] if long.any() else lines)
 
 
 def sizes() -> tuple[tuple[int, int], tuple[int, int]]:

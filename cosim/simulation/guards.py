@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from cosim.arrays import Array
-from cosim.drive.command import commands
+from cosim.circuit.heat import DRIVE_RANGE_HEAT
 from cosim.files.spill import blocks
 from cosim.mechanics.normal_force import NormalForce
 from cosim.scene import Scene
@@ -17,11 +17,6 @@ LM348_SUPPLY = 18.0
 
 OPA548_SUPPLY = (4.0, 30.0)
 """V, both signs: the range of supplies of the OPA548 (data sheet SBOS070D)."""
-
-CARLTON_HEAT = 5.0**2 / 7.1
-"""W: the most that any drive within the 3.6 to 10 V peak-to-peak of the Carlton's data sheet
-(C-151L337V5R2) makes of its 7.1 Ohm: a square wave without offset. It gives no power; the authors
-saw the housing melt (README of their repository)."""
 
 CARLTON_LENGTH = 34.3e-3
 """m: the Carlton lies lengthwise in the paper's finger (data sheet); the finger's own length is not
@@ -87,28 +82,14 @@ def _supply(scene: Scene) -> Iterator[str]:
         )
 
 
-def coil_heat(
-    energy_copper: float, duration: float, coil_resistance: float, sense_resistance: float
-) -> float:
-    """The mean heat of one coil, W, in a run of ``duration`` (s) that lost ``energy_copper`` (J) in
-    it and in its share of the sense resistor (Ohm).
-    """
-    return energy_copper / duration * coil_resistance / (coil_resistance + sense_resistance)
-
-
 def _coil(scene: Scene, summary: Mapping[str, Any]) -> Iterator[str]:
     if scene.mechanics.actuator != "ram" or scene.run.duration < scene.period:
         return
-    coil = scene.coil
-    # energy_copper has the sense resistor's share, unless that is the affair of a user's netlist.
-    sense = 0.0 if scene.rung.own_netlist else coil.count * scene.circuit.sense_resistance
-    each = summary["energy_copper"] / (coil.count * len(commands(scene)))
-    heat = coil_heat(each, scene.run.duration, coil.resistance, sense)
-    if heat > CARLTON_HEAT:
+    if summary["coil_heat"] > DRIVE_RANGE_HEAT:
         yield (
-            f"the heat of {heat:.3g} W in a coil, on average over the run, is above the "
-            f"{CARLTON_HEAT:.3g} W that the Carlton actuator's 10 V peak-to-peak make at most (its "
-            "data sheet)."
+            f"the heat of {summary['coil_heat']:.3g} W in a coil, on average over the run, is "
+            f"above the {DRIVE_RANGE_HEAT:.3g} W that the Carlton actuator's 10 V peak-to-peak "
+            "make at most (its data sheet)."
         )
 
 

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cosim.circuit.heat import heats
 from cosim.coupling.loop.recorder import Recorder
 from cosim.files.spill import blocks
+from cosim.mechanics.part import slip_budget
 from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Electrics
 from cosim.simulation.rungs.rung import Driven, Motion, average_slope
@@ -63,7 +65,34 @@ def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[
     if motion.ram is not None:
         # A rigid wall holds the ram within rounding.
         result["at_wall"] = int(abs(motion.ram) >= scene.mechanics.travel * (1.0 - 1e-12))
-    return result | _energies(scene, totals, electric)
+    result |= _energies(scene, totals, electric) | slips(scene, result)
+    return result if electric is None else result | heats(scene, result["energy_copper"])
+
+
+def budget(scene: Scene) -> dict[str, tuple[float, float]]:
+    """:func:`slip_budget` of a scene with a constant normal force."""
+    friction, mechanics = scene.friction, scene.mechanics
+    force = friction.normal_force * mechanics.n_surfaces / mechanics.part_mass
+    return slip_budget(friction.mu_s, force, mechanics.gravity, friction.mu_plate)
+
+
+def slips(scene: Scene, read: Mapping[str, Any]) -> dict[str, Any]:
+    """Beyond which accelerations of the surface a part that sticks to it slips, m/s², as the part
+    goes up or down, and which a run with these numbers reached: by the camera's reading, a mean,
+    and by instants where these are known. Nothing where the normal force changes in time."""
+    if scene.friction.normal_force_file is not None:
+        return {}
+    ways = budget(scene)
+    found: dict[str, Any] = {f"slip_{way}": [*ends] for way, ends in ways.items()}
+    for by in ("a_surface", "a_camera"):
+        low, high = read.get(f"{by}_min"), read.get(f"{by}_max")
+        if low is None or high is None:
+            continue
+        found[f"slip_by_{by[2:]}"] = {
+            way: [what for what, there in (("fall", low < fall), ("rise", high > rise)) if there]
+            for way, (fall, rise) in ways.items()
+        }
+    return found
 
 
 def _seen(

@@ -6,7 +6,6 @@
  * linear within a step (the current at its limits) or solved for at its end (friction), and since
  * steps end where the command jumps. */
 
-#include <math.h>
 #include <string.h>
 
 #include "stepper.h"
@@ -36,7 +35,9 @@ typedef struct {
     Wide t, z, v, y, r, x, w, p, s; /* time; heights and velocities of surface, ram, part, plate */
     Wide i;                         /* current of the coil */
     Wide slip;                      /* sign of the part's slip on the surface, 0 while it sticks */
-    Wide jump;                      /* when the command drops next */
+    Wide jump;                      /* when the line of the command ends */
+    Wide top, slope;                /* V1 at its end, V, and its slope, V/s */
+    Wide line;                      /* its number */
 } State;
 
 /* Friction of the surface (first) and the plate (second) on the part, as impulses. Both are set-valued:
@@ -67,6 +68,7 @@ typedef struct {
     Wide limited;         /* share at the current limit */
     Wide friction, plate; /* impulses of surface and plate on the part, N s */
     Wide wall, wall_damping; /* force of the walls' springs, down, N; their dampers, N s/m */
+    Mask drops;              /* the line of the command has ended */
 } Effect;
 
 /* One step of all lanes, whose plate is moving or stands on the ground. It ends at `edge`, or where
@@ -91,8 +93,8 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
     } else {
         const Mask on = t + half > start;
         const Wide gain = 1.0 / p[SENSE_RESISTANCE], limit = p[CURRENT_LIMIT];
-        const Wide slope = p[AMPLITUDE] * p[FREQUENCY];
-        const Wide v1 = p[OFFSET] + 0.5 * p[AMPLITUDE] - slope * (jump - t);
+        const Wide slope = m->slope;
+        const Wide v1 = m->top - slope * (jump - t);
         const Wide target0 = choose(on, within(gain * v1, limit), zero);
         const Wide target1 = choose(on, within(gain * (v1 + slope * h), limit), zero);
         const Wide drop = half * (p[RESISTANCE] + p[SENSE_RESISTANCE]);
@@ -184,7 +186,7 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
     m->i = now;
     m->slip = choose(sticks, zero, choose(slipping > 0.0, -one, one));
     m->t = end;
-    m->jump = choose(drops, jump + 1.0 / p[FREQUENCY], jump);
+    effect->drops = drops;
 }
 
 FUNCTION(chain_lanes)(const Schedule *c, const Parameters all, const Rest *rest, int from, double *out)
@@ -200,6 +202,8 @@ FUNCTION(chain_lanes)(const Schedule *c, const Parameters all, const Rest *rest,
     memcpy(&m.p, rest->plate + from, sizeof m.p);
     memcpy(&m.jump, rest->jump + from, sizeof m.jump);
     m.x = m.z;
+    m.top = p[OFFSET] + 0.5 * p[AMPLITUDE];
+    m.slope = p[AMPLITUDE] * p[FREQUENCY];
     const int moving = all[PLATE_MASS][0] > 0.0;
     for (int64_t k = -rest->steps; k <= c->steps; k++) {
         const double edge = chain_edge(c, k);
@@ -217,6 +221,7 @@ FUNCTION(chain_lanes)(const Schedule *c, const Parameters all, const Rest *rest,
                 step(p, &m, low, edge, high, 0, 1, i0, i1, &e);
             else
                 step(p, &m, low, edge, high, 1, 1, i0, i1, &e);
+            m.jump = choose(e.drops, m.jump + 1.0 / p[FREQUENCY], m.jump);
         }
         if (k < 0 || c->sample[k] < 0)
             continue;
@@ -321,6 +326,23 @@ INLINE void write_row(const Wide p[N_ALL], const State *a, const State *b, const
     row[ROW_STICKING] = b->slip[0] == 0.0;
 }
 
+/* Where a line has ended, the next one begins. */
+INLINE void pass_corners(const Drive *drives, const Wide p[N_ALL], Mask drops, State *m)
+{
+    int64_t any = 0;
+    for (int l = 0; l < WIDTH; l++)
+        any |= drops[l];
+    for (int l = 0; any && l < WIDTH; l++) {
+        if (!drops[l])
+            continue;
+        double end, top, slope;
+        drive_line(drives + l, m->line[l] += 1.0, p[FREQUENCY][l], p[PHASE][l], &end, &top, &slope);
+        m->jump[l] = end;
+        m->top[l] = top;
+        m->slope[l] = slope;
+    }
+}
+
 /* As many groups of WIDTH lanes, step by step in turn: while one waits for its quotients, the other
  * is computed. */
 INLINE void follow(const Stretch *c, const Parameters all, const Span *span, const int groups,
@@ -353,6 +375,7 @@ INLINE void follow(const Stretch *c, const Parameters all, const Span *span, con
         for (int g = 0; g < groups; g++) {
             before[g] = m[g];
             step(p[g], m + g, edge - half, edge, edge + half, 0, 0, 0.0, 0.0, e + g);
+            pass_corners(c->drives + g * WIDTH, p[g], e[g].drops, m + g);
             add_energies(p[g], before + g, m + g, e + g, until[g], sum + g);
         }
         /* No step ends further than a half one from its edge. */

@@ -1,6 +1,5 @@
 #include "stepper.h"
 
-#include <math.h>
 #include <string.h>
 
 /* Force on the ram at rest at q, without a current. */
@@ -78,10 +77,10 @@ void chain_run(const Schedule *c, const Parameters p, double *out)
         lanes(c, p, &rest, from, out);
 }
 
-void stepper_begin(const Parameters p, double step, Kept *kept)
+void stepper_begin(const Parameters p, const Drive drives[LANES], double step, Kept *kept)
 {
     /* As the fields lie in lanes.h. */
-    enum { T, Z, V, Y, R, X, W, PLATE, S, I, SLIP, JUMP };
+    enum { T, Z, V, Y, R, X, W, PLATE, S, I, SLIP, JUMP, TOP, SLOPE, LINE };
     enum { V_MAX = 7, V_MIN, Z_MAX, Z_MIN, I_MAX, I_MIN };
     Rest rest = {0};
     memset(kept, 0, sizeof *kept);
@@ -89,7 +88,12 @@ void stepper_begin(const Parameters p, double step, Kept *kept)
         rest_of(p, l, 0.5 * step, &rest);
         kept->state[Z][l] = kept->state[X][l] = rest.surface[l];
         kept->state[Y][l] = rest.ram[l];
-        kept->state[JUMP][l] = rest.jump[l];
+        double number = (double)drives[l].lines * floor(0.5 * step * p[FREQUENCY][l] + p[PHASE][l]) - 1.0;
+        do
+            drive_line(drives + l, ++number, p[FREQUENCY][l], p[PHASE][l], &kept->state[JUMP][l],
+                       &kept->state[TOP][l], &kept->state[SLOPE][l]);
+        while (kept->state[JUMP][l] <= 0.5 * step);
+        kept->state[LINE][l] = number;
         kept->sums[V_MAX][l] = kept->sums[Z_MAX][l] = kept->sums[I_MAX][l] = -INFINITY;
         kept->sums[V_MIN][l] = kept->sums[Z_MIN][l] = kept->sums[I_MIN][l] = INFINITY;
     }

@@ -6,6 +6,7 @@
 #ifndef CHAIN_STEPPER_H
 #define CHAIN_STEPPER_H
 
+#include <math.h>
 #include <stdint.h>
 
 #ifdef _WIN32
@@ -54,7 +55,14 @@ void chain_run(const Schedule *schedule, const Parameters parameters, double *ou
 
 /* ---- runs of scenes: without a plate that moves, in pieces ---- */
 
-enum { N_STATE = 12, N_SUMS = 18 };
+enum { N_STATE = 15, N_SUMS = 18 };
+
+/* A period of V1 in one lane as straight lines: where each begins, as a share of the period, and V1 (V)
+ * where it begins and ends. */
+typedef struct {
+    int64_t lines;
+    const double *phase, *first, *last;
+} Drive;
 
 /* When settling and the run end, s, lane by lane. */
 typedef struct {
@@ -79,10 +87,12 @@ typedef struct {
     int64_t samples;
     const double *times; /* s, rising; within the piece */
     int64_t rows;        /* 1: rows of the first lane; 0: heights of the surface of all */
+    const Drive *drives; /* LANES */
 } Stretch;
 
 /* The machines at rest at time 0. */
-EXPORT void stepper_begin(const Parameters parameters, double step, Kept *kept);
+EXPORT void stepper_begin(const Parameters parameters, const Drive drives[LANES], double step,
+                          Kept *kept);
 
 /* Go on through a piece. out[sample * N_COLUMNS + column], or out[sample * LANES + lane]. */
 EXPORT void stepper_run(const Stretch *piece, const Parameters parameters, const Span *span,
@@ -98,6 +108,19 @@ typedef struct {
     double surface[LANES], ram[LANES], plate[LANES]; /* heights, m */
     double jump[LANES];                              /* s, when the command drops first */
 } Rest;
+
+/* V1 on line `number` of a drive, counted from the first of the period 0: when it ends (s), what V1 is
+ * there (V), and its slope (V/s). `phase` is the share of the period that has gone by at time 0. */
+static inline void drive_line(const Drive *d, double number, double frequency, double phase,
+                              double *end, double *top, double *slope)
+{
+    const double period = floor(number / (double)d->lines);
+    const int64_t k = (int64_t)(number - period * (double)d->lines);
+    const double until = k + 1 < d->lines ? d->phase[k + 1] : 1.0 + d->phase[0];
+    *end = (period + until - phase) / frequency;
+    *top = d->last[k];
+    *slope = (d->last[k] - d->first[k]) * frequency / (until - d->phase[k]);
+}
 
 /* When step k begins. */
 static inline double chain_edge(const Schedule *c, int64_t k)

@@ -67,6 +67,18 @@ SUMMARY: dict[str, Quantity] = {
     "energy_residual": Quantity(
         "1", "what the account of energies misses, relative: a check of the run, no bound"
     ),
+    "coil_heat": Quantity("W", "mean heat of one coil's winding, over the whole run"),
+    "coil_rise_lift": Quantity(
+        "K",
+        "by that heat for 10 s, the winding's rise over the air: ends of an estimate, no rating",
+    ),
+    "coil_rise_continuous": Quantity("K", "the same of that heat for ever"),
+    "slip_up": Quantity(
+        "m/s2", "least and greatest acceleration of the surface with which a part going up sticks"
+    ),
+    "slip_down": Quantity("m/s2", "the same of a part going down"),
+    "slip_by_surface": Quantity("", "which of these the surface's acceleration passed at instants"),
+    "slip_by_camera": Quantity("", "which of these the camera's reading passed, a mean over 4 ms"),
     "circuit_steps": Quantity("1", "steps that ngspice accepted; 0 without it"),
     "circuit_rejected": Quantity("1", "steps that ngspice tried and rejected"),
     "fmu_steps": Quantity("1", "steps that the FMU was asked for"),

@@ -23,12 +23,14 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
         ("surface velocity", _range(summary, "v_surface", 1e3, "mm/s", "+.0f")),
         ("surface acceleration", _acceleration(scene, summary)),
         ("  as a camera reads it", _range(summary, "a_camera", 1, "m/s²", "+.0f")),
+        *(("slip, part going " + way, _slip(summary, way)) for way in ("up", "down")),
     ]
     if "current_max" in summary:
         rows += [
             ("coil current", _range(summary, "current", 1, "A", "+.3f")),
             ("amplifier at a limit", _limits(summary) if scene.rung.has_limits else ""),
         ]
+        rows.append(("heat of a coil", _heat(summary)))
     rows += [
         ("impacts", f"{summary.get('impacts', '')}"),
         ("stick-slip events", f"{summary.get('stick_slip_events', '')}"),
@@ -55,6 +57,31 @@ def _measured(scene: Scene) -> dict[str, str]:
         "as a camera reads it": _range(numbers, "a_camera", 1, "m/s²", "+.0f"),
     }
     return {name: f"   (measured: {words})" for name, words in told.items() if words}
+
+
+def _slip(summary: dict[str, Any], way: str) -> str:
+    """Beyond which accelerations of the surface the part slips, and which of them were reached."""
+    if f"slip_{way}" not in summary:
+        return ""
+    low, high = summary[f"slip_{way}"]
+    reached = [
+        f"{' and '.join(summary[f'slip_by_{by}'][way]) or 'neither'} by {words}"
+        for by, words in (("surface", "instants"), ("camera", "the camera's mean over 4 ms"))
+        if f"slip_by_{by}" in summary
+    ]
+    told = f"; reached: {', '.join(reached)}" if reached else ""
+    return f"beyond {low:+.1f} … {high:+.1f} m/s²{told}"
+
+
+def _heat(summary: dict[str, Any]) -> str:
+    """The heat of a coil, and how warm it would make it."""
+    if "coil_heat" not in summary:
+        return ""
+    lift, ever = (
+        " to ".join(f"{end:.3g}" for end in summary[f"coil_rise_{name}"])
+        for name in ("lift", "continuous")
+    )
+    return f"{summary['coil_heat']:.3g} W; warmer by {lift} K in 10 s, {ever} K for ever (estimate)"
 
 
 def _own_error(summary: dict[str, Any]) -> str:

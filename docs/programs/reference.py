@@ -4,6 +4,7 @@ So a page and the program cannot part: a test holds the one against the other.
 """
 
 import argparse
+import json
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -71,11 +72,13 @@ def default(key: Key) -> str:
 
 def allowed(key: Key) -> str:
     if key.choices:
-        return ", ".join(code(f'"{choice}"') for choice in key.choices)
+        return ", ".join(code(json.dumps(choice)) for choice in key.choices)
     if key.kind is bool:
         return "`true`, `false`"
     if key.kind is str:
         return "path of a file"
+    if key.kind is list:
+        return "`[[phase, level], …]`"
     assert key.low is not None and key.high is not None
     whole = "whole, " if key.kind is int else ""
     return f"{whole}{number(key.low)} … {number(key.high)}"

@@ -22,7 +22,7 @@ from cosim.coupling.loop.lead import Lead
 from cosim.coupling.loop.recorder import Recorder
 from cosim.coupling.loop.structures import CALLBACK
 from cosim.coupling.methods.mean_current import MeanCurrent
-from cosim.drive.command import Sawtooth
+from cosim.drive.command import Lines
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.toolchain.processes import in_place
@@ -390,7 +390,7 @@ def after_calls(number: int, original: Callable, failure: BaseException) -> Call
     ("owner", "name", "calls"),
     [
         (Lead, "_attend", 0),
-        (Sawtooth, "piece", 0),
+        (Lines, "piece", 0),
         (Recorder, "_plan", 0),
         (MeanCurrent, "current", 0),
         (MeanCurrent, "current", 1),

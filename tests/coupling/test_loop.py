@@ -16,7 +16,7 @@ from cosim.coupling.loop.structures import (
 )
 from cosim.coupling.methods import methods
 from cosim.coupling.rewind.joint import Joint
-from cosim.drive.periodic import Sawtooth
+from cosim.drive.periodic import Lines
 from cosim.drive.pieces import Piece
 from cosim.errors import SimulationFailed
 from cosim.files.resources import circuits
@@ -194,7 +194,7 @@ def test_a_call_of_the_mechanics_fails(model: str, monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize("failure", [ValueError("a fault"), KeyboardInterrupt()])
 @pytest.mark.parametrize(
     ("owner", "name"),
-    [(lead.Lead, "_attend"), (Sawtooth, "piece")],
+    [(lead.Lead, "_attend"), (Lines, "piece")],
     ids=["taking the log", "preparing the command"],
 )
 def test_python_fails_below_ngspice(

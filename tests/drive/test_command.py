@@ -1,8 +1,11 @@
 """The command V1(t): shapes, exact jumps, no drift, and the firmware's staircase."""
 
+import re
+from cmath import exp as e
 from fractions import Fraction
 from itertools import pairwise
-from math import floor, inf, nextafter, pi
+from math import ceil, floor, inf, nextafter, pi, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,20 +16,32 @@ from cosim.drive.command import (
     Command,
     Constant,
     Lagging,
-    Sawtooth,
+    Lines,
     Sine,
-    Square,
     Staircase,
     WithPwm,
     command,
     commands,
 )
+from cosim.drive.periodic import held
 from cosim.drive.straights import straights
-from cosim.scene import load
+from cosim.errors import BadInput
+from cosim.scene import changed, load
 from cosim.scene.firmware import passes, staircase
 from tests.helpers.pins import pin, pin_before, v_dac, v_dac_before, value_before
 
 GAIN = 15 / 4.7
+
+
+class Sawtooth(Lines):
+    def __init__(self, frequency: float, amplitude: float, offset: float, reset_time: float = 0.0):
+        self.reset_time = reset_time
+        shape = [(0.0, -0.5), (1.0 - reset_time * frequency, 0.5)]
+        super().__init__(frequency, amplitude, offset, shape)
+
+
+def square(frequency: float, amplitude: float, offset: float, duty: float = 0.5) -> Lines:
+    return Lines(frequency, amplitude, offset, held([(0.0, 0.5), (duty, -0.5)]))
 
 
 def made(*overrides: str, scene: str = "reference") -> Command:
@@ -93,7 +108,14 @@ def test_straights_of_a_sine_have_its_integrals(lag: float) -> None:
 
 @given(
     shape=st.sampled_from(
-        [[], ["drive.waveform=square"], ["drive.quantised=true"], ["drive.reset_time=1e-4"]]
+        [
+            [],
+            ["drive.waveform=square"],
+            ["drive.waveform=falling-sawtooth"],
+            ["drive.waveform=pieces", "drive.table=[[0.1, 0.5], [0.3, -0.2], [0.3, 0.1]]"],
+            ["drive.quantised=true"],
+            ["drive.reset_time=1e-4"],
+        ]
     ),
     frequency=st.one_of(st.floats(1.0, 3000.0), st.integers(1, 500)),
     amplitude=st.sampled_from([0.0, 0.3, 7.0]),
@@ -123,6 +145,113 @@ def test_square() -> None:
     assert drive.next_jump(0.025) == 0.05
     assert value_before(drive, 0.05) == pytest.approx(-5.2)
     assert value_before(drive, 0.0) == pytest.approx(-5.2)
+
+
+SHAPES: dict[str, tuple[list[str], Any]] = {
+    "falling-sawtooth": ([], lambda n: 1 / (pi * n)),
+    "square": (["drive.duty=0.3"], lambda n: 2 * abs(sin(0.3 * pi * n)) / (pi * n)),
+    "steps": (
+        ["drive.table=[[0, 0.5], [0.2, 0.0], [0.5, -0.5], [0.7, 0.0]]"],  # three levels
+        lambda n: abs(sum(0.5 * b * e(2j * pi * n * p) for p, b in
+                          ((0, 1), (0.2, -1), (0.5, -1), (0.7, 1)))) / (pi * n),
+    ),
+    "pieces": (
+        ["drive.table=[[0.25, 0.5], [0.75, -0.5]]"],  # a triangle
+        lambda n: 4 / (pi * n) ** 2 if n % 2 else 0.0,
+    ),
+}  # fmt: skip
+"""Shapes, and the amplitudes of their harmonics for 1 V peak-to-peak, in closed form."""
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_harmonics_of_a_shape(shape: str) -> None:
+    settings, harmonic = SHAPES[shape]
+    drive = made(f"drive.waveform={shape}", *settings)
+    count = 10 << 12
+    # In the middle between instants, so that none is on a jump.
+    values = drive.values((np.arange(count) + 0.5) / count / 20.0)
+    found = np.abs(np.fft.rfft(values)) / count * 2
+    expected = [8.0 * harmonic(n) for n in range(1, 12)]
+    assert found[1:12] == pytest.approx(expected, abs=2e-6)
+    assert np.ptp(values) == pytest.approx(8.0, rel=1e-3)
+
+
+def test_pieces_in_closed_form() -> None:
+    """Straight from corner to corner, over the period's end too; a jump where a phase is twice."""
+    table = "[[0.1, -0.5], [0.4, 0.25], [0.4, 0.5], [0.9, -0.1]]"
+    drive = made("drive.waveform=pieces", f"drive.table={table}")
+    phases = [0.1, 0.25, 0.4, 0.65, 0.9, 1.0, 1.05]
+    levels = [-0.5, -0.125, 0.5, 0.2, -0.1, -0.3, -0.4]
+    expected = [-1.2 + 8.0 * level for level in levels]
+    assert drive.values([phase / 20.0 for phase in phases]) == pytest.approx(expected, abs=1e-12)
+    assert (drive.next_jump(0.0), drive.next_jump(0.021)) == (0.4 / 20, 1.4 / 20)
+    assert value_before(drive, 0.02) == pytest.approx(-1.2 + 8.0 * 0.25)
+    corners = [0.005, 0.02, 0.045, 0.055]
+    assert [drive.piece(t).until for t in (0.0, *corners[:3])] == pytest.approx(corners)
+
+
+@given(levels=st.lists(st.floats(-0.5, 0.5), min_size=2, max_size=9), f=st.floats(1.0, 500.0))
+def test_a_table_of_steps_in_codes(levels: list[float], f: float) -> None:
+    """The nearest codes of the levels, held for whole steps of 50 us; the mean at the pin's."""
+    table = [list(pair) for pair in evenly(levels)]
+    given_table = [f"drive.table={table}", f"drive.frequency={f!r}", "drive.offset=0"]
+    drive = made("drive.waveform=steps", *given_table, "drive.quantised=true")
+    assert isinstance(drive, Staircase)
+    place = [int(k * 5e-5 * f * len(levels) * (1 + 1e-12)) for k in range(len(drive.codes))]
+    held_levels = 8.0 * np.array(levels)[np.minimum(place, len(levels) - 1)]
+    made_volts = np.array([GAIN * (drive.v_offset - 3.3 * code / 1024) for code in drive.codes])
+    near = np.abs(np.array(place) - 5e-5 * f * len(levels) * np.arange(len(place))) > 1e-6
+    # The codes of step, of maximum and of pin are each off by half of one at most.
+    assert np.abs(made_volts - held_levels)[near].max(initial=0) <= 1.5 * GAIN * 3.3 / 1024 + 1e-9
+    assert (
+        round(drive.period * 20_000, 9) == len(drive.codes) == ceil(Fraction(20_000) / Fraction(f))
+    )
+
+
+@pytest.mark.parametrize("shape", ["steps", "pieces"])
+@pytest.mark.parametrize(
+    ("table", "why"),
+    [
+        ("[]", "1 to 64 pairs of numbers"),
+        ("[[0.0, 0.1, 0.2]]", "pairs of numbers, [[phase, level]"),
+        ("[[0.5, 0.1], [0.2, 0.3]]", "phases from 0 to 1 that do not fall"),
+        ("[[0.5, 0.1], [1.2, 0.3]]", "phases from 0 to 1 that do not fall"),
+        ("[[0.5, 0.1], [0.50000000001, 0.3]]", "at least 1e-09 s apart"),
+        ("[[0.5, 0.6]]", "levels from -0.5 to 0.5"),
+        ("[[0.5, nan]]", "pairs of numbers, [["),
+        ("[[0.5, true]]", "pairs of numbers, [["),
+        ("7", "pairs of numbers, [["),
+        (str([[k / 65, 0.0] for k in range(65)]), "1 to 64 pairs"),
+    ],
+)
+def test_tables_that_are_refused(shape: str, table: str, why: str) -> None:
+    with pytest.raises(BadInput, match=re.escape(why)):
+        made(f"drive.waveform={shape}", f"drive.table={table}")
+
+
+@pytest.mark.parametrize(
+    ("settings", "why"),
+    [
+        (["drive.waveform=pieces"], "needs drive.table"),
+        (["drive.table=[[0, 0.5]]"], 'drive.table is for drive.waveform = "steps" or "pieces"'),
+        (["drive.waveform=sine", "drive.duty=0.3"], "drive.duty is for"),
+        (["drive.waveform=sine", "drive.reset_time=1e-3"], '"sawtooth" or "falling-sawtooth"'),
+        (["drive.waveform=pieces", "drive.table=[[0, 0.5]]", "drive.table.2=0.1"], "as many pairs"),
+        (["drive.table.1=0.1"], "as many pairs"),
+        (["drive.waveform=steps", "drive.table=[1, 2]", "drive.table.1=0.1"], "pairs of numbers"),
+        (["coil.polarity=0"], "must be one of -1, 1"),
+    ],
+)
+def test_keys_of_another_shape_are_refused(settings: list[str], why: str) -> None:
+    with pytest.raises(BadInput, match=re.escape(why)):
+        made(*settings)
+
+
+def test_a_level_is_a_key() -> None:
+    base = load("reference", ["drive.waveform=pieces", "drive.table=[[0, 0.5], [0.5, -0.5]]"])
+    assert changed(base, {"drive.table.2": 0.25}, "test").drive.table == [[0, 0.5], [0.5, 0.25]]
+    array = np.array([[0.0, 0.5], [0.5, 0.25]])
+    assert load(base, {"drive.table": array}).drive.table == array.tolist()
 
 
 def test_no_drive() -> None:
@@ -357,7 +486,7 @@ def test_pwm_edges_are_exact(code: int, inner: str, t: float) -> None:
     mean = code / 1024 * 3.3
     command: Command = {
         "sawtooth": Sawtooth(20.0, 8.0, -1.2),
-        "square": Square(31.7, 8.0, -1.2),
+        "square": square(31.7, 8.0, -1.2),
         "staircase": Staircase(staircase(778, 20.0), mean),
     }[inner]
     command.v_offset = mean
@@ -405,15 +534,23 @@ def test_a_staircase_lags_by_a_share_of_its_own_period() -> None:
 FREQUENCY = st.floats(0.5, 2000)
 AMPLITUDE = st.floats(0.1, 10)
 OFFSET = st.floats(-5, 5)
+
+
+def evenly(levels: list[float]) -> list[tuple[float, float]]:
+    return [(k / len(levels), level) for k, level in enumerate(levels)]
+
+
 COMMANDS = st.one_of(
     st.builds(Sawtooth, FREQUENCY, AMPLITUDE, OFFSET),
     st.builds(lambda f, a, o, r: Sawtooth(f, a, o, r / f), FREQUENCY, AMPLITUDE, OFFSET,
               st.floats(1e-3, 0.9)),
     st.builds(Sine, FREQUENCY, AMPLITUDE, OFFSET),
-    st.builds(Square, FREQUENCY, AMPLITUDE, OFFSET),
+    st.builds(square, FREQUENCY, AMPLITUDE, OFFSET, st.floats(0.01, 0.99)),
+    st.builds(lambda f, a, o, levels: Lines(f, a, o, held(evenly(levels))), FREQUENCY, AMPLITUDE,
+              OFFSET, st.lists(st.sampled_from([-0.5, -0.1, 0.3, 0.5]), min_size=2, max_size=9)),
     st.builds(lambda m, f, v: Staircase(staircase(m, f), v), st.integers(0, 1023), FREQUENCY,
               st.floats(0, 3.3)),
-    st.builds(lambda f, a, o, lag: Lagging(Square(f, a, o), lag / f), FREQUENCY, AMPLITUDE, OFFSET,
+    st.builds(lambda f, a, o, lag: Lagging(square(f, a, o), lag / f), FREQUENCY, AMPLITUDE, OFFSET,
               st.floats(0, 1)),
 )  # fmt: skip
 TIME = st.floats(0, 1e4)

@@ -22,6 +22,8 @@ from tests.helpers.examples import examples
 DEFAULTS: dict[str, dict[str, Any]] = {
     "drive": {
         "waveform": "sawtooth",
+        "table": None,
+        "duty": 0.5,
         "frequency": 20,
         "amplitude": 8.0,
         "offset": -1.2,
@@ -65,6 +67,11 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "force_factor": 0.6,
         "b1": 0,
         "b2": 0,
+        "polarity": 1,
+        "winding_to_body": 10.0,
+        "winding_capacity": 0.75,
+        "body_to_air": 40.0,
+        "body_capacity": 7.8,
         "count": 1,
     },
     "mechanics": {
@@ -133,7 +140,7 @@ def test_every_key_is_described() -> None:
             assert key.low is not None and key.high is not None and key.low < key.high
             assert key.default is None or key.low <= float(key.default) <= key.high
         else:
-            free = key.kind is bool or key.full in FILES
+            free = key.kind in (bool, list) or key.full in FILES
             assert free or (key.choices and key.default in key.choices)
 
 
@@ -335,6 +342,9 @@ def _values(key: Key) -> st.SearchStrategy[Any]:
         return st.just("/somewhere/own.cir")
     if key.kind is int:
         return st.integers(int(key.low or 0), int(key.high or 0))
+    if key.kind is list:
+        pairs = st.tuples(st.floats(0.0, 1.0), st.floats(-0.5, 0.5)).map(list)
+        return st.lists(pairs, min_size=1, max_size=5).map(sorted)
     assert key.low is not None and key.high is not None
     return st.floats(key.low, key.high)
 

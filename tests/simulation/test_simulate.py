@@ -50,6 +50,7 @@ LIMITS = {
     },
 }
 WORDS = ["method", "notes", "run", "versions"]
+HEAT = {"coil_heat", "coil_rise_continuous", "coil_rise_lift"}
 TOLD = {"v_average_error", "motion", "motion_periods", "motion_settled", "v_average_range"}
 
 RUNS = {
@@ -178,6 +179,10 @@ def test_summary_has_every_key(run: Run) -> None:
         assert type(summary[key]) is int, key
         assert summary[key] >= 0, key
     known = {*NUMBERS, *COUNTS, *ACCELERATIONS, *CAMERA, *DRIVEN, *WORDS}
+    known |= {"slip_up", "slip_down", "slip_by_camera"} & set(summary)
+    known |= {"slip_by_surface"} if summary.get("a_surface_min") is not None else set()
+    assert HEAT & set(summary) == (HEAT if is_driven(run) else set())
+    known |= HEAT
     limits = LIMITS.get(run.scene.circuit.model, set())
     assert set(summary) - known - TOLD == limits
     assert "v_average_error" in summary

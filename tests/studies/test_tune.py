@@ -2,9 +2,11 @@
 
 import csv
 import json
+from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from cosim.cli.main import main
@@ -86,7 +88,7 @@ BAD = [
     (["--maximise", "v_average", "--over", "drive.offset=0:1e9"], "from -100 to 100 V"),
     (["--maximise", "v_average", "--over", "circuit.model=0:1"], "not a number"),
     (["--maximise", "v_average", "--minimise", "v_average"], "not allowed with"),
-    (["--maximise", "v_average", "--set", "drive.waveform=sine"], "has no knobs"),
+    (["--maximise", "v_average", "--set", "drive.waveform=quaid"], "has no knobs"),
     ([], "--maximise"),
     (["--maximise", "v_average", "--workers", "0"], "--workers 0"),
     (["--maximise", "v_average", "--seed", "-1"], "--seed -1"),
@@ -183,3 +185,78 @@ def test_a_search_that_was_interrupted_goes_on(
     for name in ("tune.csv", "tune.json", "best.toml"):
         assert (wild / name).read_bytes() == (calm / name).read_bytes()
     assert not (wild / "tune.sqlite").exists()
+
+
+FAST = {"run.solver": "fast", "run.settle": 0.2, "run.duration": 0.4}
+
+
+def test_waveforms_are_searched_each_by_itself(tmp_path: Path) -> None:
+    """Each with the numbers of its shape; the scenes that are left make the same runs, within the
+    limit of heat, which binds here."""
+    found = tune(
+        *("paper-limited", FAST),
+        maximise="v_average",
+        waveform=["steps:3", "square"],
+        polarity=True,
+        heat=1.5,
+        budget=60,
+        workers=2,
+        out=tmp_path,
+    )
+    other = found.others[0]
+    assert {found.waveform, other.waveform} == {"steps:3", "square"}
+    assert (found.best.value or 0.0) >= (other.best.value or 0.0) > 0.0
+    for one, file in (
+        (found, "best.toml"),
+        (other, f"best-{other.waveform.replace(':', '-')}.toml"),
+    ):
+        shape = [f"drive.table.{k}" for k in (1, 2, 3)]
+        shape = ["drive.duty"] if one.waveform == "square" else shape
+        knobs = ["drive.pot_max", "drive.pot_frequency", "drive.pot_offset", "coil.polarity"]
+        assert list(one.best.values) == [*knobs, *shape]
+        assert one.best.values["coil.polarity"] in (-1, 1)
+        played: Any = simulate(load(tmp_path / file)).summary
+        assert played["v_average"] == pytest.approx(one.best.value, rel=1e-6)
+        assert played["coil_heat"] < 1.5
+    for run in (*found.runs, *other.runs):
+        hot = run.outcome.numbers["coil_heat"] > 1.5
+        assert (run.value is None) == hot == ("the heat of" in run.outcome.failure)
+    told = json.loads((tmp_path / "tune.json").read_text(encoding="utf-8"))
+    assert told["waveforms"][other.waveform]["value"] == other.best.value
+    assert not list(tmp_path.glob("*.sqlite*"))
+
+
+def test_robust_is_the_median_of_all_turns() -> None:
+    """Of the three knobs by 2 %, one by one and together: here turned once more, by hand."""
+    few = {**FAST, "run.settle": 0.1, "run.duration": 0.2}
+    found = tune("paper-limited", few, maximise="v_average", robust=True, budget=30, workers=2)
+    place, every = list(found.best.values.values()), []
+    for turn in [(0, 0, 0), *product((-1, 1), repeat=3), *(-np.eye(3)), *np.eye(3)]:
+        knobs = np.clip(place + 0.02 * np.array(turn), 0.0, 1.0)
+        there = changed(found.scene, dict(zip(found.best.values, knobs.tolist(), strict=True)), "")
+        summary: Any = simulate(changed(there, periods_made_whole(there), "")).summary
+        every.append(summary["v_average"])
+    assert min(every) > 0.0
+    # The search was told whole periods from another beginning: a little else is averaged.
+    assert found.best.value == pytest.approx(np.median(every), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["--waveform", "triangle"], "must be one of sawtooth, falling-sawtooth, sine, square"),
+        (["--waveform", "steps:65"], "N from 2 to 64"),
+        (["--waveform", "pieces"], "pieces:N with N from 2"),
+        (["--heat", "0"], "must be a number above 0 W"),
+        (["--heat", "60:2"], "a duty from 0 to 1"),
+        (["--heat", "60:0.3:1:1"], "RISE:DUTY:SECONDS"),
+        (["--heat", "warm"], "--heat warm: must be a number above 0 W"),
+    ],
+)
+def test_waveforms_and_heats_that_are_none(
+    words: list[str], why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["tune", "held", "--maximise", "v_average", *words, "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert why in said and said.count("\n") == 1 and not out.exists()

@@ -272,6 +272,9 @@ static double accepted(Lead *c, double time, double next_step)
     next_step = fmin(next_step, fmax(change / fabs(c->segment.c[1]), c->answer_step));
     if (c->impact - time < next_step)
         next_step = c->impact - time;
+    const double corner = piece_at(c, time)->until; /* where V1 or its slope jumps */
+    if (corner > time && corner - time < next_step)
+        next_step = corner - time;
     return c->jump - time < next_step ? c->jump - time : next_step;
 }
 

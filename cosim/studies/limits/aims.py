@@ -100,7 +100,7 @@ QUANTITIES = (
 
 NEEDED = (
     *("v_average", "transport_per_cycle", "a_camera_min", "a_surface_min", "impacts", "at_wall"),
-    *("current_max", "current_min", "energy_copper", "saturated_fraction"),
+    *("current_max", "current_min", "energy_copper", "coil_heat", "saturated_fraction"),
 )
 """The numbers that anything here is made of."""
 

@@ -10,7 +10,7 @@ from cosim.studies.limits.aims import QUANTITIES
 from cosim.studies.limits.confirm import KINDS, Point, Points
 from cosim.studies.limits.search import Best
 from cosim.studies.limits.study import IDEAL, OWN, Name, Study
-from cosim.studies.limits.table import Limit, needed_acceleration
+from cosim.studies.limits.table import Limit, slip_falls
 from cosim.studies.tables import brief
 
 LEAST = 0.02
@@ -216,10 +216,11 @@ def achievable(study: Study, points: Points) -> str:
             f"{quantity.title}: {own} {quantity.unit} at best, {robust} robust; with an ideal "
             f"current {ideal} and {ideal_robust}"
         )
-    needed = needed_acceleration(study.scene)
+    falls = slip_falls(study.scene)
+    needed = " and ".join(f"a part {way} from {brief(fall)}" for way, fall in falls.items())
     return (
         f"{study.scene.name}, over the range of the knobs. {'; '.join(said)}. "
-        f"The part slips down from {brief(needed)} m/s² on (µ_s F_n/m_p + g)."
+        f"Where the surface falls, {needed} m/s² on slips ((µ_s ± µ_plate) F_n/m_p + g)."
     )
 
 

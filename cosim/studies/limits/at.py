@@ -56,8 +56,7 @@ def at(
     found = []
     for number, scene in enumerate(scenes):
         own = outcomes[number, OWN, False]
-        settings = runs[number, OWN, False]
-        heat = bench.mean_heat(settings, own.numbers) if own.numbers else float("nan")
+        heat = own.numbers.get("coil_heat", float("nan"))
         there = There(scene, own, heat)
         for limit in acting(limits):
             there.against[limit.name] = outcomes[number, limit.name, False]

@@ -153,7 +153,7 @@ def _climbed(
 def _at(bench: Bench, case: Case, key: Key, point: Array, value: float) -> Point:
     """A point of the cube with its value on the circuit that judges."""
     settings = case.settings(point)
-    heat = bench.heat(case, settings, bench.outcomes([settings])[0].numbers)
+    heat = bench.heat(case, bench.outcomes([settings])[0].numbers)
     setting = Setting(tuple(point.tolist()), value, nan, nan)
     return Point(*key, setting, heat, settings, case.rung, value, True)
 
@@ -196,7 +196,7 @@ def _judged(bench: Bench, cases: dict[Name, Case], chosen: dict[Key, Setting]) -
     found: Points = {}
     for n, (key, setting) in enumerate(chosen.items()):
         value = nan if judges[n].failure else float(scores(judges[n].numbers)[key[1]])
-        heat = bench.heat(cases[key[0]], own[n], outcomes[n].numbers)
+        heat = bench.heat(cases[key[0]], outcomes[n].numbers)
         holds = bench.fidelity.agrees(setting.value, value)
         found[key] = Point(*key, setting, heat, own[n], rungs[n], value, holds)
     return found

@@ -23,7 +23,7 @@ from cosim.studies.limits.answer import (
 from cosim.studies.limits.at import There, acting
 from cosim.studies.limits.confirm import Point, Points
 from cosim.studies.limits.study import IDEAL, OWN, Study, searched
-from cosim.studies.limits.table import Limit, needed_acceleration
+from cosim.studies.limits.table import Limit, slip_falls
 from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, panels
 from cosim.studies.tables import brief
 
@@ -37,13 +37,14 @@ def drawn(
     """What draws each figure into a file, by what its name has after the study's."""
     acceleration = {
         "a_walls": ("true peak, walls' contact law", PURPLE),
-        "a_camera": ("as a camera reads it", BLUE),
         "a_free": ("true peak, no wall touched", GREEN),
     }
+    camera = {"a_camera": ("as a camera reads it, a mean over 4 ms", BLUE)}
     transport = {"v_up": ("upwards", BLUE), "v_down": ("downwards", VERMILION)}
     every: dict[str, Callable[[Path], None]] = {
         "": lambda path: answer(path, study, points, found),
         "-acceleration": lambda path: frontier(path, study, points, acceleration, True),
+        "-camera": lambda path: frontier(path, study, points, camera, True),
         "-transport": lambda path: frontier(path, study, points, transport, False),
     }
     if there:
@@ -76,12 +77,13 @@ def answer(path: Path, study: Study, points: Points, found: Sequence[Change]) ->
         axis.set_xticks([tick for tick in axis.get_xticks() if 0.0 <= tick <= right])
         axis.set_xlim(-0.1 * right, right)  # room for the names of the low ends
         if quantity.falls:
-            needed = needed_acceleration(study.scene)
-            axis.axvline(needed, color=VERMILION, lw=1.4, ls="--")
-            axis.annotate(
-                "needed", (needed, len(order) - 0.35), color=VERMILION, fontsize=8.5,
-                ha="left", xytext=(3, 0), textcoords="offset points",
-            )  # fmt: skip
+            for k, (way, fall) in enumerate(slip_falls(study.scene).items()):
+                axis.axvline(fall, color=VERMILION, lw=1.4, ls="--")
+                axis.annotate(
+                    f"slips, {way}", (fall, len(order) - 0.35 - 0.3 * k), color=VERMILION,
+                    fontsize=8.5, ha=("left", "right")[k], xytext=(3 - 6 * k, 0),
+                    textcoords="offset points",
+                )  # fmt: skip
     axes[0].set_yticks(range(len(order)), list(reversed(order)), fontsize=10)
     axes[0].set_ylim(-0.7, len(order) - 0.1)
     for label in axes[0].get_yticklabels():
@@ -96,7 +98,7 @@ def title(study: Study, points: Points, found: Sequence[Change]) -> str:
     """The message of the first figure."""
     camera = NUMBER["a_camera"]
     own = height(points.get((OWN, camera, "best")))
-    needed = needed_acceleration(study.scene)
+    needed = slip_falls(study.scene)["going up"]
     binds = {
         name: [c.limit.name for c in found if c.verdict == BINDS and c.quantity == NUMBER[name]]
         for name in ANSWER
@@ -108,7 +110,10 @@ def title(study: Study, points: Points, found: Sequence[Change]) -> str:
         )
         if binds[name]
     )
-    said = f"The surface's fall reaches {brief(own)} m/s² on camera where {brief(needed)} is needed"
+    said = (
+        f"The surface's fall reaches {brief(own)} m/s² on camera, a mean over 4 ms; a part going "
+        f"up slips from {brief(needed)} m/s² on"
+    )
     return f"{said}; what binds — {what}" if what else f"{said}; no limit of the circuit binds"
 
 
@@ -172,7 +177,11 @@ def frontier(
     note = (
         "Line and dots: best setting of the knobs; band: the robust setting, from the worst to the "
         "median of its turns by ±2 %; dotted: ideal current"
-        + ("; dashed: what a slip needs. " if falls else ". ")
+        + (
+            "; dashed: from where on a part slips that goes down, and up, at an instant. "
+            if falls
+            else ". "
+        )
         + "Short grey lines: other rigs, from their own to the lifted limit."
     )
     words = f"Achievable {what} over the value of each limit, from the tightest to none"
@@ -188,7 +197,8 @@ def frontier(
             _line(axis, study, points, limit, values, NUMBER[name], label, color)
             _other_rigs(axis, study, limit, values, NUMBER[name])
         if falls:
-            axis.axhline(needed_acceleration(study.scene), color=VERMILION, lw=1.1, ls="--")
+            for fall in slip_falls(study.scene).values():
+                axis.axhline(fall, color=VERMILION, lw=1.1, ls="--")
             axis.set_yscale("log")
         marks = [named(limit, value).removesuffix(f" {limit.unit}") for value in values]
         axis.set_xticks(range(len(values)), marks)

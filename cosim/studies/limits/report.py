@@ -26,7 +26,7 @@ from cosim.studies.limits.study import (
     study,
     told_count,
 )
-from cosim.studies.limits.table import LIMITS, Limit, needed_acceleration
+from cosim.studies.limits.table import LIMITS, Limit, slip_falls
 from cosim.studies.report import Progress, Report, counted, silent
 from cosim.studies.tables import Row
 
@@ -125,7 +125,10 @@ def achieved(study: Study, points: Points) -> list[Row]:
                 "best, other rigs": " to ".join(f"{x:.4g}" for x in (min(others), max(others)))
                 if others
                 else "-",
-                "needed": needed_acceleration(study.scene) if quantity.falls else nan,
+                **{
+                    f"slips, {way}": fall if quantity.falls else nan
+                    for way, fall in slip_falls(study.scene).items()
+                },
                 "best on amplifier": best.judged * scale if best else nan,
                 "best on full": best.full * scale if best else nan,
             }

@@ -13,7 +13,6 @@ from cosim.evaluate.point import Outcome
 from cosim.scene import Scene, changed, firmware
 from cosim.search.protocol import Feasible
 from cosim.simulation.fidelity import SEARCHES, Fidelity
-from cosim.simulation.guards import coil_heat
 from cosim.studies.limits import aims
 from cosim.studies.limits.aims import NEEDED, QUANTITIES, Numbers, scores
 from cosim.studies.limits.table import Machine, Settings
@@ -95,7 +94,7 @@ class Bench(Evaluator):
     def feasible(self, case: Case, settings: Settings, numbers: Numbers) -> bool:
         """Whether a run keeps within what the coil and the power amplifier bear."""
         current = self.peak(numbers) * case.machine.coil_scale
-        return current <= OPA548_CURRENT and self.heat(case, settings, numbers) <= case.machine.heat
+        return current <= OPA548_CURRENT and self.heat(case, numbers) <= case.machine.heat
 
     def peak(self, numbers: Numbers) -> float:
         """The greatest current of all coils together of a run, A."""
@@ -115,18 +114,9 @@ class Bench(Evaluator):
         sense = changes.get("circuit.sense_resistance", own)
         return case.machine.coil_scale * case.machine.reach * aims.RANGE / float(sense)
 
-    def heat(self, case: Case, settings: Settings, numbers: Numbers) -> float:
+    def heat(self, case: Case, numbers: Numbers) -> float:
         """Mean heat, W, of the coil that a case stands for."""
-        return self.mean_heat(settings, numbers) * case.machine.coil_scale
-
-    def mean_heat(self, settings: Settings, numbers: Numbers) -> float:
-        """Mean heat of a coil of a run, W."""
-        coil, keys = self.scene.coil, ("coil.resistance", "circuit.sense_resistance")
-        own = (coil.resistance, self.scene.circuit.sense_resistance)
-        copper, sense = (float(settings.get(k, value)) for k, value in zip(keys, own, strict=True))
-        lasted = float(settings.get("run.duration", self.scene.run.duration))
-        each = numbers["energy_copper"] / coil.count
-        return coil_heat(each, lasted, copper, coil.count * sense)
+        return numbers["coil_heat"] * case.machine.coil_scale
 
     def command(self, settings: Settings) -> str:
         """The one command that repeats a run."""

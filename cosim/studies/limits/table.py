@@ -4,8 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
 
+from cosim.circuit.heat import DRIVE_RANGE_HEAT
 from cosim.scene import Scene
-from cosim.simulation.guards import CARLTON_HEAT
+from cosim.simulation.summary import budget
 from cosim.studies.limits.aims import RANGE
 
 Settings = dict[str, float | int | str]
@@ -19,7 +20,7 @@ class Machine:
     settings: Settings = field(default_factory=dict[str, float | int | str])
     reach: float = 1.0
     """Times the knobs' own range in volts."""
-    heat: float = CARLTON_HEAT
+    heat: float = DRIVE_RANGE_HEAT
     """W: what the coil bears."""
     coil_scale: float = 1.0
     """Times its true heat and true current, of a coil that was scaled, that of the run."""
@@ -140,7 +141,7 @@ LIMITS = (
         _back_emf, more_is_better=False, real=False,
     ),
     Limit(
-        "coil heat", "W", 1.0, lambda _: CARLTON_HEAT, (0.9, 1.8, 7.0), inf,
+        "coil heat", "W", 1.0, lambda _: DRIVE_RANGE_HEAT, (0.9, 1.8, 7.0), inf,
         lambda _, value: Machine(heat=value), real=False,
     ),
     Limit(
@@ -159,8 +160,7 @@ LIMITS = (
 )  # fmt: skip
 
 
-def needed_acceleration(scene: Scene) -> float:
-    """mu_s F_n / m_p + g, m/s²: downwards, where the part begins to slip (the paper, section 2)."""
-    friction, mechanics = scene.friction, scene.mechanics
-    pull = friction.mu_s * friction.normal_force * mechanics.n_surfaces
-    return pull / mechanics.part_mass + mechanics.gravity
+def slip_falls(scene: Scene) -> dict[str, float]:
+    """The surface's downward accelerations, m/s² at an instant, from which on a part that goes up
+    or down slips."""
+    return {f"going {way}": -fall for way, (fall, _) in budget(scene).items()}

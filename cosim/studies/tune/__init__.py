@@ -19,7 +19,26 @@ STUDIES = (
             Option("--maximise", "a number of the summary: v_average, …", "NAME", one_of="goal"),
             Option("--minimise", "the same, downwards", "NAME", one_of="goal"),
             OVER,
-            Option("--budget", "runs in all", "N", int, 200),
+            Option("--budget", "settings run in all, of each waveform", "N", int, 200),
+            Option(
+                "--waveform",
+                "search each of these by itself, with the numbers of its shape: sawtooth, "
+                "falling-sawtooth, sine, square, steps:N, pieces:N with N levels",
+                "NAME,...",
+                kind=lambda names: names.split(","),
+            ),
+            Option("--polarity", "search both polarities of the coil", kind=bool),
+            Option(
+                "--robust",
+                "the median over all turns of the keys by 2 %, 15 runs a setting of three knobs",
+                kind=bool,
+            ),
+            Option(
+                "--heat",
+                "most of a coil, W, or the winding's rise in cycles (default: 3.5 W, the most that "
+                "the drives of the Carlton's data sheet make)",
+                "W|K:DUTY:SECONDS",
+            ),
             *(SEED, WORKERS, DASK),
         ),
         command="tune",

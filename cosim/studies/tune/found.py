@@ -56,6 +56,14 @@ class Tuning:
     seed: int
     by_fast: float | None = None
     """The value at the best run by the fast solver, where that searched: the FMU has judged."""
+    waveform: str = ""
+    """The family that was searched; empty for the scene's own waveform."""
+    robust: bool = False
+    """Whether values are medians over the turns of the keys."""
+    heat: float = inf
+    """W: the most in a coil."""
+    others: tuple["Tuning", ...] = ()
+    """What was found for other waveforms."""
 
     @property
     def failed(self) -> int:
@@ -83,7 +91,8 @@ class Tuning:
         return _figure(self)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write ``tune.json``, ``tune.csv``, ``best.toml`` and ``figure.png``."""
+        """Write ``tune.json``, ``tune.csv``, ``best.toml`` and ``figure.png``; of each other
+        waveform ``best-WAVEFORM.toml``."""
         _write(Path(folder), self)
         self.plot().write(Path(folder) / "figure.png")
 
@@ -106,6 +115,13 @@ def _write(folder: Path, tuning: Tuning) -> None:
         "search": "Sobol sequence, then CMA-ES",
         "scouts": tuning.scouts,
         "value_by_fast_solver": tuning.by_fast,
+        "waveforms": {
+            one.waveform: {"value": one.best.value, "settings": one.best.values}
+            for one in (tuning, *tuning.others)
+            if one.waveform
+        },
+        "robust": tuning.robust,
+        "heat_limit": tuning.heat if isfinite(tuning.heat) else None,
         "turns": [-TURN, TURN],
         "neighbours": tuning.neighbours,
         "robustness": _robustness(tuning),
@@ -115,7 +131,9 @@ def _write(folder: Path, tuning: Tuning) -> None:
     aim = f"{'largest' if tuning.largest else 'least'} {tuning.quantity}"
     found = {"name": f"{tuning.scene.name}-tuned"[:64], "description": f"Tuned for the {aim}"}
     write_json(folder / "tune.json", numbers)
-    write_text(folder / "best.toml", to_toml(tuning.scene.model_copy(update=found)))
+    for one in (tuning, *tuning.others):
+        name = "best" if one is tuning else f"best-{one.waveform.replace(':', '-')}"
+        write_text(folder / f"{name}.toml", to_toml(one.scene.model_copy(update=found)))
 
 
 def write_runs(path: Path, runs: Sequence[Run], quantity: str) -> None:
@@ -138,7 +156,7 @@ def _robustness(tuning: Tuning) -> str:
         return ""
     cost = "loses it altogether" if lost >= 1.0 else f"costs at most {max(lost, 0.0):.1%}"
     if lost == inf:
-        cost = "leads to a run that fails"
+        cost = "leads to a run that fails or is too hot"
     return f"turning one key by {TURN:.0%} of its range {cost}"
 
 
@@ -162,7 +180,7 @@ def _table(tuning: Tuning) -> str:
     ahead = f" ({tuning.scouts} ahead, cheaper)" if tuning.scouts else ""
     lines = [
         f"{tuning.quantity} = {with_unit(value * scale, unit, 5)} after {len(tuning.runs)} runs"
-        f"{ahead}, {tuning.failed} failed, at"
+        f"{ahead}, {tuning.failed} failed or too hot, at"
     ]
     if tuning.by_fast is not None:
         told = with_unit(tuning.by_fast * scale, unit, 5)
@@ -175,6 +193,11 @@ def _table(tuning: Tuning) -> str:
         lines.append(line)
     if words := _robustness(tuning):
         lines.append(f"  {words}")
+    if tuning.robust:
+        lines.append(f"  values are medians over the keys' turns by {TURN:.0%}")
+    for one in (tuning, *tuning.others) if tuning.others else ():
+        assert one.best.value is not None
+        lines.append(f"  {one.waveform}: {with_unit(one.best.value * scale, unit, 4)}")
     return "\n".join(lines)
 
 
@@ -201,16 +224,17 @@ def _figure(tuning: Tuning) -> Picture:
     )  # fmt: skip
     path_axis.set(xlabel="run", ylabel=ylabel)
     words = "Every run, and the best so far" + (
-        f"; {len(failed)} failed (×)" if len(failed) else ""
+        f"; {len(failed)} failed or too hot (×)" if len(failed) else ""
     )
     path_axis.set_title(words, loc="left", fontsize=10.5)
 
     assert tuning.best.value is not None
     turns = 100 * np.array([-TURN, 0.0, TURN])
-    for (key, row), color in zip(tuning.neighbours.items(), COLORS * 3, strict=False):
+    styles = [(color, style) for style in ("-", "--", ":") for color in COLORS]
+    for (key, row), (color, style) in zip(tuning.neighbours.items(), styles, strict=False):
         low, high = (np.nan if value is None else value * scale for value in row)
         heights = [low, tuning.best.value * scale, high]
-        turn_axis.plot(turns, heights, color=color, marker="o", ms=4, label=key)
+        turn_axis.plot(turns, heights, color=color, ls=style, marker="o", ms=4, label=key)
     turn_axis.set(xlabel="turned by [% of the key's range]", ylabel=ylabel)
     turn_axis.set_title("The neighbourhood of the best", loc="left", fontsize=10.5)
     if tuning.neighbours:
@@ -230,7 +254,8 @@ def _figure(tuning: Tuning) -> Picture:
             axis.grid(alpha=0.25)
     best = with_unit(tuning.best.value * scale, unit, 4)
     figure.suptitle(
-        f"{tuning.scene.name}: {tuning.quantity} {best} after {len(values)} runs"
+        f"{tuning.scene.name}{tuning.waveform and f', {tuning.waveform}'}: "
+        f"{'robust ' * tuning.robust}{tuning.quantity} {best} after {len(values)} runs"
         + (f", and {tuning.scouts} ahead, cheaper" if tuning.scouts else ""),
         fontsize=12,
     )

@@ -2,8 +2,8 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from pathlib import Path
 
@@ -16,12 +16,14 @@ from cosim.evaluate.keys import FREQUENCIES, numeric_key
 from cosim.evaluate.point import Number, Outcome, periods_made_whole
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
+from cosim.scene.tables import COMMANDS
 from cosim.search.climb import POPULATION, Climb
 from cosim.search.design import Design
 from cosim.search.known import Known
 from cosim.search.protocol import Feasible
-from cosim.search.turns import TURN, faces
+from cosim.search.turns import TURN, corners, faces
 from cosim.simulation.fidelity import Fidelity
+from cosim.studies.tune.families import family, most_heat
 from cosim.studies.tune.found import Run, Tuning, write_runs
 
 KNOBS: dict[str, tuple[float, float]] = {
@@ -62,6 +64,10 @@ def tune(
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     dask: str | None = None,
+    waveform: str | Sequence[str] = (),
+    polarity: bool = False,
+    robust: bool = False,
+    heat: float | str | None = None,
     progress: Callable[[Run, Run | None], None] = lambda run, best: None,
     scouting: Callable[[Run, Run | None], None] = lambda run, best: None,
 ) -> Tuning:
@@ -76,6 +82,12 @@ def tune(
     address ``dask``. ``progress`` is told each run and the best so far, as they finish,
     ``scouting`` each one ahead. Where the frequency is tuned, each run lasts whole periods.
 
+    Each ``waveform``, as :func:`family` names them, is searched by itself with the numbers of its
+    shape beside the keys, and with both polarities of the coil where ``polarity`` is asked for; the
+    best one is given, with the ``others``. A ``robust`` search makes of each setting the median
+    over all turns of the keys of ``over``, or the worst of them where that is not above zero. No
+    setting counts that makes more ``heat`` in a coil than :func:`most_heat` has.
+
     In the folder ``out`` it leaves what ``Tuning.save`` writes, and takes up what an interrupted
     search has left there.
 
@@ -88,51 +100,68 @@ def tune(
     scene = load(scene, overrides)
     if seed < 0:
         raise BadInput(f"--seed {seed}: must be a whole number from 0.")
-    if not over and scene.drive.waveform != "sawtooth":
+    if not over and not waveform and scene.drive.waveform not in COMMANDS:
         raise BadInput(
             f'scene {scene.name}: drive.waveform = "{scene.drive.waveform}" has no knobs; name '
             "what to tune with --over table.key=low:high."
         )
-    ranges = _checked(over or KNOBS)
-    turned = 2 * len(ranges)
-    least = FEWEST_RUNS + turned
-    if not least <= budget <= MOST_RUNS:
-        raise BadInput(
-            f"--budget {budget}: must be a whole number from {least}, for these keys, to "
-            f"{MOST_RUNS}."
-        )
-    path = None if out is None else Path(out) / STORE
-    whole_periods = any(key in FREQUENCIES for key in ranges)
+    keys = _checked(over or KNOBS)
+    most = most_heat(scene, heat)
+    both = {"coil.polarity": (-1.0, 1.0)} if polarity else {}
+    families: dict[str, tuple[Scene, dict[str, tuple[float, float]]]] = {}
+    for name in ([waveform] if isinstance(waveform, str) else waveform) or [""]:
+        changes, shape = family(name) if name else ({}, {})
+        ranges = {**keys, **both, **shape}
+        least = FEWEST_RUNS + 2 * len(ranges)
+        if not least <= budget <= MOST_RUNS:
+            raise BadInput(
+                f"--budget {budget}: must be a whole number from {least}, for these keys, to "
+                f"{MOST_RUNS}."
+            )
+        families[name] = changed(scene, changes, "--waveform"), ranges
     heard: list[Run] = []
+    path = None if out is None else Path(out)
 
     def told(run: Run, best: Run | None) -> None:
         heard.append(run)
         progress(run, best)
 
-    with Evaluator(scene, path, whole_periods=whole_periods, workers=workers, dask=dask) as bench:
-        try:
-            aim = _Aim(bench, quantity, largest, ranges)
-            best, neighbours, runs, ahead = _searched(aim, scene, budget, seed, told, scouting)
-        except KeyboardInterrupt:
-            if out is not None:
-                write_runs(Path(out) / "tune.csv", heard, quantity)
-            raise
-        except BadInput:
-            if not bench.resumed:
-                bench.forget()  # there is nothing to go on with
-            raise
-        tuned = changed(scene, {**best.values, **_judge(scene)}, "tune")
-        if whole_periods:
-            tuned = changed(tuned, periods_made_whole(tuned), "tune")
-        scouts, by_fast = 0 if ahead is None else len(ahead.runs), None
-        if ahead is not None and _judge(scene):
-            by_fast = ahead.value(best.values)
-        found = Tuning(
-            *(quantity, largest, ranges, runs, best, neighbours, tuned, scouts, seed, by_fast)
-        )
+    tunings, benches = [], []
+    with ExitStack() as stack:
+        for name, (base, ranges) in families.items():
+            store = path and path / (f"{name.replace(':', '-')}-{STORE}" if name else STORE)
+            whole = any(key in FREQUENCIES for key in ranges)
+            bench = Evaluator(base, store, whole_periods=whole, workers=workers, dask=dask)
+            benches.append(stack.enter_context(bench))
+            aim = _Aim(bench, quantity, largest, ranges, len(keys) if robust else 0, most)
+            try:
+                best, neighbours, runs, ahead = _searched(aim, base, budget, seed, told, scouting)
+            except KeyboardInterrupt:
+                if path is not None:
+                    write_runs(path / "tune.csv", heard, quantity)
+                raise
+            except BadInput:
+                if not bench.resumed:
+                    bench.forget()  # there is nothing to go on with
+                raise
+            tuned = changed(base, {**best.values, **_judge(base)}, "tune")
+            if whole:
+                tuned = changed(tuned, periods_made_whole(tuned), "tune")
+            scouts, by_fast = 0 if ahead is None else len(ahead.runs), None
+            if ahead is not None and _judge(base):
+                by_fast = ahead.value(best.values)
+            tunings.append(
+                Tuning(
+                    *(quantity, largest, ranges, runs, best, neighbours, tuned, scouts, seed),
+                    *(by_fast, name, robust, most),
+                )
+            )
+        tunings.sort(key=lambda one: one.best.value or 0.0, reverse=largest)
+        found = replace(tunings[0], others=tuple(tunings[1:]))
         if out is not None:
             found.save(out)
-            bench.forget()
+            for bench in benches:
+                bench.forget()
     return found
 
 
@@ -153,6 +182,10 @@ class _Aim:
     quantity: str
     largest: bool
     ranges: dict[str, tuple[float, float]]
+    turned: int
+    """How many keys, the first ones, are turned about each setting."""
+    heat: float
+    """W: the most in a coil."""
 
 
 Progress = Callable[[Run, Run | None], None]
@@ -240,23 +273,51 @@ class _Trial:
         return {key: [values[len(keys) + k], values[k]] for k, key in enumerate(keys)}
 
     def _run(self, points: Array) -> tuple[Array, Feasible]:
-        settings = [self._settings(point.tolist()) for point in points]
+        each = [[self._settings(near.tolist()) for near in self._around(point)] for point in points]
+        count = len(each[0])
+        asked = ({**self._circuit, **values} for around in each for values in around)
+        heard: list[dict[int, Outcome]] = [{} for _ in each]
         found: dict[int, Run] = {}
-        asked = ({**self._circuit, **values} for values in settings)
         for number, outcome in self._aim.bench.run(enumerate(asked)):
-            found[number] = Run(settings[number], outcome, self._value(outcome))
-            self._progress(found[number], self.best)
+            n, k = divmod(number, count)
+            heard[n][k] = outcome
+            if len(heard[n]) == count:
+                found[n] = self._heard(each[n][0], [heard[n][k] for k in range(count)])
+                self._progress(found[n], self.best)
         runs = [found[number] for number in range(len(points))]
         self.runs += runs
         scores = np.array([[self._score(run.value)] for run in runs])
         return scores, np.isfinite(scores[:, 0])
+
+    def _around(self, point: Array) -> Array:
+        """A point and, of a robust search, all turns of its first keys (rows)."""
+        count = self._aim.turned
+        if not count:
+            return point[np.newaxis]
+        turned = np.vstack([point[:count], faces(point[:count]), corners(point[:count])])
+        return np.hstack([turned, np.tile(point[count:], (len(turned), 1))])
+
+    def _heard(self, settings: dict[str, Number], outcomes: Sequence[Outcome]) -> Run:
+        """A setting with its own outcome, the first, and those of its turns, which are judged by
+        their motion alone: a hand that is off turns back."""
+        own, most = outcomes[0], self._aim.heat
+        if (heat := own.numbers.get("coil_heat", 0.0)) > most:
+            own = replace(own, failure=f"the heat of {heat:.3g} W in a coil is above {most:.3g} W")
+            return Run(settings, own, None)
+        scores = [self._score(self._value(outcome)) for outcome in outcomes]
+        score = float(np.median(scores)) if min(scores) > 0.0 else min(scores)
+        value = score if self._aim.largest else -score
+        return Run(settings, own, value if isfinite(value) else None)
 
     def _settings(self, point: Sequence[float]) -> dict[str, Number]:
         """The keys' values at a point of the unit cube."""
         settings: dict[str, Number] = {}
         for (name, (low, high)), share in zip(self._aim.ranges.items(), point, strict=True):
             value = min(max(low + share * (high - low), low), high)
-            settings[name] = round(value) if numeric_key(name).kind is int else value
+            key = numeric_key(name)
+            if key.choices:
+                value = min(map(int, key.choices), key=lambda one: abs(one - value))
+            settings[name] = round(value) if key.kind is int else value
         return settings
 
     def _value(self, outcome: Outcome) -> float | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
+from cosim.scene import Scene, load
 from cosim.waveforms.identity import tell_strangers
 from cosim.waveforms.storage import read_netcdf
 
@@ -59,3 +60,14 @@ def read(folder: Path) -> Run:
     }
     written = datetime.fromtimestamp(path.stat().st_mtime, UTC)
     return Run(folder, waveforms, units, about, written)
+
+
+def driven(run: Run, form: str) -> Scene:
+    """The scene of a run that a command drives; raises BadInput for another."""
+    scene = load(run.folder / "scene.toml")
+    if not scene.rung.driven:
+        raise BadInput(
+            f"{plain(str(run.folder))}: {form} needs a run with a coil, not one with circuit.model "
+            f'= "{scene.circuit.model}".'
+        )
+    return scene

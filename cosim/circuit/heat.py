@@ -1,0 +1,90 @@
+"""How warm a coil becomes: two nodes, winding and body, each with its capacity and its resistance.
+
+    C_w Ṫ_w = P − (T_w − T_b)/R_w        C_b Ṫ_b = (T_w − T_b)/R_w − T_b/R_b
+
+with P the heat of the winding, W, and rises over the air, K. That warm copper has 0.39 %/K more
+resistance is left out. **An estimate, no rating:** the data sheet of the Carlton (C-151L337V5R2)
+gives a range of drives, 3.6 to 10 V peak-to-peak, and 125 mA rms, but no power and no temperature.
+Body: its 20.5 cm² lose 10 to 15 W/(m² K) to still air, and its 15 g hold 0.4 to 0.67 J/(g K).
+Winding, assumed: the 0.9 to 3.6 g of copper that make 7.1 Ohm of wire of 0.14 to 0.2 mm, in a gap
+of a few tenths of a millimetre.
+"""
+
+from math import expm1, inf, sqrt
+from typing import Any
+
+from cosim.errors import BadInput
+from cosim.scene import Scene
+from cosim.scene.tables import Coil
+
+DRIVE_RANGE_HEAT = 5.0**2 / 7.1
+"""W: the most that any drive within the Carlton's range makes of its 7.1 Ohm: a square wave of
+10 V peak-to-peak without offset. It is no rating; the authors saw the housing melt (README of their
+repository)."""
+
+LIFT = 10.0
+"""s: a lift, of which a summary tells the rise."""
+
+SPREAD = {
+    **{"winding_to_body": 2.0, "winding_capacity": 1.9},
+    **{"body_to_air": 1.22, "body_capacity": 1.25},
+}
+"""Factor, either way, by which each parameter of the estimate may be off."""
+
+
+def modes(
+    winding_to_body: float, body_to_air: float, winding_capacity: float, body_capacity: float
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Resistance (K/W) and time constant (s) of both exponentials of the winding's rise, which is
+    P Σ r (1 − exp(−t/τ)) under a constant heat from t = 0 on."""
+    both = winding_to_body + body_to_air
+    zero = winding_to_body * body_to_air * body_capacity
+    sum_of_both = winding_capacity * both + body_capacity * body_to_air
+    slow = 0.5 * (sum_of_both + sqrt(sum_of_both**2 - 4.0 * winding_capacity * zero))
+    fast = winding_capacity * zero / slow
+    # Z(s) = (R_w + R_b + s R_w R_b C_b) / ((1 + s slow)(1 + s fast)), in partial fractions.
+    share = (both * slow - zero) / (slow - fast)
+    return (share, slow), (both - share, fast)
+
+
+def rise(coil: Coil, on_time: float = inf, duty: float = 1.0, side: int = 0) -> float:
+    """The winding's greatest rise over the air, K, for each watt while it is on: for ``on_time``
+    (s) of each of many cycles, their share ``duty``, where 0 is a single one. ``side`` 1 and -1
+    take the upper and lower end of the estimate.
+    """
+    given = {name: getattr(coil, name) for name in SPREAD}
+    for name, factor in SPREAD.items():
+        given[name] *= factor ** (-side if name.endswith("capacity") else side)
+    cycle = on_time / duty if duty else inf
+    return sum(r * expm1(-on_time / tau) / expm1(-cycle / tau) for r, tau in modes(**given))
+
+
+def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float = LIFT) -> float:
+    """The heat of the winding while it is on, W, with which it rises by ``rise_limit`` (K) over the
+    air at most, in cycles of which it is on for ``on_time`` (s), their share ``duty``.
+
+    Raises BadInput for what is none of these.
+    """
+    if not (rise_limit > 0.0 and 0.0 <= duty <= 1.0 and on_time > 0.0):
+        raise BadInput(
+            f"A limit of heat needs a rise above 0 K, a duty from 0 to 1 and a time above 0 s, not "
+            f"{rise_limit:g} K, {duty:g} and {on_time:g} s."
+        )
+    return rise_limit / rise(coil, on_time if duty < 1.0 else inf, duty)
+
+
+def heats(scene: Scene, energy_copper: float) -> dict[str, Any]:
+    """What a summary tells of the heat: that of one coil (W), and its rises (K), from the lower to
+    the upper end of the estimate. ``energy_copper`` (J) is that of all coils and sense resistors.
+    """
+    coil = scene.coil
+    # A user's netlist has the sense resistor's share to itself.
+    sense = 0.0 if scene.rung.own_netlist else coil.count * scene.circuit.sense_resistance
+    share = coil.resistance / (coil.resistance + sense)
+    coils = coil.count * (1 if scene.drive.phase_deg is None else 2)
+    heat = energy_copper / coils / scene.run.duration * share
+    return {
+        "coil_heat": heat,
+        "coil_rise_lift": [heat * rise(coil, LIFT, 0.0, side) for side in (-1, 1)],
+        "coil_rise_continuous": [heat * rise(coil, side=side) for side in (-1, 1)],
+    }

@@ -1,0 +1,83 @@
+"""The estimate of the winding's temperature: against the two equations, integrated by SciPy."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from cosim.circuit.heat import DRIVE_RANGE_HEAT, SPREAD, heat_limit, modes, rise
+from cosim.errors import BadInput
+from cosim.scene import load
+from cosim.scene.tables import Coil
+from cosim.simulation.simulate import summary
+
+COIL = Coil()
+
+
+def integrated(coil: Coil, heat: float, times: list[float]) -> np.ndarray:
+    """Rises of the winding (K) at the end of stretches with and without the heat, by turns."""
+
+    def slope(power: float):
+        def of(_: float, t: np.ndarray) -> list[float]:
+            across = (t[0] - t[1]) / coil.winding_to_body
+            away = t[1] / coil.body_to_air
+            return [(power - across) / coil.winding_capacity, (across - away) / coil.body_capacity]
+
+        return of
+
+    state, ends = np.zeros(2), []
+    for number, length in enumerate(times):
+        power = heat if number % 2 == 0 else 0.0
+        found = solve_ivp(slope(power), (0, length), state, rtol=1e-10, atol=1e-12, method="Radau")
+        state = found.y[:, -1]
+        ends.append(state[0])
+    return np.array(ends)
+
+
+@pytest.mark.parametrize("lasts", [0.5, 10.0, 300.0, 5000.0])
+def test_rise_is_that_of_the_equations(lasts: float) -> None:
+    (exact,) = integrated(COIL, 3.5, [lasts])
+    assert 3.5 * rise(COIL, lasts, 0.0) == pytest.approx(exact, rel=1e-7)
+
+
+@pytest.mark.parametrize(("on", "duty"), [(10.0, 0.3), (60.0, 0.5), (2.0, 0.05)])
+def test_cycles_are_those_of_the_equations(on: float, duty: float) -> None:
+    cycles = int(3000.0 / (on / duty))
+    exact = integrated(COIL, 2.0, [on, on / duty - on] * cycles)
+    assert 2.0 * rise(COIL, on, duty) == pytest.approx(exact[:-1:2].max(), rel=1e-3)
+
+
+def test_ends_of_what_is_known() -> None:
+    """For ever only the resistances count; in an instant only the winding's capacity; always on is
+    no cycle; many short cycles are as their mean."""
+    both = COIL.winding_to_body + COIL.body_to_air
+    assert rise(COIL) == pytest.approx(both, rel=1e-12)
+    assert rise(COIL, 1e-4, 0.0) == pytest.approx(1e-4 / COIL.winding_capacity, rel=1e-3)
+    assert rise(COIL, 10.0, 1.0) == pytest.approx(both, rel=1e-12)
+    assert rise(COIL, 1e-3, 0.2) == pytest.approx(0.2 * both, rel=1e-3)
+    times = [tau for _, tau in modes(**{name: getattr(COIL, name) for name in SPREAD})]
+    assert times[0] > times[1] > 0.0
+    # 33 to 49 K/W of the body, 6 to 10 J/K, 5 to 20 K/W of the winding, 0.4 to 1.4 J/K
+    assert rise(COIL, side=-1) == pytest.approx(33 + 5, rel=0.02)
+    assert rise(COIL, side=1) == pytest.approx(49 + 20, rel=0.02)
+
+
+def test_limit_of_heat() -> None:
+    assert heat_limit(COIL, 60.0) == pytest.approx(60.0 / 50.0)
+    assert heat_limit(COIL, 60.0, 0.3, 10.0) * rise(COIL, 10.0, 0.3) == pytest.approx(60.0)
+    assert heat_limit(COIL, 60.0, 0.0, 10.0) > heat_limit(COIL, 60.0, 0.3, 10.0) > 1.2
+    assert pytest.approx(3.521, abs=1e-3) == DRIVE_RANGE_HEAT
+    for wrong in ((0.0, 1.0, 1.0), (60.0, 1.1, 1.0), (60.0, 0.5, 0.0)):
+        with pytest.raises(BadInput, match="a duty from 0 to 1"):
+            heat_limit(COIL, *wrong)
+
+
+@pytest.mark.parametrize("model", ["ideal", "limited", "amplifier"])
+def test_a_run_tells_its_heat(model: str) -> None:
+    """A square wave too slow to matter, of 2 V on 4 Ohm, and the ram held still by a stiff spring:
+    i² R is 0.25 A² times 7.1 Ohm."""
+    still = {"mechanics.suspension_k1": 1e5, "run.duration": 0.2, "run.settle": 0.1}
+    drive = {"drive.waveform": "square", "drive.amplitude": 4.0, "drive.offset": 0.0}
+    told = summary(load("reference", {"circuit.model": model, **still, **drive}))
+    assert told["coil_heat"] == pytest.approx(0.25 * 7.1, rel=0.02)
+    low, high = told["coil_rise_continuous"]
+    assert (low / told["coil_heat"], high / told["coil_heat"]) == pytest.approx((38, 69), rel=0.02)
