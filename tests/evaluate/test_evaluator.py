@@ -5,7 +5,6 @@ import threading
 import time
 from collections import Counter
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,6 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import Outcome
 from cosim.scene import load
 from cosim.studies.limits import report
-from cosim.studies.limits.search import Effort
-from cosim.studies.limits.study import Efforts
 from cosim.studies.sweep.run import sweep
 from tests.helpers import needs
 
@@ -66,9 +63,7 @@ def test_dask_workers_that_are_killed(
     study: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The cluster starts others, and the result is that of this machine alone."""
-    few = Effort(8, 0, 0, rounds=0)
-    monkeypatch.setattr(report, "LIMITS", [replace(report.LIMITS[0], values=())])
-    monkeypatch.setattr(report, "QUICK", Efforts(Effort(16, 1, 0, rounds=0), few, few, 1))
+    monkeypatch.setattr(report, "CHANGES", report.CHANGES[:2])
     cluster = pytest.importorskip("distributed").LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address="", host="127.0.0.1"
     )
@@ -79,7 +74,7 @@ def test_dask_workers_that_are_killed(
             changes = {"run.duration": 10.0, "run.settle": 0.1}
             sweep("ideal-current", over, changes, out=out, **where)
             return (out / "sweep.nc").read_bytes()
-        cosim.limits("paper", at=["trial-05"], quick=True, out=out, **where)
+        cosim.limits("paper", quick=True, effort=0.2, out=out, **where)
         return (out / "limits.csv").read_bytes()
 
     over, killed = threading.Event(), []

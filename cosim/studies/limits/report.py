@@ -1,177 +1,110 @@
 """The whole study, and limits.csv, limits.md and the figures that it leaves."""
 
 import os
-from collections.abc import Mapping, Sequence
-from math import nan
+from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite, nan
 from pathlib import Path
 
 from cosim.errors import BadInput
+from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.store import Store
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
-from cosim.studies.limits import answer, figures
-from cosim.studies.limits.aims import QUANTITIES
-from cosim.studies.limits.answer import Change, changes, height
-from cosim.studies.limits.at import There, acting
-from cosim.studies.limits.at import at as lifted_at
-from cosim.studies.limits.confirm import Point, Points, confirmed, judged
-from cosim.studies.limits.runs import Bench
-from cosim.studies.limits.study import (
-    FULL,
-    IDEAL,
-    OWN,
-    QUICK,
-    Study,
-    checked,
-    ensemble,
-    study,
-    told_count,
-)
-from cosim.studies.limits.table import LIMITS, Limit, slip_falls
+from cosim.studies.limits import figures
+from cosim.studies.limits.answer import BY_NAME, gains, noise, sentences
+from cosim.studies.limits.changes import CHANGES, Settings
+from cosim.studies.limits.judge import Key, Point
+from cosim.studies.limits.runs import GOALS, NEEDED, command
+from cosim.studies.limits.study import FULL, QUICK, Study, checked, ensemble, steps, study
 from cosim.studies.report import Progress, Report, counted, silent
 from cosim.studies.tables import Row
-
-
-def report(bench: Bench, study: Study, points: Points, there: Sequence[There]) -> Report:
-    """What the study tells."""
-    found = changes(study, points)
-    said = [text for text in answer.paragraphs(study, points, found) if text]
-    if not_held := answer.refuted(points):
-        said.append(
-            f"Of {len(points)} points the more complete circuit does not confirm {len(not_held)} "
-            f"within {bench.fidelity.tolerance:.1%}; limits.csv has both values."
-        )
-    if sought := answer.sought(points):
-        said.append(
-            "Best points sought on the more complete circuit itself, since it refuted all good "
-            f"settings of the cheapest one: {len(sought)}."
-        )
-    tables: dict[str, Sequence[Row]] = {
-        "What is achievable": achieved(study, points),
-        "What lifting each limit changes, in per cent of the frontier": lifted(found),
-    }
-    if there:
-        tables["What each limit costs at given settings: change of v_average without it, mm/s"] = [
-            at_row(one, study.limits) for one in there
-        ]
-    commands = [
-        {
-            "": QUANTITIES[point.quantity].title,
-            "setting": point.kind,
-            "command": f"`{bench.command(point.settings)}`",
-        }
-        for point in points.values()
-        if point.name == OWN
-    ]
-    tables["How the points of the own circuit are repeated; limits.csv has those of all"] = commands
-    return Report(
-        "limits", "What is achievable, and which limit binds",
-        [row(bench, study, point) for point in points.values()], said, tables,
-        figures.drawn(study, points, found, there), "\n\n".join(said),
-    )  # fmt: skip
-
-
-def row(bench: Bench, study: Study, point: Point) -> Row:
-    """A point of a frontier, as a row of the table."""
-    quantity, setting = QUANTITIES[point.quantity], point.setting
-    limit = next((limit for limit in study.limits if limit.name == point.name[0]), None)
-    scale = quantity.scale
-    return {
-        "limit": point.name[0],
-        "value": point.name[1] * limit.scale if limit else nan,
-        "unit": limit.unit if limit else "",
-        "lifted": bool(limit and point.name[1] == limit.gone),
-        "ratings": answer.rated(limit, point.name[1]).strip(" ()") if limit else "",
-        "quantity": quantity.name,
-        "setting": point.kind,
-        "found": setting.value * scale,
-        "median over turns": setting.median * scale,
-        "worst over turns": setting.worst * scale,
-        "unit of these": quantity.unit,
-        "drive.frequency [Hz]": point.settings["drive.frequency"],
-        "drive.amplitude [V]": point.settings["drive.amplitude"],
-        "drive.offset [V]": point.settings["drive.offset"],
-        "heat of a coil [W]": point.heat,
-        "found on": point.settings["circuit.model"],
-        "judged on": point.rung,
-        "there": point.judged * scale,
-        "off [%]": 100.0 * abs(point.judged / setting.value - 1.0),
-        "confirmed": point.holds,
-        "on full": point.full * scale,
-        "refuted before it": point.refuted,
-        "command": bench.command(point.settings),
-    }
-
-
-def achieved(study: Study, points: Points) -> list[Row]:
-    """A row for each quantity: the own circuit and the ideal current."""
-    found = []
-    for number, quantity in enumerate(QUANTITIES):
-        best, robust = (points.get((OWN, number, kind)) for kind in ("best", "robust"))
-        scale = quantity.scale
-        others = [
-            rig.found[OWN][number].settings[0].value * scale
-            for rig in study.rigs[1:]
-            if rig.found[OWN][number].settings
-        ]
-        found.append(
-            {
-                "": f"{quantity.title} [{quantity.unit}]",
-                "name": quantity.name,
-                "best": height(best) * scale,
-                "robust: median": height(robust) * scale,
-                "robust: worst": robust.setting.worst * scale if robust else nan,
-                "best, ideal current": height(points.get((IDEAL, number, "best"))) * scale,
-                "robust, ideal current": height(points.get((IDEAL, number, "robust"))) * scale,
-                "best, other rigs": " to ".join(f"{x:.4g}" for x in (min(others), max(others)))
-                if others
-                else "-",
-                **{
-                    f"slips, {way}": fall if quantity.falls else nan
-                    for way, fall in slip_falls(study.scene).items()
-                },
-                "best on amplifier": best.judged * scale if best else nan,
-                "best on full": best.full * scale if best else nan,
-            }
-        )
-    return found
-
-
-def lifted(found: Sequence[Change]) -> list[Row]:
-    """A row for each limit: its verdict and interval for each quantity."""
-    rows = []
-    for name in answer.largest(found):
-        row: Row = {"limit": name}
-        for change in (change for change in found if change.limit.name == name):
-            title = QUANTITIES[change.quantity].name
-            told = f"{change.verdict}: {answer.interval(change)}" if change.every else "-"
-            row[title] = told
-        rows.append(row)
-    return rows
-
-
-def at_row(there: There, limits: Sequence[Limit]) -> Row:
-    """A scene's own setting and what it would do without each limit."""
-    own = there.own.numbers.get("v_average", nan) * 1e3
-    row: Row = {"scene": there.scene.name, "v_average [mm/s]": own, "coil's heat [W]": there.heat}
-    for limit in acting(limits):
-        row[limit.name] = cost(there, limit) * 1e3
-    return row
-
-
-def cost(there: There, limit: Limit) -> float:
-    """The change of v_average, m/s, when a limit is lifted at a scene's own setting."""
-    after, before = (
-        outcomes[limit.name].numbers.get("v_average", nan)
-        for outcomes in (there.lifted, there.against)
-    )
-    return after - before
-
 
 STORE = "limits.sqlite"
 
 LEAST_EFFORT, MOST_EFFORT = 0.01, 100.0
 
-TRIALS = tuple(f"trial-{number:02d}" for number in range(1, 11))
+
+def report(found: Study, asked: str) -> Report:
+    """What the study tells; ``asked`` are the words after ``cosim run`` for its scene."""
+    said = sentences(found)
+    tables: dict[str, Sequence[Row]] = {
+        f"What each change brings: {goal.title} [{goal.unit}]": [*_gains(found, goal.name)]
+        for goal in GOALS
+    }
+    tables["How the device as it is, and its best shapes, are repeated"] = [
+        {"change": change, "goal": goal, "kind": kind, "command": f"`{command(asked, settings)}`"}
+        for (change, goal, kind), point in found.rigs[0].points.items()
+        if _group(change) in ("", "waveform") and (settings := point.settings)
+    ]
+    return Report(
+        *("limits", "What is achievable, and what would change it"),
+        *([*_rows(found, asked)], said, tables, figures.drawn(found), "\n\n".join(said)),
+    )
+
+
+def _group(name: str) -> str:
+    return next(change.group for change in CHANGES if change.name == name)
+
+
+def _rows(found: Study, asked: str) -> Iterator[Row]:
+    """A row for each point on each rig."""
+    for number, rig in enumerate(found.rigs):
+        for key, point in rig.points.items():
+            settings = rig.settings | point.settings
+            yield {"rig": number, **_row(key, point), "command": command(asked, settings)}
+
+
+def _row(key: Key, point: Point) -> Row:
+    change, name, kind = key
+    goal, settings = BY_NAME[name], point.settings
+    return {
+        "change": change,
+        "goal": name,
+        "kind": kind,
+        "value": point.value * goal.scale,
+        "median over turns": point.median * goal.scale,
+        "worst over turns": point.worst * goal.scale,
+        "unit": goal.unit,
+        "v_average [mm/s]": point.v_average * 1e3,
+        "a_camera [m/s²]": point.a_camera,
+        "heat of a coil [W]": point.heat,
+        "drive.frequency [Hz]": settings["drive.frequency"],
+        "drive.amplitude [V]": settings["drive.amplitude"],
+        "drive.offset [V]": settings["drive.offset"],
+        "judged on": point.rung,
+        "there": point.there * goal.scale,
+        "confirmed": point.confirmed if point.rung else "",
+    }
+
+
+def _gains(found: Study, name: str) -> Iterator[Row]:
+    """A row for each change, the largest gain first."""
+    goal = BY_NAME[name]
+    own, apart = found.rigs[0].points, noise(found, goal)
+    first = {kind: own.get((CHANGES[0].name, name, kind)) for kind in ("robust", "best")}
+    yield _gain_row(CHANGES[0].name, goal.scale, first["robust"], first["best"], "", "", apart)
+    for gain in gains(found, goal):
+        robust, best = (own.get((gain.change.name, name, kind)) for kind in ("robust", "best"))
+        low, high = (f"{100.0 * f(gain.every):+.0f}" if gain.every else "-" for f in (min, max))
+        change = f"{100.0 * gain.own:+.1f}" if isfinite(gain.own) else "-"
+        rigs = f"{100.0 * gain.middle:+.0f} ({low} to {high})" if len(gain.every) > 1 else "-"
+        yield _gain_row(gain.change.name, goal.scale, robust, best, change, rigs, apart)
+
+
+def _gain_row(
+    name: str, scale: float, robust: Point | None, best: Point | None,
+    change: str, rigs: str, apart: float,
+) -> Row:  # fmt: skip
+    return {
+        "change": name,
+        "robust (median)": robust.median * scale if robust else nan,
+        "worst of its turns": robust.worst * scale if robust else nan,
+        "gain [%]": change,
+        "over the rigs: median (range) [%]": rigs,
+        "noise [%]": f"{100.0 * apart:.1f}",
+        "best": best.value * scale if best else nan,
+        "its median": best.median * scale if best else nan,
+    }
 
 
 def limits(
@@ -179,7 +112,6 @@ def limits(
     overrides: Overrides | None = None,
     *,
     rigs: str | os.PathLike[str] | None = None,
-    at: Sequence[Scene | str | os.PathLike[str]] | None = None,
     seed: int = 0,
     quick: bool = False,
     effort: float = 1.0,
@@ -188,14 +120,15 @@ def limits(
     dask: str | None = None,
     progress: Progress = silent,
 ) -> Report:
-    """What the three knobs can achieve on a scene's rig, and which limit of the circuit binds.
+    """What is achievable on a scene's rig with the knobs, and what would change it: the command's
+    waveform, heat, grip, and each part of the circuit.
 
-    The best settings are searched with each limit as it is, eased, tightened and gone, and judged
-    by circuits with more in them. ``rigs`` is a file of others that may be meant, such as
-    ``identify.json``: JSON or TOML whose list ``ensemble`` has tables of keys and values. At the
-    scenes ``at`` (the trials') each limit is lifted at their own settings. ``quick`` searches
-    coarsely, ``effort`` multiplies what the searches may cost. The same for the same ``seed``, on
-    any number of ``workers`` or on the Dask cluster at the address ``dask``.
+    For each change the knobs are set anew, for what is the best and for what stays good when they
+    turn by ±2 %, by the fast solver; the FMU and the amplifier judge. ``rigs`` is a file of others
+    that may be meant, such as ``identify.json``: JSON or TOML whose list ``ensemble`` has tables of
+    keys and values; gains are paired on each. ``quick`` searches coarsely, ``effort`` multiplies
+    what the searches may cost. The same for the same ``seed``, on any number of ``workers`` or on
+    the Dask cluster at the address ``dask``.
 
     In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
     study has left there. Raises BadInput.
@@ -209,18 +142,20 @@ def limits(
         pairs = overrides.items() if isinstance(overrides, Mapping) else ()
         texts = [f"{key}={value}" for key, value in pairs] or list(overrides)
         words += [f"--set {text}" for text in texts]
-    base, there = load(scene, overrides), [load(one) for one in at or TRIALS]
+    base = load(scene, overrides)
     efforts = (QUICK if quick else FULL).times(effort)
-    others = ensemble(Path(rigs), efforts.rigs) if rigs is not None else []
+    others: list[Settings] = ensemble(Path(rigs)) if rigs is not None else []
     checked(base, others, rigs)
-    told = counted(progress, told_count(LIMITS, efforts, len(others)) + 2 + len(there))
+    told = counted(progress, steps(efforts, CHANGES, len(others)))
     path = None if out is None else Path(out) / STORE
-    with Bench(base, " ".join(words), path, workers, dask) as bench:
-        found = study(bench, others, LIMITS, seed, efforts, told)
-        points = confirmed(bench, found, told)
-        points |= judged(bench, found, points, told)
-        made = report(bench, found, points, lifted_at(bench, there, LIMITS, told))
+    with Store(path, base.as_dict(), others, seed, quick, effort) as store:
+        found = study(
+            *(base, others, store),
+            lambda rig: Evaluator(rig, kept=NEEDED, workers=workers, dask=dask),
+            *(seed, efforts, CHANGES, told),
+        )
+        made = report(found, " ".join(words))
         if out is not None:
             made.save(out)
-        bench.forget()
+        store.remove()
     return made

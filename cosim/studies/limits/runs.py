@@ -1,130 +1,144 @@
-"""What the runs of machines tell: scores, heat, and what coil and power amplifier bear."""
+"""What runs of a machine tell: the quantities that are wanted large, and what the coil bears."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, inf
-from pathlib import Path
 
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import Outcome
-from cosim.scene import Scene, changed, firmware
-from cosim.search.protocol import Feasible
-from cosim.simulation.fidelity import SEARCHES, Fidelity
-from cosim.studies.limits import aims
-from cosim.studies.limits.aims import NEEDED, QUANTITIES, Numbers, scores
-from cosim.studies.limits.table import Machine, Settings
+from cosim.scene import Scene, changed
+from cosim.scene.tables import KNOBS
+from cosim.search.protocol import Evaluate, Feasible
+from cosim.search.turns import corners, faces
+from cosim.studies.limits.changes import FREE, Machine, Settings
 
-SETTLE, SPAN = 0.4, 0.6
-"""s, left out of averages and averaged over, at least; made whole periods."""
+SETTLE, SPAN = 0.6, 0.6
+"""s, left out of averages and averaged over, at least, where many settings are searched."""
 
 OPA548_CURRENT = 5.0
 """A: the OPA548's peak current (data sheet SBOS070D)."""
 
+Numbers = Mapping[str, float]
+"""Of a run's summary, SI."""
+
 
 @dataclass(frozen=True)
-class Case:
-    """A machine on a rig, on a circuit; ``rig`` are the changes of the scene that make it."""
+class Goal:
+    """A number that is wanted large."""
 
-    rig: Settings
-    machine: Machine
-    rung: str = SEARCHES
-
-    def settings(self, point: Array) -> Settings:
-        """All that differs from the scene at a point of the cube; whole periods are run."""
-        turned = aims.settings(point, self.machine.reach)
-        there = {**self.rig, **self.machine.settings, **turned, "circuit.model": self.rung}
-        period = 1.0 / turned["drive.frequency"]
-        if there.get("drive.quantised"):
-            period = (
-                len(firmware.staircase(1, turned["drive.frequency"])) / firmware.STEPS_PER_SECOND
-            )
-        settle, span = (max(1, ceil(t / period - 1e-9)) for t in (SETTLE, SPAN))
-        times = {"run.settle": settle * period, "run.duration": (settle + span) * period}
-        return {**there, **times}
+    name: str
+    title: str
+    unit: str
+    """That of tables and figures."""
+    scale: float
+    """From SI to it."""
+    of: Callable[[Numbers], float]
 
 
-class Bench(Evaluator):
-    """Runs settings on top of ``scene``; to be used in a ``with`` block.
+GOALS = (
+    Goal("v_up", "mean velocity upwards", "mm/s", 1e3, lambda told: told["v_average"]),
+    Goal("v_down", "mean velocity downwards", "mm/s", 1e3, lambda told: -told["v_average"]),
+    Goal(
+        "a_camera", "downward acceleration, as a camera reads it", "m/s²", 1.0,
+        lambda told: -told["a_camera_min"],
+    ),
+)  # fmt: skip
 
-    ``asked`` are the words after ``cosim run`` that stand for the scene.
-    """
+NEEDED = ("v_average", "a_camera_min", "current_max", "current_min", "coil_heat")
+"""The numbers that anything here is made of."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        asked: str,
-        path: Path | None,
-        workers: int | None = None,
-        dask: str | None = None,
-    ) -> None:
-        own = aims.FREE | {
-            "circuit.model": SEARCHES, "drive.pwm_ripple": False, "drive.quantised": False,
-            "run.settle": SETTLE, "run.duration": SETTLE + SPAN,
-        }  # fmt: skip
-        self.scene = changed(scene, own, f"scene {scene.name}")
-        self.fidelity = Fidelity.of(scene)
-        tables = scene.as_dict()
-        self._unlike: Settings = {
-            key: value
-            for key, value in own.items()
-            if isinstance(value, bool) and tables["drive"][key.split(".")[1]] != value
-        }
-        self._asked = asked
-        super().__init__(self.scene, path, kept=NEEDED, workers=workers, dask=dask)
+
+def scored(outcome: Outcome) -> list[float]:
+    """Each of GOALS, SI; -inf where there is none."""
+    if outcome.failure:
+        return [-np.inf] * len(GOALS)
+    found = np.array([goal.of(outcome.numbers) for goal in GOALS])
+    return np.where(np.isnan(found), -np.inf, found).tolist()
+
+
+def turned(point: Array) -> Array:
+    """A point of a machine's cube and those a turn of the knobs off (rows)."""
+    knobs = point[: len(KNOBS)]
+    every = np.vstack([knobs, faces(knobs), corners(knobs)])
+    return np.hstack([every, np.tile(point[len(KNOBS) :], (len(every), 1))])
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Runs machines that are changes of ``scene``, the device on a rig."""
+
+    scene: Scene
+    evaluator: Evaluator
+
+    @staticmethod
+    def base(scene: Scene, rig: Settings, told: str) -> Scene:
+        """A scene as its knobs are searched, on a rig; ``told`` says where the rig is from. Raises
+        BadInput."""
+        alone = {"circuit.model": "limited", "drive.pwm_ripple": False, "drive.quantised": False}
+        return changed(scene, FREE | alone | rig, told)
 
     def outcomes(self, every: Sequence[Settings]) -> list[Outcome]:
-        """What becomes of each settings, on the circuit that they name."""
-        found = dict(self.run(enumerate(every)))
+        """What becomes of each settings."""
+        found = dict(self.evaluator.run(enumerate(every)))
         return [found[number] for number in range(len(every))]
 
-    def scores(self, case: Case, points: Array) -> tuple[Array, Feasible]:
-        """The scores of points (rows), -inf where a run fails, and which of them are feasible."""
-        every = [case.settings(point) for point in points]
-        found = np.full((len(every), len(QUANTITIES)), -inf)
-        feasible = np.zeros(len(every), bool)
-        for row, (settings, outcome) in enumerate(zip(every, self.outcomes(every), strict=True)):
-            if not outcome.failure:
-                found[row] = scores(outcome.numbers)
-                feasible[row] = self.feasible(case, settings, outcome.numbers)
-        return found, feasible
-
-    def feasible(self, case: Case, settings: Settings, numbers: Numbers) -> bool:
+    def feasible(self, machine: Machine, outcome: Outcome) -> bool:
         """Whether a run keeps within what the coil and the power amplifier bear."""
-        current = self.peak(numbers) * case.machine.coil_scale
-        return current <= OPA548_CURRENT and self.heat(case, numbers) <= case.machine.heat
+        if outcome.failure:
+            return False
+        told = outcome.numbers
+        peak = max(told["current_max"], -told["current_min"]) * self.scene.coil.count
+        return peak <= OPA548_CURRENT and told["coil_heat"] <= machine.heat
 
-    def peak(self, numbers: Numbers) -> float:
-        """The greatest current of all coils together of a run, A."""
-        return max(numbers["current_max"], -numbers["current_min"]) * self.scene.coil.count
+    def once(self, machine: Machine) -> Evaluate:
+        """Scores of points of the machine's cube, each in one run."""
 
-    def judge(self, case: Case, settings: Settings, numbers: Numbers) -> str:
-        """The circuit model that judges a run."""
-        if case.rung == "ideal":
-            return case.rung
-        limit = float(settings.get("circuit.current_limit", self.scene.circuit.current_limit))
-        return self.fidelity.judge(self.peak(numbers), limit)
+        scouted = self._scout(machine)
 
-    def amperes(self, case: Case) -> float:
-        """The knobs' range, A."""
-        own = self.scene.circuit.sense_resistance
-        changes = {**case.rig, **case.machine.settings}
-        sense = changes.get("circuit.sense_resistance", own)
-        return case.machine.coil_scale * case.machine.reach * aims.RANGE / float(sense)
+        def evaluate(points: Array) -> tuple[Array, Feasible]:
+            outcomes = self.outcomes([scouted(point) for point in points])
+            allowed = np.array([self.feasible(machine, one) for one in outcomes], bool)
+            return np.array([scored(one) for one in outcomes]), allowed
 
-    def heat(self, case: Case, numbers: Numbers) -> float:
-        """Mean heat, W, of the coil that a case stands for."""
-        return numbers["coil_heat"] * case.machine.coil_scale
+        return evaluate
 
-    def command(self, settings: Settings) -> str:
-        """The one command that repeats a run."""
-        rows = {"run.output_step": float(settings["run.duration"]) / 2.0}
-        every = {**self._unlike, **settings, **rows}
-        words = (f"--set {key}={_typed(value)}" for key, value in every.items())
-        return f"cosim run {self._asked} {' '.join(words)}"
+    def over_turns(self, machine: Machine) -> Evaluate:
+        """Medians of the scores over the turns of the knobs about points of the machine's cube. The
+        turns are judged by their motion, not by their heat: a hand that is off turns back."""
+
+        scouted = self._scout(machine)
+
+        def evaluate(points: Array) -> tuple[Array, Feasible]:
+            every = [turned(point) for point in points]
+            outcomes = self.outcomes([scouted(point) for point in np.vstack(every)])
+            scores = np.array([scored(one) for one in outcomes]).reshape(len(points), -1, 3)
+            middle = outcomes[:: len(every[0])]
+            allowed = np.array([self.feasible(machine, one) for one in middle], bool)
+            return np.median(scores, axis=1), allowed
+
+        return evaluate
+
+    def _scout(self, machine: Machine) -> Callable[[Array], Settings]:
+        """Makes the settings of a point, for the fast solver where that can run the machine."""
+        solver = "fast"
+        try:
+            middle = machine.at(np.full(machine.keys, 0.5), SETTLE, SPAN)
+            changed(self.scene, middle | {"run.solver": solver}, solver)
+        except BadInput:
+            solver = "fmu"
+        return lambda point: machine.at(point, SETTLE, SPAN) | {"run.solver": solver}
 
 
-def _typed(value: float | int | str) -> str:
-    return str(value).lower() if isinstance(value, bool) else f"{value}"
+def command(asked: str, settings: Settings) -> str:
+    """The one command that repeats a run of the scene that was ``asked`` for."""
+    rows = {"run.output_step": float(settings["run.duration"]) / 2.0}
+    words = (f"--set {key}={_typed(value)}" for key, value in (settings | rows).items())
+    return f"cosim run {asked} {' '.join(words)}"
+
+
+def _typed(value: object) -> str:
+    text = str(value).lower() if isinstance(value, bool) else str(value)
+    return f"'{text}'" if " " in text else text

@@ -1,0 +1,161 @@
+"""What one can change about the device, one thing at a time, and the knobs that are then turned."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from math import ceil, inf
+from typing import Any
+
+from cosim.arrays import Array
+from cosim.circuit.heat import DRIVE_RANGE_HEAT
+from cosim.scene import Scene, firmware
+from cosim.scene.tables import KNOBS
+
+Settings = dict[str, Any]
+"""Values of keys, ``table.key``, SI."""
+
+RANGE = firmware.GAIN * firmware.volts(firmware.COUNTS - 1)
+"""V: the most that either knob of volts sets at V1."""
+
+STEPS = firmware.COUNTS - 1
+"""Of a knob's whole turn: the firmware reads each in so many, and nothing between them can be set.
+"""
+
+FREE: Settings = {f"drive.{knob}": None for knob in KNOBS}
+"""Lets amplitude, frequency and offset stand for themselves."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """The device with something changed, whose knobs, and levels of the command, are searched."""
+
+    settings: Settings = field(default_factory=dict[str, Any])
+    reach: float = 1.0
+    """Times the knobs' own range in volts."""
+    pace: float = 1.0
+    """Times the knob's own range in hertz."""
+    heat: float = DRIVE_RANGE_HEAT
+    """W: what the coil may make on average."""
+    levels: int = 0
+    """Of a command of its own, at phases evenly spread, that are searched, too."""
+    rung: str = "limited"
+    """The cheapest circuit that it acts in."""
+
+    @property
+    def keys(self) -> int:
+        """Dimensions of the unit cube whose points are settings: three knobs, and the levels."""
+        return len(KNOBS) + self.levels
+
+    def at(self, point: Array, settle: float, span: float) -> Settings:
+        """All that differs from the scene at a point of the cube, as the firmware maps its
+        potentiometers. The third knob sets where the sawtooth's ramp ends, so the mean moves with
+        the amplitude. Whole periods are run, at least as long as ``settle`` and ``span`` (s)."""
+        amplitude, top = self.reach * RANGE * point[0], self.reach * RANGE * point[2]
+        hertz = _typed(self.pace * firmware.knob_frequency(point[1] * STEPS / firmware.COUNTS))
+        found: Settings = {
+            "circuit.model": self.rung,
+            "drive.amplitude": _typed(amplitude),
+            "drive.frequency": hertz,
+            "drive.offset": _typed(top - amplitude / 2.0),
+            **self.settings,
+        }
+        if self.levels:
+            levels = (_typed(level - 0.5) for level in point[len(KNOBS) :])
+            found["drive.table"] = [[k / self.levels, level] for k, level in enumerate(levels)]
+        period = firmware.period(hertz, None) if found.get("drive.quantised") else 1.0 / hertz
+        before, after = (max(1, ceil(time / period - 1e-9)) * period for time in (settle, span))
+        return found | {"run.settle": before, "run.duration": before + after}
+
+
+def _typed(value: float) -> float:
+    return round(float(value), 6)
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing that can be changed."""
+
+    name: str
+    group: str
+    """What of the device: ``waveform``, ``heat``, ``grip`` or ``circuit``, the coil among it."""
+    machine: Callable[[Scene], Machine]
+    searched: bool = True
+    """Whether the knobs are set anew for it; else it is tried at the best settings of the device as
+    it is, for its runs need ngspice or do nothing to those."""
+
+
+def _set(*keys: str, value: float | str | bool, **more: Any) -> Callable[[Scene], Machine]:
+    return lambda scene: Machine(dict.fromkeys(keys, value), **more)
+
+
+def _times(factor: float, *keys: str, **more: Any) -> Callable[[Scene], Machine]:
+    """The values of keys, where the scene has them, times a factor."""
+
+    def machine(scene: Scene) -> Machine:
+        split = (key.split(".") for key in keys)
+        known = {f"{table}.{name}": scene.table(table).get(name) for table, name in split}
+        scaled = {key: factor * value for key, value in known.items() if value is not None}
+        return Machine(scaled, **more)
+
+    return machine
+
+
+def _sense(value: float, scene: Scene) -> Machine:
+    """The same range of currents over another resistor."""
+    key = "circuit.sense_resistance"
+    return Machine({key: value}, reach=value / scene.circuit.sense_resistance)
+
+
+def _own_command(waveform: str, levels: int) -> Callable[[Scene], Machine]:
+    return lambda scene: Machine({"drive.waveform": waveform}, levels=levels)
+
+
+AS_IT_IS = Change("as it is", "", lambda scene: Machine())
+
+_SWING = ("circuit.swing_loss_high", "circuit.swing_loss_low")
+_LIMITS = ("circuit.gain_bandwidth", "circuit.slew_rate")
+
+CHANGES: Sequence[Change] = (
+    AS_IT_IS,
+    Change("falling sawtooth", "waveform", _set("drive.waveform", value="falling-sawtooth")),
+    Change("coil's wires exchanged", "waveform", _set("coil.polarity", value=-1)),
+    Change("sine", "waveform", _set("drive.waveform", value="sine")),
+    Change("square wave", "waveform", _set("drive.waveform", value="square")),
+    Change("five levels, straight lines between", "waveform", _own_command("pieces", 5)),
+    Change("five levels, held", "waveform", _own_command("steps", 5)),
+    Change("heat 0.9 W", "heat", lambda _: Machine(heat=0.9)),
+    Change("heat 1.8 W", "heat", lambda _: Machine(heat=1.8)),
+    Change("heat 7 W", "heat", lambda _: Machine(heat=7.0)),
+    Change("half the grip force", "grip", _times(0.5, "friction.normal_force")),
+    Change("twice the grip force", "grip", _times(2.0, "friction.normal_force")),
+    Change("supply ±10 V", "circuit", _set("circuit.supply", value=10.0)),
+    Change("supply ±14 V", "circuit", _set("circuit.supply", value=14.0)),
+    Change("supply ±24 V", "circuit", _set("circuit.supply", value=24.0)),
+    Change("supply ±30 V", "circuit", _set("circuit.supply", value=30.0)),
+    Change("output swings to its rails", "circuit", _set(*_SWING, value=0.0)),
+    Change("coil of half the resistance", "circuit", _times(0.5, "coil.resistance")),
+    Change("coil of twice the resistance", "circuit", _times(2.0, "coil.resistance")),
+    Change("coil of half the inductance", "circuit", _times(0.5, "coil.inductance")),
+    Change("coil of twice the inductance", "circuit", _times(2.0, "coil.inductance")),
+    Change("coil of 0.7 times the force factor", "circuit", _times(0.7, "coil.force_factor")),
+    Change("coil of 1.4 times the force factor", "circuit", _times(1.4, "coil.force_factor")),
+    Change("sense resistor 2 Ω", "circuit", partial(_sense, 2.0)),
+    Change("sense resistor 8 Ω", "circuit", partial(_sense, 8.0)),
+    Change("current limit 0.8 A", "circuit", _set("circuit.current_limit", value=0.8)),
+    Change("current limit 5 A", "circuit", _set("circuit.current_limit", value=5.0)),
+    Change("knobs to half their volts", "circuit", lambda _: Machine(reach=0.5)),
+    Change("knobs to twice their volts", "circuit", lambda _: Machine(reach=2.0)),
+    Change("knob to twice its hertz", "circuit", lambda _: Machine(pace=2.0)),
+    Change(
+        "op-amp of a tenth the gain-bandwidth", "circuit",
+        _times(0.1, _LIMITS[0], rung="amplifier"), searched=False,
+    ),
+    Change(
+        "op-amp of a hundredth the slew rate", "circuit",
+        _times(0.01, _LIMITS[1], rung="amplifier"), searched=False,
+    ),
+    Change("DAC steps", "circuit", _set("drive.quantised", value=True), searched=False),
+    Change("ideal current", "circuit", lambda _: Machine(rung="ideal")),
+    Change("ideal current, any heat", "circuit", lambda _: Machine(rung="ideal", heat=inf)),
+)  # fmt: skip
+"""The device as it is comes first."""
