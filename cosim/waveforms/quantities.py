@@ -22,7 +22,7 @@ SUMMARY: dict[str, Quantity] = {
     "motion": Quantity(
         "",
         "regular, no transport, several answers (the start decides), chaotic, or unsettled (not "
-        "periodic after 60 periods and 2 s), as on circuit limited; absent where nothing repeats "
+        "periodic after 240 periods and 8 s), as on circuit limited; absent where nothing repeats "
         "or too few periods are run",
     ),
     "motion_periods": Quantity("1", "periods of the drive after which regular motion repeats"),

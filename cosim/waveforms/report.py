@@ -69,7 +69,7 @@ def _motion(summary: dict[str, Any]) -> str:
     if kind is None:
         return ""
     if kind == "unsettled":
-        return "not periodic after 60 periods and 2 s: the mean is that of this stretch"
+        return "not periodic after 240 periods and 8 s: the mean is that of this stretch"
     if kind == "no transport":
         return "the part shakes in its place, from other starts too"
     if kind == "regular":
