@@ -89,7 +89,7 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
     def mean(of: Scene | None) -> float | None:
         alone = summary_elsewhere if scene.rung.ngspice else summary_here
         try:
-            return None if of is None else alone(_few_rows(of), going)["v_average"]
+            return None if of is None else alone(few_rows(of), going)["v_average"]
         except CosimError:
             return None
 
@@ -282,6 +282,7 @@ def _started(scene: Scene, ahead: float) -> Scene | None:
         return None  # the drive has no such start
 
 
-def _few_rows(scene: Scene) -> Scene:
+def few_rows(scene: Scene) -> Scene:
+    """The scene with as few rows as there may be."""
     rows = {"output_step": scene.run.duration / 2.0}
     return scene.model_copy(update={"run": scene.run.model_copy(update=rows)})

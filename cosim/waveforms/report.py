@@ -33,6 +33,7 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
         ("impacts", f"{summary.get('impacts', '')}"),
         ("stick-slip events", f"{summary.get('stick_slip_events', '')}"),
         ("circuit taken", taken.format_map(summary)),
+        ("  measured of it", summary.get("circuit_model_expected", "")),
         ("energy unaccounted for", "" if lost is None else f"{lost:.1e} of the total{warning}"),
         ("error of the path", _error(summary)),
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
