@@ -9,7 +9,7 @@
 #                    those that need the trials, too); `make test` writes results/datasheet.*
 #   make bench       remakes results/bench.json, some minutes (ARGS='--trials DIR')
 #   make docs        draws the pictures and builds the documentation site, site/index.html
-#   make check       ruff and pyright
+#   make check       ruff and pyright; tells which results another core has made
 #   make dist        wheel and source distribution in dist/, each built in an empty environment
 #   make lock        remakes the locks with uv  (ARGS=--upgrade for newer versions)
 #   make clean       removes the environments and everything built
@@ -80,7 +80,9 @@ $(COMPILED): $(VENV)/.installed $(VENV)/.sources $(SOURCES)
 $(VENV)/.sources: $(VENV)/.created FORCE
 	@cksum $(SOURCES) | cmp -s - $@ || cksum $(SOURCES) >$@
 
+# benchmarks/made.json keeps with which core each of them was made.
 charts: setup
+	@touch $(VENV)/.began
 	@$(VENV)/bin/cosim run paper
 	@cp results/paper/figure.png results/paper.png
 	@$(VENV)/bin/cosim theory
@@ -92,11 +94,15 @@ charts: setup
 	@$(PY) -m benchmarks.charts
 	@$(VENV)/bin/cosim chart limits --rigs results/identify.json
 	@$(VENV)/bin/cosim chart ladder paper trial-05 gripper
+	@$(VENV)/bin/cosim chart choice
+	@cp results/choice.csv cosim/simulation/choice.csv
 	@test -z '$(TRIALS)' || { $(VENV)/bin/cosim chart trials '$(TRIALS)' && $(VENV)/bin/cosim chart paper '$(TRIALS)'; }
+	@find results -maxdepth 1 -type f -newer $(VENV)/.began -exec $(PY) -m benchmarks.stale {} +
 
 bench: setup
 	@$(PY) -m benchmarks $(ARGS)
 	@cp results/bench/bench.json results/bench.json
+	@$(PY) -m benchmarks.stale results/bench.json
 
 # In an environment of its own, without what is compiled: it takes the tables from the sources.
 DOCS := .venv-docs
@@ -118,6 +124,7 @@ check: setup
 	@$(VENV)/bin/ruff check
 	@$(VENV)/bin/ruff format --check
 	@$(VENV)/bin/pyright
+	@$(PY) -m benchmarks.stale
 
 # The wheel is built of the source distribution, so that neither takes anything that lies about.
 dist: $(VENV)/.installed

@@ -1,5 +1,6 @@
 """The gallery of results: it names all that is there, and the commands are commands."""
 
+import json
 import re
 import shlex
 import tomllib
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import stale
 from cosim.cli.main import _parser
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -37,3 +39,25 @@ def test_each_row_has_a_command() -> None:
 def test_the_citation_is_of_this_version() -> None:
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_results_that_another_core_has_made_are_told(tmp_path: Path) -> None:
+    source, results = tmp_path / "fmu" / "src" / "a.c", tmp_path / "results"
+    for folder in (source.parent, results, tmp_path / stale.MADE.parent):
+        folder.mkdir(parents=True)
+    source.write_text("int a;", encoding="utf-8")
+    for name in ("old.csv", "new.csv", "foreign.png"):
+        (results / name).write_text("", encoding="utf-8")
+    stale.made(["results/old.csv"], tmp_path)
+    then = stale.core(tmp_path)
+    assert stale.stale(tmp_path) == {"": ["foreign.png", "new.csv"]}
+    source.write_text("int b;", encoding="utf-8")
+    stale.made([str(results / "new.csv")], tmp_path)
+    assert stale.stale(tmp_path) == {"": ["foreign.png"], then: ["old.csv"]}
+
+
+def test_the_core_is_where_it_is_looked_for() -> None:
+    assert all((ROOT / folder).is_dir() for folder in stale.CORE)
+    assert set(json.loads((ROOT / stale.MADE).read_text())) >= {
+        p.name for p in RESULTS.glob("*.csv")
+    }

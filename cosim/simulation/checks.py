@@ -7,15 +7,16 @@ the run's own history that tells it, since that obeys the solver's own equations
 less tolerance alone, since both would then err alike in whatever has a fixed length.
 
 The kind is that of the scene on the circuit "limited", which is much cheaper: as it is, from a
-height 1e-9 m aside, and with the drive a quarter period ahead and behind. Where the first two part,
-motion is chaotic, and no path and no mean over a given time is right by itself. Where the others
-come to another motion, the start decides between several.
+height 1e-9 m aside, and with the drive begun 1/4, 1/2 and 3/4 of a period later in its course.
+Where the first two part and neither repeats, motion is chaotic, and no path and no mean over a
+given time is right by itself. Where the others come to another motion, the start decides between
+several. Motion that repeats within short runs needs no longer ones.
 
 Not seen: several answers that these starts do not part; a kind that the simpler circuit does
 not have, near a border between two of them; and chaos that dies out before the averages begin.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from math import isinf
 from threading import Event
@@ -46,13 +47,12 @@ STRICT = 2.4
 """How much shorter they are for an error in the strict sense, of both runs."""
 
 PERIODS, LONG = 60, 2.0
-"""Of the drive, and s: how long a run is at least that tells the kind of motion; its second half
-counts."""
+"""Of the drive, and s: how long a run is at least that tells of chaos; its second half counts."""
 
-LONGER = 4
-"""Times as long where motion is not yet periodic."""
+SHARES = (0.5, 1.0, 4.0)
+"""Of that: how long the runs are, until the motion is periodic or chaotic."""
 
-AHEAD = (0.25, 0.75)
+AHEAD = (0.25, 0.5, 0.75)
 """Of a period, by which the drive begins later in its course in the other runs."""
 
 LONGEST = 10.0
@@ -149,49 +149,64 @@ def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
         return {}
     averaged = max(1, round((scene.run.duration - scene.run.settle) / length))
     found: dict[str, Any] = {}
-    for longer in (1, LONGER):
-        end = longer * max(PERIODS, round(LONG / length)) * length
+    for share in SHARES:
+        end = round(share * max(PERIODS, round(LONG / length))) * length
         times = {"duration": end, "settle": end / 2.0, "output_step": length}
-        base = changed(scene, simple or {}, "limited").model_copy(
+        base = _looser(changed(scene, simple or {}, "limited")).model_copy(
             update={"run": scene.run.model_copy(update=times)}
         )
-        starts = [base, _aside(base), *(_started(base, ahead) for ahead in AHEAD)]
+        starts = (base, _aside(base), *(_started(base, ahead) for ahead in AHEAD))
+        ways = (_ways(start, progress) for start in starts if start is not None)
         try:
-            ways = [_ways(start, progress) for start in starts if start is not None]
+            found = _kind(ways, length, averaged, share >= 1.0)
         except CosimError:
             return {}
-        found = _kind(ways, length, averaged)
         if found["motion"] != "unsettled":
             break
     return found
 
 
-def _kind(ways: Sequence[Array], length: float, averaged: int) -> dict[str, Any]:
+def _kind(ways: Iterator[Array], length: float, averaged: int, chaos: bool) -> dict[str, Any]:
     """The kind of a motion whose part goes ``ways`` (m) in the periods of ``length`` (s): from the
-    scene's own start, from one ASIDE, and from others. The average is over ``averaged`` periods."""
-    late = [way[len(way) // 2 :] for way in ways]
-    means = [float(way.mean()) / length for way in late]
-    if max(map(abs, means)) < LEAST:
-        return {"motion": "no transport"}
-    repeats = [_repeats(way) for way in ways]
-    if None in repeats[:2] and relative_error(means[1], means[0]) > PARTED:
-        every = np.concatenate([_stretches(way, averaged) for way in late]) / length
+    scene's own start, from one ASIDE, and from others, which are not asked for where these two
+    tell it. The average is over ``averaged`` periods; ``chaos``: it would be seen by now."""
+    two = next(ways), next(ways)
+    repeats = [_repeats(way) for way in two]
+    own, aside = (_mean(way) / length for way in two)
+    if None in repeats and max(abs(own), abs(aside)) >= LEAST:
+        if not chaos or any(repeats) or relative_error(aside, own) <= PARTED:
+            return {"motion": "unsettled"}
+        every = np.concatenate([_stretches(way, averaged) for way in (*two, *ways)]) / length
         return {"motion": "chaotic", "v_average_range": [float(every.min()), float(every.max())]}
     answers: list[float] = []
-    for way, count in zip(ways, repeats, strict=True):
-        if count is None:
+    for way in (*two, *ways):
+        answer = _answer(way, length)
+        if answer is None:
             return {"motion": "unsettled"}
-        answer = float(way[-count:].mean()) / length
         if all(relative_error(answer, other) > SAME for other in answers):
             answers.append(answer)
-    assert repeats[0] is not None
-    found = {
-        "motion_periods": repeats[0],
-        "motion_settled": _settled(ways[0], repeats[0]) * length,
-    }
+    if not any(answers):
+        return {"motion": "no transport"}
+    found: dict[str, Any] = {"motion": "regular"}
     if len(answers) > 1:
-        return {"motion": "several answers", "v_average_answers": answers, **found}
-    return {"motion": "regular", **found}
+        found = {"motion": "several answers", "v_average_answers": answers}
+    if repeats[0] is not None:
+        found["motion_periods"] = repeats[0]
+        found["motion_settled"] = _settled(two[0], repeats[0]) * length
+    return found
+
+
+def _answer(way: Array, length: float) -> float | None:
+    """The mean velocity (m/s) that a way comes to; 0 below LEAST, None where it does not repeat."""
+    if abs(_mean(way)) < LEAST * length:
+        return 0.0
+    count = _repeats(way)
+    return None if count is None else float(way[-count:].mean()) / length
+
+
+def _mean(way: Array) -> float:
+    """Of its second half."""
+    return float(way[len(way) // 2 :].mean())
 
 
 def _ways(scene: Scene, progress: Callable[[float], None]) -> Array:
@@ -200,7 +215,8 @@ def _ways(scene: Scene, progress: Callable[[float], None]) -> Array:
 
 
 def _stretches(way: Array, count: int) -> Array:
-    """The mean way over each ``count`` periods in a row, at most over all."""
+    """The mean way over each ``count`` periods in a row of its second half, at most over all."""
+    way = way[len(way) // 2 :]
     count = min(count, len(way))
     return np.convolve(way, np.ones(count) / count, "valid")
 
@@ -231,12 +247,8 @@ def _steps(scene: Scene, longer: float) -> Scene | None:
         return None  # its motion is exact
     if not scene.rung.ngspice:
         if longer < 1.0:
-            finer = {"tolerance": scene.mechanics.tolerance * longer**3}
-        elif scene.mechanics.tolerance < LOOSER:
-            finer = {"tolerance": LOOSER}
-        else:
-            return None
-        return scene.model_copy(update={"mechanics": scene.mechanics.model_copy(update=finer)})
+            return _with_tolerance(scene, scene.mechanics.tolerance * longer**3)
+        return _looser(scene) if scene.mechanics.tolerance < LOOSER else None
     if scene.coupling.method != "step-locked":
         return None
     circuit = scene.circuit
@@ -245,6 +257,15 @@ def _steps(scene: Scene, longer: float) -> Scene | None:
         "max_step": min(circuit.max_step * longer, 1e-2),
     }
     return scene.model_copy(update={"circuit": circuit.model_copy(update=steps)})
+
+
+def _looser(scene: Scene) -> Scene:
+    return _with_tolerance(scene, max(scene.mechanics.tolerance, LOOSER))
+
+
+def _with_tolerance(scene: Scene, tolerance: float) -> Scene:
+    mechanics = scene.mechanics.model_copy(update={"tolerance": tolerance})
+    return scene.model_copy(update={"mechanics": mechanics})
 
 
 def _aside(scene: Scene) -> Scene:

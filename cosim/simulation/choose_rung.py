@@ -1,5 +1,8 @@
 """``circuit.model = "auto"``: the cheapest circuit that a scene can do with.
 
+``choice.csv``, which ``cosim chart choice`` has measured, tells what to expect: where "limited" is
+mostly further off than the tolerance, nothing is tried. Else the scene itself decides.
+
 The rungs without ngspice run the whole scene; the behavioural amplifier, which they simplify, runs
 only the first part of it, beside the rung "limited". What separates "limited" from the amplifier is
 small and always there, so a part shows it; what separates "ideal" from "limited" shows in the whole
@@ -11,14 +14,16 @@ less of it moves v_average much, the motion being chaotic or near another one, n
 be relied on.
 """
 
+import csv
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
+from importlib import resources
 
 from cosim.errors import BadInput
 from cosim.scene import Scene, changed
-from cosim.simulation.fidelity import JUDGES, SEARCHES, Fidelity, relative_error
+from cosim.simulation.fidelity import COMPLETE, JUDGES, SEARCHES, Fidelity, relative_error
 from cosim.simulation.here import few_rows, summary_here
 from cosim.toolchain.processes import processors
 from cosim.waveforms.result import Result
@@ -39,11 +44,31 @@ no more than its like."""
 
 @dataclass(frozen=True)
 class Choice:
-    """The rung to take, why, and the relative error of v_average found for each simpler one."""
+    """The rung to take, why, and the relative error of v_average of each simpler one tried."""
 
     model: str
     why: str
     errors: dict[str, float]
+
+
+@cache
+def expected() -> dict[str, dict[str, str]]:
+    """The row of ``choice.csv`` for each rung with default steps, by column."""
+    text = resources.files("cosim.simulation").joinpath("choice.csv").read_text(encoding="utf-8")
+    rows = [row for row in csv.DictReader(text.splitlines()) if row["machine"] == "all"]
+    return {row["circuit.model"]: row for row in rows if row["steps"] == "default"}
+
+
+def advice(model: str) -> str:
+    """What the table tells of a rung, in words."""
+    row = expected()[model]
+    half, most = (
+        " and ".join(
+            f"{float(row[f'against {m}: {share} [%]']):.2g} % of {m}" for m in (JUDGES, COMPLETE)
+        )
+        for share in ("median", "90 %")
+    )
+    return f"of {row['regular settings']} settings half within {half}; nine of ten within {most}"
 
 
 def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
@@ -52,6 +77,9 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
     ``run`` runs a scene with ngspice; the others are run at once. Raises what a run raises.
     """
     tolerance = Fidelity.of(scene).tolerance
+    mostly = float(expected()[SEARCHES][f"against {JUDGES}: median [%]"]) / 100.0
+    if mostly > tolerance:
+        return Choice(JUDGES, f"limited is mostly more than {mostly:.2%} off it", {})
     try:
         limited = few_rows(changed(scene, {"circuit.model": SEARCHES}, "auto"))
     except BadInput:  # too fast a coil
@@ -65,9 +93,9 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
         return Choice(JUDGES, why, {"limited": moved, "ideal": moved})
     part = _part(limited)
     top = changed(limited, {**part, "circuit.model": JUDGES}, "auto")
-    expected = run(top).summary["v_average"]
+    judged = run(top).summary["v_average"]
     tried, ideal = _v_averages(limited, [part, {"circuit.model": "ideal"}])
-    trial = relative_error(tried, expected)
+    trial = relative_error(tried, judged)
     errors = {"limited": max(moved, MARGIN * trial)}
     errors["ideal"] = relative_error(ideal, own) + errors["limited"]
     for model in ("ideal", "limited"):

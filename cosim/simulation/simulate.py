@@ -98,7 +98,7 @@ def summary(scene: Scene, progress: Progress = lambda _: None) -> dict[str, Any]
 
 def _cheapest(scene: Scene, run: Callable[[Scene], Result]) -> Result:
     """The run of the cheapest rung that suffices; what it took to find it is part of its time."""
-    from cosim.simulation.choose_rung import choose
+    from cosim.simulation.choose_rung import advice, choose
 
     began = time.perf_counter()
     choice = choose(scene, simulate)
@@ -106,6 +106,7 @@ def _cheapest(scene: Scene, run: Callable[[Scene], Result]) -> Result:
     found = {
         "circuit_model": choice.model,
         "circuit_model_why": choice.why,
+        "circuit_model_expected": advice(choice.model),
         "circuit_model_errors": choice.errors,
         "wall_time": time.perf_counter() - began,
     }

@@ -22,7 +22,7 @@ SUMMARY: dict[str, Quantity] = {
     "motion": Quantity(
         "",
         "regular, no transport, several answers (the start decides), chaotic, or unsettled (not "
-        "periodic after 60 periods and 2 s), as on circuit limited; absent where nothing repeats "
+        "periodic after 240 periods and 8 s), as on circuit limited; absent where nothing repeats "
         "or too few periods are run",
     ),
     "motion_periods": Quantity("1", "periods of the drive after which regular motion repeats"),
@@ -87,7 +87,8 @@ SUMMARY: dict[str, Quantity] = {
     "versions": Quantity("", "versions of the programs that took part"),
     "circuit_model": Quantity("", 'rung that circuit.model = "auto" took'),
     "circuit_model_why": Quantity("", "why it took that rung"),
-    "circuit_model_errors": Quantity("", "estimated relative error of v_average on each rung"),
+    "circuit_model_expected": Quantity("", "what cosim chart choice has measured of that rung"),
+    "circuit_model_errors": Quantity("", "estimated relative error of v_average on rungs tried"),
     "coupling_taken": Quantity("", 'method and steps that coupling.method = "auto" took'),
     "error_estimate": Quantity(
         "1", "with these, the error of the part's height, relative to its range"

@@ -35,6 +35,7 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
         ("impacts", f"{summary.get('impacts', '')}"),
         ("stick-slip events", f"{summary.get('stick_slip_events', '')}"),
         ("circuit taken", taken.format_map(summary)),
+        ("  measured of it", summary.get("circuit_model_expected", "")),
         ("energy unaccounted for", "" if lost is None else f"{lost:.1e} of the total{warning}"),
         ("error of the path", _error(summary)),
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
@@ -96,7 +97,7 @@ def _motion(summary: dict[str, Any]) -> str:
     if kind is None:
         return ""
     if kind == "unsettled":
-        return "not periodic after 60 periods and 2 s: the mean is that of this stretch"
+        return "not periodic after 240 periods and 8 s: the mean is that of this stretch"
     if kind == "no transport":
         return "the part shakes in its place, from other starts too"
     if kind == "regular":

@@ -109,8 +109,9 @@ def test_a_netlist_of_ones_own() -> None:
     assert "motion" not in found  # there is no simpler circuit of it
 
 
-def kind(scene: str, **drive: Any) -> dict[str, Any]:
+def kind(scene: str, contact: str = "compliant", **drive: Any) -> dict[str, Any]:
     settings = {f"drive.{key}": value for key, value in drive.items()}
+    settings["mechanics.contact"] = contact
     return motion(load(scene, settings), lambda _: None)
 
 
@@ -131,6 +132,26 @@ def test_several_answers_are_all_told() -> None:
         settings |= {"drive.offset": -0.95, "drive.start_phase": phase, "run.duration": 4.0}
         answers.append(simulate(load("reference", settings)).summary["v_average"])
     np.testing.assert_allclose(sorted(found["v_average_answers"]), sorted(answers), rtol=1e-3)
+
+
+def test_an_answer_that_only_half_a_period_reaches_is_told() -> None:
+    found = kind("paper", contact="rigid", frequency=42.658, amplitude=5.182, offset=-1.894)
+    assert found["motion"] == "several answers"
+    settings = {"circuit.model": "limited", "mechanics.contact": "rigid", "drive.start_phase": 0.5}
+    drive = {"drive.frequency": 42.658, "drive.amplitude": 5.182, "drive.offset": -1.894}
+    other = simulate(load("paper", settings | drive)).summary["v_average"]
+    assert other == pytest.approx(max(found["v_average_answers"]), rel=1e-3)
+
+
+def test_chaos_that_dies_out_is_none() -> None:
+    """A nanometre aside parts for 4 s, then comes to the same 15.55 mm/s; another start to 0."""
+    found = kind("paper", frequency=84.372, amplitude=3.198, offset=-2.585)
+    assert found["motion"] == "several answers"
+    drive = {"drive.frequency": 84.372, "drive.amplitude": 3.198, "drive.offset": -2.585}
+    late = {"circuit.model": "limited", "run.duration": 8.0}
+    late["run.settle"] = 8.0 - 168 / 84.372
+    own = simulate(load("paper", drive | late)).summary["v_average"]
+    np.testing.assert_allclose(found["v_average_answers"], [own, 0.0], rtol=1e-3)
 
 
 def test_chaotic_motion_has_a_range_of_means() -> None:

@@ -74,7 +74,9 @@ def test_coil_too_fast_for_the_limited_rung() -> None:
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     changes = [f"--set={change}" for change in [*SHORT, "circuit.model=auto", "run.tolerance=0.02"]]
     assert main(["run", "reference", *changes, "--out", str(tmp_path)]) == 0
-    assert "circuit taken           limited: at most about" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "circuit taken           limited: at most about" in printed
+    assert " settings half within " in printed
     written = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert written["circuit_model"] == "limited" and set(written["circuit_model_errors"]) == {
         "limited", "ideal",

@@ -1,0 +1,279 @@
+"""Which circuit model and tolerance to take: error and CPU time over settings of the knobs.
+
+The truth of the solver's error is the same model with much shorter steps; that of the model's own
+is the schematic ("full") with such steps. Only regular settings have errors: elsewhere the start,
+or the ninth digit, decides.
+"""
+
+import os
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from math import ceil, inf, nan
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import qmc
+
+from cosim.errors import BadInput
+from cosim.evaluate.evaluator import Evaluator, Settings
+from cosim.evaluate.point import point
+from cosim.scene import changed, load
+from cosim.simulation.checks import motion
+from cosim.simulation.fast import summaries
+from cosim.simulation.fidelity import COMPLETE, JUDGES, SEARCHES, relative_error
+from cosim.simulation.simulate import summary
+from cosim.stepper.stepper import LANES
+from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, End, label_ends, panels
+from cosim.studies.report import Progress, Report, counted, silent
+from cosim.studies.speed.bench import take_turns
+from cosim.studies.tables import Row, brief, markdown
+from cosim.toolchain.processes import in_place
+from cosim.version import __version__
+
+SETTINGS, QUICK, TIMED = 18, 2, 2
+"""Of each machine, in all and with ``quick``; those that are timed."""
+
+KNOBS = ("drive.frequency", "drive.amplitude", "drive.offset")
+LOW, HIGH = np.array([10.0, 3.0, -3.0]), np.array([90.0, 10.0, 3.0])
+"""Hz and V; larger offsets mostly hold the part."""
+
+BASE = changed(load("reference"), {"run.duration": 1.0, "run.settle": 0.5}, "choice")
+"""What all settings are on top of, at least so long."""
+
+OWN, COST, ALL = "own model", "CPU time over amplifier's", "all"
+SHARES = {"median": 0.5, "90 %": 0.9, "worst": 1.0}
+"""Of the regular settings, whose errors are at most what is told."""
+
+LEAST, MOST = 1e-5, 1e3
+"""%; smaller errors are drawn at the first, larger ones than the second are not."""
+
+
+def of(line: str, *every: Settings) -> dict[str, Settings]:
+    """Runs of a line of the figure, by it and their steps in words; ``{}`` has the default ones."""
+    model, _, solver = line.partition(", ")
+    own: Settings = {"circuit.model": model, **({"run.solver": solver} if solver else {})}
+    words = [", ".join(f"{key} = {value:.2g}" for key, value in one.items()) for one in every]
+    return {
+        f"{line}: {w or 'default'}": {**own, **one} for w, one in zip(words, every, strict=True)
+    }
+
+
+def steps(longer: float) -> Settings:
+    """Those of ngspice so many times as long; the tolerance goes with their cube."""
+    reltol, max_step = BASE.circuit.reltol, BASE.circuit.max_step
+    return {"circuit.reltol": reltol * longer**3, "circuit.max_step": max_step * longer}
+
+
+LOOSE, LOOSER = {"mechanics.tolerance": 1e-6}, {"mechanics.tolerance": 1e-4}
+FAST = f"{SEARCHES}, fast"
+CHOICES = {
+    **of("ideal", LOOSER, LOOSE, {}),
+    **of(FAST, *({"run.step": step} for step in (1e-4, 5e-5, 2e-5, 1e-5))),
+    **of(SEARCHES, LOOSER, LOOSE, {}),
+    **of(JUDGES, steps(3.0), steps(1.7), {}, steps(0.5)),
+    **of(COMPLETE, steps(3.0), steps(1.7), {}),
+}
+"""What is compared, each line from coarse to fine."""
+DEFAULT = f"{JUDGES}: default"
+
+FINEST = {"ideal": {"mechanics.tolerance": 1e-12}, SEARCHES: {"mechanics.tolerance": 1e-12}}
+FINEST |= {JUDGES: steps(1.0 / 4.0), COMPLETE: steps(1.0 / 3.0)}
+TRUTHS: dict[str, Settings] = {m: {"circuit.model": m, **one} for m, one in FINEST.items()}
+"""What the errors of each model are taken against."""
+
+
+def machines() -> dict[str, Settings]:
+    """What differs from BASE, whose amplifier gets the data sheet's swing losses, as that of the
+    scene `paper` has them: else its error would be that of a parameter."""
+    base, paper = BASE.as_dict(), load("paper").as_dict()
+    tables = ("circuit", "coil", "mechanics", "friction")
+    every = [(table, key, value) for table in tables for key, value in paper[table].items()]
+    rig = {f"{table}.{key}": value for table, key, value in every if base[table].get(key) != value}
+    losses = {key: value for key, value in rig.items() if key.startswith("circuit.swing_loss")}
+    return {
+        f"{name}, {contact}": {**own, "mechanics.contact": contact}
+        for name, own in (("paper", rig), ("reference", losses))
+        for contact in ("compliant", "rigid")
+    }
+
+
+def choice(
+    *,
+    quick: bool = False,
+    workers: int | None = None,
+    out: str | os.PathLike[str] | None = None,
+    progress: Progress = silent,
+) -> Report:
+    """The error of v_average and the CPU time of each circuit model at each tolerance, on settings
+    of the knobs drawn at random, and what to take for 10, 1 and 0.1 %; ``quick``: few settings.
+
+    In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
+    study has left there. Raises BadInput.
+    """
+    path, kept = None if out is None else Path(out) / "choice.sqlite", ("v_average",)
+    with Evaluator(BASE, path, whole_periods=True, kept=kept, workers=workers) as bench:
+        found = measure(bench, QUICK if quick else SETTINGS, progress)
+        if out is not None:
+            found.save(out)
+        bench.forget()
+    return found
+
+
+def measure(bench: Evaluator, draws: int, progress: Progress) -> Report:
+    """Measure all on so many settings of each machine; ``bench`` runs them."""
+    cube = qmc.Sobol(len(KNOBS), rng=np.random.default_rng(0)).random_base2(5)[:draws]
+    drawn = [
+        (machine, {**own, **dict(zip(KNOBS, row, strict=True))})
+        for machine, own in machines().items()
+        for row in (LOW + (HIGH - LOW) * cube).round(3).tolist()
+    ]
+    told = [_kind(own) for _, own in drawn]
+    kinds: dict[str, Counter[str]] = {machine: Counter() for machine in machines()}
+    for (machine, _), kind in zip(drawn, told, strict=True):
+        kinds[machine][kind] += 1
+    regular = [one for one, kind in zip(drawn, told, strict=True) if kind == "regular"]
+    every = CHOICES | TRUTHS
+    asked = [
+        (what, n, settings)
+        for n, (_, own) in enumerate(regular)
+        for what, one in every.items()
+        if _able(settings := {**own, **one})
+    ]
+    timed = [s for m in kinds for s in [own for name, own in regular if name == m][:TIMED]]
+    tick = counted(progress, len(asked) + len(timed))
+    found = {what: np.full(len(regular), nan) for what in every}
+    for k, outcome in bench.run((k, settings) for k, (*_, settings) in enumerate(asked)):
+        what, n, _ = asked[k]
+        found[what][n] = outcome.numbers.get("v_average", inf)
+        tick(what)
+    seconds, costs = [], {what: [] for what in CHOICES}
+    for settings in timed:
+        taken = _time(settings)
+        seconds.append(taken[DEFAULT])
+        for what, second in taken.items():
+            costs[what].append(second / taken[DEFAULT])
+        tick("CPU time")
+    rows: list[Row] = []
+    for machine in (*kinds, ALL):
+        there = np.array([machine in (ALL, name) for name, _ in regular], bool)
+        for what, own in CHOICES.items():
+            model = str(own["circuit.model"])
+            row = {"machine": machine, "circuit.model": model, "steps": what.partition(": ")[2]}
+            row |= {"line": what.partition(":")[0], COST: float(np.median(costs[what]))}
+            for against, truth in {OWN: model, JUDGES: JUDGES, COMPLETE: COMPLETE}.items():
+                pairs = zip(found[what][there], found[truth][there], strict=True)
+                errors = np.sort([100.0 * relative_error(v, true) for v, true in pairs])
+                errors = errors[~np.isnan(errors)]  # where the fast solver cannot run
+                row["regular settings"] = len(errors)
+                for name, share in SHARES.items() if len(errors) else ():
+                    row[_column(against, name)] = float(errors[ceil(share * len(errors)) - 1])
+            if row["regular settings"]:
+                rows.append({**row, "version": __version__})
+    return report(rows, kinds, float(np.median(seconds)))
+
+
+def _able(settings: Settings) -> bool:
+    """The fast solver has no rigid walls."""
+    return "run.solver" not in settings or settings["mechanics.contact"] == "compliant"
+
+
+def _kind(settings: Settings) -> str:
+    try:
+        point(BASE, {**settings, **TRUTHS[COMPLETE]}, True)
+    except BadInput:
+        return "beyond the knobs"
+    return motion(point(BASE, settings, True), lambda _: None).get("motion", "unknown")
+
+
+def _time(own: Settings) -> dict[str, float]:
+    """CPU time of each choice for a simulated second, s, one after the other in this process; the
+    fast ones run as many settings at once as they can."""
+    calls: dict[str, Callable[[], object]] = {}
+    for what, one in CHOICES.items():
+        if _able({**own, **one}):
+            scene = point(BASE, {**own, **one}, True)
+            many = partial(summaries, [scene] * LANES)
+            calls[what] = partial(summary, scene) if scene.run.solver == "fmu" else many
+    with in_place():
+        taken = take_turns(calls, 1)
+    lasted = point(BASE, own, True).run.duration
+    return {k: t / lasted / (LANES if "fast" in k else 1) for k, (t,) in taken.items()}
+
+
+def _column(against: str, share: str) -> str:
+    return f"against {against}: {share} [%]"
+
+
+def advice(rows: Sequence[Row], wanted: float) -> Row:
+    """The cheapest choices whose error against the schematic is at most ``wanted``, %."""
+    told: Row = {"error wanted [%]": wanted}
+    for words, share in (("in half of the settings", "median"), ("in nine of ten", "90 %")):
+        good = [row for row in rows if row[_column(COMPLETE, share)] <= wanted]
+        best = min(good, key=lambda row: row[COST], default={COST: nan})
+        told[words] = f"{best['line']}, {best['steps']}" if good else "none"
+        told[f"{words}: {COST}"] = best[COST]
+    return told
+
+
+def report(rows: Sequence[Row], kinds: Mapping[str, Counter[str]], second: float) -> Report:
+    """What was found: the rows of each machine and of ALL, how many settings have which kind of
+    motion, and the CPU time of DEFAULT for a simulated second, s."""
+    every = [row for row in rows if row["machine"] == ALL]
+    told = [advice(every, wanted) for wanted in (10.0, 1.0, 0.1)]
+    default = {row["line"]: row for row in every if row["steps"] == "default"}
+    half = {line: brief(row[_column(COMPLETE, "median")]) for line, row in default.items()}
+    cost = brief(default[SEARCHES][COST])
+    title = (
+        f"Against the schematic limited errs {half[SEARCHES]} %, at {cost} of the CPU time "
+        f"of amplifier, which errs {half[JUDGES]} %; ideal errs {half['ideal']} % (medians)"
+    )
+    notes = [
+        f"{title}.",
+        f"{sum(map(Counter.total, kinds.values()))} settings of the knobs on the rigs of scenes "
+        "`paper` and `reference`. The regular ones count; elsewhere the start decides, or no mean "
+        "over a second is right. Errors are of v_average, relative: against the own model with "
+        "much finer steps, so what the solver errs, and against the schematic, so all. On the rig "
+        "`reference` the amplifier has the data sheet's swing losses here, as in `paper`. The "
+        "sawtooth is smooth. The fast solver has no rigid walls, and runs eight settings at once.",
+        "CPU times are over that of `amplifier` with default steps on the same settings, side by "
+        f"side in one process, medians; that took {second:.2g} s for a simulated second.",
+    ]
+    names = sorted(set().union(*kinds.values()))
+    counts = [{"machine": m} | {name: one[name] for name in names} for m, one in kinds.items()]
+    hidden = ("machine", "line", "version")
+    shown = [{key: row[key] for key in row if key not in hidden} for row in every]
+    return Report(
+        "choice", "Which circuit model, which tolerance", rows, notes,
+        {"What to take": told, "All machines": shown, "Kinds of motion": counts},
+        {"": partial(draw, every, title)}, "\n".join([f"{title}.", "", *markdown(told)]),
+    )  # fmt: skip
+
+
+def draw(rows: Sequence[Row], title: str, path: Path) -> None:
+    """Draw error over cost into ``path`` (a PNG): of the solver alone, and in all."""
+    note = "A line from coarse to fine steps; ring: default. Solid: the median; dotted: the worst."
+    figure, axes = panels(title, note, (11.0, 5.2), 1, 2, sharex=True, sharey=True)
+    lines = dict.fromkeys(row["line"] for row in rows)
+    colors = dict(zip(lines, (ORANGE, GREEN, BLUE, PURPLE, VERMILION), strict=True))
+    panel = {OWN: "Solver, against its own model", COMPLETE: "All, against the schematic"}
+    ends: dict[str, End] = {}
+    for axis, (against, words) in zip(axes, panel.items(), strict=True):
+        for line, color in colors.items():
+            mine = [row for row in rows if row["line"] == line]
+            rings = [k for k, row in enumerate(mine) if row["steps"] == "default"]
+            x = [row[COST] for row in mine]
+            worst, y = (
+                [max(row[_column(against, s)], LEAST) for row in mine] for s in ("worst", "median")
+            )
+            axis.plot(x, worst, ":", color=color, marker=".")
+            axis.plot(x, y, color=color, marker=".")
+            axis.plot(x, y, "o", ms=9, mfc="none", color=color, markevery=rings)
+            ends[line] = End(x[-1], y[-1], line, color)
+        axis.set_title(words, loc="left")
+        axis.set(
+            xscale="log", yscale="log", ylim=(LEAST / 2.0, MOST), xlabel="CPU time over amplifier's"
+        )
+    label_ends(axes[1], [*ends.values()])
+    axes[0].set_ylabel("error of v_average [%]")
+    figure.write(path)
