@@ -16,11 +16,18 @@ from cosim.stepper.stepper import OWN, RIG, VARIABLES
 
 FAST = {"run.solver": "fast"}
 STILL = {"circuit.model": "limited"}
+KNEE = {"mechanics.suspension": "knee", "mechanics.suspension_hardening": 9e5}
+KNEE |= {"mechanics.suspension_k1": 120.0}
 SCENES: list[tuple[str, dict[str, Any]]] = [
     ("paper-limited", {}),
     ("ideal-current", {}),
     ("trial-05", STILL),  # switched on within the run, lifted
     ("gripper", STILL | {"drive.frequency": 20.0}),  # two surfaces alike
+    ("paper-limited", KNEE),
+    (
+        "paper-limited",
+        {"mechanics.suspension": "repulsion", "mechanics.suspension_distance": 3.5e-3},
+    ),
     ("paper-limited", {"coil.count": 2, "circuit.current_limit": 0.9}),
     ("paper-limited", {"mechanics.gravity": 0.0, "friction.mu_plate": 0.0, "run.shutter": 0.5}),
 ]
@@ -35,7 +42,7 @@ def both(name: str, changes: dict[str, Any], step: float) -> tuple[dict[str, Any
 
 def test_structures_and_names_agree_with_the_compiled_code() -> None:
     assert all(here == there for here, there in fast.sizes())
-    assert (len(RIG), len(OWN)) == (28, 7)
+    assert (len(RIG), len(OWN)) == (33, 7)
     known = load("paper-limited")
     assert set(VARIABLES.values()) <= set(fast.known_numbers(known))
 
