@@ -38,6 +38,8 @@ LAW_KEYS = {
 """What each law of the suspension takes of the keys ``mechanics.suspension_…``."""
 OF_LAWS = {f"{SUSPENSION}_{name}" for names in LAW_KEYS.values() for name in names}
 """Keys of a law: what they come out as holds for that law alone."""
+UNSCALED = ("friction.", "mechanics.contact_damping", f"{SUSPENSION}_knee", f"{SUSPENSION}_dist")
+"""Keys that are no forces or masses begin so."""
 LEAST_DISTANCE = 1.1
 """Of ``suspension_distance``, in travels."""
 _SUPPLY = ("circuit.supply", "circuit.swing_loss_high", "circuit.swing_loss_low")
@@ -90,7 +92,12 @@ class Space:
         laws: Sequence[str],
         law: str = "",
     ) -> None:
-        self.path, self._all, self.laws, self.law = path, dict(rig), tuple(laws), law or laws[0]
+        self.path, self.all_entries, self.laws, self.law = (
+            path,
+            dict(rig),
+            tuple(laws),
+            law or laws[0],
+        )
         own = {f"{SUSPENSION}_{name}" for name in LAW_KEYS[self.law]}
         rig = {key: entry for key, entry in rig.items() if key in own or key not in OF_LAWS}
         self.rig_entries, self.trial_entries = rig, dict(trial)
@@ -110,7 +117,7 @@ class Space:
 
     def of_law(self, law: str) -> "Space":
         """The same with another law of the suspension."""
-        return Space(self._all, self.trial_entries, self.path, self.laws, law)
+        return Space(self.all_entries, self.trial_entries, self.path, self.laws, law)
 
     @property
     def names(self) -> list[str]:
@@ -140,6 +147,18 @@ class Space:
         distance, travel = self._near
         found[:, distance] = np.maximum(found[:, distance], LEAST_DISTANCE * found[:, travel])
         return found
+
+    def scaled(self, places: Array, forces: Array, walls: Array) -> Array:
+        """Places (n × free) with all forces and masses times ``forces`` (n), the travel times their
+        root, and the walls' stiffness times ``walls`` besides. A motion hardly tells the scale, and
+        searches that differ end apart in it."""
+        values = self.values(places)
+        for k, name in enumerate(self.names):
+            if name == "mechanics.travel":
+                values[:, k] *= np.sqrt(forces)
+            elif not name.startswith(UNSCALED):
+                values[:, k] *= forces * (walls if name == "mechanics.contact_stiffness" else 1.0)
+        return self.place(values)
 
     def prior(self, places: Array) -> Array:
         """What the priors add to the costs of rigs at places (n × free)."""

@@ -5,6 +5,7 @@ means, since the camera's zero is its own. The mean velocity of the part is the 
 straight line through its height.
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -13,7 +14,9 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.stepper.stepper import OWN
 from cosim.studies.identify.chain.chain import simulate
+from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import Measured
+from cosim.studies.identify.search.search import Found
 from cosim.trials.camera import velocities
 
 LATE = 5
@@ -58,6 +61,25 @@ def errors(trial: Measured, rig: Array, own: Array) -> Row:
             row["v_average_mm_per_s"] - row["v_average_measured_mm_per_s"]
         )
     return row
+
+
+def samples(trials: Sequence[Measured], space: Space, found: Found) -> float:
+    """The effective number of the surface's measured velocities, for the likelihood: those whose
+    residuals do not follow from others a moment or whole periods ago, by their autocorrelation."""
+    rig, total = space.rigs(found.place[None])[0], 0.0
+    for trial, own in zip(trials, found.own, strict=True):
+        left = trial.fine.signals["v_surface"] - shown(trial, rig, own)["v_surface"]
+        left = np.where(np.isfinite(left), left - np.nanmean(left), 0.0)
+        n, known = len(left), int(np.isfinite(trial.fine.signals["v_surface"]).sum())
+        like = np.correlate(left, left, "full")[n - 1 :] / max(float(left @ left), 1e-300)
+        short = like[1 : 1 + int(np.argmax(np.append(like, -1.0)[1:] <= 0.0))].sum()
+        period = (n - 1) / float(trial.fine.time[-1]) / trial.frequency
+        again = 0.0
+        if np.isfinite(period):
+            at = np.round(period * np.arange(1, int((n - 1) / period) + 1)).astype(int)
+            again = np.maximum(like[np.minimum(at, n - 1)], 0.0).sum()
+        total += known / (1.0 + 2.0 * short) / (1.0 + 2.0 * again)
+    return max(total, 1.0)
 
 
 def own_numbers(own: Array) -> Row:
