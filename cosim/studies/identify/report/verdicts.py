@@ -78,9 +78,10 @@ def judge(best: Rig, meant: Sequence[Rig], converged: bool) -> list[Verdict]:
         else:
             every = np.append(values[key], value)
             ends = float(every.min()), float(every.max())
-            at = np.repeat(solution.place[None], 2, axis=0)
-            at[:, k] = [space.place(np.where(np.arange(len(at[0])) == k, x, 1.0))[k] for x in ends]
-            edges = bool(at[0, k] < END), bool(at[1, k] > 1.0 - END)
+            at = np.repeat(space.values(solution.place)[None], 2, axis=0)
+            at[:, k] = ends
+            low, high = space.place(at)[:, k].tolist()
+            edges = low < END, high > 1.0 - END
             kind, words = _told(value, *ends, *edges, _tie(key, partners))
         found.append(Verdict(key, value, *ends, kind, words))
     return found
@@ -125,7 +126,7 @@ def _tie(key: str, partners: Mapping[str, Array]) -> str:
 
 
 def forces(rig: Rig, places: Array) -> tuple[Array, Array]:
-    """The suspension's force at ``places`` (q, m) less that at the centre, N, and as a current, A."""
+    """The suspension's force at ``places`` (q, m) less that at the centre, N; over Bl, A."""
     space, solution = rig
     numbers = space.numbers(solution.place)
     found = suspension_force(numbers, np.append(places, 0.0))
