@@ -202,7 +202,9 @@ def _mean(rows: Sequence[Row], name: str, how: Callable[[Any], Any] = np.mean) -
 
 def overall(rows: Sequence[Row]) -> Row:
     """Means over trials of what ``errors`` says of each, and the worst velocity."""
-    every = dict.fromkeys(name for row in rows for name in row if name not in ("trial", *OWN))
+    every = dict.fromkeys(
+        name for row in rows for name in row if name not in ("trial", "at_bounds", *OWN)
+    )
     names = [name for name in every if _mean(rows, name) is not None]
     found: Row = {name: _mean(rows, name) for name in names}
     found["nrmse_v_surface_worst"] = _mean(rows, "nrmse_v_surface", max)

@@ -208,7 +208,8 @@ def limits(
         words += [f"--set {text}" for text in texts]
     base, there = load(scene, overrides), [load(one) for one in at or TRIALS]
     efforts = (QUICK if quick else FULL).times(effort)
-    others = ensemble(Path(rigs), efforts.rigs) if rigs is not None else []
+    force = base.friction.normal_force
+    others = ensemble(Path(rigs), efforts.rigs, force) if rigs is not None else []
     checked(base, others, rigs)
     told = counted(progress, told_count(LIMITS, efforts, len(others)) + 2 + len(there))
     path = None if out is None else Path(out) / STORE

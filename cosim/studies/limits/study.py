@@ -247,9 +247,10 @@ def moved(bench: Bench, points: Array, there: Case, here: Case) -> Array:
     return np.clip(points.reshape(-1, KNOB_COUNT) * [ratio, 1.0, ratio], 0.0, 1.0)
 
 
-def ensemble(path: Path, most: int) -> list[Settings]:
+def ensemble(path: Path, most: int, normal_force: float) -> list[Settings]:
     """The rigs of a file: the tables of its list ``ensemble``, each of keys ("table.key") and
-    values, SI; entries without a dot are passed over. Of more than ``most`` these are spread over
+    values, SI; of entries without a dot only ``normal_force_ratio`` counts, by which a rig wants
+    another normal force than the scene's, N. Of more than ``most`` these are spread over
     the list, without its first, the best, for which the scene stands.
 
     Raises BadInput.
@@ -268,7 +269,11 @@ def ensemble(path: Path, most: int) -> list[Settings]:
     if len(rigs) > most:
         places = np.linspace(0, len(rigs) - 1, most + 1)[1:]
         rigs = [rigs[k] for k in np.unique(places.round().astype(int)).tolist()]
-    return [{key: value for key, value in rig.items() if "." in key} for rig in rigs]
+    found = [{key: value for key, value in rig.items() if "." in key} for rig in rigs]
+    for settings, rig in zip(found, rigs, strict=True):
+        if isinstance(ratio := rig.get("normal_force_ratio"), int | float):
+            settings.setdefault("friction.normal_force", ratio * normal_force)
+    return found
 
 
 def checked(scene: Scene, rigs: Sequence[Settings], file: str | os.PathLike[str] | None) -> None:

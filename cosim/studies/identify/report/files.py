@@ -32,7 +32,7 @@ NOTES = (
     "means removed; 'straight line' is that of the best straight line. v_average is the slope of "
     "that line.",
     "The volts follow from the force factor, which is known only as the verdict says: they are not "
-    "measured volts. A constant force on the ram does the same as an offset of the drive, so of the "
+    "measured volts. A constant force on the ram does what an offset of the drive does: of the "
     "suspension's force only its change from the centre is told, and no offset is measured.",
     "The spring-loaded plate stands still here; in the published trials it moves at 5 to 18 mm/s.",
 )
@@ -43,7 +43,7 @@ def write(folder: Path, found: Solved) -> None:
     numbers = found.numbers
     write_json(folder / "identify.json", numbers)
     write_csv(folder / "identify.csv", _aligned([*numbers["trials"], *numbers["apart"]]))
-    notes = [*NOTES, *_priors(found), *told(numbers)]
+    notes = [*NOTES, *_priors(found), *findings(numbers)]
     write_page(folder / "identify.md", "The identified rig", notes, tables(numbers))
     for name, draw in figures.FIGURES.items():
         draw(found).write(folder / f"identify-{name}.png")
@@ -75,7 +75,7 @@ def _priors(found: Solved) -> list[str]:
     return [words] if weighed else []
 
 
-def told(numbers: dict[str, Any]) -> list[str]:
+def findings(numbers: dict[str, Any]) -> list[str]:
     """Of ``identify.json``: what the ranges are worth, where the ram rests, which drives are at a
     bound; a paragraph each."""
     laws, agreed = numbers["laws"], numbers["converged"]
@@ -110,7 +110,7 @@ def summary(found: Solved) -> str:
     numbers = found.numbers
     rig = numbers["rig"]
     lines = [f"{one.key:<32}{rig[one.key]:>10.4g}  {one.words}" for one in found.verdicts]
-    lines += ["", *told(numbers)]
+    lines += ["", *findings(numbers)]
     heads = ("trial", "velocity", "height", "floor", "part [mm]", "v_average [mm/s]", "measured")
     lines += ["", "".join(f"{head:>{WIDTH}}" for head in heads)]
     lines += [_line(row) for row in numbers["trials"]]

@@ -51,12 +51,14 @@ def errors(trial: Measured, rig: Array, own: Array) -> Row:
     row |= {f"nrmse_{name}": nrmse(simulated[name], signals[name]) for name in signals}
     if trial.has_part:
         apart = (simulated["z_part"] - signals["z_part"]) * 1e3
-        line = np.polynomial.Polynomial.fit(time, signals["z_part"] * 1e3, 1)
+        known = np.isfinite(apart)
+        apart, time, z = apart[known], time[known], signals["z_part"][known]
+        line = np.polynomial.Polynomial.fit(time, z * 1e3, 1)
         row["part_error_mm"] = float(np.abs(apart).mean())
         row["part_error_from_start_mm"] = float(np.abs(apart - apart[0]).mean())
-        row["straight_line_error_mm"] = float(np.abs(line(time) - signals["z_part"] * 1e3).mean())
-        row["v_average_mm_per_s"] = slope(time, simulated["z_part"]) * 1e3
-        row["v_average_measured_mm_per_s"] = slope(time, signals["z_part"]) * 1e3
+        row["straight_line_error_mm"] = float(np.abs(line(time) - z * 1e3).mean())
+        row["v_average_mm_per_s"] = slope(time, simulated["z_part"][known]) * 1e3
+        row["v_average_measured_mm_per_s"] = slope(time, z) * 1e3
         row["v_average_error_mm_per_s"] = abs(
             row["v_average_mm_per_s"] - row["v_average_measured_mm_per_s"]
         )
@@ -126,9 +128,11 @@ def bands(trial: Measured, rig: Array, own: Array) -> list[Row]:
     residual = v - shown(trial, rig, own)["v_surface"]
     known = np.isfinite(v) & np.isfinite(residual)
     step = float(np.median(np.diff(time)))
-    window = np.hanning(int(known.sum()))
+    even = np.arange(time[known][0], time[known][-1] + 0.5 * step, step)
+    window = np.hanning(len(even))
     f = np.fft.rfftfreq(len(window), step)
-    powers = [np.abs(np.fft.rfft(values[known] * window)) ** 2 for values in (v, residual)]
+    both = (np.interp(even, time[known], values[known]) for values in (v, residual))
+    powers = [np.abs(np.fft.rfft(values * window)) ** 2 for values in both]
     whole = powers[0].sum()
     rows = []
     for low, high in pairwise(BANDS):
