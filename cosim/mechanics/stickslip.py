@@ -6,16 +6,22 @@ or, where the FMU has the current source too (circuit.model "limited"), the comm
 """
 
 from collections import deque
-from ctypes import c_double, c_int
+from collections.abc import Mapping
+from ctypes import c_double, c_int, c_int64
 from dataclasses import dataclass
 from functools import cache
 from operator import attrgetter, is_
 from typing import Any
 
+import numpy as np
+
+from cosim.arrays import Array
 from cosim.errors import SimulationFailed
 from cosim.mechanics.fmi import borrow, give_back
 from cosim.mechanics.normal_force import normal_force
 from cosim.scene import Scene, keys
+from cosim.stepper.stepper import RIG, numbers
+from cosim.toolchain.libraries import library
 
 STEP_OUTPUTS = (
     *(
@@ -63,6 +69,8 @@ _VARIABLES = [
 """The FMU's variables that are keys of a scene, real and whole ones; what finds their values."""
 
 CONTACT_LAWS = {"compliant": 1, "rigid": 2}
+SUSPENSIONS = {"cubic": 1, "knee": 2, "repulsion": 3}
+"""Choices of a scene, as the FMU numbers them."""
 
 
 @dataclass(frozen=True)
@@ -213,6 +221,7 @@ def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
     reals: dict[str, float] = {}
     integers = {
         "contact": CONTACT_LAWS[scene.mechanics.contact],
+        "suspension": SUSPENSIONS[scene.mechanics.suspension],
         "ram_fixed": int(scene.mechanics.actuator == "direct"),
         "independent": int(scene.drive.phase_deg is not None),
         "source": int(scene.rung.source_in_fmu),
@@ -226,3 +235,36 @@ def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
         reals["output_high"] = circuit.supply - circuit.swing_loss_high
         reals["output_low"] = circuit.swing_loss_low - circuit.supply
     return reals, integers
+
+
+@cache
+def _stepper() -> Any:
+    found = library("stepper")
+    found.stepper_suspension.restype, found.stepper_rests.restype = c_double, c_int64
+    found.stepper_suspension.argtypes = (c_double * len(RIG), c_double)
+    found.stepper_rests.argtypes = (c_double * len(RIG), c_double * 4)
+    return found
+
+
+def numbers_of(scene: Scene) -> dict[str, float]:
+    """The stepper's numbers of a scene's rig, as far as the FMU has them."""
+    reals, integers = parameters(scene)
+    return numbers(reals | integers)
+
+
+def suspension_force(known: Mapping[str, float], places: Array) -> Array:
+    """Of the suspension on a ram at rest at ``places`` (q, m), N; of the stepper's numbers."""
+    rig, force_at = _rig(known), _stepper().stepper_suspension
+    return np.array([force_at(rig, q) for q in places.tolist()])
+
+
+def rests_of(known: Mapping[str, float]) -> list[float]:
+    """The places (q, m), rising, at which the ram rests without a current; in a wall that yields,
+    too."""
+    found = (c_double * 4)()
+    count = _stepper().stepper_rests(_rig(known), found)
+    return [*found][:count]
+
+
+def _rig(known: Mapping[str, float]) -> Any:
+    return (c_double * len(RIG))(*(known.get(name, 0.0) for name in RIG))

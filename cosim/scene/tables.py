@@ -363,9 +363,18 @@ class Mechanics(Table):
     part_mass: float = _of_fmu("part_mass")
     flexure_stiffness: float = _of_fmu("flexure_stiffness")
     flexure_damping: float = _of_fmu("flexure_damping")
+    suspension: Literal["cubic", "knee", "repulsion"] = _choice(
+        "cubic",
+        "Law of the suspension: cubic, with k1, k2 and k3; knee, with k1, and harder below "
+        "suspension_knee; repulsion, as of magnets below the ram",
+    )
     suspension_k1: float = _of_fmu("suspension_k1")
     suspension_k2: float = _of_fmu("suspension_k2")
     suspension_k3: float = _of_fmu("suspension_k3")
+    suspension_knee: float = _of_fmu("suspension_knee")
+    suspension_hardening: float = _of_fmu("suspension_hardening")
+    suspension_repulsion: float = _of_fmu("suspension_repulsion")
+    suspension_distance: float = _of_fmu("suspension_distance")
     suspension_damping: float = _of_fmu("suspension_damping")
     travel: float = _of_fmu("travel")
     contact: Literal["compliant", "rigid"] = _choice(
@@ -378,6 +387,17 @@ class Mechanics(Table):
     gravity: float = _of_fmu("gravity")
     tolerance: float = _of_fmu("tolerance")
     initial_lift: float = _of_fmu("initial_lift")
+
+    @model_validator(mode="after")
+    def _check(self) -> "Mechanics":
+        least = 1.1 * self.travel  # nearer, the force at the lower wall has no bound
+        if self.suspension == "repulsion" and self.suspension_distance < least:
+            raise fault(
+                f"mechanics.suspension_distance = {self.suspension_distance:g} m must be at least "
+                f"1.1 times mechanics.travel = {self.travel:g} m with "
+                'mechanics.suspension = "repulsion"'
+            )
+        return self
 
 
 class Friction(Table):

@@ -24,10 +24,10 @@ from cosim.errors import SimulationFailed
 from cosim.files.spill import BLOCK, Tape
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
-from cosim.simulation.guards import notes
+from cosim.simulation.guards import remarks
 from cosim.simulation.rungs.electrics import commanded
 from cosim.simulation.summary import slips
-from cosim.stepper.stepper import LANES, OWN, RIG, VARIABLES
+from cosim.stepper.stepper import LANES, OWN, RIG, numbers
 from cosim.toolchain.libraries import library
 from cosim.toolchain.processes import Progress
 from cosim.toolchain.versions import versions
@@ -94,7 +94,7 @@ def simulate_fast(scene: Scene, progress: Progress) -> Result:
     error = abs(summary["v_average"] - finer["v_average"])
     columns = _waveforms(scene, progress)
     summary |= {"v_average_error": error, "wall_time": time.perf_counter() - began}
-    return Result(scene, columns, summary | {"notes": notes(scene, columns, summary)})
+    return Result(scene, columns, summary | remarks(scene, columns, summary))
 
 
 def summary_fast(scene: Scene, progress: Progress = lambda _: None) -> dict[str, Any]:
@@ -119,8 +119,8 @@ def summaries(
         for first in range(0, len(all_places), LANES):
             places = all_places[first : first + LANES]
             told = _batch([scenes[k] for k in places], share * step, progress)
-            for place, numbers in zip(places, told, strict=True):
-                found[place] = numbers
+            for place, one in zip(places, told, strict=True):
+                found[place] = one
     return found
 
 
@@ -275,14 +275,15 @@ def _between(times: Array, low: float, high: float) -> slice:
 
 def known_numbers(scene: Scene) -> dict[str, float]:
     """The FMU's variables of a scene, with the limits of a source that has none."""
-    return {"output_high": UNLIMITED, "output_low": -UNLIMITED} | parameters(scene)[0]
+    reals, integers = parameters(scene)
+    return {"output_high": UNLIMITED, "output_low": -UNLIMITED} | reals | integers
 
 
 def _row(scene: Scene) -> list[float]:
     """The stepper's numbers of a scene, RIG and OWN."""
     known = known_numbers(scene)
     drive, coils = scene.drive, scene.coil.count
-    found = {name: known[variable] for name, variable in VARIABLES.items()}
+    found = numbers(known)
     found["part_mass"] /= scene.mechanics.n_surfaces
     found["sense_resistance"] *= coils  # of the current of all coils
     found["current_limit"] = found["current_limit"] / coils if scene.rung.has_limits else UNLIMITED

@@ -10,6 +10,7 @@ from cosim.arrays import Array
 from cosim.circuit.heat import DRIVE_RANGE_HEAT
 from cosim.files.spill import blocks
 from cosim.mechanics.normal_force import NormalForce
+from cosim.mechanics.stickslip import numbers_of, rests_of
 from cosim.scene import Scene
 
 LM348_SUPPLY = 18.0
@@ -27,13 +28,14 @@ SHALLOW = 0.1
 much smaller than the bodies."""
 
 
-def notes(
+def remarks(
     scene: Scene,
     columns: Mapping[str, Array],
     summary: Mapping[str, Any],
     force: NormalForce | None = None,
-) -> list[str]:
-    """A sentence for each limit that the scene or its run leaves: quantity, value, limit.
+) -> dict[str, Any]:
+    """``notes``: a sentence for each limit that scene or run leave: quantity, value, limit.
+    ``rests``: the places (q, m) at which a free ram rests without a current.
 
     ``columns`` are the run's waveforms, ``summary`` its numbers, SI, and ``force`` the normal force
     where it changes in time. What moves is judged by the rows of the waveforms.
@@ -46,7 +48,33 @@ def notes(
             if f"z_surface{surface}" in columns:
                 found += _ram(scene, columns, surface)
         found += _part(scene, columns)
-    return found
+    told: dict[str, Any] = {"notes": found}
+    if not scene.surface_is_given and scene.mechanics.actuator == "ram":
+        told["rests"] = _rests(scene)
+        found += _told_of(told["rests"], scene.mechanics.travel)
+    return told
+
+
+def _rests(scene: Scene) -> list[float]:
+    found, travel = rests_of(numbers_of(scene)), scene.mechanics.travel
+    rigid = scene.mechanics.contact == "rigid"
+    return [max(-travel, min(travel, q)) for q in found] if rigid else found
+
+
+def _told_of(found: list[float], travel: float) -> Iterator[str]:
+    if len(found) < 2:
+        return
+    start = min(found, key=abs)
+    places = [
+        f"q = {q * 1e3:.3g} mm"
+        + (", at the upper wall" if q >= travel else ", at the lower wall" if q <= -travel else "")
+        + (", where the run starts" if q == start else "")
+        for q in found
+    ]
+    yield (
+        f"without a current the ram rests at {len(found)} places: {'; '.join(places)}. A pulse may "
+        "leave it at another than it came from."
+    )
 
 
 def _grip(scene: Scene, force: NormalForce | None) -> Iterator[str]:

@@ -9,7 +9,7 @@ from cosim.coupling.loop.recorder import Recorder
 from cosim.files.spill import Tape, blocks
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
-from cosim.simulation.guards import notes
+from cosim.simulation.guards import remarks
 from cosim.simulation.rungs.given_surface import move_part
 from cosim.simulation.rungs.rung import Driven, rungs
 from cosim.simulation.summary import motion, numbers
@@ -24,11 +24,11 @@ def simulate_here(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     if scene.surface_is_given:
         waveforms, summary = _followed_surface(scene)
         progress(scene.run.duration)
-        return Result(scene, waveforms, summary | {"notes": notes(scene, waveforms, summary)})
+        return Result(scene, waveforms, summary | remarks(scene, waveforms, summary))
     with closing(Mechanics(scene, fmi_version)) as mechanics:
         recorder, driven, summary = _driven(scene, mechanics, progress)
     waveforms = _waveforms(scene, recorder, driven)
-    told = {"notes": notes(scene, waveforms, summary, mechanics.normal_force)}
+    told = remarks(scene, waveforms, summary, mechanics.normal_force)
     return Result(scene, waveforms, summary | told)
 
 

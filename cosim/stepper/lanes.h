@@ -61,6 +61,32 @@ INLINE Wide of_surface(const Contact *c, Wide bound, Wide *plate)
     return choose(*plate == wanted, resting, rubbing);
 }
 
+/* As the FMU numbers the laws of the suspension. What a lane's law does not have becomes 0, so that
+ * the sum of all laws is that lane's own. Whether any lane has more than the cubic. */
+INLINE int choose_laws(Wide p[N_ALL])
+{
+    const Wide zero = {0}, law = p[SUSPENSION];
+    p[SUSPENSION_K1] = choose(law == 3.0, zero, p[SUSPENSION_K1]);
+    p[SUSPENSION_K2] = choose(law == 1.0, p[SUSPENSION_K2], zero);
+    p[SUSPENSION_K3] = choose(law == 1.0, p[SUSPENSION_K3], zero);
+    p[SUSPENSION_HARDENING] = choose(law == 2.0, p[SUSPENSION_HARDENING], zero);
+    p[SUSPENSION_REPULSION] = choose(law == 3.0, p[SUSPENSION_REPULSION], zero);
+    for (int l = 0; l < WIDTH; l++)
+        if (law[l] != 1.0)
+            return 1;
+    return 0;
+}
+
+/* The force that lifts the ram below a knee and above magnets, N. */
+INLINE Wide lift_of(const Wide p[N_ALL], Wide q)
+{
+    const Wide below = most(p[SUSPENSION_KNEE] - q, (Wide){0});
+    const Wide place = most(q, -p[TRAVEL_DOWN]), share = 1.0 + place / p[SUSPENSION_DISTANCE];
+    const Wide force = p[SUSPENSION_REPULSION] / (share * share * share);
+    const Wide slope = 3.0 * force / (share * p[SUSPENSION_DISTANCE]);
+    return p[SUSPENSION_HARDENING] * below * below + (force - slope * (q - place));
+}
+
 /* What acted within a step. */
 typedef struct {
     Wide current;         /* mean, A */
@@ -72,10 +98,11 @@ typedef struct {
 } Effect;
 
 /* One step of all lanes, whose plate is moving or stands on the ground. It ends at `edge`, or where
- * the command jumps, if that lies between `low` and `high`. i0 and i1 give the current at both ends
- * where it is measured; then the effect has no limits. What of it nobody reads costs nothing. */
-INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double high, int moving,
-                 int measured, double i0, double i1, Effect *effect)
+ * the command jumps, if that lies between `low` and `high`. `lifted` is as choose_laws() has it. i0
+ * and i1 give the current at both ends where it is measured; then the effect has no limits. What of it
+ * nobody reads costs nothing. */
+INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double high, int lifted,
+                 int moving, int measured, double i0, double i1, Effect *effect)
 {
     const Wide zero = {0}, one = zero + 1.0;
     const Wide start = p[START], jump = m->jump, t = m->t;
@@ -125,8 +152,10 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
     Wide above = p[WALL_UP] * up * root(up), below = p[WALL_DOWN] * down * root(down);
     above = choose(1.0 + damping * u > 0.0, above, zero); /* a wall does not pull */
     below = choose(1.0 - damping * u > 0.0, below, zero);
-    const Wide force = p[FORCE_FACTOR] * mean + below - above -
-                       q * (p[SUSPENSION_K1] + q * (p[SUSPENSION_K2] + q * p[SUSPENSION_K3]));
+    Wide force = p[FORCE_FACTOR] * mean + below - above -
+                 q * (p[SUSPENSION_K1] + q * (p[SUSPENSION_K2] + q * p[SUSPENSION_K3]));
+    if (lifted)
+        force += lift_of(p, q);
     const Wide c = half * (p[SUSPENSION_DAMPING] + damping * (above + below));
     effect->wall = above - below;
     effect->wall_damping = damping * (above + below);
@@ -194,6 +223,7 @@ FUNCTION(chain_lanes)(const Schedule *c, const Parameters all, const Rest *rest,
     Wide p[N_ALL];
     for (int k = 0; k < N_ALL; k++)
         memcpy(p + k, all[k] + from, sizeof *p);
+    const int lifted = choose_laws(p);
     State m;
     memset(&m, 0, sizeof m);
     m.t += -(double)rest->steps * c->edges[1];
@@ -214,13 +244,13 @@ FUNCTION(chain_lanes)(const Schedule *c, const Parameters all, const Rest *rest,
             const double i0 = c->current ? c->current[k < 1 ? 0 : k - 1] : 0.0;
             Effect e;
             if (!c->current && !moving)
-                step(p, &m, low, edge, high, 0, 0, i0, i1, &e);
+                step(p, &m, low, edge, high, lifted, 0, 0, i0, i1, &e);
             else if (!c->current)
-                step(p, &m, low, edge, high, 1, 0, i0, i1, &e);
+                step(p, &m, low, edge, high, lifted, 1, 0, i0, i1, &e);
             else if (!moving)
-                step(p, &m, low, edge, high, 0, 1, i0, i1, &e);
+                step(p, &m, low, edge, high, lifted, 0, 1, i0, i1, &e);
             else
-                step(p, &m, low, edge, high, 1, 1, i0, i1, &e);
+                step(p, &m, low, edge, high, lifted, 1, 1, i0, i1, &e);
             m.jump = choose(e.drops, m.jump + 1.0 / p[FREQUENCY], m.jump);
         }
         if (k < 0 || c->sample[k] < 0)
@@ -353,9 +383,11 @@ INLINE void follow(const Stretch *c, const Parameters all, const Span *span, con
     Sums sum[LANES / WIDTH];
     Effect e[LANES / WIDTH];
     double settled = INFINITY, all_settled = 0.0, ended = INFINITY;
+    int lifted = 0;
     for (int g = 0, from = 0; g < groups; g++, from += WIDTH) {
         for (int k = 0; k < N_ALL; k++)
             memcpy(p[g] + k, all[k] + from, sizeof(Wide));
+        lifted |= choose_laws(p[g]);
         memcpy(settle + g, span->settle + from, sizeof(Wide));
         memcpy(until + g, span->until + from, sizeof(Wide));
         for (int k = 0; k < N_STATE; k++)
@@ -374,7 +406,7 @@ INLINE void follow(const Stretch *c, const Parameters all, const Span *span, con
 #pragma GCC unroll 4
         for (int g = 0; g < groups; g++) {
             before[g] = m[g];
-            step(p[g], m + g, edge - half, edge, edge + half, 0, 0, 0.0, 0.0, e + g);
+            step(p[g], m + g, edge - half, edge, edge + half, lifted, 0, 0, 0.0, 0.0, e + g);
             pass_corners(c->drives + g * WIDTH, p[g], e[g].drops, m + g);
             add_energies(p[g], before + g, m + g, e + g, until[g], sum + g);
         }

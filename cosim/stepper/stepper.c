@@ -2,34 +2,93 @@
 
 #include <string.h>
 
-/* Force on the ram at rest at q, without a current. */
-static double balance(const double p[N_ALL][LANES], int l, double q)
+double stepper_suspension(const double p[N_RIG], double q)
 {
-    const double depth = -q - p[TRAVEL_DOWN][l];
-    double force = -q * (p[SUSPENSION_K1][l] + q * (p[SUSPENSION_K2][l] + q * p[SUSPENSION_K3][l])) -
-                   p[RAM_MASS][l] * p[GRAVITY][l];
-    if (depth > 0.0)
-        force += p[WALL_DOWN][l] * depth * sqrt(depth);
-    return force;
+    if (p[SUSPENSION] == 1.0)
+        return -q * (p[SUSPENSION_K1] + q * (p[SUSPENSION_K2] + q * p[SUSPENSION_K3]));
+    if (p[SUSPENSION] == 2.0) {
+        const double below = fmax(p[SUSPENSION_KNEE] - q, 0.0);
+        return p[SUSPENSION_HARDENING] * below * below - q * p[SUSPENSION_K1];
+    }
+    const double place = fmax(q, -p[TRAVEL_DOWN]), d = p[SUSPENSION_DISTANCE];
+    const double force = p[SUSPENSION_REPULSION] / pow(1.0 + place / d, 3.0);
+    return force * (1.0 - 3.0 * (q - place) / (d + place));
 }
 
-/* Where the ram hangs at rest: as the FMU finds it, by bisection from the lower wall up. */
-static double hanging(const double p[N_ALL][LANES], int l)
+/* Force on the ram at rest at q, without a current. */
+static double balance(const double p[N_RIG], double q)
 {
-    double low = -p[TRAVEL_DOWN][l], high = 0.0;
-    if (balance(p, l, low) < 0.0) {
-        high = low;
-        for (int k = 0; k < 60 && balance(p, l, low) < 0.0; k++)
-            low *= 2.0;
-    }
+    const double above = fmax(q - p[TRAVEL_UP], 0.0), below = fmax(-q - p[TRAVEL_DOWN], 0.0);
+    return stepper_suspension(p, q) - p[RAM_MASS] * p[GRAVITY] +
+           p[WALL_DOWN] * below * sqrt(below) - p[WALL_UP] * above * sqrt(above);
+}
+
+/* Where the balance, above 0 at `low`, falls through 0. */
+static double zero_between(const double p[N_RIG], double low, double high)
+{
     for (int k = 0; k < 60; k++) {
         const double middle = 0.5 * (low + high);
-        if (balance(p, l, middle) > 0.0)
+        if (balance(p, middle) > 0.0)
             low = middle;
         else
             high = middle;
     }
     return 0.5 * (low + high);
+}
+
+/* Where the travel is cut into pieces on each of which the balance only rises or only falls, rising:
+ * its ends, the centre, and where the cubic has no stiffness. */
+static void cuts(const double p[N_RIG], double at[5])
+{
+    const double k1 = p[SUSPENSION_K1], k2 = p[SUSPENSION_K2], k3 = p[SUSPENSION_K3];
+    const double square = p[SUSPENSION] == 1.0 ? k2 * k2 - 3.0 * k1 * k3 : 0.0;
+    const double twice = k2 < 0.0 ? sqrt(fmax(square, 0.0)) - k2 : -sqrt(fmax(square, 0.0)) - k2;
+    const double found[5] = {-p[TRAVEL_DOWN], 0.0, p[TRAVEL_UP],
+                             square > 0.0 ? k1 / twice : 0.0, square > 0.0 ? twice / (3.0 * k3) : 0.0};
+    for (int n = 0; n < 5; n++) {
+        const double next = fmin(fmax(found[n], found[0]), p[TRAVEL_UP]);
+        int k = n;
+        for (; k > 0 && at[k - 1] > next; k--)
+            at[k] = at[k - 1];
+        at[k] = next;
+    }
+}
+
+int64_t stepper_rests(const double p[N_RIG], double rests[MAX_RESTS])
+{
+    const double bottom = -p[TRAVEL_DOWN], top = p[TRAVEL_UP];
+    int64_t n = 0;
+    double at[5];
+    cuts(p, at);
+    if (balance(p, bottom) < 0.0) {
+        double low = bottom;
+        for (int k = 0; k < 60 && balance(p, low) < 0.0; k++)
+            low *= 2.0;
+        rests[n++] = zero_between(p, low, bottom);
+    }
+    for (int k = 0; k < 4; k++)
+        if (balance(p, at[k]) > 0.0 && balance(p, at[k + 1]) <= 0.0)
+            rests[n++] = zero_between(p, at[k], at[k + 1]);
+    if (balance(p, top) > 0.0) {
+        double high = top;
+        for (int k = 0; k < 60 && balance(p, high) > 0.0; k++)
+            high *= 2.0;
+        rests[n++] = zero_between(p, top, high);
+    }
+    return n;
+}
+
+/* Where the ram hangs at rest: as the FMU has it, at the place nearest to the centre. */
+static double hanging(const double all[N_ALL][LANES], int l)
+{
+    double p[N_RIG], rests[MAX_RESTS], nearest = INFINITY;
+    for (int k = 0; k < N_RIG; k++)
+        p[k] = all[k][l];
+    const int64_t n = stepper_rests(p, rests);
+    for (int64_t k = 0; k < n; k++)
+        if (fabs(rests[k]) < fabs(nearest))
+            nearest = rests[k];
+    return n ? nearest : 0.0;
 }
 
 /* Lane l at rest; `middle` is that of its first step, s: drops before it are over. */

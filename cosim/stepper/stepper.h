@@ -98,6 +98,14 @@ EXPORT void stepper_begin(const Parameters parameters, const Drive drives[LANES]
 EXPORT void stepper_run(const Stretch *piece, const Parameters parameters, const Span *span,
                         Kept *kept, double *out);
 
+/* Force of the suspension on a ram at rest at q, N, of the numbers RIG. */
+EXPORT double stepper_suspension(const double rig[N_RIG], double q);
+
+enum { MAX_RESTS = 4 };
+
+/* The places (q, m) at which the ram rests without a current, rising: how many. */
+EXPORT int64_t stepper_rests(const double rig[N_RIG], double rests[MAX_RESTS]);
+
 EXPORT int64_t stepper_sizes(int64_t which); /* bytes of Kept, of Stretch */
 
 /* ---- between the files of the stepper ---- */

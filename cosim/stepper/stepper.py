@@ -1,6 +1,7 @@
 """The names of the compiled stepper's numbers, from its one table."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 LANES = 8
@@ -20,3 +21,8 @@ OWN = tuple(name.lower() for kind, name, _ in _ROWS if kind == "OWN")
 
 VARIABLES = {name.lower(): variable for _, name, variable in _ROWS if variable}
 """The FMU's variable that a number is, where it is one."""
+
+
+def numbers(known: Mapping[str, float]) -> dict[str, float]:
+    """The stepper's numbers of known variables of the FMU."""
+    return {name: known[variable] for name, variable in VARIABLES.items() if variable in known}

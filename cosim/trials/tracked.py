@@ -4,7 +4,7 @@ A velocity that is missing, or its whole column, is made by central differences,
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.trials.camera import velocities
-from cosim.trials.table import BODIES, Table, read_table
+from cosim.trials.table import BODIES, FEWEST_ROWS, Table, read_table
 
 
 @dataclass(frozen=True)
@@ -69,14 +69,21 @@ def trial_files(folder: Path, apart: Path | None = None) -> list[Path]:
 
 
 def read(path: Path) -> Trial:
-    """One trial. Raises BadInput, with file, row and column, for what is wrong with it."""
+    """One trial, of the rows in which surface and part are known; times need not be even. Raises
+    BadInput, with file, row and column, for what is wrong with it."""
     table = read_table(path)
     for name, letters in (("time", "t"), ("z_surface", "zp"), ("z_part", "zo")):
         if name not in table.columns:
             found = ", ".join(table.headers.values())
             raise BadInput(f"{path}: there is no column {letters} (found: {found}).")
-    for name in ("z_surface", "z_part"):
-        table.complete(name)
+    known = np.isfinite(table.columns["z_surface"] + table.columns["z_part"])
+    if known.sum() < FEWEST_ROWS:
+        raise BadInput(
+            f"{path}: {known.sum()} rows have both zp and zo, and {FEWEST_ROWS} are needed."
+        )
+    lines = tuple(np.array(table.lines)[known].tolist())
+    columns = {name: values[known] for name, values in table.columns.items()}
+    table = replace(table, columns=columns, lines=lines)
     tracks = {body: track(table, body) for body in BODIES.values()}
     return Trial(
         *(path.stem, number_of(path), table.columns["time"]),

@@ -58,6 +58,9 @@ SUMMARY: dict[str, Quantity] = {
     "impacts": Quantity("1", "number of impacts of the ram on a wall"),
     "stick_slip_events": Quantity("1", "number of changes between sticking and slipping"),
     "at_wall": Quantity("1", "1 where the ram touches a wall in the last row, else 0"),
+    "rests": Quantity(
+        "m", "places (ram in the actuator, q) at which the ram rests without current"
+    ),
     "energy_in": Quantity("J", "energy that the amplifier's output delivers, over the whole run"),
     "energy_copper": Quantity("J", "heat in coils (copper, eddy currents) and sense resistor"),
     "energy_friction": Quantity("J", "heat of friction on the part"),

@@ -72,6 +72,8 @@ DIRECT = {
     **{"surface_mass": 0.00783, "flexure_stiffness": 936.0, "flexure_damping": 0.475},
     **{"suspension_k1": 0.0, "suspension_k3": 0.0, "suspension_damping": 0.0, "travel": 4.6e-3},
 }
+KNEE = {"suspension": "knee", "suspension_k1": 90.0, "suspension_knee": -2e-4}
+REPULSION = {"suspension": "repulsion", "suspension_repulsion": 0.06, "suspension_distance": 2.3e-3}
 CASES = (
     Case("reference", "compliant", "amplifier", {}, 2.0, 1.0),
     Case("reference-ideal", "compliant", "ideal", {}, 2.0, 1.0),
@@ -125,6 +127,10 @@ CASES = (
         *("sine-rigid-limited", "rigid", "limited"),
         **{"waveform": "sine", "mu_plate": 0.2, "inductance": 4e-3, "frequency": 40.0},
     ),
+    case("knee", "compliant", "limited", **KNEE, frequency=22.0),
+    case("knee-rigid", "rigid", "limited", **KNEE, amplitude=9.0),
+    case("repulsion", "compliant", "limited", **REPULSION, contact_stiffness=3e6),
+    case("repulsion-rigid", "rigid", "limited", **REPULSION, frequency=30.0),
 )
 
 

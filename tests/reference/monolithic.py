@@ -23,9 +23,11 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.integrate import quad
 from scipy.optimize import root_scalar
 from sksundae.cvode import CVODE
 
@@ -75,6 +77,11 @@ class Params:
     suspension_k1: float = 40.0  # N/m
     suspension_k2: float = 0.0  # N/m^2
     suspension_k3: float = 1.5e7  # N/m^3
+    suspension_knee: float = 0.0  # m
+    suspension_hardening: float = 4e5  # N/m^2
+    suspension_repulsion: float = 0.05  # N
+    suspension_distance: float = 2.8e-3  # m
+    suspension: str = "cubic"  # or "knee", "repulsion"
     suspension_damping: float = 0.02  # N s/m
     travel: float = 1.9e-3  # m
     restitution: float = 0.75  # rigid contact
@@ -194,6 +201,29 @@ class _Model:
         """Force factor at the ram's position [N/A]."""
         return self.p.force_factor * (1.0 + q * (self.p.b1 + q * self.p.b2))
 
+    def suspension(self, q: float) -> float:
+        """Force of the suspension on the ram [N], without its damper."""
+        p = self.p
+        if p.suspension == "cubic":
+            return -q * (p.suspension_k1 + q * (p.suspension_k2 + q * p.suspension_k3))
+        if p.suspension == "knee":
+            lift = p.suspension_hardening * (p.suspension_knee - q) ** 2
+            return -p.suspension_k1 * q + (lift if q < p.suspension_knee else 0.0)
+        d, c = p.suspension_distance, p.suspension_repulsion
+        if q >= -p.travel:
+            return c * d**3 / (d + q) ** 3
+        gap = d - p.travel  # the tangent at the lower wall
+        return c * (d / gap) ** 3 - 3.0 * c * d**3 / gap**4 * (q + p.travel)
+
+    def spring_energy(self, q: float) -> float:
+        """Energy of the suspension [J]: the integral of its force, piece by piece."""
+        ends = sorted({0.0, q, *(x for x in (-self.p.travel, self.p.suspension_knee)
+                                 if min(0.0, q) < x < max(0.0, q))})  # fmt: skip
+        found = sum(
+            quad(self.suspension, a, b, epsabs=1e-17, epsrel=1e-13)[0] for a, b in pairwise(ends)
+        )
+        return math.copysign(1.0, -q) * found
+
     def wall_force(self, q: float, dq: float) -> float:
         """Compliant wall's force on the ram [N] (Hunt-Crossley), given that it is touched."""
         depth = self.side * q - self.p.travel
@@ -209,7 +239,7 @@ class _Model:
         self.normal = p.normal_force + p.normal_force_slope * t
         i, q, dq, zs, vs = self.current(t, y[0]), y[2], y[3], y[4], y[5]
         ram = self.bl(q) * i - p.suspension_damping * dq
-        ram -= q * (p.suspension_k1 + q * (p.suspension_k2 + q * p.suspension_k3))
+        ram += self.suspension(q)
         load = -p.flexure_stiffness * zs - p.flexure_damping * vs
         if self.wall == REST:
             mass = p.surface_mass + p.ram_mass
@@ -443,7 +473,8 @@ class _Model:
         if self.rigid and net(bottom) <= 0.0:
             q, self.wall, self.side = bottom, REST, -1
         else:
-            q: float = root_scalar(net, bracket=(bottom, 0.0), xtol=1e-18, rtol=1e-15).root
+            top = 0.0 if net(0.0) <= 0.0 else p.travel
+            q: float = root_scalar(net, bracket=(bottom, top), xtol=1e-18, rtol=1e-15).root
             self.wall, self.side = (FREE, 0) if q > -p.travel else (TOUCH, -1)
         carried = p.ram_mass + p.surface_mass + self.part_mass
         return [0.0, 0.0, q, 0.0, -carried * p.gravity / p.flexure_stiffness, 0.0, 0.0, 0.0]
@@ -458,7 +489,7 @@ class _Model:
             + 0.5 * self.part_mass * (vs - u) ** 2
             + p.gravity * (p.ram_mass * (zs + q) + p.surface_mass * zs + self.part_mass * (zs - w))
             + 0.5 * p.flexure_stiffness * zs**2
-            + q**2 * (p.suspension_k1 / 2 + q * (p.suspension_k2 / 3 + q * p.suspension_k3 / 4))
+            + self.spring_energy(q)
             + 0.4 * p.contact_stiffness * depth**2.5
             + (0.0 if self.ideal else 0.5 * p.inductance * i * i)
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -167,11 +168,15 @@ def test_impact_keeps_momentum_and_its_law(contact: str, side: int) -> None:
     assert r.impacts == 1
 
 
-@pytest.mark.parametrize("circuit", ["amplifier", "limited", "ideal"])
-@pytest.mark.parametrize("contact", ["rigid", "compliant"])
-@pytest.mark.parametrize("mu_plate", [0.0, 0.1])
-def test_energy_is_accounted_for(contact: str, circuit: str, mu_plate: float) -> None:
-    p = Params(mu_plate=mu_plate, suspension_k2=1e4, b1=50.0)
+@pytest.mark.parametrize(
+    ("contact", "circuit", "mu_plate", "law"),
+    [
+        *product(("rigid", "compliant"), ("amplifier", "limited", "ideal"), (0.0, 0.1), ["cubic"]),
+        *product(("rigid", "compliant"), ["limited"], [0.0], ("knee", "repulsion")),
+    ],
+)
+def test_energy_is_accounted_for(contact: str, circuit: str, mu_plate: float, law: str) -> None:
+    p = Params(mu_plate=mu_plate, suspension=law, suspension_k2=1e4, b1=50.0)
     r = simulate(p, 0.11, 0.0, contact=contact, circuit=circuit, energies=True)
     losses = sum(r.energies[k] for k in ("friction", "damping", "impact"))
     assert min(r.energies[k] for k in ("copper", "friction", "damping", "impact")) > 0.0

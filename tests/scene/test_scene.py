@@ -81,9 +81,14 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "part_mass": 0.009,
         "flexure_stiffness": 560,
         "flexure_damping": 0.84,
+        "suspension": "cubic",
         "suspension_k1": 40,
         "suspension_k2": 0,
         "suspension_k3": 1.5e7,
+        "suspension_knee": 0,
+        "suspension_hardening": 4e5,
+        "suspension_repulsion": 0.05,
+        "suspension_distance": 2.8e-3,
         "suspension_damping": 0.02,
         "travel": 1.9e-3,
         "contact": "compliant",
@@ -172,7 +177,7 @@ def test_parameters_of_the_fmu_that_are_no_keys(fmu_variables: dict[str, Any]) -
     parameters = {name for name, v in fmu_variables.items() if v.causality == "parameter"}
     assert parameters - {key.variable for key in keys()} == {
         "output_high", "output_low",  # from supply and swing losses
-        "contact", "ram_fixed", "independent", "prescribed", "source",
+        "contact", "suspension", "ram_fixed", "independent", "prescribed", "source",
     }  # fmt: skip
 
 

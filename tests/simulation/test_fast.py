@@ -16,6 +16,8 @@ from cosim.stepper.stepper import OWN, RIG, VARIABLES
 
 FAST = {"run.solver": "fast", "run.average": "ends"}
 STILL = {"circuit.model": "limited"}
+KNEE = {"mechanics.suspension": "knee", "mechanics.suspension_hardening": 9e5}
+KNEE |= {"mechanics.suspension_k1": 120.0}
 SCENES: list[tuple[str, dict[str, Any]]] = [
     ("paper-limited", {}),
     ("ideal-current", {}),
@@ -35,6 +37,11 @@ SCENES: list[tuple[str, dict[str, Any]]] = [
             "drive.table": [[0.1, 0.5], [0.35, -0.5], [0.6, 0.1]],
         },
     ),
+    ("paper-limited", KNEE),
+    (
+        "paper-limited",
+        {"mechanics.suspension": "repulsion", "mechanics.suspension_distance": 3.5e-3},
+    ),
     ("paper-limited", {"coil.count": 2, "circuit.current_limit": 0.9}),
     ("paper-limited", {"mechanics.gravity": 0.0, "friction.mu_plate": 0.0, "run.shutter": 0.5}),
 ]
@@ -49,7 +56,7 @@ def both(name: str, changes: dict[str, Any], step: float) -> tuple[dict[str, Any
 
 def test_structures_and_names_agree_with_the_compiled_code() -> None:
     assert all(here == there for here, there in fast.sizes())
-    assert (len(RIG), len(OWN)) == (28, 7)
+    assert (len(RIG), len(OWN)) == (33, 7)
     known = load("paper-limited")
     assert set(VARIABLES.values()) <= set(fast.known_numbers(known))
 

@@ -49,7 +49,7 @@ LIMITS = {
         "slew_fraction",
     },
 }
-WORDS = ["method", "notes", "run", "versions"]
+WORDS = ["method", "notes", "rests", "run", "versions"]
 HEAT = {"coil_heat", "coil_rise_continuous", "coil_rise_lift"}
 TOLD = {"v_average_error", "motion", "motion_periods", "motion_settled", "v_average_range"}
 

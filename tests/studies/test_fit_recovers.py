@@ -90,6 +90,20 @@ def test_two_trials_of_one_rig_give_their_friction_back(tmp_path: Path) -> None:
     assert found["plate_over_kinetic"] == pytest.approx(truths[0]["ratio"], abs=0.12)
 
 
+def test_missing_frames_change_the_friction_little(tmp_path: Path) -> None:
+    """A tenth of the frames has no height of one of the bodies, some in the middle of slides."""
+    truth = made(tmp_path, "05")
+    file = tmp_path / "Trial 05.csv"
+    head, *rows = (line.split(",") for line in file.read_text().splitlines())
+    gone = np.random.default_rng(1).choice(len(rows), len(rows) // 10, replace=False)
+    for n, k in enumerate(gone.tolist()):
+        rows[k][1 + n % 2] = ""
+    file.write_text("\n".join(map(",".join, [head, *rows])))
+    (row,) = cosim.fit(tmp_path).numbers["trials"]
+    assert row["kinetic_friction_weights"] == pytest.approx(truth["kinetic"], rel=0.1)
+    assert row["misfit_um"] < 3 * NOISE * 1e6
+
+
 @pytest.mark.slow
 def test_ten_trials_of_different_friction_give_it_back(tmp_path: Path) -> None:
     """Each alone, as their frictions have not even ratios in common."""

@@ -317,9 +317,11 @@ def test_bad_input(
 def test_ensemble(tmp_path: Path) -> None:
     path = tmp_path / "rigs.json"
     rigs = [{"cost": n, "mechanics.surface_mass": 0.01 + 0.001 * n} for n in range(4)]
+    rigs[3] |= {"normal_force_ratio": 0.8, "mechanics.suspension": "knee"}
     path.write_text(json.dumps({"ensemble": rigs, "seed": 0}))
-    found = study.ensemble(path)
+    found = study.ensemble(path, 2.0)
     assert [round(1e3 * float(rig["mechanics.surface_mass"])) for rig in found] == [11, 12, 13]
+    assert [rig.get("friction.normal_force") for rig in found] == [None, None, 1.6]
     scene = load("paper")
     study.checked(scene, found, path)
     with pytest.raises(BadInput, match=r"rigs\.json, ensemble 1: .*surface_mass"):
@@ -327,7 +329,7 @@ def test_ensemble(tmp_path: Path) -> None:
     for text in ("[]", "{}", '{"ensemble": [1]}'):
         path.write_text(text)
         with pytest.raises(BadInput, match="has no list"):
-            study.ensemble(path)
+            study.ensemble(path, 2.0)
     path.write_text("{")
     with pytest.raises(BadInput, match="neither JSON"):
-        study.ensemble(path)
+        study.ensemble(path, 2.0)

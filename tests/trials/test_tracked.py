@@ -147,7 +147,6 @@ def changed(row: int, column: str, value: str) -> str:
         (changed(5, "vzo", "1,5"), "row 6: it has 20 cells, the header 19"),
         (changed(5, "azs", "1e999"), "row 6, column azs: “1e999” is not finite"),
         (changed(5, "zo", "-inf"), "row 6, column zo: “-inf” is not finite"),
-        (changed(12, "zo", GONE), "row 13, column zo: the value is missing"),
         (changed(3, "t", ""), "row 4, column t: the value is missing"),
         (changed(3, "t", "0.001"), "row 4, column t: the time does not increase"),
         (text(table()[:8]), "there are 7 rows, and 8 are needed"),
@@ -165,6 +164,20 @@ def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, content: str | byt
     assert words in told
     assert told.startswith(f"{path}: ")
     assert "\n" not in told
+
+
+def test_frames_in_which_a_body_is_missing_are_left_out(tmp_path: Path):
+    trial = read(write(tmp_path / "gap.csv", changed(5, "zo", GONE)))
+    whole = read(write(tmp_path / "whole.csv", text(table())))
+    kept = np.arange(len(whole.time)) != 4
+    assert np.array_equal(trial.time, whole.time[kept])
+    assert np.array_equal(trial.part.z, whole.part.z[kept])
+    cells = table()
+    for row in cells[1:]:
+        row[cells[0].index("zo")] = GONE
+    few = text(cells)
+    with pytest.raises(BadInput, match="0 rows have both zp and zo, and 8 are needed"):
+        read(write(tmp_path / "few.csv", few))
 
 
 def test_files_that_cannot_be_read(tmp_path: Path):

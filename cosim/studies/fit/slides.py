@@ -171,7 +171,10 @@ def spans(trial: Trial, noise: float) -> list[Span]:
     signs = np.where(np.abs(moved) > CLEAR * 2 * noise, np.sign(moved), 0).astype(int)
     edges = np.flatnonzero(np.diff(signs, prepend=0, append=0))
     runs = [(i, j - 1) for i, j in pairwise(edges.tolist()) if signs[i]]
-    lost = (np.arange(INSTANTS) + 0.5) / INSTANTS * REACH * float(np.median(np.diff(time)))
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    lost = (np.arange(INSTANTS) + 0.5) / INSTANTS * REACH * usual
+    wider = np.maximum(1.0, steps / usual)  # where frames are missing
     found = []
     for k, (i, j) in enumerate(runs):
         low = runs[k - 1][1] + 2 if k else 0
@@ -183,8 +186,8 @@ def spans(trial: Trial, noise: float) -> list[Span]:
         # single frame too much depends on how smooth the motion about it is.
         if len(inside) < 2 or sum(max(0, len(x) - 2) for x in (before, after)) + len(inside) < 3:
             continue
-        begins = time[i + 1] - lost if len(before) else time[[i + 1]]
-        ends = time[j] + lost if len(after) else time[[j]]
+        begins = time[i + 1] - wider[i] * lost if len(before) else time[[i + 1]]
+        ends = time[j] + wider[min(j, len(steps) - 1)] * lost if len(after) else time[[j]]
         found.append(Span(int(signs[i]), before, inside, after, begins, ends))
     return found
 

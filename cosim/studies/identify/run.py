@@ -8,35 +8,41 @@ from typing import Any
 
 import numpy as np
 
+from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import workers_asked
 from cosim.evaluate.store import Store
 from cosim.files.picture import Picture
+from cosim.mechanics.stickslip import rests_of
 from cosim.scene import keys
 from cosim.stepper.stepper import OWN
-from cosim.studies.identify.problem.space import Space, read_space
+from cosim.studies.identify.problem.space import SUSPENSION, Space, read_space
 from cosim.studies.identify.problem.targets import (
     TRANSPORT,
     WEIGHTS,
     Measured,
     read_trials,
 )
-from cosim.studies.identify.report.measures import Row, bands, errors, own_numbers, repeatability
+from cosim.studies.identify.report.measures import (
+    Row,
+    bands,
+    errors,
+    own_numbers,
+    repeatability,
+    samples,
+)
 from cosim.studies.identify.report.scenes import exact, trial_settings
 from cosim.studies.identify.report.solved import HeldOut, Solved
-from cosim.studies.identify.report.verdicts import Profile, ensemble_of, judge
-from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds
+from cosim.studies.identify.report.verdicts import Rig, at_bounds, forces, judge, rigs_meant
+from cosim.studies.identify.search.plan import FULL, QUICK, Plan, Searched, folds, searched
 from cosim.studies.identify.search.search import Found, Progress, Search
 from cosim.toolchain.libraries import digest
 
 UNSTEADY = 0.5
 """Repeatability of a velocity (NRMSE of its cycles) beyond which no steady drive explains it."""
 
-FIRSTS = 3
-"""Solutions of the ensemble, the best first, that are finished."""
-
-PROFILE_STEPS = (0.04, 0.12, 0.25)
-"""Distances from the best value of a key at which it is held, of its bounds' range."""
+PLACES = np.linspace(-2e-3, 2e-3, 9)
+"""Of the ram in the actuator (q, m), at which the suspension's force is told."""
 
 STORE = "identify.sqlite"
 
@@ -102,15 +108,22 @@ def identify(
     effort, count = QUICK if quick else FULL, workers_asked(workers)
     path = None if out is None else Path(out) / STORE
     with Store(path, seed, *_asked(space, steady, effort)) as store:
-        plan = Plan(
-            Search(space, [trial.target for trial in steady], count),
-            Search(space, [trial.fine for trial in steady], count),
-            effort,
-            store.once,
-            seed,
-            progress or (lambda what, best: None),
-        )
-        made = _identified(plan, steady, others)
+
+        def plan(law: str, number: int) -> Plan:
+            own = space.of_law(law)
+            return Plan(
+                Search(own, [trial.target for trial in steady], count),
+                Search(own, [trial.fine for trial in steady], count),
+                effort,
+                store.once,
+                seed,
+                progress or (lambda what, best: None),
+                f"{law} {number}",
+            )
+
+        laws = space.laws[: effort.laws]
+        plans = [[plan(law, k) for k in range(1, effort.searches + 1)] for law in laws]
+        made = _identified(plans, steady, others)
         made = replace(made, numbers=_numbers(made, seed, quick))
         if out is not None:
             made.save(out)
@@ -118,26 +131,20 @@ def identify(
     return made
 
 
-def _identified(plan: Plan, steady: list[Measured], others: list[Measured]) -> Identification:
-    space, effort, rows = plan.coarse.space, plan.effort, [*range(len(steady))]
-    found = plan.ensemble("all trials", rows, effort.rounds)
-    ensemble = ensemble_of(found)
-    # The step of the search does not order solutions that are as good: the finish does.
-    ends = [plan.finished(f"all trials {k}", rows, one) for k, one in enumerate(found[:FIRSTS], 1)]
-    first = found[min(range(len(ends)), key=lambda k: ends[k].total)]
-    profiles, beside = _profiles(plan, first, ensemble)
-    lower = min(beside, key=lambda one: one.total)
-    if lower.total < first.total:
-        ends.append(plan.finished("all trials, from a profile", rows, lower))
-    best = min(ends, key=lambda one: one.total)
+def _identified(
+    plans: list[list[Plan]], steady: list[Measured], others: list[Measured]
+) -> Identification:
+    laws = [searched(several) for several in plans]
+    first = min(range(len(laws)), key=lambda k: laws[k].best.total)
+    plan, space, best = plans[first][0], laws[first].space, laws[first].best
+    meant = rigs_meant(laws, samples(steady, space, best))
+    verdicts = judge((space, best), meant, any(one.converged for one in laws))
     fold_rigs, held_out = _folds(plan, steady) if len(steady) >= 3 else ([], [])
-    verdicts = judge(space, best, ensemble, fold_rigs, profiles)
     aside = replace(plan.fine, targets=[trial.fine for trial in others])
     apart_own = plan.drives("trials apart", best.place, aside).own if others else np.empty((0, 0))
-    made_up = _made_up(plan)
     return Identification(
-        *(space, steady, others, best, apart_own, ensemble, fold_rigs, held_out),
-        *(verdicts, profiles, made_up, {}),
+        *(space, steady, others, best, apart_own, laws, meant, fold_rigs, held_out),
+        *(verdicts, _made_up(plans[0][0]), {}),
     )
 
 
@@ -149,7 +156,7 @@ def _steady(trial: Measured) -> bool:
 def _asked(space: Space, trials: Sequence[Measured], effort: object) -> Any:
     """All that decides what a stage finds, beside the seed; this build of the programs, too."""
     entries = [
-        repr(entry) for entry in (*space.rig_entries.values(), *space.trial_entries.values())
+        repr(entry) for entry in (*space.all_entries.values(), *space.trial_entries.values())
     ]
     sums = [
         [
@@ -161,7 +168,7 @@ def _asked(space: Space, trials: Sequence[Measured], effort: object) -> Any:
         ]
         for trial in trials
     ]
-    return [entries, sums, repr((effort, WEIGHTS, TRANSPORT)), digest("stepper")]
+    return [entries, space.laws, sums, repr((effort, WEIGHTS, TRANSPORT)), digest("stepper")]
 
 
 def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[HeldOut]]:
@@ -180,35 +187,12 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[He
     return rigs, sorted(held_out, key=lambda one: trials.index(one.trial))
 
 
-def _profiles(
-    plan: Plan, best: Found, ensemble: Sequence[Found]
-) -> tuple[dict[str, Profile], list[Found]]:
-    """The profile of each key about a solution, and the solutions that make it."""
-    found: dict[str, Profile] = {}
-    solutions: list[Found] = []
-    for key, name in enumerate(plan.coarse.space.names):
-        points = [(best.place[key], best.total)]
-        for side in (-1.0, 1.0):
-            start = best
-            for distance in PROFILE_STEPS[: plan.effort.profile_points]:
-                place = float(best.place[key] + side * distance)
-                if 0.0 <= place <= 1.0:
-                    start = plan.profile(key, place, start, ensemble)
-                    points.append((place, start.total))
-                    solutions.append(start)
-        places = np.repeat(best.place[None], len(points), axis=0)
-        places[:, key] = [place for place, _ in points]
-        values = plan.coarse.space.values(places)[:, key]
-        found[name] = sorted(zip(values.tolist(), (total for _, total in points), strict=True))
-    return found, solutions
-
-
-def _made_up(plan: Plan) -> Found:
+def _made_up(plan: Plan) -> Rig:
     """The rig of the scene keys' defaults, as far as the bounds reach it."""
-    space: Space = plan.fine.space
+    space = plan.fine.space
     defaults: dict[str, Any] = {key.full: key.default for key in keys()}
     values = [np.clip(defaults[entry.key], entry.low, entry.high) for entry in space.free]
-    return plan.drives("made-up rig", space.place(np.array(values)), plan.fine)
+    return space, plan.drives("made-up rig", space.place(np.array(values)), plan.fine)
 
 
 def _mean(rows: Sequence[Row], name: str, how: Callable[[Any], Any] = np.mean) -> float | None:
@@ -218,7 +202,9 @@ def _mean(rows: Sequence[Row], name: str, how: Callable[[Any], Any] = np.mean) -
 
 def overall(rows: Sequence[Row]) -> Row:
     """Means over trials of what ``errors`` says of each, and the worst velocity."""
-    every = dict.fromkeys(name for row in rows for name in row if name not in ("trial", *OWN))
+    every = dict.fromkeys(
+        name for row in rows for name in row if name not in ("trial", "at_bounds", *OWN)
+    )
     names = [name for name in every if _mean(rows, name) is not None]
     found: Row = {name: _mean(rows, name) for name in names}
     found["nrmse_v_surface_worst"] = _mean(rows, "nrmse_v_surface", max)
@@ -232,7 +218,10 @@ def _numbers(found: Identification, seed: int, quick: bool) -> dict[str, Any]:
     rows, checks, spectra = [], [], []
     for trial, own, cost in zip(found.trials, best.own, best.costs.tolist(), strict=True):
         rows.append(
-            errors(trial, rig, own) | repeatability(trial) | {"cost": cost} | own_numbers(own)
+            errors(trial, rig, own)
+            | repeatability(trial)
+            | {"cost": cost, "at_bounds": ", ".join(_at_bounds(trial, own))}
+            | own_numbers(own)
         )
         spectra += bands(trial, rig, own)
         if trial.target.current is None and trial.has_part:
@@ -255,10 +244,11 @@ def _numbers(found: Identification, seed: int, quick: bool) -> dict[str, Any]:
             | {"surface": surface | own_numbers(one.surface)}
             | {"surface_and_part": both | own_numbers(one.both)}
         )
-    there = space.rigs(found.made_up.place[None])[0]
-    made_up = [
-        errors(t, there, own) for t, own in zip(found.trials, found.made_up.own, strict=True)
-    ]
+    made_up, converged = (
+        _errors_on(found.trials, found.made_up),
+        [one for one in found.laws if one.converged],
+    )
+    apart = [forces(one, PLACES) for one in found.meant]
     return {
         "seed": seed,
         "quick": quick,
@@ -278,17 +268,50 @@ def _numbers(found: Identification, seed: int, quick: bool) -> dict[str, Any]:
         "made_up_rig": {"overall": overall(made_up), "trials": made_up},
         "exact_rungs_v_average_mm_per_s": checks,
         "bands": spectra,
-        "ensemble": [
-            {"cost": one.total}
-            | dict(zip(space.names, space.values(one.place).tolist(), strict=True))
-            for one in found.ensemble
+        "converged": [one.space.law for one in converged],
+        "effective_samples": samples(found.trials, space, best),
+        "laws": [_law(found.trials, one) for one in found.laws],
+        "force": [
+            {"q_mm": q * 1e3}
+            | {f"{end}_{unit}": float(how([one[n][k] for one in apart]))
+               for n, unit in enumerate("NA") for end, how in (("low", min), ("high", max))}
+            for k, q in enumerate(PLACES.tolist())
         ],
-        "folds": [
-            {"cost": one.total}
-            | dict(zip(space.names, space.values(one.place).tolist(), strict=True))
-            for one in found.fold_rigs
-        ],
-        "profiles": {
-            name: [list(point) for point in points] for name, points in found.profiles.items()
-        },
+        "ensemble": [_candidate(one, best) for one in found.meant],
+        "folds": [_candidate((space, one), None) for one in found.fold_rigs],
+    }  # fmt: skip
+
+
+def _at_bounds(trial: Measured, own: Array) -> list[str]:
+    return at_bounds(trial.fine.low, trial.fine.high, trial.fine.scale, own)
+
+
+def _errors_on(trials: Sequence[Measured], rig: Rig) -> list[Row]:
+    there = rig[0].rigs(rig[1].place[None])[0]
+    return [errors(trial, there, own) for trial, own in zip(trials, rig[1].own, strict=True)]
+
+
+def _law(trials: Sequence[Measured], found: Searched) -> Row:
+    """What one law of the suspension comes to."""
+    space, best = found.space, found.best
+    whole = overall(_errors_on(trials, (space, best)))
+    names = ("nrmse_v_surface", "nrmse_v_surface_worst", "v_average_error_mm_per_s")
+    return {
+        "law": space.law,
+        "costs": [one.total for one in found.ends],
+        "converged": found.converged,
+        "rests_mm": [q * 1e3 for q in rests_of(space.numbers(best.place))],
+        **{name: whole.get(name) for name in names},
+        "rig": space.settings(best.place),
     }
+
+
+def _candidate(rig: Rig, best: Found | None) -> Row:
+    """A rig by the keys of a scene; how much larger than the best's its normal forces are."""
+    space, one = rig
+    found: Row = {"cost": one.total, SUSPENSION: space.law}
+    if best is not None:
+        k = OWN.index("normal_force")
+        found["normal_force_ratio"] = float(np.exp(np.log(one.own[:, k] / best.own[:, k]).mean()))
+    settings = space.settings(one.place)
+    return found | {name: settings[name] for name in space.names}

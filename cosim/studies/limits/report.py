@@ -144,7 +144,8 @@ def limits(
         words += [f"--set {text}" for text in texts]
     base = load(scene, overrides)
     efforts = (QUICK if quick else FULL).times(effort)
-    others: list[Settings] = ensemble(Path(rigs)) if rigs is not None else []
+    force = base.friction.normal_force
+    others: list[Settings] = ensemble(Path(rigs), force) if rigs is not None else []
     checked(base, others, rigs)
     told = counted(progress, steps(efforts, CHANGES, len(others)))
     path = None if out is None else Path(out) / STORE

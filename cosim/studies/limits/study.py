@@ -193,10 +193,10 @@ def _first(candidates: Candidates) -> Candidates:
     return {kind: [some[:1] for some in candidates[kind]] for kind in KINDS}
 
 
-def ensemble(path: Path) -> list[Settings]:
+def ensemble(path: Path, normal_force: float) -> list[Settings]:
     """The rigs of a file, without its first, the best, for which the scene stands: the tables of
-    its list ``ensemble``, each of keys ("table.key") and values, SI; entries without a dot are
-    passed over.
+    its list ``ensemble``, each of keys ("table.key") and values, SI; of entries without a dot only
+    ``normal_force_ratio`` counts, by which a rig wants another normal force than the scene's, N.
 
     Raises BadInput.
     """
@@ -211,7 +211,11 @@ def ensemble(path: Path) -> list[Settings]:
     rigs = said.get("ensemble") if isinstance(said, dict) else None
     if not isinstance(rigs, list) or not rigs or not all(isinstance(rig, dict) for rig in rigs):
         raise BadInput(f'{name}: has no list "ensemble" of tables of keys and values.')
-    return [{key: value for key, value in rig.items() if "." in key} for rig in rigs[1:]]
+    found = [{key: value for key, value in rig.items() if "." in key} for rig in rigs[1:]]
+    for settings, rig in zip(found, rigs[1:], strict=True):
+        if isinstance(ratio := rig.get("normal_force_ratio"), int | float):
+            settings.setdefault("friction.normal_force", ratio * normal_force)
+    return found
 
 
 def checked(scene: Scene, rigs: Sequence[Settings], file: str | os.PathLike[str] | None) -> None:

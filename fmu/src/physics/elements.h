@@ -9,16 +9,49 @@
 
 #include "state.h"
 
-/* ---- the suspension between ram and surface: k1 q + k2 q^2 + k3 q^3 + c u, against q and u ---- */
+/* ---- the suspension between ram and surface, against q and u: c u, and by its law
+ *
+ * cubic      k1 q + k2 q^2 + k3 q^3
+ * knee       k1 q - a max(knee - q, 0)^2
+ * repulsion  -c/(1 + q/d)^3; below the lower wall the straight line that goes on from there, so that
+ *            it is regular however deep the ram presses into the wall ---- */
 
-static inline double suspension_linear(const Reals *p, double q)
+enum { CUBIC = 1, KNEE = 2, REPULSION = 3 };
+
+static inline double suspension_linear(const Model *m, double q)
 {
-    return q * p->suspension_k1;
+    return m->n.suspension == REPULSION ? 0.0 : q * m->r.suspension_k1;
 }
 
-static inline double suspension_bent(const Reals *p, double q)
+/* Of the law repulsion: its force at the nearest place that is not below the lower wall; how far q is
+ * from there (0 or less); and its stiffness. */
+typedef struct {
+    double force, below, stiffness, share;
+} Repulsion;
+
+static inline Repulsion repulsion_at(const Reals *p, double q)
 {
-    return q * q * (p->suspension_k2 + q * p->suspension_k3);
+    const double place = q < -p->travel ? -p->travel : q;
+    Repulsion r = {.below = q - place, .share = 1.0 + place / p->suspension_distance};
+    r.force = p->suspension_repulsion / (r.share * r.share * r.share);
+    r.stiffness = 3.0 * r.force / (r.share * p->suspension_distance);
+    return r;
+}
+
+static inline double below_knee(const Reals *p, double q)
+{
+    return q < p->suspension_knee ? p->suspension_knee - q : 0.0;
+}
+
+static inline double suspension_bent(const Model *m, double q)
+{
+    const Reals *p = &m->r;
+    if (m->n.suspension == CUBIC)
+        return q * q * (p->suspension_k2 + q * p->suspension_k3);
+    if (m->n.suspension == KNEE)
+        return -p->suspension_hardening * below_knee(p, q) * below_knee(p, q);
+    const Repulsion r = repulsion_at(p, q);
+    return r.stiffness * r.below - r.force;
 }
 
 static inline double suspension_damper(const Reals *p, double u)
@@ -27,26 +60,46 @@ static inline double suspension_damper(const Reals *p, double u)
 }
 
 /* On the ram, N. */
-static inline double suspension_force(const Reals *p, double q, double u)
+static inline double suspension_force(const Model *m, double q, double u)
 {
-    return -(suspension_damper(p, u) + suspension_linear(p, q)) - suspension_bent(p, q);
+    return -(suspension_damper(&m->r, u) + suspension_linear(m, q)) - suspension_bent(m, q);
 }
 
 /* On the ram at rest, N. */
-static inline double suspension_at_rest(const Reals *p, double q)
+static inline double suspension_at_rest(const Model *m, double q)
 {
+    const Reals *p = &m->r;
+    if (m->n.suspension != CUBIC)
+        return -(suspension_linear(m, q) + suspension_bent(m, q));
     return -q * (p->suspension_k1 + q * (p->suspension_k2 + q * p->suspension_k3));
 }
 
 /* N/m */
-static inline double suspension_stiffness(const Reals *p, double q)
+static inline double suspension_stiffness(const Model *m, double q)
 {
+    const Reals *p = &m->r;
+    if (m->n.suspension == KNEE)
+        return p->suspension_k1 + 2.0 * p->suspension_hardening * below_knee(p, q);
+    if (m->n.suspension == REPULSION)
+        return repulsion_at(p, q).stiffness;
     return p->suspension_k1 + q * (2.0 * p->suspension_k2 + q * 3.0 * p->suspension_k3);
 }
 
-/* J */
-static inline double suspension_energy(const Reals *p, double q)
+/* J; of the laws knee and repulsion against that at the knee and at the centre. */
+static inline double suspension_energy(const Model *m, double q)
 {
+    const Reals *p = &m->r;
+    if (m->n.suspension == KNEE) {
+        const double below = below_knee(p, q);
+        return 0.5 * p->suspension_k1 * q * q +
+               p->suspension_hardening * below * below * below * (1.0 / 3.0);
+    }
+    if (m->n.suspension == REPULSION) {
+        const Repulsion r = repulsion_at(p, q);
+        return 0.5 * p->suspension_repulsion * p->suspension_distance *
+                   (1.0 / (r.share * r.share) - 1.0) -
+               r.below * (r.force - 0.5 * r.stiffness * r.below);
+    }
     return q * q * (p->suspension_k1 / 2.0 +
                     q * (p->suspension_k2 / 3.0 + q * p->suspension_k3 / 4.0));
 }

@@ -41,7 +41,7 @@ static inline void load_on(const Model *m, const Mode *mode, const double y[N_ST
     const Reals *p = &m->r;
     const double q = y[Q], u = y[U];
     const int rest = mode->wall == WALL_REST;
-    l->suspension = suspension_force(p, q, u);
+    l->suspension = suspension_force(m, q, u);
     l->drive = force_factor_at(m, q) * stickslip_coil_current(m, y, s, tau);
     l->wall = 0.0;
     if (mode->wall == WALL_TOUCH)
@@ -68,7 +68,7 @@ STICKSLIP_INLINE void forces_of(const int plain, const Model *m, const Mode mode
         stickslip_forces_on_part(m, mode, tau, 0.0, f);
         f->drive = force_factor_at(m, y[Q]) * stickslip_coil_current(m, y, s, tau);
         f->wall = -flexure_spring(p, y[Z]) - p->surface_mass * p->gravity - f->friction -
-                  f->drive - suspension_force(p, y[Q], y[U]);
+                  f->drive - suspension_force(m, y[Q], y[U]);
         return;
     }
     Load l;

@@ -72,7 +72,7 @@ stickslip_law_rates(const Law *l, const int source, const double y[N_STATES], do
     const double shape = force_factor_shape(m, q);
     const double i = source ? y[I_COIL] : p->current + p->current_slope * tau;
     const double drive = (p->force_factor * i) * shape;
-    const double suspension = suspension_linear(p, q) + suspension_bent(p, q);
+    const double suspension = suspension_linear(m, q) + suspension_bent(m, q);
     double on_ram = (drive - suspension_damper(p, u)) - suspension;
     double lost = 0.0;
     if (l->touch) {

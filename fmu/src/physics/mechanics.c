@@ -94,7 +94,7 @@ static double ram_rate(const Model *m, const Mode *mode, const double y[N_STATES
     const double q = y[Q], u = y[U];
     return force_factor_rate(m, q, u) * stickslip_coil_current(m, y, s, tau) +
            force_factor_at(m, q) * stickslip_coil_current_rate(m, mode, y, s) -
-           suspension_stiffness(p, q) * u - suspension_damper(p, f->a_q);
+           suspension_stiffness(m, q) * u - suspension_damper(p, f->a_q);
 }
 
 /* Rate of Load.load; *wall receives that of the wall's force. */
@@ -218,7 +218,7 @@ static double energy_of_surface(const Model *m, const Mode *mode, const double y
                             part * v_part * v_part);
     double weight = p->gravity * (ram * (y[Z] + q) + p->surface_mass * y[Z] +
                                   part * (y[Z] + y[D]));
-    double springs = flexure_energy(p, y[Z]) + suspension_energy(p, q);
+    double springs = flexure_energy(p, y[Z]) + suspension_energy(m, q);
     return kinetic + weight + springs + stickslip_wall_energy(m, mode, y);
 }
 

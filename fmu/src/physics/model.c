@@ -115,25 +115,16 @@ int stickslip_model_set_integer(Model *m, size_t place, int value, char *message
 static double ram_balance(const Model *m, double q)
 {
     const Reals *p = &m->r;
-    double depth = -p->travel - q;
-    double force = suspension_at_rest(p, q) - p->ram_mass * p->gravity;
-    return depth > 0.0 ? force + wall_spring(p, depth) : force;
+    const double below = -p->travel - q, above = q - p->travel;
+    const double force = suspension_at_rest(m, q) - p->ram_mass * p->gravity;
+    if (above > 0.0)
+        return force - wall_spring(p, above);
+    return below > 0.0 ? force + wall_spring(p, below) : force;
 }
 
-static void hang_ram(Model *m)
+/* Where the balance falls through zero, which is a stable rest: above at `high`, below at `low`. */
+static double rest_between(const Model *m, double low, double high)
 {
-    double low = -m->r.travel, high = 0.0;
-    if (ram_balance(m, low) < 0.0) {
-        m->mode[0].side = -1;
-        m->mode[0].wall = m->n.contact == 1 ? WALL_TOUCH : WALL_REST;
-        if (m->mode[0].wall == WALL_REST) {
-            m->y[Q] = low;
-            return;
-        }
-        high = low;
-        while (ram_balance(m, low) < 0.0)
-            low *= 2.0;
-    }
     for (int i = 0; i < 200 && high > low; i++) {
         double middle = 0.5 * (low + high);
         if (middle == low || middle == high)
@@ -143,7 +134,60 @@ static void hang_ram(Model *m)
         else
             high = middle;
     }
-    m->y[Q] = fabs(ram_balance(m, low)) < fabs(ram_balance(m, high)) ? low : high;
+    return fabs(ram_balance(m, low)) < fabs(ram_balance(m, high)) ? low : high;
+}
+
+/* Where the travel is cut into pieces on each of which the balance only rises or only falls, rising:
+ * its ends, the centre, and where the cubic has no stiffness, twice at most. */
+static void cut_travel(const Model *m, double at[5])
+{
+    const double k1 = m->r.suspension_k1, k2 = m->r.suspension_k2, k3 = m->r.suspension_k3;
+    const double square = k2 * k2 - 3.0 * k1 * k3, travel = m->r.travel;
+    double all[5] = {-travel, 0.0, travel, 0.0, 0.0};
+    if (m->n.suspension == CUBIC && square > 0.0) {
+        /* Of the two forms of a root that which does not cancel. */
+        const double far = k2 < 0.0 ? sqrt(square) - k2 : -sqrt(square) - k2;
+        all[3] = k1 / far;
+        all[4] = far / (3.0 * k3);
+    }
+    for (int n = 0; n < 5; n++) {
+        const double next = all[n] < -travel ? -travel : all[n] > travel ? travel : all[n];
+        int k = n;
+        for (; k > 0 && at[k - 1] > next; k--)
+            at[k] = at[k - 1];
+        at[k] = next;
+    }
+}
+
+/* At rest, at the place nearest to the centre; at a wall where there is none within the travel. */
+static void hang_ram(Model *m)
+{
+    const double travel = m->r.travel;
+    double at[5], nearest = INFINITY;
+    cut_travel(m, at);
+    for (int k = 0; k < 4; k++) {
+        if (!(ram_balance(m, at[k]) > 0.0 && ram_balance(m, at[k + 1]) <= 0.0))
+            continue;
+        const double rest = rest_between(m, at[k], at[k + 1]);
+        nearest = fabs(rest) < fabs(nearest) ? rest : nearest;
+    }
+    const int above = ram_balance(m, travel) > 0.0, below = ram_balance(m, -travel) < 0.0;
+    if (isfinite(nearest) || !(above || below)) { /* a ram that nothing moves is in the middle */
+        m->y[Q] = isfinite(nearest) ? nearest : 0.0;
+        return;
+    }
+    m->mode[0].side = below ? -1 : 1;
+    m->mode[0].wall = m->n.contact == 1 ? WALL_TOUCH : WALL_REST;
+    double low = m->mode[0].side * travel, high = low;
+    if (m->mode[0].wall == WALL_REST) {
+        m->y[Q] = low;
+        return;
+    }
+    while (ram_balance(m, low) < 0.0)
+        low *= 2.0;
+    while (ram_balance(m, high) > 0.0)
+        high *= 2.0;
+    m->y[Q] = rest_between(m, low, high);
 }
 
 int stickslip_model_contradiction(const Model *m, char *message)
@@ -151,6 +195,12 @@ int stickslip_model_contradiction(const Model *m, char *message)
     if (m->r.mu_k > m->r.mu_s) {
         snprintf(message, MODEL_MESSAGE_SIZE, "mu_k = %g is larger than mu_s = %g", m->r.mu_k,
                  m->r.mu_s);
+        return -1;
+    }
+    if (m->n.suspension == REPULSION && !(m->r.suspension_distance >= 1.1 * m->r.travel)) {
+        snprintf(message, MODEL_MESSAGE_SIZE,
+                 "suspension_distance = %g m must be at least 1.1 times travel = %g m",
+                 m->r.suspension_distance, m->r.travel);
         return -1;
     }
     if (m->n.prescribed && m->n.source)

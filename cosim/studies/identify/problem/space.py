@@ -5,7 +5,7 @@ the numbers of ``chain.RIG``, a scene by its keys.
 """
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
+from cosim.mechanics.stickslip import SUSPENSIONS
 from cosim.scene import keys
 from cosim.stepper.stepper import OWN, RIG
 
@@ -28,6 +29,19 @@ _ALIASES = {
     "mechanics.contact_stiffness": ("wall_up", "wall_down"),
     "mechanics.contact_damping": ("wall_damping",),
 }
+SUSPENSION = "mechanics.suspension"
+LAW_KEYS = {
+    "cubic": ("k1", "k2", "k3"),
+    "knee": ("k1", "knee", "hardening"),
+    "repulsion": ("repulsion", "distance"),
+}
+"""What each law of the suspension takes of the keys ``mechanics.suspension_…``."""
+OF_LAWS = {f"{SUSPENSION}_{name}" for names in LAW_KEYS.values() for name in names}
+"""Keys of a law: what they come out as holds for that law alone."""
+UNSCALED = ("friction.", "mechanics.contact_damping", f"{SUSPENSION}_knee", f"{SUSPENSION}_dist")
+"""Keys that are no forces or masses begin so."""
+LEAST_DISTANCE = 1.1
+"""Of ``suspension_distance``, in travels."""
 _SUPPLY = ("circuit.supply", "circuit.swing_loss_high", "circuit.swing_loss_low")
 """Keys that together make ``output_high`` and ``output_low``; given, not searched."""
 
@@ -68,11 +82,25 @@ def _names(key: str) -> tuple[str, ...]:
 
 
 class Space:
-    """The free keys of a rig, and what is given of it."""
+    """The free keys of a rig with one law of the suspension, and what is given of it."""
 
-    def __init__(self, rig: Mapping[str, Entry], trial: Mapping[str, Entry], path: Path) -> None:
-        self.path = path
-        self.rig_entries, self.trial_entries = dict(rig), dict(trial)
+    def __init__(
+        self,
+        rig: Mapping[str, Entry],
+        trial: Mapping[str, Entry],
+        path: Path,
+        laws: Sequence[str],
+        law: str = "",
+    ) -> None:
+        self.path, self.all_entries, self.laws, self.law = (
+            path,
+            dict(rig),
+            tuple(laws),
+            law or laws[0],
+        )
+        own = {f"{SUSPENSION}_{name}" for name in LAW_KEYS[self.law]}
+        rig = {key: entry for key, entry in rig.items() if key in own or key not in OF_LAWS}
+        self.rig_entries, self.trial_entries = rig, dict(trial)
         self.free = [entry for entry in rig.values() if entry.free]
         self.log = np.array([entry.log for entry in self.free], dtype=bool)
         ends = [[entry.low, entry.high] for entry in self.free]
@@ -81,9 +109,15 @@ class Space:
         given = {name: entry.low for key, entry in rig.items() for name in _names(key)}
         given["output_high"] = supply["circuit.supply"] - supply["circuit.swing_loss_high"]
         given["output_low"] = supply["circuit.swing_loss_low"] - supply["circuit.supply"]
+        given["suspension"] = SUSPENSIONS[self.law]
         self._given = np.array([given.get(name, 0.0) for name in RIG])
         self._places = [[RIG.index(name) for name in _names(entry.key)] for entry in self.free]
         self._mu = RIG.index("mu_k"), RIG.index("mu_s")
+        self._near = RIG.index("suspension_distance"), RIG.index("travel_down")
+
+    def of_law(self, law: str) -> "Space":
+        """The same with another law of the suspension."""
+        return Space(self.all_entries, self.trial_entries, self.path, self.laws, law)
 
     @property
     def names(self) -> list[str]:
@@ -102,14 +136,29 @@ class Space:
         return np.clip((_coordinates(np.asarray(values), self.log) - low) / (high - low), 0.0, 1.0)
 
     def rigs(self, places: Array) -> Array:
-        """The chain's numbers (n × RIG) of rigs at places (n × free); µ_k is at most µ_s."""
+        """The chain's numbers (n × RIG) of rigs at places (n × free); µ_k is at most µ_s, and the
+        magnets are below the travel."""
         values = self.values(places)
         found = np.repeat(self._given[None], len(values), axis=0)
         for column, spots in zip(values.T, self._places, strict=True):
             found[:, spots] = column[:, None]
         kinetic, static = self._mu
         found[:, kinetic] = np.minimum(found[:, kinetic], found[:, static])
+        distance, travel = self._near
+        found[:, distance] = np.maximum(found[:, distance], LEAST_DISTANCE * found[:, travel])
         return found
+
+    def scaled(self, places: Array, forces: Array, walls: Array) -> Array:
+        """Places (n × free) with all forces and masses times ``forces`` (n), the travel times their
+        root, and the walls' stiffness times ``walls`` besides. A motion hardly tells the scale, and
+        searches that differ end apart in it."""
+        values = self.values(places)
+        for k, name in enumerate(self.names):
+            if name == "mechanics.travel":
+                values[:, k] *= np.sqrt(forces)
+            elif not name.startswith(UNSCALED):
+                values[:, k] *= forces * (walls if name == "mechanics.contact_stiffness" else 1.0)
+        return self.place(values)
 
     def prior(self, places: Array) -> Array:
         """What the priors add to the costs of rigs at places (n × free)."""
@@ -120,12 +169,20 @@ class Space:
                 total += WEAK * ((column - middle) / entry.sigma) ** 2
         return total
 
-    def settings(self, place: Array) -> dict[str, float]:
+    def settings(self, place: Array) -> dict[str, Any]:
         """All keys of the rig at a place, as overrides of a scene."""
-        found = {key: entry.low for key, entry in self.rig_entries.items()}
+        found: dict[str, Any] = {SUSPENSION: self.law}
+        found |= {key: entry.low for key, entry in self.rig_entries.items()}
         found |= dict(zip(self.names, self.values(place).tolist(), strict=True))
         found["friction.mu_k"] = min(found["friction.mu_k"], found["friction.mu_s"])
+        if self.law == "repulsion":
+            key, least = f"{SUSPENSION}_distance", LEAST_DISTANCE * found["mechanics.travel"]
+            found[key] = max(found[key], least * (1.0 + 1e-5))  # its digits in a file
         return found
+
+    def numbers(self, place: Array) -> dict[str, float]:
+        """The stepper's numbers of the rig at a place, by name."""
+        return dict(zip(RIG, self.rigs(place[None])[0].tolist(), strict=True))
 
 
 def _coordinates(values: Array, log: Array) -> Array:
@@ -144,6 +201,7 @@ def read_space(own: Path | None = None) -> Space:
                     raise BadInput(f'{own}: [{name}."{plain(key)}"]: this key is none of {known}.')
                 tables[name][key] = entry
     path = own or SHIPPED
+    laws = _laws(path, tables["rig"].pop(SUSPENSION))
     rig = {key: _entry(path, "rig", key, entry) for key, entry in tables["rig"].items()}
     trial = {key: _entry(path, "trial", key, entry) for key, entry in tables["trial"].items()}
     for key in _SUPPLY:
@@ -153,7 +211,16 @@ def read_space(own: Path | None = None) -> Space:
         raise BadInput(
             f"{path}: no key of the rig has a low and a high: there is nothing to search."
         )
-    return Space(rig, trial, path)
+    return Space(rig, trial, path, laws)
+
+
+def _laws(path: Path, entry: Any) -> list[str]:
+    """The laws of the suspension that are tried, the first for a start."""
+    laws = entry.get("laws") if isinstance(entry, dict) else None
+    if not isinstance(laws, list) or not laws or not all(law in [*LAW_KEYS] for law in laws):
+        known = ", ".join(f'"{law}"' for law in LAW_KEYS)
+        raise BadInput(f'{path}: [rig."{SUSPENSION}"]: laws must be a list of some of {known}.')
+    return [*dict.fromkeys(laws)]
 
 
 def _tables(path: Path) -> dict[str, dict[str, Any]]:

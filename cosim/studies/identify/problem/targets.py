@@ -3,7 +3,7 @@
 A record is taken as it is, from its first row on: a start from rest, seen by a camera, whose zero
 of height is its own. Velocities are differences of heights on both sides, or what was measured
 directly. The cost of a trial is the weighted sum of its signals' squared NRMSE (rms error over
-standard deviation).
+standard deviation). Missing values have no residual.
 """
 
 from collections.abc import Mapping
@@ -79,9 +79,8 @@ def measured(recording: Recording, path: Path, space: Space) -> Measured:
     differenced = set()
     for body in ("surface", "part"):
         if f"z_{body}" in signals:
-            if np.isnan(signals[f"z_{body}"]).any():
-                raise BadInput(f"{path}: heights of the {body} are missing, which are needed here.")
-            heights = signals[f"z_{body}"] - signals[f"z_{body}"][0]
+            heights = signals[f"z_{body}"]
+            heights = heights - heights[np.isfinite(heights)][0]
             signals |= {f"z_{body}": heights, f"v_{body}": velocities(recording.time, heights)}
             differenced.add(f"v_{body}")
     for name, values in signals.items():

@@ -9,8 +9,10 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from cosim.files.picture import Picture
 from cosim.scene import keys
+from cosim.studies.identify.problem.space import OF_LAWS
 from cosim.studies.identify.report.measures import shown
 from cosim.studies.identify.report.solved import Solved
+from cosim.studies.identify.report.verdicts import forces
 
 MEASURED, SIMULATED, OTHER, FLOOR = "0.15", "#d1495b", "#1f6fb2", "#2a9d8f"
 
@@ -96,27 +98,31 @@ def errors(found: Solved) -> Picture:
     return figure
 
 
-def profiles(found: Solved) -> Picture:
-    """The best cost with each key held at a value, and the values of ensemble and folds."""
-    names = found.space.names
+COLOURS = {"cubic": SIMULATED, "knee": OTHER, "repulsion": FLOOR}
+"""Of the laws of the suspension."""
+
+
+def rigs(found: Solved) -> Picture:
+    """The suspension's force on each rig that may be meant, and their costs over each key."""
     units = {key.full: key.unit for key in keys()}
-    columns = min(5, len(names))
-    figure = Picture(3.2 * columns, 2.8 * math.ceil(len(names) / columns) + 0.6, "constrained")
-    axes = figure.subplots(math.ceil(len(names) / columns), columns, squeeze=False)
-    top = 1.6 * found.best.total
-    for k, (axis, name) in enumerate(zip(axes.flat, names, strict=False)):
-        values, costs = zip(*found.profiles[name], strict=True)
-        axis.plot(
-            values, np.minimum(costs, top), color=SIMULATED, marker="o", ms=3, label="profile"
-        )
-        for solutions, color, label in (
-            (found.ensemble, OTHER, "ensemble"),
-            (found.fold_rigs, FLOOR, "folds"),
-        ):
-            there = [float(found.space.values(one.place)[k]) for one in solutions]
-            totals = [min(one.total, top) for one in solutions]
-            axis.plot(there, totals, color=color, ls="", marker="x", ms=5, label=label)
-        if found.space.log[k]:
+    names = [name for name in found.space.names if name not in OF_LAWS]
+    panels, columns = len(names) + 1, 4
+    figure = Picture(3.2 * columns, 2.8 * math.ceil(panels / columns) + 0.6, "constrained")
+    axes = figure.subplots(math.ceil(panels / columns), columns, squeeze=False)
+    first, *others = axes.flat
+    places = np.linspace(-2e-3, 2e-3, 81)
+    for space, one in found.meant:
+        colour = COLOURS[space.law]
+        force = forces((space, one), places)[1]
+        first.plot(places * 1e3, force, color=colour, lw=0.8, label=space.law)
+        values = dict(zip(space.names, space.values(one.place).tolist(), strict=True))
+        for axis, name in zip(others, names, strict=False):
+            axis.plot([values[name]], [one.total], color=colour, ls="", marker="x", ms=5)
+    first.set_title("suspension, (F(q) - F(0))/Bl [A]", loc="left", fontsize=9)
+    first.set_xlabel("q [mm]", fontsize=8)
+    first.set_ylim(-1.0, 2.5)
+    for axis, name in zip(others, names, strict=False):
+        if found.space.log[found.space.names.index(name)]:
             axis.set_xscale("log")
             low, high = axis.get_xlim()
             many = high > 5.0 * low
@@ -128,16 +134,15 @@ def profiles(found: Solved) -> Picture:
         else:
             axis.locator_params(axis="x", nbins=4)
         unit = "" if units[name] in ("1", "") else f" [{units[name]}]"
-        axis.set_title(f"{name.partition('.')[2]}{unit}", loc="left", fontsize=9)
+        axis.set_title(f"{name.partition('.')[2]}{unit}: cost", loc="left", fontsize=9)
+    for axis in axes.flat:
         axis.grid(alpha=0.25)
         axis.tick_params(labelsize=7)
-    for axis in [*axes.flat][len(names) :]:
+    for axis in [*axes.flat][panels:]:
         axis.set_visible(False)
-    for axis in axes[:, 0]:
-        axis.set_ylabel("cost")
-    figure.legend(
-        *axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=3, frameon=False
-    )
+    handles, labels = first.get_legend_handles_labels()
+    each = dict(zip(labels, handles, strict=True))
+    figure.legend([*each.values()], [*each], loc="outside upper right", ncols=3, frameon=False)
     return figure
 
 
@@ -175,7 +180,7 @@ def _bands(axis: Axes, rows: list[dict[str, float]]) -> None:
 FIGURES: dict[str, Callable[[Solved], Picture]] = {
     "trials": overlays,
     "errors": errors,
-    "profiles": profiles,
+    "rigs": rigs,
     "bands": spectrum,
 }
 """By the end of their files' names."""

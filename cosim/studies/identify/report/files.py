@@ -32,7 +32,9 @@ NOTES = (
     "means removed; 'straight line' is that of the best straight line. v_average is the slope of "
     "that line.",
     "The volts follow from the force factor, which is known only as the verdict says: they are not "
-    "measured volts.",
+    "measured volts. A constant force on the ram does what an offset of the drive does: of the "
+    "suspension's force only its change from the centre is told, and no offset is measured.",
+    "The spring-loaded plate stands still here; in the published trials it moves at 5 to 18 mm/s.",
 )
 
 
@@ -41,7 +43,8 @@ def write(folder: Path, found: Solved) -> None:
     numbers = found.numbers
     write_json(folder / "identify.json", numbers)
     write_csv(folder / "identify.csv", _aligned([*numbers["trials"], *numbers["apart"]]))
-    write_page(folder / "identify.md", "The identified rig", _notes(found), _tables(numbers))
+    notes = [*NOTES, *_priors(found), *findings(numbers)]
+    write_page(folder / "identify.md", "The identified rig", notes, tables(numbers))
     for name, draw in figures.FIGURES.items():
         draw(found).write(folder / f"identify-{name}.png")
     words = f"The rig identified from {len(found.trials)} trials"
@@ -59,17 +62,47 @@ def write(folder: Path, found: Solved) -> None:
             write_text(folder / f"trial-{label}.toml", toml(told, rig | settings))
 
 
-def _notes(found: Solved) -> list[str]:
+def _priors(found: Solved) -> list[str]:
     weighed = [
         f"{entry.key} {entry.prior:.4g} (σ {entry.sigma:.2g}{' of it' if entry.log else ''})"
         for entry in found.space.free
         if entry.prior is not None and entry.sigma is not None
     ]
-    told = (
+    words = (
         f"Weak priors, a thousandth of the cost for each σ², took part: {'; '.join(weighed)}. They "
         "decide where the trials do not tell."
     )
-    return [*NOTES, *([told] if weighed else [])]
+    return [words] if weighed else []
+
+
+def findings(numbers: dict[str, Any]) -> list[str]:
+    """Of ``identify.json``: what the ranges are worth, where the ram rests, which drives are at a
+    bound; a paragraph each."""
+    laws, agreed = numbers["laws"], numbers["converged"]
+    shares = [f"{one['law']} {max(one['costs']) / min(one['costs']) - 1.0:.1%}" for one in laws]
+    if agreed:
+        words = (
+            f"Two searches with the law {' or '.join(agreed)} have come to the same cost, within "
+            f"2 %. Ranges hold the values of all their solutions that are as likely (90 %, of "
+            f"{numbers['effective_samples']:.0f} effective samples), and of all these laws."
+        )
+    elif max(len(one["costs"]) for one in laws) < 2:
+        words = "Not converged: one search tells no range. A range needs two that come to the same."
+    else:
+        words = (
+            f"Not converged: two searches differ in their cost by more than 2 % "
+            f"({'; '.join(shares)}), so the spread of their solutions is the search's own, and no "
+            "range is told."
+        )
+    rests = [
+        f"{one['law']} at q = {', '.join(f'{q:.3g}' for q in one['rests_mm'])} mm"
+        for one in laws
+        if len(one["rests_mm"]) > 1
+    ]
+    several = f"Without a current the ram rests at more than one place: {'; '.join(rests)}."
+    ends = [f"{row['trial']} ({row['at_bounds']})" for row in numbers["trials"] if row["at_bounds"]]
+    bound = f"At a bound of the search lie numbers of the trials {'; '.join(ends)}."
+    return [words, *([several] if rests else []), *([bound] if ends else [])]
 
 
 def summary(found: Solved) -> str:
@@ -77,6 +110,7 @@ def summary(found: Solved) -> str:
     numbers = found.numbers
     rig = numbers["rig"]
     lines = [f"{one.key:<32}{rig[one.key]:>10.4g}  {one.words}" for one in found.verdicts]
+    lines += ["", *findings(numbers)]
     heads = ("trial", "velocity", "height", "floor", "part [mm]", "v_average [mm/s]", "measured")
     lines += ["", "".join(f"{head:>{WIDTH}}" for head in heads)]
     lines += [_line(row) for row in numbers["trials"]]
@@ -107,11 +141,37 @@ def _aligned(rows: list[Row]) -> list[Row]:
     return [{name: row.get(name) for name in names} for row in rows]
 
 
-def _tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
-    tables = {
+def _between(row: Row, unit: str) -> str:
+    low, high = (f"{row[f'{end}_{unit}']:.2f}" for end in ("low", "high"))
+    return low if low == high else f"{low} to {high}"
+
+
+def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
+    """Of ``identify.json``: the tables of the page, by heading."""
+    agreed = "" if numbers["converged"] else " (not converged: the search's own scatter)"
+    tables: dict[str, list[Row]] = {
         "The rig": [
             {"key": v["key"], "value": numbers["rig"][v["key"]], "verdict": v["words"]}
             for v in numbers["verdicts"]
+        ],
+        "Laws of the suspension": [
+            {
+                "law": one["law"],
+                "cost of each search": ", ".join(f"{cost:.4f}" for cost in one["costs"]),
+                "rests at q [mm]": ", ".join(f"{q:.2f}" for q in one["rests_mm"]),
+                "velocity": one["nrmse_v_surface"],
+                "worst": one["nrmse_v_surface_worst"],
+                "v_average, error [mm/s]": one["v_average_error_mm_per_s"] or "-",
+            }
+            for one in numbers["laws"]
+        ],
+        f"The suspension's force F(q) - F(0) on {len(numbers['ensemble'])} rigs{agreed}": [
+            {
+                "q [mm]": row["q_mm"],
+                "force [N]": _between(row, "N"),
+                "force/Bl [A]": _between(row, "A"),
+            }
+            for row in numbers["force"]
         ],
         "The trials": [_told(row, floors=True) for row in numbers["trials"]],
     }

@@ -5,6 +5,7 @@ means, since the camera's zero is its own. The mean velocity of the part is the 
 straight line through its height.
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -13,7 +14,9 @@ import numpy as np
 from cosim.arrays import Array, slope
 from cosim.stepper.stepper import OWN
 from cosim.studies.identify.chain.chain import simulate
+from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import Measured
+from cosim.studies.identify.search.search import Found
 from cosim.trials.camera import velocities
 
 LATE = 5
@@ -48,16 +51,37 @@ def errors(trial: Measured, rig: Array, own: Array) -> Row:
     row |= {f"nrmse_{name}": nrmse(simulated[name], signals[name]) for name in signals}
     if trial.has_part:
         apart = (simulated["z_part"] - signals["z_part"]) * 1e3
-        line = np.polynomial.Polynomial.fit(time, signals["z_part"] * 1e3, 1)
+        known = np.isfinite(apart)
+        apart, time, z = apart[known], time[known], signals["z_part"][known]
+        line = np.polynomial.Polynomial.fit(time, z * 1e3, 1)
         row["part_error_mm"] = float(np.abs(apart).mean())
         row["part_error_from_start_mm"] = float(np.abs(apart - apart[0]).mean())
-        row["straight_line_error_mm"] = float(np.abs(line(time) - signals["z_part"] * 1e3).mean())
-        row["v_average_mm_per_s"] = slope(time, simulated["z_part"]) * 1e3
-        row["v_average_measured_mm_per_s"] = slope(time, signals["z_part"]) * 1e3
+        row["straight_line_error_mm"] = float(np.abs(line(time) - z * 1e3).mean())
+        row["v_average_mm_per_s"] = slope(time, simulated["z_part"][known]) * 1e3
+        row["v_average_measured_mm_per_s"] = slope(time, z) * 1e3
         row["v_average_error_mm_per_s"] = abs(
             row["v_average_mm_per_s"] - row["v_average_measured_mm_per_s"]
         )
     return row
+
+
+def samples(trials: Sequence[Measured], space: Space, found: Found) -> float:
+    """The effective number of the surface's measured velocities, for the likelihood: those whose
+    residuals do not follow from others a moment or whole periods ago, by their autocorrelation."""
+    rig, total = space.rigs(found.place[None])[0], 0.0
+    for trial, own in zip(trials, found.own, strict=True):
+        left = trial.fine.signals["v_surface"] - shown(trial, rig, own)["v_surface"]
+        left = np.where(np.isfinite(left), left - np.nanmean(left), 0.0)
+        n, known = len(left), int(np.isfinite(trial.fine.signals["v_surface"]).sum())
+        like = np.correlate(left, left, "full")[n - 1 :] / max(float(left @ left), 1e-300)
+        short = like[1 : 1 + int(np.argmax(np.append(like, -1.0)[1:] <= 0.0))].sum()
+        period = (n - 1) / float(trial.fine.time[-1]) / trial.frequency
+        again = 0.0
+        if np.isfinite(period):
+            at = np.round(period * np.arange(1, int((n - 1) / period) + 1)).astype(int)
+            again = np.maximum(like[np.minimum(at, n - 1)], 0.0).sum()
+        total += known / (1.0 + 2.0 * short) / (1.0 + 2.0 * again)
+    return max(total, 1.0)
 
 
 def own_numbers(own: Array) -> Row:
@@ -99,9 +123,11 @@ def bands(trial: Measured, rig: Array, own: Array) -> list[Row]:
     residual = v - shown(trial, rig, own)["v_surface"]
     known = np.isfinite(v) & np.isfinite(residual)
     step = float(np.median(np.diff(time)))
-    window = np.hanning(int(known.sum()))
+    even = np.arange(time[known][0], time[known][-1] + 0.5 * step, step)
+    window = np.hanning(len(even))
     f = np.fft.rfftfreq(len(window), step)
-    powers = [np.abs(np.fft.rfft(values[known] * window)) ** 2 for values in (v, residual)]
+    both = (np.interp(even, time[known], values[known]) for values in (v, residual))
+    powers = [np.abs(np.fft.rfft(values * window)) ** 2 for values in both]
     whole = powers[0].sum()
     rows = []
     for low, high in pairwise(BANDS):

@@ -6,7 +6,8 @@ from typing import Any
 from cosim.arrays import Array
 from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import Measured
-from cosim.studies.identify.report.verdicts import Profile, Verdict
+from cosim.studies.identify.report.verdicts import Rig, Verdict
+from cosim.studies.identify.search.plan import Searched
 from cosim.studies.identify.search.search import Found
 
 
@@ -27,21 +28,23 @@ class Solved:
     """``numbers`` is what ``identify.json`` holds."""
 
     space: Space
+    """Of the law whose best solution is reported."""
     trials: list[Measured]
     apart: list[Measured]
     """Trials that were not fitted."""
     best: Found
     apart_own: Array
-    ensemble: list[Found]
+    laws: list[Searched]
+    meant: list[Rig]
+    """The rigs that may be meant, the best first."""
     fold_rigs: list[Found]
     held_out: list[HeldOut]
     verdicts: list[Verdict]
-    profiles: dict[str, Profile]
-    made_up: Found
+    made_up: Rig
     """The rig of the scene keys' defaults, with its best drives."""
     numbers: dict[str, Any]
 
     @property
-    def rig(self) -> dict[str, float]:
+    def rig(self) -> dict[str, Any]:
         """The identified rig by the keys of a scene, SI."""
         return self.space.settings(self.best.place)

@@ -1,8 +1,10 @@
 """What the trials say of each key of a rig: a value and how far to trust it, or that they do not.
 
 A local covariance would be far too small: the cost has many minima, and a search ends in any of
-them. So a key is judged by the values of all solutions that are nearly as good (the ensemble), of
-the folds, and by its profile: the best cost with that key held elsewhere.
+them. So no range is told until two searches with one law of the suspension have come to the same
+cost. Then a range holds the values of all solutions that are as likely, whichever search and
+whichever such law they are of. What a law's own keys come out as holds for that law alone; what all
+laws tell is the suspension's force.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,149 +13,103 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.mechanics.stickslip import suspension_force
 from cosim.stepper.stepper import OWN
-from cosim.studies.identify.problem.space import Space
+from cosim.studies.identify.problem.space import OF_LAWS, Space
+from cosim.studies.identify.search.plan import Searched
 from cosim.studies.identify.search.search import Found
 
-KEPT = 1.5
-"""Times the best cost, up to which a solution belongs to the ensemble."""
-AS_GOOD = 1.1
-"""Times the best cost, up to which a value counts as possible."""
+LIKELY = 2.71
+"""Of -2 ln L = (effective samples) ln cost: above the least up to this, one key is in its 90 %."""
+ALONE = 1.5
+"""Of a single search, whose scatter is not known: the candidates that are told, over the best."""
 TRUSTED = 0.35
 """Half of the range of possible values over their middle, up to which a key is identified."""
 TIED = 0.4
 """Spread of a product over that of the key alone, up to which only the product is identified."""
 SCATTER, FEWEST = 0.05, 4
 """Spread of a key's logarithm and number of solutions, from which on products are looked at."""
+END = 0.01
+"""Of a bound's range: nearer than this a value is at the bound."""
 
-Profile = list[tuple[float, float]]
-"""Values of a key, rising, and the best cost with each."""
+Rig = tuple[Space, Found]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """On one key: ``low`` and ``high`` bound the possible values, and are the bounds of the search
-    where nothing else does (``open_low``, ``open_high``)."""
+    """On one key; ``low`` and ``high`` bound the possible values where the searches agree."""
 
     key: str
     value: float
-    low: float
-    high: float
-    open_low: bool
-    open_high: bool
-    ensemble: tuple[float, float]
-    folds: tuple[float, float] | None
+    low: float | None
+    high: float | None
     kind: str
-    """identified, product, bounded or not."""
+    """identified, product, bounded, not; law: of one law alone; or not converged."""
     words: str
 
 
-def ensemble_of(found: Sequence[Found]) -> list[Found]:
-    """The solutions within KEPT times the best cost, the best first."""
-    ordered = sorted(found, key=lambda one: one.total)
-    return [one for one in ordered if one.total <= KEPT * ordered[0].total]
+def rigs_meant(found: Sequence[Searched], samples: float) -> list[Rig]:
+    """The rigs that may be meant, the best first: of the laws whose searches agree, all that are as
+    likely as the worse of the two; where none agree, of all laws, all within the searches' own
+    scatter. ``samples`` is the effective number of what was measured."""
+    meant: list[Rig] = []
+    for one in [one for one in found if one.converged] or found:
+        scatter = one.scatter if len(one.ends) > 1 else ALONE
+        near = one.within(scatter * float(np.exp(LIKELY / samples)))
+        meant += [(one.space, solution) for solution in [*one.ends, *near]]
+    return sorted(meant, key=lambda rig: rig[1].total)
 
 
-def judge(
-    space: Space,
-    best: Found,
-    ensemble: Sequence[Found],
-    folds: Sequence[Found],
-    profiles: Mapping[str, Profile],
-) -> list[Verdict]:
-    """A verdict for each free key. ``best`` is the solution that is reported; profiles and
-    ensemble, the best first, have costs at the step of the search."""
-    cost = min(ensemble[0].total, *(low for points in profiles.values() for _, low in points))
-    near = [one for one in ensemble if one.total <= AS_GOOD * cost] or [best]
-    values = {key: _column(space, ensemble, k) for k, key in enumerate(space.names)}
-    near_values = {key: _column(space, near, k) for k, key in enumerate(space.names)}
-    fold_values = {key: _column(space, folds, k) for k, key in enumerate(space.names)}
-    partners = {key: np.log(v) for key, v in values.items() if (v > 0.0).all()}
+def judge(best: Rig, meant: Sequence[Rig], converged: bool) -> list[Verdict]:
+    """A verdict for each free key of the rig that is reported."""
+    (space, solution), found = best, []
+    values = {key: _column(key, meant) for key in space.names if key not in OF_LAWS}
+    partners = {key: np.log(x) for key, x in values.items() if (x > 0.0).all()}
     for name in ("amplitude", "normal_force"):
-        numbers = np.array([one.own[:, OWN.index(name)] for one in ensemble])
+        numbers = np.array([one.own[:, OWN.index(name)] for _, one in meant])
         if (numbers > 0.0).all():
             partners[f"the trials' {name.replace('_', ' ')}s"] = np.log(numbers).mean(axis=1)
-    return [
-        _verdict(
-            *(key, float(space.values(best.place)[k]), space.free[k].low, space.free[k].high),
-            *(profiles[key], near_values[key], values[key], fold_values[key], partners, cost),
-        )
-        for k, key in enumerate(space.names)
-    ]
+    for k, key in enumerate(space.names):
+        value, ends = float(space.values(solution.place)[k]), (None, None)
+        if key in OF_LAWS:
+            kind, words = "law", f"of the law {space.law} alone; what holds is the force below"
+        elif not converged:
+            kind, words = "not converged", "not converged"
+        else:
+            every = np.append(values[key], value)
+            ends = float(every.min()), float(every.max())
+            at = np.repeat(space.values(solution.place)[None], 2, axis=0)
+            at[:, k] = ends
+            low, high = space.place(at)[:, k].tolist()
+            edges = low < END, high > 1.0 - END
+            kind, words = _told(value, *ends, *edges, _tie(key, partners))
+        found.append(Verdict(key, value, *ends, kind, words))
+    return found
 
 
-def _column(space: Space, found: Sequence[Found], k: int) -> Array:
-    return np.array([space.values(one.place)[k] for one in found])
+def _column(key: str, rigs: Sequence[Rig]) -> Array:
+    return np.array([space.values(one.place)[space.names.index(key)] for space, one in rigs])
 
 
-def _verdict(
-    key: str,
-    value: float,
-    least: float,
-    most: float,
-    profile: Profile,
-    near: Array,
-    ensemble: Array,
-    folds: Array,
-    partners: Mapping[str, Array],
-    cost: float,
-) -> Verdict:
-    low, high = (_end(profile, cost, side) for side in (-1, 1))
-    open_low, open_high = low is None, high is None
-    bottom = least if low is None else min(low, float(near.min()))
-    top = most if high is None else max(high, float(near.max()))
-    everything = np.concatenate([[bottom, top], folds])
-    share = _half_range(everything)
-    tied = _tie(key, partners)
-    numbers = f"{bottom:.3g} to {top:.3g}"
-    if not (open_low or open_high) and share <= TRUSTED:
-        kind, words = (
-            "identified",
-            f"identified: {value:.3g} within {numbers}; with the folds ±{share:.0%}",
-        )
-    elif tied:
-        kind, words = "product", f"only as its {tied}; alone {numbers}"
-    elif open_low and open_high:
-        kind, words = (
-            "not",
-            f"not identified: anything from {least:.3g} to {most:.3g} does nearly as well",
-        )
-    elif open_low or open_high:
-        end = f"at most {top:.3g}" if open_low else f"at least {bottom:.3g}"
-        kind, words = "bounded", f"bounded on one side only: {end}"
-    else:
-        kind = "bounded"
-        words = (
-            f"known roughly: {numbers}, in the folds {folds.min():.3g} to {folds.max():.3g}"
-            if len(folds)
-            else f"known roughly: {numbers}"
-        )
-    return Verdict(
-        *(key, value, bottom, top, open_low, open_high),
-        (float(ensemble.min()), float(ensemble.max())),
-        (float(folds.min()), float(folds.max())) if len(folds) else None,
-        *(kind, words),
-    )
-
-
-def _end(profile: Profile, cost: float, side: int) -> float | None:
-    """Where the profile leaves what is as good, to one side; None: it does not."""
-    points = sorted(profile, key=lambda point: side * point[0])
-    limit = AS_GOOD * cost
-    good = [k for k, (_, there) in enumerate(points) if there <= limit]
-    if not good or good[-1] + 1 == len(points):
-        return None
-    (x0, y0), (x1, y1) = points[good[-1]], points[good[-1] + 1]
-    return x0 + (x1 - x0) * (limit - y0) / (y1 - y0)
-
-
-def _half_range(values: Array) -> float:
-    middle = 0.5 * abs(float(values.max() + values.min()))
-    return float(np.ptp(values)) / 2.0 / middle if middle else np.inf
+def _told(
+    value: float, low: float, high: float, open_low: bool, open_high: bool, tied: str
+) -> tuple[str, str]:
+    """The kind of a verdict and its words; open is an end at which nothing but the bound is."""
+    numbers = f"{low:.3g} to {high:.3g}"
+    if open_low and open_high:
+        return "not", f"not identified: anything from {numbers} does as well"
+    if open_low or open_high:
+        end = f"at most {high:.3g}" if open_low else f"at least {low:.3g}"
+        return "bounded", f"bounded on one side only: {end}"
+    if 0.5 * (high - low) <= TRUSTED * 0.5 * abs(high + low):
+        return "identified", f"identified: {value:.3g} within {numbers}"
+    if tied:
+        return "product", f"only as its {tied}; alone {numbers}"
+    return "bounded", f"known roughly: {numbers}"
 
 
 def _tie(key: str, partners: Mapping[str, Array]) -> str:
-    """The product or ratio in which the ensemble agrees although the key scatters; or nothing."""
+    """The product or ratio in which the rigs agree although the key scatters; or nothing."""
     if key not in partners or len(partners[key]) < FEWEST:
         return ""
     alone = partners[key]
@@ -167,3 +123,19 @@ def _tie(key: str, partners: Mapping[str, Array]) -> str:
     ]
     spread, words = min(found)
     return words if spread < TIED * float(np.std(alone)) else ""
+
+
+def forces(rig: Rig, places: Array) -> tuple[Array, Array]:
+    """The suspension's force at ``places`` (q, m) less that at the centre, N; over Bl, A."""
+    space, solution = rig
+    numbers = space.numbers(solution.place)
+    found = suspension_force(numbers, np.append(places, 0.0))
+    apart = found[:-1] - found[-1]
+    return apart, apart / numbers["force_factor"]
+
+
+def at_bounds(low: Array, high: Array, scale: Array, own: Array) -> list[str]:
+    """The names of a trial's own numbers that lie at a bound."""
+    near = END * scale
+    there = (scale > 0.0) & ((own <= low + near) | (own >= high - near))
+    return [name for name, one in zip(OWN, there, strict=True) if one]

@@ -1,18 +1,20 @@
-"""The stages of an identification, from fits of single trials to the rig, its folds and profiles.
+"""The stages of an identification, from fits of single trials to the rig and its folds.
 
-Starts are rigs that fit one trial each. They are tried on all trials, and the better ones of them
-are searched further, fewer and fewer for longer and longer; all that end near the best are its
-ensemble.
+Starts are rigs that fit one trial each, as they are and with another scale of forces and masses and
+other walls. They are tried on all trials, and the better ones of them are searched further, fewer
+and fewer for longer and longer. Each law of the suspension is searched twice, from other random
+numbers: only where both come to the same cost does a range mean the trials and not the search.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 from zlib import crc32
 
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.search.finish import finish
 from cosim.studies.identify.search.search import Found, Progress, Search
 
@@ -29,16 +31,23 @@ class Effort:
     single_generations: int
     rounds: tuple[tuple[int, int, float], ...]
     fold_rounds: tuple[tuple[int, int, float], ...]
-    profile_points: int
-    """On each side of the best value of a key."""
-    profile_generations: int
+    laws: int
+    """So many laws of the suspension, of those that the bounds name, at most."""
+    searches: int
+    """Of each law."""
 
 
 FULL = Effort(
-    4, 60, ((16, 90, 0.12), (8, 150, 0.08), (3, 250, 0.05), (2, 300, 0.03)),
-    ((6, 90, 0.12), (3, 150, 0.08), (1, 300, 0.05)), 3, 40,
+    3, 50, ((10, 60, 0.12), (4, 120, 0.08), (2, 250, 0.05)),
+    ((5, 60, 0.12), (2, 150, 0.08), (1, 250, 0.05)), 3, 2,
 )  # fmt: skip
-QUICK = Effort(1, 25, ((3, 30, 0.12), (1, 60, 0.06)), ((1, 30, 0.1),), 1, 8)
+QUICK = Effort(1, 25, ((3, 30, 0.12), (1, 60, 0.06)), ((1, 30, 0.1),), 1, 1)
+
+AGREED = 1.02
+"""Ratio of the costs of two searches up to which they have come to the same."""
+
+SCALE, WALLS = 0.25, 1.5
+"""Standard deviations of the logarithms by which starts are moved."""
 
 SCREENED, KEPT, SCREEN_ROUNDS = 128, 8, 4
 """Own numbers that are drawn for a new rig, those that are refined, and the rounds for them."""
@@ -59,12 +68,15 @@ class Plan:
     """A store's, of the stages that are done: an interrupted identification goes on there."""
     seed: int
     progress: Progress
+    name: str
+    """Of the search: stages of two searches draw other random numbers."""
 
     def _stage(
         self, name: str, work: Callable[[np.random.Generator], Sequence[Found]]
     ) -> list[Found]:
         """The solutions of a stage: those of the store, or of ``work``. A stage draws random
         numbers of its own, so it comes out the same whichever of those before it were done."""
+        name = f"{self.name}: {name}"
         rng = np.random.default_rng([self.seed, crc32(name.encode())])
         found = self.once(name, lambda: [_plain(one) for one in work(rng)])
         return [_found(one) for one in found]
@@ -92,11 +104,14 @@ class Plan:
         """Solutions for the trials ``rows``, from the rigs of these trials alone on, the best
         first; each has ended its search, most of them early."""
         search, each = self.coarse.part(rows), self.effort.singles
-        places = [one.place for i, one in enumerate(self.singles()) if i // each in rows]
-        several = self._stage(
-            f"{name}: starts",
-            lambda rng: search.screen(np.array(places), rng, SCREENED, KEPT, SCREEN_ROUNDS),
-        )
+        places = np.array([one.place for i, one in enumerate(self.singles()) if i // each in rows])
+
+        def starts(rng: np.random.Generator) -> list[Found]:
+            scale, walls = (np.exp(s * rng.standard_normal(len(places))) for s in (SCALE, WALLS))
+            every = np.concatenate([places, search.space.scaled(places, scale, walls)])
+            return search.screen(every, rng, SCREENED, KEPT, SCREEN_ROUNDS)
+
+        several = self._stage(f"{name}: starts", starts)
         ended: list[Found] = []
         for number, (count, generations, sigma) in enumerate(rounds, 1):
             several = sorted(several, key=lambda one: one.total)
@@ -141,50 +156,53 @@ class Plan:
         """The best own numbers of trials on a rig, of many starts."""
         return self._stage(name, lambda rng: targets.screen(place[None], rng, *CAREFUL))[0]
 
-    def profile(self, key: int, place: float, start: Found, others: Sequence[Found]) -> Found:
-        """The best solution with one key at a place: from a neighbour on, or from that of
-        ``others`` whose key is nearest to the place, whichever is the better start.
-
-        Both are moved along the valley of the cost, half of the way or not at all.
-        """
-        name = f"profile {self.coarse.space.names[key]} {place:.4f}"
-        near = min(others, key=lambda one: abs(one.place[key] - place))
-
-        def work(rng: np.random.Generator) -> list[Found]:
-            starts = [one for from_ in (start, near) for one in self._moved(from_, key, place)]
-            there = min(starts, key=lambda one: one.total)
-            n = self.effort.profile_generations
-            return [self.coarse.nested(there, rng, n, 0.04, self._telling(name), fixed=key)]
-
-        return self._stage(name, work)[0]
-
-    def _moved(self, start: Found, key: int, place: float) -> list[Found]:
-        """A solution with one key moved to a place."""
-        search = self.coarse
-        follow = search.sensitivity(start.place, start.own)
-        along = search.valley(start.place, start.own, key)
-        low, high = ([getattr(t, end) for t in search.targets] for end in ("low", "high"))
-        found = []
-        for share in (0.0, 0.5, 1.0):
-            moved = start.place + share * (place - start.place[key]) * along
-            moved = np.clip(moved, 0.0, 1.0)
-            moved[key] = place
-            own = np.clip(start.own + follow @ (moved - start.place), low, high)
-            found.append(search.refined(moved, own, 4))
-        return found
-
     def _telling(self, title: str) -> Progress:
-        return lambda what, best: self.progress(f"{title}, {what}", best)
+        return lambda what, best: self.progress(f"{self.name}: {title}, {what}", best)
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """What the searches with one law of the suspension have found."""
+
+    space: Space
+    ends: list[Found]
+    """The best of each search, finished."""
+    candidates: list[Found]
+    """All at which a search has ended, the best first, at the step of the search."""
+
+    @property
+    def best(self) -> Found:
+        """The best of the ends."""
+        return min(self.ends, key=lambda one: one.total)
+
+    @property
+    def scatter(self) -> float:
+        """The highest cost of the ends over the lowest; of one search nothing is known."""
+        return max(one.total for one in self.ends) / self.best.total
+
+    @property
+    def converged(self) -> bool:
+        """Whether several searches have come to the same."""
+        return len(self.ends) > 1 and self.scatter <= AGREED
+
+    def within(self, factor: float) -> list[Found]:
+        """The candidates whose cost is at most ``factor`` times the lowest."""
+        return [one for one in self.candidates if one.total <= factor * self.candidates[0].total]
+
+
+def searched(plans: Sequence[Plan]) -> Searched:
+    """The searches of a law, one plan each."""
+    rows = [*range(len(plans[0].coarse.targets))]
+    every = [plan.ensemble("all trials", rows, plan.effort.rounds) for plan in plans]
+    both = zip(plans, every, strict=True)
+    ends = [plan.finished("all trials", rows, found[0]) for plan, found in both]
+    order = sorted([one for found in every for one in found], key=lambda one: one.total)
+    return Searched(plans[0].coarse.space, ends, order)
 
 
 def folds(count: int) -> list[list[int]]:
     """The trials' numbers (from 0) of each fold: every third."""
     return [[*range(k, count, FOLDS)] for k in range(min(FOLDS, count))]
-
-
-def with_targets(search: Search, targets: Sequence[object]) -> Search:
-    """The same search for other targets."""
-    return replace(search, targets=targets)
 
 
 def _plain(found: Found) -> dict[str, Any]:

@@ -162,25 +162,6 @@ class Search:
         steps = np.concatenate([turns, own_turns])[:, None]
         return residuals[0], (residuals[1:] - residuals[0]) / steps
 
-    def valley(self, place: Array, own: Array, key: int) -> Array:
-        """How the other places follow that of one key, the own numbers being fitted throughout: by
-        the normal equations of all trials. One for the key itself."""
-
-        def one(k: int) -> Array:
-            slopes, d = self.slopes(place, own, k)[1], len(place)
-            normal = np.einsum("ij,kj->ik", slopes, slopes)
-            if len(slopes) == d:
-                return normal
-            inner = normal[d:, d:] + SOFT * np.diag(np.diag(normal)[d:] + 1e-9)
-            return normal[:d, :d] - normal[:d, d:] @ np.linalg.solve(inner, normal[d:, :d])
-
-        whole = np.sum(self.each(one), axis=0)
-        rest = [k for k in range(len(place)) if k != key]
-        inner = whole[np.ix_(rest, rest)] + SOFT * np.diag(np.diag(whole)[rest] + 1e-9)
-        found = np.ones(len(place))
-        found[rest] = -np.linalg.solve(inner, whole[rest, key])
-        return found
-
     def sensitivity(self, place: Array, own: Array) -> Array:
         """How the own numbers follow the rig's place: trials × OWN × free."""
 
@@ -214,15 +195,13 @@ class Search:
         sigma: float,
         progress: Progress,
         population: int = POPULATION,
-        fixed: int | None = None,
     ) -> Found:
-        """CMA-ES over the rig from ``start`` on; ``fixed`` keeps one place where it is."""
+        """CMA-ES over the rig from ``start`` on."""
         space, trials = self.space, len(self.targets)
-        moving = [k for k in range(len(start.place)) if k != fixed]
         search = CMA(
-            mean=np.clip(start.place[moving], 1e-3, 1 - 1e-3),
+            mean=np.clip(start.place, 1e-3, 1 - 1e-3),
             sigma=sigma,
-            bounds=np.tile([0.0, 1.0], (len(moving), 1)),
+            bounds=np.tile([0.0, 1.0], (len(start.place), 1)),
             population_size=population,
             seed=int(rng.integers(2**31)),
         )
@@ -232,8 +211,7 @@ class Search:
         parents, theirs = here.place[None], here.own[None]
         for generation in range(1, generations + 1):
             asked = [search.ask() for _ in range(population)]
-            places = np.repeat(start.place[None], population, axis=0)
-            places[:, moving] = asked
+            places = np.array(asked)
             spread = parents.std(axis=0) + 1e-6
             apart = ((places[:, None] - parents) / spread) ** 2
             nearest = apart.sum(axis=2).argmin(axis=1)
