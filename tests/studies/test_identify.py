@@ -266,7 +266,7 @@ def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(
     given = (f'[rig."{key}"]\nvalue = {value}\n' for key, value in RIG.items() if key not in free)
     bounds = tmp_path / "bounds.toml"
     bounds.write_text("".join(given))
-    brief = Effort(1, 12, ((2, 15, 0.12), (1, 30, 0.06)), ((1, 15, 0.1),), 1, 4)
+    brief = Effort(1, 12, ((2, 15, 0.12), (1, 30, 0.06)), ((1, 15, 0.1),), 1, 1)
     monkeypatch.setattr(run, "QUICK", brief)
     monkeypatch.setattr(plan, "SCREENED", 32)
     monkeypatch.setattr(plan, "AGAIN", (64, 8, 3))
@@ -359,7 +359,7 @@ def test_verdicts() -> None:
         assert found["mechanics.suspension_k2"].kind == "law"
         force = found["coil.force_factor"]
         assert force.kind == "product" and "amplitudes" in force.words
-        assert all(v.low <= v.value <= v.high for v in found.values() if v.low is not None)
+        assert all(v.low <= v.value <= v.high for v in found.values() if v.low and v.high)
 
 
 def test_effective_samples_count_what_is_new(folder: Path) -> None:
@@ -376,7 +376,7 @@ def test_effective_samples_count_what_is_new(folder: Path) -> None:
             noise = rng.standard_normal(len(exact))
             for k in range(1, len(noise)):
                 noise[k] = a * noise[k - 1] + (1.0 - a**2) ** 0.5 * noise[k]
-            signals = trial.fine.signals | {"v_surface": exact + 1e-3 * noise}
+            signals = {**trial.fine.signals, "v_surface": exact + 1e-3 * noise}
             noisy = replace(trial, fine=replace(trial.fine, signals=signals))
             counts.append(samples([noisy], space, whole))
         found[a] = float(np.median(counts)) / len(exact)
