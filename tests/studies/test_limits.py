@@ -14,11 +14,12 @@ from matplotlib.figure import Figure
 import cosim
 from cosim.arrays import Array
 from cosim.cli.main import main
+from cosim.drive.command import command
 from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.store import Store
 from cosim.files.picture import Picture
-from cosim.scene import changed, load
+from cosim.scene import Scene, changed, load
 from cosim.search.turns import TURN
 from cosim.studies.limits import judge, report, runs, study
 from cosim.studies.limits.answer import BY_NAME, gain_on, gains, noise
@@ -112,6 +113,25 @@ def test_exchanged_wires_are_the_other_command() -> None:
             ]
         )
     assert mirrored.numbers["v_average"] == pytest.approx(falling.numbers["v_average"], rel=1e-6)
+
+
+def test_a_square_is_three_of_six_levels_up_and_a_sine_nearly_its_six() -> None:
+    scene, point = made_base(), np.array([0.5, 0.4, 0.6])
+    for name, apart in (("square wave", 1e-6), ("sine", 0.5)):
+        shown = NAMED[name].machine(scene)
+        levels = NAMED["six levels, held"].machine(scene)
+        more = shown.sampled(scene, levels.levels)
+        both = [
+            command(changed(scene, machine.at(at, 0.1, 0.1), "a test"))
+            for machine, at in ((shown, point), (levels, np.concatenate([point, more])))
+        ]
+        times = (np.arange(1200) + 0.5) / 1200 * both[0].period
+        first, second = (one.values(times) for one in both)
+        assert np.abs(first - second).max() <= apart * float(np.ptp(first))
+
+
+def made_base() -> Scene:
+    return Bench.base(load("reference"), {}, "test")
 
 
 @pytest.mark.slow

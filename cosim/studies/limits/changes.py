@@ -6,9 +6,12 @@ from functools import partial
 from math import ceil, inf
 from typing import Any
 
+import numpy as np
+
 from cosim.arrays import Array
 from cosim.circuit.heat import DRIVE_RANGE_HEAT
-from cosim.scene import Scene, firmware
+from cosim.drive.command import shape
+from cosim.scene import Scene, changed, firmware
 from cosim.scene.tables import KNOBS
 
 Settings = dict[str, Any]
@@ -66,6 +69,13 @@ class Machine:
         before, after = (max(1, ceil(time / period - 1e-9)) * period for time in (settle, span))
         return found | {"run.settle": before, "run.duration": before + after}
 
+    def sampled(self, scene: Scene, levels: int) -> Array:
+        """The command's own shape at ``levels`` even phases, as that many further coordinates of a
+        point of the cube; in the middle between two, since a shape may jump at them."""
+        unit: Settings = {"drive.frequency": 1.0, "drive.amplitude": 1.0, "drive.offset": 0.0}
+        command = shape(changed(scene, unit | self.settings, "a shape"))
+        return command.values((np.arange(levels) + 0.5) / levels) + 0.5
+
 
 def _typed(value: float) -> float:
     return round(float(value), 6)
@@ -121,8 +131,8 @@ CHANGES: Sequence[Change] = (
     Change("coil's wires exchanged", "waveform", _set("coil.polarity", value=-1)),
     Change("sine", "waveform", _set("drive.waveform", value="sine")),
     Change("square wave", "waveform", _set("drive.waveform", value="square")),
-    Change("five levels, straight lines between", "waveform", _own_command("pieces", 5)),
-    Change("five levels, held", "waveform", _own_command("steps", 5)),
+    Change("six levels, straight lines between", "waveform", _own_command("pieces", 6)),
+    Change("six levels, held", "waveform", _own_command("steps", 6)),
     Change("heat 0.9 W", "heat", lambda _: Machine(heat=0.9)),
     Change("heat 1.8 W", "heat", lambda _: Machine(heat=1.8)),
     Change("heat 7 W", "heat", lambda _: Machine(heat=7.0)),

@@ -61,7 +61,7 @@ def changes(path: Path, study: Study, goal: Goal) -> None:
     axis.set_yticks(range(len(names)), names, fontsize=9)
     for label, gain in zip(axis.get_yticklabels(), reversed(every), strict=True):
         label.set_color(COLORS[gain.change.group])
-    axis.set_ylim(-0.7, len(names) - 0.3)
+    axis.set_ylim(-0.7, len(names) + 0.1)
     axis.set_xlim(0.0, right := axis.get_xlim()[1])
     axis.set_xticks([tick for tick in axis.get_xticks() if 0.0 <= tick <= right])
     axis.set_xlabel(f"{goal.title}, robust [{goal.unit}]")

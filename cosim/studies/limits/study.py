@@ -130,11 +130,22 @@ class _Work:
         found = self.alone(changes, [*seed, 0], known)
         both: dict[str, Candidates] = {}
         for number, change in enumerate(changes):
-            hints = [_first(of) for name, of in found.items() if name != change.name]
+            hints = [self._hint(change, other, found[other.name]) for other in changes]
             own, seeds = found[change.name], [*seed, 1, number]
             both[change.name] = self._searched(change, self.effort[1], seeds, own, hints)
             self.told(f"rig {self.rig}, with what helps others: {change.name}")
         return both
+
+    def _hint(self, change: Change, other: Change, found: Candidates) -> Candidates:
+        """The best one for each goal of another change, its shape as levels where this one's
+        command has such: the nearest that it has."""
+        machine, there = (one.machine(self.bench.scene) for one in (change, other))
+        more: list[float] = []
+        if machine.levels and not there.levels:
+            more = there.sampled(self.bench.scene, machine.levels).tolist()
+        return {
+            kind: [[[*one, *more] for one in some[:1]] for some in found[kind]] for kind in KINDS
+        }
 
     def alone(
         self,
@@ -186,11 +197,6 @@ class _Work:
         if not name:
             self.told(f"rig {self.rig}: judged")
         return {(change, goal, kind): Point(**of) for (change, goal, kind), of in found}
-
-
-def _first(candidates: Candidates) -> Candidates:
-    """The best one for each goal."""
-    return {kind: [some[:1] for some in candidates[kind]] for kind in KINDS}
 
 
 def ensemble(path: Path, normal_force: float) -> list[Settings]:
