@@ -334,22 +334,26 @@ def test_bad_input(
     assert not out.exists()
 
 
+SHARES = (0.7, 1.1, 1.3, 1.01)
+
+
 def test_ensemble(tmp_path: Path) -> None:
-    path = tmp_path / "rigs.json"
-    rigs = [{"cost": n, "mechanics.surface_mass": 0.01 + 0.001 * n} for n in range(4)]
+    path, scene = tmp_path / "rigs.json", load("paper")
+    mass, force = scene.mechanics.surface_mass, scene.friction.normal_force
+    rigs = [{"cost": n, "mechanics.surface_mass": share * mass} for n, share in enumerate(SHARES)]
     rigs[3] |= {"normal_force_ratio": 0.8, "mechanics.suspension": "knee"}
     path.write_text(json.dumps({"ensemble": rigs, "seed": 0}))
-    found = study.ensemble(path, 2.0)
-    assert [round(1e3 * float(rig["mechanics.surface_mass"])) for rig in found] == [11, 12, 13]
-    assert [rig.get("friction.normal_force") for rig in found] == [None, None, 1.6]
-    scene = load("paper")
+    found = study.ensemble(path, scene)
+    shares = [float(rig["mechanics.surface_mass"]) / mass for rig in found]
+    assert shares == pytest.approx([0.7, 1.3, 1.01]), "the second is the scene's own"
+    assert [rig.get("friction.normal_force") for rig in found] == [None, None, 0.8 * force]
     study.checked(scene, found, path)
     with pytest.raises(BadInput, match=r"rigs\.json, ensemble 1: .*surface_mass"):
         study.checked(scene, [{"mechanics.surface_mass": -1.0}], path)
     for text in ("[]", "{}", '{"ensemble": [1]}'):
         path.write_text(text)
         with pytest.raises(BadInput, match="has no list"):
-            study.ensemble(path, 2.0)
+            study.ensemble(path, scene)
     path.write_text("{")
     with pytest.raises(BadInput, match="neither JSON"):
-        study.ensemble(path, 2.0)
+        study.ensemble(path, scene)

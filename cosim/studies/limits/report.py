@@ -144,8 +144,7 @@ def limits(
         words += [f"--set {text}" for text in texts]
     base = load(scene, overrides)
     efforts = (QUICK if quick else FULL).times(effort)
-    force = base.friction.normal_force
-    others: list[Settings] = ensemble(Path(rigs), force) if rigs is not None else []
+    others: list[Settings] = ensemble(Path(rigs), base) if rigs is not None else []
     checked(base, others, rigs)
     told = counted(progress, steps(efforts, CHANGES, len(others)))
     path = None if out is None else Path(out) / STORE

@@ -199,9 +199,14 @@ class _Work:
         return {(change, goal, kind): Point(**of) for (change, goal, kind), of in found}
 
 
-def ensemble(path: Path, normal_force: float) -> list[Settings]:
-    """The rigs of a file, without its first, the best, for which the scene stands: the tables of
-    its list ``ensemble``, each of keys ("table.key") and values, SI; of entries without a dot only
+ALIKE = 1.25
+"""Ratio of the values of every key up to which a rig is the scene's own, by the digits and the step
+that a search ended with."""
+
+
+def ensemble(path: Path, scene: Scene) -> list[Settings]:
+    """The rigs of a file, without those for which the scene stands: the tables of its list
+    ``ensemble``, each of keys ("table.key") and values, SI; of entries without a dot only
     ``normal_force_ratio`` counts, by which a rig wants another normal force than the scene's, N.
 
     Raises BadInput.
@@ -217,11 +222,28 @@ def ensemble(path: Path, normal_force: float) -> list[Settings]:
     rigs = said.get("ensemble") if isinstance(said, dict) else None
     if not isinstance(rigs, list) or not rigs or not all(isinstance(rig, dict) for rig in rigs):
         raise BadInput(f'{name}: has no list "ensemble" of tables of keys and values.')
-    found = [{key: value for key, value in rig.items() if "." in key} for rig in rigs[1:]]
-    for settings, rig in zip(found, rigs[1:], strict=True):
+    found = []
+    for rig in rigs:
+        settings: Settings = {key: value for key, value in rig.items() if "." in key}
+        if _is_own(scene, settings):
+            continue
         if isinstance(ratio := rig.get("normal_force_ratio"), int | float):
-            settings.setdefault("friction.normal_force", ratio * normal_force)
+            settings.setdefault("friction.normal_force", ratio * scene.friction.normal_force)
+        found.append(settings)
     return found
+
+
+def _is_own(scene: Scene, rig: Settings) -> bool:
+    known = scene.as_dict()
+    for key, value in rig.items():
+        table, _, name = key.partition(".")
+        own = known.get(table, {}).get(name)
+        if isinstance(own, str) or not isinstance(value, int | float) or not own:
+            if own != value:
+                return False
+        elif not 1.0 / ALIKE <= value / own <= ALIKE:
+            return False
+    return True
 
 
 def checked(scene: Scene, rigs: Sequence[Settings], file: str | os.PathLike[str] | None) -> None:
