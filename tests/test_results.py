@@ -36,6 +36,17 @@ def test_each_row_has_a_command() -> None:
     assert all(len(row) == 3 and re.search(r"`(cosim|make) |the same", row[2]) for row in rows)
 
 
+def test_the_readmes_answer_is_what_the_data_say() -> None:
+    """Each point of it is a sentence that the study has made of its numbers."""
+    section = re.split(r"^## ", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.M)
+    (answer,) = [text for text in section if text.startswith("The answer")]
+    points = re.findall(r"^- (.+(?:\n  .+)*)", answer, flags=re.M)
+    said = (RESULTS / "limits.md").read_text(encoding="utf-8")
+    assert len(points) >= 6
+    for point in points:
+        assert re.sub(r"\s+", " ", point) in said, point
+
+
 def test_the_citation_is_of_this_version() -> None:
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")

@@ -82,7 +82,7 @@ def _mechanics(scene: Scene, rest: dict[str, float]) -> str:
     rate = f"{table.contact_damping!r}*1e-3*(v(ram)-v(surface))"
     stiffness = table.contact_stiffness * 1e-3**1.5
     return _MECHANICS.format(
-        **table.model_dump(exclude={"contact"}),
+        **table.model_dump(exclude={"contact", "suspension"}),
         force_factor=repr(scene.coil.force_factor),
         force=repr(scene.friction.normal_force),
         mu_k=repr(scene.friction.mu_k),

@@ -63,7 +63,7 @@ def made(make: Callable[[], Scene], progress: Progress) -> Summary:
 
 def repeatable(summary: Summary | Exception) -> Summary:
     assert isinstance(summary, dict), summary
-    return {key: summary[key] for key in summary if key not in ("wall_time", "notes")}
+    return {key: summary[key] for key in summary if key not in ("wall_time", "notes", "rests")}
 
 
 def test_failures_are_those_of_single_runs(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -97,7 +97,10 @@ def test_interrupted_at_any_moment_of_a_fresh_session(count: int) -> None:
     for _ in range(count):
         moment = f"{dice.uniform(0.0, 1.5):.4f}"
         done = subprocess.run(
-            [sys.executable, "-c", SESSION, moment], capture_output=True, text=True, timeout=100
+            [sys.executable, "-W", "ignore", "-c", SESSION, moment],
+            capture_output=True,
+            text=True,
+            timeout=100,
         )
         assert (done.returncode, done.stderr) == (0, ""), moment
         assert float(done.stdout) == expected, moment
