@@ -24,15 +24,17 @@ from cosim.studies.measure.sample import (
     sample,
     whole,
 )
-from cosim.studies.measure.worth import Worth, worth
+from cosim.studies.measure.worth import FEWEST, Worth, chance, worth
 from cosim.studies.plots import BLUE, ORANGE, panels
 from cosim.studies.report import Progress, Report, counted, silent
 from cosim.studies.tables import Row, brief
 
-RIGS, QUICK, FEWEST = 48, 20, 4
+RIGS, QUICK, LEAST = 48, 24, 4
 """Rigs of the sample, with ``quick``, and those that a file must name at least."""
 
 WIDTH, LEFT = "width [mm/s]", "left [%]"
+NOTHING, USELESS = "nothing", "chance"
+"""Rows of no measurement, and of one that has nothing to do with what is wanted."""
 
 
 def measure(
@@ -63,8 +65,8 @@ def measure(
     others = ensemble(Path(rigs), base.friction.normal_force)
     checked(base, others, rigs)
     given = whole(base, others)
-    if len(given) < FEWEST:
-        raise BadInput(f"{rigs}: {len(given)} rigs are too few; it must have {FEWEST} at least.")
+    if len(given) < LEAST:
+        raise BadInput(f"{rigs}: {len(given)} rigs are too few; it must have {LEAST} at least.")
     count = max(len(given), QUICK if quick else RIGS)
     more = drawn(base, given, count - len(given), np.random.default_rng(seed))
     tick = counted(progress, 1 + len(given) + len(more))
@@ -94,7 +96,12 @@ def report(found: Sample, given: int, seed: int) -> Report:
     """What the sample tells; ``given`` of its rigs are those of the file."""
     now, each = worths(found, seed)
     values = dict(zip(CANDIDATES, found.values, strict=True))
-    rows: list[Row] = [_row("nothing", "", "", "", now, now)]
+    luck = chance(found.targets, np.random.default_rng(seed))
+    words = "a fine measurement of something that has nothing to do with it"
+    rows: list[Row] = [
+        _row(NOTHING, "", "", "", now, now),
+        _row(USELESS, words, "", "", luck, now),
+    ]
     rows += [
         _row(one.name, one.how, _accuracy(one), _range(one, values[one]), after, now)
         for one, after in each
@@ -117,8 +124,9 @@ def report(found: Sample, given: int, seed: int) -> Report:
         "others drawn about them. Each in turn is taken as the truth and left out, and the others "
         "are weighted by how well they agree with what it would show, noise added. Widths are "
         "means over that, ± their standard error; 'holds' is how often the interval has the truth "
-        "in it. No interval stands on less than eight effective rigs, so what is measured finer "
-        "than the sample can tell is worth more than is said here.",
+        f"in it. No interval stands on less than {FEWEST:.0f} effective rigs, so what is finer "
+        "than the sample can tell is worth more than is said here. Fewer rigs span less, too: "
+        "'chance' is what a fine measurement leaves that has nothing to do with it.",
         "Rigs count equally: their misfits differ by less than the searches that found them "
         "scatter. The velocity is the median over the knobs' turns by 2 %, at the best setting for "
         "that on each rig. Accuracies are assumed, but for the velocity in a film: that is what a "
@@ -165,15 +173,16 @@ def draw(rows: Sequence[Row], title: str, path: Path) -> None:
     """Draw the widths after each measurement into ``path`` (a PNG)."""
     note = (
         "Bars: expected width of the 90 % interval of the robust v_up after one measurement, ± "
-        "standard error; line: now."
+        "standard error. Solid line: now; dotted: after one that tells nothing."
     )
     figure, axes = panels(f"{title}.", note, (11.0, 5.2), 1, len(TARGETS), sharey=True)
-    now, *after = rows
+    now, luck, *after = rows
     for axis, target, color in zip(axes, TARGETS, (BLUE, ORANGE), strict=True):
         names = [row["measurement"] for row in after]
         widths, errors = ([row[f"{target}: {of}"] for row in after] for of in (WIDTH, "± [mm/s]"))
         axis.barh(names, widths, xerr=errors, color=color, ecolor="0.3")
         axis.axvline(now[f"{target}: {WIDTH}"], color="0.2", lw=1.2)
+        axis.axvline(luck[f"{target}: {WIDTH}"], color="0.2", lw=1.2, ls=":")
         axis.set_title(target, loc="left")
         axis.set(xlabel="width of the 90 % interval [mm/s]", xlim=(0.0, None))
     axes[0].invert_yaxis()

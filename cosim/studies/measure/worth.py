@@ -9,7 +9,7 @@ from cosim.arrays import Array
 ENDS = (0.05, 0.95)
 """Of an interval, as shares of the weight."""
 
-FEWEST = 8.0
+FEWEST = 12.0
 """Effective rigs that an interval stands on at least: of fewer it would be too narrow, so a
 measurement finer than the sample counts for no more than the sample can tell."""
 
@@ -68,3 +68,12 @@ def worth(values: Array, sd: Array, targets: Array, rng: np.random.Generator) ->
     errors = each.std(axis=0, ddof=1) / np.sqrt(n)
     told = zip(each.mean(axis=0), errors, held.mean(axis=(0, 1)), strict=True)
     return [Worth(*map(float, one)) for one in told]
+
+
+def chance(targets: Array, rng: np.random.Generator) -> list[Worth]:
+    """What a fine measurement of something that has nothing to do with the targets leaves, since
+    its intervals stand on fewer rigs: of four, in turn, the means."""
+    n = len(targets)
+    found = [worth(rng.random((n, 1)), np.full((n, 1), 1e-3), targets, rng) for _ in range(4)]
+    means = np.array([[[*vars(one).values()] for one in each] for each in found]).mean(axis=0)
+    return [Worth(*one) for one in means.tolist()]
