@@ -93,6 +93,7 @@ charts: setup
 	@$(VENV)/bin/cosim chart stability
 	@$(PY) -m benchmarks.charts
 	@$(VENV)/bin/cosim chart limits --rigs results/identify.json
+	@$(VENV)/bin/cosim chart measure --rigs results/identify.json
 	@$(VENV)/bin/cosim chart ladder paper trial-05 gripper
 	@$(VENV)/bin/cosim chart choice
 	@cp results/choice.csv cosim/simulation/choice.csv

@@ -9,6 +9,7 @@ from cosim.studies.compare.run import compare as compare
 from cosim.studies.fit.fit import fit as fit
 from cosim.studies.identify.run import identify as identify
 from cosim.studies.limits.report import limits as limits
+from cosim.studies.measure.measure import measure as measure
 from cosim.studies.paper.theory import theory as theory
 from cosim.studies.speed.bench import bench as bench
 from cosim.studies.speed.ladder import ladder as ladder

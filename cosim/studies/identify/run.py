@@ -168,7 +168,14 @@ def _asked(space: Space, trials: Sequence[Measured], effort: object) -> Any:
         ]
         for trial in trials
     ]
-    return [entries, space.laws, sums, repr((effort, WEIGHTS, TRANSPORT)), digest("stepper")]
+    return [
+        entries,
+        space.laws,
+        space.measured,
+        sums,
+        repr((effort, WEIGHTS, TRANSPORT)),
+        digest("stepper"),
+    ]
 
 
 def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[HeldOut]]:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from cosim.errors import BadInput, plain
 from cosim.mechanics.stickslip import SUSPENSIONS
 from cosim.scene import keys
 from cosim.stepper.stepper import OWN, RIG
+from cosim.studies.identify.problem.gauges import GAUGES
 
 SHIPPED = Path(__file__).parent / "bounds.toml"
 
@@ -91,7 +93,10 @@ class Space:
         path: Path,
         laws: Sequence[str],
         law: str = "",
+        measured: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     ) -> None:
+        self.measured = dict(measured)
+        """Value and standard deviation, SI, by the names of GAUGES."""
         self.path, self.all_entries, self.laws, self.law = (
             path,
             dict(rig),
@@ -117,7 +122,8 @@ class Space:
 
     def of_law(self, law: str) -> "Space":
         """The same with another law of the suspension."""
-        return Space(self.all_entries, self.trial_entries, self.path, self.laws, law)
+        both = self.all_entries, self.trial_entries
+        return Space(*both, self.path, self.laws, law, self.measured)
 
     @property
     def names(self) -> list[str]:
@@ -169,6 +175,16 @@ class Space:
                 total += WEAK * ((column - middle) / entry.sigma) ** 2
         return total
 
+    def misses(self, places: Array) -> Array:
+        """How far rigs at places (n × free) are from what was measured beside the trials, in
+        standard deviations (n × measured)."""
+        rigs = [dict(zip(RIG, row, strict=True)) for row in self.rigs(places).tolist()]
+        found = [
+            [(GAUGES[name].of(rig) - value) / sd for name, (value, sd) in self.measured.items()]
+            for rig in rigs
+        ]
+        return np.array(found).reshape(len(places), len(self.measured))
+
     def settings(self, place: Array) -> dict[str, Any]:
         """All keys of the rig at a place, as overrides of a scene."""
         found: dict[str, Any] = {SUSPENSION: self.law}
@@ -193,8 +209,12 @@ def read_space(own: Path | None = None) -> Space:
     """The shipped bounds, and those of a file of one's own in their place. Raises BadInput."""
     shipped = _tables(SHIPPED)
     tables = {name: dict(table) for name, table in shipped.items()}
+    measured: dict[str, tuple[float, float]] = {}
     if own is not None:
-        for name, table in _tables(own).items():
+        given = _tables(own)
+        entries = given.pop("measured", {}).items()
+        measured = {name: _measured(own, name, entry) for name, entry in entries}
+        for name, table in given.items():
             for key, entry in table.items():
                 if key not in tables[name]:
                     known = ", ".join(tables[name])
@@ -211,7 +231,26 @@ def read_space(own: Path | None = None) -> Space:
         raise BadInput(
             f"{path}: no key of the rig has a low and a high: there is nothing to search."
         )
-    return Space(rig, trial, path, laws)
+    return Space(rig, trial, path, laws, measured=measured)
+
+
+def _measured(path: Path, name: str, entry: Any) -> tuple[float, float]:
+    """Value and standard deviation of what was measured beside the trials."""
+    where = f'{path}: [measured."{plain(name)}"]'
+    if name not in GAUGES:
+        raise BadInput(f"{where}: this measurement is none of {', '.join(GAUGES)}.")
+    if not isinstance(entry, dict) or set(entry) - {"source"} != {"value", "sd"}:
+        raise BadInput(f"{where}: it needs a value and a standard deviation sd, and nothing else.")
+    for part in ("value", "sd"):
+        _number(where, part, entry[part])
+    if entry["sd"] <= 0.0:
+        raise BadInput(f"{where}: sd = {entry['sd']:g} must be above 0.")
+    return float(entry["value"]), float(entry["sd"])
+
+
+def _number(where: str, name: str, value: Any) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        raise BadInput(f"{where}: {name} = {plain(str(value))} must be a number.")
 
 
 def _laws(path: Path, entry: Any) -> list[str]:
@@ -231,8 +270,10 @@ def _tables(path: Path) -> dict[str, dict[str, Any]]:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise BadInput(f"{path}: is no valid TOML: {error}.") from error
     for name, table in content.items():
-        if name not in ("rig", "trial") or not isinstance(table, dict):
-            raise BadInput(f"{path}: {plain(name)}: there are the tables rig and trial only.")
+        if name not in ("rig", "trial", "measured") or not isinstance(table, dict):
+            raise BadInput(
+                f"{path}: {plain(name)}: there are the tables rig, trial and measured only."
+            )
     return content
 
 
@@ -249,8 +290,7 @@ def _entry(path: Path, table: str, key: str, entry: Any) -> Entry:
         name: entry[name] for name in ("value", "low", "high", "prior", "sigma") if name in entry
     }
     for name, value in numbers.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise BadInput(f"{where}: {name} = {plain(str(value))} must be a number.")
+        _number(where, name, value)
     given = "value" in entry
     if len(numbers) > 1 if given else not {"low", "high"} <= set(entry):
         raise BadInput(f"{where}: it needs either a value, or low and high.")

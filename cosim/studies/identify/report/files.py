@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.files.atomic import write_json, write_text
+from cosim.studies.identify.problem.gauges import GAUGES
 from cosim.studies.identify.report import figures
 from cosim.studies.identify.report.measures import Row
 from cosim.studies.identify.report.scenes import rig_settings, toml, trial_settings
@@ -72,7 +73,17 @@ def _priors(found: Solved) -> list[str]:
         f"Weak priors, a thousandth of the cost for each σ², took part: {'; '.join(weighed)}. They "
         "decide where the trials do not tell."
     )
-    return [words] if weighed else []
+    numbers = found.space.numbers(found.best.place)
+    other = [
+        f"{name} {value * gauge.scale:.4g} ± {sd * gauge.scale:.2g} {gauge.unit}, on the rig "
+        f"{gauge.of(numbers) * gauge.scale:.4g}"
+        for name, (value, sd) in found.space.measured.items()
+        for gauge in (GAUGES[name],)
+    ]
+    return [
+        *([words] if weighed else []),
+        *([f"Measured besides: {'; '.join(other)}."] * bool(other)),
+    ]
 
 
 def findings(numbers: dict[str, Any]) -> list[str]:

@@ -1,0 +1,87 @@
+"""What is measured on a machine beside its trials, as numbers that a rig gives in closed form.
+
+What each shows follows from the stepper's numbers of a rig; a file of bounds names them in its
+tables ``measured``. Accuracies are assumed, unless a source is told.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+
+from cosim.mechanics.stickslip import suspension_force
+
+Numbers = Mapping[str, float]
+
+LOAD = 0.05
+"""kg, hung on the flexures."""
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """A measurement of one number, SI."""
+
+    how: str
+    unit: str
+    """That of tables."""
+    scale: float
+    """From SI to it."""
+    sd: float
+    """Its accuracy, a standard deviation, SI."""
+    share: float
+    """The same as a share of the value, which comes besides."""
+    of: Callable[[Numbers], float]
+
+
+def leaves(rig: Numbers, wall: str) -> float:
+    """The current at which a ram that it holds at a wall leaves that, A: Bl i + F_m(q) = m_r g."""
+    q = rig["travel_up"] if wall == "up" else -rig["travel_down"]
+    force = rig["ram_mass"] * rig["gravity"] - suspension_force(rig, np.array([q]))[0]
+    return float(force / rig["force_factor"])
+
+
+def decay(rig: Numbers) -> float:
+    """Of the flexures' ring-down with the ram held at a wall, 1/s: c/2m."""
+    return 0.5 * rig["flexure_damping"] / (rig["surface_mass"] + rig["ram_mass"])
+
+
+def ring(rig: Numbers) -> float:
+    """The frequency of that ring-down, Hz; 0 where it only creeps."""
+    square = rig["flexure_stiffness"] / (rig["surface_mass"] + rig["ram_mass"])
+    return sqrt(max(square - decay(rig) ** 2, 0.0)) / (2.0 * pi)
+
+
+_CURRENT = (
+    "hold the ram at its {} wall by a current, let that go slowly, a small tone on it: the current "
+    "at which a back-EMF sets in"
+)
+_RING = "hold the ram at a wall by a current, no part; pluck the platform, film its ring-down: its "
+
+GAUGES = {
+    "click up": Gauge(
+        _CURRENT.format("upper"), "A", 1.0, 0.02, 0.0, lambda rig: leaves(rig, "up")
+    ),
+    "click down": Gauge(
+        _CURRENT.format("lower"), "A", 1.0, 0.02, 0.0, lambda rig: leaves(rig, "down")
+    ),
+    "force factor": Gauge(
+        "a current probe at a trial that is filmed, against the current that the fit gives it",
+        "N/A", 1.0, 0.0, 0.03, lambda rig: rig["force_factor"],
+    ),
+    "weight": Gauge(
+        "weigh housing, platform and ram, and a third of the flexures; half of these is not known",
+        "g", 1e3, 3e-4, 0.0, lambda rig: rig["surface_mass"] + rig["ram_mass"],
+    ),
+    "travel": Gauge(
+        "the ram's way from wall to wall, by a calliper",
+        "mm", 1e3, 5e-5, 0.0, lambda rig: rig["travel_up"] + rig["travel_down"],
+    ),
+    "ring-down": Gauge(_RING + "frequency", "Hz", 1.0, 0.0, 0.01, ring),
+    "decay": Gauge(_RING + "decay", "1/s", 1.0, 0.0, 0.1, decay),
+    "deflection": Gauge(
+        f"hang {LOAD * 1e3:.0f} g on the platform: how far it sinks, by a dial gauge",
+        "mm", 1e3, 2e-5, 0.0, lambda rig: LOAD * rig["gravity"] / rig["flexure_stiffness"],
+    ),
+}  # fmt: skip
+"""By their names in a file of bounds."""

@@ -1,0 +1,189 @@
+"""What to measure next, and measure.csv, measure.md and the figure that it leaves."""
+
+import os
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.errors import BadInput
+from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.store import Store
+from cosim.scene import Scene, load
+from cosim.scene.loading import Overrides
+from cosim.studies.limits.study import checked, ensemble
+from cosim.studies.measure.sample import (
+    CANDIDATES,
+    KEPT,
+    TARGETS,
+    Candidate,
+    Sample,
+    drawn,
+    sample,
+    whole,
+)
+from cosim.studies.measure.worth import FEWEST, Worth, chance, worth
+from cosim.studies.plots import BLUE, ORANGE, panels
+from cosim.studies.report import Progress, Report, counted, silent
+from cosim.studies.tables import Row, brief
+
+RIGS, QUICK, LEAST = 48, 24, 4
+"""Rigs of the sample, with ``quick``, and those that a file must name at least."""
+
+WIDTH, LEFT = "width [mm/s]", "left [%]"
+NOTHING, USELESS = "nothing", "chance"
+"""Rows of no measurement, and of one that has nothing to do with what is wanted."""
+
+
+def measure(
+    scene: Scene | str | os.PathLike[str] = "paper",
+    overrides: Overrides | None = None,
+    *,
+    rigs: str | os.PathLike[str],
+    seed: int = 0,
+    quick: bool = False,
+    out: str | os.PathLike[str] | None = None,
+    workers: int | None = None,
+    progress: Progress = silent,
+) -> Report:
+    """Which single measurement narrows most, for its accuracy, the 90 % interval of the mean
+    velocity upwards that the knobs reach robustly.
+
+    ``rigs`` is a file of those that may be meant, such as ``identify.json``, all equally; as they
+    are few, others are drawn about them. Each rig in turn is taken as the truth and left out: the
+    others are weighted by how well they agree with what it would show, noise added. ``quick`` draws
+    few. The same for the same ``seed``.
+
+    In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
+    study has left there. Raises BadInput.
+    """
+    if seed < 0:
+        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
+    base = load(scene, overrides)
+    others = ensemble(Path(rigs), base)
+    checked(base, others, rigs)
+    given = whole(base, others)
+    if len(given) < LEAST:
+        raise BadInput(f"{rigs}: {len(given)} rigs are too few; it must have {LEAST} at least.")
+    count = max(len(given), QUICK if quick else RIGS)
+    more = drawn(base, given, count - len(given), np.random.default_rng(seed))
+    tick = counted(progress, 1 + len(given) + len(more))
+    path = None if out is None else Path(out) / "measure.sqlite"
+    with Store(path, base.as_dict(), others, seed, quick) as store:
+        open_ = partial(Evaluator, kept=KEPT, workers=workers)
+        found = report(sample(base, [*given, *more], store, open_, seed, tick), len(given), seed)
+        if out is not None:
+            found.save(out)
+        store.remove()
+    return found
+
+
+def worths(found: Sample, seed: int) -> tuple[list[Worth], list[tuple[Candidate, list[Worth]]]]:
+    """For each of TARGETS: the worth of no measurement, and of each, that which leaves the least
+    of the first target before."""
+    nothing = np.empty((len(found.targets), 0))
+    now = worth(nothing, nothing, found.targets, np.random.default_rng(seed))
+    each = [
+        (one, worth(values, one.accuracy(values), found.targets, np.random.default_rng(seed)))
+        for one, values in zip(CANDIDATES, found.values, strict=True)
+    ]
+    return now, sorted(each, key=lambda pair: pair[1][0].width)
+
+
+def report(found: Sample, given: int, seed: int) -> Report:
+    """What the sample tells; ``given`` of its rigs are those of the file."""
+    now, each = worths(found, seed)
+    values = dict(zip(CANDIDATES, found.values, strict=True))
+    luck = chance(found.targets, np.random.default_rng(seed))
+    words = "a fine measurement of something that has nothing to do with it"
+    rows: list[Row] = [
+        _row(NOTHING, "", "", "", now, now),
+        _row(USELESS, words, "", "", luck, now),
+    ]
+    rows += [
+        _row(one.name, one.how, _accuracy(one), _range(one, values[one]), after, now)
+        for one, after in each
+    ]
+    (first, best), (second, next_) = each[:2]
+    left = [100.0 * a.width / n.width for a, n in zip(best, now, strict=True)]
+    other, leaves = min(each, key=lambda pair: pair[1][1].width)
+    title = (
+        f"Measure next: {first.name}. It leaves {left[0]:.0f} % of the 90 % interval of the robust "
+        f"velocity upwards"
+    )
+    ends = np.quantile(found.targets, (0.05, 0.95), axis=0) * 1e3
+    notes = [
+        f"{title}, {brief(best[0].width * 1e3)} of {brief(now[0].width * 1e3)} mm/s; next best is "
+        f"{second.name}, {brief(next_[0].width * 1e3)} mm/s. How: {first.how}.",
+        f"That velocity is {ends[0, 0]:.1f} to {ends[1, 0]:.1f} mm/s as the device is, and "
+        f"{ends[0, 1]:.1f} to {ends[1, 1]:.1f} mm/s with a falling sawtooth; of the latter's width "
+        f"{other.name} leaves the least, {100.0 * leaves[1].width / now[1].width:.0f} %.",
+        f"The sample is {len(found.targets)} rigs: {given} that were found from the trials, and "
+        "others drawn about them. Each in turn is taken as the truth and left out, and the others "
+        "are weighted by how well they agree with what it would show, noise added. Widths are "
+        "means over that, ± their standard error; 'holds' is how often the interval has the truth "
+        f"in it. No interval stands on less than {FEWEST:.0f} effective rigs, so what is finer "
+        "than the sample can tell is worth more than is said here. Fewer rigs span less, too: "
+        "'chance' is what a fine measurement leaves that has nothing to do with it.",
+        "Rigs count equally: their misfits differ by less than the searches that found them "
+        "scatter. The velocity is the median over the knobs' turns by 2 %, at the best setting for "
+        "that on each rig. Accuracies are assumed, but for the velocity in a film: that is what a "
+        "rig misses of a trial that it was not fitted to.",
+    ]
+    return Report(
+        "measure", "What to measure next", rows, notes, {"Each measurement": rows},
+        {"": partial(draw, rows, title)}, notes[0],
+    )  # fmt: skip
+
+
+def _row(
+    name: str, how: str, accuracy: str, over: str, after: Sequence[Worth], now: Sequence[Worth]
+) -> Row:
+    row: Row = {"measurement": name, "accuracy": accuracy, "90 % of the rigs": over}
+    for target, here, before in zip(TARGETS, after, now, strict=True):
+        row |= {
+            f"{target}: {WIDTH}": here.width * 1e3,
+            f"{target}: ± [mm/s]": here.error * 1e3,
+            f"{target}: {LEFT}": 100.0 * here.width / before.width,
+            f"{target}: holds [%]": 100.0 * here.held,
+        }
+    return row | {"how": how}
+
+
+def _accuracy(one: Candidate) -> str:
+    return ", ".join(
+        f"{100.0 * gauge.share:.2g} %"
+        if gauge.share
+        else f"{gauge.sd * gauge.scale:.2g} {gauge.unit}"
+        for gauge in one.gauges
+    )
+
+
+def _range(one: Candidate, values: Array) -> str:
+    ends = np.quantile(values, (0.05, 0.95), axis=0).T
+    return ", ".join(
+        f"{low * gauge.scale:.3g} to {high * gauge.scale:.3g} {gauge.unit}"
+        for (low, high), gauge in zip(ends.tolist(), one.gauges, strict=True)
+    )
+
+
+def draw(rows: Sequence[Row], title: str, path: Path) -> None:
+    """Draw the widths after each measurement into ``path`` (a PNG)."""
+    note = (
+        "Bars: expected width of the 90 % interval of the robust v_up after one measurement, ± "
+        "standard error. Solid line: now; dotted: after one that tells nothing."
+    )
+    figure, axes = panels(f"{title}.", note, (11.0, 5.2), 1, len(TARGETS), sharey=True)
+    now, luck, *after = rows
+    for axis, target, color in zip(axes, TARGETS, (BLUE, ORANGE), strict=True):
+        names = [row["measurement"] for row in after]
+        widths, errors = ([row[f"{target}: {of}"] for row in after] for of in (WIDTH, "± [mm/s]"))
+        axis.barh(names, widths, xerr=errors, color=color, ecolor="0.3")
+        axis.axvline(now[f"{target}: {WIDTH}"], color="0.2", lw=1.2)
+        axis.axvline(luck[f"{target}: {WIDTH}"], color="0.2", lw=1.2, ls=":")
+        axis.set_title(target, loc="left")
+        axis.set(xlabel="width of the 90 % interval [mm/s]", xlim=(0.0, None))
+    axes[0].invert_yaxis()
+    figure.write(path)

@@ -1,0 +1,79 @@
+"""How far a measurement narrows what is wanted, over a sample of what may be true."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.arrays import Array
+
+ENDS = (0.05, 0.95)
+"""Of an interval, as shares of the weight."""
+
+FEWEST = 12.0
+"""Effective rigs that an interval stands on at least: of fewer it would be too narrow, so a
+measurement finer than the sample counts for no more than the sample can tell."""
+
+DRAWS = 8
+"""Of the measurement's noise, on each rig."""
+
+
+@dataclass(frozen=True)
+class Worth:
+    """Of one measurement for one target, over rigs taken as the truth and left out."""
+
+    width: float
+    """The mean of the intervals' widths."""
+    error: float
+    """Its standard error."""
+    held: float
+    """The share of them that holds the truth."""
+
+
+def likely(values: Array, shown: Array, sd: Array) -> Array:
+    """Weights of rigs with ``values`` (n × numbers) where ``shown`` was measured to ``sd``."""
+    square = (((values - shown) / sd) ** 2).sum(axis=1)
+    square = square - square.min()
+    while True:
+        weights = np.exp(-0.5 * square)
+        if weights.sum() ** 2 >= min(FEWEST, 0.5 * len(square)) * (weights**2).sum():
+            return weights
+        square = square / 1.3
+
+
+def interval(targets: Array, weights: Array) -> Array:
+    """The ends of the 90 % interval of each target (n × targets), by weighted quantiles: ends ×
+    targets."""
+    columns = []
+    for column in targets.T:
+        order = np.argsort(column)
+        share = np.cumsum(weights[order]) - 0.5 * weights[order]
+        columns.append(np.interp(ENDS, share / weights.sum(), column[order]))
+    return np.array(columns).T
+
+
+def worth(values: Array, sd: Array, targets: Array, rng: np.random.Generator) -> list[Worth]:
+    """Of a measurement whose ``values`` and ``sd`` are rigs × numbers, for each target (rigs ×
+    targets); of none where there are no numbers."""
+    n = len(targets)
+    widths, held = (np.empty((n, DRAWS, targets.shape[1])) for _ in range(2))
+    for truth in range(n):
+        others = np.arange(n) != truth
+        for draw in range(DRAWS):
+            shown = values[truth] + sd[truth] * rng.standard_normal(values.shape[1])
+            weights = likely(values[others], shown, sd[truth])
+            low, high = interval(targets[others], weights)
+            widths[truth, draw] = high - low
+            held[truth, draw] = (low <= targets[truth]) & (targets[truth] <= high)
+    each = widths.mean(axis=1)
+    errors = each.std(axis=0, ddof=1) / np.sqrt(n)
+    told = zip(each.mean(axis=0), errors, held.mean(axis=(0, 1)), strict=True)
+    return [Worth(*map(float, one)) for one in told]
+
+
+def chance(targets: Array, rng: np.random.Generator) -> list[Worth]:
+    """What a fine measurement of something that has nothing to do with the targets leaves, since
+    its intervals stand on fewer rigs: of four, in turn, the means."""
+    n = len(targets)
+    found = [worth(rng.random((n, 1)), np.full((n, 1), 1e-3), targets, rng) for _ in range(4)]
+    means = np.array([[[*vars(one).values()] for one in each] for each in found]).mean(axis=0)
+    return [Worth(*one) for one in means.tolist()]
