@@ -41,7 +41,8 @@ def test_the_readmes_answer_is_what_the_data_say() -> None:
     section = re.split(r"^## ", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.M)
     (answer,) = [text for text in section if text.startswith("The answer")]
     points = re.findall(r"^- (.+(?:\n  .+)*)", answer, flags=re.M)
-    said = (RESULTS / "limits.md").read_text(encoding="utf-8")
+    pages = (RESULTS / name for name in ("limits.md", "measure.md"))
+    said = "\n".join(page.read_text(encoding="utf-8") for page in pages)
     assert len(points) >= 6
     for point in points:
         assert re.sub(r"\s+", " ", point) in said, point

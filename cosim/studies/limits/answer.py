@@ -15,6 +15,17 @@ from cosim.studies.tables import brief, span
 
 BY_NAME = {goal.name: goal for goal in GOALS}
 
+GROUPS = {
+    "waveform": "waveform",
+    "circuit": "circuit or coil",
+    "heat": "limit of heat",
+    "grip": "grip force",
+}
+"""In words, by what of the device is changed; in the order of the sentences."""
+
+NAMED = 4
+"""Changes that a sentence names at most."""
+
 
 @dataclass(frozen=True)
 class Gain:
@@ -77,13 +88,9 @@ def sentences(study: Study) -> list[str]:
     by_up, by_camera = gains(study, up), gains(study, camera)
     said = [
         *_as_it_is(study, up),
-        *_group(study, by_up, "waveform", "The command's shape matters most"),
-        *_group(study, by_up, "circuit", "Of the circuit itself, coil among it"),
-        *_group(study, by_up, "heat", "Heat"),
-        *_group(study, by_up, "grip", "Grip"),
+        *(words for group in GROUPS for words in _group(by_up, group)),
         *_as_it_is(study, camera),
-        *_group(study, by_camera, "waveform", "For acceleration, the shape"),
-        *_group(study, by_camera, "circuit", "For acceleration, the circuit"),
+        *(words for group in ("waveform", "circuit") for words in _group(by_camera, group)),
         _slips(study),
         _warmth(study),
         _search(study),
@@ -112,32 +119,30 @@ def _as_it_is(study: Study, goal: Goal) -> Iterator[str]:
     )
 
 
-def _group(study: Study, every: Sequence[Gain], group: str, words: str) -> Iterator[str]:
-    """What the changes of a group bring, those that exceed the noise by name."""
+def _group(every: Sequence[Gain], group: str) -> Iterator[str]:
+    """What the changes of a group bring: those that exceed the noise most by name."""
     some = [gain for gain in every if gain.change.group == group and isfinite(gain.own)]
-    named = [gain for gain in some if gain.counts]
     if not some:
         return
-    goal = some[0].goal
-    shown = named if len(named) <= 5 else [*named[:3], *named[-2:]]
-    told = "; ".join(f"{gain.change.name} {_share(gain)}" for gain in shown)
-    rest = [gain for gain in some if gain not in shown]
-    most = max((abs(gain.own) for gain in rest), default=nan)
-    if named and rest:
-        told += f"; each of {len(rest)} others {100.0 * most:.0f} % at most"
-    elif not named:
-        told = f"none of {len(rest)} changes brings or costs more than {100.0 * most:.0f} %"
-    yield f"{words} ({goal.title}, robust): {told}."
+    named = [gain for gain in some if gain.counts]
+    shown = named if len(named) <= NAMED else [*named[: NAMED - 2], *named[-2:]]
+    told = [f"{gain.change.name} {_share(gain)}" for gain in shown]
+    rest = [100.0 * gain.own for gain in some if gain not in shown]
+    if len(rest) == 1:
+        told.append(f"one other {rest[0]:+.0f} %")
+    elif rest:
+        told.append(f"{len(rest)} others {min(rest):+.0f} to {max(rest):+.0f} %")
+    yield f"The {some[0].goal.title}, robustly, with another {GROUPS[group]}: {'; '.join(told)}."
 
 
 def _share(gain: Gain) -> str:
     text = f"{100.0 * gain.own:+.0f} %"
     if len(gain.every) > 1:
         low, high = (100.0 * end for end in (min(gain.every), max(gain.every)))
-        better = sum(one > gain.noise for one in gain.every)
+        alike = sum(np.sign(gain.own) * one > gain.noise for one in gain.every)
         text += (
-            f" (median {100.0 * gain.middle:+.0f} %, {low:+.0f} to {high:+.0f} %; more than noise "
-            f"on {better} of {len(gain.every)} rigs)"
+            f" (over {len(gain.every)} rigs {100.0 * gain.middle:+.0f} %, {low:+.0f} to "
+            f"{high:+.0f}; so beyond the noise on {alike})"
         )
     return text
 

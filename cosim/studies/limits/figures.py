@@ -42,7 +42,7 @@ def changes(path: Path, study: Study, goal: Goal) -> None:
     )
     best = every[0] if every else None
     title = (
-        f"{best.change.name[0].upper()}{best.change.name[1:]} changes the {goal.title} most: "
+        f"The {goal.title} gains most by: {best.change.name}, "
         f"{brief(base * (1.0 + best.own))} for {brief(base)} {goal.unit}"
         if best
         else goal.title
