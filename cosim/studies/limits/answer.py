@@ -23,6 +23,11 @@ GROUPS = {
 }
 """In words, by what of the device is changed; in the order of the sentences."""
 
+LEGEND = (
+    "Each change with its gain on the scene's rig and, in brackets, the median over all rigs, their "
+    "range, and on how many it is beyond the search's noise to the same side."
+)
+
 NAMED = 4
 """Changes that a sentence names at most."""
 
@@ -88,6 +93,7 @@ def sentences(study: Study) -> list[str]:
     by_up, by_camera = gains(study, up), gains(study, camera)
     said = [
         *_as_it_is(study, up),
+        LEGEND if len(study.rigs) > 1 else "",
         *(words for group in GROUPS for words in _group(by_up, group)),
         *_as_it_is(study, camera),
         *(words for group in ("waveform", "circuit") for words in _group(by_camera, group)),
@@ -140,10 +146,8 @@ def _share(gain: Gain) -> str:
     if len(gain.every) > 1:
         low, high = (100.0 * end for end in (min(gain.every), max(gain.every)))
         alike = sum(np.sign(gain.own) * one > gain.noise for one in gain.every)
-        text += (
-            f" (over {len(gain.every)} rigs {100.0 * gain.middle:+.0f} %, {low:+.0f} to "
-            f"{high:+.0f}; so beyond the noise on {alike})"
-        )
+        of = f"{alike} of {len(gain.every)}"
+        text += f" ({100.0 * gain.middle:+.0f}, {low:+.0f} to {high:+.0f}; {of})"
     return text
 
 
