@@ -24,8 +24,8 @@ GROUPS = {
 """In words, by what of the device is changed; in the order of the sentences."""
 
 LEGEND = (
-    "Each change with its gain on the scene's rig and, in brackets, the median over all rigs, their "
-    "range, and on how many it is beyond the search's noise to the same side."
+    "Each change with its gain on the scene's rig and, in brackets, the median over all rigs, "
+    "their range, and on how many it is beyond the search's noise to the same side."
 )
 
 NAMED = 4
