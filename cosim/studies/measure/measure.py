@@ -185,5 +185,6 @@ def draw(rows: Sequence[Row], title: str, path: Path) -> None:
         axis.axvline(luck[f"{target}: {WIDTH}"], color="0.2", lw=1.2, ls=":")
         axis.set_title(target, loc="left")
         axis.set(xlabel="width of the 90 % interval [mm/s]", xlim=(0.0, None))
+        axis.set_xticks([x for x in axis.get_xticks() if x <= axis.get_xlim()[1]])
     axes[0].invert_yaxis()
     figure.write(path)
