@@ -1,4 +1,4 @@
-"""Loading of scenes: a built-in one or a TOML file, its base, and overrides on top."""
+"""Loading of scenes: a built-in one, a TOML file or a link, its base, and overrides on top."""
 
 import os
 import re
@@ -12,11 +12,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from cosim.errors import BadInput, NoEffect, plain
-from cosim.files import reader
+from cosim.files import link, reader
 from cosim.scene import messages, toml
 from cosim.scene.describe import acts, keys
 from cosim.scene.methods import METHODS
-from cosim.scene.model import Scene
+from cosim.scene.model import Scene, toml_value
 from cosim.scene.tables import KNOBS, LEVEL_KEY, NORMAL_FORCES, PATHS, TABLES
 
 _FULL = frozenset(key.full for key in keys())
@@ -49,8 +49,9 @@ Overrides = Mapping[str, Any] | Iterable[str]
 
 
 def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None = None) -> Scene:
-    """The checked scene of a built-in name, a TOML file or another scene, with ``overrides`` on
-    top: ``{"table.key": value}``, SI, or strings ``"table.key=value"``.
+    """The checked scene of a built-in name, a TOML file, a link (``#scene=NAME&table.key=value``) or
+    another scene, with ``overrides`` on top: ``{"table.key": value}``, SI, or strings
+    ``"table.key=value"``.
 
     A file may name a built-in scene as its ``base``; each layer changes only the keys that it
     gives. A knob of the device replaces its value from the layers below, and the other way round.
@@ -94,6 +95,8 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
 def _layers(source: str) -> list[_Layer]:
     """The file of ``source`` on top of the built-in scenes that it starts from."""
     builtin = [name for name, _ in list_scenes()]
+    if link.is_link(source):
+        return _linked(source, builtin)
     if source in builtin:
         origin, path = f"scene {source}", _LIBRARY / f"{source}.toml"
         data = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -115,6 +118,59 @@ def _layers(source: str) -> list[_Layer]:
     below = _layers(base)
     below[-1].tables.pop("description", None)
     return [*below, _Layer(origin, data, source in builtin)]
+
+
+def _linked(source: str, builtin: list[str]) -> list[_Layer]:
+    """The built-in scene of a link, and its values. A link names no files: neither a scene's nor
+    any that a scene could read."""
+    name, pairs = link.parse(source)
+    if name not in builtin:
+        hint = messages.suggestion(name, builtin) or f" ({', '.join(builtin)})"
+        raise messages.bad(f'link: there is no built-in scene "{plain(name, 60)}"{hint}')
+    for key, _ in pairs:
+        if tuple(key.split(".")) in PATHS:
+            raise BadInput(f"link: {key} names a file, which no link can.")
+    tables = _tables([(key, _value(value)) for key, value in pairs], "link")
+    return [*_layers(name), *([_Layer("link", tables)] if tables else [])]
+
+
+def to_link(scene: Scene) -> str:
+    """The shortest link that loads to an equal scene, but for its name and description: a built-in
+    scene, and the keys that differ from it. Raises BadInput where there is none."""
+    if scene.files:
+        raise BadInput(f"scene {scene.name}: it names files ({', '.join(scene.files)}); a link cannot.")
+    own = {"name": "", "description": ""}
+    wanted, found = _plain_values(scene), []
+    for name, _ in list_scenes():
+        base = load(name)
+        there = _plain_values(base)
+        values = {key: value for key, value in wanted.items() if there.get(key) != value}
+        found.append((len(values), name != scene.name, name, values))
+    for _, _, name, values in sorted(found, key=lambda one: one[:3]):
+        texts = [(key, _spelt(value)) for key, value in sorted(values.items())]
+        made = link.write(name, texts)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NoEffect)
+            try:
+                again = load(made)
+            except BadInput:
+                continue
+        if again.model_copy(update=own) == scene.model_copy(update=own):
+            return made
+    raise BadInput(f"scene {scene.name}: no link of a built-in scene and its changed keys makes it.")
+
+
+def _plain_values(scene: Scene) -> dict[str, Any]:
+    """The values by "table.key", without times of the run that follow from others."""
+    tables = {table: scene.table(table) for table in TABLES}
+    for key in {"settle", "output_step"} - scene.run.model_fields_set:
+        del tables["run"][key]
+    return {f"{table}.{key}": value for table, of in tables.items() for key, value in of.items()}
+
+
+def _spelt(value: Any) -> str:
+    """A value as a link has it: words without quotes, lists without blanks."""
+    return value if isinstance(value, str) else toml_value(value).replace(" ", "")
 
 
 def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
