@@ -9,6 +9,7 @@ const has = (object, name) => Object.prototype.hasOwnProperty.call(object, name)
 
 /* The value that a link's text stands for; throws a sentence. */
 function valueOf(key, text) {
+  if (/^(run|coupling)\.[a-z_]+$/.test(key)) return text; // for cosim run; nothing here
   const known = has(DATA.keys, key) ? DATA.keys[key] : null;
   if (!known) throw new Error(`This page cannot turn “${key.slice(0, 60)}”; cosim run may know it.`);
   if (known.choices) {
@@ -88,6 +89,7 @@ function valuesOf({ scene, changes }) {
   for (const [key, known] of Object.entries(DATA.keys)) values[key] = known.default;
   for (const layer of [DATA.scenes[scene].values, changes]) {
     for (const [key, value] of Object.entries(layer)) {
+      if (!has(DATA.keys, key)) continue;
       if (has(TWINS, key)) values[TWINS[key]] = null;
       values[key] = value;
     }
