@@ -45,7 +45,7 @@ const PANELS = [
   { name: "current, A", unit: "A", lines: [["coil", "coil_current", "a", 1]], least: 0.1 },
   { name: "heights, mm", unit: "mm", lines: [["surface", "z_surface", "a", 1e3], ["ram", "z_ram", "d", 1e3], ["part", "z_part", "b", 1e3]], least: 0.2 },
   { name: "velocities, mm/s", unit: "mm/s", lines: [["surface", "v_surface", "a", 1e3], ["ram", "v_ram", "d", 1e3], ["part", "v_part", "b", 1e3]], least: 20 },
-  { name: "surface's acceleration, m/s²", unit: "m/s²", lines: [["instant", "a_surface", "d", 1], ["mean of 4 ms", "mean", "a", 1]], least: 20 },
+  { name: "acceleration, m/s²", unit: "m/s²", lines: [["instant", "a_surface", "d", 1], ["mean of 4 ms", "mean", "a", 1]], least: 20, bend: 40 },
 ];
 const HALF = Math.round(0.002 * RATE); // rows of half of the 4 ms that a camera's reading spans
 const V_SURFACE = COLUMNS.indexOf("v_surface");
@@ -89,9 +89,12 @@ class Curves {
 
   /* The curves of `periods` periods, newest parts over the last ones'; `other`, a run to compare. */
   draw(history, periods, { slow, onSurface, other, budget }) {
+    periods = Math.max(1, Math.min(periods, Math.floor(history.frequency * 2.4)));
     const span = periods / history.frequency * RATE; // rows of the window
-    const first = Math.max(history.first, history.last - Math.floor(span) + 1, (history.turned ?? -1) + 1);
-    this.window = { history, periods, first, span };
+    // In real time whole windows up to the last period's end; slowly, the present one over the last.
+    const last = slow ? history.last : Math.floor((Math.floor(history.phase(history.last)) / history.frequency + history.origin) * RATE);
+    const first = Math.max(history.first, last - Math.floor(span) + 1, (history.turned ?? -1) + 1);
+    this.window = { history, periods, first, last, span, slow };
     const now = this.share(history.last);
     this.base = {};
     for (const name of ["z_surface", "z_part"]) this.base[name] = history.value(first, COLUMNS.indexOf(name));
@@ -102,8 +105,8 @@ class Curves {
 
   /* Where a row is in the window. */
   share(row) {
-    const { history, periods } = this.window, phase = history.phase(row) / periods;
-    return phase - Math.floor(phase);
+    const { history, periods, last, span, slow } = this.window, phase = history.phase(row) / periods;
+    return slow ? phase - Math.floor(phase) : 1 - (last - row) / span;
   }
 
   _value(name, factor) {
@@ -129,14 +132,14 @@ class Curves {
 
   _panel(k, panel, { now, slow, other, budget }) {
     const { ink, width, height } = inked(this.canvases[k]), colour = colours();
-    const { first, history, span } = this.window, right = width - RIGHT, wide = right - LEFT;
+    const { first, last: newest, span } = this.window, right = width - RIGHT, wide = right - LEFT;
     const lines = this._lines(panel), columns = Math.max(1, Math.floor(wide));
     const shapes = lines.map(([, name, , factor]) => {
       // Lowest and highest of each column of pixels.
       const low = new Float32Array(columns).fill(Infinity), high = new Float32Array(columns).fill(-Infinity);
       const value = this._value(name, factor), stride = Math.max(1, Math.floor(span / columns / 40));
-      for (let row = first; row <= history.last; row += stride) {
-        const x = Math.min(columns - 1, Math.floor(this.share(row) * columns)), v = value(row);
+      for (let row = first; row <= newest; row += stride) {
+        const x = Math.max(0, Math.min(columns - 1, Math.floor(this.share(row) * columns))), v = value(row);
         if (v < low[x]) low[x] = v;
         if (v > high[x]) high[x] = v;
       }
@@ -158,16 +161,19 @@ class Curves {
       : { low: least, high: most };
     this.limits[k] = { ...own, lines: lines.length };
     const margin = 0.06 * (own.high - own.low), low = own.low - margin, high = own.high + margin;
-    const top = 18, bottom = height - 4, y = (v) => bottom - (v - low) / (high - low) * (bottom - top);
+    const top = 18, bottom = height - 4;
+    const bend = panel.bend ? (v) => Math.asinh(v / panel.bend) : (v) => v;
+    const y = (v) => bottom - (bend(v) - bend(low)) / (bend(high) - bend(low)) * (bottom - top);
 
     ink.font = "11.5px system-ui, sans-serif";
     ink.textBaseline = "middle";
     ink.strokeStyle = colour("line");
     ink.fillStyle = colour("soft");
     ink.textAlign = "right";
-    const step = niceStep((high - low) / 4);
+    const step = niceStep((high - low) / 5), levels = panel.bend ? [-1000, -100, 0, 100, 1000].filter((v) => v > low && v < high) : [];
+    for (let v = Math.ceil(low / step) * step; v <= high && !panel.bend; v += step) levels.push(v);
     ink.beginPath();
-    for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
+    for (const v of levels) {
       ink.moveTo(LEFT, y(v));
       ink.lineTo(right, y(v));
       ink.fillText(String(Number((Math.abs(v) < step / 1e3 ? 0 : v).toPrecision(4))), LEFT - 5, Math.max(top, Math.min(bottom - 6, y(v))));
@@ -188,11 +194,13 @@ class Curves {
       ink.strokeStyle = colour(lines[n][2]);
       ink.lineWidth = 1.4;
       ink.beginPath();
-      let last = -9;
+      let last = -9, at = null;
       for (let x = 0; x < columns; x++) {
         if (low[x] > high[x]) continue;
         const joined = x - last < 3 + columns / Math.max(1, span) * 2 && !(gap >= 0 && last < gap * columns && x > gap * columns);
-        const ends = y(low[x]) - y(high[x]) < 1 ? [high[x]] : [low[x], high[x]];
+        const near = at === null || Math.abs(y(low[x]) - at) < Math.abs(y(high[x]) - at);
+        const ends = y(low[x]) - y(high[x]) < 1 ? [high[x]] : near ? [low[x], high[x]] : [high[x], low[x]];
+        at = y(ends.at(-1));
         if (!joined) ink.moveTo(LEFT + x, y(ends[0]));
         for (const v of ends) ink.lineTo(LEFT + x, y(v));
         last = x;
@@ -229,7 +237,7 @@ class Curves {
       ink.moveTo(x, top);
       ink.lineTo(x, bottom);
       ink.stroke();
-      ink.fillText("AB"[n], Math.max(LEFT + 5, Math.min(right - 5, x)), top + 5);
+      ink.fillText("AB"[n], x > right - 14 ? x - 7 : x + 7, top + 5);
     });
     ink.setLineDash([]);
     ink.textAlign = "left";
@@ -253,15 +261,15 @@ class Curves {
       ink.moveTo(LEFT, y(end));
       ink.lineTo(right, y(end));
       ink.stroke();
-      ink.fillText(`slips going ${way}`, right - 4, y(end) - 6);
+      ink.fillText(`slips ${way}`, right - (way === "up" ? 4 : 70), y(end) + (end < 0 ? 7 : -6));
     }
     ink.setLineDash([]);
   }
 
   /* The row that is drawn at a share of the window. */
   _row(share) {
-    const { history, first, span } = this.window, back = this.share(history.last) - share;
-    const row = history.last - Math.round((back - Math.floor(back)) * span);
+    const { first, last, span } = this.window, back = this.share(last) - share;
+    const row = last - Math.round((back - (back < 0 ? -1 : 0)) * span);
     return row < first ? null : row;
   }
 
@@ -278,7 +286,7 @@ class Curves {
         words.push(`${what}${from.toFixed(digits)} → ${to.toFixed(digits)} ${panel.unit}`);
       }
     }
-    this.tell(words.join("   "));
+    this.tell(words);
   }
 }
 

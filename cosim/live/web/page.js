@@ -5,7 +5,13 @@ const $ = (id) => document.getElementById(id);
 const START = settingOf(DATA.start);
 const state = { setting: START, values: valuesOf(START), speed: 1, paused: false, generation: 0, marks: [], other: null };
 const history_ = new History();
-const curves = new Curves($("curves"), (text) => { $("measure").textContent = text; });
+const curves = new Curves($("curves"), measured);
+function measured(words) {
+  const place = $("measure");
+  while (place.children.length < words.length) place.append(document.createElement("span"));
+  while (place.children.length > words.length) place.lastChild.remove();
+  words.forEach((word, k) => { place.children[k].textContent = word.replaceAll("-", "−"); });
+}
 const lit = { time: -1e9, side: 0 };
 
 // --- who plays ------------------------------------------------------------------------------------
@@ -233,8 +239,8 @@ function tellAll() {
     if (a < least) least = a;
     if (a > most) most = a;
   }
-  tell("slip", `${budget.up[0].toFixed(0)} m/s² going up`, `${budget.down[0].toFixed(0)} down; rising ${budget.up[1].toFixed(0)} and ${budget.down[1].toFixed(0)}`);
-  if (most >= least) tell("peak", `${least.toFixed(0)} … ${most.toFixed(0)} m/s²`, slipsBy(least, most, budget));
+  tell("slip", `${signed(budget.up[0], 0)} m/s² going up`, `${signed(budget.down[0], 0)} going down; where it rises ${signed(budget.up[1], 0)} and ${signed(budget.down[1], 0)}`);
+  if (most >= least) tell("peak", `${signed(least, 0)} … ${signed(most, 0)} m/s²`, slipsBy(least, most, budget));
 }
 
 function slipsBy(least, most, budget) {

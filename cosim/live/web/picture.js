@@ -30,7 +30,7 @@ function spring(ink, x, top, bottom, coils, half) {
 }
 
 /* A force as an arrow from (x, y), up for positive ones; `scale` in pixels a newton. */
-function arrow(ink, x, y, force, scale, colour, name) {
+function arrow(ink, x, y, force, scale, colour) {
   const length = Math.max(-70, Math.min(70, force * scale));
   if (Math.abs(length) < 3) return;
   const end = y - length, tip = Math.sign(length) * 6;
@@ -45,7 +45,6 @@ function arrow(ink, x, y, force, scale, colour, name) {
   ink.lineTo(x - 4.5, end + tip);
   ink.lineTo(x + 4.5, end + tip);
   ink.fill();
-  ink.fillText(name, x + 6, end + (length > 0 ? 8 : 0));
   ink.lineWidth = 1;
 }
 
@@ -107,13 +106,13 @@ function drawMachine(canvas, now, values, lit) {
   ink.strokeRect(ram.x, ram.top, ram.w, ram.bottom - ram.top);
   ink.fillStyle = colour("card");
   ink.textAlign = "center";
-  ink.fillText("ram", ram.x + ram.w / 2, (ram.top + ram.bottom) / 2);
+  ink.fillText("ram", ram.x + ram.w * 0.6, (ram.top + ram.bottom) / 2);
 
   // The part, endless to the eye: marks that go by, and its contact with the surface.
   const part = { x: plate.x + plate.w, w: wide * 0.13 }, pitch = 2e-3 * scale;
   const sticks = now.sticking > 0.5, mark = sticks ? colour("c") : colour("b");
   ink.fillStyle = colour("fill");
-  ink.fillRect(part.x, 24, part.w, height - 60);
+  ink.fillRect(part.x, 24, part.w, height - 62);
   ink.strokeStyle = colour("line");
   ink.save();
   ink.beginPath();
@@ -151,9 +150,9 @@ function drawMachine(canvas, now, values, lit) {
   const coil = now.coil_current * values["coil.force_factor"] * values["coil.polarity"];
   ink.textAlign = "left";
   const grip = Math.max(1e-3, values["friction.normal_force"]);
-  arrow(ink, part.x + part.w / 2, y(0), now.friction_force, 40 / grip, mark, "friction");
-  arrow(ink, ram.x + 6, (ram.top + ram.bottom) / 2, coil, 20, colour("a"), "coil");
-  if (now.wall_contact) arrow(ink, ram.x + ram.w - 6, (ram.top + ram.bottom) / 2, now.wall_force, 2, colour("warn"), "wall");
+  arrow(ink, part.x + part.w / 2, y(0), now.friction_force, 40 / grip, mark);
+  arrow(ink, ram.x + 12, (ram.top + ram.bottom) / 2, coil, 20, colour("a"));
+  if (now.wall_contact) arrow(ink, ram.x + ram.w - 6, (ram.top + ram.bottom) / 2, now.wall_force, 2, colour("warn"));
 
   // Words.
   ink.textAlign = "center";
@@ -163,13 +162,20 @@ function drawMachine(canvas, now, values, lit) {
   ink.fillText("plate", press + 14, 12);
   ink.fillStyle = mark;
   ink.font = "600 13px system-ui, sans-serif";
-  ink.fillText(sticks ? "sticks" : "slips", part.x + part.w / 2, height - 24);
+  ink.fillText(sticks ? "sticks" : "slips", part.x + part.w / 2, height - 27);
   ink.font = "12px system-ui, sans-serif";
   ink.fillStyle = colour("soft");
   const bar = 2e-3 * scale;
   ink.fillRect(left + 28, height - 14, bar, 2);
   ink.textAlign = "left";
-  ink.fillText("2 mm, heights and ways to scale", left + 36 + bar, height - 13);
+  ink.fillText("2 mm", left + 34 + bar, height - 13);
+  ink.textAlign = "right";
+  let x = left + wide - 4;
+  for (const [name, what] of [["wall", "warn"], ["friction", sticks ? "c" : "b"], ["coil", "a"], ["forces:", "soft"]]) {
+    ink.fillStyle = colour(what);
+    ink.fillText(name, x, height - 13);
+    x -= ink.measureText(name).width + 9;
+  }
 }
 
 /* The surface's height at rest, m. */
