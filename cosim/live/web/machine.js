@@ -139,6 +139,7 @@ class Machine {
 
   /* On to `to`, s; `v1` is then what the command was there, at a jump before it. */
   go(to) {
+    if (this.ended) this._take(this.number + 1);
     while (this.line.edge < to - SAME_TIME) {
       this._step(this.line.edge);
       this._take(this.number + 1);
@@ -197,7 +198,6 @@ class Machine {
   }
 
   _step(to) {
-    if (this.ended) this._take(this.number + 1);
     const h = to - this.time;
     if (h <= 0) return;
     if (this.time >= this.holds - SAME_TIME) {
