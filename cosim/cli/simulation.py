@@ -167,7 +167,7 @@ COMMANDS = (
             ),
             Option(
                 "--link",
-                "only print the setting as a link, which this command takes as SCENE, too",
+                "only print the setting as a link, which all commands take in place of a scene",
                 kind=bool,
             ),
         ),

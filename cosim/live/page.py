@@ -28,8 +28,10 @@ def fragment(scene: str, overrides: tuple[str, ...] | list[str] = ()) -> str:
 
 
 def html(link: str, served: bool) -> str:
-    """The page, which begins with the setting of ``link`` unless its address has another; ``served``
-    lets it ask its own server for a run with ngspice."""
+    """The page, which begins with the setting of ``link`` unless its address has another.
+
+    ``served`` lets it ask its own server for a run with ngspice.
+    """
     known = rigs.data()
     for name, scene in rigs.scenes().items():
         known["scenes"][name]["rise"] = rise(scene.coil)

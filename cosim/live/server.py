@@ -17,7 +17,7 @@ HOST = "127.0.0.1"
 class _Handler(BaseHTTPRequestHandler):
     """``/`` is the page; ``POST /run`` takes a link of it. Nothing else is there."""
 
-    server: "Server"
+    server: "Server"  # pyright: ignore[reportIncompatibleVariableOverride]
     timeout = 30
     sys_version = server_version = ""
 

@@ -49,8 +49,8 @@ Overrides = Mapping[str, Any] | Iterable[str]
 
 
 def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None = None) -> Scene:
-    """The checked scene of a built-in name, a TOML file, a link (``#scene=NAME&table.key=value``) or
-    another scene, with ``overrides`` on top: ``{"table.key": value}``, SI, or strings
+    """The checked scene of a built-in name, a TOML file, a link (``#scene=NAME&table.key=value``)
+    or another scene, with ``overrides`` on top: ``{"table.key": value}``, SI, or strings
     ``"table.key=value"``.
 
     A file may name a built-in scene as its ``base``; each layer changes only the keys that it
@@ -138,7 +138,9 @@ def to_link(scene: Scene) -> str:
     """The shortest link that loads to an equal scene, but for its name and description: a built-in
     scene, and the keys that differ from it. Raises BadInput where there is none."""
     if scene.files:
-        raise BadInput(f"scene {scene.name}: it names files ({', '.join(scene.files)}); a link cannot.")
+        raise BadInput(
+            f"scene {scene.name}: it names files ({', '.join(scene.files)}); a link cannot."
+        )
     own = {"name": "", "description": ""}
     wanted, found = _plain_values(scene), []
     for name, _ in list_scenes():
@@ -157,7 +159,9 @@ def to_link(scene: Scene) -> str:
                 continue
         if again.model_copy(update=own) == scene.model_copy(update=own):
             return made
-    raise BadInput(f"scene {scene.name}: no link of a built-in scene and its changed keys makes it.")
+    raise BadInput(
+        f"scene {scene.name}: no link of a built-in scene and its changed keys makes it."
+    )
 
 
 def _plain_values(scene: Scene) -> dict[str, Any]:

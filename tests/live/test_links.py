@@ -99,7 +99,12 @@ def test_bad_links(link: str, said: str, capsys: pytest.CaptureFixture[str]) -> 
 
 @needs_node
 def test_page_refuses_them_too() -> None:
-    code = "return given.map((link) => { try { settingOf(link); return ''; } catch (e) { return e.message; } });"
+    code = """
+    return given.map((link) => {
+      try { settingOf(link); } catch (error) { return error.message; }
+      return "";
+    });
+    """
     bad = [
         *("scene=__proto__", "#scene=nothing", "#", "#scene=paper&drive.amplitude=1e9"),
         *("#scene=paper&__proto__.x=1", "#scene=paper&drive.waveform=optimal", "#scene=%"),

@@ -24,8 +24,9 @@ SETTINGS = [
 ]
 STEPPED = """
 const machines = given.map(({ link, times, settled }) => {
-  const setting = settingOf(link), values = valuesOf(setting), setup = setupOf(values, setting.scene);
-  const machine = new Machine(started(new WebAssembly.Module(bytes)), DATA.references, setup, 4000);
+  const setting = settingOf(link), setup = setupOf(valuesOf(setting), setting.scene);
+  const exports = started(new WebAssembly.Module(bytes));
+  const machine = new Machine(exports, DATA.references, setup, 4000);
   let before = null;
   times.forEach((time, k) => {
     machine.go(time);
@@ -77,7 +78,8 @@ def test_knobs_are_those_of_the_firmware() -> None:
       const keys = ["pot_max", "pot_frequency", "pot_offset"];
       const changes = Object.fromEntries(keys.map((key, k) => [`drive.${key}`, pots[k]]));
       const values = valuesOf({ scene: "paper-limited", changes });
-      return [...["amplitude", "frequency", "offset"].map((key) => values[`drive.${key}`]), codesOf(values)];
+      const found = ["amplitude", "frequency", "offset"].map((key) => values[`drive.${key}`]);
+      return [...found, codesOf(values)];
     });
     """
     count = firmware.COUNTS
