@@ -21,13 +21,12 @@ def _live(
         return
     import webbrowser
 
-    from cosim.live.server import serve
+    from cosim.live.server import Server
 
-    def begun(address: str) -> None:
-        print(f"{address}\nServed on this machine alone; Ctrl-C ends it.", flush=True)
-        webbrowser.open(address)
-
-    serve(link, begun)
+    with Server(link) as server:
+        print(f"{server.address}/{link}\nFor this machine alone; Ctrl-C ends it.", flush=True)
+        webbrowser.open(f"{server.address}/{link}")
+        server.serve_forever(poll_interval=0.2)
 
 
 COMMANDS = (
@@ -36,10 +35,7 @@ COMMANDS = (
         "open the machine in the browser, moving, with knobs to turn",
         _live,
         (
-            Option(
-                *("scene", "a built-in scene or a link (default: paper-limited)", "SCENE"),
-                many="optional",
-            ),
+            Option("scene", "scene or link (default: paper-limited)", "SCENE", many="optional"),
             OVERRIDES,
             Option("--out", "write the page as one HTML file instead", "FILE.html", Path),
         ),

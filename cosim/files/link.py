@@ -28,17 +28,11 @@ def parse(link: str) -> tuple[str, list[tuple[str, str]]]:
     pairs: list[tuple[str, str]] = []
     for part in fragment.split("&"):
         key, equals, value = part.partition("=")
-        try:
-            key, value = (unquote(text, errors="strict") for text in (key, value))
-        except UnicodeDecodeError:
-            raise BadInput(f"link: {plain(part, 60)} is not UTF-8 text.") from None
         if not (key and equals and value):
-            raise BadInput(
-                f'link: "{plain(part, 60)}" must be table.key=value, after #scene=NAME and a &.'
-            )
+            raise BadInput(f'link: "{plain(part, 60)}" must be table.key=value.')
         if key in dict(pairs):
             raise BadInput(f"link: it has {plain(key, 60)} twice.")
-        pairs.append((key, value))
+        pairs.append((key, unquote(value)))
     (first, scene), *rest = pairs
     if first != "scene":
         raise BadInput(f'link: it must begin with #scene=NAME, not with "{plain(first, 60)}".')

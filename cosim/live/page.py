@@ -3,27 +3,27 @@
 import base64
 import hashlib
 import json
+from collections.abc import Iterable
+from math import ceil
 from pathlib import Path
 from typing import Any
 
-from cosim.circuit.heat import DRIVE_RANGE_HEAT, rise
+from cosim.circuit.heat import DRIVE_RANGE_HEAT
 from cosim.errors import BadInput
 from cosim.live import rigs
-from cosim.scene import Scene, load, to_link
+from cosim.scene import load, to_link
 
 _WEB = Path(__file__).with_name("web")
 _CORE = ("machine.js", "hosts.js")
 _SCRIPTS = ("machine.js", "settings.js", "picture.js", "curves.js", "page.js")
 
 
-def fragment(scene: str, overrides: tuple[str, ...] | list[str] = ()) -> str:
+def fragment(scene: str, overrides: Iterable[str] = ()) -> str:
     """The link of a scene as the page takes it. Raises BadInput for one that it cannot run."""
     checked = load(scene, overrides)
     if not rigs.fits(checked):
-        raise BadInput(
-            f"scene {checked.name}: the page runs a free ram that a coil drives, without files, "
-            f"staircase or second surface; for example {', '.join(list(rigs.scenes())[:3])}."
-        )
+        known = ", ".join(rigs.scenes())
+        raise BadInput(f"scene {checked.name}: the page runs {known}, and such as these.")
     return to_link(checked)
 
 
@@ -33,12 +33,10 @@ def html(link: str, served: bool) -> str:
     ``served`` lets it ask its own server for a run with ngspice.
     """
     known = rigs.data()
-    for name, scene in rigs.scenes().items():
-        known["scenes"][name]["rise"] = rise(scene.coil)
     known |= {"start": link, "heat": DRIVE_RANGE_HEAT}
     binary = base64.b64encode((_WEB / "machine.wasm").read_bytes()).decode()
     given = {"DATA": known, "BINARY": binary, "CORE": script(_CORE), "SERVED": served}
-    lines = [f"const {name} = {_literal(value)};" for name, value in given.items()]
+    lines = (f"const {name} = {_literal(value)};" for name, value in given.items())
     code = "\n".join([*lines, script(_SCRIPTS)])
     digest = base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
     asks = "'self'" if served else "'none'"
@@ -62,30 +60,22 @@ def _literal(value: Any) -> str:
 
 
 def answer(link: str) -> dict[str, Any]:
-    """What ngspice has for a link of the page: mean velocity (m/s) and the waveforms of the last
-    0.3 s. Raises CosimError."""
+    """What ngspice has for a link of the page: mean velocity (m/s) of a second, and the waveforms
+    of its last 0.3 s or two periods. Raises CosimError."""
     import cosim
 
-    scene: Scene = load(link, {"circuit.model": "amplifier"})
-    period = scene.period
-    last = max(0.3, 2.0 * period)
-    settle = max(0.7, 2.0 * period)
-    whole = round(max(1.0, last / period)) if period > last else round(last / period)
-    times = {"run.settle": settle, "run.duration": settle + whole * period}
-    if times["run.duration"] > 10.0:
+    scene = load(link, {"circuit.model": "amplifier"})
+    frequency, settle = scene.drive.frequency, 0.7
+    if frequency < 0.5:
         raise BadInput("The server runs frequencies of 0.5 Hz and more.")
-    result = cosim.run(load(scene, times | {"run.output_step": 5e-5}))
-    rows = result.waveforms.sel(time=slice(times["run.duration"] - last, None))
+    end = settle + ceil(frequency) / frequency
+    times = {"run.settle": settle, "run.duration": end, "run.output_step": 5e-5}
+    result = cosim.run(load(scene, times))
+    rows = result.waveforms.sel(time=slice(end - min(end, max(0.3, 2.0 / frequency)), None))
     return {
         "v_average": result.summary["v_average"],
-        "frequency": scene.drive.frequency,
+        "frequency": frequency,
         "begin": float(rows.time[0]),
-        "step": 5e-5,
-        "waveforms": {name: [float(f"{x:.6g}") for x in rows[name].values] for name in _DRAWN},
+        "step": times["run.output_step"],
+        "waveforms": {str(name): rows[name].values.tolist() for name in rows.data_vars},
     }
-
-
-_DRAWN = (
-    *("command", "current", "coil_voltage", "z_surface", "v_surface", "a_surface"),
-    *("z_ram", "v_ram", "z_part", "v_part"),
-)

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from cosim.errors import BadInput
+from cosim.circuit.heat import rise
 from cosim.files.link import LONGEST
 from cosim.mechanics.fmi import references
 from cosim.mechanics.stickslip import parameters
@@ -12,21 +12,20 @@ from cosim.scene.tables import COMMANDS, KNOBS
 MODEL = "limited"
 """The circuit of the page: the one that is inside the FMU."""
 
-_DRIVE = {"waveform", "table", "duty", "reset_time", *KNOBS, *KNOBS.values()}
-_OTHERS = {"coil.polarity", "circuit.model", "circuit.supply"} | {
-    *("circuit.swing_loss_high", "circuit.swing_loss_low"),
+_TURNED = {
+    "drive": {"waveform", "table", "duty", "reset_time", "start_phase", *KNOBS, *KNOBS.values()},
+    "circuit": {"model", "supply", "swing_loss_high", "swing_loss_low"},
+    "coil": {"polarity"},
 }
+"""Besides those that are the FMU's variables."""
 _CHOICES = {"drive.waveform": COMMANDS, "circuit.model": (MODEL,)}
 
 
 def turned() -> dict[str, Key]:
     """The keys that the page turns, by their full names."""
+    of_fmu = {key for key in keys() if key.variable and key.name != "tolerance"}
     return {
-        key.full: key
-        for key in keys()
-        if (key.variable and key.name != "tolerance")
-        or (key.table == "drive" and key.name in _DRIVE)
-        or key.full in _OTHERS
+        key.full: key for key in keys() if key in of_fmu or key.name in _TURNED.get(key.table, ())
     }
 
 
@@ -37,38 +36,30 @@ def scenes() -> dict[str, Scene]:
 
 
 def fits(scene: Scene) -> bool:
-    """Whether the page can run a scene: a free ram that is driven, one coil circuit, and a drive of
-    which it has the shape."""
-    drive, given = scene.drive, (scene.friction.normal_force_file, scene.circuit.netlist)
-    plain = not (drive.quantised or drive.start_time or drive.start_phase or drive.pwm_ripple)
-    driven = scene.rung.on_ladder and drive.waveform in COMMANDS and drive.phase_deg is None
-    if not (plain and driven and scene.mechanics.actuator == "ram" and not any(given)):
-        return False
-    try:
-        load(scene, {"circuit.model": MODEL})
-    except BadInput:
-        return False
-    return True
-
-
-def _values(scene: Scene) -> dict[str, Any]:
-    """Those of the keys that are not the default."""
-    tables = scene.as_dict()
-    given = {full: tables[key.table].get(key.name) for full, key in turned().items()}
-    own = {full: value for full, value in given.items() if value is not None}
-    return {full: value for full, value in own.items() if value != turned()[full].default}
+    """Whether the page can run a scene: a free ram that is driven, and a drive of which it has the
+    shape."""
+    drive = scene.drive
+    odd = drive.quantised or drive.start_time or drive.pwm_ripple or drive.phase_deg is not None
+    driven = scene.rung.on_ladder and drive.waveform in COMMANDS and not scene.files
+    return driven and not odd and scene.mechanics.actuator == "ram"
 
 
 def _scene(scene: Scene) -> dict[str, Any]:
-    values = _values(scene)
+    """What differs from the defaults."""
+    own = {full: getattr(getattr(scene, key.table), key.name) for full, key in turned().items()}
+    for knob, key in KNOBS.items():
+        if own[f"drive.{knob}"] is not None:
+            own[f"drive.{key}"] = None
+    values = {full: x for full, x in own.items() if x not in (None, turned()[full].default)}
     values.pop("circuit.model", None)
     _, integers = parameters(load(scene, {"circuit.model": MODEL}))
-    fixed = {key.variable for key in turned().values()}
+    fixed = integers.keys() - {key.variable for key in turned().values()}
     return {
         "text": scene.description,
         "model": scene.circuit.model,
         "values": values,
-        "integers": {name: n for name, n in integers.items() if name not in fixed},
+        "integers": {name: integers[name] for name in fixed},
+        "rise": rise(scene.coil),
     }
 
 

@@ -5,6 +5,7 @@ import re
 import tomllib
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -135,41 +136,28 @@ def _linked(source: str, builtin: list[str]) -> list[_Layer]:
 
 
 def to_link(scene: Scene) -> str:
-    """The shortest link that loads to an equal scene, but for its name and description: a built-in
-    scene, and the keys that differ from it. Raises BadInput where there is none."""
-    if scene.files:
-        raise BadInput(
-            f"scene {scene.name}: it names files ({', '.join(scene.files)}); a link cannot."
-        )
-    own = {"name": "", "description": ""}
+    """The shortest link that loads to an equal scene, but for its name and description. Raises
+    BadInput where no built-in scene with some keys changed is equal."""
     wanted, found = _plain_values(scene), []
     for name, _ in list_scenes():
-        base = load(name)
-        there = _plain_values(base)
-        values = {key: value for key, value in wanted.items() if there.get(key) != value}
-        found.append((len(values), name != scene.name, name, values))
-    for _, _, name, values in sorted(found, key=lambda one: one[:3]):
-        texts = [(key, _spelt(value)) for key, value in sorted(values.items())]
-        made = link.write(name, texts)
-        with warnings.catch_warnings():
+        there = _plain_values(load(name))
+        changes = {key: value for key, value in wanted.items() if there.get(key) != value}
+        made = link.write(name, [(key, _spelt(changes[key])) for key in sorted(changes)])
+        found.append((len(changes), name != scene.name, made))
+    for _, _, made in sorted(found):
+        with suppress(BadInput), warnings.catch_warnings():
             warnings.simplefilter("ignore", NoEffect)
-            try:
-                again = load(made)
-            except BadInput:
-                continue
-        if again.model_copy(update=own) == scene.model_copy(update=own):
-            return made
-    raise BadInput(
-        f"scene {scene.name}: no link of a built-in scene and its changed keys makes it."
-    )
+            if _plain_values(load(made)) == wanted:
+                return made
+    raise BadInput(f"scene {scene.name}: no link makes it, for example since it names files.")
 
 
 def _plain_values(scene: Scene) -> dict[str, Any]:
     """The values by "table.key", without times of the run that follow from others."""
-    tables = {table: scene.table(table) for table in TABLES}
+    found = {f"{table}.{key}": x for table in TABLES for key, x in scene.table(table).items()}
     for key in {"settle", "output_step"} - scene.run.model_fields_set:
-        del tables["run"][key]
-    return {f"{table}.{key}": value for table, of in tables.items() for key, value in of.items()}
+        del found[f"run.{key}"]
+    return found
 
 
 def _spelt(value: Any) -> str:

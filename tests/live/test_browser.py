@@ -10,6 +10,7 @@ from urllib.request import Request, urlopen
 
 import pytest
 
+import cosim
 from cosim.cli.main import main
 from cosim.live.page import fragment
 from cosim.live.server import Server
@@ -25,7 +26,8 @@ AMPLITUDE = """() => {
   }
   return high - low;
 }"""
-RUNS = "() => history_.last > 48000 && state.found"
+RUNS = "() => history_.last > 3 * 48000 && state.found"
+"""Three seconds: the means are of the last one, so the start is over."""
 
 
 @pytest.fixture
@@ -61,13 +63,15 @@ def test_page_is_one_small_file(tmp_path: Path) -> None:
     assert "connect-src 'none'" in text and "http://" not in text and "https://" not in text
 
 
+@pytest.mark.filterwarnings("ignore")
 def test_page_from_a_file(tab: Any, tmp_path: Path) -> None:
     path = tmp_path / "page.html"
     main(["live", "paper", "--set", "drive.amplitude=6", "--out", str(path)])
     tab.goto(path.as_uri())
     tab.wait_for_function(RUNS)
     assert tab.evaluate(AMPLITUDE) == pytest.approx(6.0, rel=2e-3)
-    assert "+9." in tab.inner_text("#told-v")  # 9.7 mm/s, as cosim run has it
+    expected = cosim.run("paper-limited", {"drive.amplitude": 6.0}).summary["v_average"]
+    assert tab.evaluate("() => state.found.velocity") == pytest.approx(expected, rel=0.01)
 
     tab.focus("#knob-amplitude")
     tab.keyboard.press("PageDown")  # 40 codes
@@ -107,9 +111,9 @@ def test_server_answers_its_own_page_alone(server: Server) -> None:
 
     assert asked("/") == 200
     assert asked("/etc/passwd") == 404
-    assert asked("/", Host="example.org") == 403
-    assert asked("/run") == 403
-    assert asked("/run", Origin="http://example.org") == 403
+    assert asked("/", Host="example.org") == 404
+    assert asked("/run") == 404
+    assert asked("/run", Origin="http://example.org") == 404
     assert asked("/run", Origin=server.address) == 400
 
 

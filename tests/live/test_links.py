@@ -68,6 +68,16 @@ def test_options_of_a_command_are_in_the_link() -> None:
     assert load(link, ["drive.amplitude=3"]).drive.amplitude == 3.0
 
 
+def test_link_of_a_scene_file(tmp_path: Path) -> None:
+    """The shortest one; and none where a file is needed."""
+    path = tmp_path / "mine.toml"
+    path.write_text('base = "gripper"\n[drive]\npot_offset = 0.25\n', encoding="utf-8")
+    assert to_link(load(path)) == "#scene=gripper&drive.pot_offset=0.25"
+    with pytest.raises(BadInput, match="no link"):
+        to_link(load("reference", {"friction.normal_force_file": tmp_path / "grip.csv"}))
+    assert to_link(load("closed-loop-grasp")) == "#scene=closed-loop-grasp"
+
+
 @pytest.mark.reliability
 @pytest.mark.parametrize(
     ("link", "said"),
@@ -86,7 +96,7 @@ def test_options_of_a_command_are_in_the_link() -> None:
         ("#scene=paper&circuit.netlist=%2Fetc%2Fpasswd", "names a file"),
         ("#scene=paper&drive.file=x.csv", "names a file"),
         ("#scene=%2Fetc%2Fpasswd", "no built-in scene"),
-        ("#scene=paper&drive.amplitude=%ff", "UTF-8"),
+        ("#scene=paper&drive.amplitude=%ff", "0 to 100 V"),
         ("#drive.amplitude=6&#scene=paper", "begin with"),
         ("#scene=paper&" + "a" * 9000, "longer than"),
     ],

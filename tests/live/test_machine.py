@@ -17,6 +17,7 @@ SETTINGS = [
     "#scene=paper-limited&drive.amplitude=6&drive.frequency=30",
     "#scene=reference&circuit.model=limited",
     "#scene=reference&circuit.model=limited&drive.waveform=sine&drive.frequency=40",
+    "#scene=trial-05&circuit.model=limited&run.average=ends",
     "#scene=square&circuit.model=limited",
     "#scene=paper-limited&drive.waveform=falling-sawtooth&drive.frequency=50",
     "#scene=paper-limited&coil.polarity=-1&friction.normal_force=1.1",

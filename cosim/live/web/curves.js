@@ -11,7 +11,7 @@ class History {
 
   clear() {
     this.first = this.last = 0; // numbers of rows; the first is the oldest, the last the newest
-    this.origin = 0;
+    this.turned = this.origin = 0;
     this.frequency = 1;
   }
 
@@ -93,7 +93,7 @@ class Curves {
     const span = periods / history.frequency * RATE; // rows of the window
     // In real time whole windows up to the last period's end; slowly, the present one over the last.
     const last = slow ? history.last : Math.floor((Math.floor(history.phase(history.last)) / history.frequency + history.origin) * RATE);
-    const first = Math.max(history.first, last - Math.floor(span) + 1, (history.turned ?? -1) + 1);
+    const first = Math.max(history.first, last - Math.floor(span) + 1, history.turned + 1);
     this.window = { history, periods, first, last, span, slow };
     const now = this.share(history.last);
     this.base = {};

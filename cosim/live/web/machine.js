@@ -117,8 +117,8 @@ class Machine {
     this.time = 0;
     this.row = 0;
     this.marks = [];
-    this.command = new Command(setup.drive, 0, chords);
-    this._take(0);
+    this.command = new Command(setup.drive, -setup.drive.start_phase / setup.drive.frequency, chords);
+    this._take(this.command.at(0));
   }
 
   free() {

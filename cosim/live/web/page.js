@@ -233,7 +233,7 @@ function tellAll() {
     $("told-heat").style.color = found.heat > DATA.heat ? "var(--warn)" : "";
   } else for (const [id] of TOLD_OF.slice(0, 4)) tell(id, "…", "from whole periods");
   let least = Infinity, most = -Infinity;
-  const mean = curves._value("mean", 1), from = Math.max(history_.first, history_.last - RATE, (history_.turned ?? -1) + 1);
+  const mean = curves._value("mean", 1), from = Math.max(history_.first, history_.last - RATE, history_.turned + 1);
   for (let row = from; row <= history_.last; row += 8) {
     const a = mean(row);
     if (a < least) least = a;
