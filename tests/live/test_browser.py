@@ -98,6 +98,9 @@ def test_link_of_a_stranger(tab: Any, tmp_path: Path) -> None:
     assert "no scene" in tab.inner_text("#fault") and not tab.faults
     assert tab.locator("img").count() == 0
 
+    tab.evaluate("() => { location.hash = '#scene=paper&friction.mu_s=0.1'; }")
+    tab.wait_for_function("() => document.getElementById('fault').textContent.includes('refused')")
+
 
 @pytest.mark.reliability
 def test_server_answers_its_own_page_alone(server: Server) -> None:

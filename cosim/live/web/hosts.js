@@ -25,11 +25,11 @@ class Player {
 
   start({ binary, references, setup, generation }) {
     this.running = false;
+    this.generation = generation;
     if (binary) this.exports = started(new WebAssembly.Module(binary));
     this.machine?.free();
     this.machine = null;
     this.machine = new Machine(this.exports, references, setup, 400);
-    this.generation = generation;
     this.position = 0;
     this.before = this.now = 0;
     this.fresh();

@@ -239,7 +239,7 @@ function tellAll() {
     if (a < least) least = a;
     if (a > most) most = a;
   }
-  tell("slip", `${signed(budget.up[0], 0)} m/s² going up`, `${signed(budget.down[0], 0)} going down; where it rises ${signed(budget.up[1], 0)} and ${signed(budget.down[1], 0)}`);
+  tell("slip", `${signed(budget.up[0], 0)} / ${signed(budget.down[0], 0)} m/s²`, `going up / down; where the surface rises ${signed(budget.up[1], 0)} / ${signed(budget.down[1], 0)}`);
   if (most >= least) tell("peak", `${signed(least, 0)} … ${signed(most, 0)} m/s²`, slipsBy(least, most, budget));
 }
 
