@@ -10,6 +10,7 @@
 #   make bench       remakes results/bench.json, some minutes (ARGS='--trials DIR')
 #   make docs        draws the pictures and builds the documentation site, site/index.html
 #   make check       ruff and pyright; tells which results another core has made
+#   make wasm        compiles the FMU for the page of `cosim live` (pip install ziglang first)
 #   make dist        wheel and source distribution in dist/, each built in an empty environment
 #   make lock        remakes the locks with uv  (ARGS=--upgrade for newer versions)
 #   make clean       removes the environments and everything built
@@ -38,7 +39,7 @@ SOURCES := $(sort $(shell find fmu/src fmu/include cosim -path cosim/_compiled -
 	-type f \( -name '*.[ch]' -o -name '*.def' \) -print)) build_c.py setup.py pyproject.toml fmu/LICENSE
 COMPILED := cosim/_compiled/build.json
 
-.PHONY: help run test test-all fuzz setup charts bench docs check dist lock clean FORCE
+.PHONY: help run test test-all fuzz setup charts bench docs check wasm dist lock clean FORCE
 
 help:
 	@sed -n 's/^#  \( .*\)/\1/p' Makefile
@@ -126,6 +127,10 @@ check: setup
 	@$(VENV)/bin/ruff format --check
 	@$(VENV)/bin/pyright
 	@$(PY) -m benchmarks.stale
+
+# The result is kept in the repository, so that only who changes the FMU's C needs zig.
+wasm: setup
+	@$(PY) build_wasm.py
 
 # The wheel is built of the source distribution, so that neither takes anything that lies about.
 dist: $(VENV)/.installed

@@ -21,11 +21,15 @@ def _run(
     overrides: Sequence[str] = (),
     spread: bool = False,
     strict: bool = False,
+    link: bool = False,
     out: Path | None = None,
 ) -> None:
-    from cosim.scene import load
+    from cosim.scene import load, to_link
 
     base = load(scene, overrides)
+    if link:
+        print(to_link(base))
+        return
     folder = out or Path("results") / base.name
     if spread:
         from cosim.studies.spread.run import turns
@@ -160,6 +164,11 @@ COMMANDS = (
                 "starts; about ten times the time",
                 kind=bool,
                 parameter="strict",
+            ),
+            Option(
+                "--link",
+                "only print the setting as a link, which all commands take in place of a scene",
+                kind=bool,
             ),
         ),
         "results/<scene>",

@@ -6,8 +6,8 @@
 """
 
 from cosim.scene.describe import Key, keys
-from cosim.scene.loading import changed, list_scenes, load
+from cosim.scene.loading import changed, list_scenes, load, to_link
 from cosim.scene.model import Scene, to_toml
 from cosim.scene.rungs import RUNGS
 
-__all__ = ["RUNGS", "Key", "Scene", "changed", "keys", "list_scenes", "load", "to_toml"]
+__all__ = ["RUNGS", "Key", "Scene", "changed", "keys", "list_scenes", "load", "to_link", "to_toml"]

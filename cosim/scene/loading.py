@@ -1,10 +1,11 @@
-"""Loading of scenes: a built-in one or a TOML file, its base, and overrides on top."""
+"""Loading of scenes: a built-in one, a TOML file or a link, its base, and overrides on top."""
 
 import os
 import re
 import tomllib
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from cosim.errors import BadInput, NoEffect, plain
-from cosim.files import reader
+from cosim.files import link, reader
 from cosim.scene import messages, toml
 from cosim.scene.describe import acts, keys
 from cosim.scene.methods import METHODS
-from cosim.scene.model import Scene
+from cosim.scene.model import Scene, toml_value
 from cosim.scene.tables import KNOBS, LEVEL_KEY, NORMAL_FORCES, PATHS, TABLES
 
 _FULL = frozenset(key.full for key in keys())
@@ -49,8 +50,9 @@ Overrides = Mapping[str, Any] | Iterable[str]
 
 
 def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None = None) -> Scene:
-    """The checked scene of a built-in name, a TOML file or another scene, with ``overrides`` on
-    top: ``{"table.key": value}``, SI, or strings ``"table.key=value"``.
+    """The checked scene of a built-in name, a TOML file, a link (``#scene=NAME&table.key=value``)
+    or another scene, with ``overrides`` on top: ``{"table.key": value}``, SI, or strings
+    ``"table.key=value"``.
 
     A file may name a built-in scene as its ``base``; each layer changes only the keys that it
     gives. A knob of the device replaces its value from the layers below, and the other way round.
@@ -94,6 +96,8 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
 def _layers(source: str) -> list[_Layer]:
     """The file of ``source`` on top of the built-in scenes that it starts from."""
     builtin = [name for name, _ in list_scenes()]
+    if link.is_link(source):
+        return _linked(source, builtin)
     if source in builtin:
         origin, path = f"scene {source}", _LIBRARY / f"{source}.toml"
         data = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -115,6 +119,50 @@ def _layers(source: str) -> list[_Layer]:
     below = _layers(base)
     below[-1].tables.pop("description", None)
     return [*below, _Layer(origin, data, source in builtin)]
+
+
+def _linked(source: str, builtin: list[str]) -> list[_Layer]:
+    """The built-in scene of a link, and its values. A link names no files: neither a scene's nor
+    any that a scene could read."""
+    name, pairs = link.parse(source)
+    if name not in builtin:
+        hint = messages.suggestion(name, builtin) or f" ({', '.join(builtin)})"
+        raise messages.bad(f'link: there is no built-in scene "{plain(name, 60)}"{hint}')
+    for key, _ in pairs:
+        if tuple(key.split(".")) in PATHS:
+            raise BadInput(f"link: {key} names a file, which no link can.")
+    tables = _tables([(key, _value(value)) for key, value in pairs], "link")
+    return [*_layers(name), *([_Layer("link", tables)] if tables else [])]
+
+
+def to_link(scene: Scene) -> str:
+    """The shortest link that loads to an equal scene, but for its name and description. Raises
+    BadInput where no built-in scene with some keys changed is equal."""
+    wanted, found = _plain_values(scene), []
+    for name, _ in list_scenes():
+        there = _plain_values(load(name))
+        changes = {key: value for key, value in wanted.items() if there.get(key) != value}
+        made = link.write(name, [(key, _spelt(changes[key])) for key in sorted(changes)])
+        found.append((len(changes), name != scene.name, made))
+    for _, _, made in sorted(found):
+        with suppress(BadInput), warnings.catch_warnings():
+            warnings.simplefilter("ignore", NoEffect)
+            if _plain_values(load(made)) == wanted:
+                return made
+    raise BadInput(f"scene {scene.name}: no link makes it, for example since it names files.")
+
+
+def _plain_values(scene: Scene) -> dict[str, Any]:
+    """The values by "table.key", without times of the run that follow from others."""
+    found = {f"{table}.{key}": x for table in TABLES for key, x in scene.table(table).items()}
+    for key in {"settle", "output_step"} - scene.run.model_fields_set:
+        del found[f"run.{key}"]
+    return found
+
+
+def _spelt(value: Any) -> str:
+    """A value as a link has it: words without quotes, lists without blanks."""
+    return value if isinstance(value, str) else toml_value(value).replace(" ", "")
 
 
 def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:

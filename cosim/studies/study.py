@@ -56,7 +56,7 @@ class Option:
         return self.parameter or self.name.lstrip("-").replace("-", "_")
 
 
-SCENE = Option("scene", "a built-in scene or a TOML file", "SCENE")
+SCENE = Option("scene", "a built-in scene, a TOML file or a link", "SCENE")
 OVERRIDES = Option(
     *("--set", "replace a value of the scene; repeatable", "TABLE.KEY=VALUE"),
     parameter="overrides",

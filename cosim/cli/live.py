@@ -1,0 +1,43 @@
+"""The command that opens the live bench."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from cosim.cli.command import Command
+from cosim.studies.study import OVERRIDES, Option
+
+
+def _live(
+    scene: str = "paper-limited", overrides: Sequence[str] = (), out: Path | None = None
+) -> None:
+    from cosim.live.page import fragment, html
+
+    link = fragment(scene, list(overrides))
+    if out is not None:
+        from cosim.files.atomic import write_text
+
+        write_text(out, html(link, served=False))
+        print(f"Written to {out}; with another setting: {out}#scene=…")
+        return
+    import webbrowser
+
+    from cosim.live.server import Server
+
+    with Server(link) as server:
+        print(f"{server.address}/{link}\nFor this machine alone; Ctrl-C ends it.", flush=True)
+        webbrowser.open(f"{server.address}/{link}")
+        server.serve_forever(poll_interval=0.2)
+
+
+COMMANDS = (
+    Command(
+        "live",
+        "open the machine in the browser, moving, with knobs to turn",
+        _live,
+        (
+            Option("scene", "scene or link (default: paper-limited)", "SCENE", many="optional"),
+            OVERRIDES,
+            Option("--out", "write the page as one HTML file instead", "FILE.html", Path),
+        ),
+    ),
+)

@@ -1,0 +1,1 @@
+"""The live bench: a page on which the machine runs and is turned by hand."""

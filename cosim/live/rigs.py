@@ -1,0 +1,96 @@
+"""What the page knows: the built-in rigs, the keys that can be turned, and the firmware's knobs."""
+
+from typing import Any
+
+from cosim.circuit.heat import rise
+from cosim.files.link import LONGEST
+from cosim.mechanics.fmi import references
+from cosim.mechanics.stickslip import parameters
+from cosim.scene import Key, Scene, firmware, keys, list_scenes, load
+from cosim.scene.tables import COMMANDS, KNOBS
+
+MODEL = "limited"
+"""The circuit of the page: the one that is inside the FMU."""
+
+_TURNED = {
+    "drive": {"waveform", "table", "duty", "reset_time", "start_phase", *KNOBS, *KNOBS.values()},
+    "circuit": {"model", "supply", "swing_loss_high", "swing_loss_low"},
+    "coil": {"polarity"},
+}
+"""Besides those that are the FMU's variables."""
+_CHOICES = {"drive.waveform": COMMANDS, "circuit.model": (MODEL,)}
+
+
+def turned() -> dict[str, Key]:
+    """The keys that the page turns, by their full names."""
+    of_fmu = {key for key in keys() if key.variable and key.name != "tolerance"}
+    return {
+        key.full: key for key in keys() if key in of_fmu or key.name in _TURNED.get(key.table, ())
+    }
+
+
+def scenes() -> dict[str, Scene]:
+    """The built-in scenes that the page can run, as they are."""
+    found = ((name, load(name)) for name, _ in list_scenes())
+    return {name: scene for name, scene in found if fits(scene)}
+
+
+def fits(scene: Scene) -> bool:
+    """Whether the page can run a scene: a free ram that is driven, and a drive of which it has the
+    shape."""
+    drive = scene.drive
+    odd = drive.quantised or drive.start_time or drive.pwm_ripple or drive.phase_deg is not None
+    driven = scene.rung.on_ladder and drive.waveform in COMMANDS and not scene.files
+    return driven and not odd and scene.mechanics.actuator == "ram"
+
+
+def _scene(scene: Scene) -> dict[str, Any]:
+    """What differs from the defaults."""
+    own = {full: getattr(getattr(scene, key.table), key.name) for full, key in turned().items()}
+    for knob, key in KNOBS.items():
+        if own[f"drive.{knob}"] is not None:
+            own[f"drive.{key}"] = None
+    values = {full: x for full, x in own.items() if x not in (None, turned()[full].default)}
+    values.pop("circuit.model", None)
+    _, integers = parameters(load(scene, {"circuit.model": MODEL}))
+    fixed = integers.keys() - {key.variable for key in turned().values()}
+    return {
+        "text": scene.description,
+        "model": scene.circuit.model,
+        "values": values,
+        "integers": {name: integers[name] for name in fixed},
+        "rise": rise(scene.coil),
+    }
+
+
+def _key(key: Key) -> dict[str, Any]:
+    choices = _CHOICES.get(key.full, key.choices)
+    default = MODEL if key.full == "circuit.model" else key.default
+    found: dict[str, Any] = {"default": default, "variable": key.variable}
+    if choices and not (key.variable and key.kind is int):
+        return found | {"choices": choices}
+    if key.kind is list:
+        return found | {"table": True}
+    return found | {"low": key.low, "high": key.high, "whole": key.kind is int}
+
+
+def knobs() -> dict[str, list[float]]:
+    """What each of the 10-bit codes of the three knobs stands for: peak-to-peak voltage (V),
+    frequency (Hz), and V1 at the end of the ramp (V), which is the offset pin's."""
+    pots = [code / firmware.COUNTS for code in range(firmware.COUNTS)]
+    return {
+        "amplitude": [firmware.knob_amplitude(pot) for pot in pots],
+        "frequency": [firmware.knob_frequency(pot) for pot in pots],
+        "pin": [firmware.knob_offset(pot, 0.0) for pot in pots],
+    }
+
+
+def data() -> dict[str, Any]:
+    """All of it, as JSON can hold it."""
+    return {
+        "scenes": {name: _scene(scene) for name, scene in scenes().items()},
+        "keys": {full: _key(key) for full, key in turned().items()},
+        "knobs": knobs(),
+        "references": references(3),
+        "longest": LONGEST,
+    }

@@ -1,0 +1,75 @@
+"""Serves the page on this machine alone, and runs what it asks for with ngspice."""
+
+import json
+import warnings
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Lock
+from typing import Any
+
+from cosim.errors import BadInput, CosimError
+from cosim.files.link import LONGEST, is_link
+from cosim.live.page import answer, html
+
+HOST = "127.0.0.1"
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """``/`` is the page; ``POST /run`` takes a link of it. Nothing else is there."""
+
+    server: "Server"  # pyright: ignore[reportIncompatibleVariableOverride]
+    timeout = 30
+    sys_version = server_version = ""
+
+    def do_GET(self) -> None:
+        if self._from_here() and self.path == "/":
+            self._send(200, self.server.page, "text/html; charset=utf-8")
+        else:
+            self._tell(404, {"error": "There is only the page itself, for this machine."})
+
+    def do_POST(self) -> None:
+        """Only the page itself may ask: another site's has another origin."""
+        length = self.headers.get("Content-Length", "")
+        known = self.path == "/run" and length.isdecimal() and int(length) <= LONGEST
+        if not (known and self._from_here(needs_origin=True)):
+            self._tell(404, {"error": "There is only run, which takes a link of the page."})
+            return
+        link = self.rfile.read(int(length)).decode("utf-8", "replace")
+        try:
+            if not is_link(link):
+                raise BadInput("This is not a link.")
+            with self.server.one_run, warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                self._tell(200, answer(link))
+        except CosimError as error:
+            self._tell(400, {"error": str(error)})
+
+    def _from_here(self, needs_origin: bool = False) -> bool:
+        """A name that leads here from elsewhere is refused, as is a page from elsewhere."""
+        origin = self.headers.get("Origin", None if needs_origin else self.server.address)
+        return f"http://{self.headers.get('Host')}" == self.server.address == origin
+
+    def _tell(self, code: int, content: Any) -> None:
+        self._send(code, json.dumps(content).encode(), "application/json")
+
+    def _send(self, code: int, body: bytes, kind: str) -> None:
+        self.send_response(code)
+        own = {"Content-Type": kind, "Content-Length": len(body), "Cache-Control": "no-store"}
+        for name, value in own.items():
+            self.send_header(name, str(value))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing is written down."""
+
+
+class Server(ThreadingHTTPServer):
+    """The page at ``address``, on a free port."""
+
+    daemon_threads = True
+
+    def __init__(self, fragment: str) -> None:
+        super().__init__((HOST, 0), _Handler)
+        self.address = f"http://{HOST}:{self.server_port}"
+        self.page = html(fragment, served=True).encode()
+        self.one_run = Lock()

@@ -1,0 +1,120 @@
+"use strict";
+/* Who owns the machine: a worker with a timer, or the audio worklet, which also plays the surface. */
+
+class Player {
+  constructor(post) {
+    this.post = post;
+    this.speed = 1;
+    this.position = 0; // of what is heard, in rows
+    this.sent = 0;
+    this.running = false;
+    this.before = this.now = 0;
+  }
+
+  message({ kind, ...told }) {
+    try {
+      if (kind === "start") this.start(told);
+      else if (kind === "speed") this.speed = told.speed;
+      else if (!this.machine) return;
+      else if (kind === "turn") this.machine.turn(told.drive);
+      else if (kind === "hold") this.machine.hold(told.force);
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  start({ binary, references, setup, generation }) {
+    this.running = false;
+    this.generation = generation;
+    if (binary) this.exports = started(new WebAssembly.Module(binary));
+    this.machine?.free();
+    this.machine = null;
+    this.machine = new Machine(this.exports, references, setup, 400);
+    this.position = 0;
+    this.before = this.now = 0;
+    this.fresh();
+    this.running = true;
+  }
+
+  fresh() {
+    this.rows = new Float32Array(1024 * OUTPUT_COUNT);
+    this.count = 0;
+  }
+
+  fail(error) {
+    this.running = false;
+    this.post({ kind: "fault", text: String(error.message), generation: this.generation });
+  }
+
+  /* One row on; its velocity of the surface is what is heard. */
+  next() {
+    if (this.count === 1024) this.send();
+    const at = this.count * OUTPUT_COUNT;
+    this.machine.next(this.rows, at);
+    this.count++;
+    this.before = this.now;
+    this.now = this.rows[at + 6];
+  }
+
+  send() {
+    if (!this.count) return;
+    const { rows, count, machine } = this;
+    const origin = machine.command.origin, frequency = machine.command.frequency;
+    this.post({ kind: "rows", rows, count, last: machine.row, marks: machine.marks, origin, frequency,
+      generation: this.generation }, [rows.buffer]);
+    machine.marks = [];
+    this.fresh();
+  }
+
+  /* `n` samples of sound, `rate` a second. */
+  play(n, rate, out) {
+    if (!this.running || !this.speed) return;
+    const step = this.speed * RATE / rate;
+    try {
+      for (let k = 0; k < n; k++) {
+        this.position += step;
+        while (this.machine.row < this.position) this.next();
+        if (out) out[k] = this.before + (this.now - this.before) * (this.position - this.machine.row + 1);
+      }
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+}
+
+if (typeof registerProcessor === "function") {
+  registerProcessor("machine", class extends AudioWorkletProcessor {
+    constructor() {
+      super();
+      this.player = new Player((told, moved) => this.port.postMessage(told, moved));
+      this.port.onmessage = ({ data }) => {
+        if (data.kind === "end") this.ended = true;
+        else if (data.kind === "gain") this.gain = data.gain;
+        else this.player.message(data);
+      };
+      this.blocks = this.mean = this.gain = 0;
+    }
+
+    process(_, [[out]]) {
+      if (this.ended) return false;
+      this.player.play(out.length, sampleRate, out);
+      for (let k = 0; k < out.length; k++) {
+        this.mean += 5e-4 * (out[k] - this.mean); // a loudspeaker has no constant part
+        out[k] = Math.tanh(this.gain * (out[k] - this.mean));
+      }
+      if (++this.blocks % 8 === 0 && this.player.running) this.player.send();
+      return true;
+    }
+  });
+} else if (typeof WorkerGlobalScope === "function") {
+  const player = new Player((told, moved) => postMessage(told, moved));
+  let last = performance.now();
+  onmessage = ({ data }) => player.message(data);
+  setInterval(() => {
+    const now = performance.now();
+    const n = Math.round(Math.min(now - last, 60) * RATE / 1000); // what is late is left out
+    last = now;
+    player.play(n, RATE, null);
+    if (player.running) player.send();
+  }, 12);
+}
