@@ -44,3 +44,9 @@ before it; the first row is the machine at rest, without command, or a given sur
 """
 
 UNITS = {name: column.unit for name, column in COLUMNS.items()}
+
+
+def about(name: str, unit: str) -> dict[str, str]:
+    """The attributes of a column in a dataset; one that a scene's own FMUs gave has no more words
+    than its name."""
+    return {"units": unit} | ({"long_name": COLUMNS[name].long_name} if name in COLUMNS else {})
