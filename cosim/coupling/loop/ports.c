@@ -297,7 +297,8 @@ static double accepted(Ports *c, double time, double next_step)
         memcpy(c->last, c->now, (size_t)c->n_saved * sizeof *c->last);
         begin_exchange(c);
     } else {
-        const int meets = time >= c->end - ON_TIME;
+        /* The last step may be so short that the time stays the same. */
+        const int meets = time >= c->end - ON_TIME && time > c->origin;
         if (meets && !c->stepped && !step_all(c, time))
             return next_step;
         c->stepped = 0;
@@ -353,7 +354,7 @@ static int ask(Ports *c)
 /* Whether the attempt that has converged at `time` is to be repeated. */
 static int to_repeat(Ports *c, double time, double *delta, double old_delta)
 {
-    if (!ask(c) || (c->stepped && !restore_all(c)))
+    if (time <= c->origin || !ask(c) || (c->stepped && !restore_all(c)))
         return 0;
     c->stepped = 1;
     if (!step_all(c, time))
