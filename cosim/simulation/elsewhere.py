@@ -74,7 +74,7 @@ def _worked(
     if scene.rung.own_netlist and fence.lacking:
         result.summary["notes"].append(
             f"this system has no {' and no '.join(fence.lacking)}: nothing but the reader's own "
-            "checks stands between the netlist and your files."
+            "checks stands between the netlist, or an FMU's code, and your files."
         )
     return result.scene, Packed(result.columns), result.summary, result.units
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Literal
 
-from cosim.errors import BeyondModel
+from cosim.errors import BadInput, BeyondModel
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.elsewhere import simulate_elsewhere, summary_elsewhere
@@ -60,6 +60,8 @@ def simulate(
     that cannot be used, SimulationFailed with where, when, and what to try.
     """
     if scene.has_ports:
+        if checks == "strict":
+            raise BadInput("--error tells of the built-in machine, not of a scene's own [[port]].")
         return _where_it_may(scene, progress, fmi_version)
     if scene.run.solver == "fast":
         from cosim.simulation.fast import simulate_fast

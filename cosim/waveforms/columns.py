@@ -50,3 +50,8 @@ def about(name: str, unit: str) -> dict[str, str]:
     """The attributes of a column in a dataset; one that a scene's own FMUs gave has no more words
     than its name."""
     return {"units": unit} | ({"long_name": COLUMNS[name].long_name} if name in COLUMNS else {})
+
+
+def netcdf_name(name: str) -> str:
+    """A name as netCDF can have it: without a slash, and with a letter, digit or _ first."""
+    return ("" if name[:1].isalnum() else "_") + name.replace("/", "|")

@@ -53,6 +53,8 @@ class Result:
         """The figure of the run, as ``figure.png`` shows it."""
         from cosim.waveforms import figure
 
+        if self.scene.has_ports:
+            return figure.draw_own(self.scene, self.columns, self.units)
         return figure.draw(self.scene, self.columns, self.summary)
 
     def save(self, folder: str | os.PathLike[str]) -> None:

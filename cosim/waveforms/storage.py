@@ -12,7 +12,7 @@ from cosim.errors import BadInput, plain
 from cosim.files.atomic import whole
 from cosim.files.reader import opened
 from cosim.files.spill import blocks
-from cosim.waveforms.columns import about
+from cosim.waveforms.columns import about, netcdf_name
 
 _CSV_ROWS = 1024
 
@@ -60,15 +60,15 @@ def netcdf(
     head = b"CDF\x02" + pack(">i", 0)
     head += pack(">ii", _DIMENSIONS, 1) + _name("time") + pack(">i", count)
     head += _attributes(attributes) + pack(">ii", _VARIABLES, len(waveforms))
-    about = [
+    heads = [
         # One dimension, the first; the type; the size; then the offset.
-        _name(name) + pack(">ii", 1, 0) + _attributes(about(name, units[name]))
+        _name(netcdf_name(name)) + pack(">ii", 1, 0) + _attributes(about(name, units[name]))
         + pack(">ii", _DOUBLES, 8 * count)
         for name in waveforms
     ]  # fmt: skip
-    start = len(head) + sum(len(text) + 8 for text in about)
+    start = len(head) + sum(len(text) + 8 for text in heads)
     starts = [start + 8 * count * k for k in range(len(waveforms))]
-    for text, offset in zip(about, starts, strict=True):
+    for text, offset in zip(heads, starts, strict=True):
         head += text + pack(">q", offset)
     file.write(head)
     for part in blocks(count):
@@ -102,7 +102,7 @@ def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str,
             units = {name: _text(variable.units) for name, variable in file.variables.items()}
             attributes = {name: _text(value) for name, value in file._attributes.items()}
         for name, values in columns.items():
-            if not (name.isidentifier() and (name + units[name]).isascii()):
+            if not ((name + units[name]).isascii() and (name + units[name]).isprintable()):
                 raise ValueError(f"{name!r} in {units[name]!r} is not a name and a unit")
             if values.dtype != ">f8" or values.ndim != 1:
                 raise ValueError(f"{name!r} is not a column")
