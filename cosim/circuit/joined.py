@@ -60,7 +60,9 @@ def deck(
     asked: bool,
 ) -> Deck:
     """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved;
-    where they are ``asked`` for within a step, each as a device's parameter. Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
+    where they are ``asked`` for within a step, each as a device's parameter.
+
+    Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
     lines = read(path)
     name = plain(str(path))
@@ -96,7 +98,8 @@ def deck(
     return Deck(
         "\n".join(text),
         {source.lower(): source[0].lower() for source in sources},
-        *(tuple(each) for each in zip(*read_as, strict=True)) if read_as else ((), ()),
+        tuple(vector for vector, _ in read_as),
+        tuple(device for _, device in read_as),
         tuple(_pulses(top, fed)),
     )
 

@@ -117,7 +117,7 @@ class Engine(Shared.NgSpiceShared):
         # PySpice leaves GetSyncData out; a second call puts it in, and a faster GetVSRCData.
         self._library.ngSpice_Init_Sync(
             _ffi.cast("GetVSRCData *", callbacks.source),
-            self._get_isrc_data_c,
+            _ffi.cast("GetISRCData *", callbacks.source),  # which has the same arguments
             _ffi.cast("GetSyncData *", callbacks.step),
             _ffi.NULL,
             self._self_c,

@@ -133,8 +133,10 @@ class Scene(BaseModel):
         for port in self.port:
             for key, end in (("from", port.origin), ("to", port.to)):
                 name, dot, _ = (end or "").partition(".")
-                if end is not None and (key, end) != ("from", "drive") and (
-                    name not in names or not dot
+                if (
+                    end is not None
+                    and (key, end) != ("from", "drive")
+                    and (name not in names or not dot)
                 ):
                     known = ", ".join(f"{name}.…" for name in names) or "of an FMU; there is none"
                     raise fault(f'[[port]] {key} = "{end}" must be a variable {known}')

@@ -33,12 +33,12 @@ def _of_fmu(name: str, least: float | None = None) -> Any:
     return _number(start, known.unit, low, known.high, known.text, name)
 
 
-def _choice(default: Any, text: str, unit: str = "", words: str = "", **limits: Any) -> Any:
+def _choice(default: Any, text: str, unit: str = "", words: str = "") -> Any:
     """Of any kind; ``words`` say what may stand there, where its type does not."""
     extra: dict[str, Any] = {"unit": unit, "words": words}
     if isinstance(default, list | dict):
-        return Field(default_factory=default.copy, **limits, description=text, json_schema_extra=extra)
-    return Field(default, **limits, description=text, json_schema_extra=extra)
+        return Field(default_factory=default.copy, description=text, json_schema_extra=extra)
+    return Field(default, description=text, json_schema_extra=extra)
 
 
 def _declared(default: str, lead: str, registry: Mapping[str, Rung | CouplingMethod]) -> Any:

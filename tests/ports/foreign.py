@@ -93,7 +93,8 @@ def _three(saves: bool, through: bool, derivative: bool, fixed: bool) -> str:
         '<Int32 name="steps" valueReference="21" causality="output"/>',
         '<Float64 name="x" valueReference="30" causality="input" start="0 0">'
         '<Dimension start="2"/></Float64>',
-        '<Float64 name="xs" valueReference="31" causality="output"><Dimension start="2"/></Float64>',
+        '<Float64 name="xs" valueReference="31" causality="output">'
+        '<Dimension start="2"/></Float64>',
     ]
     depends = ' dependencies="0"' if through else ""
     return (

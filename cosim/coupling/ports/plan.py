@@ -6,7 +6,6 @@ from cosim.circuit.joined import Deck, deck
 from cosim.coupling.ports.sides import Side
 from cosim.coupling.ports.strangers import Variable, stranger
 from cosim.coupling.ports.structures import Feed, Origin, Source
-from cosim.errors import BadInput
 from cosim.scene import Scene
 from cosim.scene.tables import Port
 

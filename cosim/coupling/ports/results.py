@@ -33,8 +33,8 @@ def joined(
     units = {"time": "s"} | {name: of for name, of, *_ in signals}
     summary = {
         f"{name}.{what}": value
-        for name, _, *signal in signals
-        for what, value in _numbers(scene.run.settle, *signal).items()
+        for name, _, times, values, continuous in signals
+        for what, value in _numbers(scene.run.settle, times, values, continuous).items()
     }
     summary |= {
         "circuit_steps": run.steps,
@@ -107,7 +107,7 @@ def _notes(run: Run) -> Iterator[str]:
         steps, moved = side.fmu.steps, state.moved
         if steps > _MANY and 0 < moved < _SELDOM * steps:
             yield (
-                f"the outputs of {side.name} changed in only {moved} of its {steps} steps: it moves "
-                'in steps of its own; coupling.method = "macro-steps" with coupling.macro_step = '
-                f"{run.state.duration / moved:.2g} s or more suits it."
+                f"the outputs of {side.name} changed in only {moved} of its {steps} steps: it "
+                'moves in steps of its own; coupling.method = "macro-steps" with '
+                f"coupling.macro_step = {run.state.duration / moved:.2g} s or more suits it."
             )

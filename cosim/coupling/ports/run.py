@@ -3,6 +3,7 @@
 import ctypes
 from collections.abc import Callable
 from ctypes import c_char_p, c_double, c_int64
+from typing import Any
 
 import numpy as np
 
@@ -70,9 +71,9 @@ class Run:
             n_fmus=len(states),
             sources=ctypes.addressof(self._sources),
             n_sources=len(plan.sources),
-            **dict(zip(("outputs", "before", "rates"), map(ctypes.addressof, self._rows))),
+            **_named(("outputs", "before", "rates"), self._rows),
             n_outputs=width,
-            **dict(zip(("now", "last", "start", "charges"), map(ctypes.addressof, self._saved))),
+            **_named(("now", "last", "start", "charges"), self._saved),
             places=ctypes.addressof(self.places),
             n_saved=count,
             driven=int(plan.driven),
@@ -189,6 +190,10 @@ class Run:
         self._pieces = kept + self._command.pieces(begin, self._scene.run.duration, _PIECES)
         self._row = (Piece * len(self._pieces))(*self._pieces)
         state.pieces, state.n_pieces, state.piece = self._row, len(self._pieces), 0
+
+
+def _named(names: tuple[str, ...], arrays: list[Any]) -> dict[str, int]:
+    return dict(zip(names, map(ctypes.addressof, arrays), strict=True))
 
 
 def _pulse(values: list[float], duration: float, step: float) -> Pulse:

@@ -60,8 +60,7 @@ class Side:
         self._feeds.append((into, place, feed))
 
     def state(self, row: int, repeats: bool) -> StrangerState:
-        """Ready to run: a new instance, whose outputs at the start are in the row at that address.
-        """
+        """Ready to run: a new instance, with its part of the row at that address."""
         self.instance = self.of.instance(self._parameters)
         names = {"set_reals": "SetReal", "get_reals": "GetReal", "do_step": "DoStep"}
         if self.of.version == 3:
@@ -83,8 +82,9 @@ class Side:
         for k, (_, _, feed) in enumerate(lines):
             feed.slope = ctypes.addressof(rates) + 8 * k
         feeds = self._keep((Feed * max(len(self._feeds), 1))(*(f for _, _, f in self._feeds)))
-        sets, gets = self._groups("Set", inputs, ctypes.addressof(self._values)), self._groups(
-            "Get", self.outputs, row
+        sets, gets = (
+            self._groups("Set", inputs, ctypes.addressof(self._values)),
+            self._groups("Get", self.outputs, row),
         )
         state = StrangerState(
             fmu=ctypes.pointer(self.fmu),

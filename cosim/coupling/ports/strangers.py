@@ -33,6 +33,8 @@ _KINDS_3 = {
 }
 """Types of values as ``loop.h`` numbers them."""
 
+_LONGEST = 600  # characters of a message
+
 _ELEMENT = re.compile(r"(.*)\[(\d+)\]")
 
 
@@ -86,7 +88,9 @@ class Stranger:
         self.loaded = self._load(folder)
 
     def bad(self, reason: str) -> BadInput:
-        return BadInput(ended(f"{self.name}: {plain(reason, 400)}"))
+        """The error that tells what is wrong with it, in a line; an FMU's words are in it."""
+        line = "".join(each if each.isprintable() else " " for each in reason)[:_LONGEST]
+        return BadInput(ended(f"{self.name}: {line}"))
 
     def _variables(self, found: Any) -> dict[str, Variable]:
         kinds = _KINDS_2 if self.version == 2 else _KINDS_3
@@ -142,7 +146,8 @@ class Stranger:
             known = f" (it has {', '.join(able[:20]) or 'none'})"
             other = f", not its {found.causality}" if found else ""
             hint = "" if found else suggestion(name, able)
-            raise self.bad(f"{where} must be an {causality} of it with numbers{other}{hint or known}")
+            said = f"{where} must be an {causality} of it with numbers{other}"
+            raise self.bad(said + (hint or known))
         if found.size > 1 and (match is None or found.name == name):
             raise self.bad(
                 f"{where} has {found.size} values: write {found.name}[0] … [{found.size - 1}]"
