@@ -65,7 +65,7 @@ def _key(table: str, name: str) -> Key:
         table=table,
         name=name,
         unit=str(extra["unit"]),
-        default=None if field.default_factory else field.default,
+        default=field.default,
         kind=kind if isinstance(kind, type) else list,
         choices=choices,
         low=limits.get("ge"),

@@ -356,9 +356,6 @@ class Scene(BaseModel):
                 del values[key]
         if values.get("normal_force_file"):
             del values["normal_force"]
-        if not self.has_ports:
-            for key in ("save", "param") if name == "circuit" else ():
-                del values[key]
         return values
 
 

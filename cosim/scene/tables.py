@@ -35,10 +35,7 @@ def _of_fmu(name: str, least: float | None = None) -> Any:
 
 def _choice(default: Any, text: str, unit: str = "", words: str = "") -> Any:
     """Of any kind; ``words`` say what may stand there, where its type does not."""
-    extra: dict[str, Any] = {"unit": unit, "words": words}
-    if isinstance(default, list | dict):
-        return Field(default_factory=default.copy, description=text, json_schema_extra=extra)
-    return Field(default, description=text, json_schema_extra=extra)
+    return Field(default, description=text, json_schema_extra={"unit": unit, "words": words})
 
 
 def _declared(default: str, lead: str, registry: Mapping[str, Rung | CouplingMethod]) -> Any:
@@ -278,13 +275,13 @@ class Circuit(Table):
 
     model: str = _declared("amplifier", "Circuit", RUNGS)
     netlist: str | None = _choice(None, "Path of the user's netlist, relative to the scene file")
-    save: list[str] = _choice(
-        [],
+    save: list[str] | None = _choice(
+        None,
         "With ports: vectors and expressions of the netlist that go into the waveforms",
         words='a list of texts such as ["v(out)", "v(a)*i(Va)"]',
     )
-    param: dict[str, float] = _choice(
-        {},
+    param: dict[str, float] | None = _choice(
+        None,
         "With ports: values, SI, for .param lines of the netlist, by their names",
         words="a table of numbers, { R1 = 1.0 }",
     )
@@ -331,7 +328,7 @@ class Circuit(Table):
         if not isinstance(data, dict):
             return data
         given = {name: data[name] for name in data if PARAM_KEY.fullmatch(str(name))}
-        known = data.get("param", {})
+        known = data.get("param") or {}
         if not given or not isinstance(known, dict):
             return data
         own = {name.partition(".")[2]: value for name, value in given.items()}
@@ -563,8 +560,10 @@ class Fmu(Table):
         description="Path of an FMU for co-simulation, FMI 2.0 or 3.0, relative to the scene file",
         json_schema_extra={"words": "the path of a file"},
     )
-    parameters: dict[str, float | int | bool | str] = _choice(
-        {}, "Start values of its parameters", words="a table of values, { J = 1e-4 }"
+    parameters: dict[str, float | int | bool | str] = Field(
+        default_factory=dict,
+        description="Start values of its parameters",
+        json_schema_extra={"words": "a table of values, { J = 1e-4 }"},
     )
 
 

@@ -23,7 +23,7 @@ class Plan:
         self.sides = _in_order(scene, sides)
         """In the order in which they step: after those that feed them, as far as that can be."""
         probes = [port.probe for port in scene.port if port.probe is not None]
-        self.words = tuple(dict.fromkeys([*probes, *scene.circuit.save]))
+        self.words = tuple(dict.fromkeys([*probes, *(scene.circuit.save or ())]))
         """What is read of the circuit."""
         self.sources: list[Source] = []
         self.names: list[str] = []
@@ -47,7 +47,7 @@ class Plan:
         circuit, run = self.scene.circuit, self.scene.run
         assert circuit.netlist is not None
         return deck(
-            *(Path(circuit.netlist), self.names, self.words, circuit.param),
+            *(Path(circuit.netlist), self.names, self.words, circuit.param or {}),
             *(run.duration, circuit.reltol, circuit.max_step, self.method == "redo"),
         )
 
