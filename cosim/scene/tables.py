@@ -562,7 +562,7 @@ class Fmu(Table):
     )
     parameters: dict[str, float | int | bool | str] = Field(
         default_factory=dict,
-        description="Start values of its parameters",
+        description="Start values of its parameters, and of inputs that no port feeds",
         json_schema_extra={"words": "a table of values, { J = 1e-4 }"},
     )
 

@@ -20,7 +20,7 @@ WRONG = {
     "no such input": (
         '"rotor.u"',
         '"rotor.v"',
-        r"to = \"rotor\.v\" must be an input",
+        r"to = \"rotor\.v\" must be one of its inputs",
     ),
     "an element of a number": ('"rotor.u"', '"rotor.u[1]"', r"elements must be \[0\]"),
     "no such FMU": ("rotor.omega", "motor.omega", r"from = \"motor\.omega\" must be a variable"),
@@ -37,7 +37,7 @@ WRONG = {
     "a slope": (
         "scale = 0.05\n",
         'scale = 0.05\nslope = "w"\n',
-        r"\"w\" must be an output",
+        r"\"w\" must be one of its outputs",
     ),
     "a source twice": (
         "[coupling]",

@@ -146,7 +146,7 @@ class Stranger:
             known = f" (it has {', '.join(able[:20]) or 'none'})"
             other = f", not its {found.causality}" if found else ""
             hint = "" if found else suggestion(name, able)
-            said = f"{where} must be an {causality} of it with numbers{other}"
+            said = f"{where} must be one of its {causality}s with numbers{other}"
             raise self.bad(said + (hint or known))
         if found.size > 1 and (match is None or found.name == name):
             raise self.bad(
@@ -176,7 +176,9 @@ class Stranger:
         text = isinstance(value, str)
         if text:
             raise self.bad(f"{where} must be a number, true or false")
-        found, place = self.find(name, "parameter", where)
+        kind = self.variables.get(name.partition("[")[0])
+        is_input = kind is not None and kind.causality == "input"
+        found, place = self.find(name, "input" if is_input else "parameter", where)
         if found.variability == "constant":
             raise self.bad(f"{where}: it is a constant")
         values = [*found.start]
