@@ -325,9 +325,7 @@ def test_an_fmu_that_ends_its_process_or_fails_is_told(tmp_path: Path) -> None:
     scene = motor(tmp_path)
     with pytest.raises(SimulationFailed, match=r"died at t = .*SIGABRT"):
         cosim.run(scene, {"run.duration": 2e-3, "fmu.rotor.crash_at": 1e-3})
-    with pytest.raises(
-        SimulationFailed, match=r"rotor failed at t = .*the bearing is worn out"
-    ):
+    with pytest.raises(SimulationFailed, match=r"rotor failed at t = .*the bearing is worn out"):
         cosim.run(scene, {"run.duration": 2e-3, "fmu.rotor.fail_at": 1e-3})
 
 
