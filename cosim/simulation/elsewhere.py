@@ -15,14 +15,22 @@ from cosim.files.spill import Packed, place
 from cosim.scene import Scene
 from cosim.toolchain import fence
 from cosim.toolchain.libraries import ngspice_library
-from cosim.toolchain.processes import Bounds, Progress, end_idle, isolated
+from cosim.toolchain.processes import Bounds, ProcessLost, Progress, end_idle, isolated
 from cosim.waveforms.result import Result
 
 
 def simulate_elsewhere(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     """What :func:`cosim.simulation.here.simulate_here` gives. Raises also SimulationFailed where
     the process dies or hangs."""
-    ran = isolated(_worked, (scene, fmi_version), progress, bounds(scene))
+    try:
+        ran = isolated(_worked, (scene, fmi_version), progress, bounds(scene))
+    except ProcessLost as lost:
+        if not scene.fmu:
+            raise
+        names = ", ".join(fmu.name for fmu in scene.fmu)
+        raise ProcessLost(
+            f"{str(lost).rstrip('.')}; of its FMUs ({names}) one may be why."
+        ) from None
     progress(scene.run.duration)
     return Result(*ran)
 

@@ -99,8 +99,8 @@ class Run:
             self._engine().transient(self.deck.text, self.deck.vectors, self)
         finally:
             self._attend()
-            for side in self.plan.sides:
-                side.close()
+            for side, state_of in zip(self.plan.sides, self.fmus, strict=False):
+                side.close(state_of.state)
         if state.status == FMU_FAILED:
             raise self._fmu_failure()
         if state.status == NOT_FINITE:

@@ -3,7 +3,8 @@
 import ctypes
 from collections import defaultdict
 from collections.abc import Sequence
-from ctypes import c_double, c_uint32
+from contextlib import suppress
+from ctypes import c_double, c_uint32, c_void_p
 from typing import Any
 
 from cosim.coupling.loop.structures import Fmu, loop
@@ -16,6 +17,9 @@ _FUNCTIONS = {
     3: {"Enumeration": "Int64"},
 }
 """What sets and reads a type, where it is not of the same name."""
+
+_ERROR = 3
+"""The status of a call, in both versions, from which on an instance is not to be used."""
 
 
 class Side:
@@ -138,9 +142,14 @@ class Side:
         array.used = len(groups)
         return array
 
-    def close(self) -> None:
-        """End the use of the instance."""
-        self.instance.close()
+    def close(self, state: int | None) -> None:
+        """End the use of the instance, and of the state that it has saved. One that has failed is
+        left alone, since nothing may be asked of it any more."""
+        if self.fmu.status < _ERROR:
+            with suppress(Exception):
+                if state:
+                    self.instance.free_state(c_void_p(state))
+                self.instance.close()
 
 
 def _grouped(variables: Sequence[Variable]) -> list[Variable]:
