@@ -62,6 +62,9 @@ class Leader(Protocol):
     def finish(self) -> None:
         """No further step comes; the last one was not told of."""
 
+    def loaded(self, engine: "Engine") -> None:
+        """The circuit is there, its run not yet begun."""
+
     def stop(self) -> None:
         """Nothing is to be done any more: the sources become NaN, so that no step succeeds."""
 
@@ -114,7 +117,7 @@ class Engine(Shared.NgSpiceShared):
         # PySpice leaves GetSyncData out; a second call puts it in, and a faster GetVSRCData.
         self._library.ngSpice_Init_Sync(
             _ffi.cast("GetVSRCData *", callbacks.source),
-            self._get_isrc_data_c,
+            _ffi.cast("GetISRCData *", callbacks.source),  # which has the same arguments
             _ffi.cast("GetSyncData *", callbacks.step),
             _ffi.NULL,
             self._self_c,
@@ -149,6 +152,8 @@ class Engine(Shared.NgSpiceShared):
             # with "error" in its name, for a failure. What fails is known by what is missing.
             self._load(deck)
             if not self.poisoned:
+                if self._leader is not None:
+                    self._leader.loaded(self)
                 self._library.ngSpice_Command(b"run")
             if self._failure is not None:
                 raise self._failure
@@ -160,6 +165,19 @@ class Engine(Shared.NgSpiceShared):
     def _load(self, deck: str) -> None:
         lines = [_ffi.new("char[]", line.encode()) for line in (*deck.splitlines(), "")]
         self._library.ngSpice_Circ(_ffi.new("char *[]", [*lines, _ffi.NULL]))
+
+    def address(self, function: str) -> int:
+        """Where compiled code finds one of the library's functions."""
+        return int(_ffi.cast("uintptr_t", getattr(self._library, function)))
+
+    def ask(self, device: str) -> list[float]:
+        """The values of a device's parameter, ``@v1[pulse]``; none where it has no such one."""
+        found = self._library.ngGet_Vec_Info(device.encode())
+        values: list[float] = []
+        if found != _ffi.NULL and found.v_realdata != _ffi.NULL:
+            values = [float(found.v_realdata[k]) for k in range(found.v_length)]
+            self._library.ngSpice_Command(f"unlet {device}".encode())
+        return values
 
     def said(self) -> str:
         """ngspice's own words of trouble, as the end of a message."""

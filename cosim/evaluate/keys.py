@@ -19,6 +19,9 @@ def numeric_key(name: str) -> Key:
     if table == "drive" and LEVEL_KEY.fullmatch(bare):
         text = f"Level of pair {bare.partition('.')[2]} of drive.table"
         return Key(table, bare, "1", None, float, None, -0.5, 0.5, text, "")
+    if (table, bare.partition(".")[0]) == ("circuit", "param") or (table == "fmu" and "." in bare):
+        text = f"Value of {bare}, of the user's own"
+        return Key(table, bare, "?", None, float, None, -1e30, 1e30, text, "")
     if any(key.full == name for key in keys()):
         raise BadInput(f"--over {plain(name)}: this key is not a number.")
     bare = [full for full, key in numeric.items() if key.name == name]

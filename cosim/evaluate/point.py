@@ -105,7 +105,7 @@ def outcome_of(record: Any) -> Outcome | None:
     one of the machine's."""
     try:
         numbers, failure, machine = record["numbers"], record["failure"], record["machine"]
-        named = all(name.isidentifier() and len(name) < 100 for name in numbers)
+        named = all(name.isprintable() and 0 < len(name) < 300 for name in numbers)
         values = [float(value) for value in numbers.values() if type(value) in (int, float)]
     except (TypeError, KeyError, AttributeError, OverflowError):
         return None

@@ -55,16 +55,18 @@ class Interface(ABC):
     _slave: ClassVar[Any]
     _step_ends: tuple[Any, ...]  # what a call of do_step ends with
 
-    def __init__(self) -> None:
+    def __init__(self, loaded: Any = None) -> None:
+        """Of an FMU that fmpy has ``loaded``; by default the project's own."""
         self.messages: list[str] = []
         """What the FMU has said, the newest last."""
         self._running = False
-        self._fmu = copy(load(self.version))
+        self._fmu = copy(load(self.version) if loaded is None else loaded)
         self._begin(new=True)
         self._names = {name: names[self.version - 2] for name, names in _FUNCTIONS.items()}
         self._call = {
             name: partial(getattr(self._fmu, function), self._fmu.component)
             for name, function in self._names.items()
+            if hasattr(self._fmu, function)  # a stranger may lack what it does not need
         }
 
     @abstractmethod
@@ -88,6 +90,11 @@ class Interface(ABC):
         self._running = False
         self.messages.clear()
         self._begin(new=False)
+
+    @property
+    def raw(self) -> Any:
+        """fmpy's own object."""
+        return self._fmu
 
     def initialise(self) -> None:
         """End the initialisation, in which parameters could be set."""

@@ -24,6 +24,8 @@ class Key:
     text: str
     variable: str
     """The FMU's variable that the key is; empty where it is none."""
+    words: str = ""
+    """What may stand there, where neither kind nor choices say it."""
 
     @property
     def full(self) -> str:
@@ -33,6 +35,8 @@ class Key:
     @property
     def allowed(self) -> str:
         """What may stand there, as the end of "… must be …"."""
+        if self.words:
+            return self.words
         if self.choices:
             quoted = [f'"{one}"' if isinstance(one, str) else str(one) for one in self.choices]
             return quoted[0] if len(quoted) == 1 else f"one of {', '.join(quoted)}"
@@ -40,8 +44,6 @@ class Key:
             return "the path of a file"
         if self.kind is bool:
             return "true or false"
-        if self.kind is list:
-            return "a list of 1 to 64 pairs of numbers, [[phase, level], ...]"
         number = "a whole number" if self.kind is int else "a number"
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"{number} from {self.low:g} to {self.high:g}{unit}"
@@ -70,6 +72,7 @@ def _key(table: str, name: str) -> Key:
         high=limits.get("le"),
         text=field.description or "",
         variable=str(extra.get("variable", "")),
+        words=str(extra.get("words", "")),
     )
 
 

@@ -18,7 +18,15 @@ from cosim.scene import messages, toml
 from cosim.scene.describe import acts, keys
 from cosim.scene.methods import METHODS
 from cosim.scene.model import Scene, toml_value
-from cosim.scene.tables import KNOBS, LEVEL_KEY, NORMAL_FORCES, PATHS, TABLES
+from cosim.scene.tables import (
+    KNOBS,
+    LEVEL_KEY,
+    NORMAL_FORCES,
+    PARAM_KEY,
+    PATHS,
+    PORT_LISTS,
+    TABLES,
+)
 
 _FULL = frozenset(key.full for key in keys())
 
@@ -208,14 +216,31 @@ def _check_names(data: dict[str, Any], origin: str) -> None:
     for name, content in data.items():
         if name in ("name", "description", "base"):
             continue
+        if name in PORT_LISTS:
+            _check_list(name, content, origin)
+            continue
         if name not in TABLES:
             raise messages.bad(f"{origin}: {messages.unknown_table(name)}")
         if not isinstance(content, dict):
             raise BadInput(f"{origin}: {name} = {messages.shown(content)} must be a table.")
         known = TABLES[name].model_fields
         for key in content:
-            if key not in known and not (name == "drive" and LEVEL_KEY.fullmatch(key)):
+            single = {"drive": LEVEL_KEY, "circuit": PARAM_KEY}.get(name)
+            if key not in known and not (single and single.fullmatch(key)):
                 raise messages.bad(f"{origin}: {messages.unknown_key(name, key)}")
+
+
+def _check_list(name: str, content: Any, origin: str) -> None:
+    """Of ``[[fmu]]`` and ``[[port]]``; or, as an override has them, parameters of FMUs."""
+    if name == "fmu" and isinstance(content, dict) and all("." in key for key in content):
+        return
+    if not (isinstance(content, list) and all(isinstance(each, dict) for each in content)):
+        hint = "; a parameter is fmu.name.parameter" if name == "fmu" else ""
+        raise BadInput(f"{origin}: {name} must be a list of tables, [[{name}]]{hint}.")
+    known = [field.alias or key for key, field in PORT_LISTS[name].model_fields.items()]
+    for key in (key for each in content for key in each if key not in known):
+        hint = messages.suggestion(key, known) or f" (keys: {', '.join(known)})"
+        raise messages.bad(f'{origin}: there is no key "{plain(key)}" in [[{name}]]{hint}')
 
 
 def _parsed(overrides: Iterable[str]) -> Iterator[tuple[str, Any]]:
@@ -260,6 +285,9 @@ def _find_files(tables: dict[str, Any], folder: Path) -> None:
         path = tables.get(table, {}).get(key)
         if isinstance(path, str):
             tables[table][key] = os.path.abspath(folder / path)
+    for fmu in tables.get("fmu", ()):
+        if isinstance(fmu, dict) and isinstance(fmu.get("file"), str):
+            fmu["file"] = os.path.abspath(folder / fmu["file"])
 
 
 def _value(text: str) -> Any:
@@ -291,6 +319,9 @@ def _merge(layers: list[_Layer]) -> dict[str, Any]:
     merged: dict[str, Any] = {}
     for layer in layers:
         for table, content in layer.tables.items():
+            if table == "fmu" and isinstance(content, dict):
+                merged[table] = _with_parameters(merged.get(table, []), content, layer.origin)
+                continue
             if table not in TABLES:
                 merged[table] = content
                 continue
@@ -300,6 +331,21 @@ def _merge(layers: list[_Layer]) -> dict[str, Any]:
                 below.pop(twins[key], None)
             below.update(content)
     return merged
+
+
+def _with_parameters(
+    fmus: list[dict[str, Any]], given: dict[str, Any], origin: str
+) -> list[dict[str, Any]]:
+    """The FMUs with other values for parameters: ``{"name.parameter": value}``."""
+    found = [fmu | {"parameters": {**fmu.get("parameters", {})}} for fmu in fmus]
+    by_name = {fmu.get("name"): fmu for fmu in found}
+    for key, value in given.items():
+        name, _, parameter = key.partition(".")
+        if name not in by_name:
+            known = ", ".join(map(str, by_name)) or "none"
+            raise BadInput(f"{origin}: fmu.{plain(key)}: there is no such FMU (known: {known}).")
+        by_name[name]["parameters"][parameter] = value
+    return found
 
 
 def _origins(layers: list[_Layer]) -> dict[str, tuple[int, str]]:
@@ -318,6 +364,8 @@ def _tell_idle(scene: Scene, layers: list[_Layer]) -> None:
     Not where a later layer chose these, nor for a scene.toml, which has every key.
     """
     origins = _origins(layers)
+    if scene.has_ports:
+        return  # its keys are of another machine
     chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
     every = [k for k in keys() if k.default is not None and k.name not in KNOBS.values()]
     silent = [

@@ -11,7 +11,7 @@ from cosim.scene.describe import Key, acts, keys
 from cosim.scene.methods import METHODS, CouplingMethod
 from cosim.scene.model import toml_value
 from cosim.scene.rungs import RUNGS, Rung
-from cosim.scene.tables import GIVEN_SURFACES, TABLES
+from cosim.scene.tables import GIVEN_SURFACES, PORT_LISTS, TABLES
 
 ALLOWED_TOP = {
     "name": "at most 64 letters, digits, blanks and ._+- that begin with a letter or digit",
@@ -108,9 +108,27 @@ def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], defa
         layers = [origins[key] for key in first["ctx"]["keys"] if key in origins]
         origin = max(layers)[1] if layers else default
         return f"{origin}: {ended(first['ctx']['sentence'])}"
+    if first["loc"][0] in PORT_LISTS:
+        return _of_list(first, origins.get(first["loc"][0], (0, default))[1])
     full = ".".join(str(part) for part in first["loc"][:2])  # not the place in a list
     key = next((key for key in keys() if key.full == full), None)
     allowed = key.allowed if key else ALLOWED_TOP.get(full, "a table")
     hint = suggestion(shown(first["input"]).strip('"'), map(str, (key and key.choices) or ()))
     origin = origins.get(full, (0, default))[1]
     return ended(f"{origin}: {full} = {shown(first['input'])} must be {allowed}{hint}")
+
+
+def _of_list(fault: Any, origin: str) -> str:
+    """A sentence on a key of ``[[fmu]]`` or ``[[port]]``."""
+    table, *place = fault["loc"]
+    if len(place) < 2:
+        return f"{origin}: [[{table}]] is given too often."
+    fields = PORT_LISTS[table].model_fields
+    field = next(each for name, each in fields.items() if place[1] in (name, each.alias))
+    extra: Any = field.json_schema_extra or {}
+    limits = {k: getattr(m, k) for m in field.metadata for k in ("ge", "le") if hasattr(m, k)}
+    allowed = extra.get("words") or "a number from {ge:g} to {le:g}".format(**limits)
+    what = f"{origin}: [[{table}]] {place[0] + 1}: {place[1]}"
+    if fault["type"] == "missing":
+        return f"{what} is missing; it must be {allowed}."
+    return ended(f"{what} = {shown(fault['input'])} must be {allowed}")

@@ -31,6 +31,8 @@ _ALL = (
     CouplingMethod(
         "companion", "macro steps, circuit carries the inertia of the mechanics", {"macro_step"}
     ),
+    CouplingMethod("macro-steps", "explicit macro steps of the scene's own FMUs", {"macro_step"}),
+    CouplingMethod("redo", "own FMUs and ngspice repeat each step until they agree"),
     CouplingMethod(
         "auto",
         "cheapest method and steps of ngspice within coupling.tolerance",
@@ -38,6 +40,9 @@ _ALL = (
         chooses={"reltol", "max_step"},
     ),
 )
+
+OF_PORTS = ("auto", "step-locked", "macro-steps", "redo")
+"""Those for a scene with its own ports; of them the last two are for no other."""
 
 METHODS = {method.name: method for method in _ALL}
 """Every method by its name; the order is that in which messages list them."""

@@ -9,19 +9,23 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cosim.scene import firmware
 from cosim.scene.describe import Key, keys
+from cosim.scene.methods import OF_PORTS
 from cosim.scene.rungs import RUNGS, Rung
 from cosim.scene.tables import (
     COMMANDS,
     GIVEN_SURFACES,
     KNOBS,
     PATHS,
+    PORT_LISTS,
     TABLES,
     Circuit,
     Coil,
     Coupling,
     Drive,
+    Fmu,
     Friction,
     Mechanics,
+    Port,
     Run,
     fault,
 )
@@ -76,6 +80,8 @@ class Scene(BaseModel):
     friction: Friction = Friction()
     coupling: Coupling = Coupling()
     run: Run = Run()
+    fmu: list[Fmu] = Field(default_factory=list, max_length=64)
+    port: list[Port] = Field(default_factory=list, max_length=1024)
 
     @model_validator(mode="before")
     @classmethod
@@ -101,6 +107,44 @@ class Scene(BaseModel):
         known = {name: getattr(self.run, name) for name in given}
         run = Run.model_construct(given, **fitted | known)
         object.__setattr__(self, "run", run)
+        return self
+
+    @model_validator(mode="after")
+    def _check_ports(self) -> "Scene":
+        """What can be known of ports before the FMUs and the netlist are read."""
+        method, model = self.coupling.method, self.circuit.model
+        if not self.has_ports:
+            if method in OF_PORTS[2:]:
+                raise fault(f'coupling.method = "{method}" is for scenes with their own [[port]]')
+            if self.circuit.save or self.circuit.param:
+                raise fault("circuit.save and circuit.param are for scenes with their own [[port]]")
+            return self
+        if not self.rung.own_netlist:
+            raise fault(f'[[fmu]] and [[port]] need circuit.model = "file", not "{model}"')
+        if method not in OF_PORTS:
+            known = ", ".join(f'"{name}"' for name in OF_PORTS)
+            raise fault(f'coupling.method = "{method}" must be one of {known} with [[port]]')
+        if self.run.solver != "fmu":
+            raise fault('run.solver must be "fmu" with [[port]]')
+        names = [fmu.name for fmu in self.fmu]
+        for name in names:
+            if names.count(name) > 1 or name == "drive":
+                raise fault(f'[[fmu]] name = "{name}" must be another: it is taken')
+        for port in self.port:
+            for key, end in (("from", port.origin), ("to", port.to)):
+                name, dot, _ = (end or "").partition(".")
+                if (
+                    end is not None
+                    and (key, end) != ("from", "drive")
+                    and (name not in names or not dot)
+                ):
+                    known = ", ".join(f"{name}.…" for name in names) or "of an FMU; there is none"
+                    raise fault(f'[[port]] {key} = "{end}" must be a variable {known}')
+        for key in ("source", "to"):
+            given = [str(getattr(port, key)).lower() for port in self.port if getattr(port, key)]
+            for end in given:
+                if given.count(end) > 1:
+                    raise fault(f'[[port]] {key} = "{end}" is given twice')
         return self
 
     @model_validator(mode="after")
@@ -265,6 +309,8 @@ class Scene(BaseModel):
         file. That of the firmware's staircase differs from 1 / ``drive.frequency``.
         """
         drive = self.drive
+        if self.has_ports and not any(port.origin == "drive" for port in self.port):
+            return inf
         if not self.rung.driven and (not self.surface_is_given or drive.waveform == "file"):
             return inf
         if self.rung.driven and drive.quantised:
@@ -275,7 +321,13 @@ class Scene(BaseModel):
     def files(self) -> dict[str, str]:
         """The paths of the files that the scene names, by key."""
         given = {key: getattr(getattr(self, table), key) for table, key in PATHS}
+        given |= {f"fmu.{fmu.name}": fmu.file for fmu in self.fmu}
         return {key: path for key, path in given.items() if path is not None}
+
+    @property
+    def has_ports(self) -> bool:
+        """Whether circuit and FMUs are the user's own, joined by ports."""
+        return bool(self.fmu or self.port)
 
     @property
     def rung(self) -> Rung:
@@ -290,10 +342,14 @@ class Scene(BaseModel):
     def as_dict(self) -> dict[str, Any]:
         """The scene as plain tables that load to an equal scene, without absent or doubled keys."""
         data: dict[str, Any] = {"name": self.name, "description": self.description}
-        return data | {table: self.table(table) for table in TABLES}
+        data |= {table: self.table(table) for table in TABLES}
+        return data | {name: self.table(name) for name in PORT_LISTS if getattr(self, name)}
 
-    def table(self, name: str) -> dict[str, Any]:
+    def table(self, name: str) -> Any:
         """One of the tables of :meth:`as_dict`."""
+        if name in PORT_LISTS:
+            own = getattr(self, name)
+            return [each.model_dump(exclude_none=True, by_alias=True) for each in own]
         values = getattr(self, name).model_dump(exclude_none=True)
         for knob, key in KNOBS.items():
             if name == "drive" and knob in values:
@@ -303,8 +359,11 @@ class Scene(BaseModel):
         return values
 
 
-def toml_value(value: bool | float | int | str | list[Any]) -> str:
+def toml_value(value: bool | float | int | str | list[Any] | dict[str, Any]) -> str:
     """A value as TOML spells it."""
+    if isinstance(value, dict):
+        pairs = (f"{toml_value(key)} = {toml_value(each)}" for key, each in value.items())
+        return f"{{ {', '.join(pairs)} }}"
     if isinstance(value, list):
         return f"[{', '.join(map(toml_value, value))}]"
     if isinstance(value, bool):
@@ -330,6 +389,10 @@ def to_toml(scene: Scene) -> str:
             shown = "" if value is None else toml_value(value)
             unit = "" if key.unit in ("", "1") else f"{key.unit}; "
             lines.append(f"{mark}{key.name} = {shown}  # {unit}{key.text}{_turned(scene, key)}")
+    for table in PORT_LISTS:
+        for each in scene.table(table):
+            lines += ["", f"[[{table}]]"]
+            lines += [f"{key} = {toml_value(value)}" for key, value in each.items()]
     return "\n".join(lines) + "\n"
 
 

@@ -13,6 +13,7 @@ _SWING = {"swing_loss_high", "swing_loss_low"}
 _LIMIT = {"current_limit"}
 _SNUBBER = {"snubber_resistance", "snubber_capacitance"}
 _DYNAMICS = {"gain_bandwidth", "open_loop_gain", "slew_rate", "output_resistance"} | _SNUBBER
+_OWN = {"netlist", "save", "param"}
 _OF_NGSPICE = _SOLVER | _SUPPLY | _SWING | _LIMIT | _DYNAMICS
 
 
@@ -85,7 +86,7 @@ _ALL = (
         automatic=True,
     ),
     Rung("none", "no coil", frozenset(), driven=False),
-    Rung("file", "netlist named in circuit.netlist", _OF_NGSPICE | {"netlist"}, ngspice=True),
+    Rung("file", "netlist named in circuit.netlist", _OF_NGSPICE | _OWN, ngspice=True),
 )
 
 RUNGS = {rung.name: rung for rung in _ALL}

@@ -33,8 +33,9 @@ def _of_fmu(name: str, least: float | None = None) -> Any:
     return _number(start, known.unit, low, known.high, known.text, name)
 
 
-def _choice(default: Any, text: str, unit: str = "") -> Any:
-    return Field(default, description=text, json_schema_extra={"unit": unit})
+def _choice(default: Any, text: str, unit: str = "", words: str = "") -> Any:
+    """Of any kind; ``words`` say what may stand there, where its type does not."""
+    return Field(default, description=text, json_schema_extra={"unit": unit, "words": words})
 
 
 def _declared(default: str, lead: str, registry: Mapping[str, Rung | CouplingMethod]) -> Any:
@@ -112,6 +113,10 @@ LEVEL_KEY = re.compile(r"table\.([1-9]\d?)")
 """The level of a pair of ``drive.table``, the first being 1, as a key of its own."""
 
 
+PARAM_KEY = re.compile(r"param\.[A-Za-z_]\w*")
+"""A ``.param`` of a netlist as a key of its own, in ``[circuit]``."""
+
+
 class Drive(Table):
     """The command V1 at the power amplifier's input.
 
@@ -127,6 +132,7 @@ class Drive(Table):
         None,
         "Shape of steps and pieces: 1 to 64 pairs of phase, 0 to 1, and level, -0.5 to 0.5, that "
         "of the offset being 0; two of one phase make a jump",
+        words="a list of 1 to 64 pairs of numbers, [[phase, level], ...]",
     )
     duty: float = _number(0.5, "1", 0.0, 1.0, "Share of the period that the square wave is high")
     frequency: float = _number(
@@ -269,6 +275,16 @@ class Circuit(Table):
 
     model: str = _declared("amplifier", "Circuit", RUNGS)
     netlist: str | None = _choice(None, "Path of the user's netlist, relative to the scene file")
+    save: list[str] | None = _choice(
+        None,
+        "With ports: vectors and expressions of the netlist that go into the waveforms",
+        words='a list of texts such as ["v(out)", "v(a)*i(Va)"]',
+    )
+    param: dict[str, float] | None = _choice(
+        None,
+        "With ports: values, SI, for .param lines of the netlist, by their names",
+        words="a table of numbers, { R1 = 1.0 }",
+    )
     supply: float = _number(18.0, "V", 0.1, 1e3, "Supply voltage, both signs")
     sense_resistance: float = _of_fmu("sense_resistance")
     current_limit: float = _of_fmu("current_limit")
@@ -304,6 +320,19 @@ class Circuit(Table):
     max_step: float = _number(
         1.4e-4, "s", 1e-9, 1e-2, "Largest step of ngspice; 2e-05 by default with file"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _take_params(cls, data: Any) -> Any:
+        """A ``.param`` may be given as a key of its own, as an override does."""
+        if not isinstance(data, dict):
+            return data
+        given = {name: data[name] for name in data if PARAM_KEY.fullmatch(str(name))}
+        known = data.get("param") or {}
+        if not given or not isinstance(known, dict):
+            return data
+        own = {name.partition(".")[2]: value for name, value in given.items()}
+        return {name: data[name] for name in data if name not in given} | {"param": known | own}
 
     @model_validator(mode="after")
     def _check(self) -> "Circuit":
@@ -517,6 +546,82 @@ class Run(Table):
             )
         return self
 
+
+class Fmu(Table):
+    """An FMU of the user's own."""
+
+    name: str = Field(
+        pattern=r"^[A-Za-z_]\w*$",
+        max_length=32,
+        description="Name, by which ports call it",
+        json_schema_extra={"words": "a name of letters, digits and _, but not drive"},
+    )
+    file: str = Field(
+        description="Path of an FMU for co-simulation, FMI 2.0 or 3.0, relative to the scene file",
+        json_schema_extra={"words": "the path of a file"},
+    )
+    parameters: dict[str, float | int | bool | str] = Field(
+        default_factory=dict,
+        description="Start values of its parameters, and of inputs that no port feeds",
+        json_schema_extra={"words": "a table of values, { J = 1e-4 }"},
+    )
+
+
+_FEEDS = Literal["mean", "line", "end"]
+
+
+class Port(Table):
+    """What is joined to what."""
+
+    probe: str | None = _choice(
+        None, "Vector or expression of the netlist", words='a text such as "i(Vemf)"'
+    )
+    origin: str | None = Field(
+        None,
+        alias="from",
+        description="Output of an FMU, name.output, or drive, the command of [drive]",
+        json_schema_extra={"words": 'a text such as "rotor.omega", or "drive"'},
+    )
+    source: str | None = _choice(
+        None, "Voltage or current source of the netlist that follows it", words="a source's name"
+    )
+    to: str | None = _choice(
+        None, "Input of an FMU that follows it, name.input", words='a text such as "rotor.torque"'
+    )
+    scale: float = _number(1.0, "1", -1e12, 1e12, "Value there = scale * value here + offset")
+    offset: float = _number(0.0, "1", -1e12, 1e12, "See scale")
+    slope: str = _choice(
+        "auto",
+        "How a source goes on until the next communication point: held, with the difference of the "
+        "last two, with the output named here as its slope; auto: with what the FMU tells of its "
+        "slope, else the difference",
+        words='"auto", "difference", "held", or an output of the same FMU',
+    )
+    feed: _FEEDS = _choice(
+        "mean",
+        "What an input is given for a step: mean, line (its start and slope) or end",
+        words='one of "mean", "line", "end"',
+    )
+
+    @property
+    def words(self) -> str:
+        """Both ends, for messages."""
+        return f"{self.probe or self.origin} -> {self.source or self.to}"
+
+    @model_validator(mode="after")
+    def _check(self) -> "Port":
+        if (self.probe is None) == (self.origin is None):
+            raise fault(f"the port {self.words} must have either probe or from")
+        if (self.source is None) == (self.to is None) or (self.probe and self.source):
+            raise fault(
+                f"the port {self.words} must lead to one thing: from a probe to an input (to), "
+                "else to an input or to a source"
+            )
+        return self
+
+
+PORT_LISTS: dict[str, type[Table]] = {"fmu": Fmu, "port": Port}
+"""Lists of tables: what a scene with its own machine is made of."""
 
 TABLES: dict[str, type[Table]] = {
     "drive": Drive,

@@ -3,7 +3,7 @@
 What only the worker needs is not imported here, since it takes a while.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,16 +15,24 @@ from cosim.files.spill import Packed, place
 from cosim.scene import Scene
 from cosim.toolchain import fence
 from cosim.toolchain.libraries import ngspice_library
-from cosim.toolchain.processes import Bounds, Progress, end_idle, isolated
+from cosim.toolchain.processes import Bounds, ProcessLost, Progress, end_idle, isolated
 from cosim.waveforms.result import Result
 
 
 def simulate_elsewhere(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     """What :func:`cosim.simulation.here.simulate_here` gives. Raises also SimulationFailed where
     the process dies or hangs."""
-    ran, columns, summary = isolated(_worked, (scene, fmi_version), progress, bounds(scene))
+    try:
+        ran = isolated(_worked, (scene, fmi_version), progress, bounds(scene))
+    except ProcessLost as lost:
+        if not scene.fmu:
+            raise
+        names = ", ".join(fmu.name for fmu in scene.fmu)
+        raise ProcessLost(
+            f"{str(lost).rstrip('.')}; of its FMUs ({names}) one may be why."
+        ) from None
     progress(scene.run.duration)
-    return Result(ran, columns, summary)
+    return Result(*ran)
 
 
 def summary_elsewhere(scene: Scene, progress: Progress) -> dict[str, Any]:
@@ -63,7 +71,9 @@ def _load(code_models: bool) -> None:
     engine(code_models)
 
 
-def _worked(given: tuple[Scene, int], progress: Progress) -> tuple[Scene, Packed, dict[str, Any]]:
+def _worked(
+    given: tuple[Scene, int], progress: Progress
+) -> tuple[Scene, Packed, dict[str, Any], Mapping[str, str]]:
     """A run in a worker."""
     from cosim.simulation.here import simulate_here
 
@@ -72,9 +82,9 @@ def _worked(given: tuple[Scene, int], progress: Progress) -> tuple[Scene, Packed
     if scene.rung.own_netlist and fence.lacking:
         result.summary["notes"].append(
             f"this system has no {' and no '.join(fence.lacking)}: nothing but the reader's own "
-            "checks stands between the netlist and your files."
+            "checks stands between the netlist, or an FMU's code, and your files."
         )
-    return result.scene, Packed(result.columns), result.summary
+    return result.scene, Packed(result.columns), result.summary, result.units
 
 
 def _summed_up(scene: Scene, progress: Progress) -> dict[str, Any]:

@@ -21,6 +21,8 @@ from cosim.waveforms.result import Result
 def simulate_here(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     """The run of a scene whose circuit and coupling are chosen. Raises as
     :func:`cosim.simulation.simulate.simulate` does."""
+    if scene.has_ports:
+        return _joined(scene, progress)
     if scene.surface_is_given:
         waveforms, summary = _followed_surface(scene)
         progress(scene.run.duration)
@@ -34,10 +36,18 @@ def simulate_here(scene: Scene, progress: Progress, fmi_version: int) -> Result:
 
 def summary_here(scene: Scene, progress: Progress) -> dict[str, Any]:
     """The summary alone, without notes."""
+    if scene.has_ports:
+        return _joined(few_rows(scene), progress).summary
     if scene.surface_is_given:
         return _followed_surface(scene)[1]
     with closing(Mechanics(scene)) as mechanics:
         return _driven(scene, mechanics, progress)[2]
+
+
+def _joined(scene: Scene, progress: Progress) -> Result:
+    from cosim.coupling.ports.results import joined
+
+    return Result(scene, *joined(scene, progress))
 
 
 def few_rows(scene: Scene) -> Scene:

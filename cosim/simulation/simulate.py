@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Literal
 
-from cosim.errors import BeyondModel
+from cosim.errors import BadInput, BeyondModel
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.elsewhere import simulate_elsewhere, summary_elsewhere
@@ -59,6 +59,10 @@ def simulate(
     Every circuit in ngspice runs in a worker process, behind a fence. Raises BadInput for a netlist
     that cannot be used, SimulationFailed with where, when, and what to try.
     """
+    if scene.has_ports:
+        if checks == "strict":
+            raise BadInput("--error tells of the built-in machine, not of a scene's own [[port]].")
+        return _where_it_may(scene, progress, fmi_version)
     if scene.run.solver == "fast":
         from cosim.simulation.fast import simulate_fast
 
@@ -74,6 +78,10 @@ def simulate(
         from cosim.simulation.choose_steps import simulate_within_tolerance
 
         return simulate_within_tolerance(scene, again)
+    return _where_it_may(scene, progress, fmi_version)
+
+
+def _where_it_may(scene: Scene, progress: Progress, fmi_version: int) -> Result:
     if scene.rung.ngspice and not in_a_worker():
         return simulate_elsewhere(scene, progress, fmi_version)
     from cosim.simulation.here import simulate_here
@@ -87,7 +95,9 @@ def summary(scene: Scene, progress: Progress = lambda _: None) -> dict[str, Any]
         from cosim.simulation.fast import summary_fast
 
         return summary_fast(scene, progress)
-    if scene.rung.automatic or (scene.rung.ngspice and scene.coupling.method == "auto"):
+    if scene.rung.automatic or (
+        scene.rung.ngspice and scene.coupling.method == "auto" and not scene.has_ports
+    ):
         return simulate(scene, progress).summary
     if scene.rung.ngspice and not in_a_worker():
         return summary_elsewhere(scene, progress)

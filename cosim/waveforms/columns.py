@@ -44,3 +44,14 @@ before it; the first row is the machine at rest, without command, or a given sur
 """
 
 UNITS = {name: column.unit for name, column in COLUMNS.items()}
+
+
+def about(name: str, unit: str) -> dict[str, str]:
+    """The attributes of a column in a dataset; one that a scene's own FMUs gave has no more words
+    than its name."""
+    return {"units": unit} | ({"long_name": COLUMNS[name].long_name} if name in COLUMNS else {})
+
+
+def netcdf_name(name: str) -> str:
+    """A name as netCDF can have it: without a slash, and with a letter, digit or _ first."""
+    return ("" if name[:1].isalnum() else "_") + name.replace("/", "|")

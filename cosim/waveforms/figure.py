@@ -1,7 +1,7 @@
 """The figure of a run: what the circuit did, and what the mechanics made of it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -62,6 +62,27 @@ def draw(scene: Scene, waves: dict[str, Array], numbers: dict[str, Any]) -> Pict
         axis.grid(alpha=0.25)
     figure.suptitle(title, fontsize=12, y=1 - 0.08 / height, va="top")
     figure.text(0.5, 1 - 0.33 / height, beside, fontsize=10, ha="center", va="top")
+    return figure
+
+
+MOST_PANELS = 12
+
+
+def draw_own(scene: Scene, waves: dict[str, Array], units: Mapping[str, str]) -> Picture:
+    """The figure of a run of a scene with its own FMUs: a panel for each waveform, up to
+    MOST_PANELS, the whole run above all."""
+    names = [name for name in waves if name != "time"][:MOST_PANELS]
+    columns = 1 if len(names) < 4 else 2
+    rows = -(-len(names) // columns)
+    figure = Picture(13.0, 1.2 + 1.9 * rows, layout="constrained")
+    for axis, name in zip(figure.subplots(rows, columns, squeeze=False).flat, names, strict=False):
+        axis.plot(*_outline(waves["time"], waves[name]), color=SURFACE, lw=0.8)
+        if scene.run.settle > 0:
+            axis.axvspan(0, scene.run.settle, color="0.93", zorder=0)
+        axis.set(xlim=(0, scene.run.duration), xlabel="time [s]", ylabel=f"[{units[name]}]")
+        axis.set_title(name.replace("$", "\\$"), loc="left", fontsize=10.5)
+        axis.grid(alpha=0.25)
+    figure.suptitle((scene.description or scene.name).replace("$", "\\$"), fontsize=12)
     return figure
 
 

@@ -83,6 +83,9 @@ SUMMARY: dict[str, Quantity] = {
     "slip_by_surface": Quantity("", "which of these the surface's acceleration passed at instants"),
     "slip_by_camera": Quantity("", "which of these the camera's reading passed, a mean over 4 ms"),
     "circuit_steps": Quantity("1", "steps that ngspice accepted; 0 without it"),
+    "steps_repeated": Quantity(
+        "1", "steps of ngspice that were repeated until circuit and FMUs agreed; own FMUs alone"
+    ),
     "circuit_rejected": Quantity("1", "steps that ngspice tried and rejected"),
     "fmu_steps": Quantity("1", "steps that the FMU was asked for"),
     "wall_time": Quantity("s", "time that the run took"),
@@ -109,6 +112,9 @@ def unit(name: str) -> str:
 
 def meaning(name: str) -> dict[str, str]:
     """The attributes ``units`` and ``long_name`` of an entry in a dataset."""
+    if name not in SUMMARY:  # of a scene with its own FMUs
+        signal, _, what = name.rpartition(".")
+        return {"units": "?", "long_name": f"{what} of {signal}"}
     found = SUMMARY[name]
     return {"units": found.unit, "long_name": found.text}
 

@@ -9,6 +9,8 @@ from cosim.trials.measured import measured
 
 def table(scene: Scene, summary: dict[str, Any]) -> str:
     """The summary in a few lines, in the units of the bench."""
+    if scene.has_ports:
+        return _own(scene, summary)
     lost = summary.get("energy_residual")
     warning = ": too much, take finer steps" if lost and lost > SUSPICIOUS else ""
     taken = "{circuit_model}: {circuit_model_why}" if "circuit_model" in summary else ""
@@ -43,6 +45,27 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
     beside = _measured(scene)
     rows = [(name, value + beside.get(name.strip(), "")) for name, value in rows if value]
     return "\n".join(f"  {name:<24}{value}" for name, value in rows)
+
+
+def _own(scene: Scene, summary: dict[str, Any]) -> str:
+    """The numbers of a scene with its own FMUs, a line for each waveform."""
+    names = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
+    width = max(20, *map(len, names))
+    whats = ("mean", "rms", "least", "greatest")
+    lines = [f"  {'':<{width}}" + "".join(f"{what:>13}" for what in whats)]
+    for name in names:
+        values = "".join(f"{summary[f'{name}.{what}']:>13.6g}" for what in whats)
+        lines.append(f"  {name:<{width}}{values}")
+    steps = f"{summary['circuit_steps']} of ngspice, {summary['fmu_steps']} of FMUs"
+    repeated = f", {summary['steps_repeated']} repeated" if summary["steps_repeated"] else ""
+    time = f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"
+    for what, words in (
+        ("coupling", summary["method"]),
+        ("steps", steps + repeated),
+        ("run time", time),
+    ):
+        lines.append(f"  {what:<{width}} {words}")
+    return "\n".join(lines)
 
 
 def _measured(scene: Scene) -> dict[str, str]:

@@ -2,7 +2,8 @@
 
 import os
 from base64 import b64encode
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -12,7 +13,7 @@ from cosim.arrays import Array
 from cosim.files.atomic import as_json, together
 from cosim.scene import Scene, to_toml
 from cosim.waveforms import identity
-from cosim.waveforms.columns import COLUMNS, UNITS
+from cosim.waveforms.columns import UNITS, about
 from cosim.waveforms.report import table
 from cosim.waveforms.storage import csv, netcdf
 
@@ -34,6 +35,8 @@ class Result:
     scene: Scene
     columns: dict[str, Array]
     summary: dict[str, Any]
+    units: Mapping[str, str] = field(default_factory=lambda: UNITS)
+    """Of the columns at least; those of a scene with its own FMUs are its own."""
 
     @cached_property
     def waveforms(self) -> "xr.Dataset":
@@ -41,7 +44,7 @@ class Result:
         import xarray as xr
 
         variables = {
-            name: ("time", values, {"units": UNITS[name], "long_name": COLUMNS[name].long_name})
+            name: ("time", values, about(name, self.units[name]))
             for name, values in self.columns.items()
         }
         return xr.Dataset(variables, attrs=self._attributes())
@@ -50,6 +53,8 @@ class Result:
         """The figure of the run, as ``figure.png`` shows it."""
         from cosim.waveforms import figure
 
+        if self.scene.has_ports:
+            return figure.draw_own(self.scene, self.columns, self.units)
         return figure.draw(self.scene, self.columns, self.summary)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
@@ -64,10 +69,10 @@ class Result:
         # A kill must not leave the figure of an older run beside the numbers of this one.
         with together(data, outdated=[figure]) as (table, waveforms, scene, summary):
             with open(table, "wb") as file:
-                csv(file, self.columns, UNITS)
+                csv(file, self.columns, self.units)
             run = identity.of_table(table)
             with open(waveforms, "wb") as file:
-                netcdf(file, self.columns, UNITS, self._attributes() | {"run": run})
+                netcdf(file, self.columns, self.units, self._attributes() | {"run": run})
             scene.write_text(to_toml(self.scene), encoding="utf-8")
             summary.write_text(as_json({"run": run, **self.summary}), encoding="utf-8")
         self.plot().write(figure, identity.in_figure(run))

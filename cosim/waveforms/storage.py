@@ -1,5 +1,6 @@
 """Waveforms as files: CSV and netCDF, each written whole or not at all."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from struct import pack
 from typing import IO
@@ -11,7 +12,7 @@ from cosim.errors import BadInput, plain
 from cosim.files.atomic import whole
 from cosim.files.reader import opened
 from cosim.files.spill import blocks
-from cosim.waveforms.columns import COLUMNS
+from cosim.waveforms.columns import about, netcdf_name
 
 _CSV_ROWS = 1024
 
@@ -19,13 +20,13 @@ LARGEST = 1 << 33
 """Bytes of a waveforms.nc that is read: an hour of rows, far more than is ever compared."""
 
 
-def write_csv(path: Path, waveforms: dict[str, Array], units: dict[str, str]) -> None:
+def write_csv(path: Path, waveforms: dict[str, Array], units: Mapping[str, str]) -> None:
     """Comma-separated values: a header row ``name [unit]``, then a row for each time."""
     with whole(path) as temporary, open(temporary, "wb") as file:
         csv(file, waveforms, units)
 
 
-def csv(file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str]) -> None:
+def csv(file: IO[bytes], waveforms: dict[str, Array], units: Mapping[str, str]) -> None:
     """What :func:`write_csv` writes, into an open file."""
     header = ",".join(f"{name} [{units[name]}]" for name in waveforms)
     file.write(f"{header}\n".encode())
@@ -44,7 +45,10 @@ _CHARACTERS, _DOUBLES = 2, 6
 
 
 def netcdf(
-    file: IO[bytes], waveforms: dict[str, Array], units: dict[str, str], attributes: dict[str, str]
+    file: IO[bytes],
+    waveforms: dict[str, Array],
+    units: Mapping[str, str],
+    attributes: dict[str, str],
 ) -> None:
     """NetCDF (classic format) with the dimension ``time``; each variable has its ``units``, and a
     column of a run its ``long_name``. It is written a block of all columns at a time.
@@ -56,25 +60,21 @@ def netcdf(
     head = b"CDF\x02" + pack(">i", 0)
     head += pack(">ii", _DIMENSIONS, 1) + _name("time") + pack(">i", count)
     head += _attributes(attributes) + pack(">ii", _VARIABLES, len(waveforms))
-    about = [
+    heads = [
         # One dimension, the first; the type; the size; then the offset.
-        _name(name) + pack(">ii", 1, 0) + _attributes(_about(name, units[name]))
+        _name(netcdf_name(name)) + pack(">ii", 1, 0) + _attributes(about(name, units[name]))
         + pack(">ii", _DOUBLES, 8 * count)
         for name in waveforms
     ]  # fmt: skip
-    start = len(head) + sum(len(text) + 8 for text in about)
+    start = len(head) + sum(len(text) + 8 for text in heads)
     starts = [start + 8 * count * k for k in range(len(waveforms))]
-    for text, offset in zip(about, starts, strict=True):
+    for text, offset in zip(heads, starts, strict=True):
         head += text + pack(">q", offset)
     file.write(head)
     for part in blocks(count):
         for values, offset in zip(waveforms.values(), starts, strict=True):
             file.seek(offset + 8 * part.start)
             file.write(values[part].astype(">f8").tobytes())
-
-
-def _about(name: str, unit: str) -> dict[str, str]:
-    return {"units": unit} | ({"long_name": COLUMNS[name].long_name} if name in COLUMNS else {})
 
 
 def _name(text: str) -> bytes:
@@ -102,7 +102,7 @@ def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str,
             units = {name: _text(variable.units) for name, variable in file.variables.items()}
             attributes = {name: _text(value) for name, value in file._attributes.items()}
         for name, values in columns.items():
-            if not (name.isidentifier() and (name + units[name]).isascii()):
+            if not ((name + units[name]).isascii() and (name + units[name]).isprintable()):
                 raise ValueError(f"{name!r} in {units[name]!r} is not a name and a unit")
             if values.dtype != ">f8" or values.ndim != 1:
                 raise ValueError(f"{name!r} is not a column")

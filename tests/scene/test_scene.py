@@ -45,6 +45,8 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "circuit": {
         "model": "amplifier",
         "supply": 18,
+        "save": None,
+        "param": None,
         "netlist": None,
         "sense_resistance": 4,
         "current_limit": 2.504,

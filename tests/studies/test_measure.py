@@ -257,7 +257,7 @@ def test_the_recommended_measurement_narrows_more_than_others() -> None:
     """Rigs that are made about the published ones, each the truth and not in the sample: what is
     recommended narrows the interval more than the median of the others does, and it holds the
     truth, in at least five of six."""
-    given = whole(SCENE, ensemble(RIGS, SCENE.friction.normal_force))
+    given = whole(SCENE, ensemble(RIGS, SCENE))
     more = drawn(SCENE, given, 34, np.random.default_rng(0))
     made = drawn(SCENE, given, MADE, np.random.default_rng(2))
     rigs, many = [*given, *more, *made], len(given) + len(more)

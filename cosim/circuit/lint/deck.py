@@ -313,6 +313,11 @@ def _directive(line: Line) -> tuple[str, str]:
     return word.lower(), text[len(word) :].strip()
 
 
+def passed(line: Line) -> str | None:
+    """The text of a logical line if ngspice may see it, None if it is dropped. Raises BadInput."""
+    return _passed(line, *_directive(line))
+
+
 def _passed(line: Line, word: str, rest: str) -> str | None:
     """The line's text if ngspice may see it, None if it is dropped."""
     if "ng_script" in line.text.lower():

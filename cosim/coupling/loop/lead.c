@@ -7,7 +7,6 @@
 
 #include <ctype.h>
 #include <math.h>
-#include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -41,17 +40,6 @@ static const double SMALL_JUMP = 0.1;
 /* In units of the command's range: the first step after a jump grows as that is smaller, till here. */
 
 static const double SETTLED_SHARE = 0.0025; /* of the command's range: an answer that is over */
-
-typedef struct {
-    char *name;
-    double creal, cimag;
-    bool is_scale, is_complex;
-} VectorValue; /* ngspice's vecvalues */
-
-typedef struct {
-    int count, index;
-    VectorValue **vectors;
-} VectorValues; /* ngspice's vecvaluesall */
 
 static const int64_t ATTEND_EVERY = 4096; /* attempted steps; some ten milliseconds */
 
@@ -291,6 +279,8 @@ EXPORT int lead_source(double *voltage, double time, const char *node, int ident
 {
     (void)ident, (void)user;
     Lead *c = run;
+    if (!c)
+        return ports_source(voltage, time, node);
     if (!going(c)) {
         *voltage = NAN;
         return 0;
@@ -313,7 +303,7 @@ EXPORT int lead_data(VectorValues *data, int n, int ident, void *user)
     (void)n, (void)ident, (void)user;
     Lead *c = run;
     if (!c)
-        return 0;
+        return ports_data(data);
     double *values = row_of(c) + LOG_SAVED;
     for (int64_t k = 0; k < c->n_saved; k++)
         values[k] = data->vectors[c->places[k]]->creal;
@@ -324,8 +314,10 @@ EXPORT int lead_data(VectorValues *data, int n, int ident, void *user)
 EXPORT int lead_step(double time, double *delta, double old_delta, int redo, int ident,
                      int location, void *user)
 {
-    (void)old_delta, (void)redo, (void)ident, (void)user;
+    (void)ident, (void)user;
     Lead *c = run;
+    if (!c)
+        return ports_step(time, delta, old_delta, redo, location);
     if (!going(c))
         return 0;
     if (location == 0) {
@@ -366,6 +358,7 @@ void lead_finish(Lead *c)
 int64_t loop_size(int which)
 {
     const size_t sizes[] = {sizeof(Fmu), sizeof(Schedule), sizeof(Recorder), sizeof(Lead),
-                            sizeof(Piece)};
+                            sizeof(Piece), sizeof(Group),    sizeof(Source),   sizeof(Feed),
+                            sizeof(Stranger), sizeof(Pulse), sizeof(Ports)};
     return (int64_t)sizes[which];
 }

@@ -174,6 +174,9 @@ class Lead:
     def finish(self) -> None:
         loop().lead_finish(ctypes.byref(self.state))
 
+    def loaded(self, engine: object) -> None:
+        """Nothing is to be asked of the circuit."""
+
     def stop(self) -> None:
         self.state.stopped = 1
 

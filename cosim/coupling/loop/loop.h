@@ -16,6 +16,7 @@
 
 #include "../../drive/command.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -35,9 +36,30 @@ typedef struct Fmu {
     AnyFunction failed; /* which of them failed */
     double time;        /* reached */
     int64_t steps;      /* so far */
+    int64_t goes_back;  /* whether a step may be repeated */
 } Fmu;
 
 EXPORT void fmu_bind(Fmu *f, int version);
+
+enum { DOUBLES, FLOATS, INT8S, UINT8S, INT16S, UINT16S, INT32S, UINT32S, INT64S, UINT64S, BOOLS, INT_BOOLS };
+
+/* Variables of one type, set or read in one call; all values are numbers on this side. */
+typedef struct {
+    AnyFunction call;
+    const uint32_t *places;
+    int64_t n, size; /* variables; values, of which an array has several */
+    int64_t kind;    /* of the values, as the FMU has them; see the enum above */
+    double *values;
+    void *raw;       /* room for them as the FMU has them */
+} Group;
+
+/* False if they failed. */
+int fmu_set_group(Fmu *f, const Group *group);
+int fmu_get_group(Fmu *f, const Group *group);
+/* Sets or reads the time derivatives of `n` reals, as `call` does. */
+int fmu_slopes(Fmu *f, AnyFunction call, const uint32_t *places, int64_t n, double *slopes);
+int fmu_save(Fmu *f, AnyFunction call, void **state);
+int fmu_restore(Fmu *f, AnyFunction call, void *state);
 
 /* --- recorder.c: moves the mechanics and writes down what they do --- */
 
@@ -106,6 +128,17 @@ EXPORT int recorder_exchange(Recorder *r, double time, double start, double end,
 
 /* --- lead.c: the callbacks of ngspice, which leads --- */
 
+typedef struct {
+    char *name;
+    double creal, cimag;
+    bool is_scale, is_complex;
+} VectorValue; /* ngspice's vecvalues */
+
+typedef struct {
+    int count, index;
+    VectorValue **vectors;
+} VectorValues; /* ngspice's vecvaluesall */
+
 /* What the circuit knows of the mechanics between two macro points. */
 typedef struct {
     double origin; /* s; the macro point that it begins at */
@@ -169,7 +202,7 @@ typedef struct Lead {
     void (*attend)(void);         /* empties the log */
 } Lead;
 
-enum { GOOD, FMU_FAILED, NOT_FINITE, UNKNOWN_SOURCE };
+enum { GOOD, FMU_FAILED, NOT_FINITE, UNKNOWN_SOURCE, NO_AGREEMENT };
 
 /* macro_point of the method step-locked, and of a circuit alone whose back-EMF is a table. */
 EXPORT void macro_point_step_locked(Lead *c);
@@ -178,6 +211,109 @@ EXPORT void macro_point_replayed(Lead *c);
 EXPORT void lead_begin(Lead *c);
 EXPORT void lead_finish(Lead *c);
 
-EXPORT int64_t loop_size(int which); /* bytes of Fmu, Schedule, Recorder, Lead, Piece */
+/* --- ports.c: a circuit and FMUs of the user's own; ngspice leads --- */
+
+enum { FROM_PROBE, FROM_OUTPUT, FROM_DRIVE };
+enum { HELD, DIFFERENCE, KNOWN };
+enum { MEAN, LINE, END };
+
+/* Where a port comes from: value = scale * what is there + offset. */
+typedef struct {
+    int64_t kind, place;       /* among the saved values, or the outputs of all FMUs */
+    int64_t slope, slope_place; /* how an output goes on: see the enum above; KNOWN: that output */
+    double scale, offset;
+} Origin;
+
+/* A source of the netlist; between two communication points a line. */
+typedef struct {
+    char name[64];
+    Origin from;
+    double value, rate;        /* at the communication point; in a second */
+    double guess, off;         /* of the last attempt: the value at its end, and what it lacked */
+    double response;           /* d off / d guess, as last seen */
+    double largest;            /* magnitude of its value so far */
+} Source;
+
+/* An input of an FMU. */
+typedef struct {
+    Origin from;
+    int64_t feed;
+    double *input;
+    double *slope;             /* of LINE; else NULL */
+} Feed;
+
+typedef struct {
+    Fmu *fmu;
+    const Group *inputs, *outputs;
+    int64_t n_inputs, n_outputs;
+    Feed *feeds;
+    int64_t n_feeds;
+    AnyFunction set_slopes, get_slopes;
+    const uint32_t *input_slopes, *output_slopes; /* places of the reals whose slopes they are */
+    int64_t n_input_slopes, n_output_slopes;
+    double *input_rates, *output_rates;
+    AnyFunction save, restore;
+    void *state;               /* at the communication point, where steps are repeated */
+    double *row;               /* its part of the outputs */
+    int64_t width;
+    int64_t moved;             /* steps in which an output changed */
+} Stranger;
+
+/* The edges of a PULSE, which ngspice can lose; see announce(). */
+typedef struct {
+    double delay, period, corners[4]; /* s; corners since the beginning of a period */
+    int64_t n;                        /* of corners */
+    double cycle;                     /* of the one that was announced last */
+    int64_t corner;
+    double previous, announced;       /* s; the last two */
+} Pulse;
+
+typedef struct Ports {
+    Stranger *fmus;            /* in the order in which they step */
+    int64_t n_fmus;
+    Source *sources;
+    int64_t n_sources;
+    double *outputs, *before, *rates; /* now; at the communication point; and their differences */
+    int64_t n_outputs;
+    double *now, *last, *start, *charges; /* saved values: sent last; at the last accepted point; at
+                                      the communication point, and their integrals since then */
+    const int64_t *places;     /* as in Lead */
+    int64_t n_saved;
+    const Piece *pieces;       /* of the drive */
+    int64_t n_pieces, piece;
+    double jump;               /* s; the drive's next one */
+    int64_t driven;            /* whether a port is from it */
+    Pulse *pulses;
+    int64_t n_pulses;
+    double macro_step;         /* s; 0: each accepted step ends on a communication point */
+    double duration, after_jump;
+    double time, origin, end;  /* s; last accepted point; last and next communication point */
+    double told, sent;         /* as in Lead */
+    int64_t repeats;           /* whether attempts are repeated until they agree with the FMUs */
+    int64_t stepped;           /* the FMUs have made the step of the last attempt */
+    int64_t tries;             /* of the step under way */
+    double tolerance;          /* of that agreement, relative to the source's largest value */
+    const char *const *asked;  /* what ngspice is asked for an attempt's saved values; or NULL */
+    AnyFunction command, ask, plot, announce; /* ngspice's */
+    char plot_name[64];
+    double *log, *points;      /* rows: time, sources, saved values; time, outputs */
+    int64_t n_log, n_points, log_rows;
+    int64_t logged, attempts, redone, exchanged, quiet;
+    int64_t status, stopped, failed; /* failed: which FMU */
+    char source[64];           /* the one that nothing feeds */
+    void (*refill)(void), (*attend)(void);
+} Ports;
+
+EXPORT void ports_begin(Ports *c);
+EXPORT void ports_finish(Ports *c);
+
+/* What ngspice calls while no Lead is under way. */
+int ports_source(double *value, double time, const char *node);
+int ports_data(const VectorValues *data);
+int ports_step(double time, double *delta, double old_delta, int redo, int location);
+
+EXPORT int64_t loop_size(int which); /* bytes of Fmu, Schedule, Recorder, Lead,
+                                                 Piece, Group, Source, Feed, Stranger, Pulse,
+                                                 Ports */
 
 #endif

@@ -14,7 +14,7 @@ CALLBACK = ctypes.CFUNCTYPE(None)
 _DOUBLES, _INTEGERS, _PLACES = POINTER(c_double), POINTER(c_int32), POINTER(ctypes.c_uint32)
 
 
-def _of(kind: Any, *names: str) -> tuple[tuple[str, Any], ...]:
+def of(kind: Any, *names: str) -> tuple[tuple[str, Any], ...]:
     """Fields of one kind."""
     return tuple((name, kind) for name in names)
 
@@ -23,16 +23,17 @@ class Fmu(Structure):
     """One instance of an FMU, bound to its version of FMI."""
 
     _fields_ = (
-        *_of(c_void_p, "instance", "set_reals", "do_step", "get_reals", "get_integers"),
-        *_of(c_void_p, "set", "step", "get", "get_whole"),
+        *of(c_void_p, "instance", "set_reals", "do_step", "get_reals", "get_integers"),
+        *of(c_void_p, "set", "step", "get", "get_whole"),
         *(("status", c_int32), ("failed", c_void_p), ("time", c_double), ("steps", c_int64)),
+        ("goes_back", c_int64),
     )
 
 
 class Schedule(Structure):
     """A quantity over time that is an input of its own."""
 
-    _fields_ = (*_of(c_void_p, "times", "values"), ("n", c_int64))
+    _fields_ = (*of(c_void_p, "times", "values"), ("n", c_int64))
 
 
 class RecorderState(Structure):
@@ -42,19 +43,19 @@ class RecorderState(Structure):
         ("fmu", POINTER(Fmu)),
         *(("input_places", _PLACES), ("ports", c_int64), ("schedule", POINTER(Schedule))),
         *(("step_places", _PLACES), ("step_outputs", c_int64)),
-        *_of(_PLACES, "real_places", "whole_places"),
-        *_of(c_int64, "reals", "wholes"),
-        *_of(_PLACES, "total_places", "counter_places"),
-        *_of(c_int64, "totals", "counters"),
-        *_of(_DOUBLES, "inputs", "outputs"),
+        *of(_PLACES, "real_places", "whole_places"),
+        *of(c_int64, "reals", "wholes"),
+        *of(_PLACES, "total_places", "counter_places"),
+        *of(c_int64, "totals", "counters"),
+        *of(_DOUBLES, "inputs", "outputs"),
         ("settle", c_double),
-        *_of(c_void_p, "times", "what"),
-        *_of(c_int64, "n_times", "next"),
-        *_of(c_void_p, "rows", "frames"),
-        *_of(c_int64, "n_rows", "n_frames", "z_surface"),
+        *of(c_void_p, "times", "what"),
+        *of(c_int64, "n_times", "next"),
+        *of(c_void_p, "rows", "frames"),
+        *of(c_int64, "n_rows", "n_frames", "z_surface"),
         *(("totals_at_settle", _DOUBLES), ("counters_at_settle", _INTEGERS)),
         ("extremes", _DOUBLES),
-        *_of(c_double, "began", "holds_until"),
+        *of(c_double, "began", "holds_until"),
         ("inside", c_int64),
         *(("plan", CALLBACK), ("stopped", c_int64)),
     )
@@ -65,7 +66,7 @@ class Segment(Structure):
 
     _fields_ = (
         *(("origin", c_double), ("c", c_double * 3)),
-        *_of(c_double, "gain", "end", "start", "charge"),
+        *of(c_double, "gain", "end", "start", "charge"),
     )
 
 
@@ -75,26 +76,26 @@ class LeadState(Structure):
     _fields_ = (
         *(("recorder", POINTER(RecorderState)), ("macro_point", c_void_p)),
         *(("segment", Segment), ("replay", c_void_p), ("pieces", POINTER(Piece))),
-        *_of(c_int64, "n_pieces", "piece"),
-        *_of(c_double, "gain", "v_offset", "count", "after_jump", "fineness"),
-        *_of(c_double, "time_constant", "range", "answer_step", "limited_step", "near_step"),
-        *_of(c_double, "restart_step", "max_step", "output_high", "output_low", "output"),
-        *_of(c_double, "emf_change", "answered"),
-        *_of(c_double, "time", "current", "carried", "emf", "given", "owed", "flux_at_start"),
-        *_of(c_double, "impact", "jump"),
+        *of(c_int64, "n_pieces", "piece"),
+        *of(c_double, "gain", "v_offset", "count", "after_jump", "fineness"),
+        *of(c_double, "time_constant", "range", "answer_step", "limited_step", "near_step"),
+        *of(c_double, "restart_step", "max_step", "output_high", "output_low", "output"),
+        *of(c_double, "emf_change", "answered"),
+        *of(c_double, "time", "current", "carried", "emf", "given", "owed", "flux_at_start"),
+        *of(c_double, "impact", "jump"),
         ("at_jump", c_int64),
-        *_of(c_double, "told", "sent"),
+        *of(c_double, "told", "sent"),
         ("places", POINTER(c_int64)),
-        *_of(c_int64, "n_saved", "swing", "motional"),
+        *of(c_int64, "n_saved", "swing", "motional"),
         ("log", c_void_p),
-        *_of(c_int64, "n_log", "log_rows", "logged", "attempts", "quiet", "status", "stopped"),
+        *of(c_int64, "n_log", "log_rows", "logged", "attempts", "quiet", "status", "stopped"),
         ("source", ctypes.c_char * 64),
-        *_of(CALLBACK, "refill", "attend"),
+        *of(CALLBACK, "refill", "attend"),
     )
 
 
-GOOD, FMU_FAILED, NOT_FINITE, UNKNOWN_SOURCE = range(4)
-"""Values of ``LeadState.status``."""
+GOOD, FMU_FAILED, NOT_FINITE, UNKNOWN_SOURCE, NO_AGREEMENT = range(5)
+"""Values of ``LeadState.status`` and ``PortsState.status``."""
 
 _FUNCTIONS = {
     "fmu_bind": (None, (c_void_p, ctypes.c_int)),
@@ -104,6 +105,8 @@ _FUNCTIONS = {
     "lead_begin": (None, (c_void_p,)),
     "macro_point_step_locked": (None, (c_void_p,)),
     "lead_finish": (None, (c_void_p,)),
+    "ports_begin": (None, (c_void_p,)),
+    "ports_finish": (None, (c_void_p,)),
     "loop_size": (c_int64, (ctypes.c_int,)),
 }
 

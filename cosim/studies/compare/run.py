@@ -170,7 +170,12 @@ def _run(
 
 
 def _check_rate(scene: Scene, trial: Recording) -> float | None:
-    """The period of a scene, s. Raises BadInput where a trial has too few rows in it."""
+    """The period of a scene, s. Raises BadInput where a trial has too few rows in it, and for a
+    scene with its own FMUs, whose waveforms are none of a recording's."""
+    if scene.has_ports:
+        raise BadInput(
+            f"{scene.name}: compare needs the built-in machine, not a scene's own ports."
+        )
     _, period = laid_over(scene)
     rate = 1.0 / float(np.median(np.diff(trial.time)))
     if period and rate * period < FEWEST_ROWS:

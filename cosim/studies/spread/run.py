@@ -144,6 +144,8 @@ def turns(scene: Scene) -> list[Settings]:
     frequency and offset by TURN of themselves, an offset of 0 by that of the amplitude.
     Raises BadInput for a scene whose knobs move nothing.
     """
+    if scene.has_ports:
+        raise BadInput(f"scene {scene.name}: --spread turns knobs of the built-in machine.")
     if not scene.rung.driven:
         raise BadInput(
             f'scene {scene.name}: circuit.model = "{scene.circuit.model}" has no knobs that '

@@ -14,6 +14,7 @@ from cosim.evaluate.point import Outcome
 from cosim.files.atomic import together
 from cosim.scene import Scene, firmware, keys, to_toml
 from cosim.studies.sweep.design import Design
+from cosim.waveforms.columns import netcdf_name
 from cosim.waveforms.quantities import meaning
 
 FAILURE = "failure"
@@ -85,7 +86,10 @@ def dataset(scene: Scene, design: Design, found: Numbers, versions: dict[str, st
         for name, column, axis in zip(axes, columns, design.axes, strict=True)
     }
     variables = {
-        name: (dims, values.reshape(design.shape), _JUDGED if name == JUDGED else meaning(name))
+        netcdf_name(name): (
+            *(dims, values.reshape(design.shape)),
+            _JUDGED if name == JUDGED else meaning(name),
+        )
         for name, values in numbers.items()
     }
     about = {"long_name": "Why the point failed; empty where it did not"}

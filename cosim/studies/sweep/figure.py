@@ -52,6 +52,10 @@ OTHERS = (
 def draw(data: xr.Dataset, title: str) -> Picture:
     """The figure of the dataset of a sweep."""
     figure = Picture(13.0, 8.4, "constrained")
+    if "v_average" not in data and any(str(name).endswith(".mean") for name in data):
+        _own(figure, data, swept(data))
+        figure.suptitle(title, fontsize=12)
+        return figure
     if POINT in data.dims:
         _clouds(figure, data, swept(data))
     else:
@@ -69,6 +73,22 @@ def draw(data: xr.Dataset, title: str) -> Picture:
             words += "; dots: rugged, neighbours tell nothing of it"
     figure.suptitle(f"{title}: {words}", fontsize=12)
     return figure
+
+
+MOST_OWN = 6
+
+
+def _own(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
+    """Of a scene with its own FMUs: means over the first key, a point for each setting."""
+    means = [str(name) for name in data if str(name).endswith(".mean")][:MOST_OWN]
+    dims = data[FAILURE].dims
+    first = xr.broadcast(data[names[0]], data[FAILURE])[0].transpose(*dims).values.ravel()
+    rows = -(-len(means) // 2)
+    for axis, name in zip(figure.subplots(rows, 2, squeeze=False).flat, means, strict=False):
+        values = data[name].transpose(*dims).values.ravel()
+        axis.plot(first, values, ".", color="#1f6fb2")
+        axis.set_xlabel(data[names[0]].key)
+        axis.set_title(name.replace("$", "\\$"), loc="left", fontsize=10.5)
 
 
 def _row(rows: Any, number: int, count: int) -> list[Axes]:

@@ -31,7 +31,8 @@ def write(run: Run, file: BytesIO) -> str:
     ]
     for number, name in enumerate(names):
         kind, form = TYPES.get(run.units[name], ("notype", "{}"))
-        lines.append(f"\t{number}\t{form.format(name)}\t{kind}")
+        named = name if name.startswith(("v(", "i(")) else form.format(name)
+        lines.append(f"\t{number}\t{named}\t{kind}")
     header = "\n".join([*lines, "Binary:\n"]).encode()
     rows = np.column_stack(list(run.waveforms.values())).astype("<f8")
     file.write(header + rows.tobytes())

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
-from cosim.waveforms.formats.source import Format, Run
+from cosim.waveforms.formats.source import Format, Run, machine
 
 RATE = 48000  # Hz
 LARGEST = 32767
@@ -35,6 +35,7 @@ RAREST = 1e-2  # s, of the rows
 
 def write(run: Run, file: BytesIO) -> str:
     """The whole run from its beginning; half a unit of the last place is the error."""
+    machine(run, "wav")
     for key, value, most in (
         ("output_step", run.step, RAREST),
         ("duration", run.waveforms["time"][-1], LONGEST),

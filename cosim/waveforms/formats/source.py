@@ -62,9 +62,20 @@ def read(folder: Path) -> Run:
     return Run(folder, waveforms, units, about, written)
 
 
+def machine(run: Run, form: str) -> Scene:
+    """The scene of a run of the built-in machine; raises BadInput for another."""
+    scene = load(run.folder / "scene.toml")
+    if scene.has_ports:
+        raise BadInput(
+            f"{plain(str(run.folder))}: {form} needs a run of the built-in machine, not one of a "
+            "scene with its own [[port]]."
+        )
+    return scene
+
+
 def driven(run: Run, form: str) -> Scene:
     """The scene of a run that a command drives; raises BadInput for another."""
-    scene = load(run.folder / "scene.toml")
+    scene = machine(run, form)
     if not scene.rung.driven:
         raise BadInput(
             f"{plain(str(run.folder))}: {form} needs a run with a coil, not one with circuit.model "

@@ -11,7 +11,7 @@ from math import isfinite
 import numpy as np
 
 from cosim.errors import BadInput, plain
-from cosim.scene import Scene, load
+from cosim.scene import Scene
 from cosim.trials.camera import (
     FRAME_RATE,
     accelerations,
@@ -21,7 +21,7 @@ from cosim.trials.camera import (
     velocities,
 )
 from cosim.trials.table import FEWEST_ROWS
-from cosim.waveforms.formats.source import Format, Run
+from cosim.waveforms.formats.source import Format, Run, machine
 
 MOST_FRAMES = 200_000
 """A trial of more is larger than a file that `cosim compare` reads."""
@@ -32,7 +32,7 @@ MISSING = "\ufffd"
 
 def write(run: Run, file: BytesIO) -> str:
     """Platform p, part o and springed plate s, mm, frame by frame."""
-    scene = load(run.folder / "scene.toml")
+    scene = machine(run, "tracker")
     start, _ = laid_over(scene)
     n = frame_count(run.waveforms, start)
     if not FEWEST_ROWS <= n <= MOST_FRAMES:

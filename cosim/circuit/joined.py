@@ -1,0 +1,160 @@
+"""A netlist of the user's own that a scene's ports join to FMUs: nothing in it has a role.
+
+Its sources that a port feeds become external; what is to be read is a vector, or an expression
+that ngspice computes itself, as the voltage of a source that is put in.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cosim.circuit.lint.checks import check
+from cosim.circuit.lint.deck import Line, passed, read
+from cosim.circuit.lint.elements import Element, Scope, parse
+from cosim.circuit.lint.expressions import sensed
+from cosim.circuit.lint.words import definitions
+from cosim.circuit.lint.write import written
+from cosim.errors import BadInput, plain
+from cosim.scene.messages import ended, suggestion
+
+_VECTOR = re.compile(r"([vi])\s*\(\s*([^\s(),]+)\s*\)", re.IGNORECASE)
+_FACTOR = re.compile(r"[vi]\s*\([^()]*\)", re.IGNORECASE)
+_UNITS = {"v": "V", "i": "A", "iv": "W", "vv": "V2", "ii": "A2"}
+_CURRENTS = "vleh"  # elements whose current ngspice computes as an unknown
+_NODE = "cosim_read"
+
+
+@dataclass(frozen=True)
+class Deck:
+    """What ngspice gets, and the names of what it sends."""
+
+    text: str
+    kinds: Mapping[str, str]
+    """``v`` or ``i`` of each source that a port feeds, by its lower-case name."""
+    vectors: tuple[str, ...]
+    """What is saved, in the order of the words that were asked for."""
+    devices: tuple[str, ...]
+    """The device parameter that has the same within a step, for each."""
+    pulses: tuple[str, ...]
+    """ngspice's names of the sources with PULSE."""
+
+
+def unit(words: str) -> str:
+    """Of a vector or of a product of vectors; "?" where it is not known."""
+    factors = _FACTOR.findall(words)
+    if "".join(words.split()) != "*".join("".join(each.split()) for each in factors):
+        return "?"
+    return _UNITS.get("".join(sorted(each[0].lower() for each in factors)), "?")
+
+
+def deck(
+    path: Path,
+    sources: Sequence[str],
+    words: Sequence[str],
+    parameters: Mapping[str, float],
+    duration: float,
+    reltol: float,
+    max_step: float,
+    asked: bool,
+) -> Deck:
+    """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved;
+    where they are ``asked`` for within a step, each as a device's parameter.
+
+    Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
+    """
+    lines = read(path)
+    name = plain(str(path))
+    found = {element.name: element for element in parse(lines).elements}
+    for source in sources:
+        if source.lower() not in found or source[0].lower() not in "vi":
+            known = sorted(each for each in found if each[0] in "vi")
+            hint = suggestion(source.lower(), known) or f" (it has {', '.join(known) or 'none'})"
+            shown = f'[[port]] source = "{plain(source)}"'
+            raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
+    plainly = re.compile(r"i.*" if asked else r".*", re.IGNORECASE)
+    direct = [_VECTOR.fullmatch(each) if plainly.match(each) else None for each in words]
+    extra = [_reading(k, each) for k, each in enumerate(words) if direct[k] is None]
+    top = check([*lines, *extra], [[source.lower() for source in sources]])
+    _check_vectors(top, name, words, {line.number for line in extra})
+    values = _parameters(top, name, parameters)
+    fed = {source.lower() for source in sources}
+    text = [lines[0].text]
+    for line, element, holder in top.order:
+        if not all(each.used for each in holder.chain()):
+            continue  # nothing calls the subcircuit
+        if holder is top and element is not None and element.name in fed:
+            text.append(" ".join([element.name, *element.nodes, "external"]))
+        else:
+            text.append(written(line, element, values if holder is top else {}))
+    text += [
+        f".options norefvalue reltol={reltol!r}",
+        ".save none",
+        f".tran {max_step!r} {duration!r} 0 {max_step!r}",
+        ".end",
+    ]
+    read_as = [_read_as(k, match) for k, match in enumerate(direct)]
+    return Deck(
+        "\n".join(text),
+        {source.lower(): source[0].lower() for source in sources},
+        tuple(vector for vector, _ in read_as),
+        tuple(device for _, device in read_as),
+        tuple(_pulses(top, fed)),
+    )
+
+
+def _reading(place: int, words: str) -> Line:
+    """A source whose voltage is the expression."""
+    line = Line(f"Bcosim{place} {_NODE}{place} 0 V={words}", f'"{plain(words)}"', place + 1)
+    passed(line)
+    return line
+
+
+def _read_as(place: int, match: re.Match[str] | None) -> tuple[str, str]:
+    """The vector that has the words' value, and the device parameter."""
+    if match is None:
+        return f"v({_NODE}{place})", f"@bcosim{place}[v]"
+    kind, inner = match[1].lower(), match[2].lower()
+    return f"{kind}({inner})", f"@{inner}[i]" if kind == "i" else ""
+
+
+def _check_vectors(top: Scope, name: str, words: Sequence[str], skipped: set[int]) -> None:
+    """What the words name must be there, as far as that can be known without subcircuits."""
+    nodes = {node for element in top.elements for node in element.nodes} | {"0"}
+    known: dict[str, set[str]] = {
+        "v": nodes,
+        "i": {each.name for each in top.elements if each.kind in _CURRENTS},
+    }
+    for each in words:
+        for kind, what in (("v", "node"), ("i", "V, L, E or H element")):
+            for inner in sensed(f"b 1 0 v={each}", kind):
+                if not re.search(r"[.:]", inner) and inner not in known[kind]:
+                    hint = suggestion(inner, known[kind])
+                    said = f'"{plain(each)}" is asked for, but there is no {what} {plain(inner)}'
+                    raise BadInput(ended(f"{name}: {said}{hint}"))
+
+
+def _parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:
+    lines = [line.text for line, _ in top.lines if line.text.lower().startswith(".param")]
+    known = [key for text in lines for (key, formal), _ in definitions(text) if formal is None]
+    for key in given:
+        if key.lower() not in known:
+            hint = suggestion(key.lower(), known) or f" (it has {', '.join(known) or 'none'})"
+            raise BadInput(ended(f"{name}: circuit.param.{key} must be one of its .param{hint}"))
+    return {key.lower(): value for key, value in given.items()}
+
+
+def _pulses(top: Scope, fed: set[str]) -> Iterator[str]:
+    for path, element in _everywhere(top, top, ""):
+        if element.kind in "vi" and "pulse" in element.words and (path or element.name not in fed):
+            yield f"{element.kind}.{path}{element.name}" if path else element.name
+
+
+def _everywhere(scope: Scope, top: Scope, path: str) -> Iterator[tuple[str, Element]]:
+    """Each element, in calls of subcircuits too, with the path of calls that lead to it."""
+    for element in scope.elements:
+        yield path, element
+        called: Any = scope.subcircuit(element.model or "") if element.kind == "x" else None
+        if called is not None and len(called) == 1:
+            yield from _everywhere(called[0], top, f"{path}{element.name}.")

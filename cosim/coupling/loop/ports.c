@@ -1,0 +1,484 @@
+/* A circuit of the user's own, joined to FMUs of others, of which nothing but their ports is known.
+   ngspice leads; for the order of its calls see cosim/circuit/ngspice.py.
+
+   Between two communication points each source goes on along a line. At a communication point all
+   FMUs step there, one after another, with what came in since the last one: an FMU is told of a
+   probe what the circuit has computed, and of another FMU what that has computed if it has stepped
+   already, else a line. So an explicit exchange is sequential, circuit first. Where steps are
+   repeated, each attempt of ngspice is a step of the FMUs too, from their saved state, and the next
+   attempt has other values at its end until both agree. */
+
+#include "loop.h"
+
+#include <ctype.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const double ON_TIME = 1e-13; /* s; as in lead.c */
+
+static const double SHORT = 1e-3;
+/* Of after_jump: a difference over less time tells of rounding, so the one before it stays. */
+
+static const int64_t ATTEND_EVERY = 4096; /* as in lead.c */
+
+static const int64_t MOST_TRIES = 25; /* of one step with one length */
+
+static const double ONE = 1e-12; /* Of a period: corners nearer than that are one. */
+
+typedef int Command(const char *);
+typedef char *PlotName(void);
+typedef bool Announce(double);
+typedef struct {
+    char *name;
+    int type;
+    short flags;
+    double *real;
+    void *complex;
+    int length;
+} VectorInfo; /* ngspice's vector_info */
+typedef VectorInfo *Ask(const char *);
+
+static Ports *run; /* the one under way, or NULL */
+static int64_t late;
+
+static int going(const Ports *c)
+{
+    return c && c->status == GOOD && !c->stopped;
+}
+
+/* --- the drive --- */
+
+static const Piece *piece_at(Ports *c, double t)
+{
+    while (t >= c->pieces[c->piece].until) {
+        if (c->piece + 1 < c->n_pieces) {
+            c->piece++;
+            continue;
+        }
+        const double last = c->pieces[c->piece].until;
+        c->refill();
+        if (!going(c) || c->pieces[c->n_pieces - 1].until <= last)
+            break;
+    }
+    while (c->piece > 0 && t < c->pieces[c->piece].begin)
+        c->piece--;
+    return &c->pieces[c->piece];
+}
+
+static double drive_before(Ports *c, double t)
+{
+    if (t <= 0.0)
+        return 0.0;
+    const Piece *p = piece_at(c, nextafter(t, 0.0));
+    return t >= p->until - ON_TIME ? p->end : command_value(p, t);
+}
+
+static double drive_after(Ports *c, double t)
+{
+    return command_value(piece_at(c, t), t);
+}
+
+/* Until a step has ended on the jump, the drive keeps its left limit. */
+static double drive_now(Ports *c, double t)
+{
+    return t <= 0.0 || t >= c->jump - ON_TIME ? drive_before(c, fmin(t, c->jump)) : drive_after(c, t);
+}
+
+/* --- the sources --- */
+
+static double source_value(Ports *c, const Source *s, double t)
+{
+    if (s->from.kind == FROM_DRIVE)
+        return s->from.scale * drive_now(c, t) + s->from.offset;
+    return s->value + s->rate * (t - c->origin);
+}
+
+static double rate_of(const Ports *c, const Origin *from)
+{
+    return from->slope == HELD    ? 0.0
+           : from->slope == KNOWN ? c->before[from->slope_place]
+                                  : c->rates[from->place];
+}
+
+static void set_lines(Ports *c)
+{
+    for (Source *s = c->sources; s < c->sources + c->n_sources; s++) {
+        if (s->from.kind != FROM_OUTPUT)
+            continue;
+        s->value = s->from.scale * c->before[s->from.place] + s->from.offset;
+        s->rate = s->from.scale * rate_of(c, &s->from);
+        s->largest = fmax(s->largest, fabs(s->value));
+    }
+}
+
+/* --- the FMUs --- */
+
+static int fmu_failed(Ports *c, const Stranger *s)
+{
+    c->status = FMU_FAILED;
+    c->failed = s - c->fmus;
+    return 0;
+}
+
+/* An input from the communication point to `time`, which lies `h` (s) later. */
+static void feed(Ports *c, const Feed *f, double time, double h)
+{
+    const int64_t k = f->from.place;
+    double start, end, mean;
+    if (f->from.kind == FROM_PROBE) {
+        start = c->start[k];
+        end = c->now[k];
+        mean = (c->charges[k] + 0.5 * (time - c->time) * (c->last[k] + c->now[k])) / h;
+    } else if (f->from.kind == FROM_OUTPUT) {
+        start = c->before[k];
+        end = c->outputs[k];
+        mean = 0.5 * (start + end);
+    } else {
+        start = drive_after(c, c->origin);
+        end = drive_before(c, time);
+        mean = 0.5 * (start + end);
+    }
+    const double value = f->feed == MEAN ? mean : f->feed == END ? end : start;
+    *f->input = f->from.scale * value + f->from.offset;
+    if (f->slope)
+        *f->slope = f->from.scale * (end - start) / h;
+}
+
+static int get_outputs(Stranger *s)
+{
+    for (int64_t k = 0; k < s->n_outputs; k++)
+        if (!fmu_get_group(s->fmu, &s->outputs[k]))
+            return 0;
+    return !s->n_output_slopes || fmu_slopes(s->fmu, s->get_slopes, s->output_slopes,
+                                             s->n_output_slopes, s->output_rates);
+}
+
+static int set_inputs(Stranger *s)
+{
+    for (int64_t k = 0; k < s->n_inputs; k++)
+        if (!fmu_set_group(s->fmu, &s->inputs[k]))
+            return 0;
+    return !s->n_input_slopes || fmu_slopes(s->fmu, s->set_slopes, s->input_slopes,
+                                            s->n_input_slopes, s->input_rates);
+}
+
+/* What an FMU puts out for the values that its inputs have at the end of a step. */
+static int refresh(Ports *c, Stranger *s)
+{
+    for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++) {
+        const int64_t k = f->from.place;
+        if (f->from.kind == FROM_PROBE)
+            *f->input = f->from.scale * c->now[k] + f->from.offset;
+        if (f->from.kind == FROM_OUTPUT)
+            *f->input = f->from.scale * c->outputs[k] + f->from.offset;
+    }
+    return set_inputs(s) && get_outputs(s);
+}
+
+/* All FMUs from the communication point to `time`. */
+static int step_all(Ports *c, double time)
+{
+    const double h = time - c->origin;
+    /* What has not stepped yet is taken to go on along its line. */
+    for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
+        for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
+            if (f->from.kind == FROM_OUTPUT)
+                c->outputs[f->from.place] =
+                    c->before[f->from.place] + h * rate_of(c, &f->from);
+    for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++) {
+        for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
+            feed(c, f, time, h);
+        s->fmu->time = c->origin;
+        if (!set_inputs(s) || !s->fmu->step(s->fmu, h) || !get_outputs(s) ||
+            (c->repeats && !refresh(c, s)))
+            return fmu_failed(c, s);
+        s->fmu->time = time;
+        s->fmu->steps++;
+    }
+    return 1;
+}
+
+static int save_all(Ports *c)
+{
+    for (Stranger *s = c->fmus; c->repeats && s < c->fmus + c->n_fmus; s++)
+        if (!fmu_save(s->fmu, s->save, &s->state))
+            return fmu_failed(c, s);
+    return 1;
+}
+
+static int restore_all(Ports *c)
+{
+    for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
+        if (!fmu_restore(s->fmu, s->restore, s->state))
+            return fmu_failed(c, s);
+    return 1;
+}
+
+/* --- communication points --- */
+
+static void write_point(Ports *c, double time)
+{
+    double *row = c->points + c->n_points++ * (1 + c->n_outputs);
+    *row++ = time;
+    memcpy(row, c->outputs, (size_t)c->n_outputs * sizeof *row);
+}
+
+/* A communication point at the time of the last accepted one: from here on a new one begins. */
+static void begin_exchange(Ports *c)
+{
+    const double time = c->time, h = time - c->origin;
+    for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++) {
+        const double *before = c->before + (s->row - c->outputs);
+        s->moved += memcmp(before, s->row, (size_t)s->width * sizeof *before) != 0;
+    }
+    if (h > SHORT * c->after_jump)
+        for (int64_t k = 0; k < c->n_outputs; k++)
+            c->rates[k] = (c->outputs[k] - c->before[k]) / h;
+    memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
+    memcpy(c->start, c->now, (size_t)c->n_saved * sizeof *c->start);
+    memset(c->charges, 0, (size_t)c->n_saved * sizeof *c->charges);
+    c->origin = time;
+    set_lines(c);
+    c->end = c->macro_step > 0.0 ? fmin(time + c->macro_step, c->jump) : -INFINITY;
+    if (c->macro_step > 0.0 && time < c->duration - ON_TIME)
+        c->end = fmin(c->end, c->duration);
+    c->exchanged++;
+    write_point(c, time);
+    save_all(c);
+}
+
+/* ngspice sets the next edge of a PULSE only if a step was cut to end on this one. A step that ends
+   there by itself loses all further ones in silence. So they are announced here, two ahead. */
+static void announce(Ports *c, double time)
+{
+    for (Pulse *p = c->pulses; p < c->pulses + c->n_pulses; p++)
+        while (p->previous <= time && p->announced <= c->duration) {
+            p->previous = p->announced;
+            if (++p->corner == p->n) {
+                p->corner = 0;
+                p->cycle += 1.0;
+            }
+            p->announced = p->delay + p->cycle * p->period + p->corners[p->corner];
+            if (p->announced > time && p->announced - p->previous > ONE * p->period)
+                ((Announce *)c->announce)(p->announced);
+        }
+}
+
+static double *log_row(const Ports *c)
+{
+    return c->log + c->n_log * (1 + c->n_sources + c->n_saved);
+}
+
+static double accepted(Ports *c, double time, double next_step)
+{
+    double sum = 0.0;
+    for (int64_t k = 0; k < c->n_saved; k++)
+        sum += c->now[k];
+    for (int64_t k = 0; k < c->n_outputs; k++)
+        sum += c->outputs[k];
+    if (!isfinite(sum)) {
+        c->told = time;
+        c->status = NOT_FINITE;
+        return next_step;
+    }
+    double *row = log_row(c);
+    *row++ = time;
+    for (int64_t k = 0; k < c->n_sources; k++)
+        *row++ = source_value(c, &c->sources[k], time);
+    memcpy(row, c->now, (size_t)c->n_saved * sizeof *row);
+    c->n_log++;
+    c->logged++;
+    c->tries = 0;
+    const int at_jump = c->driven && time >= c->jump - ON_TIME;
+    if (at_jump)
+        c->jump = piece_at(c, c->jump)->jump;
+    if (time <= 0.0) {
+        memcpy(c->last, c->now, (size_t)c->n_saved * sizeof *c->last);
+        begin_exchange(c);
+    } else {
+        /* The last step may be so short that the time stays the same. */
+        const int meets = time >= c->end - ON_TIME && time > c->origin;
+        if (meets && !c->stepped && !step_all(c, time))
+            return next_step;
+        c->stepped = 0;
+        for (int64_t k = 0; k < c->n_saved; k++)
+            c->charges[k] += 0.5 * (time - c->time) * (c->last[k] + c->now[k]);
+        memcpy(c->last, c->now, (size_t)c->n_saved * sizeof *c->last);
+        c->time = time;
+        if (meets)
+            begin_exchange(c);
+    }
+    announce(c, time);
+    if (time <= 0.0 || at_jump)
+        next_step = fmin(next_step, c->after_jump);
+    if (c->end > time)
+        next_step = fmin(next_step, c->end - time);
+    if (c->driven) {
+        const double corner = piece_at(c, time)->until;
+        if (corner > time)
+            next_step = fmin(next_step, corner - time);
+        next_step = fmin(next_step, c->jump - time);
+    }
+    return next_step;
+}
+
+/* --- attempts that are repeated --- */
+
+/* Device parameters are asked for in ngspice's constant plot: an asked one becomes a vector of the
+   current plot, whose next values are not those that SendData then sends. */
+static int ask(Ports *c)
+{
+    Command *const command = (Command *)c->command;
+    char text[160];
+    if (!c->plot_name[0])
+        snprintf(c->plot_name, sizeof c->plot_name, "%s", ((PlotName *)c->plot)());
+    command("setplot const");
+    for (int64_t k = 0; k < c->n_saved; k++) {
+        if (!c->asked[k])
+            continue;
+        snprintf(text, sizeof text, "%s", c->asked[k]);
+        const VectorInfo *found = ((Ask *)c->ask)(text);
+        if (found && found->real && found->length > 0)
+            c->now[k] = *found->real;
+        else
+            c->status = NOT_FINITE;
+        snprintf(text, sizeof text, "unlet %s", c->asked[k]);
+        command(text);
+    }
+    snprintf(text, sizeof text, "setplot %s", c->plot_name);
+    command(text);
+    return going(c);
+}
+
+/* Whether the attempt that has converged at `time` is to be repeated. */
+static int to_repeat(Ports *c, double time, double *delta, double old_delta)
+{
+    if (time <= c->origin || !ask(c) || (c->stepped && !restore_all(c)))
+        return 0;
+    c->stepped = 1;
+    if (!step_all(c, time))
+        return 0;
+    int agree = 1;
+    for (Source *s = c->sources; s < c->sources + c->n_sources; s++) {
+        if (s->from.kind != FROM_OUTPUT)
+            continue;
+        const double used = source_value(c, s, time);
+        const double off = s->from.scale * c->outputs[s->from.place] + s->from.offset - used;
+        s->largest = fmax(s->largest, fabs(used));
+        if (fabs(off) > c->tolerance * s->largest)
+            agree = 0;
+        if (c->tries > 0 && used != s->guess) {
+            const double response = (off - s->off) / (used - s->guess);
+            if (isfinite(response) && response < -1e-3)
+                s->response = response;
+        }
+        s->guess = used;
+        s->off = off;
+    }
+    if (agree)
+        return 0;
+    if (++c->tries > MOST_TRIES) {
+        c->status = NO_AGREEMENT;
+        return 0;
+    }
+    for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
+        if (s->from.kind == FROM_OUTPUT)
+            s->rate = (s->guess - s->off / s->response - s->value) / (time - c->origin);
+    c->redone++;
+    *delta = old_delta;
+    return 1;
+}
+
+/* --- what ngspice calls --- */
+
+static int is_named(const Source *s, const char *node)
+{
+    size_t k = 0;
+    while (s->name[k] && tolower((unsigned char)node[k]) == s->name[k])
+        k++;
+    return s->name[k] == node[k]; /* both at their end */
+}
+
+int ports_source(double *value, double time, const char *node)
+{
+    Ports *c = run;
+    *value = NAN;
+    if (!going(c))
+        return 0;
+    const Source *s = c->sources;
+    while (s < c->sources + c->n_sources && !is_named(s, node))
+        s++;
+    if (s == c->sources + c->n_sources) {
+        snprintf(c->source, sizeof c->source, "%s", node);
+        c->status = UNKNOWN_SOURCE;
+        return 0;
+    }
+    *value = source_value(c, s, time);
+    if (!going(c))
+        *value = NAN;
+    return 0;
+}
+
+int ports_data(const VectorValues *data)
+{
+    Ports *c = run;
+    if (!c)
+        return 0;
+    for (int64_t k = 0; k < c->n_saved; k++)
+        c->now[k] = data->vectors[c->places[k]]->creal;
+    c->sent = data->vectors[c->places[c->n_saved]]->creal;
+    return 0;
+}
+
+int ports_step(double time, double *delta, double old_delta, int redo, int location)
+{
+    Ports *c = run;
+    int again = 0;
+    if (!going(c))
+        return 0;
+    if (location == 0) {
+        c->told = time;
+        *delta = accepted(c, time, *delta);
+    } else {
+        c->attempts++;
+        c->quiet++;
+        if (redo) /* ngspice itself repeats it, shorter */
+            c->tries = 0;
+        else if (c->repeats)
+            again = to_repeat(c, time, delta, old_delta);
+    }
+    if (c->n_log == c->log_rows || c->quiet >= ATTEND_EVERY || loop_milliseconds() >= late) {
+        c->quiet = 0;
+        c->attend();
+        late = loop_milliseconds() + LOOP_PATIENCE;
+    }
+    return again;
+}
+
+/* --- what Python calls --- */
+
+void ports_begin(Ports *c)
+{
+    for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
+        if (!get_outputs(s))
+            fmu_failed(c, s);
+    memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
+    for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
+        s->response = -1.0;
+    set_lines(c);
+    c->jump = c->driven ? piece_at(c, 0.0)->jump : INFINITY;
+    late = loop_milliseconds() + LOOP_PATIENCE;
+    run = c;
+}
+
+void ports_finish(Ports *c)
+{
+    if (going(c) && c->sent > c->told) {
+        if (c->n_log == c->log_rows)
+            c->attend();
+        c->end = c->macro_step > 0.0 ? fmin(c->end, c->sent) : c->end;
+        accepted(c, c->sent, 0.0);
+    }
+    run = NULL;
+}

@@ -1,0 +1,168 @@
+"""A scene's ports, checked against its FMUs and brought into the numbers of ``ports.c``."""
+
+from pathlib import Path
+
+from cosim.circuit.joined import Deck, deck
+from cosim.coupling.ports.sides import Side
+from cosim.coupling.ports.strangers import Variable, stranger
+from cosim.coupling.ports.structures import Feed, Origin, Source
+from cosim.scene import Scene
+from cosim.scene.tables import Port
+
+_PROBE, _OUTPUT, _DRIVE = range(3)
+_HELD, _DIFFERENCE, _KNOWN = range(3)
+_FEEDS = {"mean": 0, "line": 1, "end": 2}
+
+
+class Plan:
+    """What is joined to what. Raises BadInput, naming file, key and value."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        sides = {each.name: Side(each, stranger(each.file)) for each in scene.fmu}
+        self.sides = _in_order(scene, sides)
+        """In the order in which they step: after those that feed them, as far as that can be."""
+        probes = [port.probe for port in scene.port if port.probe is not None]
+        self.words = tuple(dict.fromkeys([*probes, *(scene.circuit.save or ())]))
+        """What is read of the circuit."""
+        self.sources: list[Source] = []
+        self.names: list[str] = []
+        """Of the sources that ports feed, as the scene spells them."""
+        self._from: list[tuple[Side, Origin]] = []
+        for port in scene.port:
+            self._join(port, sides)
+        # Slopes of outputs make rows longer, so places in the row of all are known only now.
+        first = 0
+        for side in self.sides:
+            for origin in (origin for of, origin in self._from if of is side):
+                origin.place += first
+                origin.slope_place += first
+            first += side.width
+        self.width = first
+        """Of the row of all outputs."""
+        self.method = _method(scene, self.sides)
+
+    def deck(self) -> Deck:
+        """Of the circuit."""
+        circuit, run = self.scene.circuit, self.scene.run
+        assert circuit.netlist is not None
+        return deck(
+            *(Path(circuit.netlist), self.names, self.words, circuit.param or {}),
+            *(run.duration, circuit.reltol, circuit.max_step, self.method == "redo"),
+        )
+
+    @property
+    def driven(self) -> bool:
+        """Whether the command of ``[drive]`` leads to something."""
+        return any(port.origin == "drive" for port in self.scene.port)
+
+    def _join(self, port: Port, sides: dict[str, Side]) -> None:
+        origin = Origin(scale=port.scale, offset=port.offset)
+        side, output = None, None
+        if port.probe is not None:
+            origin.kind, origin.place = _PROBE, self.words.index(port.probe)
+        elif port.origin == "drive":
+            origin.kind = _DRIVE
+        else:
+            side, output, place = _end(port, "from", str(port.origin), sides, "output")
+            origin.kind, origin.place = _OUTPUT, side.places[output.name] + place
+            _set_slope(origin, port, side, output, place)
+        if port.source is not None:
+            self.names.append(port.source)
+            self.sources.append(Source(name=port.source.lower().encode(), origin=origin))
+            kept = self.sources[-1].origin  # the structure holds a copy
+        else:
+            feed = Feed(origin=origin, feed=_FEEDS[port.feed])
+            into, variable, place = _end(port, "to", str(port.to), sides, "input")
+            if not variable.real:
+                feed.feed = _FEEDS["end"]  # a mean of truth values is none
+            elif port.feed == "line":
+                _check_line(into, variable)
+            into.feed(variable, place, feed)
+            kept = feed.origin
+        if side is not None:
+            self._from.append((side, kept))
+
+
+def _end(
+    port: Port, key: str, name: str, sides: dict[str, Side], causality: str
+) -> tuple[Side, Variable, int]:
+    of, _, variable = name.partition(".")
+    found, place = sides[of].of.find(variable, causality, f'[[port]] {key} = "{name}"')
+    return sides[of], found, place
+
+
+def _set_slope(origin: Origin, port: Port, side: Side, output: Variable, place: int) -> None:
+    """How an output goes on between communication points."""
+    kind, one = port.slope, output.size == 1
+    if kind == "auto":
+        tells = output.real and one and (side.of.abilities.maxOutputDerivativeOrder or 0) >= 1
+        if tells:
+            origin.slope, origin.slope_place = _KNOWN, side.slope_place(output)
+        elif output.slope in side.places:
+            origin.slope, origin.slope_place = _KNOWN, side.places[output.slope] + place
+        else:
+            origin.slope = _DIFFERENCE if output.real else _HELD
+    elif kind in ("held", "difference"):
+        origin.slope = _HELD if kind == "held" else _DIFFERENCE
+    else:
+        name = kind.removeprefix(f"{side.name}.")
+        known, at = side.of.find(name, "output", f'[[port]] slope = "{kind}"')
+        origin.slope, origin.slope_place = _KNOWN, side.places[known.name] + at
+
+
+def _check_line(side: Side, variable: Variable) -> None:
+    if side.of.version != 2 or not side.of.abilities.canInterpolateInputs or variable.size > 1:
+        raise side.of.bad(
+            f'[[port]] feed = "line" into {side.name}.{variable.name} needs an FMU of FMI 2.0 with '
+            'canInterpolateInputs; take "mean" or "end"'
+        )
+
+
+def _in_order(scene: Scene, sides: dict[str, Side]) -> list[Side]:
+    """Each after those that feed it; of a circle, the first in the scene first."""
+    feeding: dict[str, set[str]] = {name: set() for name in sides}
+    for port in scene.port:
+        if port.origin not in (None, "drive") and port.to is not None:
+            feeding[port.to.partition(".")[0]].add(str(port.origin).partition(".")[0])
+    order: list[str] = []
+    while len(order) < len(sides):
+        rest = [name for name in sides if name not in order]
+        free = [name for name in rest if not feeding[name] - {name} - {*order}]
+        order.append((free or rest)[0])
+    return [sides[name] for name in order]
+
+
+def _method(scene: Scene, sides: list[Side]) -> str:
+    """``coupling.method``, with the choice of "auto" made."""
+    asked = scene.coupling.method
+    through = _feedthrough(scene, sides)
+    if asked == "redo" or (asked == "auto" and through):
+        for side in sides:
+            if not side.of.abilities.canGetAndSetFMUstate:
+                why = f"it feeds {through} through at once, so " if asked == "auto" else ""
+                raise side.of.bad(
+                    f'{why}coupling.method = "redo" repeats its steps, which needs '
+                    'canGetAndSetFMUstate = true; take "step-locked" with small circuit.max_step'
+                )
+        return "redo"
+    fixed = any(
+        not side.of.abilities.canHandleVariableCommunicationStepSize
+        or side.of.abilities.fixedInternalStepSize
+        for side in sides
+    )
+    return ("macro-steps" if fixed else "step-locked") if asked == "auto" else asked
+
+
+def _feedthrough(scene: Scene, sides: list[Side]) -> str:
+    """An input from the circuit that an output to it depends on at once, as the FMUs say; or
+    nothing."""
+    probed = {str(port.to) for port in scene.port if port.probe is not None}
+    fed = {str(port.origin) for port in scene.port if port.source is not None}
+    for side in sides:
+        for output, inputs in side.of.feedthrough.items():
+            if f"{side.name}.{output}" in fed:
+                for name in sorted(inputs):
+                    if f"{side.name}.{name}" in probed:
+                        return f"{name} to {output}"
+    return ""

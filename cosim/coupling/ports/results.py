@@ -1,0 +1,113 @@
+"""What a run of a scene with ports gives: its waveforms and its numbers."""
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.circuit.joined import unit
+from cosim.coupling.loop.agenda import count
+from cosim.coupling.ports.run import Run
+from cosim.files.spill import Tape, blocks
+from cosim.scene import Scene
+from cosim.toolchain.versions import versions
+
+
+def joined(
+    scene: Scene, progress: Callable[[float], None]
+) -> tuple[dict[str, Array], dict[str, Any], dict[str, str]]:
+    """Waveforms, the summary, and the waveforms' units. Raises BadInput and SimulationFailed."""
+    began = time.perf_counter()
+    run = Run(scene, progress)
+    run.run()
+    signals = [*_signals(run)]
+    waves = Tape(1 + len(signals))
+    step, rows = scene.run.output_step, count(scene.run.output_step, scene.run.duration)
+    for part in blocks(rows):
+        at = step * np.arange(part.start, part.stop, dtype=np.float64)
+        waves.append(np.stack([at, *(_at(each, at) for each in signals)], axis=1))
+    names = ["time", *(name for name, *_ in signals)]
+    columns = {name: waves.column(k) for k, name in enumerate(names)}
+    units = {"time": "s"} | {name: of for name, of, *_ in signals}
+    summary = {
+        f"{name}.{what}": value
+        for name, _, times, values, continuous in signals
+        for what, value in _numbers(scene.run.settle, times, values, continuous).items()
+    }
+    summary |= {
+        "circuit_steps": run.steps,
+        "circuit_rejected": run.state.attempts - run.steps,
+        "steps_repeated": run.state.redone,
+        "fmu_steps": sum(side.fmu.steps for side in run.plan.sides),
+        "wall_time": time.perf_counter() - began,
+        "method": run.plan.method,
+        "versions": {**versions(), **run.versions},
+        "notes": [*_notes(run)],
+    }
+    return columns, summary, units
+
+
+Signal = tuple[str, str, Array, Array, bool]
+"""Name, unit, times (s), values, and whether it is continuous."""
+
+
+def _signals(run: Run) -> Iterator[Signal]:
+    points, log = run.points.array(), run.log.array()
+    place = 1
+    for side in run.plan.sides:
+        for k, (name, of, real) in enumerate(side.columns):
+            yield name, of, points[:, 0], points[:, place + k], real
+        place += side.width
+    for k, name in enumerate(run.plan.names):
+        kind = run.deck.kinds[name.lower()]
+        yield name, "V" if kind == "v" else "A", log[:, 0], log[:, 1 + k], True
+    for k, words in enumerate(run.plan.words):
+        yield words, unit(words), log[:, 0], log[:, 1 + len(run.plan.names) + k], True
+
+
+def _at(signal: Signal, at: Array) -> Array:
+    """At these times; what is not continuous stays as it was last."""
+    _, _, times, values, continuous = signal
+    if continuous:
+        return np.interp(at, times, values)
+    last = np.searchsorted(times, at * (1 + 1e-12), "right") - 1
+    return values[np.maximum(last, 0)]
+
+
+def _numbers(settle: float, times: Array, values: Array, continuous: bool) -> dict[str, float]:
+    """Mean, rms, least and greatest after settling, of straight lines between the points."""
+    length = total = squares = 0.0
+    least, greatest = np.inf, -np.inf
+    for part in blocks(len(times) - 1):
+        reach = slice(part.start, part.stop + 1)
+        t, y = times[reach], values[reach]
+        if t[-1] <= settle and t[-1] < times[-1]:
+            continue
+        if t[0] < settle < t[-1]:
+            first = np.interp(settle, t, y) if continuous else y[t <= settle][-1]
+            y, t = np.append(first, y[t > settle]), np.append(settle, t[t > settle])
+        h, a = np.diff(t), y[:-1]
+        b = y[1:] if continuous else a
+        length += float(h.sum())
+        total += float((h * (a + b)).sum()) / 2.0
+        squares += float((h * (a * a + a * b + b * b)).sum()) / 3.0
+        least, greatest = min(least, float(y.min())), max(greatest, float(y.max()))
+    found = {"mean": total / length, "rms": float(np.sqrt(squares / length))}
+    return found | {"least": least, "greatest": greatest}
+
+
+_SELDOM, _MANY = 0.5, 100
+"""Share of its steps in which an FMU's outputs change that is too small; of so many steps."""
+
+
+def _notes(run: Run) -> Iterator[str]:
+    for side, state in zip(run.plan.sides, run.fmus, strict=False):
+        steps, moved = side.fmu.steps, state.moved
+        if steps > _MANY and 0 < moved < _SELDOM * steps:
+            yield (
+                f"the outputs of {side.name} changed in only {moved} of its {steps} steps: it "
+                'moves in steps of its own; coupling.method = "macro-steps" with '
+                f"coupling.macro_step = {run.state.duration / moved:.2g} s or more suits it."
+            )

@@ -1,0 +1,211 @@
+"""One run of a circuit that ngspice leads, joined to FMUs; the steps are those of ``ports.c``."""
+
+import ctypes
+from collections.abc import Callable
+from ctypes import c_char_p, c_double, c_int64
+from typing import Any
+
+import numpy as np
+
+from cosim.circuit import ngspice
+from cosim.coupling.loop.lead import engine
+from cosim.coupling.loop.structures import (
+    FMU_FAILED,
+    NO_AGREEMENT,
+    NOT_FINITE,
+    UNKNOWN_SOURCE,
+    callback,
+    loop,
+)
+from cosim.coupling.ports.plan import Plan
+from cosim.coupling.ports.structures import PortsState, Pulse, Source, StrangerState
+from cosim.drive.command import command
+from cosim.drive.pieces import Piece
+from cosim.errors import SimulationFailed, plain
+from cosim.files.spill import Tape
+from cosim.scene import Scene
+
+_AFTER_JUMP = 1e-2
+"""Longest step after a jump of the drive, in ``circuit.max_step``."""
+
+_POINTS, _PIECES = 2048, 512
+"""Places of the logs between two emptyings; pieces of the drive that are prepared at a time."""
+
+_AGREEMENT = 10.0
+"""Of ``circuit.reltol``: how far an FMU and ngspice may be apart where steps are repeated."""
+
+
+class Run:
+    """A run under way, and its logs."""
+
+    def __init__(self, scene: Scene, progress: Callable[[float], None]) -> None:
+        self._scene, self._progress = scene, progress
+        self.plan = plan = Plan(scene)
+        self.deck = plan.deck()
+        self._failure: BaseException | None = None
+        self._command = command(scene)
+        self._pieces: list[Piece] = []
+        count, width = len(self.deck.vectors), plan.width
+        self.places = (c_int64 * (count + 1))()
+        self._rows = [(c_double * max(width, 1))() for _ in range(3)]
+        self._saved = [(c_double * max(count, 1))() for _ in range(4)]
+        self._sources = (Source * max(len(plan.sources), 1))(*plan.sources)
+        self._asked = (c_char_p * max(count, 1))(
+            *(each.encode() or None for each in self.deck.devices)
+        )
+        self.log = Tape(1 + len(plan.sources) + count)
+        """Time (s), each source and each saved value at the accepted points."""
+        self.points = Tape(1 + width)
+        """Time (s) and the outputs of all FMUs at the communication points."""
+        self._blocks = [np.zeros((_POINTS, 1 + len(plan.sources) + count))]
+        self._blocks.append(np.zeros((_POINTS, 1 + width)))
+        repeats = plan.method == "redo"
+        states, row = [], ctypes.addressof(self._rows[0])
+        for side in plan.sides:
+            states.append(side.state(row, repeats))
+            row += 8 * side.width
+        self.fmus = (StrangerState * max(len(states), 1))(*states)
+        macro = scene.coupling.macro_step if plan.method == "macro-steps" else 0.0
+        self.state = PortsState(
+            fmus=self.fmus,
+            n_fmus=len(states),
+            sources=ctypes.addressof(self._sources),
+            n_sources=len(plan.sources),
+            **_named(("outputs", "before", "rates"), self._rows),
+            n_outputs=width,
+            **_named(("now", "last", "start", "charges"), self._saved),
+            places=ctypes.addressof(self.places),
+            n_saved=count,
+            driven=int(plan.driven),
+            macro_step=macro,
+            duration=scene.run.duration,
+            after_jump=_AFTER_JUMP * scene.circuit.max_step,
+            end=-np.inf,
+            repeats=int(repeats),
+            tolerance=_AGREEMENT * scene.circuit.reltol,
+            asked=self._asked,
+            log=self._blocks[0].ctypes.data,
+            points=self._blocks[1].ctypes.data,
+            log_rows=_POINTS,
+            refill=callback(self._refill, self._fail),
+            attend=callback(self._attend, self._fail),
+        )
+        self._refill()
+
+    def run(self) -> None:
+        """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
+        state, duration = self.state, self._scene.run.duration
+        try:
+            self._engine().transient(self.deck.text, self.deck.vectors, self)
+        finally:
+            self._attend()
+            for side, state_of in zip(self.plan.sides, self.fmus, strict=False):
+                side.close(state_of.state)
+        if state.status == FMU_FAILED:
+            raise self._fmu_failure()
+        if state.status == NOT_FINITE:
+            raise SimulationFailed(
+                f"The circuit or an FMU left the range of numbers at t = {state.told:.6g} s."
+            )
+        if state.status == UNKNOWN_SOURCE:
+            name = state.source.decode().lower()
+            raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
+        if state.status == NO_AGREEMENT:
+            raise SimulationFailed(
+                f"Circuit and FMUs do not agree at t = {state.told:.6g} s, however often the step "
+                "is repeated; a smaller circuit.max_step may help."
+            )
+        reached = float(self.log.column()[-1]) if len(self.log) else 0.0
+        if reached < duration * (1 - 1e-9):
+            raise SimulationFailed(
+                f"ngspice stopped at t = {reached:.6g} s of {duration:g} s: "
+                f"{self._engine().said()}. If the circuit is right, a smaller circuit.max_step or "
+                "another circuit.reltol may help."
+            )
+
+    @staticmethod
+    def _engine() -> ngspice.Engine:
+        return engine(True)
+
+    @property
+    def steps(self) -> int:
+        """Steps that ngspice accepted."""
+        return max(0, len(self.log) - 1)
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Of ngspice."""
+        return {"ngspice": str(self._engine().ngspice_version)}
+
+    def _fmu_failure(self) -> SimulationFailed:
+        side = self.plan.sides[self.state.failed]
+        said = side.instance.messages[-1:] or [f"status {side.fmu.status}"]
+        return SimulationFailed(
+            f"The FMU {side.name} failed at t = {self.state.told:.6g} s: {plain(said[0], 400)}"
+        )
+
+    # What ngspice's engine asks for (see cosim.circuit.ngspice.Leader).
+
+    def begin(self) -> None:
+        loop().ports_begin(ctypes.byref(self.state))
+
+    def loaded(self, engine: ngspice.Engine) -> None:
+        """Take the addresses of what is called during the run, and the edges of PULSE sources."""
+        state, run = self.state, self._scene.run
+        state.command = engine.address("ngSpice_Command")
+        state.ask = engine.address("ngGet_Vec_Info")
+        state.plot = engine.address("ngSpice_CurPlot")
+        state.announce = engine.address("ngSpice_SetBkpt")
+        found = [engine.ask(f"@{name}[pulse]") for name in self.deck.pulses]
+        pulses = [
+            _pulse(values, run.duration, self._scene.circuit.max_step)
+            for values in found
+            if len(values) > 2
+        ]
+        self._pulses = (Pulse * max(len(pulses), 1))(*pulses)
+        state.pulses, state.n_pulses = ctypes.addressof(self._pulses), len(pulses)
+
+    def finish(self) -> None:
+        loop().ports_finish(ctypes.byref(self.state))
+
+    def stop(self) -> None:
+        self.state.stopped = 1
+
+    def _fail(self, failure: BaseException) -> None:
+        self._engine().fail(failure)
+
+    def _attend(self) -> None:
+        """Take the logs away."""
+        state = self.state
+        self.log.append(self._blocks[0][: state.n_log])
+        self.points.append(self._blocks[1][: state.n_points])
+        state.n_log = state.n_points = 0
+        self._progress(state.time)
+
+    def _refill(self) -> None:
+        """Keep the pieces of the drive that are still needed, and prepare those that follow."""
+        state = self.state
+        kept = [piece for piece in self._pieces if piece.until > state.origin]
+        begin = self._pieces[-1].until if self._pieces else 0.0
+        self._pieces = kept + self._command.pieces(begin, self._scene.run.duration, _PIECES)
+        self._row = (Piece * len(self._pieces))(*self._pieces)
+        state.pieces, state.n_pieces, state.piece = self._row, len(self._pieces), 0
+
+
+def _named(names: tuple[str, ...], arrays: list[Any]) -> dict[str, int]:
+    return dict(zip(names, map(ctypes.addressof, arrays), strict=True))
+
+
+def _pulse(values: list[float], duration: float, step: float) -> Pulse:
+    """Of ngspice's values (low, high, delay, rise, fall, width, period), as it completes them."""
+    given = dict(enumerate(values))
+    delay, rise, fall = (given.get(k, 0.0) for k in (2, 3, 4))
+    rise, fall = rise or step, fall or step
+    width = given.get(5) or duration
+    period = given.get(6) or 2.0 * (duration + rise + width + fall)
+    corners = [0.0, rise, rise + width, rise + width + fall]
+    inside = [corner for corner in corners if corner < period]
+    pulse = Pulse(delay=delay, period=period, n=len(inside), corner=-1)
+    pulse.corners[: len(inside)] = inside
+    pulse.previous = pulse.announced = -np.inf
+    return pulse

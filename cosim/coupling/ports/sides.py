@@ -1,0 +1,158 @@
+"""One FMU of a scene during a run: its instance, and its variables as ``ports.c`` takes them."""
+
+import ctypes
+from collections import defaultdict
+from collections.abc import Sequence
+from contextlib import suppress
+from ctypes import c_double, c_uint32, c_void_p
+from typing import Any
+
+from cosim.coupling.loop.structures import Fmu, loop
+from cosim.coupling.ports.strangers import Stranger, Variable
+from cosim.coupling.ports.structures import Feed, Group, StrangerState
+from cosim.scene import tables
+
+_FUNCTIONS = {
+    2: {"Real": "Real", "Boolean": "Boolean", "Integer": "Integer", "Enumeration": "Integer"},
+    3: {"Enumeration": "Int64"},
+}
+"""What sets and reads a type, where it is not of the same name."""
+
+_ERROR = 3
+"""The status of a call, in both versions, from which on an instance is not to be used."""
+
+
+class Side:
+    """An FMU with room for its inputs and outputs; the outputs of all lie in one row."""
+
+    def __init__(self, about: tables.Fmu, of: Stranger) -> None:
+        self.name, self.of = about.name, of
+        self.outputs = _grouped([v for v in of.variables.values() if v.causality == "output"])
+        """Those with numbers, in the order of the row."""
+        self.columns = [
+            (f"{self.name}.{v.name}" + (f"[{k}]" if v.size > 1 else ""), v.unit, v.real)
+            for v in self.outputs
+            for k in range(v.size)
+        ]
+        """Name, unit, and whether it is real, of each number of the row."""
+        self.slopes: list[Variable] = []
+        """Outputs whose derivative the FMU itself tells; they follow in the row."""
+        self.places: dict[str, int] = {}
+        place = 0
+        for each in self.outputs:
+            self.places[each.name] = place
+            place += each.size
+        self.inputs: list[Variable] = []
+        self._feeds: list[tuple[Variable, int, Feed]] = []
+        self._kept: list[Any] = []
+        self._parameters = about.parameters
+
+    @property
+    def width(self) -> int:
+        return len(self.columns) + len(self.slopes)
+
+    def slope_place(self, output: Variable) -> int:
+        """Where in the row the derivative stands that the FMU tells of an output."""
+        if output not in self.slopes:
+            self.slopes.append(output)
+        return len(self.columns) + self.slopes.index(output)
+
+    def feed(self, into: Variable, place: int, feed: Feed) -> None:
+        """Lead ``feed`` into an input, or an element of it."""
+        if into not in self.inputs:
+            self.inputs.append(into)
+        self._feeds.append((into, place, feed))
+
+    def state(self, row: int, repeats: bool) -> StrangerState:
+        """Ready to run: a new instance, with its part of the row at that address."""
+        self.instance = self.of.instance(self._parameters)
+        names = {"set_reals": "SetReal", "get_reals": "GetReal", "do_step": "DoStep"}
+        if self.of.version == 3:
+            names |= {"set_reals": "SetFloat64", "get_reals": "GetFloat64"}
+        calls = {key: self.of.address(name) for key, name in names.items()}
+        self.fmu = Fmu(instance=self.instance.raw.component, goes_back=int(repeats), **calls)
+        loop().fmu_bind(ctypes.byref(self.fmu), self.of.version)
+        inputs = _grouped(self.inputs)
+        starts = [value for each in inputs for value in each.start]
+        self._values = (c_double * max(len(starts), 1))(*starts)
+        at, base = {}, 0
+        for each in inputs:
+            at[each.name] = ctypes.addressof(self._values) + 8 * base
+            base += each.size
+        lines = [each for each in self._feeds if each[2].feed == 1]
+        rates = self._keep((c_double * max(len(lines), 1))())
+        for into, place, feed in self._feeds:
+            feed.input = at[into.name] + 8 * place
+        for k, (_, _, feed) in enumerate(lines):
+            feed.slope = ctypes.addressof(rates) + 8 * k
+        feeds = self._keep((Feed * max(len(self._feeds), 1))(*(f for _, _, f in self._feeds)))
+        sets, gets = (
+            self._groups("Set", inputs, ctypes.addressof(self._values)),
+            self._groups("Get", self.outputs, row),
+        )
+        state = StrangerState(
+            fmu=ctypes.pointer(self.fmu),
+            **{"inputs": ctypes.addressof(sets), "n_inputs": sets.used},
+            **{"outputs": ctypes.addressof(gets), "n_outputs": gets.used},
+            **{"feeds": ctypes.addressof(feeds), "n_feeds": len(self._feeds)},
+            **{"row": row, "width": self.width},
+        )
+        if lines:
+            state.set_slopes = self.of.address("SetRealInputDerivatives")
+            state.input_slopes = self._references([into for into, _, _ in lines])
+            state.n_input_slopes, state.input_rates = len(lines), ctypes.addressof(rates)
+        if self.slopes:
+            name = "GetRealOutputDerivatives" if self.of.version == 2 else "GetOutputDerivatives"
+            state.get_slopes = self.of.address(name)
+            state.output_slopes = self._references(self.slopes)
+            state.n_output_slopes = len(self.slopes)
+            state.output_rates = row + 8 * len(self.columns)
+        if repeats:
+            word = "FMUstate" if self.of.version == 2 else "FMUState"
+            state.save, state.restore = (self.of.address(f"{do}{word}") for do in ("Get", "Set"))
+        return state
+
+    def _keep(self, array: Any) -> Any:
+        self._kept.append(array)
+        return array
+
+    def _references(self, variables: Sequence[Variable]) -> int:
+        numbers = self._keep((c_uint32 * len(variables))(*(v.reference for v in variables)))
+        return ctypes.addressof(numbers)
+
+    def _groups(self, do: str, variables: Sequence[Variable], values: int) -> Any:
+        """One group for each type; their values lie one after another."""
+        groups: list[Group] = []
+        types: dict[str, list[Variable]] = defaultdict(list)
+        for each in variables:
+            types[each.type].append(each)
+        for kind, those in types.items():
+            size = sum(each.size for each in those)
+            raw = self._keep((c_double * size)())  # no type is longer
+            groups.append(
+                Group(
+                    call=self.of.address(do + _FUNCTIONS[self.of.version].get(kind, kind)),
+                    places=self._references(those),
+                    **{"n": len(those), "size": size, "kind": those[0].kind},
+                    **{"values": values, "raw": ctypes.addressof(raw)},
+                )
+            )
+            values += 8 * size
+        array = self._keep((Group * max(len(groups), 1))(*groups))
+        array.used = len(groups)
+        return array
+
+    def close(self, state: int | None) -> None:
+        """End the use of the instance, and of the state that it has saved. One that has failed is
+        left alone, since nothing may be asked of it any more."""
+        if self.fmu.status < _ERROR:
+            with suppress(Exception):
+                if state:
+                    self.instance.free_state(c_void_p(state))
+                self.instance.close()
+
+
+def _grouped(variables: Sequence[Variable]) -> list[Variable]:
+    """Those of a type one after another."""
+    order = list(dict.fromkeys(each.type for each in variables))
+    return sorted(variables, key=lambda each: order.index(each.type))

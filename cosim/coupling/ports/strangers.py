@@ -1,0 +1,248 @@
+"""FMUs of others: unpacked, described, loaded; nothing that they say of themselves is trusted
+before it is checked.
+"""
+
+import math
+import re
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from ctypes import c_void_p, cast
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import fmpy
+from fmpy import fmi2, fmi3
+
+from cosim.errors import BadInput, plain
+from cosim.mechanics.fmi import INTERFACES, Interface
+from cosim.scene.messages import ended, shown, suggestion
+
+MOST_FILES, LARGEST = 10_000, 1 << 30
+"""Of an FMU: files in it, and bytes once unpacked."""
+
+MOST_VALUES = 4096
+"""Numbers in the outputs of an FMU: arrays count with all of theirs."""
+
+_KINDS_2 = {"Real": 0, "Integer": 6, "Enumeration": 6, "Boolean": 11}
+_KINDS_3 = {
+    **{"Float64": 0, "Float32": 1, "Int8": 2, "UInt8": 3, "Int16": 4, "UInt16": 5, "Int32": 6},
+    **{"UInt32": 7, "Int64": 8, "Enumeration": 8, "UInt64": 9, "Boolean": 10},
+}
+"""Types of values as ``loop.h`` numbers them."""
+
+_LONGEST = 600  # characters of a message
+
+_ELEMENT = re.compile(r"(.*)\[(\d+)\]")
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of an FMU that has numbers."""
+
+    name: str
+    reference: int
+    type: str
+    kind: int
+    size: int
+    unit: str
+    causality: str
+    variability: str
+    start: tuple[float, ...]
+    slope: str
+    """The output that is its derivative; empty where there is none."""
+
+    @property
+    def real(self) -> bool:
+        return self.kind < 2
+
+
+class Stranger:
+    """An FMU's file, unpacked and described. Raises BadInput, naming the file."""
+
+    def __init__(self, path: Path) -> None:
+        self.name = plain(str(path))
+        self._folder = tempfile.TemporaryDirectory(prefix="fmu-")
+        folder = self._folder.name
+        _unpack(path, folder, self.name)
+        try:
+            found: Any = fmpy.read_model_description(folder, validate=False)
+        except Exception as error:
+            raise self.bad(f"its modelDescription.xml cannot be read ({error})") from error
+        self.version = int(str(found.fmiVersion).partition(".")[0])
+        if self.version not in INTERFACES:
+            raise self.bad(f"it is of FMI {found.fmiVersion}; it must be of FMI 2.0 or 3.0")
+        if found.coSimulation is None:
+            raise self.bad("it must be for co-simulation; it has model exchange alone")
+        self.abilities: Any = found.coSimulation
+        self.token = found.instantiationToken
+        self.variables = self._variables(found)
+        self.feedthrough = {
+            each.variable.name: {v.name for v in each.dependencies}
+            for each in found.outputs
+            if each.variable is not None and each.dependencies is not None
+        }
+        """The variables that each output depends on at once, where the FMU says so."""
+        self.loaded = self._load(folder)
+
+    def bad(self, reason: str) -> BadInput:
+        """The error that tells what is wrong with it, in a line; an FMU's words are in it."""
+        line = "".join(each if each.isprintable() else " " for each in reason)[:_LONGEST]
+        return BadInput(ended(f"{self.name}: {line}"))
+
+    def _variables(self, found: Any) -> dict[str, Variable]:
+        kinds = _KINDS_2 if self.version == 2 else _KINDS_3
+        derivatives = {
+            each.derivative.name: each.name
+            for each in found.modelVariables
+            if each.derivative is not None and each.causality == "output"
+        }
+        known = {}
+        for each in found.modelVariables:
+            if each.type not in kinds:
+                continue
+            size = math.prod(each.shape or (1,))
+            try:
+                start = tuple(_number(text) for text in str(each.start or "").split())
+            except ValueError:
+                start = ()
+            start = start * size if len(start) == 1 else start
+            known[each.name] = Variable(
+                *(each.name, each.valueReference, each.type, kinds[each.type], size),
+                each.unit or (each.declaredType and each.declaredType.unit) or "1",
+                *(each.causality or "local", each.variability or "continuous"),
+                start if len(start) == size else (0.0,) * size,
+                derivatives.get(each.name, ""),
+            )
+        outputs = [each for each in known.values() if each.causality == "output"]
+        if sum(each.size for each in outputs) > MOST_VALUES:
+            raise self.bad(f"its outputs have more than {MOST_VALUES} values")
+        return known
+
+    def _load(self, folder: str) -> Any:
+        slave = fmi2.FMU2Slave if self.version == 2 else fmi3.FMU3Slave
+        names = {
+            "instanceName": "cosim",
+            "guid": self.token,
+            "modelIdentifier": self.abilities.modelIdentifier,
+        }
+        try:
+            return slave(**names, unzipDirectory=folder)
+        except Exception as error:
+            words = str(error).replace(folder, "…")
+            raise self.bad(f"it has no library that runs here ({words})") from error
+
+    def find(self, name: str, causality: str, where: str) -> tuple[Variable, int]:
+        """A variable with this causality, and the place of an array's element; ``where`` is the
+        scene's key with its value, as a message has it."""
+        found, place = self.variables.get(name), 0
+        match = _ELEMENT.fullmatch(name)
+        if found is None and match is not None:
+            found, place = self.variables.get(match[1]), int(match[2])
+        if found is None or found.causality != causality:
+            able = [each.name for each in self.variables.values() if each.causality == causality]
+            known = f" (it has {', '.join(able[:20]) or 'none'})"
+            other = f", not its {found.causality}" if found else ""
+            hint = "" if found else suggestion(name, able)
+            said = f"{where} must be one of its {causality}s with numbers{other}"
+            raise self.bad(said + (hint or known))
+        if found.size > 1 and (match is None or found.name == name):
+            raise self.bad(
+                f"{where} has {found.size} values: write {found.name}[0] … [{found.size - 1}]"
+            )
+        if place >= found.size:
+            raise self.bad(f"{where}: its elements must be [0] … [{found.size - 1}]")
+        return found, place
+
+    def instance(self, parameters: Mapping[str, Any]) -> Interface:
+        """A new instance with these start values of parameters, initialised."""
+        made = None
+        try:
+            made = INTERFACES[self.version](self.loaded)
+            for name, value in parameters.items():
+                self._set(made, name, value)
+            made.initialise()
+        except BadInput:
+            raise
+        except Exception as error:
+            said = f": {made.messages[-1]}" if made and made.messages else f" ({error})"
+            raise self.bad(f"the FMU cannot be initialised{said}") from error
+        return made
+
+    def _set(self, made: Interface, name: str, value: Any) -> None:
+        where = f"[[fmu]] parameters {name} = {shown(value)}"
+        text = isinstance(value, str)
+        if text:
+            raise self.bad(f"{where} must be a number, true or false")
+        kind = self.variables.get(name.partition("[")[0])
+        is_input = kind is not None and kind.causality == "input"
+        found, place = self.find(name, "input" if is_input else "parameter", where)
+        if found.variability == "constant":
+            raise self.bad(f"{where}: it is a constant")
+        values = [*found.start]
+        values[place] = _allowed(found, value, where, self)
+        kind = found.type if self.version == 3 else _AS_2.get(found.type, found.type)
+        kind = "Int64" if kind == "Enumeration" else kind
+        getattr(made.raw, f"set{kind}")([found.reference], values)
+
+    def address(self, name: str) -> Any:
+        """Of one of its functions, by its name in FMI 2.0 or 3.0 without the ``fmi``."""
+        function = f"fmi{self.version}{name}"
+        try:
+            return cast(getattr(self.loaded.dll, function), c_void_p).value or 0
+        except AttributeError:
+            raise self.bad(f"its library lacks the function {function}") from None
+
+
+_AS_2 = {"Enumeration": "Integer"}
+
+
+def _allowed(found: Variable, value: Any, where: str, of: Stranger) -> Any:
+    if found.type == "Boolean":
+        if not isinstance(value, bool):
+            raise of.bad(f"{where} must be true or false")
+    elif isinstance(value, bool):
+        raise of.bad(f"{where} must be a number")
+    elif not found.real:
+        if value != int(value):
+            raise of.bad(f"{where} must be a whole number")
+        return int(value)
+    return value
+
+
+def _number(text: str) -> float:
+    truth = {"true": 1.0, "false": 0.0}
+    return truth[text] if text in truth else float(text)
+
+
+def _unpack(path: Path, folder: str, name: str) -> None:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            files = archive.infolist()
+            if len(files) > MOST_FILES or sum(each.file_size for each in files) > LARGEST:
+                raise BadInput(f"{name}: it unpacks to more than {MOST_FILES} files or 1 GB.")
+            for each in files:
+                place = PurePosixPath(each.filename.replace("\\", "/"))
+                if place.is_absolute() or ".." in place.parts:
+                    raise BadInput(f"{name}: it has a file outside itself, {plain(str(place))}.")
+            archive.extractall(folder)
+    except FileNotFoundError:
+        raise BadInput(f"{name}: there is no such file.") from None
+    except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, ValueError) as error:
+        raise BadInput(f"{name}: this is no FMU ({plain(str(error))}).") from None
+
+
+def stranger(path: str) -> Stranger:
+    """That of a file, unpacked and loaded once in a process as long as the file stays the same."""
+    try:
+        about = Path(path).stat()
+    except OSError as error:
+        raise BadInput(f"{plain(path)}: cannot be read ({error.strerror}).") from None
+    return _stranger(path, about.st_mtime_ns, about.st_size)
+
+
+@cache
+def _stranger(path: str, changed: int, size: int) -> Stranger:
+    return Stranger(Path(path))

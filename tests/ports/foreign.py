@@ -1,0 +1,107 @@
+"""A stranger's FMU, compiled by the machine's own compiler; foreign.c says what it computes."""
+
+import subprocess
+import zipfile
+from pathlib import Path
+
+from fmpy import platform, sharedLibraryExtension
+
+_REALS = (
+    ("u", 0, "input", 'start="0"', "N.m"),
+    ("omega", 1, "output", "", "rad/s"),
+    ("J", 2, "parameter", 'start="2e-4"', "kg.m2"),
+    ("B", 3, "parameter", 'start="1e-4"', ""),
+    ("D", 4, "parameter", 'start="1"', ""),
+    ("alpha", 5, "output", "{derivative}", "rad/s2"),
+    ("y", 6, "output", "", ""),
+    ("crash_at", 7, "parameter", 'start="1e9"', "s"),
+    ("fail_at", 8, "parameter", 'start="1e9"', "s"),
+)
+
+
+def build(
+    folder: Path,
+    name: str,
+    version: int = 2,
+    saves: bool = True,
+    through: bool = False,
+    derivative: bool = False,
+    fixed: bool = False,
+) -> Path:
+    """An FMU of FMI 2.0 or 3.0; what it says of itself: whether it saves its state, that y depends
+    on u at once, that alpha is the derivative of omega, and that its steps are fixed."""
+    library = folder / f"foreign{sharedLibraryExtension}"
+    if not library.exists():
+        source = Path(__file__).with_name("foreign.c")
+        subprocess.run(
+            ["cc", "-shared", "-fPIC", "-O2", "-w", "-o", library, source, "-lm"], check=True
+        )
+    describe = _two if version == 2 else _three
+    place = platform if version == 2 else {"linux64": "x86_64-linux"}.get(platform, platform)
+    path = folder / f"{name}.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", describe(saves, through, derivative, fixed))
+        archive.write(library, f"binaries/{place}/foreign{sharedLibraryExtension}")
+    return path
+
+
+def _abilities(saves: bool, fixed: bool, word: str) -> str:
+    return (
+        f'<CoSimulation modelIdentifier="foreign" canGet{"AndSet"}{word}="{str(saves).lower()}" '
+        f'canHandleVariableCommunicationStepSize="{str(not fixed).lower()}"/>'
+    )
+
+
+def _two(saves: bool, through: bool, derivative: bool, fixed: bool) -> str:
+    own = 'derivative="2"' if derivative else ""
+    rows = [
+        f'<ScalarVariable name="{name}" valueReference="{place}" causality="{causality}"'
+        + (' variability="fixed"' if causality == "parameter" else "")
+        + f"><Real {start.format(derivative=own)}"
+        + (f' unit="{unit}"' if unit else "")
+        + "/></ScalarVariable>"
+        for name, place, causality, start, unit in _REALS
+    ]
+    rows += [
+        '<ScalarVariable name="off" valueReference="20" causality="input" variability="discrete">'
+        '<Boolean start="false"/></ScalarVariable>',
+        '<ScalarVariable name="steps" valueReference="21" causality="output" '
+        'variability="discrete"><Integer/></ScalarVariable>',
+    ]
+    depends = ' dependencies="1"' if through else ""
+    return (
+        '<fmiModelDescription fmiVersion="2.0" modelName="foreign" guid="{1}">'
+        + _abilities(saves, fixed, "FMUstate")
+        + f"<ModelVariables>{''.join(rows)}</ModelVariables><ModelStructure><Outputs>"
+        + f'<Unknown index="2"/><Unknown index="6"/><Unknown index="7"{depends}/>'
+        + '<Unknown index="11"/></Outputs></ModelStructure></fmiModelDescription>'
+    )
+
+
+def _three(saves: bool, through: bool, derivative: bool, fixed: bool) -> str:
+    own = 'derivative="1"' if derivative else ""
+    rows = [
+        f'<Float64 name="{name}" valueReference="{place}" causality="{causality}"'
+        + (' variability="fixed"' if causality == "parameter" else "")
+        + f" {start.format(derivative=own)}"
+        + (f' unit="{unit}"' if unit else "")
+        + "/>"
+        for name, place, causality, start, unit in _REALS
+    ]
+    rows += [
+        '<Boolean name="off" valueReference="20" causality="input" start="false"/>',
+        '<Int32 name="steps" valueReference="21" causality="output"/>',
+        '<Float64 name="x" valueReference="30" causality="input" start="0 0">'
+        '<Dimension start="2"/></Float64>',
+        '<Float64 name="xs" valueReference="31" causality="output">'
+        '<Dimension start="2"/></Float64>',
+    ]
+    depends = ' dependencies="0"' if through else ""
+    return (
+        '<fmiModelDescription fmiVersion="3.0" modelName="foreign" instantiationToken="{1}">'
+        + _abilities(saves, fixed, "FMUState")
+        + f"<ModelVariables>{''.join(rows)}</ModelVariables><ModelStructure>"
+        + '<Output valueReference="1"/><Output valueReference="5"/>'
+        + f'<Output valueReference="6"{depends}/><Output valueReference="21"/>'
+        + '<Output valueReference="31"/></ModelStructure></fmiModelDescription>'
+    )

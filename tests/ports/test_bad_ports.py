@@ -1,0 +1,87 @@
+"""What is wrong with a scene's ports is told in one sentence: file, key, value, what is allowed."""
+
+import re
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from cosim.cli.main import main
+from cosim.toolchain.processes import in_place
+from tests.ports.test_coupled import motor
+
+WRONG = {
+    "no such output": (
+        "rotor.omega",
+        "rotor.speed",
+        r"Rotor\.fmu: .*rotor\.speed\".*omega",
+    ),
+    "an input as output": ("rotor.omega", "rotor.u", r"Rotor\.fmu: .*not its input"),
+    "no such input": (
+        '"rotor.u"',
+        '"rotor.v"',
+        r"to = \"rotor\.v\" must be one of its inputs",
+    ),
+    "an element of a number": ('"rotor.u"', '"rotor.u[1]"', r"elements must be \[0\]"),
+    "no such FMU": ("rotor.omega", "motor.omega", r"from = \"motor\.omega\" must be a variable"),
+    "no such source": ('"Vemf"\n', '"Vemg"\n', r"bridge\.cir: .*\"Vemg\".*did you mean vemf"),
+    "no source at all": ('"Vemf"\n', '"Rm"\n', r"bridge\.cir: .*\"Rm\" must be a V or I source"),
+    "no such node": ('"v(gp)"', '"v(gpp)"', r"bridge\.cir: \"v\(gpp\)\".*no node gpp"),
+    "no such current": ('"i(Vemf)"', '"i(Rm)"', r"bridge\.cir: .*no V, L, E or H element rm"),
+    "a command as probe": ('"v(gp)"', '"v(gp)\\n.control"', r"cannot stand in a netlist"),
+    "a parameter": ("J = 2e-4", "K = 2e-4", r"Rotor\.fmu: .*parameters K = 0\.0002"),
+    "a parameter's type": ("J = 2e-4", 'J = "x"', r"Rotor\.fmu: .*must be a number"),
+    "a .param": ("max_step", "param = { R9 = 1.0 }\nmax_step", r"bridge\.cir: circuit\.param\.R9"),
+    "a line": ('to = "rotor.u"', 'to = "rotor.u"\nfeed = "line"', r"canInterpolateInputs"),
+    "a feed": ('to = "rotor.u"', 'to = "rotor.u"\nfeed = "now"', r"feed = \"now\" must be one of"),
+    "a slope": (
+        "scale = 0.05\n",
+        'scale = 0.05\nslope = "w"\n',
+        r"\"w\" must be one of its outputs",
+    ),
+    "a source twice": (
+        "[coupling]",
+        '[[port]]\nfrom = "rotor.y"\nsource = "vemf"\n[coupling]',
+        r"source = \"vemf\" is given twice",
+    ),
+    "two origins": ("probe =", 'from = "drive"\nprobe =', r"must have either probe or from"),
+    "a method": ('"auto"', '"jacobi"', r"coupling\.method = \"jacobi\" must be one of"),
+    "a file": ("Rotor.fmu", "Rotor2.fmu", r"Rotor2\.fmu: cannot be read"),
+    "no FMU": ("Rotor.fmu", "bridge.cir", r"bridge\.cir: this is no FMU"),
+    "a key": ("source =", "sourec =", r"there is no key \"sourec\" in \[\[port\]\]; did you mean"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_wrong_port_is_told_in_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str
+) -> None:
+    scene = motor(tmp_path)
+    old, new, said = WRONG[what]
+    text = scene.read_text()
+    assert old in text
+    scene.write_text(text.replace(old, new))
+    with in_place():
+        assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err.strip()
+    assert told.count("\n") == 0 and told.startswith("cosim: ")
+    assert re.search(said, told), told
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_fmu_that_unpacks_outside_itself_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = motor(tmp_path)
+    with zipfile.ZipFile(tmp_path / "Rotor.fmu", "a") as archive:
+        archive.writestr("../outside.txt", "x")
+    assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == 2
+    assert "outside itself" in capsys.readouterr().err
+
+
+def test_a_crash_is_exit_code_three(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = motor(tmp_path)
+    given = ["--set", "fmu.rotor.crash_at=1e-3", "--set", "run.duration=2e-3"]
+    assert main(["run", str(scene), *given, "--out", str(tmp_path / "out")]) == 3
+    told = capsys.readouterr().err.strip()
+    assert told.count("\n") == 0 and "died at t = " in told

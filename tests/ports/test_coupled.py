@@ -1,0 +1,335 @@
+"""Scenes with their own circuit and FMUs, against the same in one netlist in plain ngspice.
+
+The FMUs are strangers, compiled by the test (foreign.c); ngspice runs by itself in tests/helpers.
+"""
+
+import ctypes
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cosim
+from cosim.arrays import Array
+from cosim.coupling.loop.structures import loop
+from cosim.coupling.ports.run import Run
+from cosim.coupling.ports.structures import STRUCTURES
+from cosim.errors import BadInput, SimulationFailed
+from cosim.scene import changed, load, to_toml
+from cosim.toolchain.processes import in_place
+from tests.helpers import spice
+from tests.ports.foreign import build
+
+BRIDGE = """
+.param vdd=24
+Vdd vdd 0 {vdd}
+Vp gp 0 PULSE(0 1 0 1u 1u 129u 200u)
+Vn gn 0 PULSE(1 0 0 1u 1u 129u 200u)
+B1 vdd a I=v(vdd,a)*(1e-5+10/(1+exp(-20*(v(gp)-0.6))))
+B2 a 0 I=v(a)*(1e-5+10/(1+exp(-20*(v(gn)-0.6))))
+B3 vdd b I=v(vdd,b)*(1e-5+10/(1+exp(-20*(v(gn)-0.6))))
+B4 b 0 I=v(b)*(1e-5+10/(1+exp(-20*(v(gp)-0.6))))
+D1 a vdd DM
+D2 0 a DM
+D3 b vdd DM
+D4 0 b DM
+.model DM D(Is=1e-12 N=1 Rs=0.02)
+Rm a x 1
+Lm x y 1m
+"""
+ROTOR = """
+Vsense y z 0
+Eemf z b omega 0 0.05
+Cj omega 0 2e-4
+Rb omega 0 1e4
+Bt 0 omega I=0.05*i(Vsense)
+.ic v(omega)=0
+"""
+MOTOR = """
+description = "A motor on an H-bridge"
+[circuit]
+model = "file"
+netlist = "bridge.cir"
+save = ["v(a)*i(Vemf)", "v(gp)"]
+max_step = 5e-6
+[[fmu]]
+name = "rotor"
+file = "Rotor.fmu"
+parameters = { J = 2e-4, B = 1e-4 }
+[[port]]
+source = "Vemf"
+from = "rotor.omega"
+scale = 0.05
+[[port]]
+probe = "i(Vemf)"
+to = "rotor.u"
+scale = 0.05
+[coupling]
+method = "auto"
+[run]
+duration = 0.02
+"""
+
+
+def motor(folder: Path, **said: object) -> Path:
+    build(folder, "Rotor", **said)  # pyright: ignore[reportArgumentType]
+    (folder / "bridge.cir").write_text(f"* bridge{BRIDGE}Vemf y b 0\n.end\n")
+    (folder / "motor.toml").write_text(MOTOR)
+    return folder / "motor.toml"
+
+
+def plain(folder: Path, duration: float) -> spice.Result:
+    options = ".options reltol=1e-5\n"
+    tran = f".tran 5u {duration} 0 5u\n.end\n"
+    return spice.run(folder, f"* motor{BRIDGE}{ROTOR}{options}{tran}")
+
+
+def here(scene: Path, overrides: Mapping[str, Any]) -> cosim.Result:
+    with in_place():
+        return cosim.run(scene, overrides)
+
+
+def off(result: cosim.Result, plain: spice.Result) -> float:
+    """Greatest difference of the speeds over the greatest speed."""
+    true = np.interp(result.columns["time"], plain["time"], plain["omega"])
+    return float(np.abs(result.columns["rotor.omega"] - true).max() / np.abs(true).max())
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_motor_on_a_bridge_is_that_of_one_netlist(tmp_path: Path, version: int) -> None:
+    scene, true = motor(tmp_path, version=version), plain(tmp_path, 0.02)
+    for overrides, most in (
+        ({}, 5e-5),
+        ({"coupling.method": "redo"}, 5e-5),
+        ({"coupling.method": "macro-steps", "coupling.macro_step": 2e-5}, 2e-3),
+    ):
+        result = here(scene, overrides)
+        assert off(result, true) < most, overrides
+        assert result.summary["fmu_steps"] > 0
+        power = result.columns["v(a)*i(Vemf)"]
+        assert power == pytest.approx(
+            np.interp(result.columns["time"], true["time"], true["a"] * true["vsense#branch"]),
+            abs=0.05 * np.abs(power).max(),
+        )
+
+
+def test_what_an_fmu_says_of_its_slope_is_taken(tmp_path: Path) -> None:
+    """A macro step's error falls where the derivative need not be guessed from differences."""
+    scene, true = motor(tmp_path, derivative=True), plain(tmp_path, 0.02)
+    macro = {"coupling.method": "macro-steps", "coupling.macro_step": 1e-3}
+    known = off(here(scene, macro), true)
+    scene.write_text(scene.read_text().replace("scale = 0.05", 'scale = 0.05\nslope = "held"', 1))
+    assert off(here(scene, macro), true) > 0.0 and known < 0.05
+
+
+LOAD = """
+[circuit]
+model = "file"
+netlist = "rl.cir"
+max_step = 1e-6
+[[fmu]]
+name = "load"
+file = "Load.fmu"
+[[port]]
+source = "Vf"
+from = "load.y"
+[[port]]
+probe = "i(Vf)"
+to = "load.u"
+[coupling]
+method = "auto"
+[run]
+duration = 2e-4
+output_step = 2e-7
+settle = 0
+"""
+RL = "V1 in 0 PULSE(0 1 5u 2u 2u 40u 90u)\nR1 in x 1\nL1 x y 10u\n"
+
+
+@pytest.mark.parametrize("gain", [0.5, 2.0, 10.0, 100.0])
+@pytest.mark.parametrize("version", [2, 3])
+def test_feedthrough_is_as_exact_as_one_netlist(tmp_path: Path, gain: float, version: int) -> None:
+    build(tmp_path, "Load", version, through=True)
+    (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD)
+    decks = [
+        f"* load\n{RL}Vf y z 0\nR2 z 0 {gain}\n.options reltol={reltol}\n"
+        f".tran {step} 2e-4 0 {step}\n.end\n"
+        for reltol, step in (("1e-5", "1u"), ("1e-7", "5n"))
+    ]
+    plain, fine = spice.run_all(tmp_path, *decks)
+    with in_place():
+        run = Run(load(tmp_path / "load.toml", {"fmu.load.D": gain}), lambda _: None)
+        run.run()
+    assert run.plan.method == "redo" and run.state.redone > 0
+    # At the solvers' own points, since straight lines between them err more than either.
+    time, _, current = run.log.array().T
+
+    def error(time: Array, current: Array) -> float:
+        return float(np.abs(current - np.interp(time, fine["time"], fine["vf#branch"])).max())
+
+    assert error(time, current) <= 1.5 * error(plain["time"], plain["vf#branch"])
+
+
+def test_feedthrough_needs_an_fmu_that_saves_its_state(tmp_path: Path) -> None:
+    build(tmp_path, "Load", saves=False, through=True)
+    (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD)
+    for overrides in ({}, {"coupling.method": "redo"}):
+        with pytest.raises(BadInput, match=r"Load\.fmu: .*canGetAndSetFMUstate = true"):
+            here(tmp_path / "load.toml", overrides)
+    assert here(tmp_path / "load.toml", {"coupling.method": "step-locked"})
+
+
+EDGES = """
+.param per=50u
+.param edge=1u
+.subckt pw o
+V1 o 0 PULSE(0 1 0 {edge} {edge} {per/2-edge} {per})
+.ends
+X1 p pw
+V2 q 0 PULSE(0 1 {per/4} {per/2} {per/2} 0 {per})
+R1 p x 1
+L1 x y 1m
+R2 q 0 1
+Vemf y 0 0
+.end
+"""
+
+
+@pytest.mark.parametrize("period", [5e-5, 1e-4, 2e-5])
+def test_no_edge_of_a_pulse_is_lost(tmp_path: Path, period: float) -> None:
+    """A step ends on each corner, whatever lengths the steps have; also within a subcircuit."""
+    scene = motor(tmp_path)
+    (tmp_path / "bridge.cir").write_text(f"* edges{EDGES}")
+    text = scene.read_text().replace('["v(a)*i(Vemf)", "v(gp)"]', '["v(p)"]')
+    scene.write_text(text)
+    duration = 2e-3
+    starts = np.arange(round(duration / period)) * period
+    corners = np.concatenate(
+        [starts + at for at in (1e-6, period / 2, period / 2 + 1e-6)]
+        + [starts + share * period for share in (0.25, 0.75)]
+    )
+    for step in (5e-6, 2e-6, 1e-5):
+        for macro in (None, 2e-4, 1e-4, 2.5e-5, 3e-5):
+            given = {"circuit.param.per": period, "circuit.max_step": step}
+            given |= {"run.duration": duration, "run.settle": 0.0}
+            if macro:
+                given |= {"coupling.method": "macro-steps", "coupling.macro_step": macro}
+            with in_place():
+                run = Run(load(scene, given), lambda _: None)
+                run.run()
+            times = run.log.column()
+            nearest = np.abs(times[np.searchsorted(times, corners - 1e-12)] - corners)
+            assert nearest.max() < 1e-11, (step, macro)
+
+
+def test_arrays_truth_values_and_whole_numbers(tmp_path: Path) -> None:
+    """Two FMUs and a drive: the second is fed by the first and switched off by a voltage."""
+    build(tmp_path, "Three", 3)
+    (tmp_path / "rc.cir").write_text(
+        "* rc\nVin in 0 0\nR1 in out 1k\nC1 out 0 1u\nVoff off 0 PULSE(0 1 5m 1u 1u 1 2)\n"
+        "R2 off 0 1k\nIload 0 out 0\n.end\n"
+    )
+    (tmp_path / "two.toml").write_text("""
+[circuit]
+model = "file"
+netlist = "rc.cir"
+save = ["v(out)"]
+[drive]
+waveform = "square"
+frequency = 200
+amplitude = 2
+offset = 1
+[[fmu]]
+name = "a"
+file = "Three.fmu"
+parameters = { J = 1e-3, B = 1.0 }
+[[fmu]]
+name = "b"
+file = "Three.fmu"
+parameters = { J = 1e-3, B = 1.0 }
+[[port]]
+from = "drive"
+source = "Vin"
+[[port]]
+probe = "v(out)"
+to = "a.x[1]"
+[[port]]
+from = "a.xs[1]"
+to = "b.u"
+[[port]]
+probe = "v(off)"
+to = "a.off"
+[[port]]
+from = "b.omega"
+source = "Iload"
+scale = 0.0
+offset = 1e-6
+[run]
+duration = 0.01
+settle = 0.005
+""")
+    result = here(tmp_path / "two.toml", {})
+    waves, time = result.columns, result.columns["time"]
+    before, after = time < 4.9e-3, time > 5.1e-3
+    # First-order lags of 1 ms each: in the circuit, in a, and in b, whose input is -a.
+    t, tau = time[before & (time < 2.4e-3)], 1e-3
+    x = t / tau
+    rising = 2.0 * (1.0 - np.exp(-x))
+    a = 2.0 * (1.0 - (1.0 + x) * np.exp(-x))
+    b = -2.0 * (1.0 - (1.0 + x + x**2 / 2) * np.exp(-x))
+    first = slice(0, len(t))
+    assert waves["v(out)"][first] - 1e-3 == pytest.approx(rising, abs=2e-3)
+    assert waves["a.omega"][first] == pytest.approx(a, abs=2e-3)
+    assert waves["a.xs[1]"][first] == pytest.approx(-a, abs=2e-3)
+    assert waves["b.omega"][first] == pytest.approx(b, abs=2e-3)
+    off_at = np.interp(5.0e-3, time, waves["a.omega"])
+    gone = off_at * np.exp(-(time[after] - 5e-3) / tau)
+    assert waves["a.omega"][after] == pytest.approx(gone, abs=5e-3)
+    assert (waves["a.steps"] == np.round(waves["a.steps"])).all()
+    assert result.units["Iload"] == "A" and result.units["a.omega"] == "rad/s"
+    assert result.summary["Iload.mean"] == pytest.approx(1e-6)
+    settled = np.abs(time - 5e-3) < 1e-9
+    assert result.summary["a.omega.greatest"] == pytest.approx(
+        float(waves["a.omega"][settled][0]), rel=1e-3
+    )
+
+
+def test_fixed_steps_take_macro_steps(tmp_path: Path) -> None:
+    result = here(motor(tmp_path, fixed=True), {"run.duration": 1e-3})
+    assert result.summary["method"] == "macro-steps" and result.summary["fmu_steps"] == 10
+
+
+def test_a_scene_with_ports_is_written_and_read(tmp_path: Path) -> None:
+    scene = load(motor(tmp_path), {"fmu.rotor.J": 3e-4, "circuit.param.vdd": 12.0})
+    path = tmp_path / "again.toml"
+    path.write_text(to_toml(scene))
+    assert load(path).as_dict() == {**scene.as_dict()}
+    other = changed(scene, {"fmu.rotor.J": 1e-4}, "test")
+    assert other.fmu[0].parameters == {"J": 1e-4, "B": 1e-4}
+
+
+def test_a_sweep_goes_over_parameters_of_fmus_and_circuit(tmp_path: Path) -> None:
+    over = {"fmu.rotor.J": [1e-4, 2e-4], "circuit.param.vdd": [12.0, 24.0]}
+    with in_place():
+        data = cosim.sweep(motor(tmp_path), over, {"run.duration": 2e-3})
+    speed = data["rotor.omega.greatest"].values
+    assert speed.shape == (2, 2) and (np.abs(speed[0]) > np.abs(speed[1])).all()
+    assert not data["failure"].values.any() or list(data["failure"].values)
+
+
+def test_an_fmu_that_ends_its_process_or_fails_is_told(tmp_path: Path) -> None:
+    scene = motor(tmp_path)
+    with pytest.raises(SimulationFailed, match=r"died at t = .*SIGABRT"):
+        cosim.run(scene, {"run.duration": 2e-3, "fmu.rotor.crash_at": 1e-3})
+    with pytest.raises(SimulationFailed, match=r"rotor failed at t = .*the bearing is worn out"):
+        cosim.run(scene, {"run.duration": 2e-3, "fmu.rotor.fail_at": 1e-3})
+
+
+def test_structures_have_the_sizes_that_the_compiled_ones_have() -> None:
+    assert [ctypes.sizeof(kind) for kind in STRUCTURES] == [
+        loop().loop_size(k) for k in range(5, 5 + len(STRUCTURES))
+    ]
