@@ -466,7 +466,7 @@ def test_missing_frames_have_no_residual(folder: Path, tmp_path: Path) -> None:
         ('[rig."circuit.supply"]\nlow = 12.0\nhigh = 18.0\n', "it is not searched"),
         ('[trial."drive.offset"]\nmost = 1.0\n', "most is none of"),
         ('[rig."mechanics.suspension"]\nlaws = ["square"]\n', 'a list of some of "cubic", "knee"'),
-        ("[ring]\n", "ring: there are the tables rig and trial only"),
+        ("[ring]\n", "ring: there are the tables rig, trial and measured only"),
         ("[rig\n", "is no valid TOML"),
     ],
 )
