@@ -173,7 +173,7 @@ def test_dask(tmp_path: Path) -> None:
 
 
 def test_no_cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cosim.evaluate.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("cosim.evaluate.many.PATIENCE", 0.5)
     with pytest.raises(BadInput, match="no cluster answers"):
         sweep(load("held"), {"friction.mu_s": [0.7]}, out=tmp_path, dask="tcp://127.0.0.1:9")
 
