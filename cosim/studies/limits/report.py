@@ -16,7 +16,7 @@ from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Settings
 from cosim.studies.limits.judge import Key, Point
 from cosim.studies.limits.runs import GOALS, NEEDED, Goal, command
 from cosim.studies.limits.study import FULL, QUICK, Study, checked, ensemble, steps, study
-from cosim.studies.report import Progress, Report, counted, silent
+from cosim.studies.report import Progress, Report, counted, reported, silent
 from cosim.studies.tables import Row
 
 STORE = "limits.sqlite"
@@ -134,15 +134,13 @@ def limits(
     others: list[Settings] = ensemble(Path(rigs), base) if rigs is not None else []
     checked(base, others, rigs)
     told = counted(progress, steps(efforts, CHANGES, len(others)))
-    path = None if out is None else Path(out) / STORE
-    with Store(path, base.as_dict(), others, seed, quick, effort) as store:
-        found = study(
+
+    def found(store: Store) -> Study:
+        return study(
             *(base, others, store),
             lambda rig: Evaluator(rig, kept=NEEDED, workers=workers, dask=dask),
             *(seed, efforts, CHANGES, told),
         )
-        made = report(found, " ".join(words))
-        if out is not None:
-            made.save(out)
-        store.remove()
-    return made
+
+    asked = base.as_dict(), others, seed, quick, effort
+    return reported(lambda store: report(found(store), " ".join(words)), out, STORE, *asked)
