@@ -222,7 +222,7 @@ def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
     integers = {
         "contact": CONTACT_LAWS[scene.mechanics.contact],
         "suspension": SUSPENSIONS[scene.mechanics.suspension],
-        "ram_fixed": int(scene.mechanics.actuator == "direct"),
+        "ram_fixed": int(not scene.mechanics.free_ram),
         "independent": int(scene.drive.phase_deg is not None),
         "source": int(scene.rung.source_in_fmu),
     }
