@@ -4,8 +4,8 @@ Order of calls within a transient run (ngspice 39): for each attempted step ``Ge
 Newton iteration and then ``GetSyncData`` at location 1; for an accepted one ``SendData`` and then
 ``GetSyncData`` at location 0, where the next step may be shortened. No such call follows the last.
 
-The library reads the .spiceinit of its home and of the working folder, and the spinit of folders
-that variables name: a worker has an empty folder for both, and none of those variables.
+The library reads the .spiceinit of its home and of the working folder, and the spinit of the folder
+that a variable names: a worker has an empty folder for all of them.
 
 Importing this module loads PySpice, which takes a while: only workers do.
 """
@@ -72,21 +72,20 @@ class Leader(Protocol):
 _one: "list[Engine]" = []
 
 
-def engine(callbacks: Callbacks, code_models: bool) -> "Engine":
+def engine(callbacks: Callbacks) -> "Engine":
     """The process's one ngspice, which calls back. Raises BadInput where the library is missing.
 
-    With ``code_models``, when it is made, it knows POLY and TABLE, as a netlist of the user's own
-    may need. Each step looks at all kinds of elements, so the models cost 5 % of a run without one.
+    It loads no code models: ``lint/dialect.py`` writes what would need them otherwise, and each
+    step looks at all kinds of elements, so they would cost 5 % of a run.
     """
     if not _one:
-        _one.append(_made(callbacks, code_models))
+        _one.append(_made(callbacks))
     return _one[0]
 
 
-def _made(callbacks: Callbacks, code_models: bool) -> "Engine":
+def _made(callbacks: Callbacks) -> "Engine":
     name = ngspice_library()
-    if not code_models:  # which its own start-up file loads
-        os.environ["SPICE_SCRIPTS"] = os.curdir
+    os.environ["SPICE_SCRIPTS"] = os.curdir  # not its own start-up file, which loads code models
     try:
         if os.sep in name and not os.path.isfile(name):  # to open a pipe would wait for ever
             raise OSError("there is no such file")

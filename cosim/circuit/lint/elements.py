@@ -35,6 +35,9 @@ _SPECIAL = {"table", "laplace", "freq", "value", "vol", "cur", "and", "nand", "o
 """First words of controlled sources that have no controlling nodes."""
 
 
+COPY = "; copy its .model line into the netlist"
+
+
 @dataclass
 class Element:
     """An element; ``words`` follow the nodes, and may begin with controlling nodes or a model."""
@@ -69,6 +72,7 @@ class Scope:
     parameters: set[str] = field(default_factory=set)
     functions: set[str] = field(default_factory=set)
     models: dict[str, set[str]] = field(default_factory=dict)
+    model_lines: dict[str, Line] = field(default_factory=dict)
     names: set[str] = field(default_factory=set)
     elements: list[Element] = field(default_factory=list)
     subcircuits: dict[str, list["Scope"]] = field(default_factory=dict)
@@ -200,6 +204,7 @@ class _Parser:
         if len(found) < 3:
             refuse(line, f"{shown(line.text)} is no complete .model line")
         self.scope.models.setdefault(found[1], set()).add(found[2])
+        self.scope.model_lines[found[1]] = line
 
     def _global(self, line: Line, found: list[str]) -> None:
         self.top.globals.update(found[1:])
@@ -249,7 +254,7 @@ def _place(element: Element, scope: Scope) -> None:
         if place is None:
             # Words before a "key=" are as likely nodes as models.
             name = element.words[least + 1 if kind == "m" and len(element.words) > 4 else least]
-            element.refuse(f": no model {shown(name)} is defined here")
+            element.refuse(f": no model {shown(name)} is defined here{COPY}")
         _split(element, place)
         element.model = element.words.pop(0)
     else:

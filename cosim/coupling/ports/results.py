@@ -8,6 +8,7 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.circuit.joined import unit
+from cosim.circuit.lint.outputs import measured
 from cosim.coupling.loop.agenda import count
 from cosim.coupling.ports.run import Run
 from cosim.files.spill import Tape, blocks
@@ -44,9 +45,26 @@ def joined(
         "wall_time": time.perf_counter() - began,
         "method": run.plan.method,
         "versions": {**versions(), **run.versions},
-        "notes": [*_notes(run)],
+        "notes": [*run.deck.notes, *_notes(run)],
     }
+    summary = _measured(run, summary)
     return columns, summary, units
+
+
+def _measured(run: Run, summary: dict[str, Any]) -> dict[str, Any]:
+    """The summary with the netlist's measurements, and a note for each event that did not come."""
+    log = run.log.array()
+    known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
+    for each in run.deck.measures:
+        value = measured(each, log[:, 0], known)
+        if value is not None:
+            summary[f"meas.{each.name}"] = value
+        else:
+            where = f"{each.line.file}:{each.line.number}"
+            summary["notes"].append(
+                f"{where}: .meas {each.name} has no value: its event does not come."
+            )
+    return summary
 
 
 Signal = tuple[str, str, Array, Array, bool]
