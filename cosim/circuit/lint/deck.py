@@ -39,7 +39,7 @@ DROPPED = word_set(
 )
 """Analyses, output and remarks: a host sets its own; see ``outputs.py``."""
 _INSTEAD = {
-    ".step": "; for a value after another run cosim sweep with --over circuit.param.NAME=...",
+    ".step": "; run cosim sweep with --over circuit.param.NAME=START:STOP:COUNT instead",
     ".wave": "; cosim export writes sound",
 }
 ELEMENTS = frozenset("bcdefghijklmoqrstvwxz")
