@@ -102,6 +102,8 @@ class Engine(Shared.NgSpiceShared):
     """One ngspice library. PySpice's own callbacks turn every value into Python objects; compiled
     ones take their place."""
 
+    sent: tuple[str, ...] = ()
+    """The names of all vectors of the run, as they are sent."""
     poisoned = False
     """ngspice has given up for good: nothing runs in this process's library any more."""
 
@@ -184,6 +186,11 @@ class Engine(Shared.NgSpiceShared):
         telling = [word for word in words if _TROUBLE.search(word) and not _NOISE.search(word)]
         return "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
 
+    def ignored(self) -> list[str]:
+        """The models' parameters that it does not know."""
+        said = "\n".join((*self._stderr, *self._stdout))
+        return [*dict.fromkeys(re.findall(r"unrecognized parameter \((\w+)\)", said))]
+
     def fail(self, failure: BaseException) -> None:
         """Make ngspice give up; ``run`` raises ``failure`` then. An exception cannot pass C."""
         if self._failure is None:
@@ -204,10 +211,10 @@ class Engine(Shared.NgSpiceShared):
         self = _ffi.from_handle(user_data)
         try:
             names = [_ffi.string(data.vecs[i].vecname).decode() for i in range(data.veccount)]
-            names = [name.lower() for name in names]
+            self.sent = tuple(name.lower() for name in names)
             if self._leader is not None:
                 wanted = [*(_vector(name) for name in self._save), "time"]
-                self._leader.places[:] = [names.index(name) for name in wanted]
+                self._leader.places[:] = [self.sent.index(name) for name in wanted]
         except ValueError as error:
             self.fail(SimulationFailed(f"The netlist has no such vector: {error}."))
         return 0

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import takewhile
 
 from cosim.circuit.lint.deck import Line, refuse, shown
-from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, controls, parse
+from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed
 from cosim.circuit.lint.topology import check_topology
 from cosim.circuit.lint.words import word_set, words
@@ -181,12 +181,11 @@ def _check_current_controlled(element: Element, scope: Scope) -> None:
     found = element.words
     if element.kind != "w" and (not found or "=" in found[0] or found[0][0] in "{'"):
         return
-    place = controls(found, 1)
-    if place is None:
+    if found[:1] == ["poly"]:
         return
-    if len(found) <= place.stop:
+    if len(found) < 2:
         element.refuse(" has too few words")
-    _check_named(element, scope, "source", _plain(found[place]))
+    _check_named(element, scope, "source", _plain(found[:1]))
 
 
 def _check_named(element: Element, scope: Scope, what: str, names: Iterable[str]) -> None:

@@ -31,7 +31,7 @@ MODEL_TYPES = {
     "o": {"ltra"},
 }
 
-_SPECIAL = {"table", "laplace", "freq", "value", "vol", "cur", "and", "nand", "or", "nor"}
+_SPECIAL = {"poly", "table", "laplace", "freq", "value", "vol", "cur", "and", "nand", "or", "nor"}
 """First words of controlled sources that have no controlling nodes."""
 
 
@@ -272,27 +272,13 @@ def _split(element: Element, count: int) -> None:
         element.refuse(" has too few nodes")
 
 
-def controls(words: list[str], each: int) -> slice | None:
-    """Where the words stand that name what controls a source, ``each`` for one controlling
-    quantity; None where the dimension of a POLY is not known.
-    """
-    if words[:1] != ["poly"]:
-        return slice(0, each)
-    if len(words) < 2 or not words[1].isdigit():
-        return None
-    return slice(2, 2 + each * int(words[1]))
-
-
 def _place_controls(element: Element) -> None:
-    """Tell the controlling nodes of a linear or polynomial voltage-controlled source."""
+    """Tell the controlling nodes of a linear voltage-controlled source."""
     first = element.words[0] if element.words else ""
     if not re.fullmatch(r"[^={}']+", first) or first in _SPECIAL:
         return
-    place = controls(element.words, 2)
-    if place is None:
-        return
-    found = element.words[place]
-    if len(element.words) <= place.stop or any("=" in word for word in found):
+    found = element.words[:2]
+    if len(element.words) <= 2 or any("=" in word for word in found):
         element.refuse(" has too few nodes or no value")
     element.controls = [node(name) for name in found]
-    element.words = element.words[place.stop :]
+    element.words = element.words[2:]
