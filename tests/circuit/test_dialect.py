@@ -116,7 +116,7 @@ def test_ltspices_own_models_are_read_where_they_are(tmp_path: Path) -> None:
 
 
 TOLD = {
-    "E9 x 0 POLY(1) in 0 2": "POLY(n) takes its controls, then 2 to 200 numbers",
+    "E9 x 0 POLY(1) in 0 2": "POLY(n) takes its controls, then 2 to 50 numbers",
     "E9 x 0 POLY(3) in 0 2": "POLY(n) takes its controls",
     "E9 x 0 TABLE {V(in)} = (1,0) (0,1)": "TABLE takes an expression in braces",
     "E9 x 0 AND(2) in 0 b 0 0 1": "gates are not known here",
@@ -133,10 +133,11 @@ TOLD = {
     ".lib UniversalOpamps2.sub": "was not found in the netlist's folder: copy it there",
     ".lib C:\\models\\mine.lib": "copy the file into the netlist's folder and give its name alone",
     "B9 x 0 V=idt(V(in))": "the function idt is not defined",
+    "K9 L1 L2 L3 1": "must name two inductors and their coupling",
     "C9 x 0 1u Rser=1 m=2": "write a resistor in series",
     ".options maxstep=1u": "the option maxstep is not allowed in a netlist; leave it out",
     ".meas tran a DERIV V(in) AT=1m": ".meas a is nothing known here; it may be AVG",
-    ".meas tran a WHEN V(in)": "an event of .meas is expression=value",
+    ".meas tran a WHEN V(in)": ".meas a is nothing known here; it may be AVG",
     ".meas a": "is no complete .meas",
 }
 

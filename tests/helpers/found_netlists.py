@@ -180,7 +180,9 @@ R2 x 0 1Meg
 L1 in 0 10m Rser=1
 L2 p 0 10m
 L3 q 0 40m
-K1 L1 L2 L3 0.99
+K1 L1 L2 0.99
+K2 L1 L3 0.99
+K3 L2 L3 0.99
 R3 p 0 1k
 R4 q 0 1k
 .model FETX VDMOS(Rg=3 Vto=4 Rd=5m Rs=5m Rb=10m Kp=30 Cgdmax=.5n Cgdmin=.05n Cgs=1n Cjo=.3n

@@ -92,7 +92,7 @@ def _check_element(element: Element, scope: Scope, names: Names) -> None:
         _check_current_controlled(element, scope)
     elif kind == "k":
         if len(element.words) != 3:
-            element.refuse(" must name two inductors and their coupling")
+            element.refuse(" must name two inductors and their coupling; write K pair by pair")
         _check_named(element, scope, "inductor", element.words[:2])
     elif kind == "t" and not any(word.startswith(("z0=", "zo=")) for word in element.words):
         element.refuse(" has no Z0=…")

@@ -15,14 +15,13 @@ from pathlib import Path
 from unicodedata import category
 
 from cosim.circuit.lint.dialect import in_ngspice, prelude
-from cosim.circuit.lint.lines import Line, refuse, shown
+from cosim.circuit.lint.lines import MAX_LINE, Line, refuse, shown
 from cosim.circuit.lint.words import word_set
 from cosim.errors import BadInput, plain
 from cosim.files import reader
 
 MAX_BYTES = 4_000_000
 MAX_LINES = 100_000
-MAX_LINE = 200_000
 MAX_WORD = 4_000
 MAX_DEPTH = 10
 MAX_NAMES = 1_000

@@ -8,22 +8,20 @@ library does not bring on every machine, which cost each step, and which round a
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations, combinations_with_replacement, count, pairwise
+from itertools import chain, combinations_with_replacement, count, pairwise
 from math import pi
 
-from cosim.circuit.lint.lines import Line
+from cosim.circuit.lint.lines import MAX_LINE, Line
 from cosim.circuit.lint.words import closing, number, split_arguments, word_set, words
 
 _LETTERS = str.maketrans(
     {"\u00b5": "u", "\u03bc": "u", "\u03a9": "ohm", "\u2126": "ohm", "\u00a7": "_"}
 )
 """Both micros, both ohms, and what LTspice puts between the kind of a part and its name."""
-_MOST = 200
-"""Coefficients of a polynomial, and pairs of coupled inductors, in one line."""
-_LONGEST = 100_000
-"""Characters that a line with tables may become."""
+_MOST = 50
+"""Coefficients of a polynomial, and tables in a line."""
 
 _FUNCTIONS = {
     "if": ("c,x,y", "ternary_fcn(c,x,y)"),
@@ -40,20 +38,18 @@ _DEFINED = re.compile(r"\.func\s+(\w+)|(\w+)\s*(?:\([^()]*\)\s*)?=(?!=)")
 _TABLE = re.compile(r"(?<![\w.])table\s*\(", re.IGNORECASE)
 _PI = re.compile(r"(?<![\w.])pi(?!\w|\s*\()")
 
+_MAKERS = word_set("mfg pn type pppkg iave vpk vceo icrating qg")
 _REMARKS = {
-    "r": word_set("tol pwr"),
-    "c": word_set("v irms mtbf mfg pn type pppkg vrms"),
-    "l": word_set("ipk irms mtbf mfg pn type pppkg"),
-    ".": word_set("mfg type iave vpk vceo icrating qg pn"),
-    "vdmos": word_set("mfg type vds ron qg pn"),
-}
+    "r": word_set("tol pwr"), "c": word_set("v irms vrms mtbf") | _MAKERS,
+    "l": word_set("ipk irms mtbf") | _MAKERS, "vdmos": word_set("vds ron") | _MAKERS,
+}  # fmt: skip
 """Ratings and makers, which nothing computes with."""
 _PARASITES = {"c": word_set("rser lser rpar cpar rlshunt"), "l": word_set("rser rpar cpar"),
               "v": word_set("rser cpar")}  # fmt: skip
 _PAIR = re.compile(
     r"""(?<!\S)([a-z]\w*)\s*=\s*("[^"]*"|\{[^{}]*\}|'[^']*'|[^\s,()"{}']+)""", re.IGNORECASE
 )
-_SPLIT_NUMBER = re.compile(r"(\d+)(meg|[tgkmunpf])(\d+)", re.IGNORECASE)
+_SPLIT_NUMBER = re.compile(r"^(\d+)(meg|[tgkmunpf])(\d+)(?!\S)", re.IGNORECASE)
 _MODEL = re.compile(r"\.model\s+\S+\s+(\w+)", re.IGNORECASE)
 
 
@@ -65,12 +61,9 @@ def in_ngspice(line: Line) -> list[Line]:
         found = [*_passive(text, kind)]
     elif kind in "efgh":
         found = [_source(text)]
-    elif kind == "k":
-        found = [*_couplings(text)]
     elif model := _MODEL.match(text):
-        remarks = _REMARKS["vdmos" if model[1].lower() == "vdmos" else "."]
-        opened = text.replace("(", " ( ", 1)
-        found = [_taken(opened, lambda key, _: key in remarks)]
+        remarks = _REMARKS["vdmos"] if model[1].lower() == "vdmos" else _MAKERS
+        found = [_taken(text.replace("(", " ( ", 1), remarks)[0]]
     else:
         found = [text]
     return [replace(line, text=" ".join(each.split())) for each in found]
@@ -87,8 +80,8 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
         if ("{" in text or "'" in text or text.startswith(".param")) and _PI.search(text):
             called["pi"] = {0}
         for match in _CALL.finditer(text):
-            inside = text[match.end() : closing(text, match.end() - 1) - 1]
             if match[1] in _FUNCTIONS:
+                inside = text[match.end() : closing(text, match.end() - 1) - 1]
                 called.setdefault(match[1], set()).add(len(split_arguments(inside)))
     found = [
         f".func {name}({formals}) {{{body}}}"
@@ -100,23 +93,23 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
     return [Line(text, lines[0].file, 1) for text in found]
 
 
-def _taken(text: str, take: Callable[[str, str], bool]) -> str:
-    """The text without the assignments that are taken."""
-    return _PAIR.sub(lambda match: "" if take(match[1].lower(), match[2]) else match[0], text)
+def _taken(text: str, keys: Collection[str]) -> tuple[str, dict[str, str]]:
+    """The text without the assignments to these keys, and what they are."""
+    given = {match[1].lower(): match[2] for match in _PAIR.finditer(text)}
+    less = _PAIR.sub(lambda match: "" if match[1].lower() in keys else match[0], text)
+    return less, {key: value for key, value in given.items() if key in keys}
 
 
 def _without_tables(text: str) -> str:
-    """Calls of ``table`` as the straight lines that they mean, level outside; innermost first."""
+    """Calls of ``table`` as the straight lines that they mean, innermost first."""
     if text[:1].lower() in "eg":
         text = re.sub(r"(?i)(?<=\s)table\s*=\s*", "table ", text)  # the source's own, see below
-    places = [match.end() - 1 for match in _TABLE.finditer(text)]
-    for place in reversed(places):
-        end = closing(text, place)
-        start = text.lower().rindex("table", 0, place + 1)
-        x, *points = split_arguments(text[place + 1 : end - 1]) or [""]
+    for match in [*_TABLE.finditer(text)][:_MOST][::-1]:
+        end = closing(text, match.end() - 1)
+        x, *points = split_arguments(text[match.end() : end - 1]) or [""]
         call = _lines(x, points)
-        if call is not None and len(text) + len(call) < _LONGEST:
-            text = text[:start] + call + text[end:]
+        if call is not None and len(text) + len(call) < MAX_LINE:
+            text = text[: match.start()] + call + text[end:]
     return text
 
 
@@ -131,27 +124,18 @@ def _lines(x: str, points: list[str]) -> str | None:
 
 def _passive(text: str, kind: str) -> Iterator[str]:
     """R, C, L and V: without ratings; their parasitic parts as elements of their own."""
-    remarks, parts = _REMARKS.get(kind, ()), _PARASITES.get(kind, ())
-    given: dict[str, str] = {}
-
-    def take(key: str, value: str) -> bool:
-        if key in parts:
-            given[key] = value
-        return key in remarks or key in parts
-
-    less = _taken(text, take)
+    parts = _PARASITES.get(kind, frozenset())
+    less, given = _taken(text, parts | _REMARKS.get(kind, frozenset()))
+    given = {key: value for key, value in given.items() if key in parts and number(value) != 0.0}
     found = less.split(None, 3)
-    if len(found) < 4 or (given and re.search(r"\bm\s*=", less, re.IGNORECASE)):
-        yield text if given else less
+    if len(found) < 4 or (given and re.search(r"(?i)\bm\s*=", less)):
+        yield text
         return
     name, plus, minus, rest = found
-    if kind in "rcl":
-        first, _, others = rest.partition(" ")
-        if split := _SPLIT_NUMBER.fullmatch(first):
-            rest = f"{split[1]}.{split[3]}{split[2]} {others}"
-    elif kind == "v":
+    if kind == "v":
         rest = re.sub(r"(?i)\bsine\b", "sin", rest)
-    given = {key: value for key, value in given.items() if number(value) != 0.0}
+    else:
+        rest = _SPLIT_NUMBER.sub(r"\1.\3\2", rest)
     at = plus
     for key in ("rser", "lser"):
         if key in given:
@@ -163,16 +147,6 @@ def _passive(text: str, kind: str) -> Iterator[str]:
     for key in ("rpar", "cpar"):
         if key in given:
             yield f"{key[0]}{name}_{key} {plus} {minus} {given[key]}"
-
-
-def _couplings(text: str) -> Iterator[str]:
-    """K of more than two inductors, pair by pair."""
-    name, *coils = words(text)
-    pairs = [*combinations(coils[:-1], 2)] if 3 < len(coils) < 20 else []
-    if not pairs or not all(coil.startswith("l") for coil in coils[:-1]):
-        yield text
-    for k, (one, other) in enumerate(pairs):
-        yield f"{name}_{k} {one} {other} {coils[-1]}"
 
 
 def _source(text: str) -> str:
@@ -194,25 +168,16 @@ def _polynomial(found: list[str], kind: str) -> str | None:
     """The expression of ``POLY(n)``, controls, coefficients; None if it is none."""
     if len(found) < 2 or not re.fullmatch(r"[1-9]\d?", found[1]):
         return None
-    dimension = int(found[1])
-    each = 2 if kind in "eg" else 1
+    dimension, each = int(found[1]), 2 if kind in "eg" else 1
     read, factors = found[2 : 2 + each * dimension], found[2 + each * dimension :]
     if any("=" in word for word in found) or not 1 + (dimension == 1) <= len(factors) <= _MOST:
         return None  # of one coefficient programs disagree whether it is the constant
-    letter = "v" if each == 2 else "i"
     pairs = zip(*[iter(read)] * each, strict=True)
-    inputs = [f"{letter}({','.join(names)})" for names in pairs]
-    if dimension == 1:
-        value = f"({factors[-1]})"
-        for factor in reversed(factors[:-1]):
-            value = f"({factor}) + {inputs[0]}*({value})"
-        return value
-    products = (
-        product for degree in count() for product in combinations_with_replacement(inputs, degree)
-    )
+    inputs = [f"{'v' if each == 2 else 'i'}({','.join(names)})" for names in pairs]
+    degrees = (combinations_with_replacement(inputs, degree) for degree in count())
     terms = [
         "*".join([f"({factor})", *product])
-        for factor, product in zip(factors, products, strict=False)
+        for factor, product in zip(factors, chain.from_iterable(degrees), strict=False)
         if number(factor) != 0.0
     ]
     return " + ".join(terms) or "0"

@@ -5,6 +5,8 @@ from typing import NoReturn
 
 from cosim.errors import BadInput
 
+MAX_LINE = 200_000
+
 
 @dataclass(frozen=True)
 class Line:

@@ -5,7 +5,7 @@ an expression of ngspice's, so a limit in braces is one too, constant in time.
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,84 +14,72 @@ from cosim.arrays import Array
 from cosim.circuit.lint.lines import Line, refuse, shown
 from cosim.circuit.lint.words import number, word_set
 
-_TOLD = {
-    ".save": "circuit.save names what a run keeps",
-    **dict.fromkeys((".probe", ".plot", ".print"), "circuit.save names what a run keeps"),
-    **dict.fromkeys((".four", ".fourier"), "cosim export gives the waveforms to a program for it"),
-    **dict.fromkeys(
-        (".op", ".ac", ".dc", ".tf", ".noise", ".disto", ".pz", ".sens", ".sp"),
-        "a run is a transient analysis",
-    ),
-    ".csparam": "only ngspice's own scripts read it",
-}
+_SAVING = word_set(".save .probe .plot .print")
+_ANALYSES = word_set(".op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .csparam")
 _REDUCED = word_set("avg rms min max pp integ")
-_MEAS = re.compile(
-    r"\.meas(?:ure)?\s+(?:(tran|ac|dc|op|tf|noise|sp)\s+)?(\w+)\s+(\w+)\s*(.*)", re.S
-)
-_CLAUSE = re.compile(r"\b(from|to|at|val|td|cross|rise|fall|when|trig|targ)\b\s*=?\s*")
+_MEAS = re.compile(r"\.meas\w*\s+(?:(tran|ac|dc|op|tf|noise|sp)\s+)?(\w+)\s+(\w+)\b(.*)", re.DOTALL)
+_CLAUSE = re.compile(r"(?<![^\s,)}'])(from|to|at|val|td|cross|rise|fall|when|trig|targ)\b\s*=?\s*")
+_BRACKETS = re.compile(r"\([^()]*\)|\{[^{}]*\}")
+_LONGEST = 2_000
 _FORMS = (
-    "AVG, RMS, MIN, MAX, PP or INTEG of an expression with FROM= and TO=, FIND with AT= or WHEN, "
-    "WHEN, or TRIG and TARG"
+    "it may be AVG, RMS, MIN, MAX, PP or INTEG of an expression with FROM= and TO=, FIND with AT= "
+    "or WHEN, WHEN, or TRIG and TARG, of expression=value with TD= and CROSS=, RISE= or FALL="
 )
 
 
 @dataclass(frozen=True)
 class Event:
-    """A time: given, or when an expression crosses another."""
+    """A time, s, or when an expression crosses another; the last time if ``which`` is 0."""
 
     at: str = ""
     left: str = ""
     right: str = ""
     delay: str = "0"
     edge: str = "cross"
-    number: int = 1
-    """Which one; 0 is the last."""
+    which: int = 1
 
 
 @dataclass(frozen=True)
 class Measure:
-    """A ``.meas`` line: ``what`` is done with ``of``, between two times or at one."""
+    """A ``.meas`` line: ``what`` is done with ``of``, between two events or at the first."""
 
     line: Line
     name: str
     what: str
     of: str
-    first: Event
-    last: Event
+    events: tuple[Event, ...]
 
     @property
     def words(self) -> list[str]:
         """The vectors and expressions that it needs."""
-        needed = [self.of]
-        for event in (self.first, self.last):
-            needed += [event.at, event.left, event.right, event.delay]
-        return [each for each in needed if each and number(each) is None]
+        needed = [word for e in self.events for word in (e.at, e.left, e.right, e.delay)]
+        return [word for word in (self.of, *needed) if word and number(word) is None]
 
 
 def told(dropped: Sequence[Line]) -> Iterator[str]:
     """A sentence for each line that was left out and might be missed."""
     for line in dropped:
-        word = line.text.split()[0].lower()
-        reason = _TOLD.get(word)
-        if match := _MEAS.match(line.text.lower()):
-            reason = "a run is a transient analysis" if match[1] not in (None, "tran") else None
-        elif word == ".tran" and (kind := re.search(r"\b(uic|startup)\b", line.text.lower())):
-            word, reason = f".tran's {kind[1]}", "a run begins at the operating point, with .ic"
-        if reason:
-            yield f"{line.file}:{line.number}: {word} has no effect: {reason}."
+        text = line.text.lower()
+        word, match = text.split()[0], _MEAS.match(text)
+        without = re.search(r"\b(uic|startup)\b", text) if word == ".tran" else None
+        if word in _SAVING:
+            yield f"{line.file}:{line.number}: {word} has no effect; circuit.save keeps vectors."
+        elif word in _ANALYSES or without or (match and match[1] not in (None, "tran")):
+            what = f"{word} {without[0]}" if without else word
+            yield (
+                f"{line.file}:{line.number}: {what} has no effect: a run is a transient analysis "
+                "that begins at the operating point."
+            )
 
 
 def measures(dropped: Sequence[Line]) -> list[Measure]:
     """The measurements of the transient analysis. Raises BadInput for what is none."""
     found: dict[str, Measure] = {}
     for line in dropped:
-        text = line.text.lower()
-        if not text.startswith(".meas"):
-            continue
-        match = _MEAS.match(text)
-        if match is None:
-            refuse(line, f"{shown(line.text)} is no complete .meas; it may be {_FORMS}")
-        if match[1] in (None, "tran"):
+        match = _MEAS.match(line.text.lower()) if len(line.text) < _LONGEST else None
+        if match is None and line.text.lower().startswith(".meas"):
+            refuse(line, f"{shown(line.text)} is no complete .meas; {_FORMS}")
+        if match is not None and match[1] in (None, "tran"):
             if match[2] in found:
                 refuse(line, f"there is a second .meas {shown(match[2])}")
             found[match[2]] = _measure(line, match[2], match[3], match[4])
@@ -99,37 +87,36 @@ def measures(dropped: Sequence[Line]) -> list[Measure]:
 
 
 def _measure(line: Line, name: str, what: str, rest: str) -> Measure:
-    clauses = _clauses(f"{what} {rest}" if what in ("when", "trig") else rest)
-    of = clauses[0][1]
-    given = dict(clauses[1:])
-    start, end = Event(at=given.get("from", "0")), Event(at=given.get("to", "1e99"))
-    if what in _REDUCED and of and not {*given} - {"from", "to"}:
-        return Measure(line, name, what, of, start, end)
-    if what == "find" and of and [*given] == ["at"]:
-        return Measure(line, name, "find", of, Event(at=given["at"]), end)
-    if what in ("find", "when") and "when" in given and bool(of) == (what == "find"):
-        return Measure(line, name, what, of, _event(line, clauses[1:]), end)
-    places = [k for k, (key, _) in enumerate(clauses) if key in ("trig", "targ")]
-    if what == "trig" and len(places) == 2 and clauses[places[1]][0] == "targ":
-        parts = clauses[places[0] : places[1]], clauses[places[1] :]
-        return Measure(line, name, "trig", "", *(_event(line, part) for part in parts))
-    refuse(line, f".meas {shown(name)} is nothing known here; it may be {_FORMS}")
+    (_, of), *clauses = _clauses(f"{what}{rest}" if what in ("when", "trig") else rest)
+    keys = [key for key, _ in clauses]
+    given, events = dict(clauses), [Event()]
+    if what in _REDUCED and of and not {*keys} - {"from", "to"}:
+        events = [Event(given.get("from", "0")), Event(given.get("to", "1e99"))]
+    elif what == "find" and of and keys == ["at"]:
+        events = [Event(given["at"])]
+    elif keys[:1] == ["when"] and (what == "when" or of):
+        events = [_event(clauses)]
+    elif what == "trig" and "targ" in keys:
+        place = keys.index("targ")
+        events = [_event(clauses[:place]), _event(clauses[place:])]
+    if not all(event.at or (event.left and event.right) for event in events):
+        refuse(line, f".meas {shown(name)} is nothing known here; {_FORMS}")
+    return Measure(line, name, what, of, tuple(events))
 
 
 def _clauses(text: str) -> list[tuple[str, str]]:
     """What stands before the first keyword, then each keyword with what follows it."""
-    depth = 0
-    found: list[tuple[str, str]] = []
-    key, begin, place = "", 0, 0
-    while place < len(text):
-        match = _CLAUSE.match(text, place) if depth == 0 else None
-        if match and (place == 0 or text[place - 1] in " ,)}'"):
-            found.append((key, text[begin:place].strip(" ,")))
-            key, begin, place = match[1], match.end(), match.end()
-            continue
-        depth += (text[place] in "({") - (text[place] in ")}")
-        place += 1
-    return [(key, _plain(value)) for key, value in [*found, (key, text[begin:].strip(" ,"))]]
+    outside, before = text, ""
+    while outside != before:
+        before, outside = outside, _BRACKETS.sub(lambda match: "_" * len(match[0]), outside)
+    starts = [*_CLAUSE.finditer(outside)]
+    ends = [*(match.start() for match in starts), len(text)]
+    keys = ["", *(match[1] for match in starts)]
+    places = [0, *(match.end() for match in starts)]
+    return [
+        (key, _plain(text[place:end].strip(" ,")))
+        for key, place, end in zip(keys, places, ends, strict=True)
+    ]
 
 
 def _plain(text: str) -> str:
@@ -138,77 +125,62 @@ def _plain(text: str) -> str:
     return f"({match[1] or match[2]})" if match else text
 
 
-def _event(line: Line, clauses: Sequence[tuple[str, str]]) -> Event:
+def _event(clauses: Sequence[tuple[str, str]]) -> Event:
+    """Of the clauses from WHEN, TRIG or TARG on; one of nothing where they are not understood."""
     (_, what), *rest = clauses
     given = dict(rest)
-    edges = [key for key in ("cross", "rise", "fall") if key in given]
     if "at" in given and not what:
-        return Event(at=given["at"])
+        return Event(given["at"])
     left, _, right = what.partition("=")
-    right = given.get("val", right).strip()
-    count = given[edges[0]] if edges else "1"
-    if not left or not right or len(edges) > 1 or not re.fullmatch(r"last|[1-9]\d{0,8}", count):
-        refuse(line, "an event of .meas is expression=value with CROSS=, RISE= or FALL= and a "
-                     "number or LAST")  # fmt: skip
-    edge = edges[0] if edges else "cross"
-    which = 0 if count == "last" else int(count)
-    return Event("", left.strip(), right, given.get("td", "0"), edge, which)
+    edges = [key for key in given if key in ("cross", "rise", "fall")] or ["cross"]
+    which = given.get(edges[0], "1")
+    if len(edges) > 1 or not re.fullmatch(r"last|[1-9]\d{0,8}", which):
+        return Event()
+    right, delay = given.get("val", right).strip(), given.get("td", "0")
+    return Event("", left.strip(), right, delay, edges[0], 0 if which == "last" else int(which))
 
 
-def measured(each: Measure, time: Array, known: dict[str, Array]) -> float | None:
+def measured(each: Measure, time: Array, known: Mapping[str, Array]) -> float | None:
     """The measurement's value, SI; None where an event does not happen. ``known`` are the values of
     its words at the times (s)."""
 
     def at(words: str, place: float) -> float:
-        value = number(words)
-        return value if value is not None else float(np.interp(place, time, known[words]))
+        return float(np.interp(place, time, values(words)))
+
+    def values(words: str) -> Array:
+        return known[words] if words in known else np.full(len(time), number(words))
 
     def when(event: Event) -> float | None:
         if event.at:
             return at(event.at, 0.0)
-        left, right = (known.get(words, number(words)) for words in (event.left, event.right))
-        off = np.zeros(len(time)) + left - right
+        off = values(event.left) - values(event.right)
         return _crossing(time, off, at(event.delay, 0.0), event)
 
-    first, last = when(each.first), when(each.last)
-    if first is None or last is None:
+    times = [found for event in each.events if (found := when(event)) is not None]
+    if len(times) < len(each.events):
         return None
-    if each.what == "trig":
-        return last - first
-    if each.what == "when":
-        return first
+    if each.what in _REDUCED:
+        first, last = max(times[0], float(time[0])), min(times[1], float(time[-1]))
+        t = np.concatenate([[first], time[(time > first) & (time < last)], [last]])
+        return _reduced(each.what, t, np.interp(t, time, values(each.of))) if first < last else None
     if each.what == "find":
-        return at(each.of, first)
-    first, last = max(first, float(time[0])), min(last, float(time[-1]))
-    if not first < last:
-        return None
-    inside = time[(time > first) & (time < last)]
-    t = np.concatenate([[first], inside, [last]])
-    return _reduced(each.what, t, np.interp(t, time, known.get(each.of, number(each.of))))
+        return at(each.of, times[0])
+    return times[-1] - times[0] if each.what == "trig" else times[0]
 
 
 def _reduced(what: str, t: Array, y: Array) -> float:
     """Of straight lines between the points."""
-    h, a, b = np.diff(t), y[:-1], y[1:]
-    whole = float((h * (a + b)).sum() / 2.0)
-    length = float(t[-1] - t[0])
-    return {
-        "avg": whole / length,
-        "integ": whole,
-        "rms": float(np.sqrt((h * (a * a + a * b + b * b)).sum() / 3.0 / length)),
-        "min": float(y.min()),
-        "max": float(y.max()),
-        "pp": float(y.max() - y.min()),
-    }[what]
+    h, a, b, length = np.diff(t), y[:-1], y[1:], t[-1] - t[0]
+    whole, squares = (h * (a + b)).sum() / 2.0, (h * (a * a + a * b + b * b)).sum() / 3.0
+    found = {"avg": whole / length, "integ": whole, "rms": np.sqrt(squares / length)}
+    found |= {"min": y.min(), "max": y.max(), "pp": np.ptp(y)}
+    return float(found[what])
 
 
 def _crossing(time: Array, off: Array, delay: float, event: Event) -> float | None:
     """When ``off`` goes through 0 the right way for the right time, after the delay (s)."""
     rise, fall = (off[:-1] < 0) & (off[1:] >= 0), (off[:-1] > 0) & (off[1:] <= 0)
-    found = {"rise": rise, "fall": fall, "cross": rise | fall}[event.edge]
-    k = np.flatnonzero(found)
+    k = np.flatnonzero({"rise": rise, "fall": fall, "cross": rise | fall}[event.edge])
     places = time[k] + (time[k + 1] - time[k]) * off[k] / (off[k] - off[k + 1])
     places = places[places >= delay]
-    if len(places) < max(event.number, 1):
-        return None
-    return float(places[event.number - 1])
+    return float(places[event.which - 1]) if len(places) >= max(event.which, 1) else None

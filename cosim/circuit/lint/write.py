@@ -47,7 +47,7 @@ _ELSEWHERE = {
     "laplace": "write the filter with R and C",
 }  # fmt: skip
 _FORMS = {
-    "poly": "POLY(n) takes its controls, then 2 to 200 numbers if n is 1, else 1 to 200",
+    "poly": "POLY(n) takes its controls, then 2 to 50 numbers if n is 1, else 1 to 50",
     "table": "TABLE takes an expression in braces, then two points or more that rise in x",
     "laplace": "LAPLACE is not known here; write the filter with R and C",
     "freq": "FREQ is not known here; write the filter with R and C",
