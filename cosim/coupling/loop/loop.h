@@ -306,6 +306,8 @@ typedef struct Ports {
 
 EXPORT void ports_begin(Ports *c);
 EXPORT void ports_finish(Ports *c);
+/* How often the vector at this place among those sent has turned back since the run began. */
+EXPORT int ports_turns(int place);
 
 /* What ngspice calls while no Lead is under way. */
 int ports_source(double *value, double time, const char *node);
