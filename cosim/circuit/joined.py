@@ -58,9 +58,11 @@ def deck(
     reltol: float,
     max_step: float,
     asked: bool,
+    known: Mapping[str, float],
 ) -> Deck:
     """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved;
-    where they are ``asked`` for within a step, each as a device's parameter.
+    where they are ``asked`` for within a step, each as a device's parameter. ``known`` are values
+    for such ``.param`` lines as it may have, ``parameters`` for those that it must have.
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
@@ -69,16 +71,12 @@ def deck(
     found = {element.name: element for element in parse(lines).elements}
     for source in sources:
         if source.lower() not in found or source[0].lower() not in "vi":
-            known = sorted(each for each in found if each[0] in "vi")
-            hint = suggestion(source.lower(), known) or f" (it has {', '.join(known) or 'none'})"
+            able = sorted(each for each in found if each[0] in "vi")
+            hint = suggestion(source.lower(), able) or f" (it has {', '.join(able) or 'none'})"
             shown = f'[[port]] source = "{plain(source)}"'
             raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
-    plainly = re.compile(r"i.*" if asked else r".*", re.IGNORECASE)
-    direct = [_VECTOR.fullmatch(each) if plainly.match(each) else None for each in words]
-    extra = [_reading(k, each) for k, each in enumerate(words) if direct[k] is None]
-    top = check([*lines, *extra], [[source.lower() for source in sources]])
-    _check_vectors(top, name, words, {line.number for line in extra})
-    values = _parameters(top, name, parameters)
+    top = check_reading(path, lines, words, [[source.lower() for source in sources]], asked)
+    values = {**known, **own_parameters(top, name, parameters)}
     fed = {source.lower() for source in sources}
     text = [lines[0].text]
     for line, element, holder in top.order:
@@ -94,7 +92,7 @@ def deck(
         f".tran {max_step!r} {duration!r} 0 {max_step!r}",
         ".end",
     ]
-    read_as = [_read_as(k, match) for k, match in enumerate(direct)]
+    read_as = reading(words, asked)
     return Deck(
         "\n".join(text),
         {source.lower(): source[0].lower() for source in sources},
@@ -104,7 +102,32 @@ def deck(
     )
 
 
-def _reading(place: int, words: str) -> Line:
+def check_reading(
+    path: Path,
+    lines: Sequence[Line],
+    words: Sequence[str],
+    required: Sequence[Sequence[str]],
+    asked: bool = False,
+) -> Scope:
+    """The top level of a netlist with what reads the ``words``, as :func:`check` gives it."""
+    direct = _direct(words, asked)
+    extra = [_source_of(k, each) for k, each in enumerate(words) if direct[k] is None]
+    top = check([*lines, *extra], required)
+    _check_vectors(top, plain(str(path)), words)
+    return top
+
+
+def reading(words: Sequence[str], asked: bool = False) -> list[tuple[str, str]]:
+    """For each of the words the vector that has its value, and the device parameter."""
+    return [_read_as(k, match) for k, match in enumerate(_direct(words, asked))]
+
+
+def _direct(words: Sequence[str], asked: bool) -> list[re.Match[str] | None]:
+    plainly = re.compile(r"i.*" if asked else r".*", re.IGNORECASE)
+    return [_VECTOR.fullmatch(each) if plainly.match(each) else None for each in words]
+
+
+def _source_of(place: int, words: str) -> Line:
     """A source whose voltage is the expression."""
     line = Line(f"Bcosim{place} {_NODE}{place} 0 V={words}", f'"{plain(words)}"', place + 1)
     passed(line)
@@ -119,7 +142,7 @@ def _read_as(place: int, match: re.Match[str] | None) -> tuple[str, str]:
     return f"{kind}({inner})", f"@{inner}[i]" if kind == "i" else ""
 
 
-def _check_vectors(top: Scope, name: str, words: Sequence[str], skipped: set[int]) -> None:
+def _check_vectors(top: Scope, name: str, words: Sequence[str]) -> None:
     """What the words name must be there, as far as that can be known without subcircuits."""
     nodes = {node for element in top.elements for node in element.nodes} | {"0"}
     known: dict[str, set[str]] = {
@@ -135,7 +158,8 @@ def _check_vectors(top: Scope, name: str, words: Sequence[str], skipped: set[int
                     raise BadInput(ended(f"{name}: {said}{hint}"))
 
 
-def _parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:
+def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:
+    """The values given to ``.param`` lines, by their names in small letters. Raises BadInput."""
     lines = [line.text for line, _ in top.lines if line.text.lower().startswith(".param")]
     known = [key for text in lines for (key, formal), _ in definitions(text) if formal is None]
     for key in given:
