@@ -52,12 +52,14 @@ static int step(Model *m, double time, double h)
     }
     const double g = 9.81;
     for (double left = h; left > 0.0;) {
-        const double v = m->r[V], height = m->r[DROP] - m->r[FALLEN];
-        const double hit = (v + sqrt(v * v + 2.0 * g * fmax(height, 0.0))) / g;
-        const double part = hit > 1e-6 ? fmin(hit, left) : left;
+        const double v = m->r[V], height = fmax(m->r[DROP] - m->r[FALLEN], 0.0);
+        const double hit = (v + sqrt(v * v + 2.0 * g * height)) / g;
+        const double part = fmin(hit, left);
+        if (fabs(v) < 1e-6 && height == 0.0)
+            break; /* it lies there */
         m->r[FALLEN] -= v * part - 0.5 * g * part * part;
         m->r[V] -= g * part;
-        if (part == hit) {
+        if (hit <= left) {
             m->r[FALLEN] = m->r[DROP];
             m->r[V] *= -0.5;
         }
