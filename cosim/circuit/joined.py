@@ -65,9 +65,11 @@ def deck(
     reltol: float,
     max_step: float,
     asked: bool,
+    known: Mapping[str, float],
 ) -> Deck:
     """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved;
-    where they are ``asked`` for within a step, each as a device's parameter.
+    where they are ``asked`` for within a step, each as a device's parameter. ``known`` are values
+    for such ``.param`` lines as it may have, ``parameters`` for those that it must have.
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
@@ -77,30 +79,14 @@ def deck(
     found = {element.name: element for element in parse(lines).elements}
     for source in sources:
         if source.lower() not in found or source[0].lower() not in "vi":
-            known = sorted(each for each in found if each[0] in "vi")
-            hint = suggestion(source.lower(), known) or f" (it has {', '.join(known) or 'none'})"
+            able = sorted(each for each in found if each[0] in "vi")
+            hint = suggestion(source.lower(), able) or f" (it has {', '.join(able) or 'none'})"
             shown = f'[[port]] source = "{plain(source)}"'
             raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
-    plainly = re.compile(r"i.*" if asked else r".*", re.IGNORECASE)
-    direct = [_VECTOR.fullmatch(each) if plainly.match(each) else None for each in words]
-    extra = [
-        _reading(Line(each, f'"{plain(each)}"', k + 1), k)
-        for k, each in enumerate(words)
-        if direct[k] is None
-    ]
-    asked_for = [(name, each) for each in words]
-    every = dict.fromkeys(words)
-    for ask in asks:
-        for each in ask.words:
-            asked_for.append((f"{ask.line.file}:{ask.line.number}", each))
-            if each not in every:
-                direct.append(_VECTOR.fullmatch(each))
-                if direct[-1] is None:
-                    extra.append(_reading(Line(each, ask.line.file, ask.line.number), len(every)))
-                every[each] = None
-    top = check([*lines, *extra], [[source.lower() for source in sources]])
-    _check_vectors(top, asked_for)
-    values = _parameters(top, name, parameters)
+    top, every = check_reading(
+        path, lines, words, asks, [[source.lower() for source in sources]], asked
+    )
+    values = {**known, **own_parameters(top, name, parameters)}
     fed = {source.lower() for source in sources}
     text = [lines[0].text]
     for line, element, holder in top.order:
@@ -116,7 +102,7 @@ def deck(
         f".tran {max_step!r} {duration!r} 0 {max_step!r}",
         ".end",
     ]
-    read_as = [_read_as(k, match) for k, match in enumerate(direct)]
+    read_as = reading(every, len(words) if asked else 0)
     return Deck(
         "\n".join(text),
         {source.lower(): source[0].lower() for source in sources},
@@ -129,7 +115,44 @@ def deck(
     )
 
 
-def _reading(words: Line, place: int) -> Line:
+def check_reading(
+    path: Path,
+    lines: Sequence[Line],
+    words: Sequence[str],
+    asks: Sequence[Measure],
+    required: Sequence[Sequence[str]],
+    asked: bool = False,
+) -> tuple[Scope, list[str]]:
+    """The top level of a netlist with what reads the ``words`` and what the measurements need, as
+    :func:`check` gives it; and all these words, each once."""
+    name = plain(str(path))
+    every = {each: Line(each, f'"{plain(each)}"', k) for k, each in enumerate(words, 1)}
+    places = [(name, each) for each in words]
+    for ask in asks:
+        for each in ask.words:
+            places.append((f"{ask.line.file}:{ask.line.number}", each))
+            every.setdefault(each, replace(ask.line, text=each))
+    direct = _direct([*every], len(words) if asked else 0)
+    extra = [_source_of(k, line) for k, line in enumerate(every.values()) if direct[k] is None]
+    top = check([*lines, *extra], required)
+    _check_vectors(top, places)
+    return top, [*every]
+
+
+def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:
+    """For each of the words the vector that has its value, and the device parameter. So many of
+    them, the first, are asked for within a step, where only currents have a parameter."""
+    return [_read_as(k, match) for k, match in enumerate(_direct(words, asked))]
+
+
+def _direct(words: Sequence[str], asked: int) -> list[re.Match[str] | None]:
+    return [
+        _VECTOR.fullmatch(each) if k >= asked or each[:1].lower() == "i" else None
+        for k, each in enumerate(words)
+    ]
+
+
+def _source_of(place: int, words: Line) -> Line:
     """A source whose voltage is the expression."""
     line = replace(words, text=f"Bcosim{place} {_NODE}{place} 0 V={words.text}")
     passed(line)
@@ -161,7 +184,8 @@ def _check_vectors(top: Scope, asked: Sequence[tuple[str, str]]) -> None:
                     raise BadInput(ended(f"{name}: {said}{hint}"))
 
 
-def _parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:
+def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:
+    """The values given to ``.param`` lines, by their names in small letters. Raises BadInput."""
     lines = [line.text for line, _ in top.lines if line.text.lower().startswith(".param")]
     known = [key for text in lines for (key, formal), _ in definitions(text) if formal is None]
     for key in given:

@@ -18,6 +18,7 @@ not have, near a border between two of them; and chaos that dies out before the 
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from math import isinf
 from threading import Event
 from typing import Any
@@ -123,7 +124,7 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
         least = LEAST_TOLD * abs(own) if scene.rung.ngspice else 0.0
         error = None if told[0] is None else max(abs(own - told[0]), least)
     told_of = {"v_average_error": error, **found}
-    return Result(result.scene, result.columns, result.summary | told_of)
+    return replace(result, summary=result.summary | told_of)
 
 
 def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ and meet the tolerance too.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -76,7 +77,7 @@ def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> R
     if coupling.method != "step-locked":
         taken["coupling.macro_step"] = coupling.macro_step
     found = {"wall_time": seconds, "error_estimate": error, "coupling_taken": taken}
-    return Result(best.scene, best.columns, best.summary | found)
+    return replace(best, summary=best.summary | found)
 
 
 def _meeting(

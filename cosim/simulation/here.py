@@ -14,7 +14,7 @@ from cosim.simulation.rungs.given_surface import move_part
 from cosim.simulation.rungs.rung import Driven, rungs
 from cosim.simulation.summary import motion, numbers
 from cosim.toolchain.processes import Progress
-from cosim.waveforms.columns import COLUMNS
+from cosim.waveforms.columns import COLUMNS, UNITS
 from cosim.waveforms.result import Result
 
 
@@ -31,7 +31,8 @@ def simulate_here(scene: Scene, progress: Progress, fmi_version: int) -> Result:
         recorder, driven, summary = _driven(scene, mechanics, progress)
     waveforms = _waveforms(scene, recorder, driven)
     told = remarks(scene, waveforms, summary, mechanics.normal_force)
-    return Result(scene, waveforms, summary | told)
+    told["notes"] = [*driven.notes, *told["notes"]]
+    return Result(scene, waveforms, summary | told, {**UNITS, **_units(scene)})
 
 
 def summary_here(scene: Scene, progress: Progress) -> dict[str, Any]:
@@ -42,6 +43,15 @@ def summary_here(scene: Scene, progress: Progress) -> dict[str, Any]:
         return _followed_surface(scene)[1]
     with closing(Mechanics(scene)) as mechanics:
         return _driven(scene, mechanics, progress)[2]
+
+
+def _units(scene: Scene) -> dict[str, str]:
+    """Of what is saved of a netlist of the user's own."""
+    if not scene.circuit.save:
+        return {}
+    from cosim.circuit.joined import unit
+
+    return {name: unit(name) for name in scene.circuit.save}
 
 
 def _joined(scene: Scene, progress: Progress) -> Result:
@@ -71,7 +81,7 @@ def _driven(
     recorder = Recorder(scene, mechanics, progress)
     driven = rungs()[scene.circuit.model].drive(scene, recorder)
     summary = numbers(scene, motion(scene, recorder), driven, recorder.steps, began)
-    return recorder, driven, summary
+    return recorder, driven, summary | dict(driven.measured)
 
 
 def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Array]:
@@ -87,4 +97,4 @@ def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Ar
         for part in blocks(len(known["time"])):
             forces.append([force.before(t) for t in known["time"][part].tolist()])
         known["normal_force"] = forces.column()
-    return {name: known[name] for name in COLUMNS if name in known}
+    return {name: known[name] for name in (*COLUMNS, *(scene.circuit.save or ())) if name in known}

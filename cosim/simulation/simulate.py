@@ -4,6 +4,7 @@ import os
 import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
@@ -120,4 +121,4 @@ def _cheapest(scene: Scene, run: Callable[[Scene], Result]) -> Result:
         "circuit_model_errors": choice.errors,
         "wall_time": time.perf_counter() - began,
     }
-    return Result(result.scene, result.columns, result.summary | found)
+    return replace(result, summary=result.summary | found)

@@ -63,7 +63,7 @@ class Lead:
         scene: Scene,
         command: Command,
         recorder: Recorder,
-        deck: tuple[str, tuple[str, ...]] | None = None,
+        deck: tuple[str, dict[str, str]] | None = None,
         replay: npt.NDArray[np.float64] | None = None,
     ) -> None:
         """``deck`` and its saved vectors replace the scene's. With ``replay``, back-EMF (V),
@@ -74,7 +74,8 @@ class Lead:
         self._command = command
         self._recorder = recorder
         self._replay = replay
-        self._deck, self._saved = deck or prepare(scene)
+        self._deck, vectors = deck or prepare(scene)
+        self._saved, self._vectors = tuple(vectors), tuple(vectors.values())
         width = len(LOG) + len(self._saved)
         self._log = Tape(width)
         # With `uic`, ngspice accepts t = 0 before it has sent any value.
@@ -122,7 +123,7 @@ class Lead:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         state = self.state
         try:
-            engine().transient(self._deck, self._saved, self)
+            engine().transient(self._deck, self._vectors, self)
         finally:
             self._attend()
         if state.status == FMU_FAILED:

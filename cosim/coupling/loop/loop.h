@@ -229,6 +229,7 @@ typedef struct {
     char name[64];
     Origin from;
     double value, rate;        /* at the communication point; in a second */
+    double line;               /* the rate before any attempt changed it */
     double guess, off;         /* of the last attempt: the value at its end, and what it lacked */
     double response;           /* d off / d guess, as last seen */
     double largest;            /* magnitude of its value so far */
@@ -292,6 +293,7 @@ typedef struct Ports {
     int64_t repeats;           /* whether attempts are repeated until they agree with the FMUs */
     int64_t stepped;           /* the FMUs have made the step of the last attempt */
     int64_t tries;             /* of the step under way */
+    int64_t met;               /* an event in the step under way, which is short enough */
     double tolerance;          /* of that agreement, relative to the source's largest value */
     const char *const *asked;  /* what ngspice is asked for an attempt's saved values; or NULL */
     AnyFunction command, ask, plot, announce; /* ngspice's */

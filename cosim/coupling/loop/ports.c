@@ -24,6 +24,10 @@ static const int64_t ATTEND_EVERY = 4096; /* as in lead.c */
 
 static const int64_t MOST_TRIES = 25; /* of one step with one length */
 
+static const double EVENT = 1e-2, EVENT_WITHIN = 1e-9;
+/* Of a source's largest value: by how much it leaves its line at an event of an FMU; s: the length
+   of a step within which the event then lies. */
+
 static const double ONE = 1e-12; /* Of a period: corners nearer than that are one. */
 
 typedef int Command(const char *);
@@ -107,7 +111,7 @@ static void set_lines(Ports *c)
         if (s->from.kind != FROM_OUTPUT)
             continue;
         s->value = s->from.scale * c->before[s->from.place] + s->from.offset;
-        s->rate = s->from.scale * rate_of(c, &s->from);
+        s->rate = s->line = s->from.scale * rate_of(c, &s->from);
         s->largest = fmax(s->largest, fabs(s->value));
     }
 }
@@ -232,13 +236,14 @@ static void begin_exchange(Ports *c)
         const double *before = c->before + (s->row - c->outputs);
         s->moved += memcmp(before, s->row, (size_t)s->width * sizeof *before) != 0;
     }
-    if (h > SHORT * c->after_jump)
+    if (h > SHORT * c->after_jump && !c->met)
         for (int64_t k = 0; k < c->n_outputs; k++)
             c->rates[k] = (c->outputs[k] - c->before[k]) / h;
     memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
     memcpy(c->start, c->now, (size_t)c->n_saved * sizeof *c->start);
     memset(c->charges, 0, (size_t)c->n_saved * sizeof *c->charges);
     c->origin = time;
+    c->met = 0;
     set_lines(c);
     c->end = c->macro_step > 0.0 ? fmin(time + c->macro_step, c->jump) : -INFINITY;
     if (c->macro_step > 0.0 && time < c->duration - ON_TIME)
@@ -351,10 +356,25 @@ static int ask(Ports *c)
     return going(c);
 }
 
+/* Whether an FMU's output ends far from where its line from the communication point leads. */
+static int leaves_line(const Ports *c, double time)
+{
+    for (const Source *s = c->sources; s < c->sources + c->n_sources; s++) {
+        const double ahead = s->value + s->line * (time - c->origin);
+        if (s->from.kind == FROM_OUTPUT && fabs(s->guess - ahead) > EVENT * s->largest)
+            return 1;
+    }
+    return 0;
+}
+
 /* Whether the attempt that has converged at `time` is to be repeated. */
 static int to_repeat(Ports *c, double time, double *delta, double old_delta)
 {
-    if (time <= c->origin || !ask(c) || (c->stepped && !restore_all(c)))
+    if (c->stepped && !restore_all(c))
+        return 0;
+    c->stepped = 0;
+    /* At its end ngspice may go on in steps that do not change the time. */
+    if (time <= c->origin || !ask(c))
         return 0;
     c->stepped = 1;
     if (!step_all(c, time))
@@ -375,6 +395,17 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
         }
         s->guess = used;
         s->off = off;
+    }
+    if (agree && leaves_line(c, time)) {
+        c->met = time - c->origin <= EVENT_WITHIN;
+        if (!c->met) { /* a shorter step, to find when */
+            c->tries = 0;
+            c->redone++;
+            for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
+                s->rate = s->from.kind == FROM_OUTPUT ? s->line : s->rate;
+            *delta = 0.5 * (time - c->origin);
+            return 1;
+        }
     }
     if (agree)
         return 0;

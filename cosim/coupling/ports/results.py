@@ -50,24 +50,11 @@ def joined(
         "versions": {**versions(), **run.versions},
         "notes": [*run.deck.notes, *_notes(run)],
     }
-    summary = _measured(run, summary)
-    return columns, summary, units
-
-
-def _measured(run: Run, summary: dict[str, Any]) -> dict[str, Any]:
-    """The summary with the netlist's measurements, and a note for each event that did not come."""
     log = run.log.array()
     known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
-    for each in run.deck.measures:
-        value = measured(each, log[:, 0], known)
-        if value is not None:
-            summary[f"meas.{each.name}"] = value
-        else:
-            where = f"{each.line.file}:{each.line.number}"
-            summary["notes"].append(
-                f"{where}: .meas {each.name} has no value: its event does not come."
-            )
-    return summary
+    values, without = measured(run.deck.measures, log[:, 0], known)
+    summary["notes"] += without
+    return columns, summary | values, units
 
 
 Signal = tuple[str, str, Array, Array, bool]

@@ -31,7 +31,7 @@ class Source(Structure):
     _fields_ = (
         ("name", c_char * 64),
         ("origin", Origin),
-        *of(c_double, "value", "rate", "guess", "off", "response", "largest"),
+        *of(c_double, "value", "rate", "line", "guess", "off", "response", "largest"),
     )
 
 
@@ -80,7 +80,7 @@ class PortsState(Structure):
         *(("pulses", c_void_p), ("n_pulses", c_int64)),
         *of(c_double, "macro_step", "duration", "after_jump", "time", "origin", "end"),
         *of(c_double, "told", "sent"),
-        *of(c_int64, "repeats", "stepped", "tries"),
+        *of(c_int64, "repeats", "stepped", "tries", "met"),
         *(("tolerance", c_double), ("asked", POINTER(c_char_p))),
         *of(c_void_p, "command", "ask", "plot", "announce"),
         ("plot_name", c_char * 64),

@@ -4,7 +4,7 @@
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import ClassVar
@@ -32,6 +32,9 @@ class Driven:
     circuit_steps: int = 0
     circuit_rejected: int = 0
     versions: Mapping[str, str] = field(default_factory=dict)
+    measured: Mapping[str, float] = field(default_factory=dict)
+    """Numbers for the summary that the netlist itself asks for."""
+    notes: Sequence[str] = ()
     waves: Callable[[], Mapping[str, Array]] = dict
     """Makes the columns of the coils: a value for each row of the waveforms. In a row at a jump
     stands what is before it, as in the mechanics' columns, whose state a row is: the first row is

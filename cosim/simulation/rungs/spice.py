@@ -25,6 +25,8 @@ class Spice(Rung):
     def drive(self, scene: Scene, recorder: Recorder) -> Driven:
         # Only those who run a circuit load PySpice, which takes a while.
         from cosim.circuit.false_cycles import refuse_false
+        from cosim.circuit.lint.outputs import measured
+        from cosim.circuit.netlist import asked_for
         from cosim.coupling.loop.macro_steps import coupled
 
         lead = coupled(scene, recorder)
@@ -32,8 +34,12 @@ class Spice(Rung):
         log = lead.log()
         version = recorder.mechanics.instance.version
         refuse_false(scene, log, lambda finer: _log_alone(finer, version))
+        values, notes = {}, []
         if scene.circuit.netlist is not None:
             _refuse_foreign_coil(scene, log)
+            asks, notes = asked_for(scene)
+            values, without = measured(asks, log["time"], log)
+            notes += without
         electric, waves = _electrics(scene, command(scene), log, recorder.time)
         return Driven(
             electric,
@@ -41,6 +47,8 @@ class Spice(Rung):
             circuit_steps=lead.steps,
             circuit_rejected=lead.state.attempts - lead.steps,
             versions={"ngspice": lead.ngspice},
+            measured=values,
+            notes=notes,
             waves=lambda: waves,
         )
 
@@ -73,7 +81,8 @@ def _electrics(
     made = "v(v1)" in log and circuit.model != "amplifier"  # by the circuit, not given to it
     delivered, squares, eddy = 0.0, 0.0, Eddy(scene)
     most, least = -np.inf, np.inf
-    waves, done = Tape(3 if made else 2), 0
+    saved = circuit.save or []
+    waves, done = Tape(2 + len(saved) + made), 0
     end = log["time"][-1]
     for part in _points(log):
         time, coils, out, sense = (part[k] for k in ("time", "i(vemf)", "v(out)", "v(sense)"))
@@ -88,7 +97,8 @@ def _electrics(
         settled = current[time >= settle]
         most, least = settled.max(initial=most), settled.min(initial=least)
         stop = len(rows) if time[-1] == end else int(np.searchsorted(rows, time[-1]))
-        known = [current, out - sense, *([part["v(v1)"]] if made else [])]
+        known = [current, out - sense, *(part[name] for name in saved)]
+        known += [part["v(v1)"]] if made else []
         for here in blocks(stop - done):
             at = rows[done:stop][here]
             waves.append(np.stack([np.interp(at, time, values) for values in known], axis=1))
@@ -102,9 +112,10 @@ def _electrics(
         limited=_limited(scene, log),
     )
     return electric, {
-        "command": waves.column(2) if made else commanded(command, rows),
+        "command": waves.column(2 + len(saved)) if made else commanded(command, rows),
         "current": waves.column(0),
         "coil_voltage": waves.column(1),
+        **{name: waves.column(2 + k) for k, name in enumerate(saved)},
     }
 
 
