@@ -108,7 +108,7 @@ def direct_drive() -> tuple[LinearParticipant, LinearParticipant]:
 
 
 def largest(make: Callable[[], Joint], high: float = 0.1) -> float:
-    return largest_stable_step(make, 1e-4, high)
+    return largest_stable_step(make, 1e-4, high, leap=1.3)
 
 
 def test_the_companion_takes_ten_times_the_step_of_gauss_seidel() -> None:
