@@ -11,8 +11,8 @@ from cosim.coupling.methods.companion import Companion
 from cosim.coupling.methods.gauss_seidel import GaussSeidel
 from cosim.coupling.methods.jacobi import Jacobi
 from cosim.coupling.participants.linear import LinearParticipant, coil
-from cosim.coupling.rewind.iterated import Acceleration, Iterated
 from cosim.coupling.rewind.joint import Joint
+from cosim.coupling.rewind.methods import Acceleration, Iterated
 from cosim.coupling.rewind.stability import largest_stable_step, observed_limit
 
 pytestmark = pytest.mark.physics
