@@ -17,9 +17,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cosim.evaluate.store import Store, reported
-from cosim.studies.accuracy.cases import CASES
-from cosim.studies.accuracy.runs import Run, measure, reference
-from cosim.studies.accuracy.solvers import DEFAULT, SOLVERS, Solver
+from cosim.studies.accuracy.cases import CASES, reference
+from cosim.studies.accuracy.solvers import DEFAULT, SOLVERS, Run, Solver, measure
 from cosim.studies.plots import BLUE, FAINT, GREEN, PURPLE, SKY, VERMILION, End, label_ends, panels
 from cosim.studies.report import Progress, Report, silent
 from cosim.studies.tables import Row, brief, span
