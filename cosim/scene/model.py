@@ -383,6 +383,11 @@ class Scene(BaseModel):
         data |= {table: self.table(table) for table in TABLES}
         return data | {name: self.table(name) for name in PORT_LISTS if getattr(self, name)}
 
+    def having(self, **tables: dict[str, Any]) -> "Scene":
+        """The scene with other values for keys of some tables, which nobody checks."""
+        changed = {table: getattr(self, table).model_copy(update=x) for table, x in tables.items()}
+        return self.model_copy(update=changed)
+
     def table(self, name: str) -> Any:
         """One of the tables of :meth:`as_dict`."""
         if name in PORT_LISTS:

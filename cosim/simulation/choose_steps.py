@@ -117,9 +117,4 @@ def difference(result: Result, truth: Result) -> float:
 
 def _with(scene: Scene, level: tuple[float, float], coupling: dict[str, Any]) -> Scene:
     reltol, max_step = level
-    return scene.model_copy(
-        update={
-            "circuit": scene.circuit.model_copy(update={"reltol": reltol, "max_step": max_step}),
-            "coupling": scene.coupling.model_copy(update=coupling),
-        }
-    )
+    return scene.having(circuit={"reltol": reltol, "max_step": max_step}, coupling=coupling)

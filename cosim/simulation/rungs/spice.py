@@ -1,6 +1,7 @@
 """The rungs in ngspice, which solves the circuit and leads the coupling."""
 
 from collections.abc import Iterator
+from contextlib import closing
 
 import numpy as np
 
@@ -12,58 +13,49 @@ from cosim.errors import BadInput
 from cosim.files.spill import Tape, blocks
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
-from cosim.scene.rungs import RUNGS
-from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
-from cosim.simulation.rungs.rung import Driven, Rung
+from cosim.simulation.rungs.rung import Driven, Eddy, Electrics, commanded, magnetic, total
 
 
-class Spice(Rung):
+def drive(scene: Scene, recorder: Recorder) -> Driven:
     """The coupling method of the scene joins ngspice and the mechanics."""
+    # Only those who run a circuit load PySpice, which takes a while.
+    from cosim.circuit.false_cycles import refuse_false
+    from cosim.circuit.lint.outputs import measured
+    from cosim.circuit.netlist import asked_for
+    from cosim.coupling.loop.macro_steps import coupled
 
-    names = tuple(name for name, rung in RUNGS.items() if rung.ngspice and not rung.automatic)
-
-    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
-        # Only those who run a circuit load PySpice, which takes a while.
-        from cosim.circuit.false_cycles import refuse_false
-        from cosim.circuit.lint.outputs import measured
-        from cosim.circuit.netlist import asked_for
-        from cosim.coupling.loop.macro_steps import coupled
-
-        lead = coupled(scene, recorder)
-        lead.run()
-        log = lead.log()
-        version = recorder.mechanics.instance.version
-        refuse_false(scene, log, lambda finer: _log_alone(finer, version))
-        values, notes = {}, []
-        if scene.circuit.netlist is not None:
-            _refuse_foreign_coil(scene, log)
-            asks, notes = asked_for(scene)
-            values, without = measured(asks, log["time"], log)
-            notes += without
-        electric, waves = _electrics(scene, command(scene), log, recorder.time)
-        return Driven(
-            electric,
-            method=scene.coupling.method,
-            circuit_steps=lead.steps,
-            circuit_rejected=lead.state.attempts - lead.steps,
-            versions={"ngspice": lead.ngspice},
-            measured=values,
-            notes=notes,
-            waves=lambda: waves,
-        )
+    lead = coupled(scene, recorder)
+    lead.run()
+    log = lead.log()
+    version = recorder.mechanics.instance.version
+    refuse_false(scene, log, lambda finer: _log_alone(finer, version))
+    values, notes = {}, []
+    if scene.circuit.netlist is not None:
+        _refuse_foreign_coil(scene, log)
+        asks, notes = asked_for(scene)
+        values, without = measured(asks, log["time"], log)
+        notes += without
+    electric, waves = _electrics(scene, command(scene), log, recorder.time)
+    return Driven(
+        electric,
+        method=scene.coupling.method,
+        circuit_steps=lead.steps,
+        circuit_rejected=lead.state.attempts - lead.steps,
+        versions={"ngspice": lead.ngspice},
+        measured=values,
+        notes=notes,
+        waves=lambda: waves,
+    )
 
 
 def _log_alone(scene: Scene, fmi_version: int) -> dict[str, Array]:
     """The circuit's waveforms of a run of which nothing else is wanted."""
     from cosim.coupling.loop.macro_steps import coupled
 
-    mechanics = Mechanics(scene, fmi_version)
-    try:
+    with closing(Mechanics(scene, fmi_version)) as mechanics:
         lead = coupled(scene, Recorder(scene, mechanics, lambda _: None))
         lead.run()
         return lead.log()
-    finally:
-        mechanics.close()
 
 
 def _electrics(
