@@ -5,7 +5,7 @@ that ngspice computes itself, as the voltage of a source that is put in.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import Line, passed, read_all
 from cosim.circuit.lint.elements import Element, Scope, parse
 from cosim.circuit.lint.expressions import sensed
-from cosim.circuit.lint.outputs import Measure, measures, told
+from cosim.circuit.lint.outputs import Measure, measures, without_effect
 from cosim.circuit.lint.words import definitions
 from cosim.circuit.lint.write import written
 from cosim.errors import BadInput, plain
@@ -81,25 +81,18 @@ def deck(
             hint = suggestion(source.lower(), known) or f" (it has {', '.join(known) or 'none'})"
             shown = f'[[port]] source = "{plain(source)}"'
             raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
-    plainly = re.compile(r"i.*" if asked else r".*", re.IGNORECASE)
-    direct = [_VECTOR.fullmatch(each) if plainly.match(each) else None for each in words]
-    extra = [
-        _reading(Line(each, f'"{plain(each)}"', k + 1), k)
-        for k, each in enumerate(words)
-        if direct[k] is None
-    ]
-    asked_for = [(name, each) for each in words]
-    every = dict.fromkeys(words)
+    wanted = {each: Line(each, f'"{plain(each)}"', k + 1) for k, each in enumerate(words)}
     for ask in asks:
-        for each in ask.words:
-            asked_for.append((f"{ask.line.file}:{ask.line.number}", each))
-            if each not in every:
-                direct.append(_VECTOR.fullmatch(each))
-                if direct[-1] is None:
-                    extra.append(_reading(Line(each, ask.line.file, ask.line.number), len(every)))
-                every[each] = None
+        wanted |= {each: replace(ask.line, text=each) for each in ask.words if each not in wanted}
+    # Within a step a node's voltage is not to be had: a source that copies it is.
+    plainly = re.compile(r"i.*" if asked else r".*", re.IGNORECASE)
+    direct = [
+        _VECTOR.fullmatch(each) if each not in words or plainly.match(each) else None
+        for each in wanted
+    ]
+    extra = [_reading(k, line) for k, line in enumerate(wanted.values()) if direct[k] is None]
     top = check([*lines, *extra], [[source.lower() for source in sources]])
-    _check_vectors(top, asked_for)
+    _check_vectors(top, name, words, wanted.values())
     values = _parameters(top, name, parameters)
     fed = {source.lower() for source in sources}
     text = [lines[0].text]
@@ -121,15 +114,15 @@ def deck(
         "\n".join(text),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
-        tuple(every),
+        tuple(wanted),
         tuple(asks),
-        tuple(told(dropped)),
+        tuple(without_effect(dropped)),
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
         tuple(_pulses(top, fed)),
     )
 
 
-def _reading(words: Line, place: int) -> Line:
+def _reading(place: int, words: Line) -> Line:
     """A source whose voltage is the expression."""
     line = replace(words, text=f"Bcosim{place} {_NODE}{place} 0 V={words.text}")
     passed(line)
@@ -144,21 +137,21 @@ def _read_as(place: int, match: re.Match[str] | None) -> tuple[str, str]:
     return f"{kind}({inner})", f"@{inner}[i]" if kind == "i" else ""
 
 
-def _check_vectors(top: Scope, asked: Sequence[tuple[str, str]]) -> None:
-    """What the words name must be there, as far as that can be known without subcircuits; each
-    comes with the place that asks for it."""
-    nodes = {node for element in top.elements for node in element.nodes} | {"0"}
+def _check_vectors(top: Scope, name: str, words: Sequence[str], wanted: Iterable[Line]) -> None:
+    """What is wanted must be there, as far as that can be known without subcircuits: the scene's
+    words, and those of the netlist's lines."""
     known: dict[str, set[str]] = {
-        "v": nodes,
+        "v": {node for element in top.elements for node in element.nodes} | {"0"},
         "i": {each.name for each in top.elements if each.kind in _CURRENTS},
     }
-    for name, each in asked:
+    for each in wanted:
         for kind, what in (("v", "node"), ("i", "V, L, E or H element")):
-            for inner in sensed(f"b 1 0 v={each}", kind):
+            for inner in sensed(f"b 1 0 v={each.text}", kind):
                 if not re.search(r"[.:]", inner) and inner not in known[kind]:
+                    where = name if each.text in words else f"{each.file}:{each.number}"
                     hint = suggestion(inner, known[kind])
-                    said = f'"{plain(each)}" is asked for, but there is no {what} {plain(inner)}'
-                    raise BadInput(ended(f"{name}: {said}{hint}"))
+                    said = f'"{plain(each.text)}" is asked for, but there is no {what}'
+                    raise BadInput(ended(f"{where}: {said} {plain(inner)}{hint}"))
 
 
 def _parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.circuit.joined import unit
-from cosim.circuit.lint.outputs import measured
+from cosim.circuit.lint.outputs import Measure, measured
 from cosim.coupling.loop.agenda import count
 from cosim.coupling.loop.lead import engine
 from cosim.coupling.loop.structures import loop
@@ -40,6 +40,13 @@ def joined(
         for name, _, times, values, continuous in signals
         for what, value in _numbers(scene.run.settle, times, values, continuous).items()
     }
+    notes = [*run.deck.notes, *_notes(run)]
+    for each, value in _measured(run):
+        if value is not None:
+            summary[f"meas.{each.name}"] = value
+        else:
+            where, what = f"{each.line.file}:{each.line.number}", f".meas {each.name}"
+            notes.append(f"{where}: {what} has no value: its event does not come.")
     summary |= {
         "circuit_steps": run.steps,
         "circuit_rejected": run.state.attempts - run.steps,
@@ -48,26 +55,17 @@ def joined(
         "wall_time": time.perf_counter() - began,
         "method": run.plan.method,
         "versions": {**versions(), **run.versions},
-        "notes": [*run.deck.notes, *_notes(run)],
+        "notes": notes,
     }
-    summary = _measured(run, summary)
     return columns, summary, units
 
 
-def _measured(run: Run, summary: dict[str, Any]) -> dict[str, Any]:
-    """The summary with the netlist's measurements, and a note for each event that did not come."""
+def _measured(run: Run) -> Iterator[tuple[Measure, float | None]]:
+    """The netlist's measurements."""
     log = run.log.array()
     known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
     for each in run.deck.measures:
-        value = measured(each, log[:, 0], known)
-        if value is not None:
-            summary[f"meas.{each.name}"] = value
-        else:
-            where = f"{each.line.file}:{each.line.number}"
-            summary["notes"].append(
-                f"{where}: .meas {each.name} has no value: its event does not come."
-            )
-    return summary
+        yield each, measured(each, log[:, 0], known)
 
 
 Signal = tuple[str, str, Array, Array, bool]
