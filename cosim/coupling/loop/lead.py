@@ -88,7 +88,7 @@ class Lead:
         motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else -1
         swing = self._saved.index("v(swing)") if "v(swing)" in self._saved else -1
         self.state = LeadState(
-            recorder=ctypes.pointer(recorder.state),
+            recorder=ctypes.addressof(recorder.state),
             macro_point=address(f"macro_point_{'step_locked' if replay is None else 'replayed'}"),
             replay=None if replay is None else replay.ctypes.data,
             gain=GAIN,
@@ -102,7 +102,7 @@ class Lead:
             max_step=scene.circuit.max_step,
             output_high=scene.circuit.supply - scene.circuit.swing_loss_high,
             output_low=scene.circuit.swing_loss_low - scene.circuit.supply,
-            places=self.places,
+            places=ctypes.addressof(self.places),
             n_saved=len(self._saved),
             swing=swing,
             motional=motional,
@@ -194,7 +194,7 @@ class Lead:
         begin = self._pieces[-1].until if self._pieces else 0.0
         self._pieces = kept + self._command.pieces(begin, self._duration, _PIECES)
         self._row = (Piece * len(self._pieces))(*self._pieces)
-        state.pieces, state.n_pieces, state.piece = self._row, len(self._pieces), 0
+        state.pieces, state.n_pieces, state.piece = ctypes.addressof(self._row), len(self._row), 0
 
 
 def engine() -> ngspice.Engine:

@@ -1,5 +1,5 @@
-/* What the coupled loop's files share, and share with cosim/coupling/loop/structures.py, whose
-   structures have the same fields in the same order. SI throughout.
+/* What the coupled loop's files share, and share with Python, which has the structures and functions
+   from here (cosim/toolchain/libraries.py). SI throughout.
 
    Order of calls in a run that ngspice leads:
 
