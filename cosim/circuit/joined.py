@@ -5,7 +5,7 @@ that ngspice computes itself, as the voltage of a source that is put in.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import Line, passed, read_all
 from cosim.circuit.lint.elements import Element, Scope, parse
 from cosim.circuit.lint.expressions import sensed
-from cosim.circuit.lint.outputs import Measure, measures, told
+from cosim.circuit.lint.outputs import Measure, measures, without_effect
 from cosim.circuit.lint.words import definitions
 from cosim.circuit.lint.write import written
 from cosim.errors import BadInput, plain
@@ -107,9 +107,9 @@ def deck(
         "\n".join(text),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
-        tuple(every),
+        tuple(wanted),
         tuple(asks),
-        tuple(told(dropped)),
+        tuple(without_effect(dropped)),
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
         tuple(_pulses(top, fed)),
     )
@@ -125,17 +125,13 @@ def check_reading(
 ) -> tuple[Scope, list[str]]:
     """The top level of a netlist with what reads the ``words`` and what the measurements need, as
     :func:`check` gives it; and all these words, each once."""
-    name = plain(str(path))
     every = {each: Line(each, f'"{plain(each)}"', k) for k, each in enumerate(words, 1)}
-    places = [(name, each) for each in words]
     for ask in asks:
-        for each in ask.words:
-            places.append((f"{ask.line.file}:{ask.line.number}", each))
-            every.setdefault(each, replace(ask.line, text=each))
+        every |= {each: replace(ask.line, text=each) for each in ask.words if each not in every}
     direct = _direct([*every], len(words) if asked else 0)
     extra = [_source_of(k, line) for k, line in enumerate(every.values()) if direct[k] is None]
     top = check([*lines, *extra], required)
-    _check_vectors(top, places)
+    _check_vectors(top, plain(str(path)), words, every.values())
     return top, [*every]
 
 
@@ -146,6 +142,7 @@ def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:
 
 
 def _direct(words: Sequence[str], asked: int) -> list[re.Match[str] | None]:
+    # Within a step a node's voltage is not to be had: a source that copies it is.
     return [
         _VECTOR.fullmatch(each) if k >= asked or each[:1].lower() == "i" else None
         for k, each in enumerate(words)
@@ -167,21 +164,21 @@ def _read_as(place: int, match: re.Match[str] | None) -> tuple[str, str]:
     return f"{kind}({inner})", f"@{inner}[i]" if kind == "i" else ""
 
 
-def _check_vectors(top: Scope, asked: Sequence[tuple[str, str]]) -> None:
-    """What the words name must be there, as far as that can be known without subcircuits; each
-    comes with the place that asks for it."""
-    nodes = {node for element in top.elements for node in element.nodes} | {"0"}
+def _check_vectors(top: Scope, name: str, words: Sequence[str], wanted: Iterable[Line]) -> None:
+    """What is wanted must be there, as far as that can be known without subcircuits: the scene's
+    words, and those of the netlist's lines."""
     known: dict[str, set[str]] = {
-        "v": nodes,
+        "v": {node for element in top.elements for node in element.nodes} | {"0"},
         "i": {each.name for each in top.elements if each.kind in _CURRENTS},
     }
-    for name, each in asked:
+    for each in wanted:
         for kind, what in (("v", "node"), ("i", "V, L, E or H element")):
-            for inner in sensed(f"b 1 0 v={each}", kind):
+            for inner in sensed(f"b 1 0 v={each.text}", kind):
                 if not re.search(r"[.:]", inner) and inner not in known[kind]:
+                    where = name if each.text in words else f"{each.file}:{each.number}"
                     hint = suggestion(inner, known[kind])
-                    said = f'"{plain(each)}" is asked for, but there is no {what} {plain(inner)}'
-                    raise BadInput(ended(f"{name}: {said}{hint}"))
+                    said = f'"{plain(each.text)}" is asked for, but there is no {what}'
+                    raise BadInput(ended(f"{where}: {said} {plain(inner)}{hint}"))
 
 
 def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:

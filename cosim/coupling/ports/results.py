@@ -40,6 +40,10 @@ def joined(
         for name, _, times, values, continuous in signals
         for what, value in _numbers(scene.run.settle, times, values, continuous).items()
     }
+    log = run.log.array()
+    known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
+    values, without = measured(run.deck.measures, log[:, 0], known)
+    summary |= values
     summary |= {
         "circuit_steps": run.steps,
         "circuit_rejected": run.state.attempts - run.steps,
@@ -48,13 +52,9 @@ def joined(
         "wall_time": time.perf_counter() - began,
         "method": run.plan.method,
         "versions": {**versions(), **run.versions},
-        "notes": [*run.deck.notes, *_notes(run)],
+        "notes": [*run.deck.notes, *_notes(run), *without],
     }
-    log = run.log.array()
-    known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
-    values, without = measured(run.deck.measures, log[:, 0], known)
-    summary["notes"] += without
-    return columns, summary | values, units
+    return columns, summary, units
 
 
 Signal = tuple[str, str, Array, Array, bool]
