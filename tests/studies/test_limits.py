@@ -261,7 +261,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     interrupted goes on and leaves the same."""
     drawn: list[Figure] = []
     monkeypatch.setattr(Picture, "write", lambda figure, *where: drawn.append(figure))
-    names = ("as it is", "sine", "heat 7 W", "op-amp of a hundredth the slew rate")
+    names = ("as it is", "sine", "heat 7 W")
     monkeypatch.setattr(report, "CHANGES", [NAMED[name] for name in names])
     monkeypatch.setattr(report, "FULL", Efforts((FEW, Effort(0, 3, 2)), (FEW, FEW), 1))
     scene = load("reference", {"run.duration": 0.2})
@@ -300,6 +300,29 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(drawn) == 3 + 3 + 2  # and those of the two commands
     for figure in drawn[:3]:
         assert_legible(figure)
+
+
+def test_what_is_not_searched_is_tried_at_the_robust_setting(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Against the device as it is on the same circuit: alone each has the same median."""
+    monkeypatch.setattr(judge, "SHORT", 0.02)
+    monkeypatch.setattr(judge, "SPAN", 0.03)
+    made, place, slow = bench(), [0.6, 0.8, 0.2], "op-amp of a hundredth the slew rate"
+    own = {
+        ("as it is", "v_up", kind): Point(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, place, {})
+        for kind in ("best", "robust")
+    }
+    machines = {name: NAMED[name].machine(made.scene) for name in ("as it is", slow)}
+    with made.evaluator:
+        found = judge.tried(made, machines, [slow], own)
+        every = [machines[slow].at(one, 0.02, 0.03) for one in turned(np.array(place), 3)]
+        alone = made.evaluator.outcomes(
+            [{key: x for key, x in one.items() if key != "circuit.slew_rate"} for one in every]
+        )
+    (point,) = found.values()
+    assert [*found] == [(slow, "v_up", "robust")] and point.median != point.against
+    assert point.against == np.median([one.numbers["v_average"] for one in alone])
 
 
 ASKED = ([{"mechanics.surface_mass": 0.02}], 0, False, 1.0)

@@ -230,6 +230,8 @@ typedef struct {
     Origin from;
     double value, rate;        /* at the communication point; in a second */
     double line;               /* the rate before any attempt changed it */
+    double plain, correction;  /* the value is their sum */
+    double owed;               /* of the FMU's integral, as in Lead */
     double guess, off;         /* of the last attempt: the value at its end, and what it lacked */
     double response;           /* d off / d guess, as last seen */
     double largest;            /* magnitude of its value so far */
@@ -288,6 +290,7 @@ typedef struct Ports {
     int64_t n_pulses;
     double macro_step;         /* s; 0: each accepted step ends on a communication point */
     double duration, after_jump;
+    double jumped;             /* s; the last jump, of the drive or of an FMU */
     double time, origin, end;  /* s; last accepted point; last and next communication point */
     double told, sent;         /* as in Lead */
     int64_t repeats;           /* whether attempts are repeated until they agree with the FMUs */

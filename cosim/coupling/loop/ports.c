@@ -22,11 +22,21 @@ static const double SHORT = 1e-3;
 
 static const int64_t ATTEND_EVERY = 4096; /* as in lead.c */
 
+static const double HALF = 0.49, LAST = 1e-3;
+/* ngspice cuts a repeated step if another one as long would end beyond the run's end, from where the
+   first one ended. So steps shrink before it; of after_jump: the last one, which is not repeated. */
+
 static const int64_t MOST_TRIES = 25; /* of one step with one length */
 
-static const double EVENT = 1e-2, EVENT_WITHIN = 1e-9;
+static const double EVENT = 3e-3, EVENT_WITHIN = 1e-9;
 /* Of a source's largest value: by how much it leaves its line at an event of an FMU; s: the length
    of a step within which the event then lies. */
+
+static const double GROWTH = 0.07;
+/* Of the time since the last jump: the longest step. By its truncation error ngspice would double its
+   steps, and lose of what answers the jump, however fast that is. */
+
+static const double CARRIED = 0.2; /* as in lead.c */
 
 static const double ONE = 1e-12; /* Of a period: corners nearer than that are one. */
 
@@ -105,13 +115,29 @@ static double rate_of(const Ports *c, const Origin *from)
                                   : c->rates[from->place];
 }
 
-static void set_lines(Ports *c)
+/* ngspice integrates a source by the trapezoidal rule. Where the FMU tells the slope, the integral of
+   a cubic through both ends is nearer to its own, and what is owed is paid back as in lead.c. */
+static double correction(Ports *c, Source *s, double value, double rate, double h)
+{
+    if (s->from.slope != KNOWN || h <= 0.0)
+        return 0.0;
+    const double given = h * (s->value + 0.5 * s->rate * h);
+    s->owed += 0.5 * h * (s->plain + value) - h * h / 12.0 * (rate - s->line) - given;
+    return CARRIED * s->owed / fmax(h, c->after_jump);
+}
+
+/* The lines from here on, after a step of the length `h`. */
+static void set_lines(Ports *c, double h)
 {
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++) {
         if (s->from.kind != FROM_OUTPUT)
             continue;
-        s->value = s->from.scale * c->before[s->from.place] + s->from.offset;
-        s->rate = s->line = s->from.scale * rate_of(c, &s->from);
+        const double value = s->from.scale * c->before[s->from.place] + s->from.offset;
+        const double rate = s->from.scale * rate_of(c, &s->from);
+        s->correction = correction(c, s, value, rate, h);
+        s->plain = value;
+        s->value = value + s->correction;
+        s->rate = s->line = rate;
         s->largest = fmax(s->largest, fabs(s->value));
     }
 }
@@ -244,7 +270,7 @@ static void begin_exchange(Ports *c)
     memset(c->charges, 0, (size_t)c->n_saved * sizeof *c->charges);
     c->origin = time;
     c->met = 0;
-    set_lines(c);
+    set_lines(c, h);
     c->end = c->macro_step > 0.0 ? fmin(time + c->macro_step, c->jump) : -INFINITY;
     if (c->macro_step > 0.0 && time < c->duration - ON_TIME)
         c->end = fmin(c->end, c->duration);
@@ -316,9 +342,12 @@ static double accepted(Ports *c, double time, double next_step)
     }
     announce(c, time);
     if (time <= 0.0 || at_jump)
-        next_step = fmin(next_step, c->after_jump);
+        c->jumped = time;
+    next_step = fmin(next_step, c->after_jump + GROWTH * (time - c->jumped));
     if (c->end > time)
         next_step = fmin(next_step, c->end - time);
+    if (c->repeats)
+        next_step = fmin(next_step, fmax(HALF * (c->duration - time), LAST * c->after_jump));
     if (c->driven) {
         const double corner = piece_at(c, time)->until;
         if (corner > time)
@@ -374,7 +403,7 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
         return 0;
     c->stepped = 0;
     /* At its end ngspice may go on in steps that do not change the time. */
-    if (time <= c->origin || !ask(c))
+    if (time <= c->origin || time + old_delta > c->duration || !ask(c))
         return 0;
     c->stepped = 1;
     if (!step_all(c, time))
@@ -384,7 +413,8 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
         if (s->from.kind != FROM_OUTPUT)
             continue;
         const double used = source_value(c, s, time);
-        const double off = s->from.scale * c->outputs[s->from.place] + s->from.offset - used;
+        const double off = s->from.scale * c->outputs[s->from.place] + s->from.offset +
+                           s->correction - used;
         s->largest = fmax(s->largest, fabs(used));
         if (fabs(off) > c->tolerance * s->largest)
             agree = 0;
@@ -398,7 +428,9 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
     }
     if (agree && leaves_line(c, time)) {
         c->met = time - c->origin <= EVENT_WITHIN;
-        if (!c->met) { /* a shorter step, to find when */
+        if (c->met) {
+            c->jumped = time;
+        } else { /* a shorter step, to find when */
             c->tries = 0;
             c->redone++;
             for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
@@ -497,7 +529,7 @@ void ports_begin(Ports *c)
     memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
         s->response = -1.0;
-    set_lines(c);
+    set_lines(c, 0.0);
     c->jump = c->driven ? piece_at(c, 0.0)->jump : INFINITY;
     late = loop_milliseconds() + LOOP_PATIENCE;
     run = c;

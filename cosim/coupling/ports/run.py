@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cosim.circuit import ngspice
-from cosim.coupling.loop.lead import engine
+from cosim.coupling.loop.lead import after_jump, engine
 from cosim.coupling.loop.structures import (
     FMU_FAILED,
     NO_AGREEMENT,
@@ -25,13 +25,10 @@ from cosim.errors import SimulationFailed, plain
 from cosim.files.spill import Tape
 from cosim.scene import Scene
 
-_AFTER_JUMP = 1e-2
-"""Longest step after a jump of the drive, in ``circuit.max_step``."""
-
 _POINTS, _PIECES = 2048, 512
 """Places of the logs between two emptyings; pieces of the drive that are prepared at a time."""
 
-_AGREEMENT = 10.0
+_AGREEMENT = 2.0
 """Of ``circuit.reltol``: how far an FMU and ngspice may be apart where steps are repeated."""
 
 
@@ -79,7 +76,7 @@ class Run:
             driven=int(plan.driven),
             macro_step=macro,
             duration=scene.run.duration,
-            after_jump=_AFTER_JUMP * scene.circuit.max_step,
+            after_jump=after_jump(scene),
             end=-np.inf,
             repeats=int(repeats),
             tolerance=_AGREEMENT * scene.circuit.reltol,

@@ -31,7 +31,19 @@ class Source(Structure):
     _fields_ = (
         ("name", c_char * 64),
         ("origin", Origin),
-        *of(c_double, "value", "rate", "line", "guess", "off", "response", "largest"),
+        *of(
+            c_double,
+            "value",
+            "rate",
+            "line",
+            "plain",
+            "correction",
+            "owed",
+            "guess",
+            "off",
+            "response",
+            "largest",
+        ),
     )
 
 
@@ -78,7 +90,7 @@ class PortsState(Structure):
         *(("pieces", POINTER(Piece)), *of(c_int64, "n_pieces", "piece")),
         *(("jump", c_double), ("driven", c_int64)),
         *(("pulses", c_void_p), ("n_pulses", c_int64)),
-        *of(c_double, "macro_step", "duration", "after_jump", "time", "origin", "end"),
+        *of(c_double, "macro_step", "duration", "after_jump", "jumped", "time", "origin", "end"),
         *of(c_double, "told", "sent"),
         *of(c_int64, "repeats", "stepped", "tries", "met"),
         *(("tolerance", c_double), ("asked", POINTER(c_char_p))),
