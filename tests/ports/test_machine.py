@@ -71,19 +71,27 @@ def agreed(folder: Path, base: str = "paper", **given: Any) -> cosim.Result:
 
 
 def test_a_netlist_with_names_of_its_own_is_the_same_circuit(folder: Path) -> None:
-    (folder / "own.toml").write_text(OWN + ENDS + RUN)
+    text = OWN + ENDS + RUN
+    (folder / "own.toml").write_text("".join(x for x in text.splitlines(True) if "save" not in x))
     with in_place():
         result = cosim.run(folder / "own.toml")
     expected = agreed(folder)
-    assert list(result.columns)[: len(expected.columns)] == list(expected.columns)
+    assert list(result.columns) == list(expected.columns)
     for name, values in expected.columns.items():
-        scale = np.abs(values).max()
-        assert result.columns[name] == pytest.approx(values, abs=1e-9 * scale), name
+        # The example has a node v1, whose voltage the circuit itself computes.
+        least = 1e-12 if name == "command" else 0.0
+        assert result.columns[name] == pytest.approx(values, rel=0.0, abs=least), name
+    assert result.summary["energy_residual"] < 1e-4
+
+
+def test_what_is_saved_of_it_is_in_the_waveforms(folder: Path) -> None:
+    (folder / "own.toml").write_text(OWN + ENDS + RUN)
+    with in_place():
+        result = cosim.run(folder / "own.toml")
     power = result.columns["v(amp,shunt)*i(Vmot)"]
-    alone = expected.columns["coil_voltage"] * expected.columns["current"]
+    alone = result.columns["coil_voltage"] * result.columns["current"]
     assert power == pytest.approx(alone, abs=1e-3 * np.abs(alone).max())
     assert (result.units["v(left)"], result.units["v(amp,shunt)*i(Vmot)"]) == ("V", "W")
-    assert result.summary["energy_residual"] < 1e-4
 
 
 @pytest.mark.parametrize(("base", "contact"), [("paper", "compliant"), ("reference", "rigid")])

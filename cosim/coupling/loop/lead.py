@@ -113,6 +113,10 @@ class Lead:
             refill=callback(self._refill, self._fail),
             attend=callback(self._attend, self._fail),
         )
+        named = scene.renamed
+        names = named.get("machine.back_emf", "vemf"), "vgain", named.get("drive", "vcommand")
+        for k, name in enumerate((*names, "vdac", "voffset")):
+            self.state.names[k].value = name.lower().encode()
         emf, slope, flux = recorder.mechanics.step_outputs[:3]
         self.state.flux_at_start = flux
         segment = self.state.segment

@@ -198,6 +198,7 @@ typedef struct Lead {
     int64_t status;
     int64_t stopped;              /* by Python: nothing is to be done any more */
     char source[64];              /* name of the one that nothing feeds */
+    char names[5][64];            /* of the back-EMF, its gain, the command, the DAC and the pin */
     void (*refill)(void);         /* makes the first piece the one that holds at `time` */
     void (*attend)(void);         /* empties the log */
 } Lead;

@@ -89,7 +89,7 @@ class LeadState(Structure):
         *of(c_int64, "n_saved", "swing", "motional"),
         ("log", c_void_p),
         *of(c_int64, "n_log", "log_rows", "logged", "attempts", "quiet", "status", "stopped"),
-        ("source", ctypes.c_char * 64),
+        *(("source", ctypes.c_char * 64), ("names", ctypes.c_char * 64 * 5)),
         *of(CALLBACK, "refill", "attend"),
     )
 
