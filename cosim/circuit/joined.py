@@ -107,7 +107,7 @@ def deck(
         "\n".join(text),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
-        tuple(wanted),
+        tuple(every),
         tuple(asks),
         tuple(without_effect(dropped)),
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),

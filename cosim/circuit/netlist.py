@@ -18,7 +18,7 @@ from cosim.circuit.joined import check_reading, own_parameters, reading
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.deck import Line, read_all, refuse
 from cosim.circuit.lint.elements import Element, Scope
-from cosim.circuit.lint.outputs import Measure, measures, told
+from cosim.circuit.lint.outputs import Measure, measures, without_effect
 from cosim.circuit.lint.write import written
 from cosim.files.resources import circuits
 from cosim.scene import Scene
@@ -83,7 +83,8 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
     present = {node for element in elements for node in element.nodes}
     companion = scene.coupling.method == "companion"
     if companion:
-        _carry_inertia(external, title, present)
+        emf = scene.renamed.get("machine.back_emf", "vemf").lower()
+        _carry_inertia(external, title, present, emf)
     values = parameters(scene) | own_parameters(top, str(path), scene.circuit.param or {})
     deck = [title.text]
     for line, element, holder in top.order:
@@ -123,8 +124,7 @@ def _checked(
     path: Path, renamed: Mapping[str, str], words: tuple[str, ...]
 ) -> tuple[Line, Scope, list[str]]:
     lines, dropped = read_all(path)
-    sources = [renamed[end].lower() for end in _SOURCES] if renamed else []
-    required = [sources] if renamed else AGREED
+    required = [[renamed[end].lower() for end in _SOURCES]] if renamed else AGREED
     return lines[0], *check_reading(path, lines, words, measures(dropped), required)
 
 
@@ -138,41 +138,26 @@ def asked_for(scene: Scene) -> tuple[list[Measure], list[str]]:
     """What a netlist of one's own measures, in words that the log has, and a sentence for each of
     its lines that has no effect."""
     _, dropped = read_all(path_of(scene))
-    return measures(dropped), [*told(dropped)]
+    return measures(dropped), [*without_effect(dropped)]
 
 
-_SOURCES = {"machine.back_emf": "Vemf", "drive": "Vcommand"}
-"""The loop's names for the sources that ports join to the machine."""
+_SOURCES = ("machine.back_emf", "drive")
+"""The ends of ports that join the sources of a netlist to the machine."""
 
 
 def _external_sources(elements: Sequence[Element], renamed: Mapping[str, str]) -> dict[Line, str]:
-    """The lines of the agreed sources, as external ones; one of another name stays in series with
-    the loop's, since the netlist may speak of it."""
-    if renamed:
-        found = {element.name: element for element in elements}
-        lines: dict[Line, str] = {}
-        for end, own in _SOURCES.items():
-            element = found[renamed[end].lower()]
-            if element.kind != "v":
-                element.refuse(" must be a V source, since a [[port]] joins it to the machine")
-            plus, minus = element.nodes
-            if element.name == own.lower():
-                lines[element.line] = f"{own} {plus} {minus} external"
-            else:
-                node = f"cosim_{own.lower()}"
-                lines[element.line] = (
-                    f"{element.name} {plus} {node} 0\n{own} {node} {minus} external"
-                )
-        return lines
-    agreed = next(names for names in AGREED if {element.name for element in elements} >= set(names))
-    return {
-        element.line: " ".join([element.name, *element.nodes, "external"])
-        for element in elements
-        if element.name in agreed
-    }
+    """The lines of the agreed sources, or of those that ports join, as external ones."""
+    present = {element.name for element in elements}
+    agreed: Sequence[str] = [renamed[end].lower() for end in _SOURCES] if renamed else ()
+    agreed = agreed or next(names for names in AGREED if present >= set(names))
+    found = [element for element in elements if element.name in agreed]
+    for element in found:
+        if element.kind != "v":
+            element.refuse(" must be a V source, since a [[port]] joins it to the machine")
+    return {each.line: " ".join([each.name, *each.nodes, "external"]) for each in found}
 
 
-def _carry_inertia(external: dict[Line, str], title: Line, present: set[str]) -> None:
+def _carry_inertia(external: dict[Line, str], title: Line, present: set[str], emf: str) -> None:
     """Put the mechanics' local inertia in series with the coil, for the method "companion".
 
     A mass m behind the coil acts as a capacitor C = m/Bl² with e = ∫ i dt/C. Stick, slip and
@@ -182,7 +167,7 @@ def _carry_inertia(external: dict[Line, str], title: Line, present: set[str]) ->
     for node in ("motional", "motional_gain", "motional_emf"):
         if node in present:
             refuse(title, f'the node {node} cannot be used with coupling.method = "companion"')
-    line = next(line for line, text in external.items() if text.lower().startswith("vemf "))
+    line = next(line for line, text in external.items() if text.startswith(f"{emf} "))
     name, plus, minus, *_ = external[line].split()
     external[line] = "\n".join(
         (

@@ -84,7 +84,6 @@ class Lead:
         self._pieces: list[Piece] = []
         self._row: Any = None
         self._time = 0.0
-        fineness = (_COARSEST / scene.circuit.reltol) ** (1.0 / 3.0)
         coil, loop_resistance = scene.coil, scene.circuit.sense_resistance * scene.coil.count
         motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else -1
         swing = self._saved.index("v(swing)") if "v(swing)" in self._saved else -1
@@ -95,8 +94,8 @@ class Lead:
             gain=GAIN,
             v_offset=command.v_offset,
             count=coil.count,
-            after_jump=min(_AFTER_JUMP / fineness, _SHARE_AFTER_JUMP * scene.circuit.max_step),
-            fineness=fineness,
+            after_jump=after_jump(scene),
+            fineness=_fineness(scene),
             time_constant=coil.inductance / (coil.resistance + loop_resistance),
             range=scene.drive.amplitude or 1.0,
             emf_change=_EMF_CHANGE * scene.circuit.supply,
@@ -112,6 +111,10 @@ class Lead:
             refill=callback(self._refill, self._fail),
             attend=callback(self._attend, self._fail),
         )
+        named = scene.renamed
+        names = named.get("machine.back_emf", "vemf"), "vgain", named.get("drive", "vcommand")
+        for k, name in enumerate((*names, "vdac", "voffset")):
+            self.state.names[k].value = name.lower().encode()
         emf, slope, flux = recorder.mechanics.step_outputs[:3]
         self.state.flux_at_start = flux
         segment = self.state.segment
@@ -196,6 +199,15 @@ class Lead:
         self._pieces = kept + self._command.pieces(begin, self._duration, _PIECES)
         self._row = (Piece * len(self._pieces))(*self._pieces)
         state.pieces, state.n_pieces, state.piece = ctypes.addressof(self._row), len(self._row), 0
+
+
+def after_jump(scene: Scene) -> float:
+    """Longest step after a jump of the command, s."""
+    return min(_AFTER_JUMP / _fineness(scene), _SHARE_AFTER_JUMP * scene.circuit.max_step)
+
+
+def _fineness(scene: Scene) -> float:
+    return (_COARSEST / scene.circuit.reltol) ** (1.0 / 3.0)
 
 
 def engine() -> ngspice.Engine:
