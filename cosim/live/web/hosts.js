@@ -1,6 +1,8 @@
 "use strict";
 /* Who owns the machine: a worker with a timer, or the audio worklet, which also plays the surface. */
 
+const BUFFER = 50; // ms
+
 class Player {
   constructor(post) {
     this.post = post;
@@ -61,7 +63,7 @@ class Player {
     const { rows, count, machine } = this;
     const origin = machine.command.origin, frequency = machine.command.frequency;
     this.post({ kind: "rows", rows, count, last: machine.row, marks: machine.marks, origin, frequency,
-      generation: this.generation }, [rows.buffer]);
+      generation: this.generation, gaps: this.gaps }, [rows.buffer]);
     machine.marks = [];
     this.fresh();
   }
@@ -92,11 +94,22 @@ if (typeof registerProcessor === "function") {
         else if (data.kind === "gain") this.gain = data.gain;
         else this.player.message(data);
       };
-      this.blocks = this.mean = this.gain = 0;
+      this.blocks = this.mean = this.gain = this.player.gaps = 0;
+      this.least = Infinity;
+    }
+
+    /* What is played lags behind the clock by more than a buffer: there was a gap. */
+    watch() {
+      const late = Date.now() - 1000 * currentTime;
+      this.least = Math.min(this.least + 1e-3, late); // the two clocks drift apart
+      if (late - this.least < BUFFER) return;
+      this.player.gaps++;
+      this.least = late;
     }
 
     process(_, [[out]]) {
       if (this.ended) return false;
+      this.watch();
       this.player.play(out.length, sampleRate, out);
       for (let k = 0; k < out.length; k++) {
         this.mean += 5e-4 * (out[k] - this.mean); // a loudspeaker has no constant part

@@ -3,12 +3,12 @@
 
 const $ = (id) => document.getElementById(id);
 const START = settingOf(DATA.start);
-const state = { setting: START, values: valuesOf(START), speed: 1, paused: false, generation: 0, marks: [], other: null };
+const state = { setting: START, values: valuesOf(START), speed: 1, paused: false, generation: 0, marks: [], others: [] };
 const history_ = new History();
 const curves = new Curves($("curves"), measured);
 function measured(words) {
   const place = $("measure");
-  while (place.children.length < words.length) place.append(document.createElement("span"));
+  while (place.children.length < words.length) made(place, "span");
   while (place.children.length > words.length) place.lastChild.remove();
   words.forEach((word, k) => { place.children[k].textContent = word.replaceAll("-", "−"); });
 }
@@ -59,6 +59,7 @@ function heard(told) {
     return;
   }
   history_.add(told);
+  if (told.gaps !== undefined) $("gaps").textContent = told.gaps ? `${told.gaps} gaps` : "no gap";
   const wall = COLUMNS.indexOf("wall_contact"), count = told.count;
   for (let k = 0; k < count; k++) {
     const side = told.rows[k * OUTPUT_COUNT + wall];
@@ -82,7 +83,7 @@ function take(setting, again) {
   }
   const was = setupOf(state.values, before.scene);
   Object.assign(state, { setting, values });
-  state.other = null;
+  state.others = state.others.filter((other) => other === record);
   $("compared").textContent = "";
   fault("");
   const same = (name) => JSON.stringify(was[name]) === JSON.stringify(setup[name]);
@@ -123,7 +124,7 @@ function makeKnob(knob) {
   place.tabIndex = 0;
   const own = { role: "slider", "aria-label": knob.name, "aria-valuemin": 0, "aria-valuemax": 1 };
   for (const [name, value] of Object.entries(own)) place.setAttribute(name, value);
-  const [canvas, name, text] = ["canvas", "b", "span"].map((tag) => place.appendChild(document.createElement(tag)));
+  const [, name, text] = ["i", "b", "span"].map((tag) => made(place, tag));
   name.textContent = knob.name;
   const step = 1 / 1023, clamp = (x) => Math.max(0, Math.min(1, x));
   const keys = { ArrowUp: 4, ArrowRight: 4, ArrowDown: -4, ArrowLeft: -4, PageUp: 40, PageDown: -40, Home: -1e9, End: 1e9 };
@@ -149,28 +150,8 @@ function makeKnob(knob) {
   }, { passive: false });
   $("knobs").append(place);
   knob.show = () => {
-    const at = knob.at(state.values), { ink, width, height } = inked(canvas), colour = colours();
-    const angle = (x) => (0.75 + 1.5 * x) * Math.PI, r = width / 2 - 6;
-    const arc = (from_, to, what) => {
-      ink.strokeStyle = colour(what);
-      ink.lineWidth = 4;
-      ink.beginPath();
-      ink.arc(width / 2, height / 2, r, angle(from_), angle(to));
-      ink.stroke();
-    };
-    arc(0, 1, "fill");
-    arc(0, at, "a");
-    ink.fillStyle = colour("fill");
-    ink.beginPath();
-    ink.arc(width / 2, height / 2, r - 7, 0, 2 * Math.PI);
-    ink.fill();
-    ink.strokeStyle = colour("ink");
-    ink.lineWidth = 2.5;
-    ink.beginPath();
-    const [x, y] = [Math.cos(angle(at)), Math.sin(angle(at))];
-    ink.moveTo(width / 2 + 0.35 * r * x, height / 2 + 0.35 * r * y);
-    ink.lineTo(width / 2 + (r - 9) * x, height / 2 + (r - 9) * y);
-    ink.stroke();
+    const at = knob.at(state.values);
+    place.style.setProperty("--at", at);
     text.textContent = knob.text(state.values);
     place.setAttribute("aria-valuenow", at.toFixed(4));
     place.setAttribute("aria-valuetext", knob.text(state.values));
@@ -190,13 +171,11 @@ function show() {
 const TOLD_OF = [["v", "mean velocity of the part"], ["stick", "sticks"], ["hits", "impacts a period"], ["heat", "heat of a coil"],
   ["slip", "part slips beyond"], ["peak", "surface reached, mean of 4 ms"]];
 for (const [id, name] of TOLD_OF) {
-  const card = document.createElement("div"), dd = document.createElement("dd");
+  const card = made($("told"), "div"), dd = (made(card, "dt", name), made(card, "dd"));
   card.className = "card";
-  card.appendChild(document.createElement("dt")).textContent = name;
   dd.id = `told-${id}`;
-  dd.append(document.createElement("span"), document.createElement("small"));
-  card.append(dd);
-  $("told").append(card);
+  made(dd, "span");
+  made(dd, "small");
 }
 
 function tell(id, text, small) {
@@ -233,7 +212,7 @@ function tellAll() {
     $("told-heat").style.color = found.heat > DATA.heat ? "var(--warn)" : "";
   } else for (const [id] of TOLD_OF.slice(0, 4)) tell(id, "…", "from whole periods");
   let least = Infinity, most = -Infinity;
-  const mean = curves._value("mean", 1), from = Math.max(history_.first, history_.last - RATE, history_.turned + 1);
+  const mean = curves.value("mean", 1), from = Math.max(history_.first, history_.last - RATE, history_.turned + 1);
   for (let row = from; row <= history_.last; row += 8) {
     const a = mean(row);
     if (a < least) least = a;
@@ -248,39 +227,35 @@ function slipsBy(least, most, budget) {
   return ways.length ? `a part going ${ways.join(" or ")} slips` : "by this no part slips";
 }
 
-// --- a run of the server, beside --------------------------------------------------------------------
+// --- laid over: a run of the server, a trial's record --------------------------------------------------
 
-class Other {
-  constructor(answer) {
-    Object.assign(this, answer);
-  }
+const NAMED = { coil_current: "current" };
+const record = DATA.record && new Overlay({ ...DATA.record, begin: 0 }, [2, 3],
+  { ...NAMED, mean: "a_surface", a_surface: "", origin: true });
 
-  /* Phase in periods of the window, and value. */
-  line(name, factor, onSurface) {
-    const names = { coil_current: "current" }, values = this.waveforms[names[name] ?? name];
-    if (!values) return null;
-    const periods = Number($("window").value), z = this.waveforms, begin = values.length - Math.min(values.length, Math.round(periods / this.frequency / this.step));
-    const base = name === "z_part" ? z.z_part[begin] - z.z_surface[begin] : 0;
-    return values.slice(begin).map((v, k) => {
-      const phase = (this.begin + (begin + k) * this.step) * this.frequency / periods;
-      const on = name === "z_part" && onSurface ? z.z_surface[begin + k] : 0;
-      return [(phase - Math.floor(phase)) * periods, factor * (v - base - on)];
-    });
+/* How far the page's newest period is from what is laid over it, in words. */
+function apart(name, other, theirs) {
+  const own = state.found, there = 1e3 * theirs, here = own ? 1e3 * own.velocity : NaN, words = [];
+  if (theirs !== null) words.push(`${signed(there, 2)} mm/s, here ${signed(here, 2)}, difference ${signed(here - there, 2)}`);
+  for (const [which, factor, digits, unit] of [["coil_current", 1, 3, "A"], ["v_surface", 1e3, 1, "mm/s"]]) {
+    const off = other.off(which, history_)?.map((v) => (factor * v).toFixed(digits));
+    if (off) words.push(`${which === "coil_current" ? "current" : "surface"} off by ${off[0]} of ${off[1]} ${unit} rms`);
   }
+  return `${name}: ${words.join("; ")}`;
 }
 
 async function compare() {
-  const own = state.found, setting = state.setting;
+  const setting = state.setting, model = $("model").value;
   $("compare").disabled = true;
   $("compared").textContent = "ngspice runs …";
   try {
-    const answer = await fetch("run", { method: "POST", headers: { "Content-Type": "text/plain" }, body: linkOf(setting) });
+    const answer = await fetch(`run/${model}`, { method: "POST", headers: { "Content-Type": "text/plain" }, body: linkOf(setting) });
     const told = await answer.json();
     if (!answer.ok) throw new Error(told.error);
     if (setting !== state.setting) throw new Error("The setting has been turned meanwhile.");
-    state.other = new Other(told);
-    const there = 1e3 * told.v_average, here = own ? 1e3 * own.velocity : NaN;
-    $("compared").textContent = `amplifier (dashed): ${signed(there, 2)} mm/s, here ${signed(here, 2)}, difference ${signed(here - there, 2)}`;
+    const other = new Overlay(told, [5, 4], NAMED);
+    state.others = [...state.others.filter((one) => one === record), other];
+    $("compared").textContent = apart(`${model} (dashed)`, other, told.v_average);
   } catch (error) {
     $("compared").textContent = error.message;
   } finally {
@@ -288,10 +263,22 @@ async function compare() {
   }
 }
 
+function layRecord() {
+  const on = !state.others.includes(record), v = record.values("v_part")?.filter((x) => x !== null) ?? [];
+  $("record").setAttribute("aria-pressed", String(on));
+  state.others = state.others.filter((one) => one !== record);
+  if (!on) return;
+  record.frequency = state.values["drive.frequency"];
+  record.fit(history_);
+  state.others.push(record);
+  const mean = v.length ? v.reduce((a, b) => a + b) / v.length : null;
+  $("compared").textContent = apart(`${record.name} (dotted)`, record, mean);
+}
+
 // --- begin ------------------------------------------------------------------------------------------
 
 function options(select, names) {
-  for (const name of names) select.appendChild(document.createElement("option")).textContent = name;
+  for (const name of names) made(select, "option", name);
 }
 
 function opened() {
@@ -347,8 +334,11 @@ $("copy").onclick = async () => {
     $("compared").textContent = `cosim run '${link}'`;
   }
 };
-$("compare").hidden = !SERVED;
+$("asking").hidden = !DATA.models.length;
+options($("model"), DATA.models);
 $("compare").onclick = compare;
+$("record").hidden = !record;
+$("record").onclick = layRecord;
 addEventListener("hashchange", () => take(opened(), true));
 addEventListener("resize", show);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
@@ -366,7 +356,7 @@ function frame(time) {
     const slow = state.speed < 1;
     drawMachine($("picture"), history_.now(), state.values, lit);
     if (time - told > 45) {
-      curves.draw(history_, Number($("window").value), { slow, onSurface: $("heights").value === "slip", other: state.other, budget: slipBudget(state.values) });
+      curves.draw(history_, Number($("window").value), { slow, onSurface: $("heights").value === "slip", others: state.others, budget: slipBudget(state.values) });
       if (time - (state.toldAt ?? 0) > 200) {
         tellAll();
         state.toldAt = time;

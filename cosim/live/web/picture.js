@@ -2,24 +2,6 @@
 /* The machine to scale: the widths are made up, the heights and ways are one scale, which the legend
    tells. Masses stand for themselves by their labels. */
 
-const colours = () => {
-  const style = getComputedStyle(document.documentElement);
-  return (name) => style.getPropertyValue(`--${name}`).trim();
-};
-
-/* A canvas's context in CSS pixels, sharp on any screen. */
-function inked(canvas) {
-  const ratio = devicePixelRatio || 1, { clientWidth: width, clientHeight: height } = canvas;
-  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-  }
-  const ink = canvas.getContext("2d");
-  ink.setTransform(ratio, 0, 0, ratio, 0, 0);
-  ink.clearRect(0, 0, width, height);
-  return { ink, width, height };
-}
-
 function spring(ink, x, top, bottom, coils, half) {
   ink.beginPath();
   ink.moveTo(x, top);
@@ -27,6 +9,14 @@ function spring(ink, x, top, bottom, coils, half) {
   for (let k = 0; k < 2 * coils; k++) ink.lineTo(x + (k % 2 ? half : -half), top + (k + 0.5) * step);
   ink.lineTo(x, bottom);
   ink.stroke();
+}
+
+function box(ink, x, y, wide, high, fill, line) {
+  ink.fillStyle = fill;
+  ink.fillRect(x, y, wide, high);
+  if (!line) return;
+  ink.strokeStyle = line;
+  ink.strokeRect(x, y, wide, high);
 }
 
 /* A force as an arrow from (x, y), up for positive ones; `scale` in pixels a newton. */
@@ -58,21 +48,18 @@ function drawMachine(canvas, now, values, lit) {
   const rest = restOf(values);
   const zs = now.z_surface - rest, zr = now.z_ram - rest;
   const wide = Math.min(width, 400), left = (width - wide) / 2;
-  const box = { x: left + wide * 0.2, w: wide * 0.28 }, plate = { x: left + wide * 0.5, w: 12 };
+  const house = { x: left + wide * 0.2, w: wide * 0.28 }, plate = { x: left + wide * 0.5, w: 12 };
   ink.font = "12px system-ui, sans-serif";
   ink.textBaseline = "middle";
 
   // Ground with the flexures.
-  ink.strokeStyle = colour("steel");
-  ink.fillStyle = colour("fill");
   const ground = left + 6;
-  ink.fillRect(ground, 24, 10, height - 60);
-  ink.strokeRect(ground, 24, 10, height - 60);
+  box(ink, ground, 24, 10, height - 60, colour("fill"), colour("steel"));
   for (const z of [0.55 * housing, -0.55 * housing]) {
     ink.lineWidth = 2;
     ink.beginPath();
     ink.moveTo(ground + 10, y(z));
-    ink.bezierCurveTo(ground + 30, y(z), box.x - 22, y(z + zs), box.x, y(z + zs));
+    ink.bezierCurveTo(ground + 30, y(z), house.x - 22, y(z + zs), house.x, y(z + zs));
     ink.stroke();
   }
   ink.lineWidth = 1;
@@ -80,30 +67,21 @@ function drawMachine(canvas, now, values, lit) {
   // The surface: the actuator's body, hollow, with its end walls, and the platform.
   const top = y(zs + housing), bottom = y(zs - housing), thick = wall * scale;
   const hit = performance.now() - lit.time < 90 ? lit.side : 0;
-  ink.fillStyle = colour("body");
-  ink.strokeStyle = colour("ink");
-  ink.fillRect(box.x, top, 8, bottom - top);
-  ink.fillRect(box.x + box.w - 8, top, 8, bottom - top);
-  ink.fillStyle = hit > 0 ? colour("warn") : colour("body");
-  ink.fillRect(box.x, top, box.w, thick);
-  ink.fillStyle = hit < 0 ? colour("warn") : colour("body");
-  ink.fillRect(box.x, bottom - thick, box.w, thick);
-  ink.strokeRect(box.x, top, box.w, bottom - top);
-  ink.strokeRect(box.x + 8, top + thick, box.w - 16, bottom - top - 2 * thick);
-  ink.fillStyle = colour("body");
-  ink.fillRect(box.x + box.w, y(zs) - 7, plate.x - box.x - box.w, 14);
-  ink.fillRect(plate.x, y(zs) - 62, plate.w, 124);
-  ink.strokeRect(plate.x, y(zs) - 62, plate.w, 124);
+  const body = colour("body"), line = colour("ink"), wallOf = (side) => (hit === side ? colour("warn") : body);
+  box(ink, house.x, top, house.w, bottom - top, body, line);
+  box(ink, house.x, top, house.w, thick, wallOf(1));
+  box(ink, house.x, bottom - thick, house.w, thick, wallOf(-1));
+  ink.strokeRect(house.x, top, house.w, bottom - top);
+  box(ink, house.x + 8, top + thick, house.w - 16, bottom - top - 2 * thick, colour("card"), line);
+  box(ink, house.x + house.w, y(zs) - 7, plate.x - house.x - house.w, 14, body);
+  box(ink, plate.x, y(zs) - 62, plate.w, 124, body, line);
 
   // The ram on its suspension.
-  const ram = { x: box.x + 16, w: box.w - 32, top: y(zr + ramHalf), bottom: y(zr - ramHalf) };
+  const ram = { x: house.x + 16, w: house.w - 32, top: y(zr + ramHalf), bottom: y(zr - ramHalf) };
   ink.strokeStyle = colour("steel");
   spring(ink, ram.x + ram.w / 2, top + thick, ram.top, 3, 7);
   spring(ink, ram.x + ram.w / 2, ram.bottom, bottom - thick, 3, 7);
-  ink.fillStyle = colour("steel");
-  ink.strokeStyle = colour("ink");
-  ink.fillRect(ram.x, ram.top, ram.w, ram.bottom - ram.top);
-  ink.strokeRect(ram.x, ram.top, ram.w, ram.bottom - ram.top);
+  box(ink, ram.x, ram.top, ram.w, ram.bottom - ram.top, colour("steel"), line);
   ink.fillStyle = colour("card");
   ink.textAlign = "center";
   ink.fillText("ram", ram.x + ram.w * 0.6, (ram.top + ram.bottom) / 2);
@@ -111,9 +89,7 @@ function drawMachine(canvas, now, values, lit) {
   // The part, endless to the eye: marks that go by, and its contact with the surface.
   const part = { x: plate.x + plate.w, w: wide * 0.13 }, pitch = 2e-3 * scale;
   const sticks = now.sticking > 0.5, mark = sticks ? colour("c") : colour("b");
-  ink.fillStyle = colour("fill");
-  ink.fillRect(part.x, 24, part.w, height - 62);
-  ink.strokeStyle = colour("line");
+  box(ink, part.x, 24, part.w, height - 62, colour("fill"));
   ink.save();
   ink.beginPath();
   ink.rect(part.x, 24, part.w, height - 60);
@@ -128,17 +104,13 @@ function drawMachine(canvas, now, values, lit) {
   ink.strokeStyle = colour("soft");
   ink.stroke();
   ink.restore();
-  ink.strokeStyle = colour("ink");
+  ink.strokeStyle = line;
   ink.strokeRect(part.x, 24, part.w, height - 60);
-  ink.fillStyle = mark;
-  ink.fillRect(part.x - 2, y(zs) - 62, 4, 124);
+  box(ink, part.x - 2, y(zs) - 62, 4, 124, mark);
 
   // The springed plate that presses the part.
   const press = part.x + part.w;
-  ink.fillStyle = colour("body");
-  ink.fillRect(press, middle - 46, 8, 92);
-  ink.strokeStyle = colour("ink");
-  ink.strokeRect(press, middle - 46, 8, 92);
+  box(ink, press, middle - 46, 8, 92, body, line);
   ink.strokeStyle = colour("steel");
   ink.beginPath();
   const end = left + wide - 30;
@@ -157,7 +129,7 @@ function drawMachine(canvas, now, values, lit) {
   // Words.
   ink.textAlign = "center";
   ink.fillStyle = colour("soft");
-  ink.fillText("surface", box.x + box.w / 2 + 6, 12);
+  ink.fillText("surface", house.x + house.w / 2 + 6, 12);
   ink.fillText("part", part.x + part.w / 2, 12);
   ink.fillText("plate", press + 14, 12);
   ink.fillStyle = mark;
