@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cosim.cli.command import Command
+from cosim.cli.work import print_page
 from cosim.studies.study import OVERRIDES, Option
 
 
@@ -42,6 +43,15 @@ COMMANDS = (
             OVERRIDES,
             Option("--trial", "measurements to lay over the curves", "TRIAL.csv", Path),
             Option("--out", "write the page as one HTML file instead", "FILE.html", Path),
+        ),
+    ),
+    Command(
+        "show",
+        "write a page to look into results: curves, maps, cursors; one file, to be mailed",
+        print_page,
+        (
+            Option("results", "what run, sweep, compare or a chart wrote", "DIR|TABLE.csv", Path),
+            Option("--out", "where to write (default: show.html beside it)", "FILE.html", Path),
         ),
     ),
 )

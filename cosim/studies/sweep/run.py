@@ -16,7 +16,7 @@ from cosim.evaluate.point import Number
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
-from cosim.studies.sweep import dataset
+from cosim.studies.sweep import dataset, families
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.toolchain.versions import versions
 
@@ -40,6 +40,7 @@ def sweep(
     samples: int | None = None,
     random: bool = False,
     seed: int = 0,
+    keep: Sequence[str] = (),
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     dask: str | None = None,
@@ -57,7 +58,8 @@ def sweep(
     long as the scene's own.
 
     In the folder ``out`` it leaves ``sweep.nc`` and ``figure.png``, and takes up what an
-    interrupted sweep has left there. ``workers`` local processes (default: one for each processor),
+    interrupted sweep has left there; with ``keep``, names of waveforms, also ``families.nc``, with
+    those of every point. ``workers`` local processes (default: one for each processor),
     or the Dask cluster at the address ``dask``. ``progress`` is told the points done, how many of
     them failed, and their number.
 
@@ -71,6 +73,10 @@ def sweep(
     if random and samples is None:
         raise BadInput("--random needs --samples N.")
     design = grid(over) if samples is None else sample(over, samples, seed, random)
+    if keep and out is None:
+        raise BadInput("keep: waveforms are kept in a folder; name one as out.")
+    if keep:
+        families.check(scene, design, keep)
     if out is None:
         with TemporaryDirectory() as folder:
             return _sweep(scene, design, Path(folder), workers, dask, progress)
@@ -78,6 +84,10 @@ def sweep(
     data = _sweep(scene, design, folder, workers, dask, progress)
     from cosim.studies.sweep import figure
 
+    if keep:
+        failures = data[dataset.FAILURE].values.ravel()
+        points = [number for number, failure in enumerate(failures) if not failure]
+        families.keep(folder / families.FILE, scene, design, keep, points, workers)
     figure.draw(data, scene.name).write(folder / FIGURE)
     return data
 
