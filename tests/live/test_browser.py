@@ -12,7 +12,7 @@ import pytest
 
 import cosim
 from cosim.cli.main import main
-from cosim.live.page import fragment
+from cosim.live.page import opened
 from cosim.live.server import Server
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
@@ -49,7 +49,7 @@ def tab() -> Iterator[Any]:
 
 @pytest.fixture
 def server() -> Iterator[Server]:
-    with Server(fragment("paper-limited")) as found:
+    with Server(*opened("paper-limited")) as found:
         Thread(target=found.serve_forever, daemon=True).start()
         yield found
         found.shutdown()
@@ -105,7 +105,7 @@ def test_link_of_a_stranger(tab: Any, tmp_path: Path) -> None:
 @pytest.mark.reliability
 def test_server_answers_its_own_page_alone(server: Server) -> None:
     def asked(path: str, **headers: str) -> int:
-        data = b"#scene=optimal" if path == "/run" else None
+        data = b"#scene=optimal" if path.startswith("/run") else None
         request = Request(server.address + path, data, headers)
         try:
             return urlopen(request, timeout=30).status
@@ -115,20 +115,23 @@ def test_server_answers_its_own_page_alone(server: Server) -> None:
     assert asked("/") == 200
     assert asked("/etc/passwd") == 404
     assert asked("/", Host="example.org") == 404
-    assert asked("/run") == 404
-    assert asked("/run", Origin="http://example.org") == 404
-    assert asked("/run", Origin=server.address) == 400
+    assert asked("/run/full") == 404
+    assert asked("/run/full", Origin="http://example.org") == 404
+    assert asked("/run/other", Origin=server.address) == 404
+    assert asked("/run/full", Origin=server.address) == 400
 
 
 def test_comparison_with_ngspice(tab: Any, server: Server) -> None:
     tab.goto(f"{server.address}/#scene=paper-limited&drive.amplitude=6")
     tab.wait_for_function(RUNS)
     tab.click("#compare")
-    tab.wait_for_function("() => state.other", timeout=120_000)
-    there, here = tab.evaluate("() => [1e3 * state.other.v_average, 1e3 * state.found.velocity]")
+    tab.wait_for_function("() => state.others.length", timeout=120_000)
+    there, here = tab.evaluate(
+        "() => [1e3 * state.others[0].v_average, 1e3 * state.found.velocity]"
+    )
     assert there == pytest.approx(here, abs=0.3)
     assert "difference" in tab.inner_text("#compared") and not tab.faults
     assert {url.partition("#")[0] for url in tab.asked if url.startswith("http")} == {
         f"{server.address}/",
-        f"{server.address}/run",
+        f"{server.address}/run/amplifier",
     }
