@@ -29,7 +29,6 @@ class Player {
     this.running = false;
     this.generation = generation;
     if (binary) this.exports = started(new WebAssembly.Module(binary));
-    this.machine?.free();
     this.machine = null;
     this.machine = new Machine(this.exports, references, setup, 400);
     this.position = 0;
@@ -60,11 +59,8 @@ class Player {
 
   send() {
     if (!this.count) return;
-    const { rows, count, machine } = this;
-    const origin = machine.command.origin, frequency = machine.command.frequency;
-    this.post({ kind: "rows", rows, count, last: machine.row, marks: machine.marks, origin, frequency,
-      generation: this.generation, gaps: this.gaps }, [rows.buffer]);
-    machine.marks = [];
+    const { rows, count, machine, generation, gaps } = this, { row: last, origin, frequency } = machine;
+    this.post({ kind: "rows", rows, count, last, origin, frequency, marks: machine.marks(), generation, gaps }, [rows.buffer]);
     this.fresh();
   }
 
