@@ -5,10 +5,10 @@ What all studies of many runs stand on. A point that crashes or hangs costs only
 
 import itertools
 from collections import deque
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from cosim.errors import BadInput
 from cosim.evaluate.many import each
@@ -24,6 +24,8 @@ TOGETHER = 64
 """Points that are solved side by side, at most: some lanes full of runs of like duration."""
 
 _Task = list[tuple[int, Settings]]
+_Given = TypeVar("_Given")
+_Made = TypeVar("_Made")
 
 
 class Evaluator:
@@ -96,6 +98,13 @@ class Evaluator:
             while known:
                 yield known.popleft()
         yield from known
+
+    def apply(
+        self, call: Callable[[_Given, Progress], _Made], tasks: Iterable[tuple[int, _Given]]
+    ) -> Iterator[tuple[int, _Made | Exception]]:
+        """What ``call`` gives for each numbered task, or what it raises, as many at once as runs
+        are, here; of what no store holds, as waveforms."""
+        return each(call, tasks, self._workers)
 
     def forget(self) -> None:
         """The study is done: remove the file."""

@@ -10,9 +10,10 @@ import re
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from io import BytesIO
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,10 +24,12 @@ from cosim.files.atomic import whole
 from cosim.files.cells import read_cells
 from cosim.live.page import page, script_of
 from cosim.scene import load
-from cosim.studies.sweep import dataset, families
-from cosim.studies.sweep.report import table as table_of_sweep
 from cosim.waveforms import formats
-from cosim.waveforms.report import table as table_of_run
+from cosim.waveforms.report import table
+from cosim.waveforms.storage import LARGEST
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 NAME = "show.html"
 BLOCK = 1 << 15
@@ -107,7 +110,7 @@ def _run(folder: Path) -> Shown:
     scene = load(folder / "scene.toml")
     summary = _json(folder / "summary.json")
     names = list(run.waveforms)
-    shown = Shown(scene.name, scene.description, table_of_run(scene, summary), names)
+    shown = Shown(scene.name, scene.description, table(scene, summary), names)
     shown.units = [run.units[name] for name in names]
     shown.runs = [[run.waveforms[name] for name in names]]
     shown.panels = _by_unit(names, shown.units)
@@ -115,26 +118,27 @@ def _run(folder: Path) -> Shown:
 
 
 def _sweep(folder: Path) -> Shown:
-    data = dataset.read(folder / "sweep.nc")
-    swept, dims = dataset.swept(data), data[dataset.FAILURE].dims
-    if data[dataset.FAILURE].size > MOST_POINTS:
+    data = _dataset(folder / "sweep.nc")
+    whole_grid = data["failure"]
+    swept, dims = [str(n) for n in data.coords if "key" in data[n].attrs], whole_grid.dims
+    if whole_grid.size > MOST_POINTS:
         raise BadInput(f"{plain(str(folder))}: a page shows at most {MOST_POINTS} points.")
     names = [*swept, *(str(n) for n in data.coords if n not in swept and n not in dims)]
     names += [str(name) for name in data.data_vars]
-    full = data.broadcast_like(data[dataset.FAILURE])
     columns = []
     for name in names:
-        values = full[name].broadcast_like(data[dataset.FAILURE]).transpose(*dims).values.ravel()
+        values = data[name].broadcast_like(whole_grid).transpose(*dims).values.ravel()
         about = data[name].attrs
         columns.append(
             _column(name, about.get("units", ""), about.get("long_name", ""), values.tolist())
         )
     best = "v_average" if "v_average" in data else str(next(iter(data.data_vars)))
     ways = [swept[0], swept[1] if len(swept) > 1 else best, best]
-    shown = Shown(str(data.attrs["title"]), words=table_of_sweep(data))
+    failed = int((whole_grid != "").sum())
+    shown = Shown(str(data.attrs["title"]), f"{whole_grid.size} points, {failed} failed")
     shown.cloud = {"columns": columns, "keys": swept[2:] if len(dims) > 1 else [], "ways": ways}
-    if (folder / families.FILE).exists():
-        kept = dataset.read(folder / families.FILE)
+    if (folder / "families.nc").exists():
+        kept = _dataset(folder / "families.nc")
         shown.names = ["time", *(str(n) for n in kept.data_vars if n not in ("time", "frequency"))]
         shown.units = [str(kept[name].attrs["units"]) for name in shown.names]
         counts = np.isfinite(kept.time.values).sum(axis=1)
@@ -145,6 +149,15 @@ def _sweep(folder: Path) -> Shown:
         shown.panels = {name: [name] for name in shown.names[1:]}
         shown.cloud["family"] = kept.point.values.tolist()
     return shown
+
+
+def _dataset(path: Path) -> "xr.Dataset":
+    import xarray as xr
+
+    try:
+        return xr.load_dataset(BytesIO(reader.read(path, LARGEST)), engine="scipy")
+    except (ValueError, TypeError, IndexError, KeyError, OSError) as error:
+        raise BadInput(f"{plain(str(path))}: this is not a whole netCDF ({error}).") from None
 
 
 def _comparison(folder: Path) -> Shown:

@@ -8,8 +8,7 @@ import xarray as xr
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
-from cosim.evaluate.evaluator import workers_asked
-from cosim.evaluate.many import each
+from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import periods_made_whole
 from cosim.files.atomic import whole
 from cosim.scene import Scene, changed
@@ -44,7 +43,7 @@ def keep(
     design: Design,
     names: Sequence[str],
     points: Sequence[int],
-    workers: int | None,
+    bench: Evaluator,
 ) -> None:
     """Run ``points`` of a sweep once more, and keep the waveforms ``names`` from ``run.settle`` on:
     a netCDF with the dimensions ``point``, the point's number, and ``row``, with NaN at the end of
@@ -64,7 +63,7 @@ def keep(
         return 1.0 / of.period, columns, [result.units[name] for name in ("time", *names)]
 
     found: dict[int, tuple[float, list[Array], list[str]]] = {}
-    for number, one in each(kept_of, ((n, n) for n in points), workers_asked(workers)):
+    for number, one in bench.apply(kept_of, ((n, n) for n in points)):
         if isinstance(one, Exception):
             raise one
         found[number] = one

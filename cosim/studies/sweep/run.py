@@ -79,15 +79,11 @@ def sweep(
         families.check(scene, design, keep)
     if out is None:
         with TemporaryDirectory() as folder:
-            return _sweep(scene, design, Path(folder), workers, dask, progress)
+            return _sweep(scene, design, Path(folder), (), workers, dask, progress)
     folder = Path(out)
-    data = _sweep(scene, design, folder, workers, dask, progress)
+    data = _sweep(scene, design, folder, keep, workers, dask, progress)
     from cosim.studies.sweep import figure
 
-    if keep:
-        failures = data[dataset.FAILURE].values.ravel()
-        points = [number for number, failure in enumerate(failures) if not failure]
-        families.keep(folder / families.FILE, scene, design, keep, points, workers)
     figure.draw(data, scene.name).write(folder / FIGURE)
     return data
 
@@ -96,6 +92,7 @@ def _sweep(
     scene: Scene,
     design: Design,
     folder: Path,
+    keep: Sequence[str],
     workers: int | None,
     dask: str | None,
     progress: Callable[[int, int, int], None],
@@ -137,7 +134,11 @@ def _sweep(
         if scene.run.solver == "fast":
             for number, outcome in bench.run(_judged(design, numbers)):
                 numbers.judge(number, outcome)
-        return refreshed()
+        data = refreshed()
+        if keep:
+            points = [n for n in range(total) if not numbers.failures[n]]
+            families.keep(folder / families.FILE, scene, design, keep, points, bench)
+        return data
 
 
 def _judged(design: Design, numbers: dataset.Numbers) -> Iterator[tuple[int, Settings]]:
