@@ -18,7 +18,7 @@ _WEB = Path(__file__).with_name("web")
 _CORE = ("machine.js", "hosts.js")
 _SCRIPTS = ("machine.js", "settings.js", "plot.js", "picture.js", "curves.js", "page.js")
 
-CIRCUITS: dict[str, dict[str, str]] = {
+CIRCUITS: dict[str, dict[str, Any]] = {
     model: {"circuit.model": model} for model in ("amplifier", "full")
 }
 """What the server runs with ngspice, by the page's names, as values of a scene's keys."""
@@ -39,7 +39,7 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
     if found.circuit.netlist and not found.has_ports:
         path = str(Path(found.circuit.netlist).absolute())
         circuits["own"] = {"circuit.model": "file", "circuit.netlist": path}
-        found = changed(found, {"circuit.model": rigs.MODEL, "circuit.netlist": None}, "cosim live")
+        found = changed(found, CIRCUITS["amplifier"] | {"circuit.netlist": None}, "cosim live")
     return fragment(found), circuits
 
 

@@ -1,19 +1,16 @@
 """The page of `cosim show`: what a folder of results holds, as one HTML file to look into and mail.
 
 A file begins with the page, its script and, of long runs, lowest and highest values of each
-``BUCKET`` rows; so it is there before the rows, which follow in blocks that are read when one looks
-closely.
+``BUCKET`` rows; so it is there before the rows, which follow in blocks.
 """
 
 import json
 import re
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from io import BytesIO
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,271 +23,162 @@ from cosim.live.page import page, script_of
 from cosim.scene import load
 from cosim.waveforms import formats
 from cosim.waveforms.report import table
-from cosim.waveforms.storage import LARGEST
+from cosim.waveforms.storage import LARGEST, read_netcdf
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-NAME = "show.html"
 BLOCK = 1 << 15
 BUCKET = 256
 """Rows."""
 
 MOST_POINTS = 100_000
-_PICTURE = 20_000_000  # bytes
-_PER_PANEL = 4
-_GROUPS = {
-    "V": "voltage",
-    "A": "current",
-    "m": "height",
-    "m/s": "velocity",
-    "m/s2": "acceleration",
-    "N": "force",
-    "1": "state",
-}
 _HEAD = re.compile(r"(.+) \[(.+)\]")
 
-
-@dataclass
-class Shown:
-    """What a page shows: rows of one run or of several, a table as a cloud of points, words."""
-
-    title: str
-    about: str = ""
-    words: str = ""
-    names: Sequence[str] = ()
-    """Of the columns of each of the ``runs``; the first is what they go over."""
-    units: Sequence[str] = ()
-    runs: Sequence[Sequence[Array]] = ()
-    frequencies: Sequence[float] = ()
-    """Of the drives of a family, Hz."""
-    panels: dict[str, list[str]] = field(default_factory=dict)
-    cloud: dict[str, Any] | None = None
-    pictures: dict[str, str] = field(default_factory=dict)
+Run = list[Array]
+"""Columns; the first is what they go over."""
 
 
 def show(results: Path, out: Path | None = None) -> Path:
     """Write the page of a folder that run, sweep, compare or a chart wrote, or of a chart's table,
     to ``out``, by default beside them. Raises BadInput."""
-    path = out or (results if results.is_dir() else results.parent) / NAME
-    shown = _read(results)
-    code = script_of({"SHOWN": _as_json(shown)}, ("plot.js", "show.js"))
+    path = out or (results if results.is_dir() else results.parent) / "show.html"
+    shown, runs = _read(results)
+    given = {"title": results.name, "about": "", "words": "", "pictures": {}, "cloud": None}
+    given |= {"signals": None, "block": BLOCK, "bucket": BUCKET} | shown
+    code = script_of({"SHOWN": given}, ("plot.js", "show.js"))
     with whole(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         file.write(page("show.html", code, "'none'"))
-        for number, run in enumerate(shown.runs):
+        for number, run in enumerate(runs):
             for column, values in enumerate(run):
-                if column == 0 and _step(values):
-                    continue
                 for k, start in enumerate(range(0, len(values), BLOCK)):
-                    content = _coded(values[start : start + BLOCK])
                     head = f'<script type="text/plain" id="r{number}-{column}-{k}">'
-                    file.write(f"{head}{content}</script>\n")
+                    file.write(f"{head}{_coded(values[start : start + BLOCK])}</script>\n")
         file.write("</body>\n</html>\n")
     return path
 
 
-def _read(results: Path) -> Shown:
+def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
+    """What the page's script takes, and the rows behind it."""
     if (results / "waveforms.nc").exists():
-        return _run(results)
+        found, scene = formats.read(results), load(results / "scene.toml")
+        told = {"title": scene.name, "about": scene.description}
+        told["words"] = table(scene, _json(results / "summary.json"))
+        runs = [[*found.waveforms.values()]]
+        return told | {"signals": _signals(found.units, runs)}, runs
     if (results / "sweep.nc").exists():
         return _sweep(results)
     if (results / "frames.csv").exists():
-        return _comparison(results)
+        told = _json(results / "compare.json")
+        cells = read_cells(results / "frames.csv")
+        units = _heads(cells.rows[0][1])
+        runs = [[cells.numbers(1, k, name, {"nan", ""}) for k, name in enumerate(units)]]
+        words = "\n".join(f"{name}: {value}" for name, value in told.items())
+        title = f"{told['run']} against {told['trial']}"
+        return {"title": title, "words": words, "signals": _signals(units, runs)}, runs
     tables = sorted(results.glob("*.csv")) if results.is_dir() else [results]
     if len(tables) != 1:
-        which = f"one of {', '.join(path.name for path in tables)}" if tables else "another folder"
-        raise BadInput(
-            f"{plain(str(results))}: this holds no run, sweep or comparison; name {which}."
-        )
-    return _chart(tables[0])
+        names = ", ".join(path.name for path in tables) or "no table"
+        raise BadInput(f"{plain(str(results))}: no run, sweep or comparison; name one of: {names}.")
+    return _chart(tables[0]), []
 
 
-def _run(folder: Path) -> Shown:
-    run = formats.read(folder)
-    scene = load(folder / "scene.toml")
-    summary = _json(folder / "summary.json")
-    names = list(run.waveforms)
-    shown = Shown(scene.name, scene.description, table(scene, summary), names)
-    shown.units = [run.units[name] for name in names]
-    shown.runs = [[run.waveforms[name] for name in names]]
-    shown.panels = _by_unit(names, shown.units)
-    return shown
-
-
-def _sweep(folder: Path) -> Shown:
-    data = _dataset(folder / "sweep.nc")
-    whole_grid = data["failure"]
-    swept, dims = [str(n) for n in data.coords if "key" in data[n].attrs], whole_grid.dims
-    if whole_grid.size > MOST_POINTS:
-        raise BadInput(f"{plain(str(folder))}: a page shows at most {MOST_POINTS} points.")
-    names = [*swept, *(str(n) for n in data.coords if n not in swept and n not in dims)]
-    names += [str(name) for name in data.data_vars]
-    columns = []
-    for name in names:
-        values = data[name].broadcast_like(whole_grid).transpose(*dims).values.ravel()
-        about = data[name].attrs
-        columns.append(
-            _column(name, about.get("units", ""), about.get("long_name", ""), values.tolist())
-        )
-    best = "v_average" if "v_average" in data else str(next(iter(data.data_vars)))
-    ways = [swept[0], swept[1] if len(swept) > 1 else best, best]
-    failed = int((whole_grid != "").sum())
-    shown = Shown(str(data.attrs["title"]), f"{whole_grid.size} points, {failed} failed")
-    shown.cloud = {"columns": columns, "keys": swept[2:] if len(dims) > 1 else [], "ways": ways}
-    if (folder / "families.nc").exists():
-        kept = _dataset(folder / "families.nc")
-        shown.names = ["time", *(str(n) for n in kept.data_vars if n not in ("time", "frequency"))]
-        shown.units = [str(kept[name].attrs["units"]) for name in shown.names]
-        counts = np.isfinite(kept.time.values).sum(axis=1)
-        shown.runs = [
-            [kept[name].values[k, :count] for name in shown.names] for k, count in enumerate(counts)
-        ]
-        shown.frequencies = kept.frequency.values.tolist()
-        shown.panels = {name: [name] for name in shown.names[1:]}
-        shown.cloud["family"] = kept.point.values.tolist()
-    return shown
-
-
-def _dataset(path: Path) -> "xr.Dataset":
+def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
     import xarray as xr
 
-    try:
-        return xr.load_dataset(BytesIO(reader.read(path, LARGEST)), engine="scipy")
-    except (ValueError, TypeError, IndexError, KeyError, OSError) as error:
-        raise BadInput(f"{plain(str(path))}: this is not a whole netCDF ({error}).") from None
-
-
-def _comparison(folder: Path) -> Shown:
-    cells = read_cells(folder / "frames.csv")
-    names, units = _heads(cells.rows[0][1])
-    columns = [cells.numbers(1, k, name, {"nan", ""}) for k, name in enumerate(names)]
-    told = _json(folder / "compare.json")
-    shown = Shown(f"{told['run']} against {told['trial']}", names=names, units=units)
-    shown.runs = [columns]
-    shown.words = "\n".join(f"{name}: {value}" for name, value in told.items())
-    for name in names[1:]:
-        shown.panels.setdefault(name.rpartition("_")[0], []).append(name)
-    return shown
-
-
-def _chart(path: Path) -> Shown:
-    cells = read_cells(path)
-    names, units = _heads(cells.rows[0][1])
+    path = folder / "sweep.nc"
+    data = xr.load_dataset(BytesIO(reader.read(path, LARGEST)), engine="scipy")
+    grid = data["failure"]
+    swept = [str(name) for name in data.coords if "key" in data[name].attrs]
+    if grid.size > MOST_POINTS:
+        raise BadInput(f"{plain(str(path))}: a page shows at most {MOST_POINTS} points.")
     columns = []
-    for k, (name, unit) in enumerate(zip(names, units, strict=True)):
-        texts = [row[k] if k < len(row) else "" for _, row in cells.rows[1:]]
-        columns.append(_column(name, unit, "", _numbers(texts)))
-    numeric = [column["name"] for column in columns if column["most"] is not None]
-    if not numeric:
+    for name in [*swept, *sorted({*data.coords} - {*swept, *grid.dims}), *data.data_vars]:
+        values = data[name].broadcast_like(grid).transpose(*grid.dims).values.ravel()
+        about = data[name].attrs
+        columns.append(_column(str(name), about.get("units", ""), values.tolist(), about))
+    best = "v_average" if "v_average" in data else columns[len(swept)]["name"]
+    ways = [swept[0], swept[1] if len(swept) > 1 else best, best]
+    cloud = {"columns": columns, "keys": swept[2:] if grid.ndim > 1 else [], "ways": ways}
+    shown = {"title": data.attrs["title"], "cloud": cloud | {"count": grid.size, "family": None}}
+    points = sorted(int(kept.stem) for kept in (folder / "points").glob("*.nc"))
+    if not points:
+        return shown, []
+    kept = [read_netcdf(folder / "points" / f"{number}.nc") for number in points]
+    runs = [[*columns.values()] for columns, _, _ in kept]
+    shown["signals"] = _signals(kept[0][1], runs)
+    for run, (_, _, about) in zip(shown["signals"]["runs"], kept, strict=True):
+        run["frequency"] = float(about["frequency"])
+    shown["cloud"]["family"] = points
+    return shown, runs
+
+
+def _chart(path: Path) -> dict[str, Any]:
+    cells = read_cells(path)
+    columns = []
+    for k, (name, unit) in enumerate(_heads(cells.rows[0][1]).items()):
+        values = [row[k] if k < len(row) else "" for _, row in cells.rows[1:]]
+        try:
+            columns.append(_column(name, unit, [float(v) if v else None for v in values]))
+        except ValueError:
+            columns.append(_column(name, unit, values))
+    ways = [column["name"] for column in columns if column["most"] is not None]
+    if not ways:
         raise BadInput(f"{plain(str(path))}: this table has no column of numbers.")
-    ways = [numeric[min(k, len(numeric) - 1)] for k in range(3)]
-    shown = Shown(path.stem, cloud={"columns": columns, "keys": [], "ways": ways})
-    page_of = path.with_suffix(".md")
-    if page_of.exists():
-        shown.words = reader.read(page_of, _PICTURE).decode("utf-8", "replace")
-    for picture in sorted(path.parent.glob("*.png")):
-        if picture.stem == path.stem or picture.stem.startswith(f"{path.stem}-"):
-            content = b64encode(reader.read(picture, _PICTURE)).decode()
-            shown.pictures[picture.name] = content
-    return shown
+    cloud = {"columns": columns, "keys": [], "ways": (ways * 3)[:3], "family": None}
+    pictures = [p for p in path.parent.glob("*.png") if (p.stem + "-").startswith(path.stem + "-")]
+    return {
+        "title": path.stem,
+        "cloud": cloud | {"count": len(cells.rows) - 1},
+        "pictures": {p.name: b64encode(reader.read(p, LARGEST)).decode() for p in sorted(pictures)},
+    }
 
 
 def _json(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads(reader.read(path, _PICTURE))
-    except ValueError:
-        found = None
-    if not isinstance(found, dict):
-        raise BadInput(f"{plain(str(path))}: this is no whole JSON file.")
-    return found
+        return dict(json.loads(reader.read(path, LARGEST)))
+    except (ValueError, TypeError):
+        raise BadInput(f"{plain(str(path))}: this is no whole JSON file.") from None
 
 
-def _heads(cells: Iterable[str]) -> tuple[list[str], list[str]]:
+def _heads(cells: list[str]) -> dict[str, str]:
     """Names and units of a header."""
-    found = [_HEAD.fullmatch(cell) for cell in cells]
-    pairs = [
-        (match[1], match[2]) if match else (cell, "")
-        for match, cell in zip(found, cells, strict=True)
-    ]
-    return [name for name, _ in pairs], [unit for _, unit in pairs]
+    found = {cell: _HEAD.fullmatch(cell) for cell in cells}
+    return dict((match[1], match[2]) if match else (cell, "") for cell, match in found.items())
 
 
-def _numbers(texts: list[str]) -> list[Any]:
-    """Numbers where all that is there is one."""
-    try:
-        return [float(text) if text else None for text in texts]
-    except ValueError:
-        return list(texts)
-
-
-def _column(name: str, unit: str, text: str, values: list[Any]) -> dict[str, Any]:
+def _column(
+    name: str, unit: str, values: list[Any], about: dict[str, Any] | None = None
+) -> dict[str, Any]:
     """A column of a cloud; ``most`` is None where it has words."""
-    numbers = [abs(v) for v in values if isinstance(v, int | float) and isfinite(v)]
-    words = any(isinstance(v, str) for v in values)
-    values = [v if isinstance(v, str) or (v is not None and isfinite(v)) else None for v in values]
-    most = None if words or not numbers else max(numbers)
-    return {"name": name, "unit": unit, "text": text, "values": values, "most": most}
+    kept = [v if isinstance(v, str) or (v is not None and isfinite(v)) else None for v in values]
+    known = [v for v in kept if v is not None]
+    words = not known or any(isinstance(v, str) for v in known)
+    text = (about or {}).get("long_name", "")
+    most = None if words else max(map(abs, known))
+    return {"name": name, "unit": unit, "text": text, "values": kept, "most": most}
 
 
-def _by_unit(names: Sequence[str], units: Sequence[str]) -> dict[str, list[str]]:
-    """Panels of the columns but the first; a few of one unit in each."""
-    found: dict[str, list[str]] = {}
-    for name, unit in [*zip(names, units, strict=True)][1:]:
-        group, count = _GROUPS.get(unit, unit), 1
-        while len(found.get(group, ())) == _PER_PANEL:
-            count += 1
-            group = f"{_GROUPS.get(unit, unit)} {count}"
-        found.setdefault(group, []).append(name)
-    return found
+def _signals(units: dict[str, str], runs: list[Run]) -> dict[str, Any]:
+    """Of the runs' columns, by name, what is there before the rows; a panel for each unit."""
+    (x, unit), *others = units.items()
+    panels: dict[str, list[int]] = {}
+    columns = [{"name": x, "unit": unit, "most": 0.0}]
+    for k, (name, unit) in enumerate(others, 1):
+        panels.setdefault(unit, []).append(k)
+        most = max(float(np.nanmax(np.abs(run[k]), initial=0.0)) for run in runs)
+        columns.append({"name": name, "unit": unit, "most": most})
+    heads = [_head(run) for run in runs]
+    return {"columns": columns, "panels": [*panels.values()], "runs": heads}
 
 
-def _as_json(shown: Shown) -> dict[str, Any]:
-    found: dict[str, Any] = {"block": BLOCK, "bucket": BUCKET, "signals": None, "cloud": None}
-    found |= {name: getattr(shown, name) for name in ("title", "about", "words", "pictures")}
-    if shown.cloud is not None:
-        count = len(shown.cloud["columns"][0]["values"])
-        found["cloud"] = {"family": None, "count": count} | shown.cloud
-    if shown.runs:
-        place = {name: k for k, name in enumerate(shown.names)}
-        columns = [
-            {"name": name, "unit": unit, "most": max(_most(run[k]) for run in shown.runs)}
-            for k, (name, unit) in enumerate(zip(shown.names, shown.units, strict=True))
-        ]
-        found["signals"] = {
-            "x": f"{shown.names[0]}, {shown.units[0]}",
-            "columns": columns,
-            "panels": [
-                {"name": name, "columns": [place[column] for column in group]}
-                for name, group in shown.panels.items()
-            ],
-            "runs": [_head(run) for run in shown.runs],
-        }
-        for run, frequency in zip(found["signals"]["runs"], shown.frequencies, strict=False):
-            run["frequency"] = frequency
-    return found
-
-
-def _head(run: Sequence[Array]) -> dict[str, Any]:
-    """What is there before the rows."""
-    count, step = len(run[0]), _step(run[0])
-    found: dict[str, Any] = {"count": count, "begin": float(run[0][0]), "step": step}
+def _head(run: Run) -> dict[str, Any]:
+    time, count = run[0], len(run[0])
+    step = float(time[-1] - time[0]) / max(1, count - 1)
+    even = np.abs(time - (time[0] + step * np.arange(count))) <= 1e-6 * step
+    found = {"count": count, "begin": float(time[0]), "step": step if even.all() else None}
     if count > 4 * BLOCK:
         starts = np.arange(0, count, BUCKET)
         ends = [(np.fmin.reduceat(x, starts), np.fmax.reduceat(x, starts)) for x in run]
         found["peaks"] = [_coded(np.stack(pair, axis=1)) for pair in ends]
     return found
-
-
-def _step(time: Array) -> float | None:
-    """The step of even rows; None where they are not."""
-    step = float(time[-1] - time[0]) / max(1, len(time) - 1)
-    even = np.abs(time - (time[0] + step * np.arange(len(time)))) <= 1e-6 * step
-    return step if step > 0.0 and even.all() else None
-
-
-def _most(values: Array) -> float:
-    known = np.abs(values[np.isfinite(values)])
-    return float(known.max()) if known.size else 0.0
 
 
 def _coded(values: Array) -> str:

@@ -166,15 +166,10 @@ class Curves {
 
   /* Lowest and highest of each column of pixels. */
   _shape(name, factor, columns) {
-    const low = new Float32Array(columns).fill(Infinity), high = new Float32Array(columns).fill(-Infinity);
-    const { first, last, span } = this.window, value = this.value(name, factor);
+    const { first, last, span } = this.window, value = this.value(name, factor), found = new Envelope(columns);
     const stride = Math.max(1, Math.floor(span / columns / 40));
-    for (let row = first; row <= last; row += stride) {
-      const x = Math.max(0, Math.min(columns - 1, Math.floor(this.share(row) * columns))), v = value(row);
-      if (v < low[x]) low[x] = v;
-      if (v > high[x]) high[x] = v;
-    }
-    return { low, high };
+    for (let row = first; row <= last; row += stride) found.put(Math.floor(this.share(row) * columns), value(row));
+    return found;
   }
 
   _panel(k, panel, others, budget) {

@@ -1,7 +1,6 @@
 "use strict";
 /* The page: what is turned, who plays it, what is told of it. */
 
-const $ = (id) => document.getElementById(id);
 const START = settingOf(DATA.start);
 const state = { setting: START, values: valuesOf(START), speed: 1, paused: false, generation: 0, marks: [], others: [] };
 const history_ = new History();
@@ -342,9 +341,6 @@ $("record").onclick = layRecord;
 addEventListener("hashchange", () => take(opened(), true));
 addEventListener("resize", show);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
-$("foot").textContent = "The machine's own C, as WebAssembly, with the circuit “limited” inside: the current follows the command while the output stays "
-  + "within its swing. Widths of the drawing are made up. Instants of the acceleration, currents and voltages are not validated by measurements. "
-  + "Knobs: drag, or arrow keys (shift: one code). The frequency knob turns as the device's: right is slow.";
 
 state.setting = opened();
 state.values = valuesOf(state.setting);

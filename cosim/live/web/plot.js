@@ -2,6 +2,7 @@
 /* A plot on a canvas: axes, lines, and two cursors that measure. The live page and the files of
    `cosim show` share it. */
 
+const $ = (id) => document.getElementById(id);
 const LEFT = 54, RIGHT = 8, TOP = 18;
 
 const colours = () => {
@@ -28,6 +29,14 @@ function made(place, tag, text = "") {
   return element;
 }
 
+/* A choice of words; `act` is told the number of the one taken. */
+function choice(place, name, words, act, first) {
+  const select = made(made(place, "label", name), "select");
+  for (const one of words) made(select, "option", one);
+  select.selectedIndex = Math.max(0, words.indexOf(first));
+  select.onchange = () => act(select.selectedIndex);
+}
+
 /* Round numbers from `low` to `high`, about `count`, with their words. */
 function ticks(low, high, count) {
   const rough = (high - low) / count, ten = 10 ** Math.floor(Math.log10(rough));
@@ -38,6 +47,20 @@ function ticks(low, high, count) {
     found.push([n * step, large ? (n * step).toExponential(2) : (n * step).toFixed(digits)]);
   }
   return found;
+}
+
+/* Lowest and highest value in each of `count` columns of pixels. */
+class Envelope {
+  constructor(count) {
+    this.low = new Float64Array(count).fill(Infinity);
+    this.high = new Float64Array(count).fill(-Infinity);
+  }
+
+  put(place, value) {
+    const x = Math.max(0, Math.min(this.low.length - 1, place));
+    if (value < this.low[x]) this.low[x] = value;
+    if (value > this.high[x]) this.high[x] = value;
+  }
 }
 
 class Plot {
@@ -119,7 +142,7 @@ class Plot {
     });
   }
 
-  /* Lowest and highest of each column of pixels; columns further apart than `near`, or on the two sides
+  /* An Envelope; columns further apart than `near`, or on the two sides
      of `gap`, are not joined. */
   envelope({ low, high }, colour, { near = 3, gap = -1, width = 1.4 } = {}) {
     this.within((ink) => {

@@ -58,10 +58,10 @@ def sweep(
     long as the scene's own.
 
     In the folder ``out`` it leaves ``sweep.nc`` and ``figure.png``, and takes up what an
-    interrupted sweep has left there; with ``keep``, names of waveforms, also ``families.nc``, with
-    those of every point. ``workers`` local processes (default: one for each processor),
-    or the Dask cluster at the address ``dask``. ``progress`` is told the points done, how many of
-    them failed, and their number.
+    interrupted sweep has left there; with ``keep``, names of waveforms, also those of every point,
+    as ``points/NUMBER.nc``. ``workers`` local processes (default: one for each processor), or the
+    Dask cluster at the address ``dask``. ``progress`` is told the points done, how many of them
+    failed, and their number.
 
     Raises BadInput for keys and values that cannot be, or where ``out`` holds another sweep.
 
@@ -75,8 +75,6 @@ def sweep(
     design = grid(over) if samples is None else sample(over, samples, seed, random)
     if keep and out is None:
         raise BadInput("keep: waveforms are kept in a folder; name one as out.")
-    if keep:
-        families.check(scene, design, keep)
     if out is None:
         with TemporaryDirectory() as folder:
             return _sweep(scene, design, Path(folder), (), workers, dask, progress)
@@ -137,7 +135,7 @@ def _sweep(
         data = refreshed()
         if keep:
             points = [n for n in range(total) if not numbers.failures[n]]
-            families.keep(folder / families.FILE, scene, design, keep, points, bench)
+            families.keep(folder / "points", scene, design, keep, points, bench)
         return data
 
 
