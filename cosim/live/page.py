@@ -11,7 +11,7 @@ from typing import Any
 from cosim.circuit.heat import DRIVE_RANGE_HEAT
 from cosim.errors import BadInput
 from cosim.live import rigs
-from cosim.scene import Scene, changed, load, to_link
+from cosim.scene import Scene, load, to_link
 from cosim.trials.recording import read_recording
 
 _WEB = Path(__file__).with_name("web")
@@ -37,9 +37,12 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
     own is one of them. Raises BadInput."""
     found, circuits = load(scene, list(overrides)), dict(CIRCUITS)
     if found.circuit.netlist and not found.has_ports:
-        path = str(Path(found.circuit.netlist).absolute())
-        circuits["own"] = {"circuit.model": "file", "circuit.netlist": path}
-        found = changed(found, CIRCUITS["amplifier"] | {"circuit.netlist": None}, "cosim live")
+        kept = found.table("circuit")
+        own = {key: kept.pop(key, None) for key in ("netlist", "reltol", "max_step")}
+        own["netlist"] = str(Path(own["netlist"]).absolute())
+        circuits["own"] = {"circuit.model": "file"} | {f"circuit.{k}": x for k, x in own.items()}
+        simple = type(found.circuit).model_validate(kept | {"model": "amplifier"})
+        found = found.model_copy(update={"circuit": simple})
     return fragment(found), circuits
 
 

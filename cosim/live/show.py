@@ -84,8 +84,12 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
     import xarray as xr
 
     path = folder / "sweep.nc"
-    data = xr.load_dataset(BytesIO(reader.read(path, LARGEST)), engine="scipy")
-    grid = data["failure"]
+    content = BytesIO(reader.read(path, LARGEST))
+    try:
+        data = xr.load_dataset(content, engine="scipy")
+        grid = data["failure"]
+    except Exception as error:  # there is little that scipy does not raise on a damaged file
+        raise BadInput(f"{plain(str(path))}: not a whole sweep ({plain(str(error))}).") from None
     swept = [str(name) for name in data.coords if "key" in data[name].attrs]
     if grid.size > MOST_POINTS:
         raise BadInput(f"{plain(str(path))}: a page shows at most {MOST_POINTS} points.")
