@@ -14,6 +14,7 @@ from pathlib import Path
 
 import build_c
 from cosim.files.atomic import together
+from cosim.mechanics.fmi import references
 
 HERE = build_c.ROOT / "cosim/live/web"
 TOKEN = "live"
@@ -57,6 +58,7 @@ def main() -> None:
         "sources": digest(),
         "zig": version.stdout.strip(),
         "sha256": hashlib.sha256(binary).hexdigest(),
+        "references": references(3),
     }
     with together([HERE / "machine.wasm", HERE / "machine.json"]) as (wasm, told):
         wasm.write_bytes(binary)
