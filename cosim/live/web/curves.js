@@ -61,30 +61,25 @@ class Overlay {
     return (this.begin + k * this.step) * this.frequency + this.shift;
   }
 
+  /* What is known of a waveform, each with what the page's newest period has at its phase. */
+  pairs(name, history) {
+    const own = COLUMNS.indexOf(name), row = (k) => history.inPeriod(this.phase(k));
+    return (this.values(name) ?? []).flatMap((x, k) => (x === null ? [] : [[x, history.value(row(k), own)]]));
+  }
+
   /* A record's phase is not known: the one at which the velocities agree best. */
   fit(history) {
-    const own = COLUMNS.indexOf("v_surface"), v = this.values("v_surface");
-    if (!v) return;
-    let best = -Infinity, found = 0;
-    for (let n = 0; n < 200; n++) {
+    const agree = Array.from({ length: 200 }, (_, n) => {
       this.shift = n / 200;
-      const sum = v.reduce((all, x, k) => all + (x ?? 0) * history.value(history.inPeriod(this.phase(k)), own), 0);
-      if (sum > best) [best, found] = [sum, this.shift];
-    }
-    this.shift = found;
+      return this.pairs("v_surface", history).reduce((all, [x, y]) => all + x * y, 0);
+    });
+    this.shift = agree.indexOf(Math.max(...agree)) / 200;
   }
 
   /* Root of the mean squared difference of a waveform to the newest period, and that of itself. */
   off(name, history) {
-    const values = this.values(name), own = COLUMNS.indexOf(name);
-    let square = 0, all = 0, n = 0;
-    for (const [k, x] of (values ?? []).entries()) {
-      if (x === null) continue;
-      square += (x - history.value(history.inPeriod(this.phase(k)), own)) ** 2;
-      all += x ** 2;
-      n++;
-    }
-    return n ? [Math.sqrt(square / n), Math.sqrt(all / n)] : null;
+    const pairs = this.pairs(name, history), root = (of) => Math.sqrt(pairs.reduce((all, pair) => all + of(pair) ** 2, 0) / pairs.length);
+    return pairs.length ? [root(([x, y]) => x - y), root(([x]) => x)] : null;
   }
 
   /* Points of the last periods: share of the window, and value, with heights as the page's own begin. */
@@ -160,8 +155,7 @@ class Curves {
   }
 
   _lines(panel) {
-    const only = this.onSurface && panel.unit === "mm";
-    return only ? [["part on surface", "z_part", "b", 1e3]] : panel.lines;
+    return this.onSurface && panel.unit === "mm" ? [["part on surface", "z_part", "b", 1e3]] : panel.lines;
   }
 
   /* Lowest and highest of each column of pixels. */
@@ -178,10 +172,7 @@ class Curves {
     const shapes = lines.map(([, name, , factor]) => this._shape(name, factor, columns));
     const laid = others.flatMap((other) => lines.map(([, name, of, factor]) =>
       ({ dash: other.dash, of, points: other.points(name, factor, periods, this.onSurface, this.base.z_surface) })));
-    let least = Infinity, most = -Infinity;
-    const reach = (v) => { if (v < least) least = v; if (v > most) most = v; };
-    for (const { low, high } of shapes) { low.forEach((v) => v < Infinity && reach(v)); high.forEach((v) => v > -Infinity && reach(v)); }
-    for (const { points } of laid) for (const [, v] of points) reach(v);
+    let [least, most] = extent([...shapes.flatMap(({ low, high }) => [...low, ...high]), ...laid.flatMap(({ points }) => points.map(([, v]) => v))]);
     if (!(most >= least)) [least, most] = [-1, 1];
     if (most - least < panel.least) [least, most] = [(least + most - panel.least) / 2, (least + most + panel.least) / 2];
     // The limits follow at once outwards, slowly inwards, so that a curve does not pump.
@@ -202,10 +193,8 @@ class Curves {
   _slips(plot, budget) {
     for (const [way, ends] of Object.entries(budget)) for (const end of ends) {
       plot.line([[0, end], [1, end]], "c", { dash: [2, 4], width: 1 });
-      plot.within((ink) => {
-        Object.assign(ink, { fillStyle: plot.colour("c"), textAlign: "right" });
-        ink.fillText(`slips ${way}`, plot.right - (way === "up" ? 4 : 70), plot.up(end) + (end < 0 ? 7 : -6));
-      });
+      const at = plot.up(end) + (end < 0 ? 7 : -6);
+      if (at > TOP && at < plot.bottom) write(plot.ink, `slips ${way}`, plot.right - (way === "up" ? 4 : 70), at, plot.colour("c"), "right");
     }
   }
 

@@ -5,12 +5,7 @@ const BUFFER = 50; // ms
 
 class Player {
   constructor(post) {
-    this.post = post;
-    this.speed = 1;
-    this.position = 0; // of what is heard, in rows
-    this.sent = 0;
-    this.running = false;
-    this.before = this.now = 0;
+    Object.assign(this, { post, speed: 1, running: false });
   }
 
   message({ kind, ...told }) {
@@ -31,8 +26,7 @@ class Player {
     if (binary) this.exports = started(new WebAssembly.Module(binary));
     this.machine = null;
     this.machine = new Machine(this.exports, references, setup, 400);
-    this.position = 0;
-    this.before = this.now = 0;
+    this.position = this.before = this.now = 0; // of what is heard: the row; its value and the one before
     this.fresh();
     this.running = true;
   }

@@ -23,10 +23,45 @@ function inked(canvas) {
   return { ink, width, height };
 }
 
+/* A line through points [x, y]; a point without a number parts it. */
+function stroke(ink, points, colour, width = 1, dash = []) {
+  Object.assign(ink, { strokeStyle: colour, lineWidth: width });
+  ink.setLineDash(dash);
+  ink.beginPath();
+  let joined = false;
+  for (const [x, y] of points) {
+    const there = Number.isFinite(y);
+    if (there) ink[joined ? "lineTo" : "moveTo"](x, y);
+    joined = there;
+  }
+  ink.stroke();
+}
+
+function write(ink, words, x, y, colour, align = "left") {
+  Object.assign(ink, { fillStyle: colour, textAlign: align });
+  ink.fillText(words.replace("-", "−"), x, y);
+}
+
+/* What `draw` draws stays within a rectangle. */
+function within(ink, rectangle, draw) {
+  ink.save();
+  ink.beginPath();
+  ink.rect(...rectangle);
+  ink.clip();
+  draw();
+  ink.restore();
+}
+
 function made(place, tag, text = "") {
   const element = place.appendChild(document.createElement(tag));
   element.textContent = text;
   return element;
+}
+
+/* Draws anew where the page has another size or other colours. */
+function redrawn(draw) {
+  for (const event of ["resize", "DOMContentLoaded"]) addEventListener(event, draw);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 }
 
 /* A choice of words; `act` is told the number of the one taken. */
@@ -47,6 +82,13 @@ function ticks(low, high, count) {
     found.push([n * step, large ? (n * step).toExponential(2) : (n * step).toFixed(digits)]);
   }
   return found;
+}
+
+/* Lowest and highest of what are finite numbers. */
+function extent(values) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const v of values) if (Number.isFinite(v)) [low, high] = [v < low ? v : low, v > high ? v : high];
+  return [low, high];
 }
 
 /* Lowest and highest value in each of `count` columns of pixels. */
@@ -78,88 +120,53 @@ class Plot {
     const { ink, width, height } = inked(this.canvas), colour = colours();
     const right = width - RIGHT, bottom = height - (upright ? 4 : 18), margin = 0.06 * (high - low);
     const bent = (v) => (bend ? Math.asinh(v / bend) : v), least = bent(low - margin), most = bent(high + margin);
-    Object.assign(this, { ink, colour, x, right, bottom, wide: right - LEFT });
+    Object.assign(this, { ink, colour, x, right, bottom, wide: Math.max(1, right - LEFT) });
     this.at = (v) => LEFT + (v - x[0]) / (x[1] - x[0]) * this.wide;
     this.up = (v) => bottom - (bent(v) - least) / (most - least) * (bottom - TOP);
-    ink.font = "11.5px system-ui, sans-serif";
-    ink.textBaseline = "middle";
-    ink.lineWidth = 1;
-    ink.strokeStyle = colour("line");
-    ink.fillStyle = colour("soft");
-    ink.textAlign = "right";
+    Object.assign(ink, { font: "11.5px system-ui, sans-serif", textBaseline: "middle" });
+    const [line, soft] = ["line", "soft"].map(colour);
     const rows = bend ? [-1000, -100, 0, 100, 1000].filter((v) => v > low && v < high).map((v) => [v, String(v)])
       : ticks(low - margin, high + margin, Math.max(2, (bottom - TOP) / 24));
-    ink.beginPath();
     for (const [v, words] of rows) {
-      ink.moveTo(LEFT, this.up(v));
-      ink.lineTo(right, this.up(v));
-      ink.fillText(words.replace("-", "−"), LEFT - 5, Math.max(TOP, Math.min(bottom - 5, this.up(v))));
+      stroke(ink, [[LEFT, this.up(v)], [right, this.up(v)]], line);
+      write(ink, words, LEFT - 5, Math.max(TOP, Math.min(bottom - 5, this.up(v))), soft, "right");
     }
-    ink.textAlign = "center";
     for (const [v, words] of upright ?? ticks(...x, Math.max(2, this.wide / 90))) {
-      ink.moveTo(this.at(v), TOP);
-      ink.lineTo(this.at(v), bottom);
       const half = ink.measureText(words).width / 2;
-      ink.fillText(words.replace("-", "−"), Math.min(right - half, Math.max(LEFT + half, this.at(v))), bottom + 9);
+      stroke(ink, [[this.at(v), TOP], [this.at(v), bottom]], line);
+      write(ink, words, Math.min(right - half, Math.max(LEFT + half, this.at(v))), bottom + 9, soft, "center");
     }
-    ink.stroke();
-    ink.textAlign = "left";
-    ink.fillStyle = colour("ink");
-    ink.fillText(this.name + below, LEFT, 8);
+    write(ink, this.name + below, LEFT, 8, colour("ink"));
     let place = LEFT + ink.measureText(this.name + below).width + 14;
     for (const [words, of] of legend) {
-      ink.fillStyle = colour(of);
-      ink.fillRect(place, 7, 12, 2.5);
-      ink.fillText(words, place + 16, 8);
+      stroke(ink, [[place, 8], [place + 12, 8]], colour(of), 2.5);
+      write(ink, words, place + 16, 8, colour(of));
       place += ink.measureText(words).width + 28;
     }
   }
 
-  /* What `draw` draws stays within the axes. */
-  within(draw) {
-    this.ink.save();
-    this.ink.beginPath();
-    this.ink.rect(LEFT, TOP - 2, this.wide, this.bottom - TOP + 4);
-    this.ink.clip();
-    draw(this.ink);
-    this.ink.restore();
+  _line(points, colour, width, dash) {
+    const { ink, wide, bottom } = this;
+    within(ink, [LEFT, TOP - 2, wide, bottom - TOP + 4], () => stroke(ink, points, this.colour(colour), width, dash));
   }
 
-  /* Through points [x, y]; a point without a number parts it. */
-  line(points, colour, { dash = [], width = 1.4 } = {}) {
-    this.within((ink) => {
-      Object.assign(ink, { strokeStyle: this.colour(colour), lineWidth: width });
-      ink.setLineDash(dash);
-      ink.beginPath();
-      let joined = false;
-      for (const [x, y] of points) {
-        const there = Number.isFinite(y);
-        if (there && joined) ink.lineTo(this.at(x), this.up(y));
-        else if (there) ink.moveTo(this.at(x), this.up(y));
-        joined = there;
-      }
-      ink.stroke();
-    });
+  /* Through points of the axes; one without a number parts it. */
+  line(points, colour, { dash, width = 1.4 } = {}) {
+    this._line(points.map(([x, y]) => [this.at(x), this.up(y)]), colour, width, dash);
   }
 
-  /* An Envelope; columns further apart than `near`, or on the two sides
-     of `gap`, are not joined. */
+  /* An Envelope; columns further apart than `near`, or on the two sides of `gap`, are not joined. */
   envelope({ low, high }, colour, { near = 3, gap = -1, width = 1.4 } = {}) {
-    this.within((ink) => {
-      Object.assign(ink, { strokeStyle: this.colour(colour), lineWidth: width });
-      ink.beginPath();
-      for (let x = 0, last = -1e9, at = null; x < low.length; x++) {
-        if (!(low[x] <= high[x])) continue;
-        const [bottom, top] = [this.up(low[x]), this.up(high[x])];
-        const up = at === null || Math.abs(bottom - at) < Math.abs(top - at);
-        const ends = bottom - top < 1 ? [top] : up ? [bottom, top] : [top, bottom];
-        if (x - last >= near || (last < gap && x > gap)) ink.moveTo(LEFT + x, ends[0]);
-        for (const y of ends) ink.lineTo(LEFT + x, y);
-        at = ends.at(-1);
-        last = x;
-      }
-      ink.stroke();
-    });
+    const points = [];
+    for (let x = 0, last = -1e9; x < low.length; x++) {
+      if (!(low[x] <= high[x])) continue;
+      const [bottom, top] = [this.up(low[x]), this.up(high[x])], at = points.at(-1)?.[1];
+      const ends = bottom - top < 1 ? [top] : Math.abs(bottom - at) < Math.abs(top - at) ? [bottom, top] : [top, bottom];
+      if (x - last >= near || (last < gap && x > gap)) points.push([NaN, NaN]);
+      for (const y of ends) points.push([LEFT + x, y]);
+      last = x;
+    }
+    this._line(points, colour, width);
   }
 }
 
@@ -170,58 +177,53 @@ class Cursors {
   }
 
   add(plot) {
-    const { canvas } = plot;
+    const { canvas } = plot, limits = (x) => Math.max(plot.x[0], Math.min(plot.x[1], x));
     let which = -1, from = null;
-    const place = (event) => plot.x[0] + Math.max(0, Math.min(1, (event.offsetX - LEFT) / plot.wide)) * (plot.x[1] - plot.x[0]);
+    const place = (event) => limits(plot.x[0] + (event.offsetX - LEFT) / plot.wide * (plot.x[1] - plot.x[0]));
     const move = (event) => {
+      if (from === null) return;
       if (which >= 0) this.at[which] = place(event);
       else this.band = [from, place(event)].sort((a, b) => a - b);
       this.moved();
     };
+    const nearest = (x) => (Math.abs(this.at[0] - x) <= Math.abs(this.at[1] - x) ? 0 : 1);
     canvas.addEventListener("pointerdown", (event) => {
-      const [a, b] = this.at.map((at) => Math.abs(plot.at(at) - event.offsetX));
-      which = this.zoom && Math.min(a, b) > 12 ? -1 : a <= b ? 0 : 1;
       from = place(event);
+      which = nearest(from);
+      if (this.zoom && Math.abs(plot.at(this.at[which]) - event.offsetX) > 12) which = -1;
       canvas.setPointerCapture(event.pointerId);
       move(event);
     });
-    canvas.addEventListener("pointermove", (event) => { if (from !== null) move(event); });
-    canvas.addEventListener("pointerup", () => {
-      const band = this.band;
+    canvas.addEventListener("pointermove", move);
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => {
+      const { band } = this;
       this.band = null;
       if (band && plot.at(band[1]) - plot.at(band[0]) > 8) this.zoom(band);
-      else if (band) this.at[Math.abs(this.at[0] - from) <= Math.abs(this.at[1] - from) ? 0 : 1] = from;
+      else if (band) this.at[nearest(from)] = from;
+      from = null;
       this.moved();
     });
-    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => { from = this.band = null; });
     canvas.addEventListener("keydown", (event) => {
-      const step = { ArrowLeft: -0.002, ArrowRight: 0.002 }[event.key];
+      const step = { ArrowLeft: -0.002, ArrowRight: 0.002 }[event.key], k = event.shiftKey ? 1 : 0;
       if (!step) return;
       event.preventDefault();
-      const k = event.shiftKey ? 1 : 0, [low, high] = plot.x;
-      this.at[k] = Math.max(low, Math.min(high, this.at[k] + step * (high - low)));
+      this.at[k] = limits(this.at[k] + step * (plot.x[1] - plot.x[0]));
       this.moved();
     });
   }
 
   draw(plot) {
-    const { ink, right, bottom, colour } = plot;
-    ink.strokeStyle = ink.fillStyle = colour("warn");
+    const { ink, right, bottom, colour } = plot, warn = colour("warn");
     if (this.band) {
-      ink.globalAlpha = 0.15;
-      ink.fillRect(plot.at(this.band[0]), TOP, plot.at(this.band[1]) - plot.at(this.band[0]), bottom - TOP);
+      const [from, to] = this.band.map(plot.at);
+      Object.assign(ink, { fillStyle: warn, globalAlpha: 0.15 });
+      ink.fillRect(from, TOP, to - from, bottom - TOP);
       ink.globalAlpha = 1;
     }
-    ink.setLineDash([3, 3]);
-    ink.textAlign = "center";
-    this.at.forEach((place, n) => {
-      const x = plot.at(place);
+    this.at.map(plot.at).forEach((x, n) => {
       if (x < LEFT - 0.5 || x > right + 0.5) return;
-      ink.beginPath();
-      ink.moveTo(x, TOP);
-      ink.lineTo(x, bottom);
-      ink.stroke();
-      ink.fillText("AB"[n], x > right - 14 ? x - 7 : x + 7, TOP + 5);
+      stroke(ink, [[x, TOP], [x, bottom]], warn, 1, [3, 3]);
+      write(ink, "AB"[n], x > right - 14 ? x - 7 : x + 7, TOP + 5, warn, "center");
     });
     ink.setLineDash([]);
   }

@@ -18,7 +18,6 @@ function readable({ name, unit, most }) {
 }
 
 const spelt = (v) => (typeof v === "number" ? String(Number(v.toPrecision(6))).replace("-", "−") : v);
-const span = (values) => values.reduce(([low, high], v) => [v < low ? v : low, v > high ? v : high], [Infinity, -Infinity]);
 
 /* One run's columns. */
 class Rows {
@@ -102,7 +101,7 @@ class Signals {
   }
 
   all() {
-    this.whole = span(this.runs.flatMap((run) => [run.x(0), run.x(run.count - 1)]));
+    this.whole = extent(this.runs.flatMap((run) => [run.x(0), run.x(run.count - 1)]));
     this.cursors.at = null;
     this.look(this.whole);
   }
@@ -122,8 +121,8 @@ class Signals {
   draw() {
     const own = this.runs[this.chosen], x = own.per === 1 ? readable(this.columns[0]).words : "periods";
     for (const { plot, lines, factor } of this.plots) {
-      const [low, high] = span(this.runs.flatMap((run) => lines.map(([, , k]) => run.shape(k, factor, this.view, 1)))
-        .flatMap((one) => [one.low[0], one.high[0]]).filter(Number.isFinite));
+      const [low, high] = extent(this.runs.flatMap((run) => lines.map(([, , k]) => run.shape(k, factor, this.view, 1)))
+        .flatMap((one) => [one.low[0], one.high[0]]));
       plot.begin(this.view, high > low ? [low, high] : high === low ? [low - 0.5, low + 0.5] : [-1, 1], { legend: lines, below: ` over ${x}` });
       for (const [, of, k] of lines) {
         for (const run of this.runs) if (run !== own) run.draw(plot, k, factor, "steel", 0.6);
@@ -167,7 +166,7 @@ class Cloud {
       if (step && n) this.choose(this.shown[(this.shown.indexOf(this.chosen) + step + n) % n]);
     });
     const { values } = this.ways[2];
-    this.choose(values.indexOf(span(values.filter((v) => v !== null))[1]));
+    this.choose(values.indexOf(extent(values.filter((v) => v !== null))[1]));
   }
 
   choose(k = 0) {
@@ -191,7 +190,7 @@ class Cloud {
     const [x, y, of] = this.ways, { plot } = this;
     this.axes = this.ways.map((column) => readable(column));
     const [wide, high, deep] = this.ways.map(({ values }, k) => {
-      const [low, most] = span(values.filter((v) => v !== null)).map((v) => v * this.axes[k].factor);
+      const [low, most] = extent(values.filter((v) => v !== null)).map((v) => v * this.axes[k].factor);
       return low < most ? [low, most] : [low - 0.5, low + 0.5];
     });
     const margin = 0.05 * (wide[1] - wide[0]);
@@ -224,6 +223,4 @@ const cloud = SHOWN.cloud && new Cloud($("cloud"), SHOWN.cloud, (run) => {
 for (const [alt, content] of Object.entries(SHOWN.pictures)) {
   Object.assign(made($("pictures"), "img"), { alt, src: `data:image/png;base64,${content}` });
 }
-const again = () => { signals?.soon(); cloud?.draw(); };
-for (const event of ["resize", "DOMContentLoaded"]) addEventListener(event, again);
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
+redrawn(() => { signals?.soon(); cloud?.draw(); });
