@@ -62,7 +62,7 @@ def html(link: str, models: Iterable[str] = (), record: Path | None = None) -> s
 def script_of(given: dict[str, Any], scripts: tuple[str, ...]) -> str:
     """Constants by name, which JSON can hold, and scripts that take them."""
     lines = (f"const {name} = {literal(value)};" for name, value in given.items())
-    return "\n".join([*lines, script(scripts)])
+    return "\n".join(['"use strict";', *lines, script(scripts)])
 
 
 def page(name: str, code: str, asks: str) -> str:
@@ -74,7 +74,7 @@ def page(name: str, code: str, asks: str) -> str:
         f"form-action 'none'; connect-src {asks}"
     )
     parts = {"@POLICY@": policy, "@STYLE@": script(("style.css",)), "@SCRIPT@": code}
-    text = script((name,))
+    text = script(("head.html", name))
     for mark, part in parts.items():
         text = text.replace(mark, part)
     return text

@@ -1,4 +1,3 @@
-"use strict";
 /* The rows of the last seconds, curves of them over the drive's phase, and what is laid over them. */
 
 const KEPT = 3 * RATE; // rows
@@ -131,7 +130,9 @@ class Curves {
     this.base = {};
     for (const name of ["z_surface", "z_part"]) this.base[name] = history.value(first, COLUMNS.indexOf(name));
     this.onSurface = onSurface;
-    PANELS.forEach((panel, k) => this._panel(k, panel, others, budget));
+    const alone = [["part on surface", "z_part", "b", 1e3]];
+    this.panels = PANELS.map((panel) => (onSurface && panel.unit === "mm" ? { ...panel, lines: alone } : panel));
+    this.panels.forEach((panel, k) => this._panel(k, panel, others, budget));
     this._measure();
   }
 
@@ -154,10 +155,6 @@ class Curves {
     return (row) => factor * (history.value(row, column) - base - on(row));
   }
 
-  _lines(panel) {
-    return this.onSurface && panel.unit === "mm" ? [["part on surface", "z_part", "b", 1e3]] : panel.lines;
-  }
-
   /* Lowest and highest of each column of pixels. */
   _shape(name, factor, columns) {
     const { first, last, span } = this.window, value = this.value(name, factor), found = new Envelope(columns);
@@ -167,7 +164,7 @@ class Curves {
   }
 
   _panel(k, panel, others, budget) {
-    const plot = this.plots[k], { periods, span, slow, history } = this.window, lines = this._lines(panel);
+    const plot = this.plots[k], { lines } = panel, { periods, span, slow, history } = this.window;
     const columns = Math.max(1, Math.floor(plot.canvas.clientWidth - LEFT - RIGHT));
     const shapes = lines.map(([, name, , factor]) => this._shape(name, factor, columns));
     const laid = others.flatMap((other) => lines.map(([, name, of, factor]) =>
@@ -210,10 +207,10 @@ class Curves {
     const time = (to - from) * this.window.span / RATE;
     const words = [`B−A ${(time * 1e3).toFixed(2)} ms (${time ? (1 / Math.abs(time)).toFixed(1) : "∞"} Hz)`];
     if (a !== null && b !== null) {
-      for (const panel of PANELS) for (const [label, name, , factor] of this._lines(panel)) {
+      for (const panel of this.panels) for (const [label, name, , factor] of panel.lines) {
         if (name === "mean") continue;
         const value = this.value(name, factor), digits = panel.unit === "mm" || panel.unit === "A" ? 3 : 1;
-        const what = panel.lines.length > 1 || panel.unit === "A" ? `${label} ` : "";
+        const what = panel.lines.length > 1 || panel.unit.length < 3 ? `${label} ` : "";
         words.push(`${what}${value(a).toFixed(digits)} → ${value(b).toFixed(digits)} ${panel.unit}`);
       }
     }

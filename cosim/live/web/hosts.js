@@ -1,4 +1,3 @@
-"use strict";
 /* Who owns the machine: a worker with a timer, or the audio worklet, which also plays the surface. */
 
 const BUFFER = 50; // ms
@@ -27,13 +26,8 @@ class Player {
     this.machine = null;
     this.machine = new Machine(this.exports, references, setup, 400);
     this.position = this.before = this.now = 0; // of what is heard: the row; its value and the one before
-    this.fresh();
-    this.running = true;
-  }
-
-  fresh() {
-    this.rows = new Float32Array(1024 * OUTPUT_COUNT);
     this.count = 0;
+    this.running = true;
   }
 
   fail(error) {
@@ -44,6 +38,7 @@ class Player {
   /* One row on; its velocity of the surface is what is heard. */
   next() {
     if (this.count === 1024) this.send();
+    if (!this.count) this.rows = new Float32Array(1024 * OUTPUT_COUNT);
     const at = this.count * OUTPUT_COUNT;
     this.machine.next(this.rows, at);
     this.count++;
@@ -55,7 +50,7 @@ class Player {
     if (!this.count) return;
     const { rows, count, machine, generation, gaps } = this, { row: last, origin, frequency } = machine;
     this.post({ kind: "rows", rows, count, last, origin, frequency, marks: machine.marks(), generation, gaps }, [rows.buffer]);
-    this.fresh();
+    this.count = 0;
   }
 
   /* `n` samples of sound, `rate` a second. */
@@ -114,8 +109,7 @@ if (typeof registerProcessor === "function") {
   let last = performance.now();
   onmessage = ({ data }) => player.message(data);
   setInterval(() => {
-    const now = performance.now();
-    const n = Math.round(Math.min(now - last, 60) * RATE / 1000); // what is late is left out
+    const now = performance.now(), n = Math.round(Math.min(now - last, 60) * RATE / 1000); // what is late is left out
     last = now;
     player.play(n, RATE, null);
     if (player.running) player.send();

@@ -1,8 +1,7 @@
-"use strict";
 /* The page: what is turned, who plays it, what is told of it. */
 
-const START = settingOf(DATA.start);
-const state = { setting: START, values: valuesOf(START), speed: 1, paused: false, generation: 0, marks: [], others: [] };
+const first = opened();
+const state = { setting: first, values: valuesOf(first), speed: 1, paused: false, generation: 0, marks: [], others: [] };
 const history_ = new History();
 const curves = new Curves($("curves"), (words) => {
   $("measure").replaceChildren();
@@ -11,7 +10,6 @@ const curves = new Curves($("curves"), (words) => {
 const WALL = COLUMNS.indexOf("wall_contact"), lit = { time: -1e9, side: 0 };
 
 // --- who plays ------------------------------------------------------------------------------------
-
 const binary = Uint8Array.from(atob(BINARY), (c) => c.charCodeAt(0)).buffer;
 const workerSource = URL.createObjectURL(new Blob([CORE], { type: "text/javascript" }));
 let host = null, audio = null;
@@ -63,10 +61,11 @@ function heard(told) {
   while (state.marks.length > 3 && state.marks[1][0] < newest - 1) state.marks.shift();
 }
 
-const fault = (text) => { $("fault").textContent = text; };
+function fault(text) {
+  $("fault").textContent = text;
+}
 
 // --- what is turned -------------------------------------------------------------------------------
-
 function take(setting, again) {
   const before = state.setting, values = valuesOf(setting), setup = setupOf(values, setting.scene);
   if (values["drive.reset_time"] * values["drive.frequency"] >= 1) return fault("drive.reset_time must be below the period.");
@@ -149,16 +148,6 @@ function show() {
 }
 
 // --- what is told ---------------------------------------------------------------------------------
-
-const TOLD_OF = [["v", "mean velocity of the part"], ["stick", "sticks"], ["hits", "impacts a period"], ["heat", "heat of a coil"],
-  ["slip", "part slips beyond"], ["peak", "surface reached, mean of 4 ms"]];
-for (const [id, name] of TOLD_OF) {
-  const card = Object.assign(made($("told"), "div"), { className: "card" });
-  made(card, "dt", name);
-  const dd = Object.assign(made(card, "dd"), { id: `told-${id}` });
-  for (const tag of ["span", "small"]) made(dd, tag);
-}
-
 const tell = (id, ...words) => words.forEach((text, k) => { $(`told-${id}`).children[k].textContent = text; });
 const signed = (value, digits) => `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(digits)}`;
 
@@ -191,16 +180,11 @@ function tellAll() {
   for (let row = Math.max(history_.first, history_.last - RATE, history_.turned + 1); row <= history_.last; row += 8) reached.put(0, mean(row));
   const [[least], [most]] = [reached.low, reached.high];
   tell("slip", `${signed(budget.up[0], 0)} / ${signed(budget.down[0], 0)} m/s²`, `going up / down; where the surface rises ${signed(budget.up[1], 0)} / ${signed(budget.down[1], 0)}`);
-  if (most >= least) tell("peak", `${signed(least, 0)} … ${signed(most, 0)} m/s²`, slipsBy(least, most, budget));
-}
-
-function slipsBy(least, most, budget) {
-  const ways = Object.keys(budget).filter((way) => least < budget[way][0] || most > budget[way][1]);
-  return ways.length ? `a part going ${ways.join(" or ")} slips` : "by this no part slips";
+  const ways = Object.keys(budget).filter((way) => least < budget[way][0] || most > budget[way][1]).join(" or ");
+  if (most >= least) tell("peak", `${signed(least, 0)} … ${signed(most, 0)} m/s²`, ways ? `a part going ${ways} slips` : "by this no part slips");
 }
 
 // --- laid over: a run of the server, a trial's record --------------------------------------------------
-
 const NAMED = { coil_current: "current" }, DASHED = [5, 4], DOTTED = [2, 3];
 const record = DATA.record && new Overlay({ ...DATA.record, begin: 0 }, DOTTED,
   { ...NAMED, mean: "a_surface", a_surface: "", origin: true });
@@ -233,9 +217,8 @@ async function compare() {
     lay(new Overlay(told, DASHED, NAMED), `${model} (dashed)`, told.v_average);
   } catch (error) {
     $("compared").textContent = error.message;
-  } finally {
-    $("compare").disabled = false;
   }
+  $("compare").disabled = false;
 }
 
 function layRecord() {
@@ -249,17 +232,16 @@ function layRecord() {
 }
 
 // --- begin ------------------------------------------------------------------------------------------
-
 const options = (select, names) => { for (const name of names) made(select, "option", name); };
 
+/* The setting of the address, or of the page itself. */
 function opened() {
-  if (location.hash.length < 2) return START;
   try {
-    return settingOf(location.hash);
+    if (location.hash.length > 1) return settingOf(location.hash);
   } catch (error) {
     fault(error.message);
-    return START;
   }
+  return settingOf(DATA.start);
 }
 
 async function change(sound) {
@@ -306,8 +288,6 @@ $("record").hidden = !record;
 $("record").onclick = layRecord;
 addEventListener("hashchange", () => take(opened(), true));
 
-state.setting = opened();
-state.values = valuesOf(state.setting);
 change(false);
 show();
 const due = { curves: 0, told: 0 };

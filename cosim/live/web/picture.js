@@ -1,4 +1,3 @@
-"use strict";
 /* The machine to scale: the widths are made up, the heights and ways are one scale, which the legend
    tells. Masses stand for themselves by their labels. */
 

@@ -1,4 +1,3 @@
-"use strict";
 /* A plot on a canvas: axes, lines, and two cursors that measure. The live page and the files of
    `cosim show` share it. */
 
@@ -52,16 +51,9 @@ function within(ink, rectangle, draw) {
   ink.restore();
 }
 
-function made(place, tag, text = "") {
+function made(place, tag, text = "", kind = "") {
   const element = place.appendChild(document.createElement(tag));
-  element.textContent = text;
-  return element;
-}
-
-/* Draws anew where the page has another size or other colours. */
-function redrawn(draw) {
-  for (const event of ["resize", "DOMContentLoaded"]) addEventListener(event, draw);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  return Object.assign(element, { textContent: text, className: kind });
 }
 
 /* A choice of words; `act` is told the number of the one taken. */

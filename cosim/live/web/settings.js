@@ -1,4 +1,3 @@
-"use strict";
 /* A setting is a built-in scene and its changed keys; its link is the address's fragment. DATA is
    what cosim/live/rigs.py has made of the scenes, their keys and the firmware. */
 

@@ -1,13 +1,8 @@
-"use strict";
 /* What `cosim show` writes: a cloud of points, curves, words and pictures. SHOWN is what
    cosim/live/show.py has made of the results; the rows of a run's column stand, block by block, in the
    elements behind this script, which come after the page is there. */
 
-function numbersOf(text) {
-  const words = atob(text), bytes = new Uint8Array(words.length);
-  for (let k = 0; k < bytes.length; k++) bytes[k] = words.charCodeAt(k);
-  return new Float64Array(bytes.buffer);
-}
+const numbersOf = (text) => new Float64Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
 
 /* What a column is for a reader: a factor, a unit, and both in words. */
 function readable({ name, unit, most }) {
@@ -77,8 +72,7 @@ class Rows {
 class Signals {
   constructor(place, { runs, columns, panels }) {
     Object.assign(this, { runs: runs.map((run, k) => new Rows(run, k)), columns, chosen: 0 });
-    const bar = made(place, "div");
-    bar.className = "row";
+    const bar = made(place, "div", "", "row");
     const within = (from, to) => () => this.look([from, to].map((share) => this.view[0] + share * (this.view[1] - this.view[0])));
     for (const [words, act] of [["All", () => this.all()], ["Closer", within(0.25, 0.75)], ["Wider", within(-0.5, 1.5)],
       ["◀", within(-0.25, 0.75)], ["▶", within(0.25, 1.25)]]) made(bar, "button", words).onclick = act;
@@ -101,15 +95,14 @@ class Signals {
   }
 
   all() {
-    this.whole = extent(this.runs.flatMap((run) => [run.x(0), run.x(run.count - 1)]));
-    this.cursors.at = null;
+    const [from, to] = this.whole = extent(this.runs.flatMap((run) => [run.x(0), run.x(run.count - 1)]));
+    this.cursors.at = [0.25, 0.75].map((share) => from + share * (to - from));
     this.look(this.whole);
   }
 
   look([from, to]) {
     const [least, most] = this.whole;
     this.view = to - from > 1e-9 * (most - least) ? [Math.max(least, from), Math.min(most, to)] : [least, most];
-    this.cursors.at ??= [0.25, 0.75].map((share) => least + share * (most - least));
     this.soon();
   }
 
@@ -144,8 +137,7 @@ class Signals {
 class Cloud {
   constructor(place, { columns, count, keys, ways, family }, chose) {
     Object.assign(this, { columns, count, family, chose, only: new Map() });
-    const bar = made(place, "div"), numeric = columns.filter((column) => column.most !== null);
-    bar.className = "row";
+    const bar = made(place, "div", "", "row"), numeric = columns.filter((column) => column.most !== null);
     this.ways = ways.map((name) => numeric.find((column) => column.name === name));
     ["x", "y", "colour"].forEach((words, k) => {
       choice(bar, words, numeric.map(({ name }) => name), (n) => { this.ways[k] = numeric[n]; this.draw(); }, ways[k]);
@@ -223,4 +215,6 @@ const cloud = SHOWN.cloud && new Cloud($("cloud"), SHOWN.cloud, (run) => {
 for (const [alt, content] of Object.entries(SHOWN.pictures)) {
   Object.assign(made($("pictures"), "img"), { alt, src: `data:image/png;base64,${content}` });
 }
-redrawn(() => { signals?.soon(); cloud?.draw(); });
+const again = () => { signals?.soon(); cloud?.draw(); };
+for (const event of ["resize", "DOMContentLoaded"]) addEventListener(event, again);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
