@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim.cli.command import Command
-from cosim.cli.work import progress_bar, writable
-from cosim.studies.study import OVERRIDES, SCENE, Option
+from cosim.cli.work import print_page, progress_bar, writable
+from cosim.studies.study import OVERRIDES, SCENE, SHOW, Option
 
 if TYPE_CHECKING:
     from cosim.scene import Scene
@@ -22,6 +22,7 @@ def _run(
     spread: bool = False,
     strict: bool = False,
     link: bool = False,
+    show: bool = False,
     out: Path | None = None,
 ) -> None:
     from cosim.scene import load, to_link
@@ -61,6 +62,8 @@ def _run(
         print(found)
     print(f"Written to {folder}: waveforms.csv, waveforms.nc, summary.json, scene.toml")
     print(f"Figure: {folder / 'figure.png'}")
+    if show:
+        print_page(folder)
 
 
 def _spread(scene: "Scene") -> "Spread":
@@ -170,6 +173,7 @@ COMMANDS = (
                 "only print the setting as a link, which all commands take in place of a scene",
                 kind=bool,
             ),
+            SHOW,
         ),
         "results/<scene>",
     ),

@@ -154,16 +154,18 @@ static unsigned real_key(int version, size_t place)
 static void common_attributes(unsigned reference, const VariableInfo *info, int real)
 {
     static const char *const CAUSALITIES[] = {
-        [KIND_PARAMETER] = "parameter", [KIND_INPUT] = "input", [KIND_OUTPUT] = "output"};
+        [KIND_PARAMETER] = "parameter", [KIND_TUNABLE] = "parameter", [KIND_INPUT] = "input",
+        [KIND_OUTPUT] = "output"};
     attribute("name", info->name);
     printf(" valueReference=\"%u\"", reference);
     attribute("description", info->text);
     attribute("causality", CAUSALITIES[info->kind]);
     attribute("variability", info->kind == KIND_PARAMETER ? "fixed"
+                             : info->kind == KIND_TUNABLE ? "tunable"
                              : real                       ? "continuous"
                                                           : "discrete");
     if (info->kind != KIND_INPUT)
-        attribute("initial", info->kind == KIND_PARAMETER ? "exact" : "calculated");
+        attribute("initial", info->kind == KIND_OUTPUT ? "calculated" : "exact");
 }
 
 static void type_attributes(int version, const VariableInfo *info, int real)
