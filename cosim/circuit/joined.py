@@ -58,6 +58,7 @@ def deck(
     reltol: float,
     max_step: float,
     asked: bool,
+    called: str = "[[port]] source",
 ) -> Deck:
     """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved;
     where they are ``asked`` for within a step, each as a device's parameter.
@@ -71,7 +72,7 @@ def deck(
         if source.lower() not in found or source[0].lower() not in "vi":
             known = sorted(each for each in found if each[0] in "vi")
             hint = suggestion(source.lower(), known) or f" (it has {', '.join(known) or 'none'})"
-            shown = f'[[port]] source = "{plain(source)}"'
+            shown = f'{called} = "{plain(source)}"'
             raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
     plainly = re.compile(r"i.*" if asked else r".*", re.IGNORECASE)
     direct = [_VECTOR.fullmatch(each) if plainly.match(each) else None for each in words]
