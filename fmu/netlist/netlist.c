@@ -39,7 +39,8 @@ static struct {
     Run *run;
     pthread_mutex_t lock;
     pthread_cond_t changed;
-    int turn, stopping, ended, given_up;
+    pthread_key_t mark; /* of ngspice's thread: its end is known when that is taken away */
+    int turn, stopping, ended, gone, given_up;
     int open; /* whether there is an instance */
     double until;
     int *places; /* of each variable among the values sent; -1: not a vector */
@@ -79,14 +80,22 @@ static int on_status(char *text, int id, void *user)
     return 0;
 }
 
+/* Wait until it is no longer their turn. */
+static void wait_for(int them)
+{
+    pthread_mutex_lock(&s.lock);
+    while (s.turn == them && !s.stopping && !s.ended)
+        pthread_cond_wait(&s.changed, &s.lock);
+    pthread_mutex_unlock(&s.lock);
+}
+
 static void hand_over(int to)
 {
     pthread_mutex_lock(&s.lock);
     s.turn = to;
     pthread_cond_broadcast(&s.changed);
-    while (s.turn == to && !s.stopping && !s.ended)
-        pthread_cond_wait(&s.changed, &s.lock);
     pthread_mutex_unlock(&s.lock);
+    wait_for(to);
 }
 
 static int on_exit_asked(int status, bool unload, bool quit, int id, void *user)
@@ -99,11 +108,25 @@ static int on_exit_asked(int status, bool unload, bool quit, int id, void *user)
     return status;
 }
 
+/* ngspice's thread has left its library, which may be unloaded now. */
+static void on_gone(void *mark)
+{
+    (void)mark;
+    pthread_mutex_lock(&s.lock);
+    s.ended = s.gone = 1;
+    pthread_cond_broadcast(&s.changed);
+    pthread_mutex_unlock(&s.lock);
+}
+
 static int on_thread(bool ended, int id, void *user)
 {
     (void)id, (void)user;
     pthread_mutex_lock(&s.lock);
     s.ended = ended;
+    if (!ended) {
+        s.gone = 0;
+        pthread_setspecific(s.mark, &s);
+    }
     pthread_cond_broadcast(&s.changed);
     pthread_mutex_unlock(&s.lock);
     return 0;
@@ -185,15 +208,11 @@ static int on_sync(double time, double *delta, double last_delta, int redo, int 
 
 static int begin(void)
 {
-    static int ready;
     int number = 0;
-    if (!ready) {
-        if (!spice_find(&spice, s.run->why))
-            return 0;
-        spice.init(on_text, on_status, on_exit_asked, on_data, on_vectors, on_thread, NULL);
-        spice.init_sync(on_source, on_source, on_sync, &number, NULL);
-        ready = 1;
-    }
+    if (!spice_find(&spice, s.run->why))
+        return 0;
+    spice.init(on_text, on_status, on_exit_asked, on_data, on_vectors, on_thread, NULL);
+    spice.init_sync(on_source, on_source, on_sync, &number, NULL);
     return 1;
 }
 
@@ -276,10 +295,15 @@ static void end(Run *run)
     pthread_mutex_unlock(&s.lock);
     while (spice.command && !s.ended) /* it waits for a while, which a long step may exceed */
         spice.command(halt);
+    pthread_mutex_lock(&s.lock);
+    while (!s.gone)
+        pthread_cond_wait(&s.changed, &s.lock);
+    pthread_mutex_unlock(&s.lock);
     if (spice.command && !s.given_up) {
         spice.command(destroy);
         spice.command(remove);
     }
+    spice_leave(&spice);
     s.run = NULL;
     free(s.places);
     free(s.pulses);
@@ -290,12 +314,10 @@ static void end(Run *run)
 static int start(Run *run)
 {
     char go[] = "bg_run";
-    if (s.given_up)
-        return failed(run, "ngspice has given up in this process; a new process is needed", "");
     s.run = run;
     s.turn = SPICES;
-    s.stopping = s.unknown = 0;
-    s.ended = 1;
+    s.stopping = s.unknown = s.given_up = 0;
+    s.ended = s.gone = 1;
     s.until = 0.0;
     s.said[0] = '\0';
     s.places = calloc((size_t)ports.model.count + 1, sizeof *s.places);
@@ -303,11 +325,14 @@ static int start(Run *run)
         s.places[k] = -1;
     if (!begin() || !load(run))
         return 0;
-    find_pulses();
-    s.ended = 0;
-    if (spice.command(go) != 0)
+    if (!s.given_up)
+        find_pulses();
+    s.ended = s.gone = s.given_up;
+    if (s.given_up || spice.command(go) != 0) {
+        s.ended = s.gone = 1;
         return failed(run, "ngspice could not begin: ", s.said);
-    hand_over(SPICES);
+    }
+    wait_for(SPICES);
     if (s.unknown)
         return failed(run, "the netlist has no ", ports.variables[s.unknown - 1].name);
     return !s.ended || failed(run, "ngspice could not begin: ", *s.said ? s.said : "no reason given");
@@ -327,6 +352,7 @@ static int step_by(Run *run, double h)
 static void leave(void)
 {
     unsetenv(MARK);
+    pthread_key_delete(s.mark);
     ports_free(&ports);
     s.open = 0;
 }
@@ -344,6 +370,7 @@ const Model *model(const char *resources, char why[512])
     if (!ports_read(&ports, resources, why))
         return NULL;
     setenv(MARK, own, 1);
+    pthread_key_create(&s.mark, on_gone);
     s.open = 1;
     ports.model.alone = 1;
     ports.model.start = start;

@@ -28,7 +28,7 @@ int spice_find(Spice *spice, char why[512])
     } wanted[] = {{"ngSpice_Init", &spice->init},       {"ngSpice_Init_Sync", &spice->init_sync},
                   {"ngSpice_Circ", &spice->circuit},    {"ngSpice_Command", &spice->command},
                   {"ngSpice_SetBkpt", &spice->breakpoint}, {"ngGet_Vec_Info", &spice->vector}};
-    void *library = opened();
+    void *library = spice->library = opened();
     if (!library) {
         const char *said = dlerror();
         snprintf(why, 512,
@@ -46,4 +46,11 @@ int spice_find(Spice *spice, char why[512])
         memcpy(wanted[k].into, &found, sizeof found);
     }
     return 1;
+}
+
+void spice_leave(Spice *spice)
+{
+    if (spice->library)
+        dlclose(spice->library);
+    *spice = (Spice){0};
 }

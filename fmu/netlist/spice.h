@@ -48,6 +48,7 @@ typedef int OnSource(double *value, double time, char *name, int, void *);
 typedef int OnSync(double time, double *delta, double last_delta, int redo, int, int place, void *);
 
 typedef struct {
+    void *library;
     int (*init)(OnText *, OnText *, OnExit *, OnData *, OnVectors *, OnThread *, void *);
     int (*init_sync)(OnSource *, OnSource *, OnSync *, int *, void *);
     int (*circuit)(char **lines);
@@ -58,5 +59,7 @@ typedef struct {
 
 /* 1, or 0 with a sentence in `why`. */
 int spice_find(Spice *, char why[512]);
+/* Unloads it, since it can be initialised once only, and who else loads it would do so again. */
+void spice_leave(Spice *);
 
 #endif
