@@ -96,7 +96,6 @@ charts: setup
 	@$(VENV)/bin/cosim chart limits --rigs results/identify.json
 	@$(VENV)/bin/cosim chart measure --rigs results/identify.json
 	@$(VENV)/bin/cosim chart ladder paper trial-05 gripper
-	@$(VENV)/bin/cosim chart choice
 	@cp results/choice.csv cosim/simulation/choice.csv
 	@test -z '$(TRIALS)' || { $(VENV)/bin/cosim chart trials '$(TRIALS)' && $(VENV)/bin/cosim chart paper '$(TRIALS)'; }
 	@find results -maxdepth 1 -type f -newer $(VENV)/.began -exec $(PY) -m benchmarks.stale {} +

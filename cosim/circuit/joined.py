@@ -6,14 +6,15 @@ that ngspice computes itself, as the voltage of a source that is put in.
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from cosim.circuit.lint.checks import check
-from cosim.circuit.lint.deck import Line, passed, read
+from cosim.circuit.lint.deck import Line, passed, read_all
 from cosim.circuit.lint.elements import Element, Scope, parse
 from cosim.circuit.lint.expressions import sensed
+from cosim.circuit.lint.outputs import Measure, measures, told
 from cosim.circuit.lint.words import definitions
 from cosim.circuit.lint.write import written
 from cosim.errors import BadInput, plain
@@ -34,7 +35,13 @@ class Deck:
     kinds: Mapping[str, str]
     """``v`` or ``i`` of each source that a port feeds, by its lower-case name."""
     vectors: tuple[str, ...]
-    """What is saved, in the order of the words that were asked for."""
+    """What is saved, in the order of ``words``."""
+    words: tuple[str, ...]
+    """Those that were asked for, then those that the measurements need."""
+    measures: tuple[Measure, ...]
+    """The netlist's own ``.meas``."""
+    notes: tuple[str, ...]
+    """What has no effect in it."""
     devices: tuple[str, ...]
     """The device parameter that has the same within a step, for each."""
     pulses: tuple[str, ...]
@@ -65,7 +72,8 @@ def deck(
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
-    lines = read(path)
+    lines, dropped = read_all(path)
+    asks = measures(dropped)
     name = plain(str(path))
     found = {element.name: element for element in parse(lines).elements}
     for source in sources:
@@ -76,9 +84,23 @@ def deck(
             raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
     plainly = re.compile(r"i.*" if asked else r".*", re.IGNORECASE)
     direct = [_VECTOR.fullmatch(each) if plainly.match(each) else None for each in words]
-    extra = [_reading(k, each) for k, each in enumerate(words) if direct[k] is None]
+    extra = [
+        _reading(Line(each, f'"{plain(each)}"', k + 1), k)
+        for k, each in enumerate(words)
+        if direct[k] is None
+    ]
+    asked_for = [(name, each) for each in words]
+    every = dict.fromkeys(words)
+    for ask in asks:
+        for each in ask.words:
+            asked_for.append((f"{ask.line.file}:{ask.line.number}", each))
+            if each not in every:
+                direct.append(_VECTOR.fullmatch(each))
+                if direct[-1] is None:
+                    extra.append(_reading(Line(each, ask.line.file, ask.line.number), len(every)))
+                every[each] = None
     top = check([*lines, *extra], [[source.lower() for source in sources]])
-    _check_vectors(top, name, words, {line.number for line in extra})
+    _check_vectors(top, asked_for)
     values = _parameters(top, name, parameters)
     fed = {source.lower() for source in sources}
     text = [lines[0].text]
@@ -100,14 +122,17 @@ def deck(
         "\n".join(text),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
-        tuple(device for _, device in read_as),
+        tuple(every),
+        tuple(asks),
+        tuple(told(dropped)),
+        tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
         tuple(_pulses(top, fed)),
     )
 
 
-def _reading(place: int, words: str) -> Line:
+def _reading(words: Line, place: int) -> Line:
     """A source whose voltage is the expression."""
-    line = Line(f"Bcosim{place} {_NODE}{place} 0 V={words}", f'"{plain(words)}"', place + 1)
+    line = replace(words, text=f"Bcosim{place} {_NODE}{place} 0 V={words.text}")
     passed(line)
     return line
 
@@ -120,14 +145,15 @@ def _read_as(place: int, match: re.Match[str] | None) -> tuple[str, str]:
     return f"{kind}({inner})", f"@{inner}[i]" if kind == "i" else ""
 
 
-def _check_vectors(top: Scope, name: str, words: Sequence[str], skipped: set[int]) -> None:
-    """What the words name must be there, as far as that can be known without subcircuits."""
+def _check_vectors(top: Scope, asked: Sequence[tuple[str, str]]) -> None:
+    """What the words name must be there, as far as that can be known without subcircuits; each
+    comes with the place that asks for it."""
     nodes = {node for element in top.elements for node in element.nodes} | {"0"}
     known: dict[str, set[str]] = {
         "v": nodes,
         "i": {each.name for each in top.elements if each.kind in _CURRENTS},
     }
-    for each in words:
+    for name, each in asked:
         for kind, what in (("v", "node"), ("i", "V, L, E or H element")):
             for inner in sensed(f"b 1 0 v={each}", kind):
                 if not re.search(r"[.:]", inner) and inner not in known[kind]:

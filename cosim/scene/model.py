@@ -17,6 +17,7 @@ from cosim.scene.tables import (
     KNOBS,
     PATHS,
     PORT_LISTS,
+    RAMS,
     TABLES,
     Circuit,
     Coil,
@@ -53,7 +54,7 @@ _FAST_NEEDS: list[tuple[str, Sequence[object], str]] = [
     ("drive.waveform", COMMANDS, "one that drives a coil"),
     ("drive.quantised", (False,), "false"),
     ("drive.phase_deg", (None,), "absent"),
-    ("mechanics.actuator", ("ram",), '"ram"'),
+    ("mechanics.actuator", RAMS, '"ram"'),
     ("run.average", ("ends",), '"ends"'),
     ("mechanics.contact", ("compliant",), '"compliant"'),
     ("friction.normal_force_file", (None,), "absent"),
@@ -195,7 +196,7 @@ class Scene(BaseModel):
         rig = self.mechanics
         surface, masses = rig.surface_mass, f"mechanics.surface_mass = {rig.surface_mass:g} kg"
         both, of_both = surface, masses
-        if rig.actuator == "ram":
+        if rig.free_ram:
             both = 1.0 / (1.0 / surface + 1.0 / rig.ram_mass)
             of_both = f"mechanics.ram_mass = {rig.ram_mass:g} kg and {masses}"
         for key, most, named in (
@@ -224,7 +225,7 @@ class Scene(BaseModel):
             ("circuit.model", able, " or ".join(f'"{name}"' for name in able)),
             ("coil.count", (1,), "1: each surface has a source of its own"),
             ("mechanics.n_surfaces", (2,), "2"),
-            ("mechanics.actuator", ("ram",), '"ram"'),
+            ("mechanics.actuator", RAMS, '"ram"'),
             ("friction.mu_plate", (0.0,), "0"),
         )
         return self

@@ -381,6 +381,10 @@ class Coil(Table):
         return self
 
 
+RAMS = ("ram",)
+"""Actuators in which a free ram is the coil's reaction body; in all others it is the ground."""
+
+
 class Mechanics(Table):
     """Surface, ram and part."""
 
@@ -416,6 +420,11 @@ class Mechanics(Table):
     gravity: float = _of_fmu("gravity")
     tolerance: float = _of_fmu("tolerance")
     initial_lift: float = _of_fmu("initial_lift")
+
+    @property
+    def free_ram(self) -> bool:
+        """Whether the coil throws a ram."""
+        return self.actuator in RAMS
 
     @model_validator(mode="after")
     def _check(self) -> "Mechanics":

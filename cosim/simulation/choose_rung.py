@@ -1,6 +1,6 @@
 """``circuit.model = "auto"``: the cheapest circuit that a scene can do with.
 
-``choice.csv``, which ``cosim chart choice`` has measured, tells what to expect: where "limited" is
+``choice.csv``, as ``benchmarks.choice`` has measured it, tells what to expect: where "limited" is
 mostly further off than the tolerance, nothing is tried. Else the scene itself decides.
 
 The rungs without ngspice run the whole scene; the behavioural amplifier, which they simplify, runs

@@ -57,18 +57,17 @@ def bounds(scene: Scene) -> Bounds:
     files = scene.files
     netlist = files.pop("netlist", None)
     circuit = named(Path(netlist)) if netlist else [circuits()]
-    first = _load, scene.rung.own_netlist
     reads = *map(str, circuit), *files.values()
-    return Bounds(reads, place(), ngspice_library(), first)
+    return Bounds(reads, place(), ngspice_library(), (_load, None))
 
 
-def _load(code_models: bool) -> None:
+def _load(_: None) -> None:
     """Load what the run will: ngspice looks up whose process this is, which the fence forbids."""
     from cosim.circuit import false_cycles  # noqa: F401
     from cosim.coupling.loop.lead import engine
     from cosim.simulation import here  # noqa: F401
 
-    engine(code_models)
+    engine()
 
 
 def _worked(

@@ -49,7 +49,7 @@ def remarks(
                 found += _ram(scene, columns, surface)
         found += _part(scene, columns)
     told: dict[str, Any] = {"notes": found}
-    if not scene.surface_is_given and scene.mechanics.actuator == "ram":
+    if not scene.surface_is_given and scene.mechanics.free_ram:
         told["rests"] = _rests(scene)
         found += _told_of(told["rests"], scene.mechanics.travel)
     return told
@@ -111,7 +111,7 @@ def _supply(scene: Scene) -> Iterator[str]:
 
 
 def _coil(scene: Scene, summary: Mapping[str, Any]) -> Iterator[str]:
-    if scene.mechanics.actuator != "ram" or scene.run.duration < scene.period:
+    if not scene.mechanics.free_ram or scene.run.duration < scene.period:
         return
     if summary["coil_heat"] > DRIVE_RANGE_HEAT:
         yield (

@@ -80,7 +80,7 @@ def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Ar
     known |= {name: recorder.rows[:, k] for k, name in enumerate(columns) if name in COLUMNS}
     if driven.electric is None:
         del known["back_emf"]
-    if scene.mechanics.actuator == "direct":
+    if not scene.mechanics.free_ram:
         del known["z_ram"], known["v_ram"]
     if (force := recorder.mechanics.normal_force) is not None:
         forces = Tape(1)

@@ -198,16 +198,31 @@ def test_every_form_is_refused(folder, name):
 @pytest.mark.parametrize(
     "data",
     [
-        b"t\nR1 a 0 1 ; \xb5\n.end\n",
+        b"t\nR1 a 0 1\xe9\n.end\n",
         b"t\nR1 a 0 1\xc0\xae\n.end\n",
-        "t\nR1 a 0 1\n.end\n".encode("utf-16"),
+        "t\nR1 a 0 1\n.control\n.end\n".encode("utf-16"),
+        "t\nR1 a 0 1\n.control\n.end\n".encode("utf-16-be"),
+        "t\nR1 a 0 1\n.end\n".encode("utf-16-le")[:-1],
+        "t\nR1 a 0 1\u2028.control\n.end\n".encode("utf-16-le"),
         b"t\nR1 a 0 " + b"1" * 10_000 + b"\n.end\n",
         b"t\nV1 a 0 PWL(" + b"1 " * 200_000 + b")\n.end\n",
         b"t\n" + b"R1 a 0 1\n" * 100_001 + b".end\n",
         b"",
         b"t",
     ],
-    ids=["latin", "overlong", "utf-16", "word", "line", "lines", "empty", "title"],
+    ids=[
+        "latin",
+        "overlong",
+        "utf-16",
+        "16-be",
+        "16-cut",
+        "16-separator",
+        "word",
+        "line",
+        "lines",
+        "empty",
+        "title",
+    ],
 )
 def test_odd_and_huge_files_are_refused(tmp_path, data):
     refused(put(tmp_path, data))

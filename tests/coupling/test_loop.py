@@ -117,7 +117,7 @@ def test_no_step_goes_through_python(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_no_step_asks_for_the_cpu_time() -> None:
     """ngspice would, to print four times a second how far it is."""
     simulate(load("reference", ["run.duration=1", "circuit.max_step=1e-5"]))
-    assert not [line for line in lead.engine(False)._stdout if "Reference value" in line]
+    assert not [line for line in lead.engine()._stdout if "Reference value" in line]
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -19,7 +19,7 @@ from cosim.studies.accuracy import accuracy
 from cosim.studies.accuracy import solvers as methods
 from cosim.studies.accuracy.runs import FALSE_CYCLE, Run
 from cosim.studies.stability import stability
-from cosim.studies.stability.limits import METHODS, Limit
+from cosim.studies.stability.stability import METHODS, Limit
 
 SOLVERS = (*methods.SOLVERS, *charts.SOLVERS)
 RESULTS = Path(__file__).parents[2] / "results"

@@ -2,8 +2,8 @@
 
 import pytest
 
-from cosim.studies.stability.limits import LONGEST, observed, predicted
 from cosim.studies.stability.machines import DIRECT, REFERENCE, Regime
+from cosim.studies.stability.stability import LONGEST, observed, predicted
 
 pytestmark = pytest.mark.physics
 

@@ -5,16 +5,28 @@ What cannot be decided without evaluating the netlist passes.
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import takewhile
 
-from cosim.circuit.lint.deck import Line, refuse, shown, word_set
-from cosim.circuit.lint.elements import MODEL_TYPES, Element, Scope, controls, parse
+from cosim.circuit.lint.deck import Line, refuse, shown
+from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed
 from cosim.circuit.lint.topology import check_topology
+from cosim.circuit.lint.words import word_set, words
 
 REQUIRED = (("vemf", "vcommand"), ("vemf", "vdac", "voffset"))
 """Alternatives, each a set of top-level voltage sources that a co-simulation can replace."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d|\.\d)")
+_WAVES = {"pulse": 7, "sin": 6, "exp": 6}
+"""Most values of each: one more is a number of periods in LTspice, and a phase in ngspice."""
+_FOREIGN = {
+    "d": ("roff vfwd vrev rrev ilimit revilimit epsilon revepsilon",
+          "LTspice's ideal diode; write is, n and rs, or a B source"),
+    "s": ("lser vser ilimit epsilon", "LTspice's own; write the part apart"),
+    "w": ("lser vser ilimit epsilon", "LTspice's own; write the part apart"),
+}  # fmt: skip
+"""Parameters of models that change the device and that ngspice would ignore."""
+_BELOW = re.compile(r"\b[vi]h\s*=\s*[{']?\s*-\s*[.\d]", re.IGNORECASE)
 _NO_VALUES = {"m", "temp", "dtemp", "tc", "tc1", "tc2", "ic", "scale", "noisy"}
 _WAVEFORMS = word_set(
     """dc ac pulse sin exp pwl sffm am trnoise trrandom external distof1 distof2 portnum z0 pwr freq
@@ -79,8 +91,8 @@ def _check_element(element: Element, scope: Scope, names: Names) -> None:
     elif kind in "fhw":
         _check_current_controlled(element, scope)
     elif kind == "k":
-        if len(element.words) < 3:
-            element.refuse(" must name two inductors and their coupling")
+        if len(element.words) != 3:
+            element.refuse(" must name two inductors and their coupling; write K pair by pair")
         _check_named(element, scope, "inductor", element.words[:2])
     elif kind == "t" and not any(word.startswith(("z0=", "zo=")) for word in element.words):
         element.refuse(" has no Z0=…")
@@ -101,8 +113,19 @@ def _check_model(element: Element, scope: Scope) -> None:
         return
     types = scope.model_types(name)
     if types is None:
-        element.refuse(f": no model {shown(name)} is defined here")
+        element.refuse(f": no model {shown(name)} is defined here{COPY}")
     _check_type(element, name, types)
+    line = next((s.model_lines[name] for s in scope.chain() if name in s.model_lines), None)
+    foreign, cure = _FOREIGN.get(element.kind, ("", ""))
+    for key in foreign.split() if line is not None else ():
+        if any(word.startswith(f"{key}=") for word in words(line.text)):
+            refuse(line, f"{key} of {shown(name)} is {cure}")
+    if line is not None and element.kind in "sw" and _BELOW.search(line.text):
+        refuse(
+            line,
+            f"a hysteresis below 0 is LTspice's smooth switch, which ngspice lacks; give "
+            f"{shown(name)} one of 0, or write a B source",
+        )
 
 
 def _check_type(element: Element, model: str, types: set[str]) -> None:
@@ -128,6 +151,20 @@ def _check_passive(element: Element, scope: Scope, names: Names) -> None:
 
 
 def _check_source(element: Element, scope: Scope, names: Names) -> None:
+    for wave, most in _WAVES.items():
+        place = element.words.index(wave) + 1 if wave in element.words else len(element.words)
+        values = takewhile(_is_value, element.words[place:])
+        if len([*values]) > most:
+            element.refuse(
+                f": {wave.upper()} takes {most} values; one more means a number of periods to "
+                "LTspice and a phase to ngspice"
+            )
+    if "pwl" in element.words:
+        after = element.words[element.words.index("pwl") + 1 :]
+        if any(word.startswith("+") for word in after[::2]):
+            element.refuse(": write the times of PWL since the start, not since the last one")
+        if "repeat" in after:
+            element.refuse(": instead of REPEAT write r=0 after the points of PWL")
     for word in element.words:
         plain = word.lstrip("+-")
         known = plain in _WAVEFORMS or names.is_parameter(scope, plain)
@@ -136,16 +173,19 @@ def _check_source(element: Element, scope: Scope, names: Names) -> None:
         element.refuse(f": {shown(word)} is neither a number, a parameter nor a waveform")
 
 
+def _is_value(word: str) -> bool:
+    return word not in _WAVEFORMS and "=" not in word
+
+
 def _check_current_controlled(element: Element, scope: Scope) -> None:
     found = element.words
     if element.kind != "w" and (not found or "=" in found[0] or found[0][0] in "{'"):
         return
-    place = controls(found, 1)
-    if place is None:
+    if found[:1] == ["poly"]:
         return
-    if len(found) <= place.stop:
+    if len(found) < 2:
         element.refuse(" has too few words")
-    _check_named(element, scope, "source", _plain(found[place]))
+    _check_named(element, scope, "source", _plain(found[:1]))
 
 
 def _check_named(element: Element, scope: Scope, what: str, names: Iterable[str]) -> None:
@@ -163,7 +203,9 @@ def _check_call(element: Element, scope: Scope) -> None:
     name = element.model or ""
     subcircuits = scope.subcircuit(name)
     if subcircuits is None:
-        element.refuse(f": no subcircuit {shown(name)} is defined here")
+        element.refuse(
+            f": no subcircuit {shown(name)} is defined here; include the file with its .subckt"
+        )
     counts = {len(subcircuit.pins) for subcircuit in subcircuits}
     if len(element.nodes) not in counts:
         element.refuse(

@@ -1,5 +1,5 @@
-/* What the coupled loop's files share, and share with cosim/coupling/loop/structures.py, whose
-   structures have the same fields in the same order. SI throughout.
+/* What the coupled loop's files share, and share with Python, which has the structures and functions
+   from here (cosim/toolchain/libraries.py). SI throughout.
 
    Order of calls in a run that ngspice leads:
 
@@ -306,6 +306,8 @@ typedef struct Ports {
 
 EXPORT void ports_begin(Ports *c);
 EXPORT void ports_finish(Ports *c);
+/* How often the vector at this place among those sent has turned back since the run began. */
+EXPORT int ports_turns(int place);
 
 /* What ngspice calls while no Lead is under way. */
 int ports_source(double *value, double time, const char *node);

@@ -390,6 +390,36 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
     return 1;
 }
 
+/* --- vectors that swing --- */
+
+enum { WATCHED = 1024 };
+static const double SWING = 1e-3; /* of a vector's largest magnitude; less is none */
+static struct {
+    double turned, most; /* the last extreme; the largest magnitude */
+    int down, turns;
+} watched[WATCHED];
+
+static void watch(const VectorValues *data)
+{
+    for (int k = 0; k < data->count && k < WATCHED; k++) {
+        const double value = data->vectors[k]->creal;
+        const double on = watched[k].down ? watched[k].turned - value : value - watched[k].turned;
+        watched[k].most = fmax(watched[k].most, fabs(value));
+        if (on < -SWING * watched[k].most) {
+            watched[k].down = !watched[k].down;
+            watched[k].turns++;
+        } else if (on < 0.0) {
+            continue;
+        }
+        watched[k].turned = value;
+    }
+}
+
+int ports_turns(int place)
+{
+    return place < WATCHED ? watched[place].turns : 0;
+}
+
 /* --- what ngspice calls --- */
 
 static int is_named(const Source *s, const char *node)
@@ -428,6 +458,7 @@ int ports_data(const VectorValues *data)
     for (int64_t k = 0; k < c->n_saved; k++)
         c->now[k] = data->vectors[c->places[k]]->creal;
     c->sent = data->vectors[c->places[c->n_saved]]->creal;
+    watch(data);
     return 0;
 }
 
@@ -460,6 +491,7 @@ int ports_step(double time, double *delta, double old_delta, int redo, int locat
 
 void ports_begin(Ports *c)
 {
+    memset(watched, 0, sizeof watched);
     for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
         if (!get_outputs(s))
             fmu_failed(c, s);

@@ -96,7 +96,7 @@ class Run:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         state, duration = self.state, self._scene.run.duration
         try:
-            self._engine().transient(self.deck.text, self.deck.vectors, self)
+            engine().transient(self.deck.text, self.deck.vectors, self)
         finally:
             self._attend()
             for side, state_of in zip(self.plan.sides, self.fmus, strict=False):
@@ -119,13 +119,9 @@ class Run:
         if reached < duration * (1 - 1e-9):
             raise SimulationFailed(
                 f"ngspice stopped at t = {reached:.6g} s of {duration:g} s: "
-                f"{self._engine().said()}. If the circuit is right, a smaller circuit.max_step or "
+                f"{engine().said()}. If the circuit is right, a smaller circuit.max_step or "
                 "another circuit.reltol may help."
             )
-
-    @staticmethod
-    def _engine() -> ngspice.Engine:
-        return engine(True)
 
     @property
     def steps(self) -> int:
@@ -135,7 +131,7 @@ class Run:
     @property
     def versions(self) -> dict[str, str]:
         """Of ngspice."""
-        return {"ngspice": str(self._engine().ngspice_version)}
+        return {"ngspice": str(engine().ngspice_version)}
 
     def _fmu_failure(self) -> SimulationFailed:
         side = self.plan.sides[self.state.failed]
@@ -172,7 +168,7 @@ class Run:
         self.state.stopped = 1
 
     def _fail(self, failure: BaseException) -> None:
-        self._engine().fail(failure)
+        engine().fail(failure)
 
     def _attend(self) -> None:
         """Take the logs away."""

@@ -1,10 +1,8 @@
 """Rung ``ideal``: the coil's current is the command's, whatever voltage it takes."""
 
 from collections.abc import Sequence
-from ctypes import c_double, c_int64, c_void_p
 from dataclasses import replace
-from functools import cache, partial
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -19,17 +17,6 @@ from cosim.scene import Scene
 from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
 from cosim.simulation.rungs.rung import Driven, Rung
 from cosim.toolchain.libraries import library
-
-
-@cache
-def _library() -> Any:
-    found = library("loop")
-    found.coil_rows.restype = None
-    found.coil_rows.argtypes = (
-        *(c_int64, *(c_void_p,) * 4, *(c_double,) * 5),
-        *(c_int64, c_int64, c_void_p),
-    )
-    return found
 
 
 class Ideal(Rung):
@@ -99,7 +86,7 @@ class _Coil:
         edges, start, end = (np.ascontiguousarray(values) for values in (edges, start, end))
         for few in blocks(stop - first):
             write = partial(
-                _library().coil_rows,
+                library("loop").coil_rows,
                 *(len(h), edges.ctypes.data, start.ctypes.data, end.ctypes.data),
                 None if branch is None else branch.ctypes.data,
                 *(scene.coil.resistance, scene.coil.inductance, eddy.resistance, eddy.tau),

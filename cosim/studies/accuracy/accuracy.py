@@ -21,7 +21,7 @@ from cosim.studies.accuracy.cases import CASES
 from cosim.studies.accuracy.runs import Run, measure, reference
 from cosim.studies.accuracy.solvers import DEFAULT, SOLVERS, Solver
 from cosim.studies.plots import BLUE, FAINT, GREEN, PURPLE, SKY, VERMILION, End, label_ends, panels
-from cosim.studies.report import Progress, Report, silent
+from cosim.studies.report import Progress, Report, reported, silent
 from cosim.studies.tables import Row, brief, span
 
 EQUAL_TIME, EQUAL_ERROR = 0.5, 1e-3
@@ -156,16 +156,15 @@ def accuracy(
     """
     solvers = (*SOLVERS, *more)
     cases = [case for case in CASES.values() if not case.netlist][-1 if quick else 0 :]
-    with Store(None if out is None else Path(out) / STORE, quick) as store:
+
+    def made(store: Store) -> Report:
         runs: list[Run] = []
         for done, case in enumerate(cases, 1):
             runs += measure(case, solvers, 1 if quick else _ROUNDS, store)
             progress(done, len(cases), case.title)
-        found = report(runs, solvers)
-        if out is not None:
-            found.save(out)
-        store.remove()
-    return found
+        return report(runs, solvers)
+
+    return reported(made, out, STORE, quick)
 
 
 def report(runs: Sequence[Run], solvers: Sequence[Solver] = SOLVERS) -> Report:

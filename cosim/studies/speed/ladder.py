@@ -18,7 +18,7 @@ from cosim.scene.loading import Overrides
 from cosim.simulation.fidelity import relative_error
 from cosim.simulation.simulate import simulate
 from cosim.studies.plots import GREEN, panels
-from cosim.studies.report import Progress, Report, counted, silent
+from cosim.studies.report import Progress, Report, counted, reported, silent
 from cosim.studies.tables import Row, brief, markdown
 
 RUNGS = ("ideal", "limited", "amplifier", "full")
@@ -132,13 +132,10 @@ def ladder(
     """
     every = [load(scene, overrides) for scene in scenes]
     tick = counted(progress, runs_in_all() * len(every))
-    path = None if out is None else Path(out) / STORE
-    with Store(path, [scene.as_dict() for scene in every]) as store:
-        found = report([(scene, each_rung(scene, store, tick)) for scene in every])
-        if out is not None:
-            found.save(out)
-        store.remove()
-    return found
+    return reported(
+        lambda store: report([(scene, each_rung(scene, store, tick)) for scene in every]),
+        *(out, STORE, [scene.as_dict() for scene in every]),
+    )
 
 
 def report(found: Found) -> Report:
