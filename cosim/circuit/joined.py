@@ -66,6 +66,7 @@ def deck(
     max_step: float,
     asked: bool,
     known: Mapping[str, float],
+    called: str = "[[port]] source",
 ) -> Deck:
     """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved;
     where they are ``asked`` for within a step, each as a device's parameter. ``known`` are values
@@ -81,7 +82,7 @@ def deck(
         if source.lower() not in found or source[0].lower() not in "vi":
             able = sorted(each for each in found if each[0] in "vi")
             hint = suggestion(source.lower(), able) or f" (it has {', '.join(able) or 'none'})"
-            shown = f'[[port]] source = "{plain(source)}"'
+            shown = f'{called} = "{plain(source)}"'
             raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
     top, every = check_reading(
         path, lines, words, asks, [[source.lower() for source in sources]], asked

@@ -27,8 +27,8 @@ def keep(
     points: Sequence[int],
     workers: int | None,
 ) -> None:
-    """Run ``points`` once more, here, and write their waveforms ``names`` from ``run.settle`` on, each
-    point's as ``NUMBER.nc``. Raises CosimError."""
+    """Run ``points`` once more, here, and write their waveforms ``names`` from ``run.settle`` on,
+    each point's as ``NUMBER.nc``. Raises CosimError."""
     from cosim.simulation.simulate import simulate
 
     def kept(common: Scene, number: int, progress: Progress) -> None:
