@@ -160,7 +160,7 @@ def test_the_path_of_a_slide_is_the_exact_one() -> None:
         z = part.exact(time[[0, -1]], slow, output=time, v0=0.1, gravity=9.81, **law).z
         ends = np.array([time[0]]), np.array([time[-1]])
         span = Span(-1, np.arange(0), np.arange(16), np.arange(0), *ends)
-        nothing = Track(z, np.gradient(z, time), z, z)
+        nothing = Track(z, np.gradient(z, time))
         trial = Trial("any", 1, time, nothing, nothing, None)
         found = slide(trial, span, 2e-6, 1e5)
         assert found is not None
@@ -200,7 +200,7 @@ def test_forces_from_a_file(ending: str, tmp_path: Path) -> None:
         ("f.csv", "trial,lower,upper\na,3,2\n", "lower must not be above upper, and is 3"),
         ("f.csv", "trial,force\n", "holds no forces"),
         ("f.toml", "a = 1", "“a” must be the table of a trial"),
-        ("f.toml", "[a", "this is not TOML"),
+        ("f.toml", "[a", "is no valid TOML"),
     ],
 )
 def test_what_is_wrong_with_a_file_of_forces(

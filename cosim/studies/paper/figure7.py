@@ -17,8 +17,7 @@ from cosim.arrays import Array
 from cosim.files.picture import Picture
 from cosim.studies.compare.each import each
 from cosim.studies.compare.run import Comparison
-from cosim.studies.fit.cases import FIRST_ROW
-from cosim.studies.fit.fit import fit
+from cosim.studies.fit.fit import FIRST_ROW, fit
 from cosim.studies.fit.results import Shown
 from cosim.studies.paper.figures import DASHED, PART, SURFACE
 from cosim.studies.report import Progress, Report, silent
