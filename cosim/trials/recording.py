@@ -1,6 +1,6 @@
 """What was measured of a machine, whatever its instruments: a camera, a vibrometer, a scope."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,15 @@ class Recording:
     understood: dict[str, Any] = field(default_factory=dict)
     """What was made of the file, for a JSON file: ``rows``, ``span`` (s), ``rate`` (1/s), ``gaps``
     (sentences), and for each of ``columns`` its header, unit, and how many values are missing."""
+
+    def rows(self, chosen: slice) -> "Recording":
+        """Some of the rows; time 0 is the first of them."""
+        return replace(
+            self,
+            time=self.time[chosen] - self.time[chosen][0],
+            signals={name: values[chosen] for name, values in self.signals.items()},
+            v_across=self.v_across[chosen],
+        )
 
     def told(self) -> list[str]:
         """What was understood, in lines."""
