@@ -266,11 +266,12 @@ def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(
     given = (f'[rig."{key}"]\nvalue = {value}\n' for key, value in RIG.items() if key not in free)
     bounds = tmp_path / "bounds.toml"
     bounds.write_text("".join(given))
-    brief = Effort(1, 12, ((2, 15, 0.12), (1, 30, 0.06)), ((1, 15, 0.1),), 1, 1)
+    brief = Effort(1, 6, ((2, 6, 0.12), (1, 12, 0.06)), ((1, 6, 0.1),), 1, 1)
     monkeypatch.setattr(run, "QUICK", brief)
-    monkeypatch.setattr(plan, "SCREENED", 32)
-    monkeypatch.setattr(plan, "AGAIN", (64, 8, 3))
-    monkeypatch.setattr(plan, "CAREFUL", (128, 8, 3))
+    monkeypatch.setattr(plan, "SCREENED", 16)
+    monkeypatch.setattr(plan, "AGAIN", (32, 6, 3))
+    monkeypatch.setattr(plan, "CAREFUL", (64, 6, 3))
+    monkeypatch.setattr(plan, "LAST", 10)
     more: dict[str, Any] = {"bounds": bounds, "quick": True, "seed": 4}
     whole = identify(tmp_path, workers=2, out=tmp_path / "out", **more)
     plain, done = Store.add, [0]

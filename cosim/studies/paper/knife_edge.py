@@ -24,15 +24,14 @@ PERIODS = 20
 STEP, V_MIN = part.PUBLISHED_STEP, part.PUBLISHED_V_MIN
 
 Method = Callable[..., part.PartMotion]
-_THRESHOLD = partial(part.threshold, v_min=V_MIN)
-METHODS: dict[str, Method] = {
-    "exact": part.exact,
-    f"Moreau, {STEP * 1e3:g} ms": partial(part.moreau, step=STEP),
-    f"threshold {V_MIN * 1e6:g} µm/s, {STEP * 1e3:g} ms": partial(_THRESHOLD, step=STEP),
-    f"threshold {V_MIN * 1e6:g} µm/s, {STEP * 1e4:g} µs": partial(_THRESHOLD, step=STEP / 100),
+_THRESHOLD, _NAME = partial(part.threshold, v_min=V_MIN), f"threshold {V_MIN * 1e6:g} µm/s"
+METHODS: dict[str, tuple[Method, str, str]] = {
+    "exact": (part.exact, "#1f6fb2", "-"),
+    f"Moreau, {STEP * 1e3:g} ms": (partial(part.moreau, step=STEP), "#2a9d8f", "--"),
+    f"{_NAME}, {STEP * 1e3:g} ms": (partial(_THRESHOLD, step=STEP), "#e9a03b", "-"),
+    f"{_NAME}, {STEP * 1e4:g} µs": (partial(_THRESHOLD, step=STEP / 100), "#d1495b", "-"),
 }
-COLORS = ("#1f6fb2", "#2a9d8f", "#e9a03b", "#d1495b")
-STYLES = ("-", "--", "-", "-")
+"""Ways to solve, with colours and styles of their curves."""
 TIMING, FORCE = "timing error [periods]", "f_n [m_P g]"
 CLOSED_FORM: dict[str, Any] = {"color": "0.2", "alpha": 0.3, "label": "closed form"}
 
@@ -78,7 +77,7 @@ def write(out_dir: Path, case: Transport) -> None:
         (left, TIMING, errors, [(mistimed(optimum, error), case) for error in errors]),
         (right, FORCE, ratios, [(optimal_cycle(one, margin=1e-6), one) for one in pressed]),
     ):
-        for (name, method), color, style in zip(METHODS.items(), COLORS, STYLES, strict=True):
+        for name, (method, color, style) in METHODS.items():
             curve = [simulated(method, *one) for one in cycles]
             curves.append((over, values, name, curve))
             axis.plot(values, np.array(curve) * 1e3, color=color, ls=style, lw=1.4, label=name)

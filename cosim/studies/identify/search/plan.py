@@ -53,6 +53,8 @@ AGAIN = 256, 16, 4
 """The same before a solution is searched further."""
 CAREFUL = 512, 24, 5
 """The same where a trial's own parameters must be the best there are."""
+LAST = 40
+"""Generations at the finish's step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +149,7 @@ class Plan:
 
         def work(rng: np.random.Generator) -> list[Found]:
             start = fine.rescreened(fine.refined(found.point, found.own, 4), rng, *CAREFUL)
-            nested = fine.nested(start, rng, 40, 0.01, self._telling(f"{name}: finish"))
+            nested = fine.nested(start, rng, LAST, 0.01, self._telling(f"{name}: finish"))
             return [finish(fine, best_of([start, nested]), 12)]
 
         return self._stage(f"{name}: finish", work)[0]
