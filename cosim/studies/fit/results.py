@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
-
-Row = dict[str, Any]
+from cosim.studies.tables import Row
 
 
 @dataclass(frozen=True)

@@ -15,34 +15,12 @@ from cosim.evaluate.store import Store
 from cosim.files.picture import Picture
 from cosim.scene import keys
 from cosim.studies.identify.problem.space import Space, read_space
-from cosim.studies.identify.problem.targets import (
-    TRANSPORT,
-    WEIGHTS,
-    Measured,
-    read_trials,
-)
-from cosim.studies.identify.report import figures, files
-from cosim.studies.identify.report.measures import (
-    Row,
-    bands,
-    errors,
-    own_parameters,
-    repeatability,
-    samples,
-)
-from cosim.studies.identify.report.solved import (
-    KINDS,
-    Solved,
-    errors_on,
-    overall,
-    told_of_force,
-    told_of_law,
-    told_of_rig,
-    told_of_trials,
-)
+from cosim.studies.identify.problem.targets import TRANSPORT, WEIGHTS, Measured, read_trials
+from cosim.studies.identify.report import figures, files, measures, solved
 from cosim.studies.identify.report.verdicts import judge, rigs_meant
 from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds, searched
 from cosim.studies.identify.search.search import Found, Progress, Search, best_of
+from cosim.studies.tables import Row
 
 UNSTEADY = 0.5
 """Repeatability of a velocity (NRMSE of its cycles) beyond which no steady drive explains it."""
@@ -50,7 +28,7 @@ UNSTEADY = 0.5
 STORE = "identify.sqlite"
 
 
-class Identification(Solved):
+class Identification(solved.Solved):
     """A finished identification."""
 
     def plot(self) -> Picture:
@@ -134,48 +112,52 @@ def _identified(
     laws = [searched(several) for several in plans]
     best = best_of([law.best for law in laws])
     plan = plans[[law.best for law in laws].index(best)][0]
-    effective = samples(trials, best)
+    effective = measures.samples(trials, best)
     meant = rigs_meant(laws, effective)
     verdicts = judge(best, meant, any(law.converged for law in laws))
     rigs, held_out = _folds(plan, trials) if len(trials) >= 3 else ([], [])
     aside = replace(plan.fine, targets=[trial.fine for trial in apart])
     own = plan.drives("trials apart", best.point, aside).own if apart else np.empty((0, 0))
-    rows, checks = told_of_trials(trials, best)
-    made_up = errors_on(_made_up(plans[0][0]), trials)
-    told = [told_of_law(trials, law) for law in laws]
+    rows, checks = solved.told_of_trials(trials, best)
+    made_up = solved.errors_on(_made_up(plans[0][0]), trials)
+    told = [solved.told_of_law(trials, law) for law in laws]
     numbers = {
         "cost": best.total,
         "rig": best.settings,
         "verdicts": [asdict(verdict) for verdict in verdicts],
-        "overall": overall(rows),
+        "overall": solved.overall(rows),
         "trials": rows,
         "apart": [
-            errors(trial, best.rig, one) | repeatability(trial) | own_parameters(one)
+            measures.errors(trial, best.rig, one)
+            | measures.repeatability(trial)
+            | measures.own_parameters(one)
             for trial, one in zip(apart, own, strict=True)
         ],
         "held_out": held_out,
-        "held_out_overall": {kind: overall([one[kind] for one in held_out]) for kind in KINDS}
+        "held_out_overall": {
+            kind: solved.overall([one[kind] for one in held_out]) for kind in solved.KINDS
+        }
         if held_out
         else None,
-        "made_up_rig": {"overall": overall(made_up), "trials": made_up},
+        "made_up_rig": {"overall": solved.overall(made_up), "trials": made_up},
         "exact_rungs_v_average_mm_per_s": checks,
         "bands": [
             row
             for trial, one in zip(trials, best.own, strict=True)
-            for row in bands(trial, best.rig, one)
+            for row in measures.bands(trial, best.rig, one)
         ],
         "converged": [law["law"] for law in told if law["converged"]],
         "effective_samples": effective,
         "laws": told,
-        "force": told_of_force(meant),
-        "ensemble": [told_of_rig(one, best) for one in meant],
-        "folds": [told_of_rig(one) for one in rigs],
+        "force": solved.told_of_force(meant),
+        "ensemble": [solved.told_of_rig(one, best) for one in meant],
+        "folds": [solved.told_of_rig(one) for one in rigs],
     }
     return Identification(trials, best, apart, own, meant, verdicts, numbers)
 
 
 def _steady(trial: Measured) -> bool:
-    found = repeatability(trial)["floor_late"]
+    found = measures.repeatability(trial)["floor_late"]
     return found is None or found <= UNSTEADY
 
 
@@ -204,8 +186,8 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[Ro
         both = plan.drives(f"{name}: surface and part", rig.point, transport)
         for k, *owns in zip(left, alone.own, both.own, strict=True):
             held_out[k] = {"trial": trials[k].label, "fold": number} | {
-                kind: errors(trials[k], rig.rig, own) | own_parameters(own)
-                for kind, own in zip(KINDS, owns, strict=True)
+                kind: measures.errors(trials[k], rig.rig, own) | measures.own_parameters(own)
+                for kind, own in zip(solved.KINDS, owns, strict=True)
             }
     return rigs, [held_out[k] for k in sorted(held_out)]
 

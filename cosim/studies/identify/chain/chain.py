@@ -4,8 +4,8 @@ trials, and the fit of each trial's own parameters. See ``refine.h`` and
 """
 
 import ctypes
-import threading
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, Structure, addressof, byref, c_double, c_int64, c_longlong, c_void_p
 from dataclasses import dataclass, field
 from functools import cache
@@ -39,11 +39,9 @@ class _Trial(Structure):
     )
 
 
-class _Job(Structure):
-    _fields_ = (
-        *((name, c_void_p) for name in ("trial", "rig", "own", "cost")),
-        ("rounds", c_int64),
-    )
+_JOB = np.dtype(
+    [*((name, np.uintp) for name in ("trial", "rig", "own", "cost")), ("rounds", np.int64)]
+)
 
 
 @cache
@@ -152,24 +150,21 @@ def look_around(
 def _work(
     targets: Sequence[Target], rigs: Array, own: Array, cost: Array, rounds: int, workers: int
 ) -> None:
-    n = len(targets)
-    jobs = (_Job * n)()
-    for i, target in enumerate(targets):
-        jobs[i].trial, jobs[i].rounds = target.address, rounds
-        jobs[i].rig, jobs[i].own = rigs[i].ctypes.data, own[i].ctypes.data
-        jobs[i].cost = cost.ctypes.data + i * cost.strides[0]
-    done, functions = c_longlong(0), compiled()
-    failed: list[int] = []
+    n, done = len(targets), c_longlong(0)
+    jobs = np.zeros(n, _JOB)
+    jobs["trial"], jobs["rounds"] = [target.address for target in targets], rounds
+    for name, each in (("rig", rigs), ("own", own), ("cost", cost)):
+        jobs[name] = each.ctypes.data + np.arange(n) * each.strides[0]
 
-    def work() -> None:
-        failed.append(functions.chain_work(byref(jobs), n, byref(done)))
+    def work(_: int) -> int:
+        return compiled().chain_work(jobs.ctypes.data, n, byref(done))
 
-    threads = [threading.Thread(target=work) for _ in range(min(workers, n) - 1)]
-    for thread in threads:
-        thread.start()
-    work()
-    for thread in threads:
-        thread.join()
+    threads = range(min(workers, n))
+    if len(threads) == 1:
+        failed = [work(0)]
+    else:
+        with ThreadPoolExecutor(len(threads)) as pool:
+            failed = [*pool.map(work, threads)]
     if any(failed):
         raise SimulationFailed("There is no memory for the simulation of the trials.")
 
@@ -200,4 +195,4 @@ def simulate(target: Target, rigs: Array, own: Array) -> tuple[dict[str, Array],
 def sizes() -> tuple[tuple[int, int], tuple[int, int]]:
     """Bytes of the two structures, here and in the compiled code."""
     there = compiled().chain_sizes
-    return (ctypes.sizeof(_Trial), there(0)), (ctypes.sizeof(_Job), there(1))
+    return (ctypes.sizeof(_Trial), there(0)), (_JOB.itemsize, there(1))

@@ -10,9 +10,10 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from cosim.files.picture import Picture, grid
 from cosim.scene import keys
 from cosim.studies.identify.problem.space import OF_LAWS
-from cosim.studies.identify.report.measures import Row, shown
+from cosim.studies.identify.report.measures import shown
 from cosim.studies.identify.report.solved import KINDS, Solved
 from cosim.studies.identify.report.verdicts import forces
+from cosim.studies.tables import Row
 
 MEASURED, SIMULATED, OTHER, FLOOR = "0.15", "#d1495b", "#1f6fb2", "#2a9d8f"
 

@@ -7,10 +7,10 @@ from typing import Any
 from cosim.files.atomic import write_json, write_text
 from cosim.studies.identify.problem.gauges import GAUGES
 from cosim.studies.identify.report import figures
-from cosim.studies.identify.report.measures import Row
 from cosim.studies.identify.report.scenes import rounded, scene_file, trial_settings
 from cosim.studies.identify.report.solved import Solved
 from cosim.studies.report import Report
+from cosim.studies.tables import Row
 
 COLUMNS = {
     "nrmse_v_surface": "velocity",

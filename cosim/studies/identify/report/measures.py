@@ -7,7 +7,6 @@ straight line through its height.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from cosim.stepper.stepper import OWN
 from cosim.studies.identify.chain.chain import simulate
 from cosim.studies.identify.problem.targets import Measured
 from cosim.studies.identify.search.search import Found
+from cosim.studies.tables import Row
 from cosim.trials.camera import velocities
 
 LATE = 5
@@ -23,8 +23,6 @@ LATE = 5
 
 BANDS = (0.0, 15.0, 30.0, 80.0, 150.0, 300.0, 480.0)
 """Ends of the frequency bands, Hz."""
-
-Row = dict[str, Any]
 
 
 def shown(trial: Measured, rig: Array, own: Array) -> dict[str, Array]:

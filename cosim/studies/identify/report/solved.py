@@ -11,11 +11,12 @@ from cosim.mechanics.stickslip import rests_of
 from cosim.stepper.stepper import OWN
 from cosim.studies.identify.problem.space import SUSPENSION
 from cosim.studies.identify.problem.targets import Measured
-from cosim.studies.identify.report.measures import Row, errors, own_parameters, repeatability
+from cosim.studies.identify.report.measures import errors, own_parameters, repeatability
 from cosim.studies.identify.report.scenes import exact, trial_settings
 from cosim.studies.identify.report.verdicts import Verdict, at_bounds, forces
 from cosim.studies.identify.search.plan import Searched
 from cosim.studies.identify.search.search import Found
+from cosim.studies.tables import Row
 
 PLACES = np.linspace(-2e-3, 2e-3, 9)
 """Of the ram in the actuator (q, m), at which the suspension's force is told."""
