@@ -53,7 +53,7 @@ class Trial:
         frequency = numbers["frequency_measured"]
         period = 1.0 / frequency if frequency else None
         solved = {"theirs": self.theirs, "exact": self.exact}
-        velocities = {"measured": numbers["drift_measured"]}
+        velocities: dict[str, float | None] = {"measured": numbers["drift_measured"]}
         velocities |= {side: drift(*one.simulated, period) for side, one in solved.items()}
         velocities["machine"] = numbers["drift_simulated"]
         errors = {side: one.error * 1e3 for side, one in solved.items()}
