@@ -4,6 +4,7 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -75,14 +76,12 @@ def sweep(
     design = grid(over) if samples is None else sample(over, samples, seed, random)
     if keep and out is None:
         raise BadInput("keep: waveforms are kept in a folder; name one as out.")
-    if out is None:
-        with TemporaryDirectory() as folder:
-            return _sweep(scene, design, Path(folder), (), workers, dask, progress)
-    folder = Path(out)
-    data = _sweep(scene, design, folder, keep, workers, dask, progress)
-    from cosim.studies.sweep import figure
+    with TemporaryDirectory() if out is None else nullcontext(out) as folder:
+        data = _sweep(scene, design, Path(folder), keep, workers, dask, progress)
+        if out is not None:
+            from cosim.studies.sweep import figure
 
-    figure.draw(data, scene.name).write(folder / FIGURE)
+            figure.draw(data, scene.name).write(Path(out) / FIGURE)
     return data
 
 
@@ -108,19 +107,17 @@ def _sweep(
     with Evaluator(
         scene, folder / STORE, *asked, whole_periods=whole_periods, workers=workers, dask=dask
     ) as bench:
-        done: set[int] = set()
+        before: set[int] = set()
         for number in range(total) if bench.resumed else ():
             if (outcome := bench.known(design.point(number))) is not None:
                 numbers.add(number, outcome)
-                done.add(number)
-        before = frozenset(done)
-        progress(len(done), numbers.failed, total)
+                before.add(number)
+        progress(len(before), numbers.failed, total)
         due = time.monotonic() + _REFRESH
         points = ((n, design.point(n)) for n in range(total) if n not in before)
-        for number, outcome in bench.run(points):
+        for done, (number, outcome) in enumerate(bench.run(points), len(before) + 1):
             numbers.add(number, outcome)
-            done.add(number)
-            progress(len(done), numbers.failed, total)
+            progress(done, numbers.failed, total)
             if time.monotonic() >= due:
                 began = time.monotonic()
                 try:
