@@ -128,12 +128,17 @@ def _notes(run: Run) -> Iterator[str]:
         yield f"ngspice knows no {', '.join(ignored)} of a model, and ignored it."
     often = run.steps * run.plan.scene.circuit.max_step / run.state.duration
     if often > _OFTEN and run.steps > _LONG:
-        nodes = [k for k, name in enumerate(engine().sent) if not re.search("#|cosim_", name)]
-        turns, place = max((loop().ports_turns(k), k) for k in nodes)
+        turns = {
+            name: loop().ports_turns(k)
+            for k, name in enumerate(engine().sent)
+            if not re.search("#|cosim_", name)
+        }
+        # Where about all of a loop rings, a node that the user has named tells more.
+        node = max(turns, key=lambda name: turns[name] * (0.8 if "." in name else 1.0))
         yield (
             f"the circuit took {run.steps} steps, {often:.0f} times as many as circuit.max_step "
-            f"asks for. It turned most often, {turns} times, at node {engine().sent[place]}: if it "
-            "rings there, damp it, say by a resistor and a capacitor to ground."
+            f"asks for. It turned most often, {turns[node]} times, at node {node}: if it rings "
+            "there, damp it, say by a resistor and a capacitor to ground."
         )
     for side, state in zip(run.plan.sides, run.fmus, strict=False):
         steps, moved = side.fmu.steps, state.moved
