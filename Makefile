@@ -35,7 +35,7 @@ PIP := $(PY) -m pip --disable-pip-version-check --no-input -q
 VENV_READY := $(shell test -x $(PY) && test "$$(cat $(VENV)/.created 2>/dev/null)" = "$$(pwd)" && echo yes)
 
 # What is compiled, and what compiles it.
-SOURCES := $(sort $(shell find fmu/src fmu/include cosim -path cosim/_compiled -prune -o \
+SOURCES := $(sort $(shell find fmu/src fmu/include fmu/thin fmu/netlist fmu/models cosim -path cosim/_compiled -prune -o \
 	-type f \( -name '*.[ch]' -o -name '*.def' \) -print)) build_c.py setup.py pyproject.toml fmu/LICENSE
 COMPILED := cosim/_compiled/build.json
 

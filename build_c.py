@@ -4,6 +4,8 @@
 
     loop.so and other  libraries of the package, loaded by cosim.toolchain.libraries
     fmi2/, fmi3/       the FMU of the mechanics for FMI 2.0 and 3.0, as its .fmu files hold it
+    models/            the other FMUs of FMI 3.0, unpacked; they belong to scenes of the library
+    netlist.so         what makes an FMU of a netlist
     build.json         a hash of all that this was made of, the compiler and its flags, the size and
                        hash of each file, by which a damaged one is told from a whole one, and the
                        functions and structures of each library, as its C declares them
@@ -11,6 +13,7 @@
 The same sources, compiler and flags give the same bytes.
 """
 
+import ctypes
 import hashlib
 import json
 import os
@@ -40,6 +43,8 @@ LIBRARIES = {
 }
 """The package's libraries; each is made of all C files of its folders."""
 DESCRIBE = FMU / "src/fmi/describe.c"
+THIN = tuple(FMU / folder for folder in ("thin", "netlist", "models"))
+"""What makes FMUs of models with numbers alone, and those models."""
 FMU_LICENSE = FMU / "LICENSE"
 
 # Without contraction every platform computes the same bits. The other two -fno leave them as they
@@ -50,6 +55,7 @@ FLAGS = (
 )
 # Older systems have threads in a library of their own.
 THREADS = () if sys.platform == "win32" else ("-pthread",)
+LOADER = ("-ldl",) if sys.platform == "linux" else ()
 LIBRARY_FLAGS = ("-fPIC", "-fvisibility=hidden")
 HARDENING = (
     ("-fstack-protector-strong",),
@@ -77,6 +83,7 @@ def sources() -> list[Path]:
     """All files that the products depend on."""
     kinds = ("*.[ch]", "*.def")
     code = [path for of in LIBRARIES.values() for kind in kinds for path in _code(of, kind)]
+    code += [path for kind in kinds for path in _code(THIN, kind)]
     return sorted([*code, *_fmu_files(), DESCRIBE, FMU_LICENSE, Path(__file__)])
 
 
@@ -98,6 +105,7 @@ def make(folder: Path) -> None:
             objects = _objects(_code(folders, "*.c"), work)
             link(objects, new / (library + SUFFIX), "-shared", *THREADS)
         _make_fmu(new, work)
+        _make_thin(new, work)
         made: dict[str, Any] = {"sources": digest(), "compiler": compiler_version()}
         made["flags"] = [*FLAGS, *hardening()]
         made["interfaces"] = {name: interface(folders) for name, folders in LIBRARIES.items()}
@@ -332,6 +340,26 @@ def _make_fmu(target: Path, work: Path) -> None:
             path = target / f"fmi{version}" / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
+
+
+def _make_thin(target: Path, work: Path) -> None:
+    flags = (f"-I{FMU / 'include'}",)
+    layer, *models = (_objects(_code((folder,), "*.c"), work, *flags) for folder in THIN)
+    netlist, own = models
+    link([*layer, *netlist], target / ("netlist" + SUFFIX), "-shared", *THREADS, *LOADER)
+    for source, compiled in zip(_code(THIN[2:], "*.c"), own, strict=True):
+        name = source.stem
+        folder = target / "models" / name
+        library = folder / "binaries" / _platforms()[1] / (name + SUFFIX)
+        library.parent.mkdir(parents=True)
+        link([*layer, compiled], library, "-shared")
+        why = ctypes.create_string_buffer(512)
+        about = str(folder / "modelDescription.xml").encode()
+        if not ctypes.CDLL(str(library)).model_describe(3, b"", about, why):
+            raise BuildFailed(f"{name}: {why.value.decode()}.")
+        licences = folder / "documentation/licenses"
+        licences.mkdir(parents=True)
+        shutil.copyfile(FMU_LICENSE, licences / "license.txt")
 
 
 def _platforms() -> tuple[str, str]:

@@ -65,9 +65,12 @@ def deck(
     reltol: float,
     max_step: float,
     asked: bool,
+    known: Mapping[str, float],
+    called: str = "[[port]] source",
 ) -> Deck:
     """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved;
-    where they are ``asked`` for within a step, each as a device's parameter.
+    where they are ``asked`` for within a step, each as a device's parameter. ``known`` are values
+    for such ``.param`` lines as it may have, ``parameters`` for those that it must have.
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
@@ -77,23 +80,14 @@ def deck(
     found = {element.name: element for element in parse(lines).elements}
     for source in sources:
         if source.lower() not in found or source[0].lower() not in "vi":
-            known = sorted(each for each in found if each[0] in "vi")
-            hint = suggestion(source.lower(), known) or f" (it has {', '.join(known) or 'none'})"
-            shown = f'[[port]] source = "{plain(source)}"'
+            able = sorted(each for each in found if each[0] in "vi")
+            hint = suggestion(source.lower(), able) or f" (it has {', '.join(able) or 'none'})"
+            shown = f'{called} = "{plain(source)}"'
             raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
-    wanted = {each: Line(each, f'"{plain(each)}"', k + 1) for k, each in enumerate(words)}
-    for ask in asks:
-        wanted |= {each: replace(ask.line, text=each) for each in ask.words if each not in wanted}
-    # Within a step a node's voltage is not to be had: a source that copies it is.
-    plainly = re.compile(r"i.*" if asked else r".*", re.IGNORECASE)
-    direct = [
-        _VECTOR.fullmatch(each) if each not in words or plainly.match(each) else None
-        for each in wanted
-    ]
-    extra = [_reading(k, line) for k, line in enumerate(wanted.values()) if direct[k] is None]
-    top = check([*lines, *extra], [[source.lower() for source in sources]])
-    _check_vectors(top, name, words, wanted.values())
-    values = _parameters(top, name, parameters)
+    top, every = check_reading(
+        path, lines, words, asks, [[source.lower() for source in sources]], asked
+    )
+    values = {**known, **own_parameters(top, name, parameters)}
     fed = {source.lower() for source in sources}
     text = [lines[0].text]
     for line, element, holder in top.order:
@@ -109,12 +103,12 @@ def deck(
         f".tran {max_step!r} {duration!r} 0 {max_step!r}",
         ".end",
     ]
-    read_as = [_read_as(k, match) for k, match in enumerate(direct)]
+    read_as = reading(every, len(words) if asked else 0)
     return Deck(
         "\n".join(text),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
-        tuple(wanted),
+        tuple(every),
         tuple(asks),
         tuple(without_effect(dropped)),
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
@@ -122,7 +116,41 @@ def deck(
     )
 
 
-def _reading(place: int, words: Line) -> Line:
+def check_reading(
+    path: Path,
+    lines: Sequence[Line],
+    words: Sequence[str],
+    asks: Sequence[Measure],
+    required: Sequence[Sequence[str]],
+    asked: bool = False,
+) -> tuple[Scope, list[str]]:
+    """The top level of a netlist with what reads the ``words`` and what the measurements need, as
+    :func:`check` gives it; and all these words, each once."""
+    every = {each: Line(each, f'"{plain(each)}"', k) for k, each in enumerate(words, 1)}
+    for ask in asks:
+        every |= {each: replace(ask.line, text=each) for each in ask.words if each not in every}
+    direct = _direct([*every], len(words) if asked else 0)
+    extra = [_source_of(k, line) for k, line in enumerate(every.values()) if direct[k] is None]
+    top = check([*lines, *extra], required)
+    _check_vectors(top, plain(str(path)), words, every.values())
+    return top, [*every]
+
+
+def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:
+    """For each of the words the vector that has its value, and the device parameter. So many of
+    them, the first, are asked for within a step, where only currents have a parameter."""
+    return [_read_as(k, match) for k, match in enumerate(_direct(words, asked))]
+
+
+def _direct(words: Sequence[str], asked: int) -> list[re.Match[str] | None]:
+    # Within a step a node's voltage is not to be had: a source that copies it is.
+    return [
+        _VECTOR.fullmatch(each) if k >= asked or each[:1].lower() == "i" else None
+        for k, each in enumerate(words)
+    ]
+
+
+def _source_of(place: int, words: Line) -> Line:
     """A source whose voltage is the expression."""
     line = replace(words, text=f"Bcosim{place} {_NODE}{place} 0 V={words.text}")
     passed(line)
@@ -154,7 +182,8 @@ def _check_vectors(top: Scope, name: str, words: Sequence[str], wanted: Iterable
                     raise BadInput(ended(f"{where}: {said} {plain(inner)}{hint}"))
 
 
-def _parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:
+def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:
+    """The values given to ``.param`` lines, by their names in small letters. Raises BadInput."""
     lines = [line.text for line, _ in top.lines if line.text.lower().startswith(".param")]
     known = [key for text in lines for (key, formal), _ in definitions(text) if formal is None]
     for key in given:

@@ -3,11 +3,11 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cosim.cli.command import Command
-from cosim.cli.work import progress_bar, writable
-from cosim.studies.study import OVERRIDES, SCENE, Option
+from cosim.cli.work import print_page, progress_bar, writable
+from cosim.studies.study import OVERRIDES, SCENE, SHOW, Option
 
 if TYPE_CHECKING:
     from cosim.scene import Scene
@@ -22,6 +22,7 @@ def _run(
     spread: bool = False,
     strict: bool = False,
     link: bool = False,
+    show: bool = False,
     out: Path | None = None,
 ) -> None:
     from cosim.scene import load, to_link
@@ -61,6 +62,8 @@ def _run(
         print(found)
     print(f"Written to {folder}: waveforms.csv, waveforms.nc, summary.json, scene.toml")
     print(f"Figure: {folder / 'figure.png'}")
+    if show:
+        print_page(folder)
 
 
 def _spread(scene: "Scene") -> "Spread":
@@ -129,6 +132,39 @@ def _check() -> int:
     return 1 if package.check() else 0
 
 
+def _netlist(
+    netlist: Path, outputs: list[str], out: Path = Path(_FMU), fmi: str = "2", **asked: Any
+) -> None:
+    from cosim.fmus import netlist as fmus
+
+    target = out / f"{netlist.stem}.fmu"
+    with writable(out):
+        fmus.netlist(netlist, outputs, target, version=int(fmi), **asked)
+    print(target)
+
+
+_NETLIST = (
+    Option("netlist", "a netlist of one's own", "NETLIST", Path),
+    Option(
+        *("--input", "a V or I source that the importer sets; repeatable", "SOURCE"),
+        parameter="inputs",
+        many="repeat",
+    ),
+    Option(
+        *(
+            "--output",
+            'what the importer reads, as "v(out)" or "i(V1)*v(out)"; repeatable',
+            "WORDS",
+        ),
+        parameter="outputs",
+        many="repeat",
+        needed=True,
+    ),
+    Option("--max-step", "longest step of ngspice", "s", float, 2e-5),
+    Option("--reltol", "ngspice's relative tolerance", kind=float, default=1e-5),
+    Option("--fmi", "version of FMI", choices=("2", "3"), default="2"),
+)
+
 COMMANDS = (
     Command(
         "export",
@@ -139,10 +175,11 @@ COMMANDS = (
     ),
     Command(
         "fmu",
-        "write or check the FMU files of the mechanics",
+        "write or check FMU files: of the mechanics, of a netlist",
         commands=(
             Command("build", "write stickslip-fmi2.fmu and stickslip-fmi3.fmu", _build, out=_FMU),
             Command("check", "validate the FMU files and run them", _check),
+            Command("netlist", "write a netlist as an FMU", _netlist, _NETLIST, _FMU),
         ),
     ),
     Command(
@@ -170,6 +207,7 @@ COMMANDS = (
                 "only print the setting as a link, which all commands take in place of a scene",
                 kind=bool,
             ),
+            SHOW,
         ),
         "results/<scene>",
     ),

@@ -103,8 +103,18 @@ class Evaluator:
 
     def outcomes(self, every: Sequence[Settings]) -> list[Outcome]:
         """What becomes of each settings, in their order."""
-        found = dict(self.run(enumerate(every)))
-        return [found[number] for number in range(len(every))]
+        return next((found for _, found in self.groups([every])), [])
+
+    def groups(self, groups: Sequence[Sequence[Settings]]) -> Iterator[tuple[int, list[Outcome]]]:
+        """The outcomes of groups of settings, all run at once: a group (its number, outcomes) as
+        soon as it is complete."""
+        places = [(n, k) for n, group in enumerate(groups) for k in range(len(group))]
+        known: list[dict[int, Outcome]] = [{} for _ in groups]
+        for number, outcome in self.run(enumerate(one for group in groups for one in group)):
+            n, k = places[number]
+            known[n][k] = outcome
+            if len(known[n]) == len(groups[n]):
+                yield n, [known[n][k] for k in range(len(groups[n]))]
 
     def _run(self, points: Iterator[_Numbered]) -> Iterator[tuple[int, Outcome]]:
         call = partial(evaluate_all, whole_periods=self._whole_periods)

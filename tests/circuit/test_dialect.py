@@ -218,7 +218,8 @@ def test_an_event_that_does_not_come_has_no_value(tmp_path: Path) -> None:
     path.write_text(f"{HEAD}.meas x WHEN V(in)=5 rise=2\n.meas y AVG V(in) from=2 to=3\n.end\n")
     time = np.linspace(0, 1, 11)
     for each in measures(read_all(path)[1]):
-        assert measured(each, time, {word: np.sin(time) for word in each.words}) is None
+        values, (note,) = measured([each], time, {word: np.sin(time) for word in each.words})
+        assert not values and "its event does not come" in note
     summary = summary_of(tmp_path, path.read_text().removesuffix(".end\n"))
     assert not [key for key in summary if key.startswith("meas")]
     assert [note for note in summary["notes"] if "own.cir:8: .meas x has no value" in note]
@@ -266,3 +267,17 @@ def test_a_circuit_that_rings_is_told_with_its_node(tmp_path: Path) -> None:
     with in_place():
         (note,) = cosim.run(tmp_path / "own.toml").summary["notes"]
     assert re.match(r"the circuit took \d+ steps, \d+ times as many .* at node n: ", note), note
+
+
+def test_a_netlist_on_the_built_in_mechanics_measures_too(tmp_path: Path) -> None:
+    """The mean of the coil's current from 20 ms on, against the mean of the run's own column."""
+    text = (circuits() / "examples" / "h_bridge.cir").read_text(encoding="utf-8")
+    asks = ".meas tran mean AVG i(Vemf) FROM=0.02 TO=0.05\n.print i(Vemf)\n.end\n"
+    (tmp_path / "own.cir").write_text(text.replace(".end\n", asks))
+    own = {"circuit.model": "file", "circuit.netlist": tmp_path / "own.cir"}
+    result = cosim.run("paper", {**own, "run.duration": 0.05, "run.output_step": 1e-6})
+    time, current = result.columns["time"], result.columns["current"]
+    late = time >= 0.02
+    mean = np.trapezoid(current[late], time[late]) / 0.03
+    assert result.summary["meas.mean"] == pytest.approx(mean, rel=1e-3)
+    assert any(".print has no effect" in note for note in result.summary["notes"])

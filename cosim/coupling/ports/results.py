@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.circuit.joined import unit
-from cosim.circuit.lint.outputs import Measure, measured
+from cosim.circuit.lint.outputs import measured
 from cosim.coupling.loop.agenda import count
 from cosim.coupling.loop.lead import engine
 from cosim.coupling.loop.structures import loop
@@ -40,13 +40,10 @@ def joined(
         for name, _, times, values, continuous in signals
         for what, value in _numbers(scene.run.settle, times, values, continuous).items()
     }
-    notes = [*run.deck.notes, *_notes(run)]
-    for each, value in _measured(run):
-        if value is not None:
-            summary[f"meas.{each.name}"] = value
-        else:
-            where, what = f"{each.line.file}:{each.line.number}", f".meas {each.name}"
-            notes.append(f"{where}: {what} has no value: its event does not come.")
+    log = run.log.array()
+    known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
+    values, without = measured(run.deck.measures, log[:, 0], known)
+    summary |= values
     summary |= {
         "circuit_steps": run.steps,
         "circuit_rejected": run.state.attempts - run.steps,
@@ -55,17 +52,9 @@ def joined(
         "wall_time": time.perf_counter() - began,
         "method": run.plan.method,
         "versions": {**versions(), **run.versions},
-        "notes": notes,
+        "notes": [*run.deck.notes, *_notes(run), *without],
     }
     return columns, summary, units
-
-
-def _measured(run: Run) -> Iterator[tuple[Measure, float | None]]:
-    """The netlist's measurements."""
-    log = run.log.array()
-    known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
-    for each in run.deck.measures:
-        yield each, measured(each, log[:, 0], known)
 
 
 Signal = tuple[str, str, Array, Array, bool]

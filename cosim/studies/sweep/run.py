@@ -16,7 +16,7 @@ from cosim.evaluate.point import Number
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
-from cosim.studies.sweep import dataset
+from cosim.studies.sweep import dataset, families
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.toolchain.versions import versions
 
@@ -40,6 +40,7 @@ def sweep(
     samples: int | None = None,
     random: bool = False,
     seed: int = 0,
+    keep: Sequence[str] = (),
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     dask: str | None = None,
@@ -57,9 +58,10 @@ def sweep(
     long as the scene's own.
 
     In the folder ``out`` it leaves ``sweep.nc`` and ``figure.png``, and takes up what an
-    interrupted sweep has left there. ``workers`` local processes (default: one for each processor),
-    or the Dask cluster at the address ``dask``. ``progress`` is told the points done, how many of
-    them failed, and their number.
+    interrupted sweep has left there; with ``keep``, names of waveforms, also those of every point,
+    as ``points/NUMBER.nc``. ``workers`` local processes (default: one for each processor), or the
+    Dask cluster at the address ``dask``. ``progress`` is told the points done, how many of them
+    failed, and their number.
 
     Raises BadInput for keys and values that cannot be, or where ``out`` holds another sweep.
 
@@ -71,11 +73,13 @@ def sweep(
     if random and samples is None:
         raise BadInput("--random needs --samples N.")
     design = grid(over) if samples is None else sample(over, samples, seed, random)
+    if keep and out is None:
+        raise BadInput("keep: waveforms are kept in a folder; name one as out.")
     if out is None:
         with TemporaryDirectory() as folder:
-            return _sweep(scene, design, Path(folder), workers, dask, progress)
+            return _sweep(scene, design, Path(folder), (), workers, dask, progress)
     folder = Path(out)
-    data = _sweep(scene, design, folder, workers, dask, progress)
+    data = _sweep(scene, design, folder, keep, workers, dask, progress)
     from cosim.studies.sweep import figure
 
     figure.draw(data, scene.name).write(folder / FIGURE)
@@ -86,6 +90,7 @@ def _sweep(
     scene: Scene,
     design: Design,
     folder: Path,
+    keep: Sequence[str],
     workers: int | None,
     dask: str | None,
     progress: Callable[[int, int, int], None],
@@ -127,7 +132,11 @@ def _sweep(
         if scene.run.solver == "fast":
             for number, outcome in bench.run(_judged(design, numbers)):
                 numbers.judge(number, outcome)
-        return refreshed()
+        data = refreshed()
+        if keep:
+            points = [n for n in range(total) if not numbers.failures[n]]
+            families.keep(folder / "points", scene, design, keep, points, workers)
+        return data
 
 
 def _judged(design: Design, numbers: dataset.Numbers) -> Iterator[tuple[int, Settings]]:

@@ -1,0 +1,50 @@
+"""Families of waveforms: those of every point of a sweep, a file each beside its numbers."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from cosim.errors import BadInput, plain
+from cosim.evaluate.evaluator import workers_asked
+from cosim.evaluate.many import each, threads
+from cosim.evaluate.point import periods_made_whole
+from cosim.files.atomic import whole
+from cosim.scene import Scene, changed
+from cosim.studies.sweep.design import Design
+from cosim.toolchain.processes import Progress
+from cosim.waveforms.storage import netcdf
+
+
+def parse(text: str | list[str]) -> list[str]:
+    """The names of ``--keep``; none where it was not given."""
+    return [name.strip() for name in text.split(",")] if isinstance(text, str) else []
+
+
+def keep(
+    folder: Path,
+    scene: Scene,
+    design: Design,
+    names: Sequence[str],
+    points: Sequence[int],
+    workers: int | None,
+) -> None:
+    """Run ``points`` once more, here, and write their waveforms ``names`` from ``run.settle`` on,
+    each point's as ``NUMBER.nc``. Raises CosimError."""
+    from cosim.simulation.simulate import simulate
+
+    def kept(common: Scene, number: int, progress: Progress) -> None:
+        of = changed(common, design.point(number), "--over")
+        if design.changes_frequency:
+            of = changed(of, periods_made_whole(of), "--over")
+        result = simulate(of, progress)
+        if unknown := [name for name in names if name not in result.columns]:
+            known = ", ".join(result.columns)
+            raise BadInput(f'--keep: the runs have no "{plain(unknown[0])}" (they have {known}).')
+        later = result.columns["time"] >= of.run.settle
+        columns = {name: result.columns[name][later] for name in ("time", *names)}
+        with whole(folder / f"{number}.nc") as temporary, temporary.open("wb") as file:
+            netcdf(file, columns, result.units, {"frequency": repr(1.0 / of.period)})
+
+    with threads(scene, workers_asked(workers)) as pool:
+        for _, failed in each(pool, kept, points):
+            if failed is not None:
+                raise failed
