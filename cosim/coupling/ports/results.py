@@ -106,8 +106,9 @@ def _numbers(settle: float, times: Array, values: Array, continuous: bool) -> di
     return found | {"least": least, "greatest": greatest}
 
 
-_OFTEN, _LONG = 10, 10_000
-"""How many times as many steps as ``circuit.max_step`` asks for tell of ringing; of so many."""
+_OFTEN, _LONG, _WITHIN = 10, 10_000, 20
+"""How many times as many steps as ``circuit.max_step`` asks for tell of ringing; of so many; by how
+much more a node within a subcircuit has to ring to be named."""
 _SELDOM, _MANY = 0.5, 100
 """Share of its steps in which an FMU's outputs change that is too small; of so many steps."""
 
@@ -117,12 +118,17 @@ def _notes(run: Run) -> Iterator[str]:
         yield f"ngspice knows no {', '.join(ignored)} of a model, and ignored it."
     often = run.steps * run.plan.scene.circuit.max_step / run.state.duration
     if often > _OFTEN and run.steps > _LONG:
-        nodes = [k for k, name in enumerate(engine().sent) if not re.search("#|cosim_", name)]
-        turns, place = max((loop().ports_turns(k), k) for k in nodes)
+        turns = {
+            name: loop().ports_turns(k)
+            for k, name in enumerate(engine().sent)
+            if not re.search("#|cosim_", name)
+        }
+        # A node that the user has named tells more than one within a model, if it rings at all.
+        node = max(turns, key=lambda n: turns[n] if "." not in n else turns[n] / _WITHIN)
         yield (
             f"the circuit took {run.steps} steps, {often:.0f} times as many as circuit.max_step "
-            f"asks for. It turned most often, {turns} times, at node {engine().sent[place]}: if it "
-            "rings there, damp it, say by a resistor and a capacitor to ground."
+            f"asks for. It turned most often, {turns[node]} times, at node {node}: if it rings "
+            "there, damp it, say by a resistor and a capacitor to ground."
         )
     for side, state in zip(run.plan.sides, run.fmus, strict=False):
         steps, moved = side.fmu.steps, state.moved
