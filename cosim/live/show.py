@@ -97,7 +97,8 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
         columns.append(_column(str(name), unit, values.tolist(), text))
     best = "v_average" if "v_average" in data else columns[len(swept)]["name"]
     ways = [swept[0], swept[1] if len(swept) > 1 else best, best]
-    cloud = {"columns": columns, "keys": swept[2:] if grid.ndim > 1 else [], "ways": ways}
+    axes = swept if grid.ndim > 1 else []
+    cloud = {"columns": columns, "keys": axes[2:], "ways": ways, "grid": axes}
     shown = {"title": data.attrs["title"], "cloud": cloud | {"count": grid.size, "family": None}}
     points = sorted(int(kept.stem) for kept in (folder / "points").glob("*.nc"))
     if not points:
@@ -129,7 +130,7 @@ def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
     ways = [column["name"] for column in columns if column["most"] is not None]
     if not ways:
         raise BadInput(f"{plain(str(path))}: this table has no column of numbers.")
-    cloud = {"columns": columns, "keys": [], "ways": (ways * 3)[:3], "family": None}
+    cloud = {"columns": columns, "keys": [], "ways": (ways * 3)[:3], "family": None, "grid": []}
     cloud["count"] = len(cells.rows) - 1
     pictures = [p for p in path.parent.glob("*.png") if f"{p.stem}-".startswith(f"{path.stem}-")]
     content = {p.name: b64encode(reader.read(p, LARGEST)).decode() for p in sorted(pictures)}
