@@ -35,7 +35,7 @@ PIP := $(PY) -m pip --disable-pip-version-check --no-input -q
 VENV_READY := $(shell test -x $(PY) && test "$$(cat $(VENV)/.created 2>/dev/null)" = "$$(pwd)" && echo yes)
 
 # What is compiled, and what compiles it.
-SOURCES := $(sort $(shell find fmu/src fmu/include cosim -path cosim/_compiled -prune -o \
+SOURCES := $(sort $(shell find fmu/src fmu/include fmu/thin fmu/netlist fmu/models cosim -path cosim/_compiled -prune -o \
 	-type f \( -name '*.[ch]' -o -name '*.def' \) -print)) build_c.py setup.py pyproject.toml fmu/LICENSE
 COMPILED := cosim/_compiled/build.json
 
@@ -96,7 +96,6 @@ charts: setup
 	@$(VENV)/bin/cosim chart limits --rigs results/identify.json
 	@$(VENV)/bin/cosim chart measure --rigs results/identify.json
 	@$(VENV)/bin/cosim chart ladder paper trial-05 gripper
-	@$(VENV)/bin/cosim chart choice
 	@cp results/choice.csv cosim/simulation/choice.csv
 	@test -z '$(TRIALS)' || { $(VENV)/bin/cosim chart trials '$(TRIALS)' && $(VENV)/bin/cosim chart paper '$(TRIALS)'; }
 	@find results -maxdepth 1 -type f -newer $(VENV)/.began -exec $(PY) -m benchmarks.stale {} +

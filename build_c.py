@@ -4,16 +4,21 @@
 
     loop.so and other  libraries of the package, loaded by cosim.toolchain.libraries
     fmi2/, fmi3/       the FMU of the mechanics for FMI 2.0 and 3.0, as its .fmu files hold it
-    build.json         a hash of all that this was made of, the compiler and its flags, and the size
-                       and hash of each file, by which a damaged one is told from a whole one
+    models/            the other FMUs of FMI 3.0, unpacked; they belong to scenes of the library
+    netlist.so         what makes an FMU of a netlist
+    build.json         a hash of all that this was made of, the compiler and its flags, the size and
+                       hash of each file, by which a damaged one is told from a whole one, and the
+                       functions and structures of each library, as its C declares them
 
 The same sources, compiler and flags give the same bytes.
 """
 
+import ctypes
 import hashlib
 import json
 import os
 import platform
+import re
 import shlex
 import shutil
 import subprocess
@@ -24,6 +29,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent
 FMU = ROOT / "fmu"
@@ -37,6 +43,8 @@ LIBRARIES = {
 }
 """The package's libraries; each is made of all C files of its folders."""
 DESCRIBE = FMU / "src/fmi/describe.c"
+THIN = tuple(FMU / folder for folder in ("thin", "netlist", "models"))
+"""What makes FMUs of models with numbers alone, and those models."""
 FMU_LICENSE = FMU / "LICENSE"
 
 # Without contraction every platform computes the same bits. The other two -fno leave them as they
@@ -47,6 +55,7 @@ FLAGS = (
 )
 # Older systems have threads in a library of their own.
 THREADS = () if sys.platform == "win32" else ("-pthread",)
+LOADER = ("-ldl",) if sys.platform == "linux" else ()
 LIBRARY_FLAGS = ("-fPIC", "-fvisibility=hidden")
 HARDENING = (
     ("-fstack-protector-strong",),
@@ -74,6 +83,7 @@ def sources() -> list[Path]:
     """All files that the products depend on."""
     kinds = ("*.[ch]", "*.def")
     code = [path for of in LIBRARIES.values() for kind in kinds for path in _code(of, kind)]
+    code += [path for kind in kinds for path in _code(THIN, kind)]
     return sorted([*code, *_fmu_files(), DESCRIBE, FMU_LICENSE, Path(__file__)])
 
 
@@ -95,8 +105,10 @@ def make(folder: Path) -> None:
             objects = _objects(_code(folders, "*.c"), work)
             link(objects, new / (library + SUFFIX), "-shared", *THREADS)
         _make_fmu(new, work)
-        made = {"sources": digest(), "compiler": compiler_version()}
+        _make_thin(new, work)
+        made: dict[str, Any] = {"sources": digest(), "compiler": compiler_version()}
         made["flags"] = [*FLAGS, *hardening()]
+        made["interfaces"] = {name: interface(folders) for name, folders in LIBRARIES.items()}
         made["files"] = {
             path.relative_to(new).as_posix(): [path.stat().st_size, _sum(path.read_bytes())]
             for path in sorted(new.rglob("*"))
@@ -225,6 +237,62 @@ def _hash(files: list[Path]) -> str:
     return digest.hexdigest()
 
 
+# ---- what Python has to know of a library ----
+
+_COMMENTS = re.compile(r"/\*.*?\*/", re.DOTALL)
+_ENUMS = re.compile(r"enum \{([^{}#]*)\};")
+_STRUCTURES = re.compile(r"typedef struct(?: \w+)? \{([^{}]*)\} (\w+);")
+_EXPORTS = re.compile(r"EXPORT (\w+) (\w+)\(([^()]*)\)")
+_NUMBERS = {"void", "char", "bool", "int", "long", "int32_t", "int64_t", "double"}
+_POINTERS = {"AnyFunction"}
+"""Types that are pointers under a name."""
+
+
+def interface(folders: tuple[Path, ...]) -> dict[str, Any]:
+    """The structures and exported functions that the C in some folders declares, in its order: of a
+    structure each field's name, type and lengths (as an array), of a function its result and its
+    arguments. A type is a number's of C, ``*`` for any pointer, ``()`` for a pointer to a function
+    without arguments and result, or a structure. What has other types or lengths is left out.
+    """
+    files = [*_code(folders, "*.h"), *_code(folders, "*.c")]
+    text = _COMMENTS.sub("", "\n".join(file.read_text(encoding="utf-8") for file in files))
+    lengths: dict[str, int] = {}
+    for values in _ENUMS.findall(text):
+        following = 0
+        for name, _, value in (one.partition("=") for one in values.split(",") if one.strip()):
+            lengths[name.strip()] = following = int(value.strip() or following)
+            following += 1
+    structures: dict[str, Any] = {}
+    for body, name in _STRUCTURES.findall(text):
+        fields = [each for line in body.split(";") for each in _fields(line, lengths)]
+        if all(kind in {*_NUMBERS, *structures, "*", "()"} for _, kind, _ in fields):
+            structures[name] = fields
+    functions = {
+        name: [result, [_argument(one) for one in arguments.split(",")]]
+        for result, name, arguments in _EXPORTS.findall(text)
+    }
+    return {"structures": structures, "functions": functions}
+
+
+def _fields(line: str, lengths: dict[str, int]) -> Iterator[tuple[str, str, list[int]]]:
+    """Name, type and lengths of what a declaration without its semicolon declares."""
+    plain = " ".join(re.sub(r"\b(const|struct)\b", "", line).split())
+    kind, _, names = re.sub(r"\(\*(\w+)\)\(void\)", r"()\1", plain).partition(" ")
+    names = re.sub(r"\(\*(\w+)\)\([^()]*\)", r"*\1", names)
+    for name in names.split(",") if names else ():
+        first, *others = name.replace("]", "").split("[")
+        of = "()" if "()" in first and kind == "void" else "*" if {*"()*"} & {*first} else kind
+        sizes = [int(size) if size.isdigit() else lengths.get(size, 0) for size in others]
+        known = "*" if of in _POINTERS else of if all(sizes) else "?"
+        yield first.strip("()* "), known, sizes
+
+
+def _argument(text: str) -> str:
+    """The type of an argument: what is no number is handed over as a pointer."""
+    kind = next(word for word in text.split() if word != "const")
+    return kind if kind in _NUMBERS and not {*"*["} & {*text} else "*"
+
+
 # ---- the FMU ----
 
 
@@ -272,6 +340,26 @@ def _make_fmu(target: Path, work: Path) -> None:
             path = target / f"fmi{version}" / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
+
+
+def _make_thin(target: Path, work: Path) -> None:
+    flags = (f"-I{FMU / 'include'}",)
+    layer, *models = (_objects(_code((folder,), "*.c"), work, *flags) for folder in THIN)
+    netlist, own = models
+    link([*layer, *netlist], target / ("netlist" + SUFFIX), "-shared", *THREADS, *LOADER)
+    for source, compiled in zip(_code(THIN[2:], "*.c"), own, strict=True):
+        name = source.stem
+        folder = target / "models" / name
+        library = folder / "binaries" / _platforms()[1] / (name + SUFFIX)
+        library.parent.mkdir(parents=True)
+        link([*layer, compiled], library, "-shared")
+        why = ctypes.create_string_buffer(512)
+        about = str(folder / "modelDescription.xml").encode()
+        if not ctypes.CDLL(str(library)).model_describe(3, b"", about, why):
+            raise BuildFailed(f"{name}: {why.value.decode()}.")
+        licences = folder / "documentation/licenses"
+        licences.mkdir(parents=True)
+        shutil.copyfile(FMU_LICENSE, licences / "license.txt")
 
 
 def _platforms() -> tuple[str, str]:

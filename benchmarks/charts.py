@@ -1,19 +1,20 @@
-"""Charts of the methods: ``accuracy`` with further lines, laws of friction, a chaotic scene.
+"""Charts of this project's own methods and models.
 
-    python -m benchmarks.charts [--quick] [--out DIR]
+    python -m benchmarks.charts [NAME ...] [--quick] [--out DIR]
 
-The further lines are other programs and error-controlled macro steps. Besides what ``cosim chart
-accuracy`` writes, it writes ``friction`` and ``chaos``, ``.csv``, ``.md`` and ``.png``.
+draws all, or what is named: ``accuracy``, as ``cosim chart accuracy``, with other programs and
+error-controlled macro steps besides; laws of ``friction``; ``chaos``, a chaotic scene; ``choice``,
+which circuit model and tolerance to take. Each writes ``.csv``, ``.md`` and ``.png``.
 """
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks import chaos, friction
+from benchmarks import chaos, choice, friction
 from benchmarks.error_control import ErrorControlled
 from benchmarks.peers import lsoda, ngspice_alone
 from cosim.coupling.methods.jacobi import Jacobi
@@ -30,6 +31,7 @@ from cosim.studies.accuracy.solvers import (
     rewinding,
     tenths,
 )
+from cosim.studies.report import Report
 
 
 def _all_in_ngspice(scene: Scene, case: Case, reltol: float) -> Outcome:
@@ -82,13 +84,25 @@ SOLVERS = (
 """The further lines."""
 
 
+CHARTS: dict[str, Callable[[bool, Path], Report]] = {
+    "accuracy": lambda quick, out: accuracy(quick=quick, out=out, more=SOLVERS),
+    "friction": lambda *_: friction.report(),
+    "chaos": lambda *_: chaos.report(),
+    "choice": lambda quick, out: choice.choice(quick, out),
+}
+"""Each asks whether it is to be quick, and where an interrupted one has left what it found."""
+
+
 def main() -> None:
     parser = argparse.ArgumentParser("benchmarks.charts", description="Charts of the methods.")
-    parser.add_argument("--quick", action="store_true", help="accuracy on one scene")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(CHARTS)}")
+    parser.add_argument("--quick", action="store_true", help="one scene, few settings")
     parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
     asked = parser.parse_args()
-    accuracy(quick=asked.quick, out=asked.out, more=SOLVERS)
-    for report in (friction.report(), chaos.report()):
+    if not set(asked.names) <= set(CHARTS):
+        parser.error(f"a NAME must be one of {', '.join(CHARTS)}")
+    for name in asked.names or CHARTS:
+        report = CHARTS[name](asked.quick, asked.out)
         report.save(asked.out)
         print(f"{report}\n\n{report.written(asked.out)}")
 

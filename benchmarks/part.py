@@ -11,6 +11,7 @@ from cosim.mechanics import part
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.speed.bench import ratios, take_turns
+from cosim.toolchain.libraries import library
 from cosim.trials import published
 from cosim.trials.camera import film, frame_times
 from cosim.trials.tracked import Track, Trial, read_folder
@@ -58,10 +59,10 @@ def _call(trial: Trial, exact: bool) -> Callable[[], int]:
     given = (*given, law.ctypes.data, 0.0, float(trial.part.v[3]))
     found: tuple[int | None, ...] = tuple(row.ctypes.data for row in motion)
     if exact:
-        solve, asked = part.part_library().part_exact, (0.0, 0.0, len(time), None)
+        solve, asked = library("part").part_exact, (0.0, 0.0, len(time), None)
         found = (*found, None)
     else:
-        solve = part.part_library().part_threshold
+        solve = library("part").part_threshold
         asked = (part.PUBLISHED_STEP, part.PUBLISHED_V_MIN, steps)
 
     def call(_: object = (time, surface, law, motion)) -> int:  # they live as long as the call

@@ -5,7 +5,7 @@ steps; the mechanics alone get its current.
 """
 
 from contextlib import closing
-from ctypes import byref
+from ctypes import Structure, byref
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from benchmarks.errors import BRIEF
 from cosim.arrays import Array
 from cosim.coupling.loop.lead import Lead
 from cosim.coupling.loop.recorder import Recorder
-from cosim.coupling.loop.structures import LeadState, loop
+from cosim.coupling.loop.structures import loop
 from cosim.drive.command import command
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, load
@@ -81,7 +81,7 @@ def _replay(scene: Scene) -> Array:
 class _Listener:
     """Writes down what the method step-locked tells the circuit."""
 
-    def __init__(self, state: LeadState) -> None:
+    def __init__(self, state: Structure) -> None:
         self._state = state
         self.told: list[tuple[float, float, float]] = []
 

@@ -4,7 +4,6 @@ from cosim.errors import SimulationFailed as SimulationFailed
 from cosim.scene import load as load
 from cosim.simulation.simulate import run as run
 from cosim.studies.accuracy.accuracy import accuracy as accuracy
-from cosim.studies.choice.choice import choice as choice
 from cosim.studies.compare.run import compare as compare
 from cosim.studies.fit.fit import fit as fit
 from cosim.studies.identify.run import identify as identify

@@ -4,8 +4,8 @@ Order of calls within a transient run (ngspice 39): for each attempted step ``Ge
 Newton iteration and then ``GetSyncData`` at location 1; for an accepted one ``SendData`` and then
 ``GetSyncData`` at location 0, where the next step may be shortened. No such call follows the last.
 
-The library reads the .spiceinit of its home and of the working folder, and the spinit of folders
-that variables name: a worker has an empty folder for both, and none of those variables.
+The library reads the .spiceinit of its home and of the working folder, and the spinit of the folder
+that a variable names: a worker has an empty folder for all of them.
 
 Importing this module loads PySpice, which takes a while: only workers do.
 """
@@ -72,21 +72,20 @@ class Leader(Protocol):
 _one: "list[Engine]" = []
 
 
-def engine(callbacks: Callbacks, code_models: bool) -> "Engine":
+def engine(callbacks: Callbacks) -> "Engine":
     """The process's one ngspice, which calls back. Raises BadInput where the library is missing.
 
-    With ``code_models``, when it is made, it knows POLY and TABLE, as a netlist of the user's own
-    may need. Each step looks at all kinds of elements, so the models cost 5 % of a run without one.
+    It loads no code models: ``lint/dialect.py`` writes what would need them otherwise, and each
+    step looks at all kinds of elements, so they would cost 5 % of a run.
     """
     if not _one:
-        _one.append(_made(callbacks, code_models))
+        _one.append(_made(callbacks))
     return _one[0]
 
 
-def _made(callbacks: Callbacks, code_models: bool) -> "Engine":
+def _made(callbacks: Callbacks) -> "Engine":
     name = ngspice_library()
-    if not code_models:  # which its own start-up file loads
-        os.environ["SPICE_SCRIPTS"] = os.curdir
+    os.environ["SPICE_SCRIPTS"] = os.curdir  # not its own start-up file, which loads code models
     try:
         if os.sep in name and not os.path.isfile(name):  # to open a pipe would wait for ever
             raise OSError("there is no such file")
@@ -103,6 +102,8 @@ class Engine(Shared.NgSpiceShared):
     """One ngspice library. PySpice's own callbacks turn every value into Python objects; compiled
     ones take their place."""
 
+    sent: tuple[str, ...] = ()
+    """The names of all vectors of the run, as they are sent."""
     poisoned = False
     """ngspice has given up for good: nothing runs in this process's library any more."""
 
@@ -185,6 +186,11 @@ class Engine(Shared.NgSpiceShared):
         telling = [word for word in words if _TROUBLE.search(word) and not _NOISE.search(word)]
         return "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
 
+    def ignored(self) -> list[str]:
+        """The models' parameters that it does not know."""
+        said = "\n".join((*self._stderr, *self._stdout))
+        return [*dict.fromkeys(re.findall(r"unrecognized parameter \((\w+)\)", said))]
+
     def fail(self, failure: BaseException) -> None:
         """Make ngspice give up; ``run`` raises ``failure`` then. An exception cannot pass C."""
         if self._failure is None:
@@ -205,10 +211,10 @@ class Engine(Shared.NgSpiceShared):
         self = _ffi.from_handle(user_data)
         try:
             names = [_ffi.string(data.vecs[i].vecname).decode() for i in range(data.veccount)]
-            names = [name.lower() for name in names]
+            self.sent = tuple(name.lower() for name in names)
             if self._leader is not None:
                 wanted = [*(_vector(name) for name in self._save), "time"]
-                self._leader.places[:] = [names.index(name) for name in wanted]
+                self._leader.places[:] = [self.sent.index(name) for name in wanted]
         except ValueError as error:
             self.fail(SimulationFailed(f"The netlist has no such vector: {error}."))
         return 0

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cosim.cli.command import Command
 from cosim.cli.work import print_page, progress_bar, writable
@@ -132,6 +132,39 @@ def _check() -> int:
     return 1 if package.check() else 0
 
 
+def _netlist(
+    netlist: Path, outputs: list[str], out: Path = Path(_FMU), fmi: str = "2", **asked: Any
+) -> None:
+    from cosim.fmus import netlist as fmus
+
+    target = out / f"{netlist.stem}.fmu"
+    with writable(out):
+        fmus.netlist(netlist, outputs, target, version=int(fmi), **asked)
+    print(target)
+
+
+_NETLIST = (
+    Option("netlist", "a netlist of one's own", "NETLIST", Path),
+    Option(
+        *("--input", "a V or I source that the importer sets; repeatable", "SOURCE"),
+        parameter="inputs",
+        many="repeat",
+    ),
+    Option(
+        *(
+            "--output",
+            'what the importer reads, as "v(out)" or "i(V1)*v(out)"; repeatable',
+            "WORDS",
+        ),
+        parameter="outputs",
+        many="repeat",
+        needed=True,
+    ),
+    Option("--max-step", "longest step of ngspice", "s", float, 2e-5),
+    Option("--reltol", "ngspice's relative tolerance", kind=float, default=1e-5),
+    Option("--fmi", "version of FMI", choices=("2", "3"), default="2"),
+)
+
 COMMANDS = (
     Command(
         "export",
@@ -142,10 +175,11 @@ COMMANDS = (
     ),
     Command(
         "fmu",
-        "write or check the FMU files of the mechanics",
+        "write or check FMU files: of the mechanics, of a netlist",
         commands=(
             Command("build", "write stickslip-fmi2.fmu and stickslip-fmi3.fmu", _build, out=_FMU),
             Command("check", "validate the FMU files and run them", _check),
+            Command("netlist", "write a netlist as an FMU", _netlist, _NETLIST, _FMU),
         ),
     ),
     Command(

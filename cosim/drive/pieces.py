@@ -4,8 +4,7 @@ The one formula of a piece's value is in ``command.c``, which ngspice's callback
 """
 
 from abc import ABC, abstractmethod
-from ctypes import POINTER, Structure, byref, c_double, c_int64, c_void_p
-from functools import cache
+from ctypes import byref
 from math import floor
 from typing import Any
 
@@ -14,13 +13,13 @@ import numpy.typing as npt
 
 from cosim.arrays import Array
 from cosim.scene.firmware import GAIN
-from cosim.toolchain.libraries import library
+from cosim.toolchain.libraries import library, structures
 
 LEVEL, RAMP, SINE = range(3)
 """Kinds of pieces."""
 
 
-class Piece(Structure):
+class Piece(structures("loop")["Piece"]):
     """The command in [``begin``, ``until``), s; ``command.h`` says what the fields are.
 
     ``kind``, ``offset``, ``amplitude`` (V), ``origin`` (s), ``rate`` (Hz) and ``span`` make its
@@ -28,14 +27,6 @@ class Piece(Structure):
     V1 or of a pin after ``begin`` (inf: none), ``dac`` the voltage of the DAC on a level, ``pin``
     that of the offset pin.
     """
-
-    _fields_ = (
-        ("begin", c_double),
-        ("until", c_double),
-        ("kind", c_int64),
-        *((name, c_double) for name in ("offset", "amplitude", "origin", "rate", "span")),
-        *((name, c_double) for name in ("end", "jump", "dac", "pin")),
-    )
 
     begin: float
     until: float
@@ -52,13 +43,13 @@ class Piece(Structure):
 
     def value(self, t: float) -> float:
         """V1 at ``t`` in the piece, V."""
-        return _formula().command_value(byref(self), t)
+        return library("loop").command_value(byref(self), t)
 
     def values(self, times: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """V1 at each of ``times`` in the piece, V."""
         at = np.ascontiguousarray(times)
         values = np.empty_like(at)
-        _formula().command_values(byref(self), at.size, at.ctypes.data, values.ctypes.data)
+        library("loop").command_values(byref(self), at.size, at.ctypes.data, values.ctypes.data)
         return values
 
     def before(self, t: float) -> float:
@@ -70,17 +61,6 @@ def level(until: float, value: float, pin: float, dac: float | None = None) -> P
     """A constant piece that ends with a jump, if it ends."""
     dac = pin - value / GAIN if dac is None else dac
     return Piece(until=until, offset=value, end=value, jump=until, dac=dac, pin=pin)
-
-
-@cache
-def _formula() -> Any:
-    found = library("loop")
-    found.command_value.restype = c_double
-    found.command_value.argtypes = (POINTER(Piece), c_double)
-    for several in (found.command_values, found.command_values_before):
-        several.restype = None
-        several.argtypes = (POINTER(Piece), c_int64, c_void_p, c_void_p)
-    return found
 
 
 class Command(ABC):
@@ -128,13 +108,13 @@ class Command(ABC):
 
     def values(self, times: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """V1 at each of ``times``, which do not fall, V; at a jump the value after it."""
-        return self._values(times, 0.0, _formula().command_values)
+        return self._values(times, 0.0, library("loop").command_values)
 
     def values_before(self, times: npt.ArrayLike, into: Array | None = None) -> Array:
         """Left limits of V1 at each of ``times``, which do not fall, V; a time up to 1e-12 s after
         a jump is on it. Written ``into`` a contiguous array of as many values, where one is given.
         """
-        return self._values(times, 2e-12, _formula().command_values_before, into)
+        return self._values(times, 2e-12, library("loop").command_values_before, into)
 
     def _values(
         self, times: npt.ArrayLike, earlier: float, formula: Any, into: Array | None = None

@@ -3,19 +3,19 @@
 What all studies of many runs stand on. A point that crashes or hangs costs only itself.
 """
 
-import itertools
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from contextlib import ExitStack
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from functools import partial
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 from cosim.errors import BadInput
-from cosim.evaluate.many import each
-from cosim.evaluate.point import Number, Outcome, evaluate, evaluate_many, failed, outcome_of, point
+from cosim.evaluate.many import Pool, cluster, each, threads
+from cosim.evaluate.point import Number, Outcome, evaluate_all, failed, is_fast, outcome_of, point
 from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene
-from cosim.toolchain.processes import Progress, processors
+from cosim.toolchain.processes import processors
 
 Settings = Mapping[str, Number | str]
 """``table.key`` and value, SI."""
@@ -23,9 +23,7 @@ Settings = Mapping[str, Number | str]
 TOGETHER = 64
 """Points that are solved side by side, at most: some lanes full of runs of like duration."""
 
-_Task = list[tuple[int, Settings]]
-_Given = TypeVar("_Given")
-_Made = TypeVar("_Made")
+_Numbered = tuple[int, Settings]
 
 
 class Evaluator:
@@ -52,11 +50,11 @@ class Evaluator:
         self._scene = point(scene, {}, False)  # what all points have in common is changed once
         self._whole_periods, self._kept = whole_periods, kept
         self._workers, self._dask = workers_asked(workers), dask
+        self._far: Pool | None = None
         self._stack = ExitStack()
         self._store = Store(path, scene.as_dict(), whole_periods, *asked)
         self.resumed = self._store.resumed
         """Outcomes that stood in the file."""
-        self._cluster: Any = None
 
     def __enter__(self) -> Self:
         self._stack.enter_context(self._store)
@@ -70,14 +68,14 @@ class Evaluator:
         because the machine was the reason of their failure."""
         return outcome_of(self._store.get(hashed(settings)))
 
-    def run(self, points: Iterable[tuple[int, Settings]]) -> Iterator[tuple[int, Outcome]]:
+    def run(self, points: Iterable[_Numbered]) -> Iterator[tuple[int, Outcome]]:
         """The outcome of each point (number, settings), in the order in which they are known."""
         waiting: dict[str, list[int]] = {}
         """The points that wait for the same settings, by their key."""
         known: deque[tuple[int, Outcome]] = deque()
         keys: dict[int, str] = {}
 
-        def new() -> Iterator[tuple[int, Settings]]:
+        def new() -> Iterator[_Numbered]:
             for number, settings in points:
                 key = hashed(settings)
                 found = outcome_of(self._store.get(key))
@@ -99,62 +97,61 @@ class Evaluator:
                 yield known.popleft()
         yield from known
 
-    def apply(
-        self, call: Callable[[_Given, Progress], _Made], tasks: Iterable[tuple[int, _Given]]
-    ) -> Iterator[tuple[int, _Made | Exception]]:
-        """What ``call`` gives for each numbered task, or what it raises, as many at once as runs
-        are, here; of what no store holds, as waveforms."""
-        return each(call, tasks, self._workers)
-
     def forget(self) -> None:
         """The study is done: remove the file."""
         self._store.remove()
 
-    def _run(self, points: Iterator[tuple[int, Settings]]) -> Iterator[tuple[int, Outcome]]:
-        if self._dask is not None:
-            from cosim.evaluate.cluster import Cluster
+    def outcomes(self, every: Sequence[Settings]) -> list[Outcome]:
+        """What becomes of each settings, in their order."""
+        return next((found for _, found in self.groups([every])), [])
 
-            if self._cluster is None:
-                cluster = Cluster(self._dask, self._scene, self._whole_periods)
-                self._cluster = self._stack.enter_context(cluster)
-            yield from self._cluster.run(points)
-            return
-        tasks: dict[int, _Task] = {}
-        for number, found in each(self._evaluate, self._tasks(points, tasks), self._workers):
-            task = tasks.pop(number)
-            if isinstance(found, Exception):
-                found = [failed(found)] * len(task)
-            yield from zip((number for number, _ in task), found, strict=True)
+    def groups(self, groups: Sequence[Sequence[Settings]]) -> Iterator[tuple[int, list[Outcome]]]:
+        """The outcomes of groups of settings, all run at once: a group (its number, outcomes) as
+        soon as it is complete."""
+        places = [(n, k) for n, group in enumerate(groups) for k in range(len(group))]
+        known: list[dict[int, Outcome]] = [{} for _ in groups]
+        for number, outcome in self.run(enumerate(one for group in groups for one in group)):
+            n, k = places[number]
+            known[n][k] = outcome
+            if len(known[n]) == len(groups[n]):
+                yield n, [known[n][k] for k in range(len(groups[n]))]
 
-    def _tasks(
-        self, points: Iterator[tuple[int, Settings]], known: dict[int, _Task]
-    ) -> Iterator[tuple[int, _Task]]:
-        """The points as tasks with numbers, which are ``known`` from then on: those that are solved
-        side by side together, all others one by one."""
-        together: _Task = []
+    def _run(self, points: Iterator[_Numbered]) -> Iterator[tuple[int, Outcome]]:
+        call = partial(evaluate_all, whole_periods=self._whole_periods)
+        with self._pool() as pool:
+            for task, found in each(pool, call, self._tasks(points)):
+                if isinstance(found, Exception):
+                    found = [self._given_up(found)] * len(task)
+                yield from zip((number for number, _ in task), found, strict=True)
 
-        def task(of: _Task) -> tuple[int, _Task]:
-            number = next(numbers)
-            known[number] = of
-            return number, of
+    def _given_up(self, error: Exception) -> Outcome:
+        outcome = failed(error)
+        if self._dask is None:
+            return outcome
+        # Its worker died with it, again and again, or something that no scene explains.
+        return Outcome({}, f"The cluster gave it up: {outcome.failure}", machine=True)
 
-        numbers = itertools.count()
+    def _pool(self) -> AbstractContextManager[Pool]:
+        """Threads for one call; the cluster stays."""
+        if self._dask is None:
+            return threads(self._scene, self._workers)
+        if self._far is None:
+            self._far = self._stack.enter_context(cluster(self._scene, self._dask))
+        return nullcontext(self._far)
+
+    def _tasks(self, points: Iterator[_Numbered]) -> Iterator[list[_Numbered]]:
+        """Points that the fast solver runs side by side together, all others one by one."""
+        together: list[_Numbered] = []
         for one in points:
-            if one[1].get("run.solver", self._scene.run.solver) != "fast":
-                yield task([one])
+            if not is_fast(self._scene, one[1]):
+                yield [one]
                 continue
             together.append(one)
             if len(together) == TOGETHER:
-                yield task(together)
+                yield together
                 together = []
         if together:
-            yield task(together)
-
-    def _evaluate(self, task: _Task, progress: Progress) -> list[Outcome]:
-        settings = [settings for _, settings in task]
-        if settings[0].get("run.solver", self._scene.run.solver) == "fast":
-            return evaluate_many(self._scene, settings, self._whole_periods)
-        return [evaluate(self._scene, settings[0], self._whole_periods, progress)]
+            yield together
 
 
 def workers_asked(workers: int | None) -> int:

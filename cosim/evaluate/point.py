@@ -54,15 +54,21 @@ def evaluate(
     return lost
 
 
-def evaluate_many(
-    base: Scene, each: Sequence[Mapping[str, Number | str]], whole_periods: bool
+def evaluate_all(
+    base: Scene,
+    points: Sequence[tuple[int, Mapping[str, Number | str]]],
+    progress: Callable[[float], None] = lambda _: None,
+    *,
+    whole_periods: bool,
 ) -> list[Outcome]:
-    """The same of several settings, all with ``run.solver`` fast, side by side."""
+    """The same of several numbered points, side by side where the fast solver runs them all."""
+    if not all(is_fast(base, values) for _, values in points):
+        return [evaluate(base, values, whole_periods, progress) for _, values in points]
     from cosim.simulation.fast import LOST, summaries
 
-    outcomes: list[Outcome] = [Outcome({})] * len(each)
+    outcomes: list[Outcome] = [Outcome({})] * len(points)
     scenes: dict[int, Scene] = {}
-    for place, values in enumerate(each):
+    for place, (_, values) in enumerate(points):
         try:
             scenes[place] = point(base, values, whole_periods)
         except CosimError as error:
@@ -70,6 +76,11 @@ def evaluate_many(
     for place, found in zip(scenes, summaries([*scenes.values()]), strict=True):
         outcomes[place] = outcome(found) if isfinite(found["v_average"]) else Outcome({}, LOST)
     return outcomes
+
+
+def is_fast(base: Scene, values: Mapping[str, Number | str]) -> bool:
+    """Whether the fast solver runs a point."""
+    return values.get("run.solver", base.run.solver) == "fast"
 
 
 def point(base: Scene, values: Mapping[str, Number | str], whole_periods: bool) -> Scene:

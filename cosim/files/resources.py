@@ -23,6 +23,12 @@ def circuits() -> Path:
     return _folder("cosim._circuits", "circuits", ".")
 
 
+def compiled_fmus() -> list[Path]:
+    """The folders that hold the package's own FMUs, unpacked: ``gearbox``, ``fmi3``."""
+    folder = Path(__file__).resolve().parents[1] / "_compiled"
+    return [folder / "models", folder]
+
+
 def _folder(package: str, name: str, known: str) -> Path:
     # Not importlib.resources.files: for a folder without __init__.py it is not a path.
     spec = find_spec(package)

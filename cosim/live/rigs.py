@@ -43,7 +43,7 @@ def fits(scene: Scene) -> bool:
     drive = scene.drive
     odd = drive.quantised or drive.start_time or drive.pwm_ripple or drive.phase_deg is not None
     driven = scene.rung.on_ladder and drive.waveform in COMMANDS and not scene.files
-    return driven and not odd and scene.mechanics.actuator == "ram"
+    return driven and not odd and scene.mechanics.free_ram
 
 
 def _scene(scene: Scene) -> dict[str, Any]:

@@ -39,7 +39,7 @@ def pack(folder: Path) -> dict[int, Path]:
     paths = {version: folder / f"{MODEL}-fmi{version}.fmu" for version in VERSIONS}
     for version, path in paths.items():
         with whole(path) as target:
-            _zip(unpacked(version), target)
+            zipped(unpacked(version), target)
     return paths
 
 
@@ -81,7 +81,8 @@ def _trial_run(path: Path) -> float:
     return z_part
 
 
-def _zip(folder: Path, target: Path) -> None:
+def zipped(folder: Path, target: Path) -> None:
+    """Pack the folder of an FMU; the same files give the same bytes."""
     with zipfile.ZipFile(target, "w") as archive:
         for file in sorted(path for path in folder.rglob("*") if path.is_file()):
             # Dated 1980, so that the same files give the same bytes.

@@ -12,7 +12,6 @@
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
-#include <stdint.h>
 
 #include "surface.h"
 
@@ -241,27 +240,6 @@ EXPORT long part_exact(long knots, const double *time, const double *v_surface, 
                   v_out, stuck_out, told_out);
 }
 
-/* The arguments of a call of part_exact(), and the call. */
-typedef struct {
-    long knots;
-    const double *time, *v_surface;
-    long periods;
-    const double *law;
-    double z, v, half, turn;
-    long outputs;
-    const double *at;
-    double *z_out, *v_out, *stuck_out, *told_out;
-} Exact;
-
-EXPORT int64_t exact_run(void *call)
-{
-    const Exact *c = call;
-    follow(c->knots, c->time, c->v_surface, c->periods, c->law, c->z, c->v, c->half, c->turn,
-           c->outputs, c->at, c->z_out, c->v_out, c->stuck_out, c->told_out);
-    return 0;
-}
-
-/* The surface as the stepping schemes see it: times that never decrease. */
 typedef struct {
     Surface surface;
     long knot, period;

@@ -11,11 +11,9 @@ it may rub with µ_p F_n against the part's own velocity, set-valued at rest. Un
 comparison; `published` is `threshold` as in the simulation of Yako, Nowak, Yuan and Salisbury.
 """
 
-import ctypes
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Required, TypedDict, Unpack
 
 import numpy as np
@@ -32,34 +30,6 @@ PUBLISHED_STEP = 1e-4  # s
 PUBLISHED_V_MIN = 1e-5  # m/s
 MOST_STEPS = 100_000_000
 EPSILON, LARGEST = sys.float_info.epsilon, sys.float_info.max
-
-_POINTER, _LONG, _REAL = ctypes.c_void_p, ctypes.c_long, ctypes.c_double
-_SURFACE = (_LONG, _POINTER, _POINTER, _LONG, _POINTER, _REAL, _REAL)
-_RESULT = (_POINTER, _POINTER, _POINTER)
-_EXACT = (*_SURFACE, _REAL, _REAL, _LONG, _POINTER, *_RESULT, _POINTER)
-_ARGUMENTS = {
-    "exact_run": (_POINTER,),
-    "part_exact": _EXACT,
-    "part_threshold": (*_SURFACE, _REAL, _REAL, _LONG, *_RESULT),
-    "part_moreau": (*_SURFACE, _REAL, _LONG, *_RESULT),
-}
-
-
-class _Exact(ctypes.Structure):
-    """``Exact`` of ``part.c``."""
-
-    _fields_ = tuple((f"argument_{k}", kind) for k, kind in enumerate(_EXACT))
-
-
-@cache
-def part_library() -> ctypes.CDLL:
-    """The functions of ``part.c``."""
-    functions = library("part")
-    for name, arguments in _ARGUMENTS.items():
-        function = getattr(functions, name)
-        function.argtypes = arguments
-        function.restype = _LONG
-    return functions
 
 
 @dataclass(frozen=True)
@@ -85,35 +55,6 @@ class PartMotion:
 
 
 _TOLD = ("sticks", "z_surface", "v_surface", "a_surface", "friction", "work", "heat", "events")
-
-
-@dataclass(frozen=True)
-class Account:
-    """Part and surface at ``time`` [s], and what passed between them, a value for each time.
-
-    Where the surface's velocity or acceleration jumps, the values are those before the jump.
-    """
-
-    time: Array
-    z: Array
-    """Of the part, m; ``v`` its velocity, m/s."""
-    v: Array
-    stuck: Array
-    """Time spent sticking so far, s."""
-    sticks: Array
-    """1 while the part sticks, else 0."""
-    z_surface: Array
-    """m, from 0; ``v_surface`` in m/s, ``a_surface`` in m/s²."""
-    v_surface: Array
-    a_surface: Array
-    friction: Array
-    """Of the surface on the part, over the part's mass, m/s²."""
-    work: Array
-    """What the surface has done on the part so far, over the part's mass, J/kg."""
-    heat: Array
-    """What friction at surface and plate has taken so far, over the part's mass, J/kg."""
-    events: Array
-    """Changes between sticking and slipping so far."""
 
 
 class Case(TypedDict, total=False):
@@ -146,7 +87,7 @@ def exact(
     at = None if output is None else case.times(output)
     times = case.all_knots() if at is None else at
     z, v, stuck = np.empty((3, len(times)))
-    events = part_library().part_exact(
+    events = library("part").part_exact(
         *case.arguments(),
         *(0.0, 0.0, len(times), None if at is None else at.ctypes.data),
         *(z.ctypes.data, v.ctypes.data, stuck.ctypes.data, None),
@@ -154,29 +95,26 @@ def exact(
     return PartMotion(times, z, v, _shares(times, stuck), events)
 
 
-def account(
-    surface: Surface,
-    output: Real,
-    *,
-    mu_s: float,
-    mu_k: float,
-    force_per_mass: float,
-    gravity: float = 9.81,
-    mu_plate: float = 0.0,
-) -> Account:
-    """The exact motion on a surface at the times ``output``, and what passed between the two; the
-    part starts at the height 0 with the surface's velocity. See :class:`Case`.
+def account(surface: Surface, output: Real, **given: Unpack[Case]) -> dict[str, Array]:
+    """The exact motion on a surface at the times ``output`` (s), and what passed between the two;
+    the part starts at the height 0 with the surface's velocity.
+
+    ``z`` (m) and ``v`` (m/s) are the part's, ``stuck`` the time spent sticking so far (s) and
+    ``sticks`` 1 while it sticks, else 0; ``z_surface`` (from 0), ``v_surface`` and ``a_surface``
+    the surface's. Over the part's mass are ``friction``, of the surface on the part (m/s²), and the
+    sums so far (J/kg) ``work``, of the surface on the part, and ``heat``, of surface and plate.
+    ``events`` are the changes between sticking and slipping so far. Where the surface's velocity or
+    acceleration jumps, the values are those before the jump.
     """
-    law = (mu_s, mu_k, force_per_mass, gravity, mu_plate)
-    case = _Case(surface.times, surface.velocities, *law, periods=surface.periods)
+    given["periods"] = surface.periods
+    case = _Case(surface.times, surface.velocities, **given)
     times = case.times(output)
     motion, told = np.empty((3, len(times))), np.empty((len(times), len(_TOLD)))
-    arguments = _Exact(
+    library("part").part_exact(
         *(*case.arguments(), surface.half, surface.turn, len(times), times.ctypes.data),
         *(*(row.ctypes.data for row in motion), told.ctypes.data),
     )
-    part_library().exact_run(ctypes.byref(arguments))
-    return Account(times, *motion, **dict(zip(_TOLD, told.T, strict=True)))
+    return dict(zip(("z", "v", "stuck", *_TOLD), (*motion, *told.T), strict=True))
 
 
 def bounds(
@@ -217,7 +155,7 @@ def threshold(
     case = _Case(time, v_surface, **given)
     if not v_min >= 0:
         raise BadInput(f"The velocity threshold must not be negative, and is {v_min:g} m/s.")
-    return case.stepped(part_library().part_threshold, (step, v_min), output)
+    return case.stepped(library("part").part_threshold, (step, v_min), output)
 
 
 def published(
@@ -242,7 +180,7 @@ def moreau(
 ) -> PartMotion:
     """Fixed steps that are implicit in the friction (Moreau); ``output`` as in `threshold`."""
     case = _Case(time, v_surface, **given)
-    return case.stepped(part_library().part_moreau, (step,), output)
+    return case.stepped(library("part").part_moreau, (step,), output)
 
 
 def friction_law(

@@ -7,7 +7,7 @@ or, where the FMU has the current source too (circuit.model "limited"), the comm
 
 from collections import deque
 from collections.abc import Mapping
-from ctypes import c_double, c_int, c_int64
+from ctypes import c_double, c_int
 from dataclasses import dataclass
 from functools import cache
 from operator import attrgetter, is_
@@ -222,7 +222,7 @@ def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
     integers = {
         "contact": CONTACT_LAWS[scene.mechanics.contact],
         "suspension": SUSPENSIONS[scene.mechanics.suspension],
-        "ram_fixed": int(scene.mechanics.actuator == "direct"),
+        "ram_fixed": int(not scene.mechanics.free_ram),
         "independent": int(scene.drive.phase_deg is not None),
         "source": int(scene.rung.source_in_fmu),
     }
@@ -237,15 +237,6 @@ def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:
     return reals, integers
 
 
-@cache
-def _stepper() -> Any:
-    found = library("stepper")
-    found.stepper_suspension.restype, found.stepper_rests.restype = c_double, c_int64
-    found.stepper_suspension.argtypes = (c_double * len(RIG), c_double)
-    found.stepper_rests.argtypes = (c_double * len(RIG), c_double * 4)
-    return found
-
-
 def numbers_of(scene: Scene) -> dict[str, float]:
     """The stepper's numbers of a scene's rig, as far as the FMU has them."""
     reals, integers = parameters(scene)
@@ -254,7 +245,7 @@ def numbers_of(scene: Scene) -> dict[str, float]:
 
 def suspension_force(known: Mapping[str, float], places: Array) -> Array:
     """Of the suspension on a ram at rest at ``places`` (q, m), N; of the stepper's numbers."""
-    rig, force_at = _rig(known), _stepper().stepper_suspension
+    rig, force_at = _rig(known), library("stepper").stepper_suspension
     return np.array([force_at(rig, q) for q in places.tolist()])
 
 
@@ -262,7 +253,7 @@ def rests_of(known: Mapping[str, float]) -> list[float]:
     """The places (q, m), rising, at which the ram rests without a current; in a wall that yields,
     too."""
     found = (c_double * 4)()
-    count = _stepper().stepper_rests(_rig(known), found)
+    count = library("stepper").stepper_rests(_rig(known), found)
     return [*found][:count]
 
 

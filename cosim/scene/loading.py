@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from cosim.errors import BadInput, NoEffect, plain
 from cosim.files import link, reader
+from cosim.files.resources import circuits, compiled_fmus
 from cosim.scene import messages, toml
 from cosim.scene.describe import acts, keys
 from cosim.scene.methods import METHODS
@@ -115,7 +116,8 @@ def _layers(source: str) -> list[_Layer]:
     name = re.sub(r"[^\w.+-]+", "-", path.stem).strip("-.+")[:64]
     data.setdefault("name", name or "scene")
     _check_names(data, origin)
-    _find_files(data, path.parent)
+    own = [circuits() / "examples", *compiled_fmus()] if source in builtin else []
+    _find_files(data, path.parent, *own)
     base = data.pop("base", None)
     if base is None:
         return [_Layer(origin, data, source in builtin)]
@@ -279,15 +281,21 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
     return tables
 
 
-def _find_files(tables: dict[str, Any], folder: Path) -> None:
-    """Make the paths of files absolute; they are relative to ``folder``."""
+def _find_files(tables: dict[str, Any], folder: Path, *more: Path) -> None:
+    """Make the paths of files absolute; they are relative to ``folder``, or to the first of these
+    where the file is."""
+
+    def found(file: str) -> str:
+        there = (place / file for place in (folder, *more))
+        return os.path.abspath(next((path for path in there if path.exists()), folder / file))
+
     for table, key in PATHS:
         path = tables.get(table, {}).get(key)
         if isinstance(path, str):
-            tables[table][key] = os.path.abspath(folder / path)
+            tables[table][key] = found(path)
     for fmu in tables.get("fmu", ()):
         if isinstance(fmu, dict) and isinstance(fmu.get("file"), str):
-            fmu["file"] = os.path.abspath(folder / fmu["file"])
+            fmu["file"] = found(fmu["file"])
 
 
 def _value(text: str) -> Any:

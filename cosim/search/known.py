@@ -25,7 +25,6 @@ class Known:
         self._rows: dict[bytes, int] = {}
         self.points, self.scores = np.empty((0, keys)), np.empty((0, quantities))
         self.feasible: Feasible = np.empty(0, bool)
-        self._raw = self.scores
         self._tree: KDTree | None = None
 
     def set_at(self, points: Array) -> Array:
@@ -43,16 +42,10 @@ class Known:
             first = len(self.points)
             self._rows |= {keys[n]: first + k for k, n in enumerate(new)}
             self.points = np.vstack([self.points, points[new]])
-            self._raw = np.vstack([self._raw, found])
             self.feasible = np.concatenate([self.feasible, feasible])
-            self.scores = np.where(self.feasible[:, None], self._raw, -inf)
+            self.scores = np.vstack([self.scores, np.where(feasible[:, None], found, -inf)])
             self._tree = None
         return [self._rows[key] for key in keys]
-
-    def own(self, points: Array) -> Array:
-        """The scores of points (rows), whether they are feasible or not."""
-        rows = self.rows(points)
-        return self._raw[rows]
 
     def search(self, searches: Mapping[int, Search], runs: float = inf) -> None:
         """Let searches, by the number of the quantity that each is for, ask for ``runs`` points

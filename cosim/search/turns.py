@@ -17,6 +17,15 @@ def faces(point: Array) -> Array:
     return np.clip(point + np.vstack([step, -step]), 0.0, 1.0)
 
 
+def turned(point: Array, keys: int) -> Array:
+    """A point and all turns of its first ``keys``, one by one and together (rows)."""
+    if not keys:
+        return point[np.newaxis]
+    first = point[:keys]
+    every = np.vstack([first, faces(first), corners(first)])
+    return np.hstack([every, np.tile(point[keys:], (len(every), 1))])
+
+
 def corners(point: Array) -> Array:
     """Points (rows) with all keys turned by TURN together, in every combination."""
     signs = np.array(list(product((-1.0, 1.0), repeat=len(point))))

@@ -5,12 +5,10 @@ finds each event. Forces and accelerations are means over a step, so a peak with
 number of impacts and that of slips are not known.
 """
 
-import ctypes
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from ctypes import Structure, byref, c_double, c_int64, c_void_p
-from functools import cache
+from ctypes import addressof, byref
 from typing import Any
 
 import numpy as np
@@ -25,10 +23,10 @@ from cosim.files.spill import BLOCK, Tape
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
 from cosim.simulation.guards import remarks
-from cosim.simulation.rungs.electrics import commanded
+from cosim.simulation.rungs.rung import commanded
 from cosim.simulation.summary import slips
 from cosim.stepper.stepper import LANES, OWN, RIG, numbers
-from cosim.toolchain.libraries import library
+from cosim.toolchain.libraries import library, structures
 from cosim.toolchain.processes import Progress
 from cosim.toolchain.versions import versions
 from cosim.trials.camera import FRAME_RATE, accelerations, instants_a_frame, shown
@@ -47,7 +45,7 @@ LOST = (
 UNLIMITED = 1e9
 """V and A: the limits of a source that has none."""
 
-_STATES, _COLUMNS = 15, tuple(name for name in COLUMNS if name not in ("time", "command"))[:12]
+_COLUMNS = tuple(name for name in COLUMNS if name not in ("time", "command"))[:12]
 _SUMS = (
     *("x_settle", "x_end", "i_end", "sticking", "swing_high", "swing_low", "current_limit"),
     *("v_max", "v_min", "z_max", "z_min", "i_max", "i_min"),
@@ -56,31 +54,7 @@ _SUMS = (
 """As ``Sums`` of ``lanes.h`` has them."""
 
 
-class _Kept(Structure):
-    _fields_ = (
-        ("state", c_double * LANES * _STATES),
-        ("sums", c_double * LANES * len(_SUMS)),
-    )
-
-
-class _Stretch(Structure):
-    _fields_ = (
-        *(("step", c_double), ("first", c_int64), ("last", c_int64), ("samples", c_int64)),
-        *(("times", c_void_p), ("rows", c_int64), ("drives", c_void_p)),
-    )
-
-
-class _Drive(Structure):
-    _fields_ = (("lines", c_int64), *((name, c_void_p) for name in ("phase", "first", "last")))
-
-
-@cache
-def _library() -> Any:
-    found = library("stepper")
-    found.stepper_begin.restype = found.stepper_run.restype = None
-    found.stepper_begin.argtypes = (c_void_p, c_void_p, c_double, c_void_p)
-    found.stepper_run.argtypes = (c_void_p,) * 5
-    return found
+_Kept, _Stretch, _Drive = (structures("stepper")[name] for name in ("Kept", "Stretch", "Drive"))
 
 
 def simulate_fast(scene: Scene, progress: Progress) -> Result:
@@ -233,7 +207,7 @@ class _Runs:
         self._row_step = scenes[0].run.output_step
         self.reached = 0.0
         """s."""
-        _library().stepper_begin(
+        library("stepper").stepper_begin(
             self._parameters.ctypes.data, self._drives, step, byref(self._kept)
         )
 
@@ -258,9 +232,9 @@ class _Runs:
             out = np.empty((len(times), len(_COLUMNS) if rows else LANES))
             piece = _Stretch(
                 *(self._step, first, last, len(times), times.ctypes.data, int(rows)),
-                ctypes.addressof(self._drives),
+                addressof(self._drives),
             )
-            _library().stepper_run(
+            library("stepper").stepper_run(
                 *(byref(piece), self._parameters.ctypes.data, self._span.ctypes.data),
                 *(byref(self._kept), out.ctypes.data),
             )
@@ -308,10 +282,3 @@ def _lines(scene: Scene) -> Array:
     long = np.diff(times) >= 0.5 * step
     lines = np.array([times[:-1] / made.period, first[:, 0], last[:, 0]])
     return np.ascontiguousarray(lines[:, long] if long.any() else lines)
-
-
-def sizes() -> tuple[tuple[int, int], tuple[int, int]]:
-    """Bytes of the two structures, here and in the compiled code."""
-    there = _library().stepper_sizes
-    there.restype, there.argtypes = c_int64, (c_int64,)
-    return (ctypes.sizeof(_Kept), there(0)), (ctypes.sizeof(_Stretch), there(1))

@@ -4,10 +4,13 @@ Only what is published or follows from the model's own laws has a limit here.
 """
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from cosim.arrays import Array
 from cosim.circuit.heat import DRIVE_RANGE_HEAT
+from cosim.circuit.lint.deck import read_all
+from cosim.circuit.lint.outputs import without_effect
 from cosim.files.spill import blocks
 from cosim.mechanics.normal_force import NormalForce
 from cosim.mechanics.stickslip import numbers_of, rests_of
@@ -41,6 +44,8 @@ def remarks(
     where it changes in time. What moves is judged by the rows of the waveforms.
     """
     found = [*_grip(scene, force), *_supply(scene)]
+    if scene.circuit.netlist is not None:
+        found += without_effect(read_all(Path(scene.circuit.netlist))[1], measuring=False)
     if scene.rung.driven:
         found += _coil(scene, summary)
     if not scene.surface_is_given:
@@ -49,7 +54,7 @@ def remarks(
                 found += _ram(scene, columns, surface)
         found += _part(scene, columns)
     told: dict[str, Any] = {"notes": found}
-    if not scene.surface_is_given and scene.mechanics.actuator == "ram":
+    if not scene.surface_is_given and scene.mechanics.free_ram:
         told["rests"] = _rests(scene)
         found += _told_of(told["rests"], scene.mechanics.travel)
     return told
@@ -111,7 +116,7 @@ def _supply(scene: Scene) -> Iterator[str]:
 
 
 def _coil(scene: Scene, summary: Mapping[str, Any]) -> Iterator[str]:
-    if scene.mechanics.actuator != "ram" or scene.run.duration < scene.period:
+    if not scene.mechanics.free_ram or scene.run.duration < scene.period:
         return
     if summary["coil_heat"] > DRIVE_RANGE_HEAT:
         yield (

@@ -13,8 +13,7 @@ from cosim.coupling.loop.recorder import Recorder
 from cosim.files.spill import blocks
 from cosim.mechanics.part import slip_budget
 from cosim.scene import Scene
-from cosim.simulation.rungs.electrics import Electrics
-from cosim.simulation.rungs.rung import Driven, Motion, average_slope
+from cosim.simulation.rungs.rung import Driven, Electrics, Motion, average_slope
 from cosim.toolchain.versions import versions
 from cosim.trials.camera import FRAME_RATE, accelerations, instants_a_frame, shown
 
@@ -142,7 +141,7 @@ def _hanging(scene: Scene) -> float:
     if scene.surface_is_given:
         return 0.0
     mechanics = scene.mechanics
-    ram = 0.0 if mechanics.actuator == "direct" else mechanics.ram_mass
+    ram = mechanics.ram_mass if mechanics.free_ram else 0.0
     mass = ram + mechanics.surface_mass + mechanics.part_mass / mechanics.n_surfaces
     force = mass * mechanics.gravity
     return scene.coil.count * force**2 / (2.0 * mechanics.flexure_stiffness)
@@ -151,7 +150,7 @@ def _hanging(scene: Scene) -> float:
 def motion(scene: Scene, recorder: Recorder) -> Motion:
     """What surface and part did, at the end of a run."""
     ram = None
-    if scene.mechanics.actuator == "ram":
+    if scene.mechanics.free_ram:
         last = dict(zip(recorder.mechanics.columns, recorder.rows[-1].tolist(), strict=True))
         ram = last["z_ram"] - last["z_surface"]
     return Motion(

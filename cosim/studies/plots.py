@@ -6,6 +6,7 @@ from textwrap import fill
 from typing import Any
 
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 
 from cosim.files.picture import Picture
 
@@ -43,6 +44,13 @@ def panels(
         axis.grid(alpha=0.25)
         axis.set_axisbelow(True)
     return figure, list(axes.flat)
+
+
+def keep_ticks_inside(*axes: Axis) -> None:
+    """Drop the ticks beyond the ends of these x or y axes."""
+    for one in axes:
+        low, high = one.get_view_interval()
+        one.set_ticks([tick for tick in one.get_ticklocs() if low <= tick <= high])
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """What the C of the package was compiled to when the package was installed.
 
-A library that is damaged, cut off or of another build would end the process, or compute something
+The build also wrote down the functions and structures of each library, as its C declares them. A
+library that is damaged, cut off or of another build would end the process, or compute something
 else, once it is loaded: each file is held against the size and hash that the build wrote down.
 """
 
@@ -10,8 +11,10 @@ import json
 import os
 import sys
 from ctypes.util import find_library
-from functools import cache
+from functools import cache, reduce
+from operator import mul
 from pathlib import Path
+from typing import Any
 
 from cosim.errors import BadInput
 
@@ -23,14 +26,50 @@ _OTHERS = 0o002
 """The mode of a file or folder that every user may write."""
 
 
+CALLBACK = ctypes.CFUNCTYPE(None)
+
+_TYPES: dict[str, Any] = {
+    **{f"{name}_t": getattr(ctypes, f"c_{name}") for name in ("int32", "int64")},
+    **{name: getattr(ctypes, f"c_{name}") for name in ("char", "bool", "int", "long", "double")},
+    **{"void": None, "*": ctypes.c_void_p, "()": CALLBACK},
+}
+"""What the build's words for types stand for."""
+
+
 @cache
 def library(name: str) -> ctypes.CDLL:
-    """The shared library ``name``; BadInput if it is missing, damaged or cannot be loaded."""
+    """The shared library ``name``, whose functions take pointers as addresses; BadInput if it is
+    missing, damaged or cannot be loaded."""
     path = compiled(name + SUFFIX)
     try:
-        return ctypes.CDLL(str(path))
+        found = ctypes.CDLL(str(path))
     except OSError as error:
         raise BadInput(f"The compiled library {path} cannot be loaded: {error}.") from error
+    for function, (result, arguments) in _interface(name)["functions"].items():
+        of = getattr(found, function)
+        of.restype, of.argtypes = _TYPES[result], [_TYPES[kind] for kind in arguments]
+    return found
+
+
+@cache
+def structures(name: str) -> dict[str, type[ctypes.Structure]]:
+    """The structures that the C of the library ``name`` declares; pointers are addresses in them.
+    Raises BadInput."""
+    known = dict(_TYPES)
+    declared = _interface(name)["structures"]
+    for structure, fields in declared.items():
+        kinds = [
+            (field, reduce(mul, reversed(lengths), known[kind])) for field, kind, lengths in fields
+        ]
+        body = {"_fields_": kinds, "__slots__": ()}  # no other names are taken
+        known[structure] = type(structure, (ctypes.Structure,), body)
+    return {structure: known[structure] for structure in declared}
+
+
+def _interface(name: str) -> dict[str, Any]:
+    """What the build wrote down of a library's C."""
+    path = compiled(name + SUFFIX)
+    return json.loads((path.parent / "build.json").read_bytes())["interfaces"][name]
 
 
 def ngspice_library() -> str:

@@ -93,7 +93,7 @@ SUMMARY: dict[str, Quantity] = {
     "versions": Quantity("", "versions of the programs that took part"),
     "circuit_model": Quantity("", 'rung that circuit.model = "auto" took'),
     "circuit_model_why": Quantity("", "why it took that rung"),
-    "circuit_model_expected": Quantity("", "what cosim chart choice has measured of that rung"),
+    "circuit_model_expected": Quantity("", "what was measured of that rung"),
     "circuit_model_errors": Quantity("", "estimated relative error of v_average on rungs tried"),
     "coupling_taken": Quantity("", 'method and steps that coupling.method = "auto" took'),
     "error_estimate": Quantity(

@@ -90,8 +90,8 @@ def test_no_spelling_of_a_level_passes(parameters: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("element", "told"),
     [
-        ("C9 v1 0 1u Rser=1", "write a resistor in series"),
-        ("C9 v1 0 1u Rpar=1k", "write a resistor in parallel"),
+        ("C9 v1 0 1u Rser=1 m=2", "write a resistor in series"),
+        ("R9 v1 0 1 Rpar=1k", "write a resistor in parallel"),
         ("E9 x9 0 v1 0 laplace=1", "write the filter"),
         ("L9 v1 x9 1m ruler=3", "nothing that ngspice knows"),
     ],

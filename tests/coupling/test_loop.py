@@ -117,7 +117,7 @@ def test_no_step_goes_through_python(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_no_step_asks_for_the_cpu_time() -> None:
     """ngspice would, to print four times a second how far it is."""
     simulate(load("reference", ["run.duration=1", "circuit.max_step=1e-5"]))
-    assert not [line for line in lead.engine(False)._stdout if "Reference value" in line]
+    assert not [line for line in lead.engine()._stdout if "Reference value" in line]
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -220,7 +220,7 @@ def test_python_fails_below_ngspice(
 def test_a_source_that_nothing_feeds(monkeypatch: pytest.MonkeyPatch) -> None:
     original = lead.prepare
 
-    def strange(scene: Scene) -> tuple[str, tuple[str, ...]]:
+    def strange(scene: Scene) -> tuple[str, dict[str, str]]:
         deck, saved = original(scene)
         return deck.replace("\n.tran", "\nVodd odd 0 external\nRodd odd 0 1\n.tran"), saved
 

@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from cosim.errors import CosimError
-from cosim.evaluate.many import Progress, each
+from cosim.evaluate.many import each, threads
 from cosim.mechanics import pace
 from cosim.scene import Scene, load
 from cosim.simulation.simulate import simulate, summary
+from cosim.toolchain.processes import Progress
 
 Summary = dict[str, Any]
 SHORT: dict[str, Any] = {"run.duration": 0.15, "run.settle": 0.05, "run.output_step": 0.05}
@@ -51,14 +52,19 @@ def test_equal_to_single_runs(model: str, tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def check(scenes: list[Scene]) -> None:
-    found = dict(each(made, enumerate(lambda scene=scene: scene for scene in scenes), 3))
+    found = at_once([lambda scene=scene: scene for scene in scenes], 3)
     assert sorted(found) == list(range(len(scenes)))
     for number, scene in enumerate(scenes):
         assert repeatable(found[number]) == repeatable(simulate(scene).summary), scene
 
 
-def made(make: Callable[[], Scene], progress: Progress) -> Summary:
-    return summary(make(), progress)
+def at_once(making: list[Callable[[], Scene]], count: int) -> dict[int, Any]:
+    with threads(making, count) as pool:
+        return dict(each(pool, made, range(len(making))))
+
+
+def made(making: list[Callable[[], Scene]], number: int, progress: Progress) -> Summary:
+    return summary(making[number](), progress)
 
 
 def repeatable(summary: Summary | Exception) -> Summary:
@@ -80,7 +86,7 @@ def test_failures_are_those_of_single_runs(monkeypatch: pytest.MonkeyPatch) -> N
         {},
     ]
     making = [partial(load, scene, change) for change in changes]
-    found = dict(each(made, enumerate(making), 2))
+    found = at_once([*making], 2)
     said = []
     for number, make in enumerate(making[:-1]):
         with pytest.raises(CosimError) as single:
@@ -95,7 +101,6 @@ def test_what_runs_is_stopped() -> None:
     """A run that would take hours ends with the `with` block, and so when Ctrl-C leaves it."""
     endless = {"circuit.model": "ideal", "run.duration": 1e5, "run.output_step": 1e3}
     making = [partial(load, "reference", changes) for changes in (endless, endless | SHORT)]
-    found = each(made, enumerate(making), 2)
-    number, numbers = next(found)
-    assert number == 1 and isinstance(numbers, dict)
-    found.close()
+    with threads(making, 2) as pool:
+        number, numbers = next(each(pool, made, range(2)))
+        assert number == 1 and isinstance(numbers, dict)

@@ -4,7 +4,7 @@ import cProfile
 import pstats
 from functools import partial
 
-from cosim.evaluate.many import each
+from cosim.evaluate.many import each, threads
 from cosim.evaluate.point import point
 from cosim.scene import load
 from cosim.simulation.simulate import summary
@@ -16,9 +16,10 @@ def test_python_calls_few_functions_for_a_point() -> None:
     knobs = [{"drive.amplitude": 5.0 + 0.02 * k, "drive.offset": -0.01 * k} for k in range(100)]
 
     def run() -> None:
-        tasks = enumerate(partial(point, base, at, False) for at in knobs)
-        for _, found in each(lambda make, progress: summary(make(), progress), tasks, 1):
-            assert isinstance(found, dict)
+        tasks = [partial(point, base, at, False) for at in knobs]
+        with threads(None, 1) as pool:
+            for _, found in each(pool, lambda _, make, told: summary(make(), told), tasks):
+                assert isinstance(found, dict)
 
     run()  # what is kept from run to run is made
     profile = cProfile.Profile()

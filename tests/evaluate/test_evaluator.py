@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 import cosim
-from cosim.evaluate import evaluator
+from cosim.evaluate import point
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import Outcome
 from cosim.scene import load
@@ -33,7 +33,7 @@ def test_each_settings_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         machine = settings["friction.mu_s"] in lost
         return Outcome({"v_average": ran[-1]}, "lost" if machine else "", machine)
 
-    monkeypatch.setattr(evaluator, "evaluate", counted)
+    monkeypatch.setattr(point, "evaluate", counted)
     values = [0.7, 0.8, 0.7, 0.9, 0.8, 0.7]
     points = [*enumerate({"friction.mu_s": value} for value in values)]
     path = tmp_path / "store.sqlite"

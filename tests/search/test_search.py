@@ -100,7 +100,6 @@ def test_points_are_run_once_where_they_can_be_set() -> None:
     points = np.array([[0.31], [0.29], [0.9], [-1.0], [0.3]])
     assert found.rows(points) == [0, 0, 1, 2, 0] and found.rows(points[2:]) == [1, 2, 0]
     assert asked == [0.3, 0.9, 0.0]
-    np.testing.assert_array_equal(found.own(points)[:, 0], [0.3, 0.3, 0.9, 0.0, 0.3])
     np.testing.assert_array_equal(found.scores[:, 0], [0.3, -np.inf, 0.0])
     assert found.tops() == 0.3 and found.ranked(0, 0.05, 9)[:, 0].tolist() == [0.3, 0.0]
 

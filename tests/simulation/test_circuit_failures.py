@@ -155,28 +155,9 @@ def _spoil_or_run(spoil: int, progress: object) -> object:
     if not spoil:
         return os.getpid(), good_run()
     deck = "spoilt\nV1 a 0 1\nR1 a 0 {nothing}\n.tran 1u 1m\n.end"
-    lead.engine(False).transient(deck, ("v(a)",), _Nobody())
+    lead.engine().transient(deck, ("v(a)",), _Nobody())
     assert ngspice.Engine.poisoned
     return os.getpid()
-
-
-POLY = "E9 x9 0 POLY(1) v1 0 0 1\nR9 x9 0 1k"
-
-
-def test_code_models_are_there_for_a_netlist_of_ones_own_alone(home: Path) -> None:
-    """Each kind that ngspice knows costs time in each step."""
-    deck = f"poly\nVcommand v1 0 1\n{POLY}\n.tran 1u 1m\n.end"
-    with_them = processes.isolated(_said, (deck, True), lambda _: None)
-    if "not parsed" in with_them:
-        pytest.skip("ngspice's library lacks its code models here")
-    assert "not parsed" in processes.isolated(_said, (deck, False), lambda _: None)
-    simulate(load("reference", own(home, edited(SENSE, f"{SENSE}\n{POLY}"))))
-
-
-def _said(given: tuple[str, bool], progress: object) -> str:
-    engine = lead.engine(given[1])
-    engine.transient(given[0], ("v(v1)",), _Nobody())
-    return engine.said()
 
 
 class _Nobody:

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from benchmarks.choice import CHOICES, COST, TRUTHS, advice, choice, machines, report
 from cosim.scene import changed, load
 from cosim.simulation.choose_rung import advice as told
 from cosim.simulation.choose_rung import expected
 from cosim.simulation.simulate import summary
-from cosim.studies.choice.choice import CHOICES, COST, TRUTHS, advice, choice, machines, report
 from tests.simulation.test_against_reference import CASES, scene_of
 
 ROOT = Path(__file__).parents[2]
@@ -102,7 +102,7 @@ def test_the_figure_and_the_page(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_a_quick_chart(tmp_path: Path) -> None:
-    found = choice(quick=True, out=tmp_path)
+    found = choice(True, tmp_path)
     every = {(r["circuit.model"], r["steps"]): r for r in found.rows if r["machine"] == "all"}
     ideal, limited, full = (every[model, "default"] for model in ("ideal", "limited", "full"))
     assert ideal["against full: worst [%]"] > 5.0 > limited["against full: worst [%]"]

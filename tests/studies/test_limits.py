@@ -20,13 +20,13 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.store import Store
 from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
-from cosim.search.turns import TURN
-from cosim.studies.limits import judge, report, runs, study
+from cosim.search.turns import TURN, turned
+from cosim.studies.limits import judge, report, runs, search, study
 from cosim.studies.limits.answer import BY_NAME, gain_on, gains, noise
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, FREE, STEPS, Machine
 from cosim.studies.limits.judge import Key, Point
 from cosim.studies.limits.report import STORE
-from cosim.studies.limits.runs import GOALS, NEEDED, Bench, turned
+from cosim.studies.limits.runs import GOALS, NEEDED, Bench
 from cosim.studies.limits.search import Effort, searched
 from cosim.studies.limits.study import Efforts, Rig, Study
 from tests.studies.test_figures import assert_legible
@@ -81,7 +81,7 @@ def test_whole_periods_are_run() -> None:
 
 def test_turns() -> None:
     """One knob by 2 % of its turn either way, and all three together; levels stay."""
-    every = turned(np.array([0.5, 0.5, 0.99, 0.2]))
+    every = turned(np.array([0.5, 0.5, 0.99, 0.2]), 3)
     assert every.shape == (1 + 6 + 8, 4) and (every[:, 3] == 0.2).all()
     off = np.abs(every[:, :2] - 0.5)
     assert set(np.round(off.ravel(), 9)) == {0.0, TURN} and every[:, 2].max() == 1.0
@@ -93,7 +93,7 @@ def test_a_sense_resistor_leaves_the_current() -> None:
     with made.evaluator:
         machines = Machine(), NAMED["sense resistor 2 Ω"].machine(made.scene)
         every = [replace(one, rung="ideal").at(point, 0.1, 0.1) for one in machines]
-        own, less = made.outcomes(every)
+        own, less = made.evaluator.outcomes(every)
     for name in ("v_average", "current_max"):
         assert less.numbers[name] == pytest.approx(own.numbers[name], rel=1e-5)
 
@@ -102,7 +102,7 @@ def test_exchanged_wires_are_the_other_command() -> None:
     """A symmetric circuit cannot tell the coil's wires from the command's sign."""
     made = bench()
     with made.evaluator:
-        mirrored, falling = made.outcomes(
+        mirrored, falling = made.evaluator.outcomes(
             [
                 {**common, "drive.offset": sign * -0.7, **own}
                 for sign, own in (
@@ -177,7 +177,7 @@ class Hills:
         once = self.once(machine)
 
         def evaluate(points: Array) -> tuple[Array, Any]:
-            heights = [np.median(once(turned(point))[0], axis=0) for point in points]
+            heights = [np.median(once(turned(point, 3))[0], axis=0) for point in points]
             return np.array(heights), points[:, 0] < 0.9
 
         return evaluate
@@ -226,7 +226,7 @@ def test_what_is_not_settled_does_not_stand() -> None:
     with made.evaluator, slow.evaluator:
         for one in (made, slow):
             points = judge.judged(one, {"": Machine()}, candidates, ("robust",), 1)
-            whole, late = one.outcomes(
+            whole, late = one.evaluator.outcomes(
                 [Machine().at(np.array(place[0]), *times) for times in ((1.5, 1.5), (2.25, 0.75))]
             )
             for key, point in points.items():
@@ -249,7 +249,8 @@ def made_study(own: float, changed_: float, other: tuple[float, float], again: f
 def test_gains_are_paired_on_each_rig() -> None:
     found = made_study(0.02, 0.04, (0.03, 0.033), 0.021)
     (gain,) = gains(found, BY_NAME["v_up"])
-    assert gain.every == pytest.approx((1.0, 0.1)) and gain.middle == pytest.approx(0.55)
+    assert gain.every == pytest.approx((1.0, 0.1))
+    assert gain.over_rigs == pytest.approx((55.0, 10.0, 100.0))
     assert noise(found, BY_NAME["v_up"]) == pytest.approx(0.05) and gain.counts
     assert not gains(made_study(0.02, 0.0206, (0.03, 0.03), 0.021), BY_NAME["v_up"])[0].counts
     assert np.isnan(gain_on(found.rigs[0], AS_IT_IS, BY_NAME["v_down"]))
@@ -261,7 +262,8 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     interrupted goes on and leaves the same."""
     drawn: list[Figure] = []
     monkeypatch.setattr(Picture, "write", lambda figure, *where: drawn.append(figure))
-    names = ("as it is", "sine", "heat 7 W", "op-amp of a hundredth the slew rate")
+    names = ("as it is", "sine", "heat 7 W")
+    monkeypatch.setattr(search, "KEPT", 1)
     monkeypatch.setattr(report, "CHANGES", [NAMED[name] for name in names])
     monkeypatch.setattr(report, "FULL", Efforts((FEW, Effort(0, 3, 2)), (FEW, FEW), 1))
     scene = load("reference", {"run.duration": 0.2})
@@ -300,6 +302,29 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(drawn) == 3 + 3 + 2  # and those of the two commands
     for figure in drawn[:3]:
         assert_legible(figure)
+
+
+def test_what_is_not_searched_is_tried_at_the_robust_setting(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Against the device as it is on the same circuit: alone each has the same median."""
+    monkeypatch.setattr(judge, "SHORT", 0.02)
+    monkeypatch.setattr(judge, "SPAN", 0.03)
+    made, place, slow = bench(), [0.6, 0.8, 0.2], "op-amp of a hundredth the slew rate"
+    own = {
+        ("as it is", "v_up", kind): Point(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, place, {})
+        for kind in ("best", "robust")
+    }
+    machines = {name: NAMED[name].machine(made.scene) for name in ("as it is", slow)}
+    with made.evaluator:
+        found = judge.tried(made, machines, [slow], own)
+        every = [machines[slow].at(one, 0.02, 0.03) for one in turned(np.array(place), 3)]
+        alone = made.evaluator.outcomes(
+            [{key: x for key, x in one.items() if key != "circuit.slew_rate"} for one in every]
+        )
+    (point,) = found.values()
+    assert [*found] == [(slow, "v_up", "robust")] and point.median != point.against
+    assert point.against == np.median([one.numbers["v_average"] for one in alone])
 
 
 ASKED = ([{"mechanics.surface_mass": 0.02}], 0, False, 1.0)

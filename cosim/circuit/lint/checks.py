@@ -6,15 +6,26 @@ What cannot be decided without evaluating the netlist passes.
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from cosim.circuit.lint.deck import Line, refuse, shown, word_set
-from cosim.circuit.lint.elements import MODEL_TYPES, Element, Scope, controls, parse
+from cosim.circuit.lint.deck import Line, refuse, shown
+from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed
 from cosim.circuit.lint.topology import check_topology
+from cosim.circuit.lint.words import word_set
 
 REQUIRED = (("vemf", "vcommand"), ("vemf", "vdac", "voffset"))
 """Alternatives, each a set of top-level voltage sources that a co-simulation can replace."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d|\.\d)")
+_WAVES = {"pulse": 7, "sin": 6, "exp": 6}
+"""Most values of each: one more is a number of periods in LTspice, and a phase in ngspice."""
+_FOREIGN = (
+    ("d", re.compile(r"\b(roff|vfwd|vrev|rrev|(?:rev)?(?:ilimit|epsilon))\s*="),
+     "is LTspice's ideal diode; write is, n and rs, or a B source"),
+    ("sw", re.compile(r"\b(lser|vser|ilimit|epsilon)\s*="), "is LTspice's own; write it apart"),
+    ("sw", re.compile(r"\b([vi]h)\s*=\s*[{']?\s*-"),
+     "below 0 is LTspice's smooth switch; give one of 0, or write a B source"),
+)  # fmt: skip
+"""What models of these elements mean in LTspice alone, and ngspice would ignore."""
 _NO_VALUES = {"m", "temp", "dtemp", "tc", "tc1", "tc2", "ic", "scale", "noisy"}
 _WAVEFORMS = word_set(
     """dc ac pulse sin exp pwl sffm am trnoise trrandom external distof1 distof2 portnum z0 pwr freq
@@ -79,8 +90,8 @@ def _check_element(element: Element, scope: Scope, names: Names) -> None:
     elif kind in "fhw":
         _check_current_controlled(element, scope)
     elif kind == "k":
-        if len(element.words) < 3:
-            element.refuse(" must name two inductors and their coupling")
+        if len(element.words) != 3:
+            element.refuse(" must name two inductors and their coupling; write K pair by pair")
         _check_named(element, scope, "inductor", element.words[:2])
     elif kind == "t" and not any(word.startswith(("z0=", "zo=")) for word in element.words):
         element.refuse(" has no Z0=…")
@@ -101,8 +112,13 @@ def _check_model(element: Element, scope: Scope) -> None:
         return
     types = scope.model_types(name)
     if types is None:
-        element.refuse(f": no model {shown(name)} is defined here")
+        element.refuse(f": no model {shown(name)} is defined here{COPY}")
     _check_type(element, name, types)
+    line = next((s.model_lines[name] for s in scope.chain() if name in s.model_lines), None)
+    text = line.text.lower() if line else ""
+    for kinds, parameter, cure in _FOREIGN:
+        if line and element.kind in kinds and (found := parameter.search(text)):
+            refuse(line, f"{found[1]} of {shown(name)} {cure}")
 
 
 def _check_type(element: Element, model: str, types: set[str]) -> None:
@@ -128,6 +144,20 @@ def _check_passive(element: Element, scope: Scope, names: Names) -> None:
 
 
 def _check_source(element: Element, scope: Scope, names: Names) -> None:
+    for wave, most in _WAVES.items():
+        after = element.words[element.words.index(wave) + 1 :] if wave in element.words else []
+        ends = (k for k, word in enumerate(after) if word in _WAVEFORMS or "=" in word)
+        if next(ends, len(after)) > most:
+            element.refuse(
+                f": {wave.upper()} takes {most} values; one more means a number of periods to "
+                "LTspice and a phase to ngspice"
+            )
+    if "pwl" in element.words:
+        after = element.words[element.words.index("pwl") + 1 :]
+        if any(word.startswith("+") for word in after[::2]):
+            element.refuse(": write the times of PWL since the start, not since the last one")
+        if "repeat" in after:
+            element.refuse(": instead of REPEAT write r=0 after the points of PWL")
     for word in element.words:
         plain = word.lstrip("+-")
         known = plain in _WAVEFORMS or names.is_parameter(scope, plain)
@@ -140,12 +170,11 @@ def _check_current_controlled(element: Element, scope: Scope) -> None:
     found = element.words
     if element.kind != "w" and (not found or "=" in found[0] or found[0][0] in "{'"):
         return
-    place = controls(found, 1)
-    if place is None:
+    if found[:1] == ["poly"]:
         return
-    if len(found) <= place.stop:
+    if len(found) < 2:
         element.refuse(" has too few words")
-    _check_named(element, scope, "source", _plain(found[place]))
+    _check_named(element, scope, "source", _plain(found[:1]))
 
 
 def _check_named(element: Element, scope: Scope, what: str, names: Iterable[str]) -> None:
@@ -163,7 +192,9 @@ def _check_call(element: Element, scope: Scope) -> None:
     name = element.model or ""
     subcircuits = scope.subcircuit(name)
     if subcircuits is None:
-        element.refuse(f": no subcircuit {shown(name)} is defined here")
+        element.refuse(
+            f": no subcircuit {shown(name)} is defined here; include the file with its .subckt"
+        )
     counts = {len(subcircuit.pins) for subcircuit in subcircuits}
     if len(element.nodes) not in counts:
         element.refuse(

@@ -12,33 +12,20 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
 from unicodedata import category
 
+from cosim.circuit.lint.dialect import in_ngspice, prelude
+from cosim.circuit.lint.lines import MAX_LINE, Line, refuse, shown
+from cosim.circuit.lint.words import word_set
 from cosim.errors import BadInput, plain
 from cosim.files import reader
 
-
-@dataclass(frozen=True)
-class Line:
-    """A logical line: comments stripped, continuations joined, where it began."""
-
-    text: str
-    file: str
-    number: int
-
-
 MAX_BYTES = 4_000_000
 MAX_LINES = 100_000
-MAX_LINE = 200_000
 MAX_WORD = 4_000
 MAX_DEPTH = 10
 MAX_NAMES = 1_000
 """Of files, in one file."""
-
-
-def word_set(text: str) -> frozenset[str]:
-    return frozenset(text.split())
 
 
 KEPT = word_set(
@@ -49,7 +36,11 @@ DROPPED = word_set(
     ".tran .op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .meas .measure .save .print "
     ".plot .probe .width .title .csparam .backanno .prot .unprot .protect .unprotect"
 )
-"""Analyses, output and remarks: a host sets its own."""
+"""Analyses, output and remarks: a host sets its own; see ``outputs.py``."""
+_INSTEAD = {
+    ".step": "; run cosim sweep with --over circuit.param.NAME=START:STOP:COUNT instead",
+    ".wave": "; cosim export writes sound",
+}
 ELEMENTS = frozenset("bcdefghijklmoqrstvwxz")
 """First letters of elements. Not A (code models start processes and read files), N (compiled
 Verilog-A), U (translated to code models), P and Y (lossy lines, of no use here)."""
@@ -83,18 +74,10 @@ _MODEL = re.compile(r"\.model\s+([^\s=(){}']+)\s+([a-z]\w*)(?![\w:])", re.IGNORE
 _LEVEL = re.compile(r"(?<![\w.])level\s*(=?)\s*([^\s,()]*)", re.IGNORECASE)
 _PATH = re.compile(r"""\s*(?:"([^"]*)"|'([^']*)'|([^\s"']+))\s*([^\s"']*)\s*""")
 _NAMED = re.compile(
-    rb"""^[ \t]*\.(?:include|inc|lib)[\s+]+(?:"([^"\n]+)|'([^'\n]+)|([^\s"']+))""", re.I | re.M
+    r"""^[ \t]*\.(?:include|inc|lib)[\s+]+(?:"([^"\n]+)|'([^'\n]+)|([^\s"']+))""", re.I | re.M
 )
-
-
-def refuse(line: Line, reason: str) -> NoReturn:
-    """Raise the one sentence that tells what is wrong with ``line``."""
-    raise BadInput(f"{line.file}:{line.number}: {reason}.")
-
-
-def shown(text: str) -> str:
-    """A piece of a netlist as it may stand in a message: short and printable."""
-    return ascii(text if len(text) <= 40 else f"{text[:37]}...")[1:-1]
+_STANDARD = re.compile(r"\bstandard\.\w{3}\b", re.IGNORECASE)
+"""LTspice's own models, which it names wherever it draws a part, whether it needs them or not."""
 
 
 def named(path: Path) -> list[Path]:
@@ -103,14 +86,16 @@ def named(path: Path) -> list[Path]:
     folder, found, size = path.parent.resolve(), [path], 0
     for one in found:
         try:
-            text = reader.contents(one, MAX_BYTES - size)
+            data = reader.contents(one, MAX_BYTES - size)
+            text = _text(data)
         except (reader.Refused, OSError, ValueError):  # a NUL in its name
             continue
-        size += len(text)
+        size += len(data)
         names = {next(filter(None, groups)) for groups in _NAMED.findall(text)}
+        names.update(_STANDARD.findall(text))
         for name in sorted(names)[:MAX_NAMES]:
             with suppress(OSError, ValueError, RuntimeError):
-                file = (one.parent / os.fsdecode(name)).resolve()
+                file = (one.parent / name).resolve()
                 if file not in found and file.is_relative_to(folder) and file.is_file():
                     found.append(file)
     return found
@@ -122,7 +107,13 @@ def read(path: Path) -> list[Line]:
     The text ends at ``.end``, which is not among the lines. Raises BadInput, beginning with
     ``file:line:``, for anything that is not plainly part of a circuit.
     """
-    return _Reader(path).deck()
+    return read_all(path)[0]
+
+
+def read_all(path: Path) -> tuple[list[Line], list[Line]]:
+    """What :func:`read` gives, and the lines that were left out."""
+    reading = _Reader(path)
+    return reading.deck(), reading.dropped
 
 
 @dataclass
@@ -131,6 +122,7 @@ class _Reader:
 
     path: Path
     lines: list[Line] = field(default_factory=list)
+    dropped: list[Line] = field(default_factory=list)
     bytes_read: int = 0
 
     def deck(self) -> list[Line]:
@@ -146,7 +138,7 @@ class _Reader:
         if not ended:
             last = Line("", name, text.rstrip().count("\n") + 1)
             refuse(last, "the netlist does not end with .end, so it may be cut short")
-        return self.lines
+        return [self.lines[0], *prelude(self.lines), *self.lines[1:]]
 
     def _top(self) -> str:
         """The text of the netlist itself."""
@@ -187,15 +179,21 @@ class _Reader:
                     refuse(after, "there is text after .end, which must come last")
                 return True
             elif (text := _passed(line, word, rest)) is not None:
-                self._add(Line(text, line.file, line.number))
+                self._add(self.lines, Line(text, line.file, line.number))
+            else:
+                self._add(self.dropped, line)
         return found
 
-    def _add(self, line: Line) -> None:
-        if len(self.lines) >= MAX_LINES:
+    def _add(self, lines: list[Line], line: Line) -> None:
+        if len(lines) >= MAX_LINES:
             refuse(line, f"the netlist with its includes has more than {MAX_LINES} lines")
-        self.lines.append(line)
+        lines.append(line)
 
     def _inline(self, line: Line, rest: str, opened: tuple[Path, ...]) -> None:
+        if standard := _STANDARD.search(rest):
+            rest = standard[0]
+            if not os.path.lexists(opened[-1].parent / rest):
+                return  # a model of it that is needed is missed where it is used
         match = _PATH.fullmatch(rest)
         if match is None:
             refuse(line, f"{shown(line.text)} does not name one file")
@@ -217,15 +215,19 @@ class _Reader:
         """The regular file that an include means, if it lies in the netlist's own folder."""
         parts = name.split("/")
         if not name.isprintable() or re.search(r"[\\:$~|*?<>`;]", name):
-            refuse(line, f"{shown(name)} is no plain file name")
+            refuse(
+                line,
+                f"{shown(name)} is no plain file name: copy the file into the netlist's folder and "
+                "give its name alone",
+            )
         if name.startswith("/") or ".." in parts:
-            refuse(line, f"{shown(name)} must lie in the netlist's own folder")
+            refuse(line, f"{shown(name)} must lie in the netlist's own folder: copy it there")
         try:
             path = (base.parent / name).resolve(strict=True)
             if path.is_relative_to(self.folder) and path.is_file():
                 return path
         except (OSError, ValueError, RuntimeError):
-            refuse(line, f"{shown(name)} was not found in the netlist's folder")
+            refuse(line, f"{shown(name)} was not found in the netlist's folder: copy it there")
         refuse(line, f"{shown(name)} must be a file in the netlist's own folder")
 
     def _text(self, path: Path, line: Line) -> str:
@@ -241,14 +243,23 @@ class _Reader:
         return _decoded(data, path.name)
 
 
+def _text(data: bytes) -> str:
+    """Of UTF-8, of the UTF-16 and the Latin letters of Windows, with or without their marks."""
+    coding = "utf-8-sig"
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        coding = "utf-16"
+    elif data[1:2] == b"\0" or data[:1] == b"\0":
+        coding = "utf-16-le" if data[1:2] == b"\0" else "utf-16-be"
+    try:
+        return data.decode(coding).replace("\r\n", "\n")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace").replace("\r\n", "\n")
+
+
 def _decoded(data: bytes, name: str) -> str:
     """The text, lines ended by line feeds; any other sign that some program takes for a line's end
     or does not show is refused."""
-    try:
-        text = data.decode("utf-8-sig").replace("\r\n", "\n")
-    except UnicodeDecodeError as error:
-        line = Line("", shown(name), data.count(b"\n", 0, error.start) + 1)
-        refuse(line, "the text is not UTF-8")
+    text = _text(data)
     for place, char in enumerate(text):
         if char not in "\n\t" and category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
             line = Line("", shown(name), text.count("\n", 0, place) + 1)
@@ -271,7 +282,13 @@ def _title(line: Line) -> str:
 
 
 def _logical(text: str, file: str, first: int) -> Iterator[Line]:
-    """The lines with content, without comments, continuations joined to what they continue."""
+    """The lines with content, as ngspice knows them."""
+    for line in _joined(text, file, first):
+        yield from in_ngspice(line)
+
+
+def _joined(text: str, file: str, first: int) -> Iterator[Line]:
+    """The lines without comments, continuations joined to what they continue."""
     pending: Line | None = None
     for number, raw in enumerate(text.split("\n"), first):
         content = _without_comment(Line(raw, file, number))
@@ -325,7 +342,8 @@ def _passed(line: Line, word: str, rest: str) -> str | None:
     if word in DROPPED:
         return None
     if word and word not in KEPT:
-        refuse(line, f"{shown(word)} is not allowed in a netlist")
+        cure = _INSTEAD.get(word, "; leave it out")
+        refuse(line, f"{shown(word)} is not allowed in a netlist{cure}")
     if not _TEXT.fullmatch(line.text) or _UNSAFE.search(line.text):
         odd = next(c for c in line.text if not " " <= c <= "~" or c in '"`\\')
         refuse(line, f"the character {shown(odd)} cannot stand in a netlist outside comments")
@@ -354,7 +372,7 @@ def _options(line: Line, word: str, rest: str) -> str | None:
         if name in NUMERIC_OPTIONS:
             kept.append(match[0].strip(" ,"))
         elif name not in DROPPED_OPTIONS:
-            refuse(line, f"the option {shown(name)} is not allowed in a netlist")
+            refuse(line, f"the option {shown(name)} is not allowed in a netlist; leave it out")
         place = match.end()
     return f"{word} {' '.join(kept)}" if kept else None
 
@@ -365,7 +383,8 @@ def _check_model(line: Line) -> None:
         refuse(line, f"{shown(line.text)} is no complete .model line")
     kind = match[2].lower()
     if kind not in MODELS:
-        refuse(line, f"models of type {shown(kind)} are not allowed in a netlist")
+        cure = "; write it as sw" if kind == "vswitch" else ""
+        refuse(line, f"models of type {shown(kind)} are not allowed in a netlist{cure}")
     if kind not in ("nmos", "pmos"):
         return
     for equals, level in _LEVEL.findall(line.text):

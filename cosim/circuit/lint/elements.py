@@ -31,8 +31,11 @@ MODEL_TYPES = {
     "o": {"ltra"},
 }
 
-_SPECIAL = {"table", "laplace", "freq", "value", "vol", "cur", "and", "nand", "or", "nor"}
+_SPECIAL = {"poly", "table", "laplace", "freq", "value", "vol", "cur", "and", "nand", "or", "nor"}
 """First words of controlled sources that have no controlling nodes."""
+
+
+COPY = "; copy its .model line into the netlist"
 
 
 @dataclass
@@ -69,6 +72,7 @@ class Scope:
     parameters: set[str] = field(default_factory=set)
     functions: set[str] = field(default_factory=set)
     models: dict[str, set[str]] = field(default_factory=dict)
+    model_lines: dict[str, Line] = field(default_factory=dict)
     names: set[str] = field(default_factory=set)
     elements: list[Element] = field(default_factory=list)
     subcircuits: dict[str, list["Scope"]] = field(default_factory=dict)
@@ -200,6 +204,7 @@ class _Parser:
         if len(found) < 3:
             refuse(line, f"{shown(line.text)} is no complete .model line")
         self.scope.models.setdefault(found[1], set()).add(found[2])
+        self.scope.model_lines[found[1]] = line
 
     def _global(self, line: Line, found: list[str]) -> None:
         self.top.globals.update(found[1:])
@@ -249,7 +254,7 @@ def _place(element: Element, scope: Scope) -> None:
         if place is None:
             # Words before a "key=" are as likely nodes as models.
             name = element.words[least + 1 if kind == "m" and len(element.words) > 4 else least]
-            element.refuse(f": no model {shown(name)} is defined here")
+            element.refuse(f": no model {shown(name)} is defined here{COPY}")
         _split(element, place)
         element.model = element.words.pop(0)
     else:
@@ -267,27 +272,13 @@ def _split(element: Element, count: int) -> None:
         element.refuse(" has too few nodes")
 
 
-def controls(words: list[str], each: int) -> slice | None:
-    """Where the words stand that name what controls a source, ``each`` for one controlling
-    quantity; None where the dimension of a POLY is not known.
-    """
-    if words[:1] != ["poly"]:
-        return slice(0, each)
-    if len(words) < 2 or not words[1].isdigit():
-        return None
-    return slice(2, 2 + each * int(words[1]))
-
-
 def _place_controls(element: Element) -> None:
-    """Tell the controlling nodes of a linear or polynomial voltage-controlled source."""
+    """Tell the controlling nodes of a linear voltage-controlled source."""
     first = element.words[0] if element.words else ""
     if not re.fullmatch(r"[^={}']+", first) or first in _SPECIAL:
         return
-    place = controls(element.words, 2)
-    if place is None:
-        return
-    found = element.words[place]
-    if len(element.words) <= place.stop or any("=" in word for word in found):
+    found = element.words[:2]
+    if len(element.words) <= 2 or any("=" in word for word in found):
         element.refuse(" has too few nodes or no value")
     element.controls = [node(name) for name in found]
-    element.words = element.words[place.stop :]
+    element.words = element.words[2:]

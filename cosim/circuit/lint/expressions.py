@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
-from cosim.circuit.lint.deck import Line, refuse, shown, word_set
+from cosim.circuit.lint.deck import Line, refuse, shown
 from cosim.circuit.lint.elements import Element, Scope
-from cosim.circuit.lint.words import closing, definitions
+from cosim.circuit.lint.words import closing, definitions, split_arguments, word_set
 
 _RANDOM = {"agauss": 3, "gauss": 3, "aunif": 2, "unif": 2, "limit": 2}
 _ONE_ARGUMENT = word_set(
@@ -276,21 +276,7 @@ def used(expression: str) -> Iterator[tuple[str, list[str] | None]]:
         elif token in ("v", "i"):
             place = closing(text, call.end() - 1)
         else:
-            yield token, _arguments(text[call.end() : closing(text, call.end() - 1) - 1])
-
-
-def _arguments(text: str) -> list[str]:
-    """What commas part, outside brackets."""
-    found = [""]
-    place = 0
-    while place < len(text):
-        end = closing(text, place) if text[place] in "({'" else place + 1
-        if text[place] == ",":
-            found.append("")
-        else:
-            found[-1] += text[place:end]
-        place = end
-    return found if text.strip() else []
+            yield token, split_arguments(text[call.end() : closing(text, call.end() - 1) - 1])
 
 
 def sensed(text: str, kind: str) -> Iterator[str]:

@@ -6,6 +6,26 @@ _ASSIGNED = re.compile(r"\s*(?<![<>=!])=(?!=)\s*")
 _DEFINITION = re.compile(r"([a-z_]\w*)\s*(\([^()]*\))?\s*=(?!=)\s*", re.IGNORECASE)
 
 
+NUMBER = re.compile(
+    r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(meg|mil|[tgkmunpfa])?[a-z]*(?![\w.])", re.IGNORECASE
+)
+_FACTORS = {"t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6,
+            "n": 1e-9, "p": 1e-12, "f": 1e-15, "a": 1e-18}  # fmt: skip
+
+
+def word_set(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+def number(text: str) -> float | None:
+    """What ngspice takes the text for, if it is a plain number."""
+    match = NUMBER.fullmatch(text, text[:1] in ("+", "-"))
+    if match is None:
+        return None
+    sign = -1.0 if text[0] == "-" else 1.0
+    return sign * float(match[1]) * _FACTORS.get((match[2] or "").lower(), 1.0)
+
+
 def words(text: str) -> list[str]:
     """The words of a line, lower case: ``{…}`` and ``'…'`` whole, ``key=value`` in one."""
     found: list[str] = []
@@ -44,6 +64,20 @@ def closing(text: str, place: int) -> int:
         if depth == 0:
             return i + 1
     return len(text)
+
+
+def split_arguments(text: str) -> list[str]:
+    """What commas part, outside brackets."""
+    found = [""]
+    place = 0
+    while place < len(text):
+        end = closing(text, place) if text[place] in "({'" else place + 1
+        if text[place] == ",":
+            found.append("")
+        else:
+            found[-1] += text[place:end]
+        place = end
+    return found if text.strip() else []
 
 
 def definitions(text: str) -> list[tuple[tuple[str, str | None], str]]:

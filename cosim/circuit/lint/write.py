@@ -8,13 +8,10 @@ no element has is refused.
 import re
 from collections.abc import Iterator, Mapping
 
-from cosim.circuit.lint.deck import MOS_LEVELS, Line, refuse, shown, word_set
+from cosim.circuit.lint.deck import MOS_LEVELS, Line, refuse, shown
 from cosim.circuit.lint.elements import Element
-from cosim.circuit.lint.words import definitions, words
+from cosim.circuit.lint.words import NUMBER, definitions, word_set, words
 
-_NUMBER = re.compile(
-    r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(meg|mil|[tgkmunpfa])?[a-z]*(?![\w.])", re.IGNORECASE
-)
 _NAME = re.compile(r"[a-z_][\w.$#]*", re.IGNORECASE)
 _NODES = re.compile(r"[vi]\s*\([^(){}=']*\)", re.IGNORECASE)
 _DEVICE = re.compile(r"@[\w.#]+\[\w+\]")
@@ -45,9 +42,17 @@ _KEYS = {
 }
 """What elements may set, as ngspice 39 has it; a call of a subcircuit sets what that one has."""
 _ELSEWHERE = {
-    "rser": "write a resistor in series", "rpar": "write a resistor in parallel",
-    "cpar": "write a capacitor in parallel", "laplace": "write the filter with R and C",
+    "rser": "write a resistor in series", "lser": "write an inductor in series",
+    "rpar": "write a resistor in parallel", "cpar": "write a capacitor in parallel",
+    "laplace": "write the filter with R and C",
 }  # fmt: skip
+_FORMS = {
+    "poly": "POLY(n) takes its controls, then 2 to 50 numbers if n is 1, else 1 to 50",
+    "table": "TABLE takes an expression in braces, then two points or more that rise in x",
+    "laplace": "LAPLACE is not known here; write the filter with R and C",
+    "freq": "FREQ is not known here; write the filter with R and C",
+} | dict.fromkeys(("and", "nand", "or", "nor"), "gates are not known here; write a B source")
+"""What ngspice would need code models for, where it could not be rewritten."""
 
 
 def written(line: Line, element: Element | None, values: Mapping[str, float]) -> str:
@@ -81,8 +86,10 @@ def _element(element: Element) -> str:
         if key not in word_set(known or ""):
             cure = _ELSEWHERE.get(key, "leave it out")
             element.refuse(f": {shown(key)} is nothing that ngspice knows of it; {cure}")
-    if "laplace" in element.words:
-        element.refuse(f": laplace is not known here; {_ELSEWHERE['laplace']}")
+    if element.kind in "efgh":
+        for word in element.words:
+            if cure := _FORMS.get(word.partition("=")[0]):
+                element.refuse(f": {cure}")
     if element.kind in "beghfvi":
         return _expression(line, line.text)
     head = [element.name, *element.nodes, *element.controls]
@@ -124,7 +131,7 @@ def _word(line: Line, word: str) -> str:
     if word[0] in "{'":
         return _expression(line, word)
     sign = word[: word[0] in "+-"]
-    if number := _NUMBER.fullmatch(word, len(sign)):
+    if number := NUMBER.fullmatch(word, len(sign)):
         return f"{sign}{number[1]}{number[2] or ''}"
     if not _HEAD.fullmatch(word) or (word[len(sign) : len(sign) + 1].isdigit() and "=" in word):
         refuse(line, f"{shown(word)} is neither a value nor name=value; put a blank between two")
@@ -135,7 +142,7 @@ def _expression(line: Line, text: str) -> str:
     """An expression, or a line of expressions, token by token; blanks stay where they are."""
     found, place = "", 0
     while place < len(text):
-        for kind in (_NODES, _NUMBER, _NAME, _DEVICE):
+        for kind in (_NODES, NUMBER, _NAME, _DEVICE):
             if match := kind.match(text, place):
                 break
         if match is None:
@@ -143,7 +150,7 @@ def _expression(line: Line, text: str) -> str:
                 refuse(line, f"{shown(text[place:])} is no expression that ngspice can read")
             found, place = found + text[place], place + 1
             continue
-        number = match.re is _NUMBER
+        number = match.re is NUMBER
         if number and re.match(r"\s*=(?!=)", text[match.end() :]):
             refuse(line, f"{shown(match[0])} cannot be set; put a blank between two words")
         found += f"{match[1]}{match[2] or ''}" if number else match[0]

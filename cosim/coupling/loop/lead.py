@@ -7,7 +7,6 @@ prepares the command and takes the log away in blocks.
 import ctypes
 from collections.abc import Callable
 from ctypes import c_int64
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -64,7 +63,7 @@ class Lead:
         scene: Scene,
         command: Command,
         recorder: Recorder,
-        deck: tuple[str, tuple[str, ...]] | None = None,
+        deck: tuple[str, dict[str, str]] | None = None,
         replay: npt.NDArray[np.float64] | None = None,
     ) -> None:
         """``deck`` and its saved vectors replace the scene's. With ``replay``, back-EMF (V),
@@ -75,8 +74,8 @@ class Lead:
         self._command = command
         self._recorder = recorder
         self._replay = replay
-        self._deck, self._saved = deck or prepare(scene)
-        self._engine = partial(engine, scene.circuit.netlist is not None)
+        self._deck, vectors = deck or prepare(scene)
+        self._saved, self._vectors = tuple(vectors), tuple(vectors.values())
         width = len(LOG) + len(self._saved)
         self._log = Tape(width)
         # With `uic`, ngspice accepts t = 0 before it has sent any value.
@@ -85,26 +84,25 @@ class Lead:
         self._pieces: list[Piece] = []
         self._row: Any = None
         self._time = 0.0
-        fineness = (_COARSEST / scene.circuit.reltol) ** (1.0 / 3.0)
         coil, loop_resistance = scene.coil, scene.circuit.sense_resistance * scene.coil.count
         motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else -1
         swing = self._saved.index("v(swing)") if "v(swing)" in self._saved else -1
         self.state = LeadState(
-            recorder=ctypes.pointer(recorder.state),
+            recorder=ctypes.addressof(recorder.state),
             macro_point=address(f"macro_point_{'step_locked' if replay is None else 'replayed'}"),
             replay=None if replay is None else replay.ctypes.data,
             gain=GAIN,
             v_offset=command.v_offset,
             count=coil.count,
-            after_jump=min(_AFTER_JUMP / fineness, _SHARE_AFTER_JUMP * scene.circuit.max_step),
-            fineness=fineness,
+            after_jump=after_jump(scene),
+            fineness=_fineness(scene),
             time_constant=coil.inductance / (coil.resistance + loop_resistance),
             range=scene.drive.amplitude or 1.0,
             emf_change=_EMF_CHANGE * scene.circuit.supply,
             max_step=scene.circuit.max_step,
             output_high=scene.circuit.supply - scene.circuit.swing_loss_high,
             output_low=scene.circuit.swing_loss_low - scene.circuit.supply,
-            places=self.places,
+            places=ctypes.addressof(self.places),
             n_saved=len(self._saved),
             swing=swing,
             motional=motional,
@@ -113,6 +111,10 @@ class Lead:
             refill=callback(self._refill, self._fail),
             attend=callback(self._attend, self._fail),
         )
+        named = scene.renamed
+        names = named.get("machine.back_emf", "vemf"), "vgain", named.get("drive", "vcommand")
+        for k, name in enumerate((*names, "vdac", "voffset")):
+            self.state.names[k].value = name.lower().encode()
         emf, slope, flux = recorder.mechanics.step_outputs[:3]
         self.state.flux_at_start = flux
         segment = self.state.segment
@@ -124,7 +126,7 @@ class Lead:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         state = self.state
         try:
-            self._engine().transient(self._deck, self._saved, self)
+            engine().transient(self._deck, self._vectors, self)
         finally:
             self._attend()
         if state.status == FMU_FAILED:
@@ -139,7 +141,7 @@ class Lead:
         if self._time < self._duration * (1 - 1e-9):
             raise SimulationFailed(
                 f"ngspice stopped at t = {self._time:.6g} s of {self._duration:g} s: "
-                f"{self._engine().said()}. If the circuit is right, a smaller circuit.max_step or "
+                f"{engine().said()}. If the circuit is right, a smaller circuit.max_step or "
                 "another circuit.reltol may help."
             )
 
@@ -151,7 +153,7 @@ class Lead:
     @property
     def ngspice(self) -> str:
         """Version of ngspice."""
-        return str(self._engine().ngspice_version)
+        return str(engine().ngspice_version)
 
     def log(self) -> dict[str, npt.NDArray[np.float64]]:
         """LOG and the saved vectors (A, V) at the accepted points."""
@@ -164,7 +166,7 @@ class Lead:
         self.state.macro_point = ctypes.cast(called, ctypes.c_void_p).value
 
     def _fail(self, failure: BaseException) -> None:
-        self._engine().fail(failure)
+        engine().fail(failure)
 
     # What ngspice's engine asks for (see cosim.circuit.ngspice.Leader).
 
@@ -196,10 +198,19 @@ class Lead:
         begin = self._pieces[-1].until if self._pieces else 0.0
         self._pieces = kept + self._command.pieces(begin, self._duration, _PIECES)
         self._row = (Piece * len(self._pieces))(*self._pieces)
-        state.pieces, state.n_pieces, state.piece = self._row, len(self._pieces), 0
+        state.pieces, state.n_pieces, state.piece = ctypes.addressof(self._row), len(self._row), 0
 
 
-def engine(code_models: bool) -> ngspice.Engine:
+def after_jump(scene: Scene) -> float:
+    """Longest step after a jump of the command, s."""
+    return min(_AFTER_JUMP / _fineness(scene), _SHARE_AFTER_JUMP * scene.circuit.max_step)
+
+
+def _fineness(scene: Scene) -> float:
+    return (_COARSEST / scene.circuit.reltol) ** (1.0 / 3.0)
+
+
+def engine() -> ngspice.Engine:
     """This process's ngspice, which calls the loop. Raises BadInput."""
     names = ("lead_data", "lead_source", "lead_step")
-    return ngspice.engine(ngspice.Callbacks(*map(address, names)), code_models)
+    return ngspice.engine(ngspice.Callbacks(*map(address, names)))

@@ -1,5 +1,5 @@
-/* What the coupled loop's files share, and share with cosim/coupling/loop/structures.py, whose
-   structures have the same fields in the same order. SI throughout.
+/* What the coupled loop's files share, and share with Python, which has the structures and functions
+   from here (cosim/toolchain/libraries.py). SI throughout.
 
    Order of calls in a run that ngspice leads:
 
@@ -198,6 +198,7 @@ typedef struct Lead {
     int64_t status;
     int64_t stopped;              /* by Python: nothing is to be done any more */
     char source[64];              /* name of the one that nothing feeds */
+    char names[5][64];            /* of the back-EMF, its gain, the command, the DAC and the pin */
     void (*refill)(void);         /* makes the first piece the one that holds at `time` */
     void (*attend)(void);         /* empties the log */
 } Lead;
@@ -227,8 +228,11 @@ typedef struct {
 /* A source of the netlist; between two communication points a line. */
 typedef struct {
     char name[64];
-    Origin from;
+    Origin origin;
     double value, rate;        /* at the communication point; in a second */
+    double line;               /* the rate before any attempt changed it */
+    double plain, correction;  /* the value is their sum */
+    double owed;               /* of the FMU's integral, as in Lead */
     double guess, off;         /* of the last attempt: the value at its end, and what it lacked */
     double response;           /* d off / d guess, as last seen */
     double largest;            /* magnitude of its value so far */
@@ -236,7 +240,7 @@ typedef struct {
 
 /* An input of an FMU. */
 typedef struct {
-    Origin from;
+    Origin origin;
     int64_t feed;
     double *input;
     double *slope;             /* of LINE; else NULL */
@@ -287,11 +291,13 @@ typedef struct Ports {
     int64_t n_pulses;
     double macro_step;         /* s; 0: each accepted step ends on a communication point */
     double duration, after_jump;
+    double jumped;             /* s; the last jump, of the drive or of an FMU */
     double time, origin, end;  /* s; last accepted point; last and next communication point */
     double told, sent;         /* as in Lead */
     int64_t repeats;           /* whether attempts are repeated until they agree with the FMUs */
     int64_t stepped;           /* the FMUs have made the step of the last attempt */
     int64_t tries;             /* of the step under way */
+    int64_t met;               /* an event in the step under way, which is short enough */
     double tolerance;          /* of that agreement, relative to the source's largest value */
     const char *const *asked;  /* what ngspice is asked for an attempt's saved values; or NULL */
     AnyFunction command, ask, plot, announce; /* ngspice's */
@@ -306,6 +312,8 @@ typedef struct Ports {
 
 EXPORT void ports_begin(Ports *c);
 EXPORT void ports_finish(Ports *c);
+/* How often the vector at this place among those sent has turned back since the run began. */
+EXPORT int ports_turns(int place);
 
 /* What ngspice calls while no Lead is under way. */
 int ports_source(double *value, double time, const char *node);

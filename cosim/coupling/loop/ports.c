@@ -22,7 +22,21 @@ static const double SHORT = 1e-3;
 
 static const int64_t ATTEND_EVERY = 4096; /* as in lead.c */
 
+static const double HALF = 0.49, LAST = 1e-3;
+/* ngspice cuts a repeated step if another one as long would end beyond the run's end, from where the
+   first one ended. So steps shrink before it; of after_jump: the last one, which is not repeated. */
+
 static const int64_t MOST_TRIES = 25; /* of one step with one length */
+
+static const double EVENT = 3e-3, EVENT_WITHIN = 1e-9;
+/* Of a source's largest value: by how much it leaves its line at an event of an FMU; s: the length
+   of a step within which the event then lies. */
+
+static const double GROWTH = 0.07;
+/* Of the time since the last jump: the longest step. By its truncation error ngspice would double its
+   steps, and lose of what answers the jump, however fast that is. */
+
+static const double CARRIED = 0.2; /* as in lead.c */
 
 static const double ONE = 1e-12; /* Of a period: corners nearer than that are one. */
 
@@ -89,8 +103,8 @@ static double drive_now(Ports *c, double t)
 
 static double source_value(Ports *c, const Source *s, double t)
 {
-    if (s->from.kind == FROM_DRIVE)
-        return s->from.scale * drive_now(c, t) + s->from.offset;
+    if (s->origin.kind == FROM_DRIVE)
+        return s->origin.scale * drive_now(c, t) + s->origin.offset;
     return s->value + s->rate * (t - c->origin);
 }
 
@@ -101,13 +115,29 @@ static double rate_of(const Ports *c, const Origin *from)
                                   : c->rates[from->place];
 }
 
-static void set_lines(Ports *c)
+/* ngspice integrates a source by the trapezoidal rule. Where the FMU tells the slope, the integral of
+   a cubic through both ends is nearer to its own, and what is owed is paid back as in lead.c. */
+static double correction(Ports *c, Source *s, double value, double rate, double h)
+{
+    if (s->origin.slope != KNOWN || h <= 0.0)
+        return 0.0;
+    const double given = h * (s->value + 0.5 * s->rate * h);
+    s->owed += 0.5 * h * (s->plain + value) - h * h / 12.0 * (rate - s->line) - given;
+    return CARRIED * s->owed / fmax(h, c->after_jump);
+}
+
+/* The lines from here on, after a step of the length `h`. */
+static void set_lines(Ports *c, double h)
 {
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++) {
-        if (s->from.kind != FROM_OUTPUT)
+        if (s->origin.kind != FROM_OUTPUT)
             continue;
-        s->value = s->from.scale * c->before[s->from.place] + s->from.offset;
-        s->rate = s->from.scale * rate_of(c, &s->from);
+        const double value = s->origin.scale * c->before[s->origin.place] + s->origin.offset;
+        const double rate = s->origin.scale * rate_of(c, &s->origin);
+        s->correction = correction(c, s, value, rate, h);
+        s->plain = value;
+        s->value = value + s->correction;
+        s->rate = s->line = rate;
         s->largest = fmax(s->largest, fabs(s->value));
     }
 }
@@ -124,13 +154,13 @@ static int fmu_failed(Ports *c, const Stranger *s)
 /* An input from the communication point to `time`, which lies `h` (s) later. */
 static void feed(Ports *c, const Feed *f, double time, double h)
 {
-    const int64_t k = f->from.place;
+    const int64_t k = f->origin.place;
     double start, end, mean;
-    if (f->from.kind == FROM_PROBE) {
+    if (f->origin.kind == FROM_PROBE) {
         start = c->start[k];
         end = c->now[k];
         mean = (c->charges[k] + 0.5 * (time - c->time) * (c->last[k] + c->now[k])) / h;
-    } else if (f->from.kind == FROM_OUTPUT) {
+    } else if (f->origin.kind == FROM_OUTPUT) {
         start = c->before[k];
         end = c->outputs[k];
         mean = 0.5 * (start + end);
@@ -140,9 +170,9 @@ static void feed(Ports *c, const Feed *f, double time, double h)
         mean = 0.5 * (start + end);
     }
     const double value = f->feed == MEAN ? mean : f->feed == END ? end : start;
-    *f->input = f->from.scale * value + f->from.offset;
+    *f->input = f->origin.scale * value + f->origin.offset;
     if (f->slope)
-        *f->slope = f->from.scale * (end - start) / h;
+        *f->slope = f->origin.scale * (end - start) / h;
 }
 
 static int get_outputs(Stranger *s)
@@ -167,11 +197,11 @@ static int set_inputs(Stranger *s)
 static int refresh(Ports *c, Stranger *s)
 {
     for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++) {
-        const int64_t k = f->from.place;
-        if (f->from.kind == FROM_PROBE)
-            *f->input = f->from.scale * c->now[k] + f->from.offset;
-        if (f->from.kind == FROM_OUTPUT)
-            *f->input = f->from.scale * c->outputs[k] + f->from.offset;
+        const int64_t k = f->origin.place;
+        if (f->origin.kind == FROM_PROBE)
+            *f->input = f->origin.scale * c->now[k] + f->origin.offset;
+        if (f->origin.kind == FROM_OUTPUT)
+            *f->input = f->origin.scale * c->outputs[k] + f->origin.offset;
     }
     return set_inputs(s) && get_outputs(s);
 }
@@ -183,9 +213,9 @@ static int step_all(Ports *c, double time)
     /* What has not stepped yet is taken to go on along its line. */
     for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
         for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
-            if (f->from.kind == FROM_OUTPUT)
-                c->outputs[f->from.place] =
-                    c->before[f->from.place] + h * rate_of(c, &f->from);
+            if (f->origin.kind == FROM_OUTPUT)
+                c->outputs[f->origin.place] =
+                    c->before[f->origin.place] + h * rate_of(c, &f->origin);
     for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++) {
         for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
             feed(c, f, time, h);
@@ -232,14 +262,15 @@ static void begin_exchange(Ports *c)
         const double *before = c->before + (s->row - c->outputs);
         s->moved += memcmp(before, s->row, (size_t)s->width * sizeof *before) != 0;
     }
-    if (h > SHORT * c->after_jump)
+    if (h > SHORT * c->after_jump && !c->met)
         for (int64_t k = 0; k < c->n_outputs; k++)
             c->rates[k] = (c->outputs[k] - c->before[k]) / h;
     memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
     memcpy(c->start, c->now, (size_t)c->n_saved * sizeof *c->start);
     memset(c->charges, 0, (size_t)c->n_saved * sizeof *c->charges);
     c->origin = time;
-    set_lines(c);
+    c->met = 0;
+    set_lines(c, h);
     c->end = c->macro_step > 0.0 ? fmin(time + c->macro_step, c->jump) : -INFINITY;
     if (c->macro_step > 0.0 && time < c->duration - ON_TIME)
         c->end = fmin(c->end, c->duration);
@@ -311,9 +342,12 @@ static double accepted(Ports *c, double time, double next_step)
     }
     announce(c, time);
     if (time <= 0.0 || at_jump)
-        next_step = fmin(next_step, c->after_jump);
+        c->jumped = time;
+    next_step = fmin(next_step, c->after_jump + GROWTH * (time - c->jumped));
     if (c->end > time)
         next_step = fmin(next_step, c->end - time);
+    if (c->repeats)
+        next_step = fmin(next_step, fmax(HALF * (c->duration - time), LAST * c->after_jump));
     if (c->driven) {
         const double corner = piece_at(c, time)->until;
         if (corner > time)
@@ -351,20 +385,36 @@ static int ask(Ports *c)
     return going(c);
 }
 
+/* Whether an FMU's output ends far from where its line from the communication point leads. */
+static int leaves_line(const Ports *c, double time)
+{
+    for (const Source *s = c->sources; s < c->sources + c->n_sources; s++) {
+        const double ahead = s->value + s->line * (time - c->origin);
+        if (s->origin.kind == FROM_OUTPUT && fabs(s->guess - ahead) > EVENT * s->largest)
+            return 1;
+    }
+    return 0;
+}
+
 /* Whether the attempt that has converged at `time` is to be repeated. */
 static int to_repeat(Ports *c, double time, double *delta, double old_delta)
 {
-    if (time <= c->origin || !ask(c) || (c->stepped && !restore_all(c)))
+    if (c->stepped && !restore_all(c))
+        return 0;
+    c->stepped = 0;
+    /* At its end ngspice may go on in steps that do not change the time. */
+    if (time <= c->origin || time + old_delta > c->duration || !ask(c))
         return 0;
     c->stepped = 1;
     if (!step_all(c, time))
         return 0;
     int agree = 1;
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++) {
-        if (s->from.kind != FROM_OUTPUT)
+        if (s->origin.kind != FROM_OUTPUT)
             continue;
         const double used = source_value(c, s, time);
-        const double off = s->from.scale * c->outputs[s->from.place] + s->from.offset - used;
+        const double off = s->origin.scale * c->outputs[s->origin.place] + s->origin.offset +
+                           s->correction - used;
         s->largest = fmax(s->largest, fabs(used));
         if (fabs(off) > c->tolerance * s->largest)
             agree = 0;
@@ -376,6 +426,19 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
         s->guess = used;
         s->off = off;
     }
+    if (agree && leaves_line(c, time)) {
+        c->met = time - c->origin <= EVENT_WITHIN;
+        if (c->met) {
+            c->jumped = time;
+        } else { /* a shorter step, to find when */
+            c->tries = 0;
+            c->redone++;
+            for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
+                s->rate = s->origin.kind == FROM_OUTPUT ? s->line : s->rate;
+            *delta = 0.5 * (time - c->origin);
+            return 1;
+        }
+    }
     if (agree)
         return 0;
     if (++c->tries > MOST_TRIES) {
@@ -383,11 +446,41 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
         return 0;
     }
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
-        if (s->from.kind == FROM_OUTPUT)
+        if (s->origin.kind == FROM_OUTPUT)
             s->rate = (s->guess - s->off / s->response - s->value) / (time - c->origin);
     c->redone++;
     *delta = old_delta;
     return 1;
+}
+
+/* --- vectors that swing --- */
+
+enum { WATCHED = 1024 };
+static const double SWING = 1e-3; /* of a vector's largest magnitude; less is none */
+static struct {
+    double turned, most; /* the last extreme; the largest magnitude */
+    int down, turns;
+} watched[WATCHED];
+
+static void watch(const VectorValues *data)
+{
+    for (int k = 0; k < data->count && k < WATCHED; k++) {
+        const double value = data->vectors[k]->creal;
+        const double on = watched[k].down ? watched[k].turned - value : value - watched[k].turned;
+        watched[k].most = fmax(watched[k].most, fabs(value));
+        if (on < -SWING * watched[k].most) {
+            watched[k].down = !watched[k].down;
+            watched[k].turns++;
+        } else if (on < 0.0) {
+            continue;
+        }
+        watched[k].turned = value;
+    }
+}
+
+int ports_turns(int place)
+{
+    return place < WATCHED ? watched[place].turns : 0;
 }
 
 /* --- what ngspice calls --- */
@@ -428,6 +521,7 @@ int ports_data(const VectorValues *data)
     for (int64_t k = 0; k < c->n_saved; k++)
         c->now[k] = data->vectors[c->places[k]]->creal;
     c->sent = data->vectors[c->places[c->n_saved]]->creal;
+    watch(data);
     return 0;
 }
 
@@ -460,13 +554,14 @@ int ports_step(double time, double *delta, double old_delta, int redo, int locat
 
 void ports_begin(Ports *c)
 {
+    memset(watched, 0, sizeof watched);
     for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
         if (!get_outputs(s))
             fmu_failed(c, s);
     memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
         s->response = -1.0;
-    set_lines(c);
+    set_lines(c, 0.0);
     c->jump = c->driven ? piece_at(c, 0.0)->jump : INFINITY;
     late = loop_milliseconds() + LOOP_PATIENCE;
     run = c;

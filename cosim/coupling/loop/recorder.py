@@ -1,9 +1,8 @@
 """Moves the mechanics and writes down what was asked for; the steps are those of ``recorder.c``."""
 
-import ctypes
 from collections.abc import Callable
 from contextlib import nullcontext
-from ctypes import c_double, c_int32
+from ctypes import addressof, byref, c_double, c_int32
 from functools import cached_property, partial
 
 import numpy as np
@@ -63,42 +62,43 @@ class Recorder:
         and height (m) of the surface, and current of the coil (A) where the mechanics have the
         source."""
         self._fmu = Fmu(**mechanics.instance.addresses)
-        self._library.fmu_bind(ctypes.byref(self._fmu), mechanics.instance.version)
+        self._library.fmu_bind(byref(self._fmu), mechanics.instance.version)
         grip = mechanics.normal_force
         corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
         self._agendas = agenda.agendas(
             *(run.output_step, run.duration, run.settle, (*corners, run.duration), run.shutter)
         )
         self._corners = np.array([grip.corners, grip.forces] if grip else [])
-        schedule = None
+        self._schedule = None
         if grip:
-            schedule = Schedule(*(row.ctypes.data for row in self._corners), len(grip.corners))
-        places = mechanics.places
+            ends = (row.ctypes.data for row in self._corners)
+            self._schedule = Schedule(*ends, len(grip.corners))
+        places = {role: addressof(of) for role, of in mechanics.places.items()}
         self.state = RecorderState(
-            fmu=ctypes.pointer(self._fmu),
+            fmu=addressof(self._fmu),
             input_places=places["held_inputs"],
             ports=len(mechanics.ports),
-            schedule=schedule and ctypes.pointer(schedule),
+            schedule=self._schedule and addressof(self._schedule),
             step_places=places["step_outputs"],
             step_outputs=len(mechanics.step_outputs),
             real_places=places["reals"],
             whole_places=places["wholes"],
-            reals=len(places["reals"]),
-            wholes=len(places["wholes"]),
+            reals=len(mechanics.places["reals"]),
+            wholes=len(mechanics.places["wholes"]),
             total_places=places["totals"],
             counter_places=places["counters"],
             totals=len(self._totals),
             counters=len(self._counters),
-            inputs=self._inputs,
-            outputs=mechanics.step_outputs,
+            inputs=addressof(self._inputs),
+            outputs=addressof(mechanics.step_outputs),
             settle=run.settle,
             z_surface=mechanics.columns.index("z_surface"),
-            totals_at_settle=self._totals,
-            counters_at_settle=self._counters,
-            extremes=self.extremes,
+            totals_at_settle=addressof(self._totals),
+            counters_at_settle=addressof(self._counters),
+            extremes=addressof(self.extremes),
             plan=callback(self._plan, self._stop),
         )
-        self._state = ctypes.addressof(self.state)
+        self._state = addressof(self.state)
         self.exchange: Callable[[float, float, float, float], int] = partial(
             self._library.recorder_exchange, self._state
         )

@@ -2,12 +2,15 @@
 
 from pathlib import Path
 
+from cosim.circuit import netlist
 from cosim.circuit.joined import Deck, deck
 from cosim.coupling.ports.sides import Side
 from cosim.coupling.ports.strangers import Variable, stranger
 from cosim.coupling.ports.structures import Feed, Origin, Source
+from cosim.mechanics.package import unpacked
+from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
-from cosim.scene.tables import Port
+from cosim.scene.tables import MACHINE, Fmu, Port
 
 _PROBE, _OUTPUT, _DRIVE = range(3)
 _HELD, _DIFFERENCE, _KNOWN = range(3)
@@ -20,6 +23,10 @@ class Plan:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         sides = {each.name: Side(each, stranger(each.file)) for each in scene.fmu}
+        ends = [port.origin or port.to or "" for port in scene.port]
+        self._has_machine = any(end.startswith(f"{MACHINE}.") for end in ends)
+        if self._has_machine:
+            sides[MACHINE] = Side(_machine(scene), stranger(str(unpacked(2))))
         self.sides = _in_order(scene, sides)
         """In the order in which they step: after those that feed them, as far as that can be."""
         probes = [port.probe for port in scene.port if port.probe is not None]
@@ -49,6 +56,7 @@ class Plan:
         return deck(
             *(Path(circuit.netlist), self.names, self.words, circuit.param or {}),
             *(run.duration, circuit.reltol, circuit.max_step, self.method == "redo"),
+            netlist.parameters(self.scene) if self._has_machine else {},
         )
 
     @property
@@ -72,16 +80,28 @@ class Plan:
             self.sources.append(Source(name=port.source.lower().encode(), origin=origin))
             kept = self.sources[-1].origin  # the structure holds a copy
         else:
-            feed = Feed(origin=origin, feed=_FEEDS[port.feed])
             into, variable, place = _end(port, "to", str(port.to), sides, "input")
-            if not variable.real:
-                feed.feed = _FEEDS["end"]  # a mean of truth values is none
-            elif port.feed == "line":
-                _check_line(into, variable)
+            able = into.of.version == 2 and into.of.abilities.canInterpolateInputs
+            able = able and variable.size == 1
+            if port.feed == "line" and variable.real and not able:
+                raise into.of.bad(
+                    f'[[port]] feed = "line" into {into.name}.{variable.name} needs an FMU of FMI '
+                    '2.0 with canInterpolateInputs; take "mean" or "end"'
+                )
+            kind = port.feed if port.feed != "auto" else "line" if able else "mean"
+            # A mean of truth values is none.
+            feed = Feed(origin=origin, feed=_FEEDS[kind if variable.real else "end"])
             into.feed(variable, place, feed)
             kept = feed.origin
         if side is not None:
             self._from.append((side, kept))
+
+
+def _machine(scene: Scene) -> Fmu:
+    """The built-in machine as an FMU like others, with the parameters of the scene's tables."""
+    reals, wholes = parameters(scene)
+    given = {**reals, **wholes, "normal_force": scene.friction.normal_force}
+    return Fmu(name=MACHINE, file=str(unpacked(2)), parameters=given)
 
 
 def _end(
@@ -109,14 +129,6 @@ def _set_slope(origin: Origin, port: Port, side: Side, output: Variable, place: 
         name = kind.removeprefix(f"{side.name}.")
         known, at = side.of.find(name, "output", f'[[port]] slope = "{kind}"')
         origin.slope, origin.slope_place = _KNOWN, side.places[known.name] + at
-
-
-def _check_line(side: Side, variable: Variable) -> None:
-    if side.of.version != 2 or not side.of.abilities.canInterpolateInputs or variable.size > 1:
-        raise side.of.bad(
-            f'[[port]] feed = "line" into {side.name}.{variable.name} needs an FMU of FMI 2.0 with '
-            'canInterpolateInputs; take "mean" or "end"'
-        )
 
 
 def _in_order(scene: Scene, sides: dict[str, Side]) -> list[Side]:

@@ -1,5 +1,6 @@
 """What a run of a scene with ports gives: its waveforms and its numbers."""
 
+import re
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -8,7 +9,10 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.circuit.joined import unit
+from cosim.circuit.lint.outputs import measured
 from cosim.coupling.loop.agenda import count
+from cosim.coupling.loop.lead import engine
+from cosim.coupling.loop.structures import loop
 from cosim.coupling.ports.run import Run
 from cosim.files.spill import Tape, blocks
 from cosim.scene import Scene
@@ -36,6 +40,10 @@ def joined(
         for name, _, times, values, continuous in signals
         for what, value in _numbers(scene.run.settle, times, values, continuous).items()
     }
+    log = run.log.array()
+    known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
+    values, without = measured(run.deck.measures, log[:, 0], known)
+    summary |= values
     summary |= {
         "circuit_steps": run.steps,
         "circuit_rejected": run.state.attempts - run.steps,
@@ -44,7 +52,7 @@ def joined(
         "wall_time": time.perf_counter() - began,
         "method": run.plan.method,
         "versions": {**versions(), **run.versions},
-        "notes": [*_notes(run)],
+        "notes": [*run.deck.notes, *_notes(run), *without],
     }
     return columns, summary, units
 
@@ -98,11 +106,24 @@ def _numbers(settle: float, times: Array, values: Array, continuous: bool) -> di
     return found | {"least": least, "greatest": greatest}
 
 
+_OFTEN, _LONG = 10, 10_000
+"""How many times as many steps as ``circuit.max_step`` asks for tell of ringing; of so many."""
 _SELDOM, _MANY = 0.5, 100
 """Share of its steps in which an FMU's outputs change that is too small; of so many steps."""
 
 
 def _notes(run: Run) -> Iterator[str]:
+    if ignored := engine().ignored():
+        yield f"ngspice knows no {', '.join(ignored)} of a model, and ignored it."
+    often = run.steps * run.plan.scene.circuit.max_step / run.state.duration
+    if often > _OFTEN and run.steps > _LONG:
+        nodes = [k for k, name in enumerate(engine().sent) if not re.search("#|cosim_", name)]
+        turns, place = max((loop().ports_turns(k), k) for k in nodes)
+        yield (
+            f"the circuit took {run.steps} steps, {often:.0f} times as many as circuit.max_step "
+            f"asks for. It turned most often, {turns} times, at node {engine().sent[place]}: if it "
+            "rings there, damp it, say by a resistor and a capacitor to ground."
+        )
     for side, state in zip(run.plan.sides, run.fmus, strict=False):
         steps, moved = side.fmu.steps, state.moved
         if steps > _MANY and 0 < moved < _SELDOM * steps:

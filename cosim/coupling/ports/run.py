@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cosim.circuit import ngspice
-from cosim.coupling.loop.lead import engine
+from cosim.coupling.loop.lead import after_jump, engine
 from cosim.coupling.loop.structures import (
     FMU_FAILED,
     NO_AGREEMENT,
@@ -25,13 +25,10 @@ from cosim.errors import SimulationFailed, plain
 from cosim.files.spill import Tape
 from cosim.scene import Scene
 
-_AFTER_JUMP = 1e-2
-"""Longest step after a jump of the drive, in ``circuit.max_step``."""
-
 _POINTS, _PIECES = 2048, 512
 """Places of the logs between two emptyings; pieces of the drive that are prepared at a time."""
 
-_AGREEMENT = 10.0
+_AGREEMENT = 2.0
 """Of ``circuit.reltol``: how far an FMU and ngspice may be apart where steps are repeated."""
 
 
@@ -67,7 +64,7 @@ class Run:
         self.fmus = (StrangerState * max(len(states), 1))(*states)
         macro = scene.coupling.macro_step if plan.method == "macro-steps" else 0.0
         self.state = PortsState(
-            fmus=self.fmus,
+            fmus=ctypes.addressof(self.fmus),
             n_fmus=len(states),
             sources=ctypes.addressof(self._sources),
             n_sources=len(plan.sources),
@@ -79,11 +76,11 @@ class Run:
             driven=int(plan.driven),
             macro_step=macro,
             duration=scene.run.duration,
-            after_jump=_AFTER_JUMP * scene.circuit.max_step,
+            after_jump=after_jump(scene),
             end=-np.inf,
             repeats=int(repeats),
             tolerance=_AGREEMENT * scene.circuit.reltol,
-            asked=self._asked,
+            asked=ctypes.addressof(self._asked),
             log=self._blocks[0].ctypes.data,
             points=self._blocks[1].ctypes.data,
             log_rows=_POINTS,
@@ -96,7 +93,7 @@ class Run:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         state, duration = self.state, self._scene.run.duration
         try:
-            self._engine().transient(self.deck.text, self.deck.vectors, self)
+            engine().transient(self.deck.text, self.deck.vectors, self)
         finally:
             self._attend()
             for side, state_of in zip(self.plan.sides, self.fmus, strict=False):
@@ -119,13 +116,9 @@ class Run:
         if reached < duration * (1 - 1e-9):
             raise SimulationFailed(
                 f"ngspice stopped at t = {reached:.6g} s of {duration:g} s: "
-                f"{self._engine().said()}. If the circuit is right, a smaller circuit.max_step or "
+                f"{engine().said()}. If the circuit is right, a smaller circuit.max_step or "
                 "another circuit.reltol may help."
             )
-
-    @staticmethod
-    def _engine() -> ngspice.Engine:
-        return engine(True)
 
     @property
     def steps(self) -> int:
@@ -135,7 +128,7 @@ class Run:
     @property
     def versions(self) -> dict[str, str]:
         """Of ngspice."""
-        return {"ngspice": str(self._engine().ngspice_version)}
+        return {"ngspice": str(engine().ngspice_version)}
 
     def _fmu_failure(self) -> SimulationFailed:
         side = self.plan.sides[self.state.failed]
@@ -172,7 +165,7 @@ class Run:
         self.state.stopped = 1
 
     def _fail(self, failure: BaseException) -> None:
-        self._engine().fail(failure)
+        engine().fail(failure)
 
     def _attend(self) -> None:
         """Take the logs away."""
@@ -189,7 +182,7 @@ class Run:
         begin = self._pieces[-1].until if self._pieces else 0.0
         self._pieces = kept + self._command.pieces(begin, self._scene.run.duration, _PIECES)
         self._row = (Piece * len(self._pieces))(*self._pieces)
-        state.pieces, state.n_pieces, state.piece = self._row, len(self._pieces), 0
+        state.pieces, state.n_pieces, state.piece = ctypes.addressof(self._row), len(self._row), 0
 
 
 def _named(names: tuple[str, ...], arrays: list[Any]) -> dict[str, int]:

@@ -91,7 +91,7 @@ class Side:
             self._groups("Get", self.outputs, row),
         )
         state = StrangerState(
-            fmu=ctypes.pointer(self.fmu),
+            fmu=ctypes.addressof(self.fmu),
             **{"inputs": ctypes.addressof(sets), "n_inputs": sets.used},
             **{"outputs": ctypes.addressof(gets), "n_outputs": gets.used},
             **{"feeds": ctypes.addressof(feeds), "n_feeds": len(self._feeds)},

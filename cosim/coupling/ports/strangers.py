@@ -64,9 +64,11 @@ class Stranger:
 
     def __init__(self, path: Path) -> None:
         self.name = plain(str(path))
-        self._folder = tempfile.TemporaryDirectory(prefix="fmu-")
-        folder = self._folder.name
-        _unpack(path, folder, self.name)
+        folder = str(path)
+        if not path.is_dir():
+            self._folder = tempfile.TemporaryDirectory(prefix="fmu-")
+            folder = self._folder.name
+            _unpack(path, folder, self.name)
         try:
             found: Any = fmpy.read_model_description(folder, validate=False)
         except Exception as error:

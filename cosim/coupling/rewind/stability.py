@@ -11,12 +11,12 @@ it is seen whether what is exchanged grows.
 
 from collections.abc import Callable
 from math import isfinite
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from cosim.coupling.method import Past
 from cosim.coupling.polynomials import Array
+from cosim.coupling.rewind.joint import Joint
 from cosim.errors import SimulationFailed
 
 _MARGIN = 1e-9
@@ -26,17 +26,7 @@ _UNBOUNDED, _NOISE = 1e7, 1e-4
 """Multiples of the first size: beyond the one nothing is bounded, below the other all is noise."""
 
 
-class Steps(Protocol):
-    """What is asked of a master with its method here."""
-
-    past: Past
-
-    def step(self, h: float) -> None: ...
-    def save(self) -> Any: ...
-    def restore(self, saved: Any) -> None: ...
-
-
-def _linear_map(method: Steps, h: float) -> Array:
+def _linear_map(method: Joint, h: float) -> Array:
     """The matrix by which one macro step of ``h`` (s) takes what the method keeps to the next."""
     for _ in range(_WARM_UP):
         method.step(h)
@@ -48,7 +38,7 @@ def _linear_map(method: Steps, h: float) -> Array:
     return np.concatenate(_leaves(method.save()))
 
 
-def _is_stable(make: Callable[[], Steps], h: float) -> bool:
+def _is_stable(make: Callable[[], Joint], h: float) -> bool:
     """Whether no eigenvalue of the map is larger than 1; not where a step cannot be done at all."""
     try:
         m = _linear_map(make(), h)
@@ -58,7 +48,7 @@ def _is_stable(make: Callable[[], Steps], h: float) -> bool:
 
 
 def largest_stable_step(
-    make: Callable[[], Steps], low: float, high: float, leap: float = 1.15
+    make: Callable[[], Joint], low: float, high: float, leap: float = 1.15
 ) -> float:
     """The macro step (s) between ``low`` and ``high`` up to which the coupling is predicted stable.
 
@@ -70,14 +60,14 @@ def largest_stable_step(
 
 
 def observed_limit(
-    make: Callable[[], Steps], low: float, high: float, steps: int = 600, leap: float = 1.15
+    make: Callable[[], Joint], low: float, high: float, steps: int = 600, leap: float = 1.15
 ) -> float:
     """The same within a fiftieth by running the method itself; ``make`` gives it disturbed from
     its equilibrium."""
     return _first_limit(lambda h: _remains_bounded(make, h, steps), low, high, 0.02, leap)
 
 
-def _remains_bounded(make: Callable[[], Steps], h: float, steps: int) -> bool:
+def _remains_bounded(make: Callable[[], Joint], h: float, steps: int) -> bool:
     """Whether what is exchanged has stopped growing after ``steps`` macro steps of ``h`` (s).
 
     It is compared in the last quarter of the steps with the second quarter.
@@ -99,7 +89,7 @@ def _remains_bounded(make: Callable[[], Steps], h: float, steps: int) -> bool:
     return bool(sizes[3 * quarter :].max() <= 1.0001 * sizes[quarter : 2 * quarter].max() + floor)
 
 
-def _size(method: Steps) -> float:
+def _size(method: Joint) -> float:
     past = method.past
     return float(max(np.abs(past.current.value).max(), np.abs(past.emf.value).max()))
 

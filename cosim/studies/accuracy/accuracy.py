@@ -16,10 +16,9 @@ from textwrap import fill
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.evaluate.store import Store
-from cosim.studies.accuracy.cases import CASES
-from cosim.studies.accuracy.runs import Run, measure, reference
-from cosim.studies.accuracy.solvers import DEFAULT, SOLVERS, Solver
+from cosim.evaluate.store import Store, reported
+from cosim.studies.accuracy.cases import CASES, reference
+from cosim.studies.accuracy.solvers import DEFAULT, SOLVERS, Run, Solver, measure
 from cosim.studies.plots import BLUE, FAINT, GREEN, PURPLE, SKY, VERMILION, End, label_ends, panels
 from cosim.studies.report import Progress, Report, silent
 from cosim.studies.tables import Row, brief, span
@@ -156,16 +155,15 @@ def accuracy(
     """
     solvers = (*SOLVERS, *more)
     cases = [case for case in CASES.values() if not case.netlist][-1 if quick else 0 :]
-    with Store(None if out is None else Path(out) / STORE, quick) as store:
+
+    def made(store: Store) -> Report:
         runs: list[Run] = []
         for done, case in enumerate(cases, 1):
             runs += measure(case, solvers, 1 if quick else _ROUNDS, store)
             progress(done, len(cases), case.title)
-        found = report(runs, solvers)
-        if out is not None:
-            found.save(out)
-        store.remove()
-    return found
+        return report(runs, solvers)
+
+    return reported(made, out, STORE, quick)
 
 
 def report(runs: Sequence[Run], solvers: Sequence[Solver] = SOLVERS) -> Report:

@@ -7,7 +7,6 @@ from math import isfinite, nan
 import numpy as np
 
 from cosim.circuit.heat import DRIVE_RANGE_HEAT, LIFT, rise
-from cosim.mechanics.part import slip_budget
 from cosim.studies.limits.changes import AS_IT_IS, Change
 from cosim.studies.limits.runs import GOALS, Goal
 from cosim.studies.limits.study import Rig, Study
@@ -39,36 +38,34 @@ class Gain:
     change: Change
     goal: Goal
     own: float
-    """On the scene's own rig."""
+    """On the scene's own rig; NaN where nothing was found."""
     every: tuple[float, ...]
     """On each rig on which both are known."""
     noise: float
     """The search's own, relative: what it found apart when it was repeated."""
 
     @property
-    def middle(self) -> float:
-        return float(np.median(self.every)) if self.every else nan
-
-    @property
     def counts(self) -> bool:
         """Whether the own rig's gain is more than noise."""
         return abs(self.own) > self.noise
 
+    @property
+    def over_rigs(self) -> tuple[float, float, float]:
+        """Median, least and greatest, %."""
+        return tuple(100.0 * float(of(self.every)) for of in (np.median, min, max))  # pyright: ignore[reportReturnType]
 
-def gain_on(rig: Rig, change: Change, goal: Goal, kind: str = "robust") -> float:
+
+def gain_on(rig: Rig, change: Change, goal: Goal) -> float:
     """The gain on one rig; NaN where it is not known."""
-    point = rig.points.get((change.name, goal.name, kind))
-    own = rig.points.get((AS_IT_IS.name, goal.name, kind))
+    point, own = (rig.point(one, goal, "robust") for one in (change, AS_IT_IS))
     if own is None or point is None:
         return nan
-    reference = point.against if isfinite(point.against) else own.rank(kind)
-    return point.rank(kind) / reference - 1.0
+    return point.median / (point.against if isfinite(point.against) else own.median) - 1.0
 
 
 def gains(study: Study, goal: Goal) -> list[Gain]:
     """Of every change, the largest on the own rig first; those that find nothing, last."""
-    apart = noise(study, goal)
-    found = []
+    apart, found = noise(study, goal), []
     for change in study.changes[1:]:
         every = [gain_on(rig, change, goal) for rig in study.rigs]
         known = tuple(one for one in every if isfinite(one))
@@ -80,9 +77,9 @@ def noise(study: Study, goal: Goal) -> float:
     """The largest relative difference between robust values of repeated searches."""
     found = [0.0]
     for points in study.repeats:
-        for (change, name, kind), point in points.items():
-            first = study.rigs[0].points.get((change, name, kind))
-            if first is not None and (name, kind) == (goal.name, "robust"):
+        for key, point in points.items():
+            first = study.rigs[0].points.get(key)
+            if first is not None and key[1:] == (goal.name, "robust"):
                 found.append(abs(point.median / first.median - 1.0))
     return max(found)
 
@@ -105,12 +102,11 @@ def sentences(study: Study) -> list[str]:
 
 
 def _as_it_is(study: Study, goal: Goal) -> Iterator[str]:
-    points = study.rigs[0].points
-    robust, best = (points.get((AS_IT_IS.name, goal.name, kind)) for kind in ("robust", "best"))
+    every = [rig.point(AS_IT_IS, goal, "robust") for rig in study.rigs]
+    robust, best = every[0], study.rigs[0].point(AS_IT_IS, goal, "best")
     if robust is None or best is None:
         return
-    values = [rig.points.get((AS_IT_IS.name, goal.name, "robust")) for rig in study.rigs]
-    known = [one.median * goal.scale for one in values if one]
+    known = [one.median * goal.scale for one in every if one]
     over = f" ({span(known)} on {len(known)} rigs)" if len(known) > 1 else ""
     also = (
         ""
@@ -144,17 +140,15 @@ def _group(every: Sequence[Gain], group: str) -> Iterator[str]:
 def _share(gain: Gain) -> str:
     text = f"{100.0 * gain.own:+.0f} %"
     if len(gain.every) > 1:
-        low, high = (100.0 * end for end in (min(gain.every), max(gain.every)))
+        middle, low, high = gain.over_rigs
         alike = sum(np.sign(gain.own) * one > gain.noise for one in gain.every)
         of = f"{alike} of {len(gain.every)}"
-        text += f" ({100.0 * gain.middle:+.0f}, {low:+.0f} to {high:+.0f}; {of})"
+        text += f" ({middle:+.0f}, {low:+.0f} to {high:+.0f}; {of})"
     return text
 
 
 def _slips(study: Study) -> str:
-    friction, mechanics = study.scene.friction, study.scene.mechanics
-    force = friction.normal_force * mechanics.n_surfaces / mechanics.part_mass
-    every = slip_budget(friction.mu_s, force, mechanics.gravity, friction.mu_plate)
+    every = study.slips
     fall, rise_ = every["up"]
     return (
         f"A part that goes up slips where the surface falls with more than {-fall:.0f} m/s² or "

@@ -6,14 +6,20 @@ from pathlib import Path
 from textwrap import fill
 
 import numpy as np
-from matplotlib.axes import Axes
 
-from cosim.mechanics.part import slip_budget
 from cosim.studies.limits.answer import BY_NAME, gains, noise
 from cosim.studies.limits.changes import AS_IT_IS
 from cosim.studies.limits.runs import Goal
 from cosim.studies.limits.study import Study
-from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, panels
+from cosim.studies.plots import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    VERMILION,
+    keep_ticks_inside,
+    panels,
+)
 from cosim.studies.tables import brief
 
 COLORS = {"": "0.15", "waveform": VERMILION, "heat": ORANGE, "grip": GREEN, "circuit": BLUE}
@@ -32,7 +38,7 @@ def drawn(study: Study) -> dict[str, Callable[[Path], None]]:
 def changes(path: Path, study: Study, goal: Goal) -> None:
     """A row for each change, the largest gain on top: what is achieved robustly with it."""
     every = [gain for gain in gains(study, goal) if isfinite(gain.own)]
-    own = study.rigs[0].points.get((AS_IT_IS.name, goal.name, "robust"))
+    own = study.rigs[0].point(AS_IT_IS, goal, "robust")
     base = own.median * goal.scale if own else 1.0
     note = (
         "Robust: the median over turns of the knobs by ±2 %, the knobs set anew for each change. "
@@ -40,33 +46,30 @@ def changes(path: Path, study: Study, goal: Goal) -> None:
         "relative to each one's own; grey band: what repeated searches differ by. All trials that "
         "were measured have a rising sawtooth."
     )
-    best = every[0] if every else None
-    title = (
-        f"The {goal.title} gains most by: {best.change.name}, "
-        f"{brief(base * (1.0 + best.own))} for {brief(base)} {goal.unit}"
-        if best
-        else goal.title
-    )
+    title = goal.title
+    if every:
+        gained = f"{brief(base * (1.0 + every[0].own))} for {brief(base)} {goal.unit}"
+        title = f"The {goal.title} gains most by: {every[0].change.name}, {gained}"
     figure, (axis,) = panels(title, fill(note, 125), (10.0, 0.27 * len(every) + 1.9))
     apart = noise(study, goal)
     axis.axvspan(base * (1.0 - apart), base * (1.0 + apart), color="0.88", zorder=0)
     axis.axvline(base, color="0.15", lw=1.0)
-    for row, gain in enumerate(reversed(every)):
+    upwards = every[::-1]
+    for row, gain in enumerate(upwards):
         color = COLORS[gain.change.group]
         ends = np.array([min(gain.every), max(gain.every)])
         axis.plot(base * (1.0 + ends), [row, row], color=color, lw=1.6, alpha=0.55)
         filled = color if gain.counts else "white"
         axis.plot(base * (1.0 + gain.own), row, "o", color=color, mfc=filled, ms=6, zorder=3)
-    names = [gain.change.name for gain in reversed(every)]
-    axis.set_yticks(range(len(names)), names, fontsize=9)
-    for label, gain in zip(axis.get_yticklabels(), reversed(every), strict=True):
+    axis.set_yticks(range(len(every)), [gain.change.name for gain in upwards], fontsize=9)
+    for label, gain in zip(axis.get_yticklabels(), upwards, strict=True):
         label.set_color(COLORS[gain.change.group])
-    axis.set_ylim(-0.7, len(names) + 0.1)
-    axis.set_xlim(0.0, right := axis.get_xlim()[1])
-    axis.set_xticks([tick for tick in axis.get_xticks() if 0.0 <= tick <= right])
+    axis.set_ylim(-0.7, len(every) + 0.1)
+    axis.set_xlim(left=0.0)
+    keep_ticks_inside(axis.xaxis)
     axis.set_xlabel(f"{goal.title}, robust [{goal.unit}]")
     axis.annotate(
-        "as it is", (base, len(names) - 0.45), xytext=(3, 0), textcoords="offset points",
+        "as it is", (base, len(every) - 0.45), xytext=(3, 0), textcoords="offset points",
         fontsize=8.5, color="0.15",
     )  # fmt: skip
     figure.write(path)
@@ -89,20 +92,12 @@ def settings(path: Path, study: Study) -> None:
         velocity = [point.v_average * 1e3 for point in some]
         reading = [point.a_camera for point in some]
         axis.plot(velocity, reading, "o", color=color, ms=5, alpha=0.75, label=words)
-    friction, mechanics = study.scene.friction, study.scene.mechanics
-    force = friction.normal_force * mechanics.n_surfaces / mechanics.part_mass
-    budget = slip_budget(friction.mu_s, force, mechanics.gravity, friction.mu_plate)
     for way, style in (("up", "--"), ("down", ":")):
         label = f"slips, part going {way}"
-        axis.axhline(-budget[way][0], color=PURPLE, lw=1.2, ls=style, label=label)
+        axis.axhline(-study.slips[way][0], color=PURPLE, lw=1.2, ls=style, label=label)
     axis.axvline(0.0, color="0.6", lw=0.8)
     axis.set_xlabel("mean velocity of the part, upwards [mm/s]")
     axis.set_ylabel("largest fall, as a camera reads it [m/s²]")
     axis.legend(fontsize=8.5)
-    _keep_ticks_inside(axis)
+    keep_ticks_inside(axis.xaxis, axis.yaxis)
     figure.write(path)
-
-
-def _keep_ticks_inside(axis: Axes) -> None:
-    for one, limits in ((axis.xaxis, axis.get_xlim()), (axis.yaxis, axis.get_ylim())):
-        one.set_ticks([tick for tick in one.get_ticklocs() if limits[0] <= tick <= limits[1]])

@@ -15,7 +15,7 @@ from cosim.arrays import Array
 from cosim.evaluate.point import Outcome
 from cosim.simulation.fidelity import SEARCHES, Fidelity, relative_error
 from cosim.studies.limits.changes import Machine, Settings
-from cosim.studies.limits.runs import GOALS, Bench, scored, turned
+from cosim.studies.limits.runs import GOALS, Bench, around, scored
 from cosim.studies.limits.search import Candidates
 
 SETTLE, SPAN = 1.5, 1.5
@@ -86,11 +86,10 @@ def judged(
         for point in some[:tries]
     ]
     good = _settled(bench, machines, asked)
-    runs = [[machines[key[0]].at(one, SETTLE, SPAN) for one in turned(p)] for key, p in good]
-    outcomes = iter(bench.outcomes([settings for each in runs for settings in each]))
+    runs = [[machines[key[0]].at(one, SETTLE, SPAN) for one in around(p)] for key, p in good]
     found: dict[Key, Point] = {}
-    for (key, place), each in zip(good, runs, strict=True):
-        point = _point(key[1], place.tolist(), [next(outcomes) for _ in each], each[0])
+    for (key, middle), each, turns in zip(good, runs, bench.outcomes(runs), strict=True):
+        point = _point(key[1], middle.tolist(), turns, each[0])
         best = found.get(key)
         if point.rank(key[2]) > (best.rank(key[2]) if best else 0.0):
             found[key] = point
@@ -102,16 +101,13 @@ _Asked = list[tuple[Key, Array]]
 
 def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked) -> _Asked:
     """Those that are settled and feasible; of a machine's best settings only the very best one."""
-    runs: list[Settings] = []
-    for key, point in asked:
-        late = machines[key[0]].at(point, SETTLE + SPAN / 2.0, SPAN / 2.0)
-        runs += [machines[key[0]].at(point, SETTLE, SPAN), late]
-    outcomes = bench.outcomes(runs)
+    times = (SETTLE, SPAN), (SETTLE + SPAN / 2.0, SPAN / 2.0)
+    runs = [[machines[key[0]].at(point, *each) for each in times] for key, point in asked]
     found: _Asked = []
     top: dict[Key, float] = {}
-    for (key, point), whole, late in zip(asked, outcomes[::2], outcomes[1::2], strict=True):
-        values = [scored(one)[NUMBER[key[1]]] for one in (whole, late)]
-        if not bench.feasible(machines[key[0]], whole) or relative_error(*values) > SETTLED:
+    for (key, point), both in zip(asked, bench.outcomes(runs), strict=True):
+        values = [scored(one)[NUMBER[key[1]]] for one in both]
+        if not bench.feasible(machines[key[0]], both[0]) or relative_error(*values) > SETTLED:
             continue
         if key[2] != "best":
             found.append((key, point))
@@ -121,13 +117,13 @@ def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked) -> _A
     return found
 
 
-def _point(goal: str, place: list[float], turns: Sequence[Outcome], settings: Settings) -> Point:
+def _point(goal: str, middle: list[float], turns: Sequence[Outcome], settings: Settings) -> Point:
     scores = np.array([scored(one)[NUMBER[goal]] for one in turns])
     numbers = turns[0].numbers
     return Point(
         *(float(scores[0]), float(np.median(scores)), float(scores.min())),
         *(numbers["coil_heat"], numbers["v_average"], -numbers["a_camera_min"]),
-        *(place, settings),
+        *(middle, settings),
     )
 
 
@@ -138,19 +134,19 @@ def confirmed(
     limit acts, which the amplifier does not have."""
     fidelity, own = Fidelity.of(bench.scene), bench.scene.circuit.current_limit
     asked = {key: point for key, point in points.items() if machines[key[0]].rung == SEARCHES}
-    peaks = bench.outcomes([point.settings for point in asked.values()])
-    rungs: list[str] = []
-    for point, outcome in zip(asked.values(), peaks, strict=True):
+    run = bench.evaluator.outcomes
+    every: list[Settings] = []
+    for point, outcome in zip(
+        asked.values(), run([point.settings for point in asked.values()]), strict=True
+    ):
         current = max(outcome.numbers["current_max"], -outcome.numbers["current_min"])
         limit = point.settings.get("circuit.current_limit", own)
-        rungs.append(fidelity.judge(current * bench.scene.coil.count, limit))
-    every = [
-        point.settings | {"circuit.model": rung}
-        for point, rung in zip(asked.values(), rungs, strict=True)
-    ]
+        rung = fidelity.judge(current * bench.scene.coil.count, limit)
+        every.append(point.settings | {"circuit.model": rung})
     found = dict(points)
-    for key, rung, outcome in zip(asked, rungs, bench.outcomes(every), strict=True):
-        found[key] = replace(points[key], rung=rung, there=scored(outcome)[NUMBER[key[1]]])
+    for key, there, outcome in zip(asked, every, run(every), strict=True):
+        value = scored(outcome)[NUMBER[key[1]]]
+        found[key] = replace(points[key], rung=there["circuit.model"], there=value)
     return found
 
 
@@ -167,12 +163,11 @@ def tried(
             here = machines[name]
             there = replace(machines[as_it_is], rung=here.rung)
             each = [
-                [machine.at(one, SHORT, SPAN) for one in turned(np.array(point.point))]
+                [machine.at(one, SHORT, SPAN) for one in around(np.array(point.point))]
                 for machine in (here, there)
             ]
-            outcomes = bench.outcomes([*each[0], *each[1]])
-            told, others = outcomes[: len(each[0])], outcomes[len(each[0]) :]
-            if not any(one.failure for one in outcomes):
+            told, others = bench.outcomes(each)
+            if not any(one.failure for one in (*told, *others)):
                 median = _point(goal, point.point, others, each[1][0]).median
                 one = _point(goal, point.point, told, each[0][0])
                 found[name, goal, kind] = replace(one, against=median)

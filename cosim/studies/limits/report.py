@@ -7,14 +7,14 @@ from pathlib import Path
 
 from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator
-from cosim.evaluate.store import Store
+from cosim.evaluate.store import Store, reported
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
 from cosim.studies.limits import figures
 from cosim.studies.limits.answer import BY_NAME, gains, noise, sentences
-from cosim.studies.limits.changes import CHANGES, Settings
+from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Settings
 from cosim.studies.limits.judge import Key, Point
-from cosim.studies.limits.runs import GOALS, NEEDED, command
+from cosim.studies.limits.runs import GOALS, NEEDED, Goal, command
 from cosim.studies.limits.study import FULL, QUICK, Study, checked, ensemble, steps, study
 from cosim.studies.report import Progress, Report, counted, silent
 from cosim.studies.tables import Row
@@ -26,41 +26,36 @@ LEAST_EFFORT, MOST_EFFORT = 0.01, 100.0
 
 def report(found: Study, asked: str) -> Report:
     """What the study tells; ``asked`` are the words after ``cosim run`` for its scene."""
-    said = sentences(found)
+    said, groups = sentences(found), {change.name: change.group for change in CHANGES}
     tables: dict[str, Sequence[Row]] = {
-        f"What each change brings: {goal.title} [{goal.unit}]": [*_gains(found, goal.name)]
+        f"What each change brings: {goal.title} [{goal.unit}]": [*_gains(found, goal)]
         for goal in GOALS
     }
     tables["How the device as it is, and its best shapes, are repeated"] = [
-        {"change": change, "goal": goal, "kind": kind, "command": f"`{command(asked, settings)}`"}
-        for (change, goal, kind), point in found.rigs[0].points.items()
-        if _group(change) in ("", "waveform") and (settings := point.settings)
+        {**_named(key), "command": f"`{command(asked, point.settings)}`"}
+        for key, point in found.rigs[0].points.items()
+        if groups[key[0]] in ("", "waveform") and point.settings
+    ]
+    rows = [
+        {
+            **({"rig": number} | _named(key) | _row(BY_NAME[key[1]], point)),
+            "command": command(asked, rig.settings | point.settings),
+        }
+        for number, rig in enumerate(found.rigs)
+        for key, point in rig.points.items()
     ]
     return Report(
         *("limits", "What is achievable, and what would change it"),
-        *([*_rows(found, asked)], said, tables, figures.drawn(found), "\n\n".join(said)),
+        *(rows, said, tables, figures.drawn(found), "\n\n".join(said)),
     )
 
 
-def _group(name: str) -> str:
-    return next(change.group for change in CHANGES if change.name == name)
+def _named(key: Key) -> Row:
+    return dict(zip(("change", "goal", "kind"), key, strict=True))
 
 
-def _rows(found: Study, asked: str) -> Iterator[Row]:
-    """A row for each point on each rig."""
-    for number, rig in enumerate(found.rigs):
-        for key, point in rig.points.items():
-            settings = rig.settings | point.settings
-            yield {"rig": number, **_row(key, point), "command": command(asked, settings)}
-
-
-def _row(key: Key, point: Point) -> Row:
-    change, name, kind = key
-    goal, settings = BY_NAME[name], point.settings
+def _row(goal: Goal, point: Point) -> Row:
     return {
-        "change": change,
-        "goal": name,
-        "kind": kind,
         "value": point.value * goal.scale,
         "median over turns": point.median * goal.scale,
         "worst over turns": point.worst * goal.scale,
@@ -68,43 +63,35 @@ def _row(key: Key, point: Point) -> Row:
         "v_average [mm/s]": point.v_average * 1e3,
         "a_camera [m/s²]": point.a_camera,
         "heat of a coil [W]": point.heat,
-        "drive.frequency [Hz]": settings["drive.frequency"],
-        "drive.amplitude [V]": settings["drive.amplitude"],
-        "drive.offset [V]": settings["drive.offset"],
+        "drive.frequency [Hz]": point.settings["drive.frequency"],
+        "drive.amplitude [V]": point.settings["drive.amplitude"],
+        "drive.offset [V]": point.settings["drive.offset"],
         "judged on": point.rung,
         "there": point.there * goal.scale,
         "confirmed": point.confirmed if point.rung else "",
     }
 
 
-def _gains(found: Study, name: str) -> Iterator[Row]:
-    """A row for each change, the largest gain first."""
-    goal = BY_NAME[name]
-    own, apart = found.rigs[0].points, noise(found, goal)
-    first = {kind: own.get((CHANGES[0].name, name, kind)) for kind in ("robust", "best")}
-    yield _gain_row(CHANGES[0].name, goal.scale, first["robust"], first["best"], "", "", apart)
-    for gain in gains(found, goal):
-        robust, best = (own.get((gain.change.name, name, kind)) for kind in ("robust", "best"))
-        low, high = (f"{100.0 * f(gain.every):+.0f}" if gain.every else "-" for f in (min, max))
-        change = f"{100.0 * gain.own:+.1f}" if isfinite(gain.own) else "-"
-        rigs = f"{100.0 * gain.middle:+.0f} ({low} to {high})" if len(gain.every) > 1 else "-"
-        yield _gain_row(gain.change.name, goal.scale, robust, best, change, rigs, apart)
-
-
-def _gain_row(
-    name: str, scale: float, robust: Point | None, best: Point | None,
-    change: str, rigs: str, apart: float,
-) -> Row:  # fmt: skip
-    return {
-        "change": name,
-        "robust (median)": robust.median * scale if robust else nan,
-        "worst of its turns": robust.worst * scale if robust else nan,
-        "gain [%]": change,
-        "over the rigs: median (range) [%]": rigs,
-        "noise [%]": f"{100.0 * apart:.1f}",
-        "best": best.value * scale if best else nan,
-        "its median": best.median * scale if best else nan,
-    }
+def _gains(found: Study, goal: Goal) -> Iterator[Row]:
+    """A row for the device as it is and for each change, the largest gain first."""
+    every, apart = gains(found, goal), noise(found, goal)
+    for change, gain in ((AS_IT_IS, None), *((gain.change, gain) for gain in every)):
+        robust, best = (found.rigs[0].point(change, goal, kind) for kind in ("robust", "best"))
+        own = rigs = "-" if gain else ""
+        if gain and isfinite(gain.own):
+            own = f"{100.0 * gain.own:+.1f}"
+        if gain and len(gain.every) > 1:
+            rigs = "{:+.0f} ({:+.0f} to {:+.0f})".format(*gain.over_rigs)
+        yield {
+            "change": change.name,
+            "robust (median)": robust.median * goal.scale if robust else nan,
+            "worst of its turns": robust.worst * goal.scale if robust else nan,
+            "gain [%]": own,
+            "over the rigs: median (range) [%]": rigs,
+            "noise [%]": f"{100.0 * apart:.1f}",
+            "best": best.value * goal.scale if best else nan,
+            "its median": best.median * goal.scale if best else nan,
+        }
 
 
 def limits(
@@ -147,15 +134,13 @@ def limits(
     others: list[Settings] = ensemble(Path(rigs), base) if rigs is not None else []
     checked(base, others, rigs)
     told = counted(progress, steps(efforts, CHANGES, len(others)))
-    path = None if out is None else Path(out) / STORE
-    with Store(path, base.as_dict(), others, seed, quick, effort) as store:
-        found = study(
+
+    def found(store: Store) -> Study:
+        return study(
             *(base, others, store),
             lambda rig: Evaluator(rig, kept=NEEDED, workers=workers, dask=dask),
             *(seed, efforts, CHANGES, told),
         )
-        made = report(found, " ".join(words))
-        if out is not None:
-            made.save(out)
-        store.remove()
-    return made
+
+    asked = base.as_dict(), others, seed, quick, effort
+    return reported(lambda store: report(found(store), " ".join(words)), out, STORE, *asked)

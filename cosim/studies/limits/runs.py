@@ -12,7 +12,7 @@ from cosim.evaluate.point import Outcome
 from cosim.scene import Scene, changed
 from cosim.scene.tables import KNOBS
 from cosim.search.protocol import Evaluate, Feasible
-from cosim.search.turns import corners, faces
+from cosim.search.turns import turned
 from cosim.studies.limits.changes import FREE, Machine, Settings
 
 SETTLE, SPAN = 0.6, 0.6
@@ -59,11 +59,9 @@ def scored(outcome: Outcome) -> list[float]:
     return np.where(np.isnan(found), -np.inf, found).tolist()
 
 
-def turned(point: Array) -> Array:
-    """A point of a machine's cube and those a turn of the knobs off (rows)."""
-    knobs = point[: len(KNOBS)]
-    every = np.vstack([knobs, faces(knobs), corners(knobs)])
-    return np.hstack([every, np.tile(point[len(KNOBS) :], (len(every), 1))])
+def around(point: Array) -> Array:
+    """A point of a machine's cube and all turns of its knobs (rows)."""
+    return turned(point, len(KNOBS))
 
 
 @dataclass(frozen=True)
@@ -80,10 +78,10 @@ class Bench:
         alone = {"circuit.model": "limited", "drive.pwm_ripple": False, "drive.quantised": False}
         return changed(scene, FREE | alone | rig, told)
 
-    def outcomes(self, every: Sequence[Settings]) -> list[Outcome]:
-        """What becomes of each settings."""
-        found = dict(self.evaluator.run(enumerate(every)))
-        return [found[number] for number in range(len(every))]
+    def outcomes(self, groups: Sequence[Sequence[Settings]]) -> list[list[Outcome]]:
+        """What becomes of groups of settings, all run at once."""
+        found = dict(self.evaluator.groups(groups))
+        return [found[number] for number in range(len(groups))]
 
     def feasible(self, machine: Machine, outcome: Outcome) -> bool:
         """Whether a run keeps within what the coil and the power amplifier bear."""
@@ -95,29 +93,20 @@ class Bench:
 
     def once(self, machine: Machine) -> Evaluate:
         """Scores of points of the machine's cube, each in one run."""
-
-        scouted = self._scout(machine)
-
-        def evaluate(points: Array) -> tuple[Array, Feasible]:
-            outcomes = self.outcomes([scouted(point) for point in points])
-            allowed = np.array([self.feasible(machine, one) for one in outcomes], bool)
-            return np.array([scored(one) for one in outcomes]), allowed
-
-        return evaluate
+        return self._scores(machine, lambda point: point[np.newaxis])
 
     def over_turns(self, machine: Machine) -> Evaluate:
         """Medians of the scores over the turns of the knobs about points of the machine's cube. The
         turns are judged by their motion, not by their heat: a hand that is off turns back."""
+        return self._scores(machine, around)
 
+    def _scores(self, machine: Machine, every: Callable[[Array], Array]) -> Evaluate:
         scouted = self._scout(machine)
 
         def evaluate(points: Array) -> tuple[Array, Feasible]:
-            every = [turned(point) for point in points]
-            outcomes = self.outcomes([scouted(point) for point in np.vstack(every)])
-            scores = np.array([scored(one) for one in outcomes]).reshape(len(points), -1, 3)
-            middle = outcomes[:: len(every[0])]
-            allowed = np.array([self.feasible(machine, one) for one in middle], bool)
-            return np.median(scores, axis=1), allowed
+            groups = self.outcomes([[scouted(one) for one in every(point)] for point in points])
+            allowed = np.array([self.feasible(machine, group[0]) for group in groups], bool)
+            return np.median([[*map(scored, group)] for group in groups], axis=1), allowed
 
         return evaluate
 

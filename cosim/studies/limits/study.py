@@ -5,6 +5,7 @@ import os
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -12,10 +13,12 @@ from typing import Any
 from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.store import Store
+from cosim.files.reader import read
+from cosim.mechanics.part import slip_budget
 from cosim.scene import Scene
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Change, Settings
 from cosim.studies.limits.judge import TRIES, Key, Point, confirmed, judged, tried
-from cosim.studies.limits.runs import Bench
+from cosim.studies.limits.runs import Bench, Goal
 from cosim.studies.limits.search import KINDS, Candidates, Effort, searched
 
 
@@ -54,6 +57,10 @@ class Rig:
     settings: Settings
     points: dict[Key, Point]
 
+    def point(self, change: Change, goal: Goal, kind: str) -> Point | None:
+        """What stands for a change; None where nothing was found."""
+        return self.points.get((change.name, goal.name, kind))
+
 
 @dataclass(frozen=True)
 class Study:
@@ -64,6 +71,13 @@ class Study:
     rigs: list[Rig]
     repeats: list[dict[Key, Point]]
     """Of REPEATED on the own rig, searched alone with other seeds."""
+
+    @property
+    def slips(self) -> Mapping[str, tuple[float, float]]:
+        """Accelerations of the surface, m/s², beyond which a part slips on its way up or down."""
+        friction, mechanics = self.scene.friction, self.scene.mechanics
+        force = friction.normal_force * mechanics.n_surfaces / mechanics.part_mass
+        return slip_budget(friction.mu_s, force, mechanics.gravity, friction.mu_plate)
 
 
 def steps(efforts: Efforts, changes: Sequence[Change], rigs: int) -> int:
@@ -90,25 +104,32 @@ def study(
     """
     found: list[Rig] = []
     repeats: list[dict[Key, Point]] = []
+    searched = [change for change in changes if change.searched]
     own: dict[str, Candidates] = {}
     for number, rig in enumerate([{}, *rigs]):
         base = Bench.base(scene, rig, f"rig {number}")
         with open_(base) as evaluator:
-            bench = Bench(base, evaluator)
-            effort = efforts.others if number else efforts.own
-            work = _Work(bench, store, number, effort, changes, told)
-            candidates = work.candidates([seed, number], own)
-            found.append(Rig(rig, work.points(candidates, own=not number)))
+            work = _Work(Bench(base, evaluator), store, number, changes, told)
+            first, second = efforts.others if number else efforts.own
+            alone = work.candidates(searched, first, [seed, number, 0], own)
+            # Each with the best of all others, so that what helps one is tried on all, and a limit
+            # that is eased never lowers what is found.
+            words, seeds = ", with what helps others", [seed, number, 1]
+            both = work.candidates(searched, second, seeds, alone, alone, words)
+            found.append(Rig(rig, work.points(both, own=not number)))
             if number:
                 continue
-            own = candidates
+            own = both
             again = [change for change in changes if change.name in REPEATED]
             for other in range(efforts.again):
-                alone = work.alone(again, [seed, number, 2 + other])
-                repeats.append(work.points(alone, name=f"repeat {other}"))
+                apart = work.candidates(again, first, [seed, number, 2 + other])
+                repeats.append(work.points(apart, name=f"repeat {other}"))
             if efforts.again:
                 told("searched again")
     return Study(scene, changes, found, repeats)
+
+
+_NOTHING: Mapping[str, Candidates] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -118,90 +139,71 @@ class _Work:
     bench: Bench
     store: Store
     rig: int
-    effort: tuple[Effort, Effort]
     changes: Sequence[Change]
     told: Callable[[str], object]
 
-    def candidates(self, seed: list[int], known: dict[str, Candidates]) -> dict[str, Candidates]:
-        """The candidates of each change by name, from those that are ``known`` of other rigs: first
-        each by itself, then with the best of all others, so that what helps one is tried on all,
-        and a limit that is eased never lowers what is found."""
-        changes = [change for change in self.changes if change.searched]
-        found = self.alone(changes, [*seed, 0], known)
-        both: dict[str, Candidates] = {}
+    def candidates(
+        self,
+        changes: Sequence[Change],
+        effort: Effort,
+        seed: list[int],
+        known: Mapping[str, Candidates] = _NOTHING,
+        others: Mapping[str, Candidates] = _NOTHING,
+        words: str = "",
+    ) -> dict[str, Candidates]:
+        """The candidates of each change by name, from its own that are ``known`` and the best of
+        those of all ``others``."""
+        found: dict[str, Candidates] = {}
         for number, change in enumerate(changes):
-            hints = [self._hint(change, other, found[other.name]) for other in changes]
-            own, seeds = found[change.name], [*seed, 1, number]
-            both[change.name] = self._searched(change, self.effort[1], seeds, own, hints)
-            self.told(f"rig {self.rig}, with what helps others: {change.name}")
-        return both
+            warm = [self._warm(change, other, others) for other in changes if others]
+            machine, own = change.machine(self.bench.scene), known.get(change.name)
+            seeds = [*seed, number]
+            search = partial(searched, self.bench, machine, effort, seeds, own, warm)
+            found[change.name] = self.store.once(f"{change.name} {seeds}", search)
+            self.told(f"rig {self.rig}{words}: {change.name}")
+        return found
 
-    def _hint(self, change: Change, other: Change, found: Candidates) -> Candidates:
+    def _warm(self, change: Change, other: Change, found: Mapping[str, Candidates]) -> Candidates:
         """The best one for each goal of another change, its shape as levels where this one's
         command has such: the nearest that it has."""
         machine, there = (one.machine(self.bench.scene) for one in (change, other))
         more: list[float] = []
         if machine.levels and not there.levels:
             more = there.sampled(self.bench.scene, machine.levels).tolist()
-        return {
-            kind: [[[*one, *more] for one in some[:1]] for some in found[kind]] for kind in KINDS
-        }
-
-    def alone(
-        self,
-        changes: Sequence[Change],
-        seed: list[int],
-        known: Mapping[str, Candidates] = MappingProxyType({}),
-    ) -> dict[str, Candidates]:
-        """The candidates of each change by itself."""
-        found: dict[str, Candidates] = {}
-        for number, change in enumerate(changes):
-            own, seeds = known.get(change.name), [*seed, number]
-            found[change.name] = self._searched(change, self.effort[0], seeds, own)
-            self.told(f"rig {self.rig}: {change.name}")
-        return found
-
-    def _searched(
-        self,
-        change: Change,
-        effort: Effort,
-        seed: list[int],
-        own: Candidates | None,
-        hints: Sequence[Candidates] = (),
-    ) -> Candidates:
-        machine = change.machine(self.bench.scene)
-
-        def search() -> Candidates:
-            return searched(self.bench, machine, effort, seed, own, hints)
-
-        return self.store.once(f"{change.name} {seed}", search)
+        of = found[other.name]
+        return {kind: [[[*one, *more] for one in some[:1]] for some in of[kind]] for kind in KINDS}
 
     def points(
         self, candidates: dict[str, Candidates], own: bool = False, name: str = ""
     ) -> dict[Key, Point]:
         """The judged points of machines; on the scene's ``own`` rig also by the amplifier, and with
         those of the changes that are not searched."""
-
-        def judge() -> list[tuple[Key, dict[str, Any]]]:
-            machines = {c.name: c.machine(self.bench.scene) for c in self.changes}
-            kinds, tries = (KINDS, TRIES) if own else (KINDS[1:], 1)
-            found = judged(self.bench, machines, candidates, kinds, tries)
-            if own:
-                others = [c.name for c in self.changes if not c.searched]
-                found = confirmed(self.bench, machines, found)
-                own_points = {key: one for key, one in found.items() if key[0] == AS_IT_IS.name}
-                found |= tried(self.bench, machines, others, own_points)
-            return [(key, vars(point)) for key, point in found.items()]
-
-        found = self.store.once(f"judged {self.rig} {name}", judge)
+        found = self.store.once(f"judged {self.rig} {name}", partial(self._judge, candidates, own))
         if not name:
             self.told(f"rig {self.rig}: judged")
         return {(change, goal, kind): Point(**of) for (change, goal, kind), of in found}
+
+    def _judge(
+        self, candidates: dict[str, Candidates], own: bool
+    ) -> list[tuple[Key, dict[str, Any]]]:
+        machines = {change.name: change.machine(self.bench.scene) for change in self.changes}
+        kinds, tries = (KINDS, TRIES) if own else (KINDS[1:], 1)
+        found = judged(self.bench, machines, candidates, kinds, tries)
+        if own:
+            others = [change.name for change in self.changes if not change.searched]
+            found = confirmed(self.bench, machines, found)
+            own_points = {key: one for key, one in found.items() if key[0] == AS_IT_IS.name}
+            found |= tried(self.bench, machines, others, own_points)
+        return [(key, vars(point)) for key, point in found.items()]
 
 
 ALIKE = 1.25
 """Ratio of the values of every key up to which a rig is the scene's own, by the digits and the step
 that a search ended with."""
+
+
+MOST_BYTES = 1 << 24
+"""Of a file of rigs."""
 
 
 def ensemble(path: Path, scene: Scene) -> list[Settings]:
@@ -212,11 +214,10 @@ def ensemble(path: Path, scene: Scene) -> list[Settings]:
     Raises BadInput.
     """
     name = plain(str(path))
+    content = read(path, MOST_BYTES)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = content.decode()
         said = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
-    except OSError as error:
-        raise BadInput(f"{name}: cannot be read ({error.strerror}).") from error
     except ValueError as error:
         raise BadInput(f"{name}: is neither JSON nor, named .toml, TOML ({error}).") from error
     rigs = said.get("ensemble") if isinstance(said, dict) else None

@@ -226,5 +226,5 @@ def _films(
         for name, drive in FILMS.values()
     ]
     with open_(base) as evaluator:
-        outcomes = Bench(base, evaluator).outcomes(runs)
+        outcomes = evaluator.outcomes(runs)
     return [[nan if one.failure else gauge.of(one.numbers) for gauge in FILM] for one in outcomes]

@@ -70,15 +70,9 @@ def bench(*, quick: bool = False) -> Bench:
 
 def measure(quick: bool) -> dict[str, Any]:
     """All numbers: of each ratio the median over the rounds, ``low`` and ``high``."""
-    host = machine()
-    return {
-        **real_time(3 if quick else 11),
-        "quick": quick,
-        "machine": {
-            **{name: host[name] for name in ("processor", "cores", "python")},
-            "compiler": compiler_version(),
-        },
-    }
+    host = {name: machine()[name] for name in ("processor", "cores", "python")}
+    host |= {"compiler": compiler_version()}
+    return {**real_time(3 if quick else 11), "quick": quick, "machine": host}
 
 
 def compiler_version() -> str:
@@ -100,10 +94,12 @@ def real_time(rounds: int) -> dict[str, Any]:
         name: [scene.run.duration / seconds for seconds in taken[name]]
         for name, scene in scenes.items()
     }
-    others = ("full", "limited", "ideal")
+    over = {
+        name: ratios(speeds[name], speeds["amplifier"]) for name in ("full", "limited", "ideal")
+    }
     return {
         "real_time": {name: spread(found) for name, found in speeds.items()},
-        "over_amplifier": {name: ratios(speeds[name], speeds["amplifier"]) for name in others},
+        "over_amplifier": over,
     }
 
 
@@ -159,11 +155,10 @@ def table(numbers: dict[str, Any], titles: Mapping[str, str]) -> str:
 def _spreads(numbers: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Each spread with its dotted name."""
     for name, value in numbers.items():
-        if isinstance(value, dict):
-            if "median" in value:
-                yield name, value
-            else:
-                yield from ((f"{name}.{key}", found) for key, found in _spreads(value))
+        if isinstance(value, dict) and "median" in value:
+            yield name, value
+        elif isinstance(value, dict):
+            yield from ((f"{name}.{key}", found) for key, found in _spreads(value))
 
 
 def _cells(found: dict[str, Any]) -> str:

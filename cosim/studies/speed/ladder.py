@@ -12,7 +12,7 @@ from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.point import periods_made_whole
-from cosim.evaluate.store import Store, hashed
+from cosim.evaluate.store import Store, hashed, reported
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.fidelity import relative_error
@@ -132,13 +132,10 @@ def ladder(
     """
     every = [load(scene, overrides) for scene in scenes]
     tick = counted(progress, runs_in_all() * len(every))
-    path = None if out is None else Path(out) / STORE
-    with Store(path, [scene.as_dict() for scene in every]) as store:
-        found = report([(scene, each_rung(scene, store, tick)) for scene in every])
-        if out is not None:
-            found.save(out)
-        store.remove()
-    return found
+    return reported(
+        lambda store: report([(scene, each_rung(scene, store, tick)) for scene in every]),
+        *(out, STORE, [scene.as_dict() for scene in every]),
+    )
 
 
 def report(found: Found) -> Report:

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -144,8 +143,3 @@ def write(path: Path, data: xr.Dataset, figure: Path) -> None:
     content = data.to_netcdf(engine="scipy")
     with together([path], outdated=[figure]) as (temporary,):
         temporary.write_bytes(bytes(content))
-
-
-def read(path: Path) -> xr.Dataset:
-    """A dataset that :func:`write` wrote."""
-    return xr.load_dataset(BytesIO(path.read_bytes()), engine="scipy")

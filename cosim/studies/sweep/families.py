@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cosim.errors import BadInput, plain
-from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.evaluator import workers_asked
+from cosim.evaluate.many import each, threads
 from cosim.evaluate.point import periods_made_whole
 from cosim.files.atomic import whole
 from cosim.scene import Scene, changed
@@ -19,14 +20,14 @@ def keep(
     design: Design,
     names: Sequence[str],
     points: Sequence[int],
-    bench: Evaluator,
+    workers: int | None,
 ) -> None:
-    """Run ``points`` once more, and write their waveforms ``names`` from ``run.settle`` on, each
-    point's as ``NUMBER.nc``. Raises CosimError."""
+    """Run ``points`` once more, here, and write their waveforms ``names`` from ``run.settle`` on,
+    each point's as ``NUMBER.nc``. Raises CosimError."""
     from cosim.simulation.simulate import simulate
 
-    def kept(number: int, progress: Progress) -> None:
-        of = changed(scene, design.point(number), "--over")
+    def kept(common: Scene, number: int, progress: Progress) -> None:
+        of = changed(common, design.point(number), "--over")
         if design.changes_frequency:
             of = changed(of, periods_made_whole(of), "--over")
         result = simulate(of, progress)
@@ -38,6 +39,7 @@ def keep(
         with whole(folder / f"{number}.nc") as temporary, temporary.open("wb") as file:
             netcdf(file, columns, result.units, {"frequency": repr(1.0 / of.period)})
 
-    for _, failed in bench.apply(kept, ((number, number) for number in points)):
-        if failed is not None:
-            raise failed
+    with threads(scene, workers_asked(workers)) as pool:
+        for _, failed in each(pool, kept, points):
+            if failed is not None:
+                raise failed

@@ -57,10 +57,10 @@ def draw(data: xr.Dataset, title: str) -> Picture:
         figure.suptitle(title, fontsize=12)
         return figure
     if POINT in data.dims:
-        _clouds(figure, data, swept(data))
+        _scatters(figure, data, swept(data))
     else:
         names = [str(name) for name in data.dims]
-        varied = sorted((n for n in names if data.sizes[n] > 1), key=names.index) or names[:1]
+        varied = [name for name in names if data.sizes[name] > 1] or names[:1]
         if len(varied) == 1:
             _curves(figure, data.squeeze([n for n in names if n != varied[0]]), varied[0])
         else:
@@ -108,8 +108,7 @@ def _curves(figure: Figure, data: xr.Dataset, name: str) -> None:
         axis.plot(data[name].values, values, color="#1f6fb2", marker=".", lw=1.3)
         _over_key(axis, data, name)
         axis.set(ylabel=f"[{quantity.unit}]")
-        axis.set_title(quantity.title, loc="left", fontsize=10.5)
-        _tell_absent(axis, values)
+        _head(axis, quantity, values)
     figure.axes[0].axhline(0.0, color="0.3", lw=0.8)
 
 
@@ -151,15 +150,13 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
     for axis, quantity in zip(others, OTHERS, strict=True):
         values = _values(here, quantity).values
         shown = _map(axis, here, quantity, x, y, "viridis", _one_sided(values, quantity.unit))
-        axis.set_title(quantity.title, loc="left", fontsize=10.5)
-        if not _tell_absent(axis, values):
-            axis.figure.colorbar(shown, ax=axis, label=f"[{quantity.unit}]")
+        _head(axis, quantity, values, shown)
     said += [_setting(here, third)] if third else []
     if said:
         others[0].set_title(f"{OTHERS[0].title}\nat {', '.join(said)}", loc="left", fontsize=10.5)
 
 
-def _clouds(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
+def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
     """The velocity over each key, and three quantities over the first two keys."""
     rows = figure.subfigures(2, 1)
     v = _values(data, V_AVERAGE).values
@@ -176,18 +173,14 @@ def _clouds(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
     x, y = data[names[0]].values, data[names[1]].values
     for axis, quantity in zip(_row(rows, 1, 3), (V_AVERAGE, *OTHERS[1:]), strict=True):
         values = _values(data, quantity).values
-        colors = (
-            ("RdBu", norm)
-            if quantity is V_AVERAGE
-            else ("viridis", _one_sided(values, quantity.unit))
-        )
-        shown = axis.scatter(x, y, c=values, cmap=colors[0], norm=colors[1], s=22, **edges)
+        colors, limits = "viridis", _one_sided(values, quantity.unit)
+        if quantity is V_AVERAGE:
+            colors, limits = "RdBu", norm
+        shown = axis.scatter(x, y, c=values, cmap=colors, norm=limits, s=22, **edges)
         failed = data[FAILURE].values != ""
         axis.plot(x[failed], y[failed], **FAILED)
         _name_axes(axis, data, names[0], names[1])
-        axis.set_title(quantity.title, loc="left", fontsize=10.5)
-        if not _tell_absent(axis, values):
-            axis.figure.colorbar(shown, ax=axis, label=f"[{quantity.unit}]")
+        _head(axis, quantity, values, shown)
 
 
 def _over_key(axis: Axes, data: xr.Dataset, name: str) -> None:
@@ -213,8 +206,7 @@ def _map(
     values = _values(data, quantity).transpose(y, x).values
     xs, ys = data[x].values, data[y].values
     shown = axis.pcolormesh(xs, ys, values, cmap=colors, norm=norm, shading="nearest")
-    levels = _levels(norm)
-    smooth = values
+    levels, smooth = _levels(norm), values
     if rugged is not None:
         smooth = np.where(rugged, np.nan, values)
         rows, columns = np.nonzero(rugged)
@@ -282,26 +274,27 @@ def _levels(norm: Normalize) -> list[float]:
     return [float(level) for level in ticks if low < level < high and level != 0.0]
 
 
-def _tell_absent(axis: Axes, values: Array) -> bool:
-    """Say so where there is nothing to show, as of a peak that rigid walls do not have."""
-    absent = not np.isfinite(values).any()
-    if absent:
+def _head(axis: Axes, quantity: Quantity, values: Array, shown: Any = None) -> None:
+    """Name what a panel has ``shown`` in colours, or that there is nothing to show, as of a peak
+    that rigid walls do not have."""
+    axis.set_title(quantity.title, loc="left", fontsize=10.5)
+    if not np.isfinite(values).any():
         axis.text(0.5, 0.5, "there is none here", transform=axis.transAxes, ha="center")
-    return absent
+    elif shown is not None:
+        axis.figure.colorbar(shown, ax=axis, label=f"[{quantity.unit}]")
 
 
 def _setting(data: xr.Dataset, name: str) -> str:
-    return f"{setting(data[name], 4)}{_turned(data[name].key, float(data[name]))}".replace(
-        "\n", ", "
-    )
+    meant = _meant(data[name].key, float(data[name]))
+    return setting(data[name], 4) + (meant and f", {meant}")
 
 
-def _turned(key: str, value: float) -> str:
-    """What a knob at ``value`` stands for, below it."""
+def _meant(key: str, value: float) -> str:
+    """What a knob at ``value`` stands for."""
     if key == "drive.pot_frequency":
-        return f"\n{firmware.knob_frequency(value):.3g} Hz"
+        return f"{firmware.knob_frequency(value):.3g} Hz"
     if key == "drive.pot_max":
-        return f"\n{firmware.knob_amplitude(value):.3g} V"
+        return f"{firmware.knob_amplitude(value):.3g} V"
     return ""
 
 
@@ -311,9 +304,9 @@ def _name_axes(axis: Axes, data: xr.Dataset, *names: str) -> None:
     for name, line in zip(names, (axis.xaxis, axis.yaxis), strict=False):
         key, unit = data[name].key, data[name].units
         line.set_label_text(label(key, unit))
-        if _turned(key, 0.5):
+        if _meant(key, 0.5):
             low, high = line.get_view_interval()
             shown = [tick for tick in np.linspace(0.0, 1.0, 6) if low <= tick <= high]
             if len(shown) > 1:
-                words = [f"{tick:.1f}{_turned(key, tick)}" for tick in shown]
+                words = [f"{tick:.1f}\n{_meant(key, tick)}" for tick in shown]
                 line.set_ticks(shown, words, fontsize=8.5)

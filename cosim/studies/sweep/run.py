@@ -135,7 +135,7 @@ def _sweep(
         data = refreshed()
         if keep:
             points = [n for n in range(total) if not numbers.failures[n]]
-            families.keep(folder / "points", scene, design, keep, points, bench)
+            families.keep(folder / "points", scene, design, keep, points, workers)
         return data
 
 

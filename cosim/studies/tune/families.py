@@ -36,7 +36,7 @@ def most_heat(scene: Scene, limit: float | str | None) -> float:
     """W of a coil, of a limit in W or as "RISE:DUTY" or "RISE:DUTY:SECONDS" (K, 1, s); of None that
     of the Carlton's range of drives, in a scene with such an actuator. Raises BadInput."""
     if limit is None:
-        return DRIVE_RANGE_HEAT if scene.mechanics.actuator == "ram" else float("inf")
+        return DRIVE_RANGE_HEAT if scene.mechanics.free_ram else float("inf")
     try:
         watts, *cycle = (float(part) for part in str(limit).split(":"))
         found = heat_limit(scene.coil, watts, *cycle) if cycle else watts

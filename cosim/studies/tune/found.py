@@ -151,7 +151,7 @@ def write_runs(path: Path, runs: Sequence[Run], quantity: str) -> None:
 def _robustness(tuning: Tuning) -> str:
     """What it costs to turn a key a little, in words."""
     if not tuning.neighbours:
-        return "the budget ended before its neighbourhood was heard: a larger one may help"
+        return "the budget ended before its neighbours were run: a larger one may help"
     if (lost := tuning.lost) is None:
         return ""
     cost = "loses it altogether" if lost >= 1.0 else f"costs at most {max(lost, 0.0):.1%}"

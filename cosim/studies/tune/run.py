@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from pathlib import Path
@@ -21,7 +21,7 @@ from cosim.search.climb import POPULATION, Climb
 from cosim.search.design import Design
 from cosim.search.known import Known
 from cosim.search.protocol import Feasible
-from cosim.search.turns import TURN, corners, faces
+from cosim.search.turns import TURN, faces, turned
 from cosim.simulation.fidelity import Fidelity
 from cosim.studies.tune.families import family, most_heat
 from cosim.studies.tune.found import Run, Tuning, write_runs
@@ -119,40 +119,35 @@ def tune(
                 f"{MOST_RUNS}."
             )
         families[name] = changed(scene, changes, "--waveform"), ranges
-    heard: list[Run] = []
-    path = None if out is None else Path(out)
-
-    def told(run: Run, best: Run | None) -> None:
-        heard.append(run)
-        progress(run, best)
-
     tunings, benches = [], []
     with ExitStack() as stack:
         for name, (base, ranges) in families.items():
-            store = path and path / (f"{name.replace(':', '-')}-{STORE}" if name else STORE)
+            store = f"{name.replace(':', '-')}-{STORE}" if name else STORE
             whole = any(key in FREQUENCIES for key in ranges)
-            bench = Evaluator(base, store, whole_periods=whole, workers=workers, dask=dask)
+            path = None if out is None else Path(out) / store
+            bench = Evaluator(base, path, whole_periods=whole, workers=workers, dask=dask)
             benches.append(stack.enter_context(bench))
-            aim = _Aim(bench, quantity, largest, ranges, len(keys) if robust else 0, most)
+            count, made = len(keys) if robust else 0, [run for one in tunings for run in one.runs]
+            aim = _Aim(bench, base, quantity, largest, ranges, count, most, made)
             try:
-                best, neighbours, runs, ahead = _searched(aim, base, budget, seed, told, scouting)
+                best, neighbours, runs, ahead = _searched(aim, budget, seed, progress, scouting)
             except KeyboardInterrupt:
-                if path is not None:
-                    write_runs(path / "tune.csv", heard, quantity)
+                if out is not None:
+                    write_runs(Path(out) / "tune.csv", aim.made, quantity)
                 raise
             except BadInput:
                 if not bench.resumed:
                     bench.forget()  # there is nothing to go on with
                 raise
-            tuned = changed(base, {**best.values, **_judge(base)}, "tune")
+            tuned = changed(base, {**best.values, **aim.judge}, "tune")
             if whole:
                 tuned = changed(tuned, periods_made_whole(tuned), "tune")
-            scouts, by_fast = 0 if ahead is None else len(ahead.runs), None
-            if ahead is not None and _judge(base):
-                by_fast = ahead.value(best.values)
+            by_fast = None
+            if aim.judge:
+                by_fast = next((run.value for run in ahead if run.values == best.values), None)
             tunings.append(
                 Tuning(
-                    *(quantity, largest, ranges, runs, best, neighbours, tuned, scouts, seed),
+                    *(quantity, largest, ranges, runs, best, neighbours, tuned, len(ahead), seed),
                     *(by_fast, name, robust, most),
                 )
             )
@@ -179,6 +174,7 @@ class _Aim:
     """What is run, and what for."""
 
     bench: Evaluator
+    scene: Scene
     quantity: str
     largest: bool
     ranges: dict[str, tuple[float, float]]
@@ -186,49 +182,50 @@ class _Aim:
     """How many keys, the first ones, are turned about each setting."""
     heat: float
     """W: the most in a coil."""
+    made: list[Run]
+    """All runs but those ahead, as they finish."""
+
+    @property
+    def judge(self) -> Settings:
+        """What makes the scene the one whose numbers count: the FMU judges the fast solver."""
+        return {"run.solver": "fmu"} if self.scene.run.solver == "fast" else {}
 
 
 Progress = Callable[[Run, Run | None], None]
 
 
-def _judge(scene: Scene) -> Settings:
-    """What makes of a scene the one whose numbers count: the FMU judges the fast solver."""
-    return {"run.solver": "fmu"} if scene.run.solver == "fast" else {}
-
-
 def _searched(
-    aim: _Aim, scene: Scene, budget: int, seed: int, progress: Progress, scouting: Progress
-) -> tuple[Run, dict[str, list[float | None]], list[Run], "_Trial | None"]:
-    """The best run, its neighbours, all runs, and the scouts that went ahead."""
-    turned = 2 * len(aim.ranges)
-    searched = min(round(SEARCHED * budget), budget - turned)
-    ahead, warm = None, np.empty((0, len(aim.ranges)))
-    simple, judge = Fidelity.of(scene).simple, _judge(scene)
-    if judge:
-        ahead = _Trial(aim, {}, scouting)
-        ahead.search(searched, seed)
-    elif simple is not None:
+    aim: _Aim, budget: int, seed: int, progress: Progress, scouting: Progress
+) -> tuple[Run, dict[str, list[float | None]], list[Run], list[Run]]:
+    """The best run, its neighbours, all runs, and those of the scouts that went ahead."""
+    faces_each = 2 * len(aim.ranges)
+    searched = min(round(SEARCHED * budget), budget - faces_each)
+    ahead: list[Run] = []
+    warm = np.empty((0, len(aim.ranges)))
+    circuit = {} if aim.judge else Fidelity.of(aim.scene).simple
+    if circuit is not None:
         # Quantities that only the scene's own rung has find no scouts.
-        with suppress(BadInput):
-            scouts = _Trial(aim, simple, scouting)
-            scouts.search(SCOUTS * searched, seed)
-            ahead = scouts
-    if ahead is not None:
-        warm = ahead.known.ranked(0, WARM_APART, WARM)
-    trial = _Trial(aim, judge, progress)
-    if judge:
+        with nullcontext() if aim.judge else suppress(BadInput):
+            scouts = _Trial(aim, circuit, scouting)
+            scouts.search((1 if aim.judge else SCOUTS) * searched, seed)
+            ahead, warm = scouts.runs, scouts.known.ranked(0, WARM_APART, WARM)
+
+    def told(run: Run, best: Run | None) -> None:
+        aim.made.append(run)
+        progress(run, best)
+
+    trial = _Trial(aim, aim.judge, told)
+    if aim.judge:
         trial.known.rows(warm)  # the search is over
     else:
         trial.search(searched, seed, warm)
     if trial.best is None:
-        first = (trial.runs or (ahead or trial).runs)[0]
+        first = (trial.runs or ahead)[0]
         raise SimulationFailed(f"No setting could be run; the first one: {first.outcome.failure}")
     best, neighbours = trial.best, trial.neighbours()
-    while trial.best is not best and len(trial.runs) + turned <= budget:
+    while trial.best is not best and len(trial.runs) + faces_each <= budget:
         best, neighbours = trial.best, trial.neighbours()
-    if trial.best is not best:
-        best, neighbours = trial.best, {}
-    return best, neighbours, trial.runs, ahead
+    return trial.best, neighbours if trial.best is best else {}, trial.runs, ahead
 
 
 class _Trial:
@@ -246,10 +243,6 @@ class _Trial:
         found = self.known.scores[: len(self.runs), 0]
         return self.runs[int(found.argmax())] if len(found) and found.max() > -inf else None
 
-    def value(self, settings: Mapping[str, Number]) -> float | None:
-        """What was found at settings; None where they were not asked for."""
-        return next((run.value for run in self.runs if run.values == settings), None)
-
     def search(self, runs: int, seed: int, warm: Array | None = None) -> None:
         """Run at most ``runs`` points; ``warm`` starts (rows) first, in place of most of the
         exploration."""
@@ -265,39 +258,29 @@ class _Trial:
         """The value asked for with each key turned down and up from the best."""
         keys = list(self._aim.ranges)
         best = self.known.points[int(self.known.scores[:, 0].argmax())]
-        turned = faces(best)
-        off = np.abs(turned - best).max(axis=1)
+        every = faces(best)
+        off = np.abs(every - best).max(axis=1)
         inside = np.isclose(off, TURN)
-        rows = iter(self.known.rows(turned[inside]))
+        rows = iter(self.known.rows(every[inside]))
         values = [self.runs[next(rows)].value if there else None for there in inside]
         return {key: [values[len(keys) + k], values[k]] for k, key in enumerate(keys)}
 
     def _run(self, points: Array) -> tuple[Array, Feasible]:
-        each = [[self._settings(near.tolist()) for near in self._around(point)] for point in points]
-        count = len(each[0])
-        asked = ({**self._circuit, **values} for around in each for values in around)
-        heard: list[dict[int, Outcome]] = [{} for _ in each]
+        each = [
+            [self._settings(near.tolist()) for near in turned(point, self._aim.turned)]
+            for point in points
+        ]
+        asked = [[{**self._circuit, **values} for values in around] for around in each]
         found: dict[int, Run] = {}
-        for number, outcome in self._aim.bench.run(enumerate(asked)):
-            n, k = divmod(number, count)
-            heard[n][k] = outcome
-            if len(heard[n]) == count:
-                found[n] = self._heard(each[n][0], [heard[n][k] for k in range(count)])
-                self._progress(found[n], self.best)
+        for number, outcomes in self._aim.bench.groups(asked):
+            found[number] = self._judged(each[number][0], outcomes)
+            self._progress(found[number], self.best)
         runs = [found[number] for number in range(len(points))]
         self.runs += runs
         scores = np.array([[self._score(run.value)] for run in runs])
         return scores, np.isfinite(scores[:, 0])
 
-    def _around(self, point: Array) -> Array:
-        """A point and, of a robust search, all turns of its first keys (rows)."""
-        count = self._aim.turned
-        if not count:
-            return point[np.newaxis]
-        turned = np.vstack([point[:count], faces(point[:count]), corners(point[:count])])
-        return np.hstack([turned, np.tile(point[count:], (len(turned), 1))])
-
-    def _heard(self, settings: dict[str, Number], outcomes: Sequence[Outcome]) -> Run:
+    def _judged(self, settings: dict[str, Number], outcomes: Sequence[Outcome]) -> Run:
         """A setting with its own outcome, the first, and those of its turns, which are judged by
         their motion alone: a hand that is off turns back."""
         own, most = outcomes[0], self._aim.heat

@@ -5,7 +5,6 @@ is the schematic ("full") with such steps. Only regular settings have errors: el
 or the ninth digit, decides.
 """
 
-import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -25,7 +24,7 @@ from cosim.simulation.fidelity import COMPLETE, JUDGES, SEARCHES, relative_error
 from cosim.simulation.simulate import summary
 from cosim.stepper.stepper import LANES
 from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, End, label_ends, panels
-from cosim.studies.report import Progress, Report, counted, silent
+from cosim.studies.report import Report
 from cosim.studies.speed.bench import take_turns
 from cosim.studies.tables import Row, brief, markdown
 from cosim.toolchain.processes import in_place
@@ -98,29 +97,21 @@ def machines() -> dict[str, Settings]:
     }
 
 
-def choice(
-    *,
-    quick: bool = False,
-    workers: int | None = None,
-    out: str | os.PathLike[str] | None = None,
-    progress: Progress = silent,
-) -> Report:
+def choice(quick: bool, out: Path) -> Report:
     """The error of v_average and the CPU time of each circuit model at each tolerance, on settings
     of the knobs drawn at random, and what to take for 10, 1 and 0.1 %; ``quick``: few settings.
 
-    In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
-    study has left there. Raises BadInput.
+    It leaves what ``Report.save`` writes in ``out``, and takes up what an interrupted one left.
     """
-    path, kept = None if out is None else Path(out) / "choice.sqlite", ("v_average",)
-    with Evaluator(BASE, path, whole_periods=True, kept=kept, workers=workers) as bench:
-        found = measure(bench, QUICK if quick else SETTINGS, progress)
-        if out is not None:
-            found.save(out)
+    path = out / "choice.sqlite"
+    with Evaluator(BASE, path, whole_periods=True, kept=("v_average",)) as bench:
+        found = measure(bench, QUICK if quick else SETTINGS)
+        found.save(out)
         bench.forget()
     return found
 
 
-def measure(bench: Evaluator, draws: int, progress: Progress) -> Report:
+def measure(bench: Evaluator, draws: int) -> Report:
     """Measure all on so many settings of each machine; ``bench`` runs them."""
     cube = qmc.Sobol(len(KNOBS), rng=np.random.default_rng(0)).random_base2(5)[:draws]
     drawn = [
@@ -141,19 +132,16 @@ def measure(bench: Evaluator, draws: int, progress: Progress) -> Report:
         if _able(settings := {**own, **one})
     ]
     timed = [s for m in kinds for s in [own for name, own in regular if name == m][:TIMED]]
-    tick = counted(progress, len(asked) + len(timed))
     found = {what: np.full(len(regular), nan) for what in every}
     for k, outcome in bench.run((k, settings) for k, (*_, settings) in enumerate(asked)):
         what, n, _ = asked[k]
         found[what][n] = outcome.numbers.get("v_average", inf)
-        tick(what)
     seconds, costs = [], {what: [] for what in CHOICES}
     for settings in timed:
         taken = _time(settings)
         seconds.append(taken[DEFAULT])
         for what, second in taken.items():
             costs[what].append(second / taken[DEFAULT])
-        tick("CPU time")
     rows: list[Row] = []
     for machine in (*kinds, ALL):
         there = np.array([machine in (ALL, name) for name, _ in regular], bool)

@@ -1,0 +1,27 @@
+"""A netlist's logical line, and how one is refused."""
+
+from dataclasses import dataclass
+from typing import NoReturn
+
+from cosim.errors import BadInput
+
+MAX_LINE = 200_000
+
+
+@dataclass(frozen=True)
+class Line:
+    """A logical line: comments stripped, continuations joined, where it began."""
+
+    text: str
+    file: str
+    number: int
+
+
+def refuse(line: Line, reason: str) -> NoReturn:
+    """Raise the one sentence that tells what is wrong with ``line``."""
+    raise BadInput(f"{line.file}:{line.number}: {reason}.")
+
+
+def shown(text: str) -> str:
+    """A piece of a netlist as it may stand in a message: short and printable."""
+    return ascii(text if len(text) <= 40 else f"{text[:37]}...")[1:-1]

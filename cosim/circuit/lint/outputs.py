@@ -1,0 +1,203 @@
+"""What a netlist asks for besides its circuit: ``.meas`` is computed, the rest has no effect.
+
+A measurement is computed on what ngspice recorded. All that it compares or averages is a vector or
+an expression of ngspice's, so a limit in braces is one too, constant in time.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.circuit.lint.lines import Line, refuse, shown
+from cosim.circuit.lint.words import number, word_set
+
+_SAVING = word_set(".save .probe .plot .print")
+_ANALYSES = word_set(".op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .csparam")
+_REDUCED = word_set("avg rms min max pp integ")
+_MEAS = re.compile(r"\.meas\w*\s+(?:(tran|ac|dc|op|tf|noise|sp)\s+)?(\w+)\s+(\w+)\b(.*)", re.DOTALL)
+_CLAUSE = re.compile(r"(?<![^\s,)}'])(from|to|at|val|td|cross|rise|fall|when|trig|targ)\b\s*=?\s*")
+_BRACKETS = re.compile(r"\([^()]*\)|\{[^{}]*\}")
+_LONGEST = 2_000
+_FORMS = (
+    "it may be AVG, RMS, MIN, MAX, PP or INTEG of an expression with FROM= and TO=, FIND with AT= "
+    "or WHEN, WHEN, or TRIG and TARG, of expression=value with TD= and CROSS=, RISE= or FALL="
+)
+
+
+@dataclass(frozen=True)
+class Event:
+    """A time, s, or when an expression crosses another; the last time if ``which`` is 0."""
+
+    at: str = ""
+    left: str = ""
+    right: str = ""
+    delay: str = "0"
+    edge: str = "cross"
+    which: int = 1
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A ``.meas`` line: ``what`` is done with ``of``, between two events or at the first."""
+
+    line: Line
+    name: str
+    what: str
+    of: str
+    events: tuple[Event, ...]
+
+    @property
+    def words(self) -> list[str]:
+        """The vectors and expressions that it needs."""
+        needed = [word for e in self.events for word in (e.at, e.left, e.right, e.delay)]
+        return [word for word in (self.of, *needed) if word and number(word) is None]
+
+
+def without_effect(dropped: Sequence[Line], measuring: bool = True) -> Iterator[str]:
+    """A sentence for each line that was left out and might be missed; whether ``.meas`` is."""
+    for line in dropped:
+        text = line.text.lower()
+        word, match = text.split()[0], _MEAS.match(text)
+        without = re.search(r"\b(uic|startup)\b", text) if word == ".tran" else None
+        if word in _SAVING:
+            yield f"{line.file}:{line.number}: {word} has no effect; circuit.save keeps vectors."
+        elif match and not measuring:
+            yield f"{line.file}:{line.number}: {word} has no effect without [[port]]."
+        elif word in _ANALYSES or without or (match and match[1] not in (None, "tran")):
+            what = f"{word} {without[0]}" if without else word
+            yield (
+                f"{line.file}:{line.number}: {what} has no effect: a run is a transient analysis "
+                "that begins at the operating point."
+            )
+
+
+def measures(dropped: Sequence[Line]) -> list[Measure]:
+    """The measurements of the transient analysis. Raises BadInput for what is none."""
+    found: dict[str, Measure] = {}
+    for line in dropped:
+        match = _MEAS.match(line.text.lower()) if len(line.text) < _LONGEST else None
+        if match is None and line.text.lower().startswith(".meas"):
+            refuse(line, f"{shown(line.text)} is no complete .meas; {_FORMS}")
+        if match is not None and match[1] in (None, "tran"):
+            if match[2] in found:
+                refuse(line, f"there is a second .meas {shown(match[2])}")
+            found[match[2]] = _measure(line, match[2], match[3], match[4])
+    return list(found.values())
+
+
+def _measure(line: Line, name: str, what: str, rest: str) -> Measure:
+    (_, of), *clauses = _clauses(f"{what}{rest}" if what in ("when", "trig") else rest)
+    keys = [key for key, _ in clauses]
+    given, events = dict(clauses), [Event()]
+    if what in _REDUCED and of and not {*keys} - {"from", "to"}:
+        events = [Event(given.get("from", "0")), Event(given.get("to", "1e99"))]
+    elif what == "find" and of and keys == ["at"]:
+        events = [Event(given["at"])]
+    elif keys[:1] == ["when"] and (what == "when" or of):
+        events = [_event(clauses)]
+    elif what == "trig" and "targ" in keys:
+        place = keys.index("targ")
+        events = [_event(clauses[:place]), _event(clauses[place:])]
+    if not all(event.at or (event.left and event.right) for event in events):
+        refuse(line, f".meas {shown(name)} is nothing known here; {_FORMS}")
+    return Measure(line, name, what, of, tuple(events))
+
+
+def _clauses(text: str) -> list[tuple[str, str]]:
+    """What stands before the first keyword, then each keyword with what follows it."""
+    outside, before = text, ""
+    while outside != before:
+        before, outside = outside, _BRACKETS.sub(lambda match: "_" * len(match[0]), outside)
+    starts = [*_CLAUSE.finditer(outside)]
+    ends = [*(match.start() for match in starts), len(text)]
+    keys = ["", *(match[1] for match in starts)]
+    places = [0, *(match.end() for match in starts)]
+    return [
+        (key, _plain(text[place:end].strip(" ,")))
+        for key, place, end in zip(keys, places, ends, strict=True)
+    ]
+
+
+def _plain(text: str) -> str:
+    """An expression without ``par('…')``, quotes or braces around it."""
+    match = re.fullmatch(r"(?:par\s*\(\s*)?(?:'([^']*)'|\{([^{}]*)\})(?:\s*\))?", text)
+    return f"({match[1] or match[2]})" if match else text
+
+
+def _event(clauses: Sequence[tuple[str, str]]) -> Event:
+    """Of the clauses from WHEN, TRIG or TARG on; one of nothing where they are not understood."""
+    (_, what), *rest = clauses
+    given = dict(rest)
+    if "at" in given and not what:
+        return Event(given["at"])
+    left, _, right = what.partition("=")
+    edges = [key for key in given if key in ("cross", "rise", "fall")] or ["cross"]
+    which = given.get(edges[0], "1")
+    if len(edges) > 1 or not re.fullmatch(r"last|[1-9]\d{0,8}", which):
+        return Event()
+    right, delay = given.get("val", right).strip(), given.get("td", "0")
+    return Event("", left.strip(), right, delay, edges[0], 0 if which == "last" else int(which))
+
+
+def measured(
+    every: Sequence[Measure], time: Array, known: Mapping[str, Array]
+) -> tuple[dict[str, float], list[str]]:
+    """The measurements by the names of a summary, and a sentence for each whose event does not
+    come. ``known`` are the values of their words at the times (s)."""
+    values, notes = {}, []
+    for each in every:
+        value = _value(each, time, known)
+        if value is not None:
+            values[f"meas.{each.name}"] = value
+        else:
+            where = f"{each.line.file}:{each.line.number}"
+            notes.append(f"{where}: .meas {each.name} has no value: its event does not come.")
+    return values, notes
+
+
+def _value(each: Measure, time: Array, known: Mapping[str, Array]) -> float | None:
+    """The measurement's value, SI; None where an event does not happen."""
+
+    def at(words: str, place: float) -> float:
+        return float(np.interp(place, time, values(words)))
+
+    def values(words: str) -> Array:
+        return known[words] if words in known else np.full(len(time), number(words))
+
+    def when(event: Event) -> float | None:
+        if event.at:
+            return at(event.at, 0.0)
+        off = values(event.left) - values(event.right)
+        return _crossing(time, off, at(event.delay, 0.0), event)
+
+    times = [found for event in each.events if (found := when(event)) is not None]
+    if len(times) < len(each.events):
+        return None
+    if each.what in _REDUCED:
+        first, last = max(times[0], float(time[0])), min(times[1], float(time[-1]))
+        t = np.concatenate([[first], time[(time > first) & (time < last)], [last]])
+        return _reduced(each.what, t, np.interp(t, time, values(each.of))) if first < last else None
+    if each.what == "find":
+        return at(each.of, times[0])
+    return times[-1] - times[0] if each.what == "trig" else times[0]
+
+
+def _reduced(what: str, t: Array, y: Array) -> float:
+    """Of straight lines between the points."""
+    h, a, b, length = np.diff(t), y[:-1], y[1:], t[-1] - t[0]
+    whole, squares = (h * (a + b)).sum() / 2.0, (h * (a * a + a * b + b * b)).sum() / 3.0
+    found = {"avg": whole / length, "integ": whole, "rms": np.sqrt(squares / length)}
+    found |= {"min": y.min(), "max": y.max(), "pp": np.ptp(y)}
+    return float(found[what])
+
+
+def _crossing(time: Array, off: Array, delay: float, event: Event) -> float | None:
+    """When ``off`` goes through 0 the right way for the right time, after the delay (s)."""
+    rise, fall = (off[:-1] < 0) & (off[1:] >= 0), (off[:-1] > 0) & (off[1:] <= 0)
+    k = np.flatnonzero({"rise": rise, "fall": fall, "cross": rise | fall}[event.edge])
+    places = time[k] + (time[k + 1] - time[k]) * off[k] / (off[k] - off[k + 1])
+    places = places[places >= delay]
+    return float(places[event.which - 1]) if len(places) >= max(event.which, 1) else None

@@ -1,0 +1,283 @@
+"""LTspice's and PSpice's words mean in a run what they mean there; what cannot is told."""
+
+import cmath
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cosim
+from cosim.circuit.joined import deck
+from cosim.circuit.lint.checks import check
+from cosim.circuit.lint.deck import named, read, read_all
+from cosim.circuit.lint.outputs import measured, measures
+from cosim.circuit.lint.write import written
+from cosim.errors import BadInput, BeyondModel
+from cosim.files.resources import circuits
+from cosim.toolchain.processes import in_place
+from tests.circuit.test_found_netlists import SCENE, found
+from tests.helpers import needs, spice
+
+pytestmark = pytest.mark.filterwarnings(f"ignore::{BeyondModel.__module__}.{BeyondModel.__name__}")
+
+HEAD = "title\nV1 in 0 SIN(0 1 1k)\nV2 b 0 2\nV3 c 0 -3\nR1 in 0 1k\nR2 b 0 1k\nR3 c 0 1k\n"
+
+
+def summary_of(folder: Path, text: str) -> dict[str, Any]:
+    with in_place():
+        return found(folder, "", f"{text}.end\n").summary
+
+
+def anew(folder: Path, *lines: str, head: str = HEAD) -> list[str]:
+    """The lines that ngspice gets, of those that are used."""
+    path = folder / "own.cir"
+    path.write_text(head + "\n".join((*lines, ".end\n")), encoding="utf-8")
+    top = check(read(path), ())
+    used = [each for each in top.order if all(scope.used for scope in each[2].chain())]
+    return "\n".join(written(line, element, {}) for line, element, _ in used).split("\n")
+
+
+@needs.ngspice_library
+def test_polynomials_have_their_coefficients_in_spices_order(tmp_path: Path) -> None:
+    """The order of the SPICE 2G6 manual, written out."""
+    factors = "0.5 -1.5 2 0.25 -0.75 3 0.1 0.2 0.3 0.4"
+    p = [float(factor) for factor in factors.split()]
+    x, y = 2.0, -3.0
+    two = p[0] + p[1] * x + p[2] * y + p[3] * x * x + p[4] * x * y + p[5] * y * y
+    two += p[6] * x**3 + p[7] * x * x * y + p[8] * x * y * y + p[9] * y**3
+    three = p[0] + p[1] * x + p[2] * y + p[3] * x + p[4] * x * x + p[5] * x * y + p[6] * x * x
+    three += p[7] * y * y + p[8] * y * x + p[9] * x * x
+    one = sum(factor * x**k for k, factor in enumerate(p[:4]))
+    current = sum(factor * (-x / 1e3) ** k for k, factor in enumerate(p[:4]))
+    lines = anew(
+        tmp_path,
+        f"E1 e1 0 POLY(1) (b,0) {' '.join(factors.split()[:4])}",
+        f"E2 e2 0 POLY(2) b 0 c 0 {factors}",
+        f"G3 0 g3 poly(3) (b, 0) (c, 0) (b, 0) {factors}\nR4 g3 0 1",
+        f"F4 0 f4 POLY(1) V2 {' '.join(factors.split()[:4])}\nR5 f4 0 1",
+        f"H5 h5 0 POLY (1) V2 {' '.join(factors.split()[:4])}",
+        ".param k=-1.5\nE6 e6 0 POLY(2) b 0 c 0 {k+1} 0 {2*k}",
+    )
+    result = spice.run(tmp_path, "\n".join(["title", *lines, ".tran 1u 10u", ".end"]))
+    for node, true in {
+        "e1": one, "e2": two, "g3": three, "f4": current, "h5": current, "e6": -0.5 - 3 * y,
+    }.items():  # fmt: skip
+        assert result[node][-1] == pytest.approx(true, rel=1e-6), node
+
+
+PARTS = {
+    "C1 x 0 10u Rser=0.1 Lser=20n RLshunt=3 Rpar=1k Cpar=1u": lambda s: (
+        1 / (1 / (0.1 + 1 / (1 / (20e-9 * s) + 1 / 3) + 1 / (10e-6 * s)) + 1e-3 + 1e-6 * s)
+    ),
+    "L1 x 0 1m Rser={2*0.4} Rpar=5k Cpar=100p": lambda s: (
+        1 / (1 / (0.8 + 1e-3 * s) + 1 / 5e3 + 100e-12 * s)
+    ),
+    'C1 x 0 1µ V=16 Irms=1 Rser=0 Lser=0 mfg="A B" type="Al"': lambda s: 1 / (1e-6 * s),
+    "R9 x 0 4k7 tol=1": lambda s: 4700 + 0 * s,
+}
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("part", PARTS)
+def test_real_parts_have_the_impedance_of_their_circuit(part: str, tmp_path: Path) -> None:
+    lines = anew(tmp_path, part, head="title\nI1 0 x 0 ac 1\nR0 x 0 1e9\n")
+    text = "\n".join(["title", *lines, ".ac dec 3 10 10meg", ".end"])
+    result = spice.run(tmp_path, text)
+    for f, z in zip(result["frequency"], result["x"], strict=True):
+        true = 1 / (1 / PARTS[part](2j * cmath.pi * f.real) + 1e-9)
+        assert abs(z - true) < 1e-6 * abs(true), f
+
+
+TEXT = "Verstärker\nR1 in out 10µ ; größer\nV1 in 0 1\nC1 out 0 1\n.end\n"
+
+
+@pytest.mark.parametrize(
+    "coding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1", "cp1252"]
+)
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_every_coding_gives_the_same_lines(coding: str, ending: str, tmp_path: Path) -> None:
+    path = tmp_path / "own.cir"
+    path.write_bytes(TEXT.replace("\n", ending).encode(coding))
+    assert [line.text for line in read(path)][1:] == ["R1 in out 10u", "V1 in 0 1", "C1 out 0 1"]
+    assert [line.number for line in read(path)] == [1, 2, 3, 4]
+
+
+def test_ltspices_own_models_are_read_where_they_are(tmp_path: Path) -> None:
+    path, there = tmp_path / "own.cir", ".lib C:\\Program Files\\LTC\\lib\\cmp\\standard.dio"
+    for coding in ("utf-8", "utf-16"):
+        path.write_bytes(f"{HEAD}D1 in b 1N4148\n{there}\n.end\n".encode(coding))
+        with pytest.raises(BadInput, match=r"own\.cir:8: .*no model 1n4148 .*copy its \.model"):
+            check(read(path), ())
+        (tmp_path / "standard.dio").write_text(".model 1N4148 D(Is=2n Iave=0.2 mfg=X)\n")
+        assert [line.text for line in read(path)][-1] == ".model 1N4148 D ( Is=2n )"
+        assert [file.name for file in named(path)] == ["own.cir", "standard.dio"]
+        (tmp_path / "standard.dio").unlink()
+    outside = tmp_path.parent / "standard.dio"
+    outside.write_text(".model 1N4148 D(Is=2n)\n")
+    (tmp_path / "standard.dio").symlink_to(outside)
+    with pytest.raises(BadInput, match="must be a file in the netlist's own folder"):
+        read(path)
+    outside.unlink()
+
+
+TOLD = {
+    "E9 x 0 POLY(1) in 0 2": "POLY(n) takes its controls, then 2 to 50 numbers",
+    "E9 x 0 POLY(3) in 0 2": "POLY(n) takes its controls",
+    "E9 x 0 TABLE {V(in)} = (1,0) (0,1)": "TABLE takes an expression in braces",
+    "E9 x 0 AND(2) in 0 b 0 0 1": "gates are not known here",
+    "E9 x 0 in 0 Laplace=1/(1+s)": "write the filter with R and C",
+    "E9 x 0 FREQ {V(in)} = (0,0,0)": "FREQ is not known here",
+    "V9 x 0 PULSE(0 1 0 1n 1n 1u 2u 3)": "PULSE takes 7 values; one more means a number of periods",
+    "V9 x 0 SINE(0 1 1k 0 0 0 5)": "SIN takes 6 values",
+    "V9 x 0 PWL(0 0 +1m 1)": "write the times of PWL since the start",
+    "V9 x 0 PWL REPEAT FOREVER (0 0 1m 1) ENDREPEAT": "instead of REPEAT write r=0",
+    "S9 x 0 in 0 W\n.model W SW(Ron=1 Vt=.5 Vh=-.2)": "vh of w below 0 is LTspice's smooth switch",
+    "D9 x 0 W\n.model W D(Vfwd=.5)": "vfwd of w is LTspice's ideal diode",
+    "A9 in 0 0 0 0 x 0 0 SCHMITT Vt=.5": "is no element that a netlist may have",
+    "XU9 in x level2 Avol=1Meg": "include the file with its .subckt",
+    ".lib UniversalOpamps2.sub": "was not found in the netlist's folder: copy it there",
+    ".lib C:\\models\\mine.lib": "copy the file into the netlist's folder and give its name alone",
+    "B9 x 0 V=idt(V(in))": "the function idt is not defined",
+    "K9 L1 L2 L3 1": "must name two inductors and their coupling",
+    "C9 x 0 1u Rser=1 m=2": "write a resistor in series",
+    ".options maxstep=1u": "the option maxstep is not allowed in a netlist; leave it out",
+    ".meas tran a DERIV V(in) AT=1m": ".meas a is nothing known here; it may be AVG",
+    ".meas tran a WHEN V(in)": ".meas a is nothing known here; it may be AVG",
+    ".meas a": "is no complete .meas",
+}
+
+
+@pytest.mark.parametrize("line", TOLD)
+def test_what_would_mean_something_else_is_told(line: str, tmp_path: Path) -> None:
+    path = tmp_path / "own.cir"
+    path.write_text(f"{HEAD}R8 x 0 1k\n{line}\n.end\n")
+    with pytest.raises(BadInput, match=rf"^own\.cir:\d+: .*{re.escape(TOLD[line])}"):
+        deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False)
+
+
+def test_what_is_not_used_is_not_refused(tmp_path: Path) -> None:
+    library = ".subckt filter a b\nE1 b 0 LAPLACE {V(a)} = {1/(1+s)}\nE2 c 0 POLY(1) a 0 1\n.ends"
+    lines = anew(tmp_path, library, ".model W D(Vfwd=.5)", ".lib C:\\x\\standard.bjt")
+    assert not [line for line in lines if "aplace" in line]
+
+
+MEASURES = {
+    # of V(in), one volt at 1 kHz, and V(b), its absolute value: three periods
+    "m1 AVG V(b) from=0 to=3m": 2 / np.pi,
+    "m2 RMS V(in) FROM 0 TO 2m": np.sqrt(0.5),
+    "m3 MIN V(in)": -1.0,
+    "m4 MAX V(in) from={t1} to='t1+0.1m'": np.sin(2 * np.pi * 0.1),
+    "m5 PP V(in)": 2.0,
+    "m6 INTEG V(b) from=1m to=2m": 2e-3 / np.pi,
+    "m7 FIND V(in)*2 AT=0.125m": np.sqrt(2),
+    "m8 FIND V(b) WHEN V(in)=-0.5 fall=1": 0.5,
+    "m9 WHEN V(in)=0.5 CROSS=3": 1e-3 + 1e-3 / 12,
+    "m10 when V(in)=0.5 td=1.5m rise=1": 2e-3 + 1e-3 / 12,
+    "m11 WHEN V(in)=0.5 FALL=LAST": 2e-3 + 5e-3 / 12,
+    "m12 TRIG V(in) VAL=0.5 RISE=1 TARG V(in) VAL=0.5 FALL=2": 1e-3 + 1e-3 / 3,
+    "m13 trig at=0.5m targ v(b)=0.5 td=0.6m rise=1": 1e-3 + 1e-3 / 12 - 0.5e-3,
+    "m14 WHEN V(in)=V(b)-0.5 fall=1": 0.5e-3 + np.arcsin(0.25) / (2e3 * np.pi),
+}
+MEASURED = (
+    "t\n.param t1=1m\nV1 in 0 SIN(0 1 1k)\nBb b 0 V=abs(V(in))\nR1 in 0 1k\nR2 b 0 1k\n"
+    + "".join(f".meas tran {line}\n" for line in MEASURES)
+)  # fmt: skip
+
+
+def test_measurements_are_those_of_a_sine(tmp_path: Path) -> None:
+    summary = summary_of(tmp_path, MEASURED)
+    for line, true in MEASURES.items():
+        assert summary[f"meas.{line.split()[0]}"] == pytest.approx(true, rel=1e-4), line
+
+
+@needs.ngspice_program
+def test_measurements_are_those_of_the_program(tmp_path: Path) -> None:
+    """In its own form: with =, and no braces."""
+    text = MEASURED.replace("FROM 0 TO 2m", "FROM=0 TO=2m").replace("V(in)*2 AT", "V(in) AT")
+    text = text.replace("{t1} to='t1+0.1m'", "1m to=1.1m").replace("v(b)=0.5 td", "v(b) val=0.5 td")
+    text = re.sub(r".*m14.*\n", "", text)
+    summary = summary_of(tmp_path, text)
+    path = tmp_path / "alone.cir"
+    path.write_text(f"{text}.options reltol=1e-5\n.tran 1u 3m 0 1u\n.end\n")
+    command = [str(shutil.which("ngspice")), "-b", str(path)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    theirs = dict(re.findall(r"^(m\d+)\s*=\s*(\S+)", done.stdout, re.MULTILINE))
+    assert len(theirs) == 13
+    for name, value in theirs.items():
+        # An interval ends for it at the last point within.
+        near = 1e-2 if name == "m4" else 1e-3
+        assert summary[f"meas.{name}"] == pytest.approx(float(value), rel=near), name
+
+
+def test_an_event_that_does_not_come_has_no_value(tmp_path: Path) -> None:
+    path = tmp_path / "own.cir"
+    path.write_text(f"{HEAD}.meas x WHEN V(in)=5 rise=2\n.meas y AVG V(in) from=2 to=3\n.end\n")
+    time = np.linspace(0, 1, 11)
+    for each in measures(read_all(path)[1]):
+        values, (note,) = measured([each], time, {word: np.sin(time) for word in each.words})
+        assert not values and "its event does not come" in note
+    summary = summary_of(tmp_path, path.read_text().removesuffix(".end\n"))
+    assert not [key for key in summary if key.startswith("meas")]
+    assert [note for note in summary["notes"] if "own.cir:8: .meas x has no value" in note]
+
+
+def test_what_has_no_effect_is_told(tmp_path: Path) -> None:
+    lines = """M1 in b 0 0 MX
+.model MX NMOS(vto=1 odd=2)
+.save V(in)
+.plot tran V(in)
+.print tran V(in)
+.four 1k V(in)
+.ac dec 1 1 2
+.meas ac x MAX V(in)
+.tran 1u 1m uic
+.backanno
+.tran 1m
+"""
+    notes = summary_of(tmp_path, f"{HEAD}{lines}")["notes"]
+    assert [note.split(" ")[0] for note in notes[:-1]] == [f"own.cir:{n}:" for n in range(10, 17)]
+    assert notes[-1] == "ngspice knows no odd of a model, and ignored it."
+
+
+def test_on_the_built_in_mechanics_it_is_told_too(tmp_path: Path) -> None:
+    text = (circuits() / "amplifier.cir").read_text(encoding="utf-8")
+    head, end, _ = text.rpartition(".end")
+    (tmp_path / "own.cir").write_text(f"{head}.save v(out)\n.meas tran x MAX v(out)\n{end}\n")
+    given = {"circuit.model": "file", "circuit.netlist": tmp_path / "own.cir"}
+    with in_place():
+        notes = cosim.run("reference", {"run.duration": 1e-3, **given}).summary["notes"]
+    assert [note.partition(": ")[2] for note in notes if note.startswith("own.cir")] == [
+        ".save has no effect; circuit.save keeps vectors.",
+        ".meas has no effect without [[port]].",
+    ]
+
+
+def test_a_circuit_that_rings_is_told_with_its_node(tmp_path: Path) -> None:
+    """50 MHz, on steps that ask for microseconds; the quiet node is a thousandth as much."""
+    tank = "Rt in a 50\nLt a n 1u\nCt n 0 10p\nRq n q 1Meg\nCq q 0 1n\n"
+    (tmp_path / "own.cir").write_text(
+        "t\nV1 d 0 0\nVe in 0 PULSE(0 1 0 1n 1n 2u 4u)\nRd d 0 1\n" + tank + ".end\n"
+    )
+    (tmp_path / "own.toml").write_text(SCENE.format("").replace("max_step = 1e-6", "max_step=5e-5")
+                                       .replace("duration = 3e-3", "duration = 2e-4"))  # fmt: skip
+    with in_place():
+        (note,) = cosim.run(tmp_path / "own.toml").summary["notes"]
+    assert re.match(r"the circuit took \d+ steps, \d+ times as many .* at node n: ", note), note
+
+
+def test_a_netlist_on_the_built_in_mechanics_measures_too(tmp_path: Path) -> None:
+    """The mean of the coil's current from 20 ms on, against the mean of the run's own column."""
+    text = (circuits() / "examples" / "h_bridge.cir").read_text(encoding="utf-8")
+    asks = ".meas tran mean AVG i(Vemf) FROM=0.02 TO=0.05\n.print i(Vemf)\n.end\n"
+    (tmp_path / "own.cir").write_text(text.replace(".end\n", asks))
+    own = {"circuit.model": "file", "circuit.netlist": tmp_path / "own.cir"}
+    result = cosim.run("paper", {**own, "run.duration": 0.05, "run.output_step": 1e-6})
+    time, current = result.columns["time"], result.columns["current"]
+    late = time >= 0.02
+    mean = np.trapezoid(current[late], time[late]) / 0.03
+    assert result.summary["meas.mean"] == pytest.approx(mean, rel=1e-3)
+    assert any(".print has no effect" in note for note in result.summary["notes"])
