@@ -4,7 +4,7 @@ What all studies of many runs stand on. A point that crashes or hangs costs only
 """
 
 from collections import deque
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
 from pathlib import Path
@@ -96,6 +96,14 @@ class Evaluator:
             while known:
                 yield known.popleft()
         yield from known
+
+    def apply(
+        self, call: Callable[..., object], points: Iterable[int]
+    ) -> Iterator[tuple[int, object]]:
+        """What ``call(scene, number, progress)`` gives or raises for each number, as many at once
+        as runs are, here: of what no store holds, as waveforms."""
+        with threads(self._scene, self._workers) as pool:
+            yield from each(pool, call, points)
 
     def forget(self) -> None:
         """The study is done: remove the file."""

@@ -24,7 +24,7 @@ def off(time: np.ndarray, mine: np.ndarray, true: spice.Result, vector: str) -> 
 
 
 def test_a_motor_with_a_gearbox(tmp_path: Path) -> None:
-    """Friction by tanh in the netlist, set-valued in the FMU: at a standstill the netlist creeps."""
+    """Friction by tanh in the netlist, set-valued in the FMU: at rest the netlist creeps."""
     duration = 0.2
     inertia, friction, viscous = 2e-5 + 2e-2 / 400, 1.5 / 20, 2e-3 / 400
     whole = circuit("dc_motor.cir").replace("Vemf y b 0", "Vsense y z 0\nEemf z b w 0 0.05")

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cosim.errors import BadInput, plain
-from cosim.evaluate.evaluator import workers_asked
-from cosim.evaluate.many import each, threads
+from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import periods_made_whole
 from cosim.files.atomic import whole
 from cosim.scene import Scene, changed
@@ -20,7 +19,7 @@ def keep(
     design: Design,
     names: Sequence[str],
     points: Sequence[int],
-    workers: int | None,
+    bench: Evaluator,
 ) -> None:
     """Run ``points`` once more, here, and write their waveforms ``names`` from ``run.settle`` on,
     each point's as ``NUMBER.nc``. Raises CosimError."""
@@ -39,7 +38,6 @@ def keep(
         with whole(folder / f"{number}.nc") as temporary, temporary.open("wb") as file:
             netcdf(file, columns, result.units, {"frequency": repr(1.0 / of.period)})
 
-    with threads(scene, workers_asked(workers)) as pool:
-        for _, failed in each(pool, kept, points):
-            if failed is not None:
-                raise failed
+    for _, failed in bench.apply(kept, points):
+        if isinstance(failed, Exception):
+            raise failed

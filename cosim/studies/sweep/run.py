@@ -135,7 +135,7 @@ def _sweep(
         data = refreshed()
         if keep:
             points = [n for n in range(total) if not numbers.failures[n]]
-            families.keep(folder / "points", scene, design, keep, points, workers)
+            families.keep(folder / "points", scene, design, keep, points, bench)
         return data
 
 
