@@ -51,7 +51,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder, "machine.wasm")
         include = f"-I{build_c.FMU / 'include'}"
-        command = [*zig, "cc", *FLAGS, include, *exports, str(LEAD), *map(str, code), "-o", str(made)]
+        sources = map(str, (LEAD, *code))
+        command = [*zig, "cc", *FLAGS, include, *exports, *sources, "-o", str(made)]
         subprocess.run(command, check=True)
         binary = made.read_bytes()
     about = {

@@ -11,7 +11,7 @@ from typing import Any
 from cosim.circuit.heat import DRIVE_RANGE_HEAT
 from cosim.errors import BadInput
 from cosim.live import rigs
-from cosim.scene import Scene, load, to_link
+from cosim.scene import load, to_link
 from cosim.trials.recording import read_recording
 
 _WEB = Path(__file__).with_name("web")
@@ -24,17 +24,9 @@ CIRCUITS: dict[str, dict[str, Any]] = {
 """What the server runs with ngspice, by the page's names, as values of a scene's keys."""
 
 
-def fragment(scene: Scene) -> str:
-    """The link of a scene as the page takes it. Raises BadInput for one that it cannot run."""
-    if not rigs.fits(scene):
-        known = ", ".join(rigs.scenes())
-        raise BadInput(f"scene {scene.name}: the page runs {known}, and such as these.")
-    return to_link(scene)
-
-
 def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, dict[str, str]]]:
-    """The link of a scene, and the circuits that the server runs it with: a netlist of the user's
-    own is one of them. Raises BadInput."""
+    """The link of a scene, as the page takes it, and the circuits that the server runs it with: a
+    netlist of the user's own is one of them. Raises BadInput for one that the page cannot run."""
     found, circuits = load(scene, list(overrides)), dict(CIRCUITS)
     if found.circuit.netlist and not found.has_ports:
         kept = found.table("circuit")
@@ -43,7 +35,10 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
         circuits["own"] = {"circuit.model": "file"} | {f"circuit.{k}": x for k, x in own.items()}
         simple = type(found.circuit).model_validate(kept | {"model": "amplifier"})
         found = found.model_copy(update={"circuit": simple})
-    return fragment(found), circuits
+    if not rigs.fits(found):
+        known = ", ".join(rigs.scenes())
+        raise BadInput(f"scene {found.name}: the page runs {known}, and such as these.")
+    return to_link(found), circuits
 
 
 def html(link: str, models: Iterable[str] = (), record: Path | None = None) -> str:
@@ -60,9 +55,12 @@ def html(link: str, models: Iterable[str] = (), record: Path | None = None) -> s
 
 
 def script_of(given: dict[str, Any], scripts: tuple[str, ...]) -> str:
-    """Constants by name, which JSON can hold, and scripts that take them."""
-    lines = (f"const {name} = {literal(value)};" for name, value in given.items())
-    return "\n".join(['"use strict";', *lines, script(scripts)])
+    """Constants by name, as JSON that cannot end a script's element, and scripts that take them."""
+    code = ['"use strict";']
+    for name, value in given.items():
+        content = json.dumps(value, separators=(",", ":"), allow_nan=False)
+        code.append(f"const {name} = {content};".replace("<", "\\u003c"))
+    return "\n".join([*code, script(scripts)])
 
 
 def page(name: str, code: str, asks: str) -> str:
@@ -85,22 +83,15 @@ def script(names: tuple[str, ...]) -> str:
     return "\n".join((_WEB / name).read_text(encoding="utf-8") for name in names)
 
 
-def literal(value: Any) -> str:
-    """JSON that cannot end a script's element."""
-    return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-
-
 def _record(path: Path) -> dict[str, Any]:
     """Measurements as the page takes them: in even steps, s; None where nothing is known."""
     found = read_recording(path)
-    signals = {name: values.tolist() for name, values in found.signals.items()}
-    return {
-        "name": found.name,
-        "step": float(found.time[-1]) / (len(found.time) - 1),
-        "waveforms": {
-            name: [x if isfinite(x) else None for x in values] for name, values in signals.items()
-        },
+    step = float(found.time[-1]) / (len(found.time) - 1)
+    signals = {
+        name: [x if isfinite(x) else None for x in values.tolist()]
+        for name, values in found.signals.items()
     }
+    return {"name": found.name, "step": step, "waveforms": signals}
 
 
 def answer(link: str, circuit: dict[str, str]) -> dict[str, Any]:

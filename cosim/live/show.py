@@ -59,25 +59,22 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
     """What the page's script takes, and the rows behind it."""
     if (results / "waveforms.nc").exists():
         found, scene = formats.read(results), load(results / "scene.toml")
-        told = {"title": scene.name, "about": scene.description}
-        told["words"] = table(scene, _json(results / "summary.json"))
         runs = [[*found.waveforms.values()]]
+        words = table(scene, _json(results / "summary.json"))
+        told = {"title": scene.name, "about": scene.description, "words": words}
         return told | {"signals": _signals(found.units, runs)}, runs
     if (results / "sweep.nc").exists():
         return _sweep(results)
-    if (results / "frames.csv").exists():
+    if (results / "compare.json").exists():
         told = _json(results / "compare.json")
-        cells = read_cells(results / "frames.csv")
-        units = _heads(cells.rows[0][1])
-        runs = [[cells.numbers(1, k, name, {"nan", ""}) for k, name in enumerate(units)]]
-        words = "\n".join(f"{name}: {value}" for name, value in told.items())
-        title = f"{told['run']} against {told['trial']}"
-        return {"title": title, "words": words, "signals": _signals(units, runs)}, runs
+        shown, runs = _table(results / "frames.csv")
+        shown["words"] = "\n".join(f"{name}: {value}" for name, value in told.items())
+        return shown | {"title": f"{told.get('run')} against {told.get('trial')}"}, runs
     tables = sorted(results.glob("*.csv")) if results.is_dir() else [results]
     if len(tables) != 1:
         names = ", ".join(path.name for path in tables) or "no table"
         raise BadInput(f"{plain(str(results))}: no run, sweep or comparison; name one of: {names}.")
-    return _chart(tables[0]), []
+    return _table(tables[0])
 
 
 def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
@@ -96,11 +93,12 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
     columns = []
     for name in [*swept, *sorted({*data.coords} - {*swept, *grid.dims}), *data.data_vars]:
         values = data[name].broadcast_like(grid).transpose(*grid.dims).values.ravel()
-        about = data[name].attrs
-        columns.append(_column(str(name), about.get("units", ""), values.tolist(), about))
+        unit, text = (data[name].attrs.get(key, "") for key in ("units", "long_name"))
+        columns.append(_column(str(name), unit, values.tolist(), text))
     best = "v_average" if "v_average" in data else columns[len(swept)]["name"]
     ways = [swept[0], swept[1] if len(swept) > 1 else best, best]
-    cloud = {"columns": columns, "keys": swept[2:] if grid.ndim > 1 else [], "ways": ways}
+    axes = swept if grid.ndim > 1 else []
+    cloud = {"columns": columns, "keys": axes[2:], "ways": ways, "grid": axes}
     shown = {"title": data.attrs["title"], "cloud": cloud | {"count": grid.size, "family": None}}
     points = sorted(int(kept.stem) for kept in (folder / "points").glob("*.nc"))
     if not points:
@@ -114,10 +112,16 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
     return shown, runs
 
 
-def _chart(path: Path) -> dict[str, Any]:
+def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
+    """Curves of a table that begins with the time; a cloud of any other, and a chart's pictures."""
     cells = read_cells(path)
+    matches = {cell: _HEAD.fullmatch(cell) for cell in cells.rows[0][1]}
+    heads = dict((m[1], m[2]) if m else (cell, "") for cell, m in matches.items())
+    if next(iter(heads)) == "time":
+        runs = [[cells.numbers(1, k, name, {"nan", ""}) for k, name in enumerate(heads)]]
+        return {"title": path.stem, "signals": _signals(heads, runs)}, runs
     columns = []
-    for k, (name, unit) in enumerate(_heads(cells.rows[0][1]).items()):
+    for k, (name, unit) in enumerate(heads.items()):
         values = [row[k] if k < len(row) else "" for _, row in cells.rows[1:]]
         try:
             columns.append(_column(name, unit, [float(v) if v else None for v in values]))
@@ -126,13 +130,11 @@ def _chart(path: Path) -> dict[str, Any]:
     ways = [column["name"] for column in columns if column["most"] is not None]
     if not ways:
         raise BadInput(f"{plain(str(path))}: this table has no column of numbers.")
-    cloud = {"columns": columns, "keys": [], "ways": (ways * 3)[:3], "family": None}
-    pictures = [p for p in path.parent.glob("*.png") if (p.stem + "-").startswith(path.stem + "-")]
-    return {
-        "title": path.stem,
-        "cloud": cloud | {"count": len(cells.rows) - 1},
-        "pictures": {p.name: b64encode(reader.read(p, LARGEST)).decode() for p in sorted(pictures)},
-    }
+    cloud = {"columns": columns, "keys": [], "ways": (ways * 3)[:3], "family": None, "grid": []}
+    cloud["count"] = len(cells.rows) - 1
+    pictures = [p for p in path.parent.glob("*.png") if f"{p.stem}-".startswith(f"{path.stem}-")]
+    content = {p.name: b64encode(reader.read(p, LARGEST)).decode() for p in sorted(pictures)}
+    return {"title": path.stem, "cloud": cloud, "pictures": content}, []
 
 
 def _json(path: Path) -> dict[str, Any]:
@@ -142,20 +144,11 @@ def _json(path: Path) -> dict[str, Any]:
         raise BadInput(f"{plain(str(path))}: this is no whole JSON file.") from None
 
 
-def _heads(cells: list[str]) -> dict[str, str]:
-    """Names and units of a header."""
-    found = {cell: _HEAD.fullmatch(cell) for cell in cells}
-    return dict((match[1], match[2]) if match else (cell, "") for cell, match in found.items())
-
-
-def _column(
-    name: str, unit: str, values: list[Any], about: dict[str, Any] | None = None
-) -> dict[str, Any]:
+def _column(name: str, unit: str, values: list[Any], text: str = "") -> dict[str, Any]:
     """A column of a cloud; ``most`` is None where it has words."""
     kept = [v if isinstance(v, str) or (v is not None and isfinite(v)) else None for v in values]
     known = [v for v in kept if v is not None]
     words = not known or any(isinstance(v, str) for v in known)
-    text = (about or {}).get("long_name", "")
     most = None if words else max(map(abs, known))
     return {"name": name, "unit": unit, "text": text, "values": kept, "most": most}
 

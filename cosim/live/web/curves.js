@@ -49,7 +49,7 @@ class History {
    null where nothing is known. */
 class Overlay {
   constructor(found, dash, names) {
-    Object.assign(this, found, { dash, names, shift: 0 });
+    Object.assign(this, found, { dash, names, shift: 0, lift: 0 });
   }
 
   values(name) {
@@ -66,13 +66,14 @@ class Overlay {
     return (this.values(name) ?? []).flatMap((x, k) => (x === null ? [] : [[x, history.value(row(k), own)]]));
   }
 
-  /* A record's phase is not known: the one at which the velocities agree best. */
+  /* A record's phase and its origin of heights are not known: those at which the surfaces agree best. */
   fit(history) {
     const agree = Array.from({ length: 200 }, (_, n) => {
       this.shift = n / 200;
       return this.pairs("v_surface", history).reduce((all, [x, y]) => all + x * y, 0);
     });
     this.shift = agree.indexOf(Math.max(...agree)) / 200;
+    this.lift = this.pairs("z_surface", history).reduce((mean, [x, y], _, { length }) => mean + (x - y) / length, 0);
   }
 
   /* Root of the mean squared difference of a waveform to the newest period, and that of itself. */
@@ -81,12 +82,12 @@ class Overlay {
     return pairs.length ? [root(([x, y]) => x - y), root(([x]) => x)] : null;
   }
 
-  /* Points of the last periods: share of the window, and value, with heights as the page's own begin. */
-  points(name, factor, periods, onSurface, base) {
+  /* Points of the last periods: share of the window, and value. */
+  points(name, factor, periods, onSurface) {
     const values = this.values(name), { z_part: part, z_surface: surface } = this.waveforms;
     if (!values) return [];
     const begin = Math.max(0, values.length - Math.round(periods / this.frequency / this.step));
-    const height = name.startsWith("z_") && this.names.origin ? (surface?.[begin] ?? 0) - base : 0;
+    const height = name.startsWith("z_") ? this.lift : 0;
     const travelled = name === "z_part" && surface ? part[begin] - surface[begin] : 0;
     const found = [];
     for (let k = begin, last = 0; k < values.length; k++) {
@@ -168,7 +169,7 @@ class Curves {
     const columns = Math.max(1, Math.floor(plot.canvas.clientWidth - LEFT - RIGHT));
     const shapes = lines.map(([, name, , factor]) => this._shape(name, factor, columns));
     const laid = others.flatMap((other) => lines.map(([, name, of, factor]) =>
-      ({ dash: other.dash, of, points: other.points(name, factor, periods, this.onSurface, this.base.z_surface) })));
+      ({ dash: other.dash, of, points: other.points(name, factor, periods, this.onSurface) })));
     let [least, most] = extent([...shapes.flatMap(({ low, high }) => [...low, ...high]), ...laid.flatMap(({ points }) => points.map(([, v]) => v))]);
     if (!(most >= least)) [least, most] = [-1, 1];
     if (most - least < panel.least) [least, most] = [(least + most - panel.least) / 2, (least + most + panel.least) / 2];

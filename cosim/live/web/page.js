@@ -187,7 +187,7 @@ function tellAll() {
 // --- laid over: a run of the server, a trial's record --------------------------------------------------
 const NAMED = { coil_current: "current" }, DASHED = [5, 4], DOTTED = [2, 3];
 const record = DATA.record && new Overlay({ ...DATA.record, begin: 0 }, DOTTED,
-  { ...NAMED, mean: "a_surface", a_surface: "", origin: true });
+  { ...NAMED, mean: "a_surface", a_surface: "" });
 
 /* How far the page's newest period is from what is laid over it, in words. */
 function apart(name, other, theirs) {
@@ -222,11 +222,12 @@ async function compare() {
 }
 
 function layRecord() {
-  const on = !state.others.includes(record), v = record.values("v_part")?.filter((x) => x !== null) ?? [];
+  const on = !state.others.includes(record), f = state.values["drive.frequency"], part = record.values("v_part") ?? [];
+  const whole = Math.floor(part.length * record.step * f) / f, v = part.slice(0, Math.round(whole / record.step)).filter((x) => x !== null);
   $("record").setAttribute("aria-pressed", String(on));
   state.others = state.others.filter((one) => one !== record);
   if (!on) return;
-  record.frequency = state.values["drive.frequency"];
+  record.frequency = f;
   record.fit(history_);
   lay(record, `${record.name} (dotted)`, v.length ? v.reduce((a, b) => a + b) / v.length : null);
 }

@@ -79,7 +79,7 @@ class Signals {
     if (runs[0].frequency) {
       choice(bar, "over", ["time", "periods"], (k) => {
         for (const run of this.runs) run.per = k ? run.frequency : 1;
-        this.all();
+        this.all(0.15);
       });
     }
     this.cursors = new Cursors([0, 0], () => this.soon(), (band) => this.look(band));
@@ -90,14 +90,13 @@ class Signals {
       return { plot, factor, unit, lines: own.map((k, n) => [columns[k].name, ["a", "b", "d", "c", "ink"][n % 5], k]) };
     });
     this.table = made(place, "table");
-    this.all();
-    if (runs.length > 1) this.look([this.whole[0], this.whole[0] + 0.15 * (this.whole[1] - this.whole[0])]);
+    this.all(runs.length > 1 ? 0.15 : 1);
   }
 
-  all() {
+  all(first = 1) {
     const [from, to] = this.whole = extent(this.runs.flatMap((run) => [run.x(0), run.x(run.count - 1)]));
-    this.cursors.at = [0.25, 0.75].map((share) => from + share * (to - from));
-    this.look(this.whole);
+    this.cursors.at = [0.25, 0.75].map((share) => from + share * first * (to - from));
+    this.look([from, from + first * (to - from)]);
   }
 
   look([from, to]) {
@@ -135,8 +134,8 @@ class Signals {
 
 /* Points of a table over two of its columns, coloured by a third; one is chosen. */
 class Cloud {
-  constructor(place, { columns, count, keys, ways, family }, chose) {
-    Object.assign(this, { columns, count, family, chose, only: new Map() });
+  constructor(place, { columns, count, keys, ways, family, grid }, chose) {
+    Object.assign(this, { columns, count, family, grid, chose, only: new Map() });
     const bar = made(place, "div", "", "row"), numeric = columns.filter((column) => column.most !== null);
     this.ways = ways.map((name) => numeric.find((column) => column.name === name));
     ["x", "y", "colour"].forEach((words, k) => {
@@ -146,6 +145,7 @@ class Cloud {
       const { values } = columns.find((column) => column.name === name), all = [...new Set(values)];
       choice(bar, name, ["all", ...all.map(spelt)], (n) => { this.only.set(values, all[n - 1]); this.draw(); });
     }
+    this.axesTold = made(place, "small");
     this.plot = new Plot(place, "", "arrow keys choose another point");
     this.told = made(place, "dl");
     const { canvas } = this.plot;
@@ -186,15 +186,16 @@ class Cloud {
       return low < most ? [low, most] : [low - 0.5, low + 0.5];
     });
     const margin = 0.05 * (wide[1] - wide[0]);
-    plot.name = `${this.axes[1].words} over ${this.axes[0].words}; colour: ${this.axes[2].words}, ${deep.map(spelt).join(" … ")}`;
+    const [across, up, shade] = this.axes.map(({ words }) => words);
+    this.axesTold.textContent = `${up} over ${across}; colour: ${shade}, ${deep.map(spelt).join(" … ")}`;
     plot.begin([wide[0] - margin, wide[1] + margin], high, {});
     this.shown = Array.from({ length: this.count }, (_, k) => k).filter((k) => x.values[k] !== null && y.values[k] !== null
       && [...this.only].every(([values, one]) => one === undefined || values[k] === one));
-    const counts = [x, y].map(({ values }) => new Set(values).size), grid = counts[0] * counts[1] <= 1.5 * this.shown.length;
-    const [w, h] = [plot.wide, plot.bottom - TOP].map((long, k) => (grid ? Math.max(4, Math.min(60, 0.9 * long / (counts[k] + 1))) : 8));
+    const cells = [x, y].map(({ name, values }) => (this.grid.includes(name) ? new Set(values).size + 1 : Infinity));
+    const [w, h] = [plot.wide, plot.bottom - TOP].map((long, k) => Math.max(9, Math.min(60, 0.9 * long / cells[k])));
     for (const k of this.shown) {
       const [left, top] = this.places(k), share = (of.values[k] * this.axes[2].factor - deep[0]) / (deep[1] - deep[0]);
-      plot.ink.fillStyle = of.values[k] === null ? "#888" : `hsl(${250 - 200 * share} 65% ${32 + 28 * share}%)`;
+      plot.ink.fillStyle = of.values[k] === null ? "#888" : `hsl(${250 - 200 * share} 65% ${42 + 18 * share}%)`;
       plot.ink.fillRect(left - w / 2, top - h / 2, w, h);
       if (k !== this.chosen) continue;
       Object.assign(plot.ink, { strokeStyle: plot.colour("warn"), lineWidth: 2.5 });

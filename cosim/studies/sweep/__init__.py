@@ -23,8 +23,7 @@ STUDIES = (
             Option("--seed", "of the samples", "N", int, 0),
             Option(
                 *("--keep", "also keep these waveforms of every point"),
-                *("current,v_surface", str, None),
-                read="sweep.families.parse",
+                *("current,v_surface", lambda text: text.split(",")),
             ),
             *(WORKERS, DASK, SHOW),
         ),

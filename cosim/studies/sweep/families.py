@@ -13,11 +13,6 @@ from cosim.toolchain.processes import Progress
 from cosim.waveforms.storage import netcdf
 
 
-def parse(text: str | list[str]) -> list[str]:
-    """The names of ``--keep``; none where it was not given."""
-    return [name.strip() for name in text.split(",")] if isinstance(text, str) else []
-
-
 def keep(
     folder: Path,
     scene: Scene,
