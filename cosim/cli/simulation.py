@@ -143,6 +143,7 @@ def _netlist(
     print(target)
 
 
+_FMI = Option("--fmi", "version of FMI", choices=("2", "3"), default="2")
 _NETLIST = (
     Option("netlist", "a netlist of one's own", "NETLIST", Path),
     Option(
@@ -162,8 +163,24 @@ _NETLIST = (
     ),
     Option("--max-step", "longest step of ngspice", "s", float, 2e-5),
     Option("--reltol", "ngspice's relative tolerance", kind=float, default=1e-5),
-    Option("--fmi", "version of FMI", choices=("2", "3"), default="2"),
+    _FMI,
 )
+
+
+def _ssp(
+    scene: str, overrides: Sequence[str] = (), fmi: str = "2", out: Path | None = None
+) -> None:
+    from cosim.fmus.ssp import ssp
+    from cosim.scene import load
+
+    base = load(scene, overrides)
+    target = out or Path(_FMU) / f"{base.name}.ssp"
+    with writable(target.parent):
+        ssp(base, target, int(fmi))
+    print(target)
+
+
+_FILE = Option("--out", f"the file (default: {_FMU}/<scene>.ssp)", "FILE.ssp", Path)
 
 COMMANDS = (
     Command(
@@ -175,11 +192,17 @@ COMMANDS = (
     ),
     Command(
         "fmu",
-        "write or check FMU files: of the mechanics, of a netlist",
+        "write or check FMU files: of the mechanics, a netlist, the whole machine",
         commands=(
             Command("build", "write stickslip-fmi2.fmu and stickslip-fmi3.fmu", _build, out=_FMU),
             Command("check", "validate the FMU files and run them", _check),
             Command("netlist", "write a netlist as an FMU", _netlist, _NETLIST, _FMU),
+            Command(
+                "ssp",
+                "write a scene's machine as an .ssp: its FMUs, and how they are joined",
+                _ssp,
+                (SCENE, OVERRIDES, _FMI, _FILE),
+            ),
         ),
     ),
     Command(

@@ -1,12 +1,15 @@
 """The library's scenes with ports, each against the same in one netlist in plain ngspice."""
 
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import cosim
+from benchmarks.peers import ngspice_alone
 from cosim.files.resources import circuits
+from cosim.mechanics.stickslip import Mechanics
 from cosim.toolchain.processes import in_place
 from tests.helpers import spice
 
@@ -24,7 +27,7 @@ def off(time: np.ndarray, mine: np.ndarray, true: spice.Result, vector: str) -> 
 
 
 def test_a_motor_with_a_gearbox(tmp_path: Path) -> None:
-    """Friction by tanh in the netlist, set-valued in the FMU: at rest the netlist creeps."""
+    """Friction by tanh in the netlist, set-valued in the FMU."""
     duration = 0.2
     inertia, friction, viscous = 2e-5 + 2e-2 / 400, 1.5 / 20, 2e-3 / 400
     whole = circuit("dc_motor.cir").replace("Vemf y b 0", "Vsense y z 0\nEemf z b w 0 0.05")
@@ -45,3 +48,51 @@ Bt 0 w I=0.05*i(Vsense)-{viscous}*v(w)-{friction}*tanh(v(w)/0.05)
     assert np.mean(waves["i(Vemf)"]) == pytest.approx(
         np.interp(time, true["time"], true["vsense#branch"]).mean(), rel=2e-2, abs=2e-2
     )
+
+
+SAMPLED = """
+Vjsense j2 j3 0
+Bjemf j3 0 V=2*v(vj)
+Cvj vj 0 0.05
+Bvj 0 vj I=2*i(Vjsense)-v(nf)-5*v(vj)
+Cx x 0 1 ic=0.195
+Bx 0 x I=1e3*v(vj)
+Bnf nf 0 V=max(0,2*v(x)+2*v(vj))
+Vs1 s1 0 PULSE(0 1 {50m-20u} 1u 1u 18u 50m)
+B1 0 h1 I=1e-3*v(s1)*(v(p)-v(h1))
+C1 h1 0 1n
+Bread read 0 V=max(0.2,min(0.5,0.39+60e-3*(6-v(h1))))
+Vs2 s2 0 PULSE(0 1 60m 1u 1u 18u 50m)
+B2 0 h2 I=1e-3*v(s2)*(v(read)-v(h2))
+C2 h2 0 1n ic=0.39
+Bjaw jaw 0 V=2*v(h2)
+"""
+
+
+@pytest.mark.slow
+def test_a_grip_in_a_closed_loop(tmp_path: Path) -> None:
+    """The mechanics as capacitors and sources, friction by tanh, the controller as two
+    capacitors that sample and hold."""
+    reference, duration = cosim.load("reference"), 0.6
+    with closing(Mechanics(reference)) as mechanics:
+        lines = ngspice_alone._mechanics(reference, mechanics.sample())
+    lines = lines.replace("Vemf c3", "Vemf c2").replace("V=0.5*tanh", "V=v(nf)*tanh")
+    whole = circuit("closed_grip.cir")
+    for old, new in (
+        ("Vcommand v1 0 0", f"Vcommand v1 0 PULSE(-5.2 2.8 0 {0.05 - 2e-9} 1n 1n 50m)"),
+        ("Vemf c2 sense 0\n", ""),
+        ("Vjaw jaw 0 0\n", ""),
+        ("Vjemf j2 0 0", ""),
+        ("Ljaw j1 j2 1m", "Ljaw j1 j2 1m ic=0.195"),
+    ):
+        assert old in whole
+        whole = whole.replace(old, new)
+    options = f".options reltol=1e-7 method=trap\n.tran 10u {duration} 0 10u uic\n.end\n"
+    true = spice.run(tmp_path, f"* grip\n{whole}{lines}{SAMPLED}{options}")
+    assert true["time"][-1] == pytest.approx(duration)
+    with in_place():
+        result = cosim.run("closed-grip", {"run.duration": duration, "circuit.max_step": 1e-5})
+    time, waves = result.columns["time"], result.columns
+    assert off(time, 1e3 * waves["rig.z_part"], true, "p") < 2e-2
+    late = time > 0.01
+    assert off(time[late], waves["jaw.normal_force"][late], true, "nf") < 2e-2

@@ -1,0 +1,94 @@
+"""The machine as an .ssp in other masters, as far as they are installed, against our Jacobi."""
+
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import cosim
+from benchmarks.peers import masters
+from cosim.cli.main import main
+from cosim.toolchain.processes import in_place
+
+STEP, DURATION = 1e-4, 0.1
+SHORT = {"run.duration": DURATION, "run.settle": 0.0}
+
+
+@pytest.fixture(scope="module")
+def heights() -> tuple[np.ndarray, np.ndarray]:
+    fine = {"run.output_step": 2e-5, "circuit.max_step": 1e-5, "circuit.reltol": 1e-6}
+    with in_place():
+        columns = cosim.run("reference", SHORT | fine).columns
+    return columns["time"], columns["z_surface"]
+
+
+def error(times: np.ndarray, found: np.ndarray, true: tuple[np.ndarray, np.ndarray]) -> float:
+    """Rms of the error over the rms."""
+    wanted = np.interp(times, *true)
+    return float(np.sqrt(np.mean((found - wanted) ** 2) / np.mean(wanted**2)))
+
+
+@pytest.fixture(scope="module")
+def jacobi(heights: tuple[np.ndarray, np.ndarray]) -> float:
+    ours = {"coupling.method": "jacobi", "coupling.order": 0, "coupling.macro_step": STEP}
+    with in_place():
+        columns = cosim.run("reference", SHORT | ours | {"run.output_step": STEP}).columns
+    return error(columns["time"], columns["z_surface"], heights)
+
+
+@pytest.mark.parametrize("master", masters.PACKAGES)
+def test_masters_are_as_exact_as_our_own_jacobi(
+    tmp_path: Path, heights: tuple[np.ndarray, np.ndarray], jacobi: float, master: str
+) -> None:
+    file = tmp_path / "machine.ssp"
+    assert main(["fmu", "ssp", "reference", "--out", str(file)]) == 0
+    found = masters.run(master, file, STEP, DURATION)
+    if found is None:
+        pytest.skip(f"{masters.PACKAGES[master]} is not installed")
+    times, there, _ = found
+    assert times[-1] == pytest.approx(DURATION)
+    assert 0.9 * jacobi < error(times, there, heights) < 1.1 * jacobi
+
+
+def test_the_structure_joins_variables_that_are_there(tmp_path: Path) -> None:
+    """Each connector is a variable of its FMU with that causality; parameters have the scene's."""
+    file = tmp_path / "rig.ssp"
+    given = ["--set", "mechanics.part_mass=0.012", "--set", "coil.count=2"]
+    assert main(["fmu", "ssp", "square", *given, "--out", str(file)]) == 0
+    with zipfile.ZipFile(file) as archive:
+        root = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
+        known = {}
+        for name in ("circuit", "mechanics"):
+            inner = zipfile.ZipFile(archive.open(f"resources/{name}.fmu"))
+            about = ElementTree.fromstring(inner.read("modelDescription.xml"))
+            known[name] = {v.get("name"): v.get("causality") for v in about.iter("ScalarVariable")}
+    ssd = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
+    ssv = "{http://ssp-standard.org/SSP1/SystemStructureParameterValues}"
+    kinds = {}
+    for component in root.iter(f"{ssd}Component"):
+        name = str(component.get("name"))
+        for connector in component.iter(f"{ssd}Connector"):
+            kinds[name, connector.get("name")] = connector.get("kind")
+            assert known[name][connector.get("name")] == connector.get("kind")
+        for parameter in component.iter(f"{ssv}Parameter"):
+            assert parameter.get("name") in known[name]
+    for joined in root.iter(f"{ssd}Connection"):
+        assert kinds[joined.get("startElement"), joined.get("startConnector")] == "output"
+        assert kinds[joined.get("endElement"), joined.get("endConnector")] == "input"
+    values = {each.get("name"): each[0].get("value") for each in root.iter(f"{ssv}Parameter")}
+    assert values["part_mass"] == "0.012"
+
+
+@pytest.mark.parametrize(
+    ("scene", "said"),
+    [("paper-limited", "circuit in ngspice"), ("dc-motor", "built-in machine"),
+     ("closed-loop-grasp", "constant normal_force")],
+)  # fmt: skip
+def test_what_cannot_be_one_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], scene: str, said: str
+) -> None:
+    assert main(["fmu", "ssp", scene, "--out", str(tmp_path / "a" / "x.ssp")]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "a").exists()
