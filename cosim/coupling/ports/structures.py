@@ -5,6 +5,9 @@ from ctypes import POINTER, Structure, c_char, c_char_p, c_double, c_int64, c_vo
 from cosim.coupling.loop.structures import CALLBACK, Fmu, of
 from cosim.drive.pieces import Piece
 
+PROBE, OUTPUT, DRIVE = range(3)
+"""Kinds of an Origin."""
+
 
 class Group(Structure):
     """Variables of one type, set or read in one call."""
@@ -31,19 +34,8 @@ class Source(Structure):
     _fields_ = (
         ("name", c_char * 64),
         ("origin", Origin),
-        *of(
-            c_double,
-            "value",
-            "rate",
-            "line",
-            "plain",
-            "correction",
-            "owed",
-            "guess",
-            "off",
-            "response",
-            "largest",
-        ),
+        *of(c_double, "value", "rate", "line", "through_rate", "plain", "correction", "owed"),
+        *of(c_double, "guess", "off", "response", "largest"),
     )
 
 
@@ -78,6 +70,15 @@ class Pulse(Structure):
     )
 
 
+class Through(Structure):
+    """What the circuit itself carries of an FMU's feedthrough."""
+
+    _fields_ = (
+        *of(c_int64, "source", "probe", "fmu", "output"),
+        *(("input", c_void_p), *of(c_double, "scale", "gain")),
+    )
+
+
 class PortsState(Structure):
     """``Ports``."""
 
@@ -90,10 +91,11 @@ class PortsState(Structure):
         *(("pieces", POINTER(Piece)), *of(c_int64, "n_pieces", "piece")),
         *(("jump", c_double), ("driven", c_int64)),
         *(("pulses", c_void_p), ("n_pulses", c_int64)),
+        *(("throughs", c_void_p), *of(c_int64, "n_throughs", "learn")),
         *of(c_double, "macro_step", "duration", "after_jump", "jumped", "time", "origin", "end"),
         *of(c_double, "told", "sent"),
         *of(c_int64, "repeats", "stepped", "tries", "met"),
-        *(("tolerance", c_double), ("asked", POINTER(c_char_p))),
+        *(("tolerance", c_double), ("asked", POINTER(c_char_p)), ("n_probed", c_int64)),
         *of(c_void_p, "command", "ask", "plot", "announce"),
         ("plot_name", c_char * 64),
         *of(c_void_p, "log", "points"),
@@ -105,5 +107,5 @@ class PortsState(Structure):
     )
 
 
-STRUCTURES = (Group, Source, Feed, StrangerState, Pulse, PortsState)
+STRUCTURES = (Group, Source, Feed, StrangerState, Pulse, Through, PortsState)
 """In the order of ``loop_size``, after those of the loop itself."""
