@@ -67,10 +67,13 @@ def deck(
     asked: bool,
     known: Mapping[str, float],
     called: str = "[[port]] source",
+    through: Sequence[tuple[str, str]] = (),
 ) -> Deck:
     """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved;
     where they are ``asked`` for within a step, each as a device's parameter. ``known`` are values
-    for such ``.param`` lines as it may have, ``parameters`` for those that it must have.
+    for such ``.param`` lines as it may have, ``parameters`` for those that it must have. For each
+    source and word of ``through`` the circuit adds the word, times the external source
+    ``Vcosim_gain`` with the pair's number, to the source.
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
@@ -94,7 +97,7 @@ def deck(
         if not all(each.used for each in holder.chain()):
             continue  # nothing calls the subcircuit
         if holder is top and element is not None and element.name in fed:
-            text.append(" ".join([element.name, *element.nodes, "external"]))
+            text += _external(element, through)
         else:
             text.append(written(line, element, values if holder is top else {}))
     text += [
@@ -114,6 +117,21 @@ def deck(
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
         tuple(_pulses(top, fed)),
     )
+
+
+def _external(element: Element, through: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """The lines of a source that the host gives its value."""
+    (plus, minus), name = element.nodes, element.name
+    shares = [(k, words) for k, (source, words) in enumerate(through) if source.lower() == name]
+    between = minus
+    if shares:
+        between = f"cosim_{name}" if element.kind == "v" else minus
+        plus_of_sum = between if element.kind == "v" else plus
+        total = "+".join(f"v(cosim_gain{k})*({words})" for k, words in shares)
+        yield f"Bcosim_{name} {plus_of_sum} {minus} {element.kind}={total}"
+    yield f"{name} {plus} {between} external"
+    for k, _ in shares:
+        yield f"Vcosim_gain{k} cosim_gain{k} 0 external"
 
 
 def check_reading(

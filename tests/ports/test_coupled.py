@@ -22,6 +22,7 @@ from cosim.coupling.ports.structures import (
     Pulse,
     Source,
     StrangerState,
+    Through,
 )
 from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import changed, load, to_toml
@@ -170,7 +171,9 @@ def test_feedthrough_is_as_exact_as_one_netlist(tmp_path: Path, gain: float, ver
     with in_place():
         run = Run(load(tmp_path / "load.toml", {"fmu.load.D": gain}), lambda _: None)
         run.run()
-    assert run.plan.method == "redo" and run.state.redone > 0
+    assert run.plan.method == "redo"
+    # The circuit itself carries what is fed through, so that no more steps are tried than alone.
+    assert run.state.attempts < 1.5 * len(plain["time"])
     # At the solvers' own points, since straight lines between them err more than either.
     time, _, current = run.log.array().T
 
@@ -229,21 +232,21 @@ Vemf y 0 0
 """
 
 
-@pytest.mark.parametrize("period", [5e-5, 1e-4, 2e-5])
+@pytest.mark.parametrize("period", [5e-5, 1e-4, 2e-5, 3e-5, 3.1415926e-5])
 def test_no_edge_of_a_pulse_is_lost(tmp_path: Path, period: float) -> None:
     """A step ends on each corner, whatever lengths the steps have; also within a subcircuit."""
     scene = motor(tmp_path)
     (tmp_path / "bridge.cir").write_text(f"* edges{EDGES}")
     text = scene.read_text().replace('["v(a)*i(Vemf)", "v(gp)"]', '["v(p)"]')
     scene.write_text(text)
-    duration = 2e-3
-    starts = np.arange(round(duration / period)) * period
+    duration = 40 * period
+    starts = np.arange(40) * period
     corners = np.concatenate(
         [starts + at for at in (1e-6, period / 2, period / 2 + 1e-6)]
         + [starts + share * period for share in (0.25, 0.75)]
     )
-    for step in (5e-6, 2e-6, 1e-5):
-        for macro in (None, 2e-4, 1e-4, 2.5e-5, 3e-5):
+    for step in (1e-6, 2e-6, 5e-6, 1e-5, 2e-5):
+        for macro in (None, 1e-5, 2e-5, 2.5e-5, 3e-5, 5e-5, 1e-4, 2e-4):
             given = {"circuit.param.per": period, "circuit.max_step": step}
             given |= {"run.duration": duration, "run.settle": 0.0}
             if macro:
@@ -360,7 +363,7 @@ def test_an_fmu_that_ends_its_process_or_fails_is_told(tmp_path: Path) -> None:
 
 
 def test_structures_have_the_sizes_that_the_compiled_ones_have() -> None:
-    kinds = (Group, Source, Feed, StrangerState, Pulse, PortsState)
+    kinds = (Group, Source, Feed, StrangerState, Pulse, Through, PortsState)
     assert [ctypes.sizeof(kind) for kind in kinds] == [
         loop().loop_size(k) for k in range(5, 5 + len(kinds))
     ]

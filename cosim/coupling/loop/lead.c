@@ -359,6 +359,6 @@ int64_t loop_size(int which)
 {
     const size_t sizes[] = {sizeof(Fmu), sizeof(Schedule), sizeof(Recorder), sizeof(Lead),
                             sizeof(Piece), sizeof(Group),    sizeof(Source),   sizeof(Feed),
-                            sizeof(Stranger), sizeof(Pulse), sizeof(Ports)};
+                            sizeof(Stranger), sizeof(Pulse), sizeof(Through), sizeof(Ports)};
     return (int64_t)sizes[which];
 }

@@ -1,18 +1,18 @@
 """A scene's ports, checked against its FMUs and brought into the numbers of ``ports.c``."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from cosim.circuit import netlist
 from cosim.circuit.joined import Deck, deck
 from cosim.coupling.ports.sides import Side
 from cosim.coupling.ports.strangers import Variable, stranger
-from cosim.coupling.ports.structures import Feed, Origin, Source
+from cosim.coupling.ports.structures import DRIVE, OUTPUT, PROBE, Feed, Origin, Source, Through
 from cosim.mechanics.package import unpacked
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
 from cosim.scene.tables import MACHINE, Fmu, Port
 
-_PROBE, _OUTPUT, _DRIVE = range(3)
 _HELD, _DIFFERENCE, _KNOWN = range(3)
 _FEEDS = {"mean": 0, "line": 1, "end": 2}
 
@@ -29,13 +29,14 @@ class Plan:
             sides[MACHINE] = Side(_machine(scene), stranger(str(unpacked(2))))
         self.sides = _in_order(scene, sides)
         """In the order in which they step: after those that feed them, as far as that can be."""
-        probes = [port.probe for port in scene.port if port.probe is not None]
-        self.words = tuple(dict.fromkeys([*probes, *(scene.circuit.save or ())]))
-        """What is read of the circuit."""
+        self.probes = tuple(dict.fromkeys(p.probe for p in scene.port if p.probe is not None))
+        self.words = tuple(dict.fromkeys([*self.probes, *(scene.circuit.save or ())]))
+        """What is read of the circuit, first what leads to FMUs."""
         self.sources: list[Source] = []
         self.names: list[str] = []
         """Of the sources that ports feed, as the scene spells them."""
         self._from: list[tuple[Side, Origin]] = []
+        self._fed: list[tuple[int, Side, Variable]] = []  # sources that FMUs feed
         for port in scene.port:
             self._join(port, sides)
         # Slopes of outputs make rows longer, so places in the row of all are known only now.
@@ -48,6 +49,8 @@ class Plan:
         self.width = first
         """Of the row of all outputs."""
         self.method = _method(scene, self.sides)
+        self.throughs = [*self._throughs()] if self.method == "redo" else []
+        """What the circuit itself carries of the FMUs' feedthrough, and what leads to it."""
 
     def deck(self) -> Deck:
         """Of the circuit."""
@@ -57,6 +60,7 @@ class Plan:
             *(Path(circuit.netlist), self.names, self.words, circuit.param or {}),
             *(run.duration, circuit.reltol, circuit.max_step, self.method == "redo"),
             netlist.parameters(self.scene) if self._has_machine else {},
+            through=[(self.names[t.source], self.words[t.probe]) for t, _ in self.throughs],
         )
 
     @property
@@ -64,20 +68,34 @@ class Plan:
         """Whether the command of ``[drive]`` leads to something."""
         return any(port.origin == "drive" for port in self.scene.port)
 
+    def _throughs(self) -> Iterator[tuple[Through, Feed]]:
+        for at, side, output in self._fed:
+            origin, known = self.sources[at].origin, side.of.feedthrough.get(output.name)
+            for into, feed in side.probed():
+                if known is None or into.name in known:
+                    scale = origin.scale * feed.origin.scale
+                    fmu = self.sides.index(side)
+                    yield (
+                        Through(at, feed.origin.place, fmu, origin.place, scale=scale),
+                        feed,
+                    )
+
     def _join(self, port: Port, sides: dict[str, Side]) -> None:
         origin = Origin(scale=port.scale, offset=port.offset)
         side, output = None, None
         if port.probe is not None:
-            origin.kind, origin.place = _PROBE, self.words.index(port.probe)
+            origin.kind, origin.place = PROBE, self.words.index(port.probe)
         elif port.origin == "drive":
-            origin.kind = _DRIVE
+            origin.kind = DRIVE
         else:
             side, output, place = _end(port, "from", str(port.origin), sides, "output")
-            origin.kind, origin.place = _OUTPUT, side.places[output.name] + place
+            origin.kind, origin.place = OUTPUT, side.places[output.name] + place
             _set_slope(origin, port, side, output, place)
         if port.source is not None:
             self.names.append(port.source)
             self.sources.append(Source(name=port.source.lower().encode(), origin=origin))
+            if side is not None and output is not None and output.real:
+                self._fed.append((len(self.sources) - 1, side, output))
             kept = self.sources[-1].origin  # the structure holds a copy
         else:
             into, variable, place = _end(port, "to", str(port.to), sides, "input")

@@ -18,7 +18,7 @@ from cosim.coupling.loop.structures import (
     loop,
 )
 from cosim.coupling.ports.plan import Plan
-from cosim.coupling.ports.structures import PortsState, Pulse, Source, StrangerState
+from cosim.coupling.ports.structures import PortsState, Pulse, Source, StrangerState, Through
 from cosim.drive.command import command
 from cosim.drive.pieces import Piece
 from cosim.errors import SimulationFailed, plain
@@ -62,6 +62,10 @@ class Run:
             states.append(side.state(row, repeats))
             row += 8 * side.width
         self.fmus = (StrangerState * max(len(states), 1))(*states)
+        for through, feed in plan.throughs:
+            through.input = feed.input
+        count_through = len(plan.throughs)
+        self._throughs = (Through * max(count_through, 1))(*(t for t, _ in plan.throughs))
         macro = scene.coupling.macro_step if plan.method == "macro-steps" else 0.0
         self.state = PortsState(
             fmus=ctypes.addressof(self.fmus),
@@ -79,8 +83,11 @@ class Run:
             after_jump=after_jump(scene),
             end=-np.inf,
             repeats=int(repeats),
+            throughs=ctypes.addressof(self._throughs),
+            n_throughs=count_through,
             tolerance=_AGREEMENT * scene.circuit.reltol,
             asked=ctypes.addressof(self._asked),
+            n_probed=len(plan.probes),
             log=self._blocks[0].ctypes.data,
             points=self._blocks[1].ctypes.data,
             log_rows=_POINTS,

@@ -2,7 +2,10 @@
 
 from cosim.toolchain.libraries import structures
 
-Group, Origin, Source, Feed, StrangerState, Pulse, PortsState = (
+PROBE, OUTPUT, DRIVE = range(3)
+"""Kinds of an Origin."""
+
+Group, Origin, Source, Feed, StrangerState, Pulse, Through, PortsState = (
     structures("loop")[name]
-    for name in ("Group", "Origin", "Source", "Feed", "Stranger", "Pulse", "Ports")
+    for name in ("Group", "Origin", "Source", "Feed", "Stranger", "Pulse", "Through", "Ports")
 )
