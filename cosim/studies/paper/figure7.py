@@ -56,7 +56,7 @@ class Trial:
         velocities: dict[str, float | None] = {"measured": numbers["drift_measured"]}
         velocities |= {side: drift(*one.simulated, period) for side, one in solved.items()}
         velocities["machine"] = numbers["drift_simulated"]
-        errors = {side: one.error * 1e3 for side, one in solved.items()}
+        errors: dict[str, float | None] = {side: one.error * 1e3 for side, one in solved.items()}
         errors["machine"] = numbers["mean_error_mm"]
         return {
             "trial": self.number,
