@@ -76,13 +76,23 @@ def _spread(scene: "Scene") -> "Spread":
         return cosim.spread(scene, progress=progress)
 
 
-def _scenes() -> None:
-    from cosim.scene import list_scenes
+def _scenes(scene: str | None = None) -> None:
+    from cosim.scene.loading import groups, list_scenes, load
 
-    found = list_scenes()
-    width = max(len(name) for name, _ in found)
-    for name, description in found:
-        print(f"{name:<{width}}  {description}")
+    if scene is not None:
+        from cosim.scene.model import differing
+
+        found = load(scene)
+        print(f"{found.name}: {found.description}")
+        print("\n".join(differing(found)))
+        return
+    told = dict(list_scenes())
+    width = max(map(len, told))
+    for title, names in groups().items():
+        print(f"{title}:")
+        for name in names:
+            print(f"  {name:<{width}}  {told[name]}")
+    print("\nWhat is in one: cosim scenes NAME; one of your own: cosim new FILE.toml")
 
 
 def _export_options() -> list[Option]:
@@ -234,5 +244,10 @@ COMMANDS = (
         ),
         "results/<scene>",
     ),
-    Command("scenes", "list the built-in scenes", _scenes),
+    Command(
+        "scenes",
+        "list the built-in scenes, or what is in one",
+        _scenes,
+        [Option("scene", "tell what of it is not as by default", "SCENE", many="optional")],
+    ),
 )

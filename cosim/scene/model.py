@@ -417,18 +417,21 @@ def toml_value(value: bool | float | int | str | list[Any] | dict[str, Any]) -> 
     return repr(value)
 
 
-def to_toml(scene: Scene) -> str:
+def to_toml(scene: Scene, base: str = "") -> str:
     """The resolved scene as TOML: every key with its unit and meaning; loads to an equal scene.
 
-    A key without a value, or with the one that a knob gives it, is a comment.
+    A key without a value, or with the one that a knob gives it, is a comment. With the name of a
+    built-in scene as ``base`` all keys are: the file is then one to begin with.
     """
     data = scene.as_dict()
-    lines = [f"{key} = {toml_value(data[key])}" for key in ("name", "description")]
+    first = {"base": base} if base else {"name": scene.name}
+    first["description"] = scene.description
+    lines = [f"{key} = {toml_value(value)}" for key, value in first.items()]
     for table in TABLES:
         lines += ["", f"[{table}]"]
         for key in (key for key in keys() if key.table == table):
             value = getattr(getattr(scene, table), key.name)
-            mark = "" if key.name in data[table] else "# "
+            mark = "" if key.name in data[table] and not base else "# "
             shown = "" if value is None else toml_value(value)
             unit = "" if key.unit in ("", "1") else f"{key.unit}; "
             lines.append(f"{mark}{key.name} = {shown}  # {unit}{key.text}{_turned(scene, key)}")
@@ -437,6 +440,20 @@ def to_toml(scene: Scene) -> str:
             lines += ["", f"[[{table}]]"]
             lines += [f"{key} = {toml_value(value)}" for key, value in each.items()]
     return "\n".join(lines) + "\n"
+
+
+def differing(scene: Scene) -> list[str]:
+    """The lines of :func:`to_toml` whose values are not the defaults."""
+    usual = {*to_toml(Scene(name=scene.name, description=scene.description)).splitlines()}
+    found: list[str] = []
+    for line in to_toml(scene).splitlines()[2:]:
+        if line.startswith("["):
+            while found and found[-1].startswith("[") and not found[-1].startswith("[["):
+                found.pop()  # a table with nothing in it
+            found.append(line)
+        elif line and line not in usual and not line.startswith("#"):
+            found.append(line)
+    return found
 
 
 def _turned(scene: Scene, key: Key) -> str:
