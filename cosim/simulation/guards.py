@@ -4,13 +4,10 @@ Only what is published or follows from the model's own laws has a limit here.
 """
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from cosim.arrays import Array
 from cosim.circuit.heat import DRIVE_RANGE_HEAT
-from cosim.circuit.lint.deck import read_all
-from cosim.circuit.lint.outputs import without_effect
 from cosim.files.spill import blocks
 from cosim.mechanics.normal_force import NormalForce
 from cosim.mechanics.stickslip import numbers_of, rests_of
@@ -44,8 +41,6 @@ def remarks(
     where it changes in time. What moves is judged by the rows of the waveforms.
     """
     found = [*_grip(scene, force), *_supply(scene)]
-    if scene.circuit.netlist is not None:
-        found += without_effect(read_all(Path(scene.circuit.netlist))[1], measuring=False)
     if scene.rung.driven:
         found += _coil(scene, summary)
     if not scene.surface_is_given:

@@ -156,7 +156,7 @@ def test_what_would_mean_something_else_is_told(line: str, tmp_path: Path) -> No
     path = tmp_path / "own.cir"
     path.write_text(f"{HEAD}R8 x 0 1k\n{line}\n.end\n")
     with pytest.raises(BadInput, match=rf"^own\.cir:\d+: .*{re.escape(TOLD[line])}"):
-        deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False)
+        deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False, {})
 
 
 def test_what_is_not_used_is_not_refused(tmp_path: Path) -> None:
@@ -246,14 +246,15 @@ def test_what_has_no_effect_is_told(tmp_path: Path) -> None:
 def test_on_the_built_in_mechanics_it_is_told_too(tmp_path: Path) -> None:
     text = (circuits() / "amplifier.cir").read_text(encoding="utf-8")
     head, end, _ = text.rpartition(".end")
-    (tmp_path / "own.cir").write_text(f"{head}.save v(out)\n.meas tran x MAX v(out)\n{end}\n")
+    (tmp_path / "own.cir").write_text(f"{head}.save v(out)\n.meas tran x PP v(out)\n{end}\n")
     given = {"circuit.model": "file", "circuit.netlist": tmp_path / "own.cir"}
     with in_place():
-        notes = cosim.run("reference", {"run.duration": 1e-3, **given}).summary["notes"]
-    assert [note.partition(": ")[2] for note in notes if note.startswith("own.cir")] == [
-        ".save has no effect; circuit.save keeps vectors.",
-        ".meas has no effect without [[port]].",
+        result = cosim.run("reference", {"run.duration": 1e-3, **given})
+    told = [note for note in result.summary["notes"] if note.startswith("own.cir")]
+    assert [note.partition(": ")[2] for note in told] == [
+        ".save has no effect; circuit.save keeps vectors."
     ]
+    assert result.summary["meas.x"] > 0.0
 
 
 def test_a_circuit_that_rings_is_told_with_its_node(tmp_path: Path) -> None:

@@ -242,7 +242,7 @@ MEASURED = [
 def test_no_measurement_hides_a_word(folder, words):
     path = put(folder, line(f".meas tran x AVG {words}"))
     with pytest.raises(BadInput, match=r"^my\.cir:4: "):
-        deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False)
+        deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False, {})
 
 
 @pytest.mark.parametrize(

@@ -56,16 +56,14 @@ class Measure:
         return [word for word in (self.of, *needed) if word and number(word) is None]
 
 
-def without_effect(dropped: Sequence[Line], measuring: bool = True) -> Iterator[str]:
-    """A sentence for each line that was left out and might be missed; whether ``.meas`` is."""
+def without_effect(dropped: Sequence[Line]) -> Iterator[str]:
+    """A sentence for each line that was left out and might be missed."""
     for line in dropped:
         text = line.text.lower()
         word, match = text.split()[0], _MEAS.match(text)
         without = re.search(r"\b(uic|startup)\b", text) if word == ".tran" else None
         if word in _SAVING:
             yield f"{line.file}:{line.number}: {word} has no effect; circuit.save keeps vectors."
-        elif match and not measuring:
-            yield f"{line.file}:{line.number}: {word} has no effect without [[port]]."
         elif word in _ANALYSES or without or (match and match[1] not in (None, "tran")):
             what = f"{word} {without[0]}" if without else word
             yield (
