@@ -98,6 +98,7 @@ charts: setup
 	@cp results/paper-limited-sweep/figure.png results/sweep.png
 	@$(VENV)/bin/cosim chart stability
 	@$(PY) -m benchmarks.charts
+	@$(PY) -m benchmarks.ports
 	@$(VENV)/bin/cosim chart limits --rigs results/identify.json
 	@$(VENV)/bin/cosim chart measure --rigs results/identify.json
 	@$(VENV)/bin/cosim chart ladder paper trial-05 gripper

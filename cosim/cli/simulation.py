@@ -190,6 +190,16 @@ def _ssp(
     print(target)
 
 
+def _pack(library: Path, fmi: str = "2", out: Path = Path(_FMU)) -> None:
+    from cosim.fmus.pack import pack
+
+    target = out / f"{library.stem}.fmu"
+    with writable(out):
+        pack(library, target, int(fmi))
+    print(target)
+
+
+_LIBRARY = Option("library", "a library of a model in C and of fmu/thin", "LIBRARY", Path)
 _FILE = Option("--out", f"the file (default: {_FMU}/<scene>.ssp)", "FILE.ssp", Path)
 
 COMMANDS = (
@@ -207,6 +217,9 @@ COMMANDS = (
             Command("build", "write stickslip-fmi2.fmu and stickslip-fmi3.fmu", _build, out=_FMU),
             Command("check", "validate the FMU files and run them", _check),
             Command("netlist", "write a netlist as an FMU", _netlist, _NETLIST, _FMU),
+            Command(
+                "pack", "write a model of one's own in C as an FMU", _pack, (_LIBRARY, _FMI), _FMU
+            ),
             Command(
                 "ssp",
                 "write a scene's machine as an .ssp: its FMUs, and how they are joined",

@@ -6,17 +6,25 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void *opened(void)
+/* Who has loaded ngspice before has initialised it, which can be done once only. */
+static void *opened(int *there)
 {
     static const char *const names[] = {"libngspice.so.0", "libngspice.so",
                                         "libngspice.dylib", "/opt/homebrew/lib/libngspice.dylib",
                                         "/usr/local/lib/libngspice.dylib"};
     const char *named = getenv("NGSPICE_LIBRARY_PATH");
-    if (named && *named)
-        return dlopen(named, RTLD_NOW | RTLD_LOCAL);
+    const size_t n = named && *named ? 1 : sizeof names / sizeof *names;
     void *library = NULL;
-    for (size_t k = 0; !library && k < sizeof names / sizeof *names; k++)
-        library = dlopen(names[k], RTLD_NOW | RTLD_LOCAL);
+    for (size_t k = 0; !library && k < n; k++) {
+        const char *name = named && *named ? named : names[k];
+        void *before = dlopen(name, RTLD_NOW | RTLD_NOLOAD);
+        if (before) {
+            dlclose(before);
+            *there = 1;
+            return NULL;
+        }
+        library = dlopen(name, RTLD_NOW | RTLD_LOCAL);
+    }
     return library;
 }
 
@@ -28,7 +36,13 @@ int spice_find(Spice *spice, char why[512])
     } wanted[] = {{"ngSpice_Init", &spice->init},       {"ngSpice_Init_Sync", &spice->init_sync},
                   {"ngSpice_Circ", &spice->circuit},    {"ngSpice_Command", &spice->command},
                   {"ngSpice_SetBkpt", &spice->breakpoint}, {"ngGet_Vec_Info", &spice->vector}};
-    void *library = spice->library = opened();
+    int there = 0;
+    void *library = spice->library = opened(&there);
+    if (there) {
+        snprintf(why, 512, "something else in this process has loaded ngspice, which has one circuit "
+                           "in a process");
+        return 0;
+    }
     if (!library) {
         const char *said = dlerror();
         snprintf(why, 512,

@@ -149,7 +149,7 @@ def test_blocks_say_what_they_are(page: Path) -> None:
     inside = hidden and any(block.start < hidden.start() < block.end for block in found)
     assert not hidden or inside, f"a command outside of a fence: {hidden[0]}"
     for block in found:
-        assert block.language in {"python", "sh", "text", "toml", "spice", "csv"}, block.line
+        assert block.language in {"c", "python", "sh", "text", "toml", "spice", "csv"}, block.line
         known = block.note in ("", "slow") or re.match(r"needs \w+$|not run: \w.*\w", block.note)
         assert known or not block.runs, f"line {block.line}: {block.note}"
         if block.language in ("text", "spice", "csv") and not block.title:

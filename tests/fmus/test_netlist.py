@@ -99,11 +99,11 @@ json.dump({"found": found, "said": said, "alive": alive}, sys.stdout)
 """
 
 
-def stepped(*runs: dict[str, Any], **environment: str) -> dict[str, Any]:
+def stepped(*runs: dict[str, Any], child: str = CHILD, **environment: str) -> dict[str, Any]:
     import os
 
     done = subprocess.run(
-        [sys.executable, "-c", CHILD],
+        [sys.executable, "-c", child],
         input=json.dumps({"runs": runs}),
         env={**os.environ, **environment},
         text=True,
@@ -178,6 +178,9 @@ def test_what_goes_wrong_is_told_in_a_message(tmp_path: Path) -> None:
     run = {"path": path, "h": 1e-4, "n": 3, "outputs": ["v(b)"]}
     none = stepped(run, NGSPICE_LIBRARY_PATH=str(tmp_path / "none.so"))
     assert "install it" in none["said"][0] and "NGSPICE_LIBRARY_PATH" in none["said"][0]
+    child = CHILD.replace("import json", "import ctypes, ctypes.util, json", 1)
+    child = child.replace("try:", 'ctypes.CDLL(ctypes.util.find_library("ngspice"))\ntry:', 1)
+    assert "something else in this process" in stepped(run, child=child)["said"][0]
     assert "past the stop time" in stepped(run | {"stop": 2e-4})["said"][0]
     assert "must begin at" in stepped(run | {"from": 0.0})["said"][0]
     # A capacitor's current without bound: no time step is short enough.

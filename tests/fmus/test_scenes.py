@@ -96,3 +96,38 @@ def test_a_grip_in_a_closed_loop(tmp_path: Path) -> None:
     assert off(time, 1e3 * waves["rig.z_part"], true, "p") < 2e-2
     late = time > 0.01
     assert off(time[late], waves["jaw.normal_force"][late], true, "nf") < 2e-2
+
+
+ARMATURE = """
+Bcoil c d I=v(flux)*(v(x)+0.3)*1e-3/1.2e-4
+Cflux flux 0 1 ic=0
+Bflux 0 flux I=v(c)-v(d)
+Cx x 0 1 ic=1.0015
+Bx 0 x I=1e3*v(w)
+Cw w 0 3e-3 ic=0
+Bspring spring 0 V=0.3+0.2*(1-v(x))-0.05*v(w)-v(flux)**2/2.4e-4
+Blow low 0 V=(v(x)<0) ? max(0,-200*v(x)-10*v(w)) : 0
+Bhigh high 0 V=(v(x)>1) ? max(0,200*(v(x)-1)+10*v(w)) : 0
+Bw 0 w I=v(spring)+v(low)-v(high)
+Bclosed contact 0 V=(v(x)<0.1) ? 1 : 0
+"""
+
+
+def test_a_relay(tmp_path: Path) -> None:
+    duration = 0.04
+    whole = circuit("relay.cir")
+    for old in ("Icoil c d 0\n", "Vcontact contact 0 0\n"):
+        assert old in whole
+        whole = whole.replace(old, "")
+    options = f".options reltol=1e-6\n.tran 1u {duration} 0 1u uic\n.end\n"
+    true = spice.run(tmp_path, f"* relay\n{whole}{ARMATURE}{options}")
+    with in_place():
+        result = cosim.run("relay", {"run.duration": duration})
+    time, waves = result.columns["time"], result.columns
+    assert off(time, 1e3 * waves["relay.gap"], true, "x") < 1e-2
+    flux = np.interp(time, true["time"], true["flux"])
+    wanted = flux * (np.interp(time, true["time"], true["x"]) + 0.3) * 1e-3 / 1.2e-4
+    assert np.abs(waves["relay.current"] - wanted).max() < 1e-2 * wanted.max()
+    # It closes once the coil is on, and opens only after it is off; between it bounces.
+    closed = waves["relay.contact"] > 0.5
+    assert 2e-3 < time[closed][0] < 9e-3 and 16e-3 < time[closed][-1] < 30e-3

@@ -18,7 +18,8 @@ DIRECTIONS = {
 @pytest.mark.parametrize("name", sorted(set(dict(list_scenes())) - NEEDS_A_FILE))
 def test_a_scene_runs(name: str):
     result = simulate(load(name, ["run.duration=0.04", "run.settle=0.02", "run.output_step=1e-3"]))
-    assert result.summary["energy_residual"] < 1e-3  # pyright: ignore[reportOperatorIssue]
+    if not result.scene.has_ports:
+        assert result.summary["energy_residual"] < 1e-3  # pyright: ignore[reportOperatorIssue]
     assert all(math.isfinite(values.sum()) for values in result.columns.values())
 
 
