@@ -20,10 +20,10 @@ from cosim.coupling.rewind.joint import Joint
 from cosim.coupling.rewind.methods import variants
 from cosim.coupling.rewind.stability import largest_stable_step, observed_limit
 from cosim.drive.command import command
-from cosim.evaluate.store import Store
+from cosim.evaluate.store import Store, reported
 from cosim.scene import changed
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, End, label_ends, panels
-from cosim.studies.report import Progress, Report, reported, silent
+from cosim.studies.report import Progress, Report, silent
 from cosim.studies.stability.machines import (
     DIRECT,
     REFERENCE,
