@@ -1,6 +1,7 @@
 """``coupling.method = "auto"`` against the monolithic reference solution."""
 
 import warnings
+from functools import cache
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from cosim.errors import NoEffect, SimulationFailed
 from cosim.scene import Scene, load
 from cosim.simulation.simulate import simulate
 from cosim.studies.accuracy.cases import CASES, reference
+from cosim.waveforms.result import Result
 
 pytestmark = pytest.mark.physics
 
@@ -28,9 +30,14 @@ def scene(name: str, tolerance: float, *more: str) -> Scene:
     )
 
 
+@cache
+def ran(name: str, tolerance: float) -> Result:
+    return simulate(scene(name, tolerance))
+
+
 @pytest.mark.parametrize(("name", "tolerance"), [("reference", 1e-3), ("stick-slip", 1e-3)])
 def test_the_tolerance_is_met_and_the_error_told(name: str, tolerance: float) -> None:
-    result = simulate(scene(name, tolerance))
+    result = ran(name, tolerance)
     true = reference(name).error(result.columns["z_part"][np.newaxis, 1:])
     told = result.summary["error_estimate"]
     assert isinstance(told, float)
@@ -42,7 +49,7 @@ def test_the_tolerance_is_met_and_the_error_told(name: str, tolerance: float) ->
 
 
 def test_a_smaller_tolerance_takes_more_steps() -> None:
-    coarse, fine = (simulate(scene("reference", tolerance)).summary for tolerance in (1e-3, 5e-6))
+    coarse, fine = (ran("reference", tolerance).summary for tolerance in (1e-3, 5e-6))
     assert isinstance(coarse["circuit_steps"], int) and isinstance(fine["circuit_steps"], int)
     assert coarse["circuit_steps"] < fine["circuit_steps"]
 
