@@ -166,6 +166,23 @@ def trajectory(it: Rig, steps: int) -> list[dict[str, float]]:
     return rows
 
 
+def test_integers_may_be_read_as_reals(version: int) -> None:
+    """Some importers ask for all outputs in one call; what they may not, they still may not."""
+    with rig(version) as it:
+        it.begin()
+        trajectory(it, 300)
+        names = [n for n, v in it.variables.items() if v.causality == "output"]
+        together = it._getter(False)([it._reference(name) for name in names])
+        assert together == [it.get(name) for name in names]
+        assert it.get("impacts") > 3 and it.get("stick_slip_events") > 3
+        last = max(it._reference(name) for name in it.variables)
+        for no_real in (last + 1, 1000):
+            with pytest.raises(FMICallException):
+                it._getter(False)([no_real])
+        with pytest.raises(FMICallException):
+            it._setter(False)([it._reference("contact")], [0.0])
+
+
 # ---- the files ----
 
 

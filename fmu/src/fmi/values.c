@@ -67,9 +67,17 @@ static int get_special(Instance *inst, const char *function, uint32_t vr, double
         *value = inst->state.time;
         return 1;
     }
-    if (place >= N_REALS)
-        return stickslip_refuse(inst, function, "no real variable has the value reference %u",
-                                (unsigned)vr);
+    if (place >= N_REALS) {
+        /* Some importers ask for all outputs as reals. */
+        int whole;
+        if ((size_t)vr - REFERENCE_INTEGERS >= N_INTEGERS)
+            return stickslip_refuse(inst, function, "no real variable has the value reference %u",
+                                    (unsigned)vr);
+        if (!stickslip_get_integers(inst, function, &vr, 1, &whole))
+            return 0;
+        *value = whole;
+        return 1;
+    }
     if (stickslip_real_info[place].kind == KIND_OUTPUT && !outputs_fresh(inst, function))
         return 0;
     if (place >= FIRST_ENERGY && model->energies_old)
