@@ -193,29 +193,6 @@ class Store:
             self._file = None
 
 
-class Saves(Protocol):
-    """What a study finds."""
-
-    def save(self, folder: str | os.PathLike[str], /) -> object: ...
-
-
-Report = TypeVar("Report", bound=Saves)
-
-
-def reported(
-    make: Callable[[Store], Report], out: str | os.PathLike[str] | None, store: str, *asked: Any
-) -> Report:
-    """What ``make`` reports, which follows from ``asked``; it is saved in a folder ``out``. The
-    file ``store`` there keeps what is found meanwhile: an interrupted study goes on from it. Raises
-    BadInput."""
-    with Store(None if out is None else Path(out) / store, *asked) as kept:
-        made = make(kept)
-        if out is not None:
-            made.save(out)
-        kept.remove()
-    return made
-
-
 def hashed(*said: Any) -> str:
     """A hash of what JSON can hold."""
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()

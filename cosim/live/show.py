@@ -91,7 +91,8 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
     if grid.size > MOST_POINTS:
         raise BadInput(f"{plain(str(path))}: a page shows at most {MOST_POINTS} points.")
     columns = []
-    for name in [*swept, *sorted({*data.coords} - {*swept, *grid.dims}), *data.data_vars]:
+    others = sorted(str(name) for name in {*data.coords} - {*swept, *grid.dims})
+    for name in [*swept, *others, *data.data_vars]:
         values = data[name].broadcast_like(grid).transpose(*grid.dims).values.ravel()
         unit, text = (data[name].attrs.get(key, "") for key in ("units", "long_name"))
         columns.append(_column(str(name), unit, values.tolist(), text))
@@ -149,7 +150,7 @@ def _column(name: str, unit: str, values: list[Any], text: str = "") -> dict[str
     kept = [v if isinstance(v, str) or (v is not None and isfinite(v)) else None for v in values]
     known = [v for v in kept if v is not None]
     words = not known or any(isinstance(v, str) for v in known)
-    most = None if words else max(map(abs, known))
+    most = None if words else max(abs(float(v)) for v in known)
     return {"name": name, "unit": unit, "text": text, "values": kept, "most": most}
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from cosim.circuit import netlist
 from cosim.circuit.joined import Deck, deck
@@ -32,10 +33,10 @@ class Plan:
         self.probes = tuple(dict.fromkeys(p.probe for p in scene.port if p.probe is not None))
         self.words = tuple(dict.fromkeys([*self.probes, *(scene.circuit.save or ())]))
         """What is read of the circuit, first what leads to FMUs."""
-        self.sources: list[Source] = []
+        self.sources: list[Any] = []
         self.names: list[str] = []
         """Of the sources that ports feed, as the scene spells them."""
-        self._from: list[tuple[Side, Origin]] = []
+        self._from: list[tuple[Side, Any]] = []
         self._fed: list[tuple[int, Side, Variable]] = []  # sources that FMUs feed
         for port in scene.port:
             self._join(port, sides)
@@ -68,7 +69,7 @@ class Plan:
         """Whether the command of ``[drive]`` leads to something."""
         return any(port.origin == "drive" for port in self.scene.port)
 
-    def _throughs(self) -> Iterator[tuple[Through, Feed]]:
+    def _throughs(self) -> Iterator[tuple[Any, Any]]:
         for at, side, output in self._fed:
             origin, known = self.sources[at].origin, side.of.feedthrough.get(output.name)
             for into, feed in side.probed():
@@ -130,7 +131,7 @@ def _end(
     return sides[of], found, place
 
 
-def _set_slope(origin: Origin, port: Port, side: Side, output: Variable, place: int) -> None:
+def _set_slope(origin: Any, port: Port, side: Side, output: Variable, place: int) -> None:
     """How an output goes on between communication points."""
     kind, one = port.slope, output.size == 1
     if kind == "auto":

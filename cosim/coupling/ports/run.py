@@ -196,7 +196,7 @@ def _named(names: tuple[str, ...], arrays: list[Any]) -> dict[str, int]:
     return dict(zip(names, map(ctypes.addressof, arrays), strict=True))
 
 
-def _pulse(values: list[float], duration: float, step: float) -> Pulse:
+def _pulse(values: list[float], duration: float, step: float) -> Any:
     """Of ngspice's values (low, high, delay, rise, fall, width, period), as it completes them."""
     given = dict(enumerate(values))
     delay, rise, fall = (given.get(k, 0.0) for k in (2, 3, 4))

@@ -43,7 +43,7 @@ class Side:
             self.places[each.name] = place
             place += each.size
         self.inputs: list[Variable] = []
-        self._feeds: list[tuple[Variable, int, Feed]] = []
+        self._feeds: list[tuple[Variable, int, Any]] = []
         self._kept: list[Any] = []
         self._parameters = about.parameters
 
@@ -57,19 +57,19 @@ class Side:
             self.slopes.append(output)
         return len(self.columns) + self.slopes.index(output)
 
-    def feed(self, into: Variable, place: int, feed: Feed) -> None:
+    def feed(self, into: Variable, place: int, feed: Any) -> None:
         """Lead ``feed`` into an input, or an element of it."""
         if into not in self.inputs:
             self.inputs.append(into)
         self._feeds.append((into, place, feed))
 
-    def probed(self) -> Iterator[tuple[Variable, Feed]]:
+    def probed(self) -> Iterator[tuple[Variable, Any]]:
         """What leads from the circuit into real inputs."""
         for into, _, feed in self._feeds:
             if into.real and feed.origin.kind == PROBE:
                 yield into, feed
 
-    def state(self, row: int, repeats: bool) -> StrangerState:
+    def state(self, row: int, repeats: bool) -> Any:
         """Ready to run: a new instance, with its part of the row at that address."""
         self.instance = self.of.instance(self._parameters)
         names = {"set_reals": "SetReal", "get_reals": "GetReal", "do_step": "DoStep"}
@@ -128,7 +128,7 @@ class Side:
 
     def _groups(self, do: str, variables: Sequence[Variable], values: int) -> Any:
         """One group for each type; their values lie one after another."""
-        groups: list[Group] = []
+        groups: list[Any] = []
         types: dict[str, list[Variable]] = defaultdict(list)
         for each in variables:
             types[each.type].append(each)
