@@ -372,9 +372,9 @@ def _make_fmu(target: Path, work: Path) -> None:
 
 def _make_thin(target: Path, work: Path) -> None:
     flags = (f"-I{FMU / 'include'}",)
-    layer, *models = (_objects(_code((folder,), "*.c"), work, *flags) for folder in THIN)
-    netlist, own = models
-    if SYSTEM != "windows":  # POSIX threads, and its own search for libngspice
+    layer, own = (_objects(_code((folder,), "*.c"), work, *flags) for folder in THIN[::2])
+    if SYSTEM != "windows":  # it has threads and a loader of POSIX
+        netlist = _objects(_code(THIN[1:2], "*.c"), work, *flags)
         link([*layer, *netlist], target / ("netlist" + SUFFIX), "-shared", *THREADS, *LOADER)
     for source, compiled in zip(_code(THIN[2:], "*.c"), own, strict=True):
         name = source.stem
