@@ -1,17 +1,18 @@
-# `make run` is enough on a bare machine: each stage does only what is still missing.
+# `make run` is enough on a bare machine: each stage installs only what is still missing, and only
+# what it needs, at the versions and hashes of requirements/*.lock.
 #
 #   make run         sets up and runs the paper's scene (SCENE=name for another)
 #   make test        sets up and runs the quick tests   (ARGS='-k name' for some of them)
 #   make test-all    the slow ones too
 #   make fuzz        the random tests with new examples, many more (ARGS=--hypothesis-seed=N to repeat)
-#   make setup       sets up: system packages, .venv from the hashed lock, the compiled C
+#   make setup       sets up for all that follows: also the tools that check
 #   make charts      remakes the figures and tables in results/, some minutes (TRIALS=DIR:
 #                    those that need the trials, too); `make test` writes results/datasheet.*
 #   make bench       remakes results/bench.json, some minutes (ARGS='--trials DIR')
 #   make docs        draws the pictures and builds the documentation site, site/index.html
 #   make check       ruff and pyright; tells which results another core has made
-#   make wasm        compiles the FMU for the page of `cosim live` (pip install ziglang first)
-#   make dist        wheel and source distribution in dist/, each built in an empty environment
+#   make wasm        compiles the FMU for the page of `cosim live`
+#   make dist        what a release has, for five platforms, in dist/: wheels, sources, the FMU
 #   make lock        remakes the locks with uv  (ARGS=--upgrade for newer versions)
 #   make clean       removes the environments and everything built
 #
@@ -30,6 +31,9 @@ UV ?= uv
 VENV := .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check --no-input -q
+# A lock names all that is needed: pip need not look again, nor bring what the lock leaves out.
+# Python compiles what it imports by itself.
+LOCKED := install --require-hashes --no-deps --no-compile -r
 
 # An environment that was moved, or whose Python is gone, counts as not made.
 VENV_READY := $(shell test -x $(PY) && test "$$(cat $(VENV)/.created 2>/dev/null)" = "$$(pwd)" && echo yes)
@@ -40,38 +44,39 @@ SOURCES := $(sort $(shell find fmu/src fmu/include fmu/thin fmu/netlist fmu/mode
 COMPILED := cosim/_compiled/build.json
 
 .PHONY: help run test test-all fuzz setup charts bench docs check wasm dist lock clean FORCE
+.PRECIOUS: $(VENV)/.locked-%
 
 help:
 	@sed -n 's/^#  \( .*\)/\1/p' Makefile
 
-run: setup
+run: $(COMPILED)
 	@$(VENV)/bin/cosim run $(SCENE) $(ARGS)
 
-test: setup
+test: $(COMPILED) $(VENV)/.locked-test
 	@$(PY) -m pytest -n auto -m "not slow" $(ARGS)
 
-test-all: setup
+test-all: $(COMPILED) $(VENV)/.locked-test
 	@$(PY) -m pytest $(ARGS)
 
-fuzz: setup
+fuzz: $(COMPILED) $(VENV)/.locked-test
 	@$(PY) -m pytest -m hypothesis --hypothesis-profile=fuzz -o timeout=0 $(ARGS)
 
-setup: $(COMPILED)
+setup: $(COMPILED) $(VENV)/.locked-dev
 	@:
 
 # The machine: Python, libngspice, a C compiler; and an empty .venv.
 $(VENV)/.created: .ci/setup-system.sh $(if $(VENV_READY),,FORCE)
 	@PYTHON='$(PYTHON)' sh .ci/setup-system.sh
 
-# The Python packages, at the versions and hashes of the lock.
-$(VENV)/.installed: $(VENV)/.created requirements.lock
-	@echo "Installing the Python packages of requirements.lock into $(VENV)"
-	@$(PIP) install --require-hashes -r requirements.lock || \
+# The Python packages for run, test, dev (which has those of the first two) or dist.
+$(VENV)/.locked-%: requirements/%.lock $(VENV)/.created
+	@echo "Installing the Python packages of $< into $(VENV)"
+	@$(PIP) $(LOCKED) $< || \
 		{ echo "cosim set-up: pip could not install the Python packages (see above); try again." >&2; exit 1; }
 	@touch $@
 
 # This project, in place; that compiles its C.
-$(COMPILED): $(VENV)/.installed $(VENV)/.sources $(SOURCES)
+$(COMPILED): $(VENV)/.locked-run $(VENV)/.sources $(SOURCES)
 	@echo "Installing cosim and compiling its C"
 	@$(PIP) install --no-build-isolation --no-deps \
 		--config-settings editable_mode=compat -e . || \
@@ -110,11 +115,10 @@ bench: setup
 DOCS := .venv-docs
 DOCS_PY := PYTHONPATH=. $(DOCS)/bin/python
 
-$(DOCS)/.installed: docs/requirements.lock $(VENV)/.created
+$(DOCS)/.installed: requirements/docs.lock $(VENV)/.created
 	@echo "Installing what the site is built with into $(DOCS)"
 	@$(or $(PYTHON),python3) -m venv --clear $(DOCS)
-	@$(DOCS)/bin/python -m pip --disable-pip-version-check --no-input -q install \
-		--require-hashes -r docs/requirements.lock
+	@$(DOCS)/bin/python -m pip --disable-pip-version-check --no-input -q $(LOCKED) $<
 	@touch $@
 
 docs: $(DOCS)/.installed
@@ -129,25 +133,24 @@ check: setup
 	@$(PY) -m benchmarks.stale
 
 # The result is kept in the repository, so that only who changes the FMU's C needs zig.
-wasm: setup
+wasm: $(COMPILED) $(VENV)/.locked-dist
 	@$(PY) build_wasm.py
 
-# The wheel is built of the source distribution, so that neither takes anything that lies about.
-dist: $(VENV)/.installed
-	@rm -rf dist cosim.egg-info
-	@$(PY) -m build -q --outdir dist || \
-		{ echo "cosim: the distributions could not be built (see above)." >&2; exit 1; }
-	@ls -s --block-size=K dist
+dist: $(COMPILED) $(VENV)/.locked-dist
+	@$(PY) build_dist.py
+
+# The largest first: the others have its versions. cmake is for `fmpy compile` alone.
+COMPILE = $(UV) pip compile --quiet --universal --fork-strategy fewest --generate-hashes --no-emit-index-url \
+	--python-version 3.11 --custom-compile-command "make lock" --no-emit-package cmake pyproject.toml
 
 lock:
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: install it (pip install uv) or name it with UV=/path/to/uv." >&2; exit 1; }
-	@$(UV) pip compile --quiet --universal --fork-strategy fewest --generate-hashes --python-version 3.11 \
-		--custom-compile-command "make lock" \
-		pyproject.toml --extra test --extra dev -o requirements.lock $(ARGS)
-	@$(UV) pip compile --quiet --universal --fork-strategy fewest --generate-hashes --python-version 3.11 \
-		--custom-compile-command "make lock" pyproject.toml --extra docs -o docs/requirements.lock $(ARGS)
-	@! grep -n '://' requirements.lock docs/requirements.lock || \
-		{ echo "A lock must name no registry." >&2; exit 1; }
+	@$(COMPILE) --group install --extra test --extra dev -o requirements/dev.lock $(ARGS)
+	@$(COMPILE) --group install --extra test -c requirements/dev.lock -o requirements/test.lock $(ARGS)
+	@$(COMPILE) --group install -c requirements/dev.lock -o requirements/run.lock $(ARGS)
+	@$(COMPILE) --group install --extra dist -c requirements/dev.lock -o requirements/dist.lock $(ARGS)
+	@$(COMPILE) --extra docs -o requirements/docs.lock $(ARGS)
+	@! grep -n '://' requirements/*.lock || { echo "A lock must name no registry." >&2; exit 1; }
 
 clean:
 	@rm -rf $(VENV) $(DOCS) site build dist *.egg-info cosim/_compiled .pytest_cache .hypothesis .ruff_cache

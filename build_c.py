@@ -11,6 +11,9 @@
                        functions and structures of each library, as its C declares them
 
 The same sources, compiler and flags give the same bytes.
+
+COSIM_TARGET, "aarch64-linux" for one, names another platform to compile for; CC then makes code for
+that one, and CC_FOR_BUILD for this machine.
 """
 
 import ctypes
@@ -53,9 +56,22 @@ FLAGS = (
     *("-std=c11", "-O3", "-Wall", "-Wextra"),
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
 )
+
+
+def _this_platform() -> str:
+    system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
+    arm = platform.machine().lower() in ("aarch64", "arm64")
+    processor = "aarch64" if arm else "x86_64" if sys.maxsize > 2**32 else "x86"
+    return f"{processor}-{system}"
+
+
+CROSS = "COSIM_TARGET" in os.environ
+TARGET = os.environ["COSIM_TARGET"] if CROSS else _this_platform()
+"""The platform, by its name in FMI 3.0."""
+PROCESSOR, SYSTEM = TARGET.split("-")
 # Older systems have threads in a library of their own.
-THREADS = () if sys.platform == "win32" else ("-pthread",)
-LOADER = ("-ldl",) if sys.platform == "linux" else ()
+THREADS = () if SYSTEM == "windows" else ("-pthread",)
+LOADER = ("-ldl",) if SYSTEM == "linux" else ()
 LIBRARY_FLAGS = ("-fPIC", "-fvisibility=hidden")
 HARDENING = (
     ("-fstack-protector-strong",),
@@ -68,8 +84,7 @@ HARDENING = (
 -fcf-protection: with it a run on the rung "limited" seemed to take 2 % longer (a noisy machine)."""
 # A shared library has FMI's functions by their plain names; source code has them with a prefix.
 PLAIN_NAMES = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
-SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-
+SUFFIX = {"windows": ".dll", "darwin": ".dylib"}.get(SYSTEM, ".so")
 
 PATIENCE = 300
 """s that a compiler has for one file; a second is usual."""
@@ -103,18 +118,20 @@ def make(folder: Path) -> None:
         new.mkdir()
         for library, folders in LIBRARIES.items():
             objects = _objects(_code(folders, "*.c"), work)
-            link(objects, new / (library + SUFFIX), "-shared", *THREADS)
+            made = work / (library + SUFFIX)  # some linkers leave more files beside it
+            link(objects, made, "-shared", *THREADS)
+            made.rename(new / made.name)
         _make_fmu(new, work)
         _make_thin(new, work)
-        made: dict[str, Any] = {"sources": digest(), "compiler": compiler_version()}
-        made["flags"] = [*FLAGS, *hardening()]
-        made["interfaces"] = {name: interface(folders) for name, folders in LIBRARIES.items()}
-        made["files"] = {
+        about: dict[str, Any] = {"sources": digest(), "compiler": compiler_version()}
+        about["flags"] = [*FLAGS, *hardening()]
+        about["interfaces"] = {name: interface(folders) for name, folders in LIBRARIES.items()}
+        about["files"] = {
             path.relative_to(new).as_posix(): [path.stat().st_size, _sum(path.read_bytes())]
             for path in sorted(new.rglob("*"))
             if path.is_file()
         }
-        (new / "build.json").write_text(json.dumps(made, indent=1) + "\n")
+        (new / "build.json").write_text(json.dumps(about, indent=1) + "\n")
         for path in new.rglob("*"):
             if path.is_file():  # else, after a loss of power, names may be there and contents not
                 with open(path, "rb+") as file:
@@ -143,9 +160,9 @@ def _alone(folder: Path) -> Iterator[None]:
         os.close(handle)
 
 
-def compiler() -> list[str]:
+def compiler(variable: str = "CC") -> list[str]:
     """The command in CC, or the machine's cc, gcc or clang."""
-    chosen = shlex.split(os.environ.get("CC", ""))
+    chosen = shlex.split(os.environ.get(variable, ""))
     if chosen:
         return chosen
     for name in ("cc", "gcc", "clang"):
@@ -190,6 +207,12 @@ def link(inputs: list[Path], target: Path, *flags: str) -> None:
     """Make a program, or with ``-shared`` a library, of objects or C files."""
     sources = map(str, inputs)
     _run(*compiler(), *FLAGS, *hardening(), *sources, "-o", str(target), *flags, "-lm")
+
+
+def _link_here(files: list[Path], target: Path, *flags: str) -> None:
+    """What must run while others are compiled for another platform."""
+    code = map(str, files)
+    _run(*compiler("CC_FOR_BUILD"), "-std=c11", "-O1", *flags, *code, "-o", str(target), "-lm")
 
 
 def _code(folders: tuple[Path, ...], pattern: str) -> list[Path]:
@@ -319,12 +342,17 @@ def _make_fmu(target: Path, work: Path) -> None:
     library = work / (MODEL + SUFFIX)
     link(objects, library, "-shared")
     describe = work / ("describe.exe" if sys.platform == "win32" else "describe")
-    link([*objects, *_objects([DESCRIBE], work, *flags)], describe)
+    if CROSS:
+        _link_here([*fmu_sources(), DESCRIBE], describe, *flags)
+    else:
+        link([*objects, *_objects([DESCRIBE], work, *flags)], describe)
 
     def described(*what: str) -> bytes:
         return _run(str(describe), *what).replace(b"\r\n", b"\n")
 
-    for version, other, binaries in zip("23", "32", _platforms(), strict=True):
+    bits = "32" if PROCESSOR == "x86" else "64"
+    places = (SYSTEM.removesuffix("dows") + bits, TARGET)
+    for version, other, binaries in zip("23", "32", places, strict=True):
         # The library has both interfaces, the sources only the file's own.
         own = [file for file in _fmu_files() if not file.name.startswith(f"fmi{other}")]
         names = [_place(file) for file in own if file.suffix == ".c"]
@@ -346,26 +374,24 @@ def _make_thin(target: Path, work: Path) -> None:
     flags = (f"-I{FMU / 'include'}",)
     layer, *models = (_objects(_code((folder,), "*.c"), work, *flags) for folder in THIN)
     netlist, own = models
-    link([*layer, *netlist], target / ("netlist" + SUFFIX), "-shared", *THREADS, *LOADER)
+    if SYSTEM != "windows":  # POSIX threads, and its own search for libngspice
+        link([*layer, *netlist], target / ("netlist" + SUFFIX), "-shared", *THREADS, *LOADER)
     for source, compiled in zip(_code(THIN[2:], "*.c"), own, strict=True):
         name = source.stem
         folder = target / "models" / name
-        library = folder / "binaries" / _platforms()[1] / (name + SUFFIX)
+        library = folder / "binaries" / TARGET / (name + SUFFIX)
         library.parent.mkdir(parents=True)
-        link([*layer, compiled], library, "-shared")
+        made = work / library.name
+        link([*layer, compiled], made, "-shared")
+        shutil.copyfile(made, library)
+        runs_here = library
+        if CROSS:
+            runs_here = work / f"{name}-here"
+            _link_here([*_code(THIN[:1], "*.c"), source], runs_here, *flags, "-fPIC", "-shared")
         why = ctypes.create_string_buffer(512)
         about = str(folder / "modelDescription.xml").encode()
-        if not ctypes.CDLL(str(library)).model_describe(3, b"", about, why):
+        if not ctypes.CDLL(str(runs_here)).model_describe(3, b"", about, why):
             raise BuildFailed(f"{name}: {why.value.decode()}.")
         licences = folder / "documentation/licenses"
         licences.mkdir(parents=True)
         shutil.copyfile(FMU_LICENSE, licences / "license.txt")
-
-
-def _platforms() -> tuple[str, str]:
-    """The names of this platform in FMI 2.0 and FMI 3.0."""
-    system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
-    bits = "64" if sys.maxsize > 2**32 else "32"
-    arm = platform.machine().lower() in ("aarch64", "arm64")
-    processor = "aarch64" if arm else {"64": "x86_64", "32": "x86"}[bits]
-    return system.removesuffix("dows") + bits, f"{processor}-{system}"

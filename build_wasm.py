@@ -6,6 +6,7 @@ that nobody else needs it; a test tells when it is older than the C that it was 
 
 import hashlib
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -13,13 +14,13 @@ from pathlib import Path
 
 import build_c
 from cosim.files.atomic import together
+from cosim.mechanics.fmi import references
 
 HERE = build_c.ROOT / "cosim/live/web"
 TOKEN = "live"
-CALLS = (
-    *("InstantiateCoSimulation", "FreeInstance", "EnterInitializationMode"),
-    *("ExitInitializationMode", "SetFloat64", "SetInt32", "GetFloat64", "GetInt32", "DoStep"),
-)
+LEAD = build_c.ROOT / "cosim/live/machine.c"
+"""What the page calls, and what calls the FMU."""
+CALLS = tuple(re.findall(r"^\w+ \*?(machine_\w+)\(", LEAD.read_text("utf-8"), re.MULTILINE))
 FLAGS = (
     *("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c11", "-O2", "-ffp-contract=off"),
     *("-fno-math-errno", "-fno-trapping-math", "-Wl,--strip-all", f"-DFMU_TOKEN={TOKEN}"),
@@ -29,7 +30,7 @@ FLAGS = (
 
 def files() -> list[Path]:
     """All that the page's machine is made of."""
-    return sorted([*build_c.fmu_sources(), *build_c.FMU.glob("src/*/*.[hd]*")])
+    return sorted([LEAD, *build_c.fmu_sources(), *build_c.FMU.glob("src/*/*.[hd]*")])
 
 
 def digest() -> str:
@@ -45,18 +46,20 @@ def main() -> None:
     version = subprocess.run([*zig, "version"], capture_output=True, text=True)
     if version.returncode:
         sys.exit("make wasm needs zig: .venv/bin/pip install ziglang==0.17.1")
-    exports = [f"-Wl,--export={name}" for name in ("malloc", *(f"fmi3{call}" for call in CALLS))]
+    exports = [f"-Wl,--export={name}" for name in CALLS]
     code = [path for path in build_c.fmu_sources() if not path.name.startswith("fmi2")]
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder, "machine.wasm")
         include = f"-I{build_c.FMU / 'include'}"
-        command = [*zig, "cc", *FLAGS, include, *exports, *map(str, code), "-o", str(made)]
+        sources = map(str, (LEAD, *code))
+        command = [*zig, "cc", *FLAGS, include, *exports, *sources, "-o", str(made)]
         subprocess.run(command, check=True)
         binary = made.read_bytes()
     about = {
         "sources": digest(),
         "zig": version.stdout.strip(),
         "sha256": hashlib.sha256(binary).hexdigest(),
+        "references": references(3),
     }
     with together([HERE / "machine.wasm", HERE / "machine.json"]) as (wasm, told):
         wasm.write_bytes(binary)

@@ -27,8 +27,7 @@ from benchmarks.peers.lsoda import Machine, U
 from benchmarks.peers.lsoda import run as run_machine
 from cosim.drive.command import Command
 from cosim.scene import Scene, load
-from cosim.studies.accuracy.cases import CASES
-from cosim.studies.accuracy.runs import reference
+from cosim.studies.accuracy.cases import CASES, reference
 from cosim.studies.plots import BLUE, GREEN, VERMILION, panels
 from cosim.studies.report import Report
 from cosim.studies.tables import Row, span

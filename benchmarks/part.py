@@ -74,7 +74,6 @@ def _call(trial: Trial, exact: bool) -> Callable[[], int]:
 def _made_up(number: int) -> Trial:
     scene = load("reference", ["circuit.model=ideal", "run.duration=0.8", "run.settle=0.4"])
     frames = film(simulate(scene).columns, frame_times(0.4 + 0.003 * number, FRAMES), 0.0)
-    nothing = np.full(FRAMES, np.nan)
-    surface = Track(frames.z_surface, frames.v_surface, nothing, nothing)
-    moved = Track(frames.z_part, frames.v_part, nothing, nothing)
+    surface = Track(frames.z_surface, frames.v_surface)
+    moved = Track(frames.z_part, frames.v_part)
     return Trial(f"made up {number}", None, frames.time, surface, moved, None)

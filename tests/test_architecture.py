@@ -89,7 +89,7 @@ def test_the_reader_of_imports_sees_them() -> None:
     """Against an import that Python itself made, and one of each form."""
     found = arrows()
     assert ("cosim.__main__", "cosim.cli.main") in found
-    assert ("cosim.studies.fit.cases", "cosim.mechanics.part") in found
+    assert ("cosim.studies.fit.fit", "cosim.mechanics.part") in found
     assert len({start for start, _ in found}) > 100
 
 

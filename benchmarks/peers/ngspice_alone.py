@@ -50,7 +50,7 @@ Cz z 0 1 ic={z}
 Cp p 0 1 ic={z}"""
 
 
-def _netlist(scene: Scene, rest: dict[str, float]) -> tuple[str, tuple[str, ...]]:
+def _netlist(scene: Scene, rest: dict[str, float]) -> tuple[str, dict[str, str]]:
     """The deck, and the vectors to log; ``rest`` are the heights (m) in equilibrium."""
     deck, _ = prepare(scene)
     saved = ("i(vemf)", "v(p)")
@@ -58,7 +58,8 @@ def _netlist(scene: Scene, rest: dict[str, float]) -> tuple[str, tuple[str, ...]
     lines = [own.get(line.split()[0], line) for line in deck.splitlines()]
     # The trapezoidal rule is the better one for a mechanism.
     lines = [line.replace("method=gear", "method=trap") for line in lines]
-    return "\n".join(f"{x} uic" if x.startswith(".tran ") else x for x in lines), saved
+    text = "\n".join(f"{x} uic" if x.startswith(".tran ") else x for x in lines)
+    return text, {name: name for name in saved}
 
 
 def run(scene: Scene, times: Sequence[float]) -> tuple[float, Array]:

@@ -70,14 +70,7 @@ def refuse_false(
         "max_step": circuit.max_step / _FINER_STEP,
     }
     until = {"duration": end, "settle": 0.0, "output_step": min(run.output_step, end / 2)}
-    truth = solve(
-        scene.model_copy(
-            update={
-                "circuit": circuit.model_copy(update=finer),
-                "run": run.model_copy(update=until),
-            }
-        )
-    )
+    truth = solve(scene.having(circuit=finer, run=until))
     found, true = int((times <= end).sum()), len(swings(truth))
     if true <= found // 2:
         raise SimulationFailed(

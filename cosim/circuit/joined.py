@@ -5,7 +5,7 @@ that ngspice computes itself, as the voltage of a source that is put in.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import Line, passed, read_all
 from cosim.circuit.lint.elements import Element, Scope, parse
 from cosim.circuit.lint.expressions import sensed
-from cosim.circuit.lint.outputs import Measure, measures, told
+from cosim.circuit.lint.outputs import Measure, measures, without_effect
 from cosim.circuit.lint.words import definitions
 from cosim.circuit.lint.write import written
 from cosim.errors import BadInput, plain
@@ -65,10 +65,15 @@ def deck(
     reltol: float,
     max_step: float,
     asked: bool,
+    known: Mapping[str, float],
     called: str = "[[port]] source",
+    through: Sequence[tuple[str, str]] = (),
 ) -> Deck:
     """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved;
-    where they are ``asked`` for within a step, each as a device's parameter.
+    where they are ``asked`` for within a step, each as a device's parameter. ``known`` are values
+    for such ``.param`` lines as it may have, ``parameters`` for those that it must have. For each
+    source and word of ``through`` the circuit adds the word, times the external source
+    ``Vcosim_gain`` with the pair's number, to the source.
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
@@ -78,37 +83,21 @@ def deck(
     found = {element.name: element for element in parse(lines).elements}
     for source in sources:
         if source.lower() not in found or source[0].lower() not in "vi":
-            known = sorted(each for each in found if each[0] in "vi")
-            hint = suggestion(source.lower(), known) or f" (it has {', '.join(known) or 'none'})"
+            able = sorted(each for each in found if each[0] in "vi")
+            hint = suggestion(source.lower(), able) or f" (it has {', '.join(able) or 'none'})"
             shown = f'{called} = "{plain(source)}"'
             raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
-    plainly = re.compile(r"i.*" if asked else r".*", re.IGNORECASE)
-    direct = [_VECTOR.fullmatch(each) if plainly.match(each) else None for each in words]
-    extra = [
-        _reading(Line(each, f'"{plain(each)}"', k + 1), k)
-        for k, each in enumerate(words)
-        if direct[k] is None
-    ]
-    asked_for = [(name, each) for each in words]
-    every = dict.fromkeys(words)
-    for ask in asks:
-        for each in ask.words:
-            asked_for.append((f"{ask.line.file}:{ask.line.number}", each))
-            if each not in every:
-                direct.append(_VECTOR.fullmatch(each))
-                if direct[-1] is None:
-                    extra.append(_reading(Line(each, ask.line.file, ask.line.number), len(every)))
-                every[each] = None
-    top = check([*lines, *extra], [[source.lower() for source in sources]])
-    _check_vectors(top, asked_for)
-    values = _parameters(top, name, parameters)
+    top, every = check_reading(
+        path, lines, words, asks, [[source.lower() for source in sources]], asked
+    )
+    values = {**known, **own_parameters(top, name, parameters)}
     fed = {source.lower() for source in sources}
     text = [lines[0].text]
     for line, element, holder in top.order:
         if not all(each.used for each in holder.chain()):
             continue  # nothing calls the subcircuit
         if holder is top and element is not None and element.name in fed:
-            text.append(" ".join([element.name, *element.nodes, "external"]))
+            text += _external(element, through)
         else:
             text.append(written(line, element, values if holder is top else {}))
     text += [
@@ -117,20 +106,69 @@ def deck(
         f".tran {max_step!r} {duration!r} 0 {max_step!r}",
         ".end",
     ]
-    read_as = [_read_as(k, match) for k, match in enumerate(direct)]
+    read_as = reading(every, len(words) if asked else 0)
     return Deck(
         "\n".join(text),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
         tuple(every),
         tuple(asks),
-        tuple(told(dropped)),
+        tuple(without_effect(dropped)),
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
         tuple(_pulses(top, fed)),
     )
 
 
-def _reading(words: Line, place: int) -> Line:
+def _external(element: Element, through: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """The lines of a source that the host gives its value."""
+    (plus, minus), name = element.nodes, element.name
+    shares = [(k, words) for k, (source, words) in enumerate(through) if source.lower() == name]
+    between = minus
+    if shares:
+        between = f"cosim_{name}" if element.kind == "v" else minus
+        plus_of_sum = between if element.kind == "v" else plus
+        total = "+".join(f"v(cosim_gain{k})*({words})" for k, words in shares)
+        yield f"Bcosim_{name} {plus_of_sum} {minus} {element.kind}={total}"
+    yield f"{name} {plus} {between} external"
+    for k, _ in shares:
+        yield f"Vcosim_gain{k} cosim_gain{k} 0 external"
+
+
+def check_reading(
+    path: Path,
+    lines: Sequence[Line],
+    words: Sequence[str],
+    asks: Sequence[Measure],
+    required: Sequence[Sequence[str]],
+    asked: bool = False,
+) -> tuple[Scope, list[str]]:
+    """The top level of a netlist with what reads the ``words`` and what the measurements need, as
+    :func:`check` gives it; and all these words, each once."""
+    every = {each: Line(each, f'"{plain(each)}"', k) for k, each in enumerate(words, 1)}
+    for ask in asks:
+        every |= {each: replace(ask.line, text=each) for each in ask.words if each not in every}
+    direct = _direct([*every], len(words) if asked else 0)
+    extra = [_source_of(k, line) for k, line in enumerate(every.values()) if direct[k] is None]
+    top = check([*lines, *extra], required)
+    _check_vectors(top, plain(str(path)), words, every.values())
+    return top, [*every]
+
+
+def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:
+    """For each of the words the vector that has its value, and the device parameter. So many of
+    them, the first, are asked for within a step, where only currents have a parameter."""
+    return [_read_as(k, match) for k, match in enumerate(_direct(words, asked))]
+
+
+def _direct(words: Sequence[str], asked: int) -> list[re.Match[str] | None]:
+    # Within a step a node's voltage is not to be had: a source that copies it is.
+    return [
+        _VECTOR.fullmatch(each) if k >= asked or each[:1].lower() == "i" else None
+        for k, each in enumerate(words)
+    ]
+
+
+def _source_of(place: int, words: Line) -> Line:
     """A source whose voltage is the expression."""
     line = replace(words, text=f"Bcosim{place} {_NODE}{place} 0 V={words.text}")
     passed(line)
@@ -145,24 +183,25 @@ def _read_as(place: int, match: re.Match[str] | None) -> tuple[str, str]:
     return f"{kind}({inner})", f"@{inner}[i]" if kind == "i" else ""
 
 
-def _check_vectors(top: Scope, asked: Sequence[tuple[str, str]]) -> None:
-    """What the words name must be there, as far as that can be known without subcircuits; each
-    comes with the place that asks for it."""
-    nodes = {node for element in top.elements for node in element.nodes} | {"0"}
+def _check_vectors(top: Scope, name: str, words: Sequence[str], wanted: Iterable[Line]) -> None:
+    """What is wanted must be there, as far as that can be known without subcircuits: the scene's
+    words, and those of the netlist's lines."""
     known: dict[str, set[str]] = {
-        "v": nodes,
+        "v": {node for element in top.elements for node in element.nodes} | {"0"},
         "i": {each.name for each in top.elements if each.kind in _CURRENTS},
     }
-    for name, each in asked:
+    for each in wanted:
         for kind, what in (("v", "node"), ("i", "V, L, E or H element")):
-            for inner in sensed(f"b 1 0 v={each}", kind):
+            for inner in sensed(f"b 1 0 v={each.text}", kind):
                 if not re.search(r"[.:]", inner) and inner not in known[kind]:
+                    where = name if each.text in words else f"{each.file}:{each.number}"
                     hint = suggestion(inner, known[kind])
-                    said = f'"{plain(each)}" is asked for, but there is no {what} {plain(inner)}'
-                    raise BadInput(ended(f"{name}: {said}{hint}"))
+                    said = f'"{plain(each.text)}" is asked for, but there is no {what}'
+                    raise BadInput(ended(f"{where}: {said} {plain(inner)}{hint}"))
 
 
-def _parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:
+def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:
+    """The values given to ``.param`` lines, by their names in small letters. Raises BadInput."""
     lines = [line.text for line, _ in top.lines if line.text.lower().startswith(".param")]
     known = [key for text in lines for (key, formal), _ in definitions(text) if formal is None]
     for key in given:

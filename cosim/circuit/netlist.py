@@ -6,7 +6,7 @@ scene's analysis and ``reltol`` replace the netlist's; its other options stay. A
 is treated alike; ``circuits/README.md`` says what it must have.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.arrays import Array
+from cosim.circuit.joined import check_reading, own_parameters, reading
 from cosim.circuit.lint.checks import REQUIRED as AGREED
-from cosim.circuit.lint.checks import check
-from cosim.circuit.lint.deck import Line, read, refuse
+from cosim.circuit.lint.deck import Line, read_all, refuse
 from cosim.circuit.lint.elements import Element, Scope
+from cosim.circuit.lint.outputs import Measure, measures, without_effect
 from cosim.circuit.lint.write import written
 from cosim.files.resources import circuits
 from cosim.scene import Scene
@@ -64,33 +65,42 @@ def path_of(scene: Scene) -> Path:
     return circuits() / f"{circuit.model}.cir"
 
 
-def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
-    """The deck of the scene's circuit, for ``ngSpice_Circ``, and the vectors to log.
+def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
+    """The deck of the scene's circuit, for ``ngSpice_Circ``, and the vectors to log: by the names
+    that the log has, ngspice's.
 
     The run goes to ``run.duration`` with steps of at most ``circuit.max_step``. Raises BadInput,
     beginning with the netlist's file and line, for what is wrong with it or might do harm.
     """
-    path = path_of(scene)
-    # A netlist of one's own may have changed since it was read last.
-    title, top = (_packaged if scene.circuit.netlist is None else _checked)(path)
+    path, words = path_of(scene), _words(scene)
+    if scene.circuit.netlist is None:
+        title, top = _packaged(path)
+    else:  # may have changed since it was read last
+        title, top, every = _checked(path, scene.renamed, tuple(words.values()))
+        words |= {each: each for each in every[len(words) :]}
     elements = top.elements
-    external = _external_sources(elements)
+    external = _external_sources(elements, scene.renamed)
     present = {node for element in elements for node in element.nodes}
     companion = scene.coupling.method == "companion"
     if companion:
-        _carry_inertia(external, title, present)
-    values = parameters(scene)
+        emf = scene.renamed.get("machine.back_emf", "vemf").lower()
+        _carry_inertia(external, title, present, emf)
+    values = parameters(scene) | own_parameters(top, str(path), scene.circuit.param or {})
     deck = [title.text]
     for line, element, holder in top.order:
         if not all(each.used for each in holder.chain()):
             continue  # nothing calls the subcircuit
         deck.append(external.get(line) or written(line, element, values if holder is top else {}))
     for node in ("out", "sense"):
-        if node not in present:
-            refuse(title, f"the netlist must have a node {node}, one of the coil's two ends")
-    saved = REQUIRED + tuple(f"v({name})" for name in OPTIONAL if name in present)
+        if f"v({node})" not in words and node not in present:
+            port = f', or a [[port]] to "machine.{node}"' if scene.renamed else ""
+            refuse(title, f"the netlist must have a node {node}, one of the coil's two ends{port}")
+    saved = {name: name for name in REQUIRED}
+    saved |= {f"v({name})": f"v({name})" for name in OPTIONAL if name in present}
     if companion:
-        saved += (MOTIONAL,)
+        saved[MOTIONAL] = MOTIONAL
+    read = zip(words, reading(list(words.values())), strict=True)
+    saved |= {name: vector for name, (vector, _) in read}
     run, circuit = scene.run, scene.circuit
     deck += [
         # Without norefvalue it asks for the CPU time at each step, to print how far it is.
@@ -103,26 +113,51 @@ def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
     return "\n".join(deck), saved
 
 
-def _checked(path: Path) -> tuple[Line, Scope]:
-    lines = read(path)
-    return lines[0], check(lines)
+def _words(scene: Scene) -> dict[str, str]:
+    """What is read of a netlist of one's own under other names, or besides, by the log's names."""
+    ends = {"machine.current": "i(vemf)", "machine.out": "v(out)", "machine.sense": "v(sense)"}
+    named = {ends[end]: name for end, name in scene.renamed.items() if end in ends}
+    return named | {name: name for name in scene.circuit.save or ()}
 
 
-_packaged = cache(_checked)
-"""The same of a netlist of the package, once a process."""
+def _checked(
+    path: Path, renamed: Mapping[str, str], words: tuple[str, ...]
+) -> tuple[Line, Scope, list[str]]:
+    lines, dropped = read_all(path)
+    required = [[renamed[end].lower() for end in _SOURCES]] if renamed else AGREED
+    return lines[0], *check_reading(path, lines, words, measures(dropped), required)
 
 
-def _external_sources(elements: Sequence[Element]) -> dict[Line, str]:
-    """The lines of the agreed sources, as external ones."""
-    agreed = next(names for names in AGREED if {element.name for element in elements} >= set(names))
-    return {
-        element.line: " ".join([element.name, *element.nodes, "external"])
-        for element in elements
-        if element.name in agreed
-    }
+@cache
+def _packaged(path: Path) -> tuple[Line, Scope]:
+    """A netlist of the package, read once a process."""
+    return _checked(path, {}, ())[:2]
 
 
-def _carry_inertia(external: dict[Line, str], title: Line, present: set[str]) -> None:
+def asked_for(scene: Scene) -> tuple[list[Measure], list[str]]:
+    """What a netlist of one's own measures, in words that the log has, and a sentence for each of
+    its lines that has no effect."""
+    _, dropped = read_all(path_of(scene))
+    return measures(dropped), [*without_effect(dropped)]
+
+
+_SOURCES = ("machine.back_emf", "drive")
+"""The ends of ports that join the sources of a netlist to the machine."""
+
+
+def _external_sources(elements: Sequence[Element], renamed: Mapping[str, str]) -> dict[Line, str]:
+    """The lines of the agreed sources, or of those that ports join, as external ones."""
+    present = {element.name for element in elements}
+    agreed: Sequence[str] = [renamed[end].lower() for end in _SOURCES] if renamed else ()
+    agreed = agreed or next(names for names in AGREED if present >= set(names))
+    found = [element for element in elements if element.name in agreed]
+    for element in found:
+        if element.kind != "v":
+            element.refuse(" must be a V source, since a [[port]] joins it to the machine")
+    return {each.line: " ".join([each.name, *each.nodes, "external"]) for each in found}
+
+
+def _carry_inertia(external: dict[Line, str], title: Line, present: set[str], emf: str) -> None:
     """Put the mechanics' local inertia in series with the coil, for the method "companion".
 
     A mass m behind the coil acts as a capacitor C = m/Bl² with e = ∫ i dt/C. Stick, slip and
@@ -132,7 +167,7 @@ def _carry_inertia(external: dict[Line, str], title: Line, present: set[str]) ->
     for node in ("motional", "motional_gain", "motional_emf"):
         if node in present:
             refuse(title, f'the node {node} cannot be used with coupling.method = "companion"')
-    line = next(line for line, text in external.items() if text.lower().startswith("vemf "))
+    line = next(line for line, text in external.items() if text.startswith(f"{emf} "))
     name, plus, minus, *_ = external[line].split()
     external[line] = "\n".join(
         (

@@ -13,7 +13,7 @@ import warnings
 from io import TextIOWrapper
 from typing import Any, NoReturn
 
-from cosim.cli import live, simulation, studies
+from cosim.cli import live, new, simulation, studies
 from cosim.cli.command import add_commands
 from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain
 from cosim.files.reader import watched
@@ -45,7 +45,7 @@ def _parser(arguments: list[str] | None) -> argparse.ArgumentParser:
         description="Runs a vibrating gripper: its circuit in ngspice, its mechanics in an FMU.",
     )
     parser.add_argument("--version", action="version", version=f"cosim {__version__}")
-    commands = [*simulation.COMMANDS, *live.COMMANDS, *studies.commands()]
+    commands = [*simulation.COMMANDS, *live.COMMANDS, *new.COMMANDS, *studies.commands()]
     add_commands(parser, sorted(commands, key=lambda one: one.name), arguments, "COMMAND")
     return parser
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.cli.command import Command
-from cosim.cli.work import progress_bar, writable
-from cosim.studies.study import OVERRIDES, SCENE, Option
+from cosim.cli.work import print_page, progress_bar, writable
+from cosim.studies.study import OVERRIDES, SCENE, SHOW, Option
 
 if TYPE_CHECKING:
     from cosim.scene import Scene
@@ -22,6 +22,7 @@ def _run(
     spread: bool = False,
     strict: bool = False,
     link: bool = False,
+    show: bool = False,
     out: Path | None = None,
 ) -> None:
     from cosim.scene import load, to_link
@@ -61,6 +62,8 @@ def _run(
         print(found)
     print(f"Written to {folder}: waveforms.csv, waveforms.nc, summary.json, scene.toml")
     print(f"Figure: {folder / 'figure.png'}")
+    if show:
+        print_page(folder)
 
 
 def _spread(scene: "Scene") -> "Spread":
@@ -73,13 +76,23 @@ def _spread(scene: "Scene") -> "Spread":
         return cosim.spread(scene, progress=progress)
 
 
-def _scenes() -> None:
-    from cosim.scene import list_scenes
+def _scenes(scene: str | None = None) -> None:
+    from cosim.scene.loading import groups, list_scenes, load
 
-    found = list_scenes()
-    width = max(len(name) for name, _ in found)
-    for name, description in found:
-        print(f"{name:<{width}}  {description}")
+    if scene is not None:
+        from cosim.scene.model import differing
+
+        found = load(scene)
+        print(f"{found.name}: {found.description}")
+        print("\n".join(differing(found)))
+        return
+    told = dict(list_scenes())
+    width = max(map(len, told))
+    for title, names in groups().items():
+        print(f"{title}:")
+        for name in names:
+            print(f"  {name:<{width}}  {told[name]}")
+    print("\nWhat is in one: cosim scenes NAME; one of your own: cosim new FILE.toml")
 
 
 def _export_options() -> list[Option]:
@@ -240,8 +253,14 @@ COMMANDS = (
                 "only print the setting as a link, which all commands take in place of a scene",
                 kind=bool,
             ),
+            SHOW,
         ),
         "results/<scene>",
     ),
-    Command("scenes", "list the built-in scenes", _scenes),
+    Command(
+        "scenes",
+        "list the built-in scenes, or what is in one",
+        _scenes,
+        [Option("scene", "tell what of it is not as by default", "SCENE", many="optional")],
+    ),
 )

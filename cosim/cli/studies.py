@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli.command import Command
-from cosim.cli.work import progress_bar, writable
+from cosim.cli.work import print_page, progress_bar, writable
 from cosim.studies.study import Study, Told, loaded, studies
 
 CHART = "chart"
@@ -32,6 +32,7 @@ def _run(study: Study, out: Path | None = None, **asked: Any) -> None:
         if option.prints and asked.pop(option.argument, False):
             print(loaded(option.prints)())
             return
+    shown = asked.pop("show", False)
     title = study.name
     if "<scene>" in study.out:
         from cosim.scene import load
@@ -44,8 +45,8 @@ def _run(study: Study, out: Path | None = None, **asked: Any) -> None:
             asked[option.argument] = loaded(option.read)(asked.get(option.argument, []))
     known = {option.argument: option.default for option in study.options} | asked
     bar = progress_bar(title, known.get(study.total), study.unit) if study.tells else nullcontext()
-    with writable(out, shared=not study.writes), bar as shown:
-        shows = {name: partial(_show, shown, means) for name, means in study.tells.items()}
+    with writable(out, shared=not study.writes), bar as seen:
+        shows = {name: partial(_show, seen, means) for name, means in study.tells.items()}
         found = study.function(**asked, **shows, **({"out": out} if study.saves else {}))
         results = found if isinstance(found, tuple) else (found,)
         for result in () if study.saves else results:
@@ -59,6 +60,8 @@ def _run(study: Study, out: Path | None = None, **asked: Any) -> None:
     if study.figures:
         paths = ", ".join(str(out / name) for name in study.figures)
         print(f"Figure{'s' * (len(study.figures) > 1)}: {paths}")
+    if shown:
+        print_page(out)
     if study.check:
         loaded(study.check)(found)
 

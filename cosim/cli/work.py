@@ -44,6 +44,13 @@ def writable(folder: Path, shared: bool = False) -> Iterator[None]:
         raise
 
 
+def print_page(results: Path, out: Path | None = None) -> None:
+    """Write the page of ``cosim show``."""
+    from cosim.live.show import show
+
+    print(f"Page: {show(results, out)}")
+
+
 def progress_bar(name: str, total: float | None, unit: str, **more: Any) -> "tqdm[Any]":
     """A progress bar on stderr, where that is a terminal; gone at its end."""
     from tqdm import tqdm

@@ -4,7 +4,7 @@ What all studies of many runs stand on. A point that crashes or hangs costs only
 """
 
 from collections import deque
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
 from pathlib import Path
@@ -97,14 +97,32 @@ class Evaluator:
                 yield known.popleft()
         yield from known
 
+    def apply(
+        self, call: Callable[..., object], points: Iterable[int]
+    ) -> Iterator[tuple[int, object]]:
+        """What ``call(scene, number, progress)`` gives or raises for each number, as many at once
+        as runs are, here: of what no store holds, as waveforms."""
+        with threads(self._scene, self._workers) as pool:
+            yield from each(pool, call, points)
+
     def forget(self) -> None:
         """The study is done: remove the file."""
         self._store.remove()
 
     def outcomes(self, every: Sequence[Settings]) -> list[Outcome]:
         """What becomes of each settings, in their order."""
-        found = dict(self.run(enumerate(every)))
-        return [found[number] for number in range(len(every))]
+        return next((found for _, found in self.groups([every])), [])
+
+    def groups(self, groups: Sequence[Sequence[Settings]]) -> Iterator[tuple[int, list[Outcome]]]:
+        """The outcomes of groups of settings, all run at once: a group (its number, outcomes) as
+        soon as it is complete."""
+        places = [(n, k) for n, group in enumerate(groups) for k in range(len(group))]
+        known: list[dict[int, Outcome]] = [{} for _ in groups]
+        for number, outcome in self.run(enumerate(one for group in groups for one in group)):
+            n, k = places[number]
+            known[n][k] = outcome
+            if len(known[n]) == len(groups[n]):
+                yield n, [known[n][k] for k in range(len(groups[n]))]
 
     def _run(self, points: Iterator[_Numbered]) -> Iterator[tuple[int, Outcome]]:
         call = partial(evaluate_all, whole_periods=self._whole_periods)

@@ -17,7 +17,7 @@ from itertools import islice
 from math import inf
 from pathlib import Path
 from time import monotonic
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from cosim.errors import BadInput, Note, plain
 from cosim.mechanics import package
@@ -193,6 +193,29 @@ class Store:
             self._file = None
 
 
+class Saves(Protocol):
+    """What a study finds."""
+
+    def save(self, folder: str | os.PathLike[str], /) -> object: ...
+
+
+Report = TypeVar("Report", bound=Saves)
+
+
+def reported(
+    make: Callable[[Store], Report], out: str | os.PathLike[str] | None, store: str, *asked: Any
+) -> Report:
+    """What ``make`` reports, which follows from ``asked``; it is saved in a folder ``out``. The
+    file ``store`` there keeps what is found meanwhile: an interrupted study goes on from it. Raises
+    BadInput."""
+    with Store(None if out is None else Path(out) / store, *asked) as kept:
+        made = make(kept)
+        if out is not None:
+            made.save(out)
+        kept.remove()
+    return made
+
+
 def hashed(*said: Any) -> str:
     """A hash of what JSON can hold."""
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
@@ -225,3 +248,24 @@ def _locked(path: Path) -> int:
         os.close(file)
         raise BadInput(f"{name}: another process is writing it.") from error
     return file
+
+
+class _Saves(Protocol):
+    def save(self, folder: str | os.PathLike[str]) -> object: ...
+
+
+Made = TypeVar("Made", bound=_Saves)
+
+
+def reported(
+    make: Callable[[Store], Made], out: str | os.PathLike[str] | None, store: str, *asked: Any
+) -> Made:
+    """What ``make`` reports, which follows from ``asked``; a folder ``out`` gets what its ``save``
+    writes. The file ``store`` there keeps what is found meanwhile: an interrupted study goes on
+    from it. Raises BadInput."""
+    with Store(None if out is None else Path(out) / store, *asked) as kept:
+        made = make(kept)
+        if out is not None:
+            made.save(out)
+        kept.remove()
+    return made

@@ -52,14 +52,15 @@ def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[l
                 path.parent.mkdir(parents=True, exist_ok=True)
                 pairs.append((stack.enter_context(_temporary(path)), path))
             name = paths[0] if len(paths) == 1 else paths[0].parent
-            yield [temporary for (_, temporary), _ in pairs]
-            for (handle, _), path in pairs:
+            yield [temporary for temporary, _ in pairs]
+            for temporary, path in pairs:
                 name = path
                 # Else, after a loss of power, the name may be there and its content not.
-                os.fsync(handle)
+                with open(temporary, "rb+") as file:
+                    os.fsync(file.fileno())
             for name in outdated:
                 name.unlink(missing_ok=True)
-            for (_, temporary), path in pairs:
+            for temporary, path in pairs:
                 name = path
                 os.replace(temporary, path)
     except OSError as error:
@@ -71,19 +72,22 @@ def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[l
 
 
 @contextmanager
-def _temporary(path: Path) -> Iterator[tuple[int, Path]]:
+def _temporary(path: Path) -> Iterator[Path]:
     """A new file beside ``path``, locked while this process has it at hand."""
     temporary = path.with_name(f"{_PREFIX}{uuid4().hex}{path.suffix}")
     handle = os.open(
         temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666
     )
+    if fcntl is None:  # Windows, which replaces no open file
+        os.close(handle)
     try:
         if fcntl is not None:
             with suppress(OSError):  # a file system without locks
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield handle, temporary
+        yield temporary
     finally:
-        os.close(handle)
+        if fcntl is not None:
+            os.close(handle)
         temporary.unlink(missing_ok=True)
 
 

@@ -1,4 +1,5 @@
-"""The one reader of tables: cells between commas, semicolons or tabs, and strict numbers.
+"""The one reader of tables: cells between commas, semicolons or tabs, and strict numbers; and of a
+quantity over time, from two columns of one.
 
 Nothing is guessed that could turn one number into another: a decimal comma is one only where commas
 do not part the cells, and not beside decimal points; a row has as many cells as its header; a
@@ -169,3 +170,38 @@ def _cells(line: str, separator: str, name: str, row: int) -> Iterator[str]:
 def _width(row: list[str]) -> int:
     """Its cells, without empty ones at the end."""
     return max((place for place, cell in enumerate(row, 1) if cell), default=0)
+
+
+def read_timetable(path: Path, time: tuple[str, ...], value: tuple[str, ...]) -> Array | None:
+    """The two columns as rows of (time, value); None where the header does not have them.
+
+    ``time`` and ``value`` are the names that each column may have; other columns do not matter. Two
+    rows or more, finite, and the time does not fall: at a time given twice the value jumps. Raises
+    BadInput.
+    """
+    cells = read_cells(path)
+    columns = [_place(cells, names) for names in (time, value)]
+    if None in columns:
+        return None
+    cells.even(1)
+    if len(cells.rows) < 3:
+        raise BadInput(f"{cells.name}: at least two rows of {time[-1]} and {value[-1]} are needed.")
+    header = cells.rows[0][1]
+    result = np.column_stack(
+        [cells.numbers(1, place, header[place]) for place in columns if place is not None]
+    )
+    late = np.flatnonzero(np.diff(result[:, 0]) < 0)
+    if len(late):
+        row = cells.rows[late[0] + 2][0]
+        raise BadInput(f"{cells.name}: row {row}: the time must not fall.")
+    return result
+
+
+def _place(cells: Cells, names: tuple[str, ...]) -> int | None:
+    """Where the one column with one of these names stands."""
+    line, header = cells.rows[0]
+    found = [place for place, cell in enumerate(header) if cell in names]
+    if len(found) > 1:
+        same = " and ".join(header[place] for place in found)
+        raise BadInput(f"{cells.name}: row {line}: {same} are the same column.")
+    return found[0] if found else None

@@ -1,9 +1,11 @@
 """Figures that need neither pyplot nor a screen."""
 
+import math
 from io import BytesIO
 from pathlib import Path
 from typing import Literal
 
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -31,3 +33,18 @@ class Picture(Figure):
         return content.getvalue()
 
     _repr_png_ = png
+
+
+def grid(
+    count: int, columns: int, width: float, height: float, beside: float
+) -> tuple[Picture, list[Axes]]:
+    """A figure of ``count`` panels row by row, and their axes: ``width`` inches wide, each row
+    ``height`` inches high, and ``beside`` inches for what stands above and below them."""
+    rows = math.ceil(count / columns)
+    figure = Picture(width, beside + height * rows, "constrained")
+    axes = [*figure.subplots(rows, columns, squeeze=False).flat]
+    for axis in axes[:count]:
+        axis.grid(alpha=0.25)
+    for axis in axes[count:]:
+        axis.set_visible(False)
+    return figure, axes[:count]

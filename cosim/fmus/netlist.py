@@ -33,7 +33,7 @@ def netlist(
     the ``outputs``, vectors or expressions. Raises BadInput."""
     if not max_step > 0.0 or not 0.0 < reltol < 1.0:
         raise BadInput("--max-step must be above 0 s, and --reltol between 0 and 1.")
-    made = deck(path, inputs, outputs, {}, 1.0, reltol, max_step, False, called="--input")
+    made = deck(path, inputs, outputs, {}, 1.0, reltol, max_step, False, {}, called="--input")
     kinds = {name: made.kinds[name.lower()] for name in inputs}
     vectors = dict(zip(outputs, made.vectors, strict=False))  # those of .meas follow
     write(made.text, kinds, vectors, target, max_step, version, made.pulses)

@@ -1,10 +1,10 @@
-"""The page of `cosim live`: one HTML file that needs nothing else, and asks nobody."""
+"""Pages of one HTML file that need nothing else, and ask nobody; that of `cosim live`."""
 
 import base64
 import hashlib
 import json
 from collections.abc import Iterable
-from math import ceil
+from math import ceil, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -12,41 +12,70 @@ from cosim.circuit.heat import DRIVE_RANGE_HEAT
 from cosim.errors import BadInput
 from cosim.live import rigs
 from cosim.scene import load, to_link
+from cosim.trials.recording import read_recording
 
 _WEB = Path(__file__).with_name("web")
 _CORE = ("machine.js", "hosts.js")
-_SCRIPTS = ("machine.js", "settings.js", "picture.js", "curves.js", "page.js")
+_SCRIPTS = ("machine.js", "settings.js", "plot.js", "picture.js", "curves.js", "page.js")
+
+CIRCUITS: dict[str, dict[str, Any]] = {
+    model: {"circuit.model": model} for model in ("amplifier", "full")
+}
+"""What the server runs with ngspice, by the page's names, as values of a scene's keys."""
 
 
-def fragment(scene: str, overrides: Iterable[str] = ()) -> str:
-    """The link of a scene as the page takes it. Raises BadInput for one that it cannot run."""
-    checked = load(scene, overrides)
-    if not rigs.fits(checked):
+def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, dict[str, str]]]:
+    """The link of a scene, as the page takes it, and the circuits that the server runs it with: a
+    netlist of the user's own is one of them. Raises BadInput for one that the page cannot run."""
+    found, circuits = load(scene, list(overrides)), dict(CIRCUITS)
+    if found.circuit.netlist and not found.has_ports:
+        kept = found.table("circuit")
+        own = {key: kept.pop(key, None) for key in ("netlist", "reltol", "max_step")}
+        own["netlist"] = str(Path(own["netlist"]).absolute())
+        circuits["own"] = {"circuit.model": "file"} | {f"circuit.{k}": x for k, x in own.items()}
+        simple = type(found.circuit).model_validate(kept | {"model": "amplifier"})
+        found = found.model_copy(update={"circuit": simple})
+    if not rigs.fits(found):
         known = ", ".join(rigs.scenes())
-        raise BadInput(f"scene {checked.name}: the page runs {known}, and such as these.")
-    return to_link(checked)
+        raise BadInput(f"scene {found.name}: the page runs {known}, and such as these.")
+    return to_link(found), circuits
 
 
-def html(link: str, served: bool) -> str:
+def html(link: str, models: Iterable[str] = (), record: Path | None = None) -> str:
     """The page, which begins with the setting of ``link`` unless its address has another.
 
-    ``served`` lets it ask its own server for a run with ngspice.
+    It may ask its own server for runs with the circuits ``models``. ``record``, measurements of a
+    machine, can be laid over its curves. Raises BadInput.
     """
-    known = rigs.data()
-    known |= {"start": link, "heat": DRIVE_RANGE_HEAT}
+    known = rigs.data() | {"start": link, "heat": DRIVE_RANGE_HEAT, "models": [*models]}
+    known["record"] = None if record is None else _record(record)
     binary = base64.b64encode((_WEB / "machine.wasm").read_bytes()).decode()
-    given = {"DATA": known, "BINARY": binary, "CORE": script(_CORE), "SERVED": served}
-    lines = (f"const {name} = {_literal(value)};" for name, value in given.items())
-    code = "\n".join([*lines, script(_SCRIPTS)])
+    given = {"DATA": known, "BINARY": binary, "CORE": script(_CORE)}
+    return page("page.html", script_of(given, _SCRIPTS), "'self'" if known["models"] else "'none'")
+
+
+def script_of(given: dict[str, Any], scripts: tuple[str, ...]) -> str:
+    """Constants by name, as JSON that cannot end a script's element, and scripts that take them."""
+    code = ['"use strict";']
+    for name, value in given.items():
+        content = json.dumps(value, separators=(",", ":"), allow_nan=False)
+        code.append(f"const {name} = {content};".replace("<", "\\u003c"))
+    return "\n".join([*code, script(scripts)])
+
+
+def page(name: str, code: str, asks: str) -> str:
+    """The page of that name with its script, which alone may run; it ``asks`` nobody else."""
     digest = base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
-    asks = "'self'" if served else "'none'"
     policy = (
         f"default-src 'none'; script-src 'sha256-{digest}' 'wasm-unsafe-eval' data: blob:; "
-        "worker-src blob:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; "
-        f"connect-src {asks}"
+        "worker-src blob:; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+        f"form-action 'none'; connect-src {asks}"
     )
-    page = (_WEB / "page.html").read_text(encoding="utf-8")
-    return page.replace("@POLICY@", policy).replace("@SCRIPT@", code)
+    parts = {"@POLICY@": policy, "@STYLE@": script(("style.css",)), "@SCRIPT@": code}
+    text = script(("head.html", name))
+    for mark, part in parts.items():
+        text = text.replace(mark, part)
+    return text
 
 
 def script(names: tuple[str, ...]) -> str:
@@ -54,17 +83,23 @@ def script(names: tuple[str, ...]) -> str:
     return "\n".join((_WEB / name).read_text(encoding="utf-8") for name in names)
 
 
-def _literal(value: Any) -> str:
-    """JSON that cannot end a script's element."""
-    return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+def _record(path: Path) -> dict[str, Any]:
+    """Measurements as the page takes them: in even steps, s; None where nothing is known."""
+    found = read_recording(path)
+    step = float(found.time[-1]) / (len(found.time) - 1)
+    signals = {
+        name: [x if isfinite(x) else None for x in values.tolist()]
+        for name, values in found.signals.items()
+    }
+    return {"name": found.name, "step": step, "waveforms": signals}
 
 
-def answer(link: str) -> dict[str, Any]:
+def answer(link: str, circuit: dict[str, str]) -> dict[str, Any]:
     """What ngspice has for a link of the page: mean velocity (m/s) of a second, and the waveforms
     of its last 0.3 s or two periods. Raises CosimError."""
     import cosim
 
-    scene = load(link, {"circuit.model": "amplifier"})
+    scene = load(link, circuit)
     frequency, settle = scene.drive.frequency, 0.7
     if frequency < 0.5:
         raise BadInput("The server runs frequencies of 0.5 Hz and more.")

@@ -1,14 +1,16 @@
 """What the page knows: the built-in rigs, the keys that can be turned, and the firmware's knobs."""
 
+import json
+from pathlib import Path
 from typing import Any
 
 from cosim.circuit.heat import rise
 from cosim.files.link import LONGEST
-from cosim.mechanics.fmi import references
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Key, Scene, firmware, keys, list_scenes, load
 from cosim.scene.tables import COMMANDS, KNOBS
 
+_MACHINE = Path(__file__).with_name("web") / "machine.json"
 MODEL = "limited"
 """The circuit of the page: the one that is inside the FMU."""
 
@@ -91,6 +93,6 @@ def data() -> dict[str, Any]:
         "scenes": {name: _scene(scene) for name, scene in scenes().items()},
         "keys": {full: _key(key) for full, key in turned().items()},
         "knobs": knobs(),
-        "references": references(3),
+        "references": json.loads(_MACHINE.read_text(encoding="utf-8"))["references"],
         "longest": LONGEST,
     }

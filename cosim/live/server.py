@@ -2,19 +2,21 @@
 
 import json
 import warnings
+from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from threading import Lock
+from pathlib import Path
+from threading import Lock, Thread
 from typing import Any
 
 from cosim.errors import BadInput, CosimError
 from cosim.files.link import LONGEST, is_link
-from cosim.live.page import answer, html
+from cosim.live.page import CIRCUITS, answer, html
 
 HOST = "127.0.0.1"
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """``/`` is the page; ``POST /run`` takes a link of it. Nothing else is there."""
+    """``/`` is the page; ``POST /run/CIRCUIT`` takes a link of it. Nothing else is there."""
 
     server: "Server"  # pyright: ignore[reportIncompatibleVariableOverride]
     timeout = 30
@@ -29,17 +31,16 @@ class _Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         """Only the page itself may ask: another site's has another origin."""
         length = self.headers.get("Content-Length", "")
-        known = self.path == "/run" and length.isdecimal() and int(length) <= LONGEST
-        if not (known and self._from_here(needs_origin=True)):
+        circuit = self.server.circuits.get(self.path.removeprefix("/run/"))
+        sound = length.isdecimal() and int(length) <= LONGEST
+        if circuit is None or not (sound and self._from_here(needs_origin=True)):
             self._tell(404, {"error": "There is only run, which takes a link of the page."})
             return
         link = self.rfile.read(int(length)).decode("utf-8", "replace")
         try:
             if not is_link(link):
                 raise BadInput("This is not a link.")
-            with self.server.one_run, warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                self._tell(200, answer(link))
+            self._tell(200, self.server.run(link, circuit))
         except CosimError as error:
             self._tell(400, {"error": str(error)})
 
@@ -68,8 +69,23 @@ class Server(ThreadingHTTPServer):
 
     daemon_threads = True
 
-    def __init__(self, fragment: str) -> None:
+    def __init__(
+        self, link: str, circuits: dict[str, dict[str, str]], record: Path | None = None
+    ) -> None:
+        self.page = html(link, circuits, record).encode()
+        self.circuits = circuits
         super().__init__((HOST, 0), _Handler)
         self.address = f"http://{HOST}:{self.server_port}"
-        self.page = html(fragment, served=True).encode()
         self.one_run = Lock()
+        Thread(target=self._warm, args=(link,), daemon=True).start()
+
+    def run(self, link: str, circuit: dict[str, str]) -> dict[str, Any]:
+        """One at a time. Raises CosimError."""
+        with self.one_run, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return answer(link, circuit)
+
+    def _warm(self, link: str) -> None:
+        """The first run would wait for what all runs need."""
+        with suppress(CosimError):
+            self.run(link, CIRCUITS["amplifier"])

@@ -4,7 +4,7 @@ from bisect import bisect_left, bisect_right
 from pathlib import Path
 
 from cosim.errors import BadInput, plain
-from cosim.files.columns import read_timetable
+from cosim.files.cells import read_timetable
 from cosim.scene import Scene
 
 _SAME_TIME = 1e-12  # s; times closer than this are one, as in the recorder

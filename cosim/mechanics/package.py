@@ -38,9 +38,14 @@ def pack(folder: Path) -> dict[int, Path]:
     """Write both .fmu files to ``folder``; gives their paths by FMI version."""
     paths = {version: folder / f"{MODEL}-fmi{version}.fmu" for version in VERSIONS}
     for version, path in paths.items():
-        with whole(path) as target:
-            zipped(unpacked(version), target)
+        write(path, version)
     return paths
+
+
+def write(path: Path, version: int) -> None:
+    """Write the .fmu file of one FMI version to ``path``."""
+    with whole(path) as target:
+        zipped(unpacked(version), target)
 
 
 def check() -> list[str]:

@@ -57,35 +57,6 @@ class PartMotion:
 _TOLD = ("sticks", "z_surface", "v_surface", "a_surface", "friction", "work", "heat", "events")
 
 
-@dataclass(frozen=True)
-class Account:
-    """Part and surface at ``time`` [s], and what passed between them, a value for each time.
-
-    Where the surface's velocity or acceleration jumps, the values are those before the jump.
-    """
-
-    time: Array
-    z: Array
-    """Of the part, m; ``v`` its velocity, m/s."""
-    v: Array
-    stuck: Array
-    """Time spent sticking so far, s."""
-    sticks: Array
-    """1 while the part sticks, else 0."""
-    z_surface: Array
-    """m, from 0; ``v_surface`` in m/s, ``a_surface`` in m/s²."""
-    v_surface: Array
-    a_surface: Array
-    friction: Array
-    """Of the surface on the part, over the part's mass, m/s²."""
-    work: Array
-    """What the surface has done on the part so far, over the part's mass, J/kg."""
-    heat: Array
-    """What friction at surface and plate has taken so far, over the part's mass, J/kg."""
-    events: Array
-    """Changes between sticking and slipping so far."""
-
-
 class Case(TypedDict, total=False):
     """What the part is in and how it starts.
 
@@ -124,28 +95,26 @@ def exact(
     return PartMotion(times, z, v, _shares(times, stuck), events)
 
 
-def account(
-    surface: Surface,
-    output: Real,
-    *,
-    mu_s: float,
-    mu_k: float,
-    force_per_mass: float,
-    gravity: float = 9.81,
-    mu_plate: float = 0.0,
-) -> Account:
-    """The exact motion on a surface at the times ``output``, and what passed between the two; the
-    part starts at the height 0 with the surface's velocity. See :class:`Case`.
+def account(surface: Surface, output: Real, **given: Unpack[Case]) -> dict[str, Array]:
+    """The exact motion on a surface at the times ``output`` (s), and what passed between the two;
+    the part starts at the height 0 with the surface's velocity.
+
+    ``z`` (m) and ``v`` (m/s) are the part's, ``stuck`` the time spent sticking so far (s) and
+    ``sticks`` 1 while it sticks, else 0; ``z_surface`` (from 0), ``v_surface`` and ``a_surface``
+    the surface's. Over the part's mass are ``friction``, of the surface on the part (m/s²), and the
+    sums so far (J/kg) ``work``, of the surface on the part, and ``heat``, of surface and plate.
+    ``events`` are the changes between sticking and slipping so far. Where the surface's velocity or
+    acceleration jumps, the values are those before the jump.
     """
-    law = (mu_s, mu_k, force_per_mass, gravity, mu_plate)
-    case = _Case(surface.times, surface.velocities, *law, periods=surface.periods)
+    given["periods"] = surface.periods
+    case = _Case(surface.times, surface.velocities, **given)
     times = case.times(output)
     motion, told = np.empty((3, len(times))), np.empty((len(times), len(_TOLD)))
     library("part").part_exact(
         *(*case.arguments(), surface.half, surface.turn, len(times), times.ctypes.data),
         *(*(row.ctypes.data for row in motion), told.ctypes.data),
     )
-    return Account(times, *motion, **dict(zip(_TOLD, told.T, strict=True)))
+    return dict(zip(("z", "v", "stuck", *_TOLD), (*motion, *told.T), strict=True))
 
 
 def bounds(

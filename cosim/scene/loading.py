@@ -54,6 +54,11 @@ def list_scenes() -> list[tuple[str, str]]:
     return sorted(found, key=lambda scene: (not scene[0].startswith("paper"), scene[0]))
 
 
+def groups() -> dict[str, list[str]]:
+    """The names of the built-in scenes under what they are for."""
+    return tomllib.loads(_LIBRARY.with_name("groups.toml").read_text(encoding="utf-8"))
+
+
 Overrides = Mapping[str, Any] | Iterable[str]
 """Values for keys: ``{"table.key": value}``, SI, or ``"table.key=value"`` as the command has it."""
 

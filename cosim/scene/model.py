@@ -15,6 +15,8 @@ from cosim.scene.tables import (
     COMMANDS,
     GIVEN_SURFACES,
     KNOBS,
+    MACHINE,
+    MACHINE_ENDS,
     PATHS,
     PORT_LISTS,
     RAMS,
@@ -114,20 +116,20 @@ class Scene(BaseModel):
     def _check_ports(self) -> "Scene":
         """What can be known of ports before the FMUs and the netlist are read."""
         method, model = self.coupling.method, self.circuit.model
-        if not self.has_ports:
-            if method in OF_PORTS[2:]:
-                raise fault(f'coupling.method = "{method}" is for scenes with their own [[port]]')
-            if self.circuit.save or self.circuit.param:
-                raise fault("circuit.save and circuit.param are for scenes with their own [[port]]")
+        if not self.has_ports and method in OF_PORTS[2:]:
+            raise fault(f'coupling.method = "{method}" is for scenes with their own [[fmu]]')
+        if not self.fmu and not self.port:
             return self
         if not self.rung.own_netlist:
             raise fault(f'[[fmu]] and [[port]] need circuit.model = "file", not "{model}"')
-        if method not in OF_PORTS:
-            known = ", ".join(f'"{name}"' for name in OF_PORTS)
-            raise fault(f'coupling.method = "{method}" must be one of {known} with [[port]]')
         if self.run.solver != "fmu":
             raise fault('run.solver must be "fmu" with [[port]]')
-        names = [fmu.name for fmu in self.fmu]
+        if not self.has_ports:
+            return self._check_machine()
+        if method not in OF_PORTS:
+            known = ", ".join(f'"{name}"' for name in OF_PORTS)
+            raise fault(f'coupling.method = "{method}" must be one of {known} with [[fmu]]')
+        names = [MACHINE, *(fmu.name for fmu in self.fmu)]
         for name in names:
             if names.count(name) > 1 or name == "drive":
                 raise fault(f'[[fmu]] name = "{name}" must be another: it is taken')
@@ -139,13 +141,40 @@ class Scene(BaseModel):
                     and (key, end) != ("from", "drive")
                     and (name not in names or not dot)
                 ):
-                    known = ", ".join(f"{name}.…" for name in names) or "of an FMU; there is none"
+                    known = ", ".join(f"{name}.…" for name in names)
                     raise fault(f'[[port]] {key} = "{end}" must be a variable {known}')
         for key in ("source", "to"):
             given = [str(getattr(port, key)).lower() for port in self.port if getattr(port, key)]
             for end in given:
                 if given.count(end) > 1:
                     raise fault(f'[[port]] {key} = "{end}" is given twice')
+        return self
+
+    def _check_machine(self) -> "Scene":
+        """Ports of the built-in machine alone say what the netlist calls what it needs."""
+        for port in self.port:
+            end = port.to or port.origin
+            if port.scale != 1.0 or port.offset != 0.0:
+                raise fault(f"the port {port.words}: without [[fmu]] scale must be 1 and offset 0")
+            here = port.source if end in MACHINE_ENDS[:2] else port.probe
+            if end not in MACHINE_ENDS or here is None:
+                raise fault(
+                    f'the port {port.words} must be one of from = "drive" or "machine.back_emf" to '
+                    'a source and probe to "machine.current", "machine.out" or "machine.sense"'
+                )
+        names = self.renamed
+        if len(names) < len(self.port):
+            raise fault("[[port]]: an end of the machine is given twice")
+        for end in MACHINE_ENDS[:3]:
+            if end not in names:
+                raise fault(f'[[port]]: nothing is joined to "{end}"')
+        if "".join(names["machine.current"].lower().split()) != (
+            f"i({names['machine.back_emf'].lower()})"
+        ):
+            raise fault(
+                f'the port of machine.current must have probe = "i({names["machine.back_emf"]})", '
+                "the current of the source that is the back-EMF"
+            )
         return self
 
     @model_validator(mode="after")
@@ -327,8 +356,16 @@ class Scene(BaseModel):
 
     @property
     def has_ports(self) -> bool:
-        """Whether circuit and FMUs are the user's own, joined by ports."""
-        return bool(self.fmu or self.port)
+        """Whether ports join more than the built-in machine to the circuit."""
+        return bool(self.fmu) or (bool(self.port) and not self.renamed)
+
+    @property
+    def renamed(self) -> dict[str, str]:
+        """Where ports join a netlist to the built-in machine alone: by each end of the machine, of
+        MACHINE_ENDS, the netlist's own name for it."""
+        names = {str(p.to or p.origin): str(p.source or p.probe) for p in self.port}
+        of_machine = any(end.startswith(f"{MACHINE}.") for end in names)
+        return names if of_machine and not self.fmu else {}
 
     @property
     def rung(self) -> Rung:
@@ -345,6 +382,11 @@ class Scene(BaseModel):
         data: dict[str, Any] = {"name": self.name, "description": self.description}
         data |= {table: self.table(table) for table in TABLES}
         return data | {name: self.table(name) for name in PORT_LISTS if getattr(self, name)}
+
+    def having(self, **tables: dict[str, Any]) -> "Scene":
+        """The scene with other values for keys of some tables, which nobody checks."""
+        changed = {table: getattr(self, table).model_copy(update=x) for table, x in tables.items()}
+        return self.model_copy(update=changed)
 
     def table(self, name: str) -> Any:
         """One of the tables of :meth:`as_dict`."""
@@ -375,18 +417,21 @@ def toml_value(value: bool | float | int | str | list[Any] | dict[str, Any]) -> 
     return repr(value)
 
 
-def to_toml(scene: Scene) -> str:
+def to_toml(scene: Scene, base: str = "") -> str:
     """The resolved scene as TOML: every key with its unit and meaning; loads to an equal scene.
 
-    A key without a value, or with the one that a knob gives it, is a comment.
+    A key without a value, or with the one that a knob gives it, is a comment. With the name of a
+    built-in scene as ``base`` all keys are: the file is then one to begin with.
     """
     data = scene.as_dict()
-    lines = [f"{key} = {toml_value(data[key])}" for key in ("name", "description")]
+    first = {"base": base} if base else {"name": scene.name}
+    first["description"] = scene.description
+    lines = [f"{key} = {toml_value(value)}" for key, value in first.items()]
     for table in TABLES:
         lines += ["", f"[{table}]"]
         for key in (key for key in keys() if key.table == table):
             value = getattr(getattr(scene, table), key.name)
-            mark = "" if key.name in data[table] else "# "
+            mark = "" if key.name in data[table] and not base else "# "
             shown = "" if value is None else toml_value(value)
             unit = "" if key.unit in ("", "1") else f"{key.unit}; "
             lines.append(f"{mark}{key.name} = {shown}  # {unit}{key.text}{_turned(scene, key)}")
@@ -395,6 +440,20 @@ def to_toml(scene: Scene) -> str:
             lines += ["", f"[[{table}]]"]
             lines += [f"{key} = {toml_value(value)}" for key, value in each.items()]
     return "\n".join(lines) + "\n"
+
+
+def differing(scene: Scene) -> list[str]:
+    """The lines of :func:`to_toml` whose values are not the defaults."""
+    usual = {*to_toml(Scene(name=scene.name, description=scene.description)).splitlines()}
+    found: list[str] = []
+    for line in to_toml(scene).splitlines()[2:]:
+        if line.startswith("["):
+            while found and found[-1].startswith("[") and not found[-1].startswith("[["):
+                found.pop()  # a table with nothing in it
+            found.append(line)
+        elif line and line not in usual and not line.startswith("#"):
+            found.append(line)
+    return found
 
 
 def _turned(scene: Scene, key: Key) -> str:

@@ -277,12 +277,12 @@ class Circuit(Table):
     netlist: str | None = _choice(None, "Path of the user's netlist, relative to the scene file")
     save: list[str] | None = _choice(
         None,
-        "With ports: vectors and expressions of the netlist that go into the waveforms",
+        "Vectors and expressions of the user's netlist that go into the waveforms",
         words='a list of texts such as ["v(out)", "v(a)*i(Va)"]',
     )
     param: dict[str, float] | None = _choice(
         None,
-        "With ports: values, SI, for .param lines of the netlist, by their names",
+        "Values, SI, for .param lines of the user's netlist, by their names",
         words="a table of numbers, { R1 = 1.0 }",
     )
     supply: float = _number(18.0, "V", 0.1, 1e3, "Supply voltage, both signs")
@@ -576,7 +576,7 @@ class Fmu(Table):
     )
 
 
-_FEEDS = Literal["mean", "line", "end"]
+_FEEDS = Literal["auto", "mean", "line", "end"]
 
 
 class Port(Table):
@@ -607,9 +607,10 @@ class Port(Table):
         words='"auto", "difference", "held", or an output of the same FMU',
     )
     feed: _FEEDS = _choice(
-        "mean",
-        "What an input is given for a step: mean, line (its start and slope) or end",
-        words='one of "mean", "line", "end"',
+        "auto",
+        "What an input is given for a step: mean, line (its start and slope) or end; auto: line "
+        "where the FMU can, else mean",
+        words='one of "auto", "mean", "line", "end"',
     )
 
     @property
@@ -628,6 +629,15 @@ class Port(Table):
             )
         return self
 
+
+MACHINE = "machine"
+"""The name by which ports call the built-in machine."""
+
+MACHINE_ENDS = (
+    *("drive", f"{MACHINE}.back_emf", f"{MACHINE}.current"),
+    *(f"{MACHINE}.out", f"{MACHINE}.sense"),
+)
+"""What a netlist needs of the built-in machine, or has for it; the last two are the coils' ends."""
 
 PORT_LISTS: dict[str, type[Table]] = {"fmu": Fmu, "port": Port}
 """Lists of tables: what a scene with its own machine is made of."""

@@ -10,7 +10,7 @@ from functools import cache
 from cosim.files.resources import fmu_sources
 
 _ROW = re.compile(
-    r'^(INT_)?(?:PARAMETER|INPUT)\((\w+), (?:"(.*?)", )?(.*?), (.*?), (.*?), "(.*)"\)$',
+    r'^(INT_)?(?:PARAMETER|TUNABLE|INPUT)\((\w+), (?:"(.*?)", )?(.*?), (.*?), (.*?), "(.*)"\)$',
     re.MULTILINE,
 )
 

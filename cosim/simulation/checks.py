@@ -18,6 +18,8 @@ not have, near a border between two of them; and chaos that dies out before the 
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
 from math import isinf
 from threading import Event
 from typing import Any
@@ -29,9 +31,9 @@ from cosim.errors import BadInput, CosimError
 from cosim.mechanics.fmi import load
 from cosim.mechanics.normal_force import normal_force
 from cosim.scene import Scene, changed
-from cosim.simulation.elsewhere import summary_elsewhere
+from cosim.simulation.elsewhere import one_run
 from cosim.simulation.fidelity import LEAST, Fidelity, relative_error
-from cosim.simulation.here import few_rows, simulate_here, summary_here
+from cosim.simulation.here import few_rows, simulate_here
 from cosim.waveforms.result import Result
 
 COARSER = 3.0
@@ -90,11 +92,10 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
             raise _Stopped
 
     def mean(of: Scene | None) -> float | None:
-        alone = summary_elsewhere if scene.rung.ngspice else summary_here
-        try:
-            return None if of is None else alone(few_rows(of), going)["v_average"]
-        except CosimError:
-            return None
+        with suppress(CosimError):
+            if of is not None:
+                return one_run(few_rows(of), going, alone=True).summary["v_average"]
+        return None
 
     load(3)
     with ThreadPoolExecutor(2) as threads:
@@ -123,7 +124,7 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
         least = LEAST_TOLD * abs(own) if scene.rung.ngspice else 0.0
         error = None if told[0] is None else max(abs(own - told[0]), least)
     told_of = {"v_average_error": error, **found}
-    return Result(result.scene, result.columns, result.summary | told_of)
+    return replace(result, summary=result.summary | told_of)
 
 
 def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
@@ -152,9 +153,7 @@ def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
     for share in SHARES:
         end = round(share * max(PERIODS, round(LONG / length))) * length
         times = {"duration": end, "settle": end / 2.0, "output_step": length}
-        base = _looser(changed(scene, simple or {}, "limited")).model_copy(
-            update={"run": scene.run.model_copy(update=times)}
-        )
+        base = _looser(changed(scene, simple or {}, "limited")).having(run=times)
         starts = (base, _aside(base), *(_started(base, ahead) for ahead in AHEAD))
         ways = (_ways(start, progress) for start in starts if start is not None)
         try:
@@ -211,7 +210,7 @@ def _mean(way: Array) -> float:
 
 def _ways(scene: Scene, progress: Callable[[float], None]) -> Array:
     """How far the part goes in each period, m."""
-    return np.diff(simulate_here(scene, progress, 3).columns["z_part"])
+    return np.diff(simulate_here(scene, progress).columns["z_part"])
 
 
 def _stretches(way: Array, count: int) -> Array:
@@ -247,30 +246,21 @@ def _steps(scene: Scene, longer: float) -> Scene | None:
         return None  # its motion is exact
     if not scene.rung.ngspice:
         if longer < 1.0:
-            return _with_tolerance(scene, scene.mechanics.tolerance * longer**3)
+            return scene.having(mechanics={"tolerance": scene.mechanics.tolerance * longer**3})
         return _looser(scene) if scene.mechanics.tolerance < LOOSER else None
     if scene.coupling.method != "step-locked":
         return None
     circuit = scene.circuit
-    steps = {
-        "reltol": min(circuit.reltol * longer**3, 1e-2),
-        "max_step": min(circuit.max_step * longer, 1e-2),
-    }
-    return scene.model_copy(update={"circuit": circuit.model_copy(update=steps)})
+    steps = {"reltol": circuit.reltol * longer**3, "max_step": circuit.max_step * longer}
+    return scene.having(circuit={name: min(value, 1e-2) for name, value in steps.items()})
 
 
 def _looser(scene: Scene) -> Scene:
-    return _with_tolerance(scene, max(scene.mechanics.tolerance, LOOSER))
-
-
-def _with_tolerance(scene: Scene, tolerance: float) -> Scene:
-    mechanics = scene.mechanics.model_copy(update={"tolerance": tolerance})
-    return scene.model_copy(update={"mechanics": mechanics})
+    return scene.having(mechanics={"tolerance": max(scene.mechanics.tolerance, LOOSER)})
 
 
 def _aside(scene: Scene) -> Scene:
-    lifted = {"initial_lift": scene.mechanics.initial_lift + ASIDE}
-    return scene.model_copy(update={"mechanics": scene.mechanics.model_copy(update=lifted)})
+    return scene.having(mechanics={"initial_lift": scene.mechanics.initial_lift + ASIDE})
 
 
 def _started(scene: Scene, ahead: float) -> Scene | None:

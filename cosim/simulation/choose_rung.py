@@ -23,8 +23,9 @@ from importlib import resources
 
 from cosim.errors import BadInput
 from cosim.scene import Scene, changed
+from cosim.simulation.elsewhere import one_run
 from cosim.simulation.fidelity import COMPLETE, JUDGES, SEARCHES, Fidelity, relative_error
-from cosim.simulation.here import few_rows, summary_here
+from cosim.simulation.here import few_rows
 from cosim.toolchain.processes import processors
 from cosim.waveforms.result import Result
 
@@ -109,8 +110,8 @@ def _v_averages(scene: Scene, settings: Sequence[Mapping[str, float | str]]) -> 
     """Of a scene without ngspice with each of some settings, m/s."""
     scenes = [partial(changed, scene, values, "auto") for values in settings]
     with ThreadPoolExecutor(processors()) as threads:
-        found = threads.map(lambda make: summary_here(make(), lambda _: None), scenes)
-        return [summary["v_average"] for summary in found]
+        found = threads.map(lambda make: one_run(make(), lambda _: None, alone=True), scenes)
+        return [result.summary["v_average"] for result in found]
 
 
 def _part(scene: Scene) -> dict[str, float | str]:

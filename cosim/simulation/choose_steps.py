@@ -9,6 +9,7 @@ and meet the tolerance too.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -76,7 +77,7 @@ def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> R
     if coupling.method != "step-locked":
         taken["coupling.macro_step"] = coupling.macro_step
     found = {"wall_time": seconds, "error_estimate": error, "coupling_taken": taken}
-    return Result(best.scene, best.columns, best.summary | found)
+    return replace(best, summary=best.summary | found)
 
 
 def _meeting(
@@ -116,9 +117,4 @@ def difference(result: Result, truth: Result) -> float:
 
 def _with(scene: Scene, level: tuple[float, float], coupling: dict[str, Any]) -> Scene:
     reltol, max_step = level
-    return scene.model_copy(
-        update={
-            "circuit": scene.circuit.model_copy(update={"reltol": reltol, "max_step": max_step}),
-            "coupling": scene.coupling.model_copy(update=coupling),
-        }
-    )
+    return scene.having(circuit={"reltol": reltol, "max_step": max_step}, coupling=coupling)

@@ -1,4 +1,4 @@
-"""Runs a scene in a worker process behind a fence: all those that ngspice has a part in.
+"""Runs a scene where it may run: in a worker process behind a fence if ngspice has a part in it.
 
 What only the worker needs is not imported here, since it takes a while.
 """
@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from cosim.arrays import Array
 from cosim.circuit.lint.deck import named
 from cosim.files import spill
 from cosim.files.resources import circuits
@@ -15,15 +16,19 @@ from cosim.files.spill import Packed, place
 from cosim.scene import Scene
 from cosim.toolchain import fence
 from cosim.toolchain.libraries import ngspice_library
-from cosim.toolchain.processes import Bounds, ProcessLost, Progress, end_idle, isolated
+from cosim.toolchain.processes import Bounds, ProcessLost, Progress, end_idle, in_a_worker, isolated
 from cosim.waveforms.result import Result
 
 
-def simulate_elsewhere(scene: Scene, progress: Progress, fmi_version: int) -> Result:
-    """What :func:`cosim.simulation.here.simulate_here` gives. Raises also SimulationFailed where
-    the process dies or hangs."""
+def one_run(scene: Scene, progress: Progress, fmi_version: int = 3, alone: bool = False) -> Result:
+    """What :func:`cosim.simulation.here.simulate_here` gives, from where it may run. Raises also
+    SimulationFailed where the process dies or hangs."""
+    if in_a_worker() or not scene.rung.ngspice:
+        from cosim.simulation.here import simulate_here
+
+        return simulate_here(scene, progress, fmi_version, alone)
     try:
-        ran = isolated(_worked, (scene, fmi_version), progress, bounds(scene))
+        ran = isolated(_worked, (scene, fmi_version, alone), progress, bounds(scene))
     except ProcessLost as lost:
         if not scene.fmu:
             raise
@@ -33,11 +38,6 @@ def simulate_elsewhere(scene: Scene, progress: Progress, fmi_version: int) -> Re
         ) from None
     progress(scene.run.duration)
     return Result(*ran)
-
-
-def summary_elsewhere(scene: Scene, progress: Progress) -> dict[str, Any]:
-    """What :func:`cosim.simulation.here.summary_here` gives."""
-    return isolated(_summed_up, scene, progress, bounds(scene))
 
 
 @contextmanager
@@ -71,22 +71,17 @@ def _load(_: None) -> None:
 
 
 def _worked(
-    given: tuple[Scene, int], progress: Progress
-) -> tuple[Scene, Packed, dict[str, Any], Mapping[str, str]]:
+    given: tuple[Scene, int, bool], progress: Progress
+) -> tuple[Scene, Packed | dict[str, Array], dict[str, Any], Mapping[str, str]]:
     """A run in a worker."""
     from cosim.simulation.here import simulate_here
 
-    scene, fmi_version = given
-    result = simulate_here(scene, progress, fmi_version)
-    if scene.rung.own_netlist and fence.lacking:
+    scene, fmi_version, alone = given
+    result = simulate_here(scene, progress, fmi_version, alone)
+    if scene.rung.own_netlist and fence.lacking and not alone:
         result.summary["notes"].append(
             f"this system has no {' and no '.join(fence.lacking)}: nothing but the reader's own "
             "checks stands between the netlist, or an FMU's code, and your files."
         )
-    return result.scene, Packed(result.columns), result.summary, result.units
-
-
-def _summed_up(scene: Scene, progress: Progress) -> dict[str, Any]:
-    from cosim.simulation.here import summary_here
-
-    return summary_here(scene, progress)
+    columns = {} if alone else Packed(result.columns)
+    return result.scene, columns, result.summary, result.units

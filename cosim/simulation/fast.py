@@ -23,7 +23,7 @@ from cosim.files.spill import BLOCK, Tape
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
 from cosim.simulation.guards import remarks
-from cosim.simulation.rungs.electrics import commanded
+from cosim.simulation.rungs.rung import commanded
 from cosim.simulation.summary import slips
 from cosim.stepper.stepper import LANES, OWN, RIG, numbers
 from cosim.toolchain.libraries import library, structures

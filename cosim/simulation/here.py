@@ -2,7 +2,6 @@
 
 import time
 from contextlib import closing
-from typing import Any
 
 from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
@@ -11,67 +10,57 @@ from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
 from cosim.simulation.guards import remarks
 from cosim.simulation.rungs.given_surface import move_part
-from cosim.simulation.rungs.rung import Driven, rungs
+from cosim.simulation.rungs.rung import Driven, drive
 from cosim.simulation.summary import motion, numbers
 from cosim.toolchain.processes import Progress
-from cosim.waveforms.columns import COLUMNS
+from cosim.waveforms.columns import COLUMNS, UNITS
 from cosim.waveforms.result import Result
 
 
-def simulate_here(scene: Scene, progress: Progress, fmi_version: int) -> Result:
-    """The run of a scene whose circuit and coupling are chosen. Raises as
-    :func:`cosim.simulation.simulate.simulate` does."""
+def simulate_here(
+    scene: Scene, progress: Progress, fmi_version: int = 3, alone: bool = False
+) -> Result:
+    """The run of a scene whose circuit and coupling are chosen; ``alone``: its summary alone,
+    without waveforms and notes. Raises as :func:`cosim.simulation.simulate.simulate` does."""
+    began = time.perf_counter()
     if scene.has_ports:
-        return _joined(scene, progress)
+        from cosim.coupling.ports.results import joined
+
+        return Result(scene, *joined(few_rows(scene) if alone else scene, progress))
     if scene.surface_is_given:
-        waveforms, summary = _followed_surface(scene)
+        waveforms, moved = move_part(scene)
+        summary = numbers(scene, moved, Driven(None, "exact"), 0, began)
         progress(scene.run.duration)
-        return Result(scene, waveforms, summary | remarks(scene, waveforms, summary))
-    with closing(Mechanics(scene, fmi_version)) as mechanics:
-        recorder, driven, summary = _driven(scene, mechanics, progress)
-    waveforms = _waveforms(scene, recorder, driven)
-    told = remarks(scene, waveforms, summary, mechanics.normal_force)
-    return Result(scene, waveforms, summary | told)
+        force, driven = None, Driven(None, "exact")
+    else:
+        with closing(Mechanics(scene, fmi_version)) as mechanics:
+            recorder = Recorder(scene, mechanics, progress)
+            driven = drive(scene, recorder)
+            summary = numbers(scene, motion(scene, recorder), driven, recorder.steps, began)
+        summary |= driven.measured
+        waveforms = {} if alone else _waveforms(scene, recorder, driven)
+        force = mechanics.normal_force
+    if alone:
+        return Result(scene, {}, summary)
+    told = remarks(scene, waveforms, summary, force)
+    told["notes"] = [*driven.notes, *told["notes"]]
+    return Result(scene, waveforms, summary | told, {**UNITS, **_units(scene)})
 
 
-def summary_here(scene: Scene, progress: Progress) -> dict[str, Any]:
-    """The summary alone, without notes."""
-    if scene.has_ports:
-        return _joined(few_rows(scene), progress).summary
-    if scene.surface_is_given:
-        return _followed_surface(scene)[1]
-    with closing(Mechanics(scene)) as mechanics:
-        return _driven(scene, mechanics, progress)[2]
+def _units(scene: Scene) -> dict[str, str]:
+    """Of what is saved of a netlist of the user's own."""
+    if not scene.circuit.save:
+        return {}
+    from cosim.circuit.joined import unit
 
-
-def _joined(scene: Scene, progress: Progress) -> Result:
-    from cosim.coupling.ports.results import joined
-
-    return Result(scene, *joined(scene, progress))
+    return {name: unit(name) for name in scene.circuit.save}
 
 
 def few_rows(scene: Scene) -> Scene:
     """The scene with as few rows as its summary needs."""
     if scene.run.average == "slope":
         return scene  # the rows show the part's way
-    rows = {"output_step": scene.run.duration / 2.0}
-    return scene.model_copy(update={"run": scene.run.model_copy(update=rows)})
-
-
-def _followed_surface(scene: Scene) -> tuple[dict[str, Array], dict[str, Any]]:
-    began = time.perf_counter()
-    waveforms, moved = move_part(scene)
-    return waveforms, numbers(scene, moved, Driven(None, "exact"), 0, began)
-
-
-def _driven(
-    scene: Scene, mechanics: Mechanics, progress: Progress
-) -> tuple[Recorder, Driven, dict[str, Any]]:
-    began = time.perf_counter()
-    recorder = Recorder(scene, mechanics, progress)
-    driven = rungs()[scene.circuit.model].drive(scene, recorder)
-    summary = numbers(scene, motion(scene, recorder), driven, recorder.steps, began)
-    return recorder, driven, summary
+    return scene.having(run={"output_step": scene.run.duration / 2.0})
 
 
 def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Array]:
@@ -87,4 +76,4 @@ def _waveforms(scene: Scene, recorder: Recorder, driven: Driven) -> dict[str, Ar
         for part in blocks(len(known["time"])):
             forces.append([force.before(t) for t in known["time"][part].tolist()])
         known["normal_force"] = forces.column()
-    return {name: known[name] for name in COLUMNS if name in known}
+    return {name: known[name] for name in (*COLUMNS, *(scene.circuit.save or ())) if name in known}

@@ -4,14 +4,15 @@ import os
 import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
 from cosim.errors import BadInput, BeyondModel
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
-from cosim.simulation.elsewhere import simulate_elsewhere, summary_elsewhere
-from cosim.toolchain.processes import Progress, in_a_worker
+from cosim.simulation.elsewhere import one_run
+from cosim.toolchain.processes import Progress
 from cosim.waveforms.result import Result
 
 
@@ -62,7 +63,7 @@ def simulate(
     if scene.has_ports:
         if checks == "strict":
             raise BadInput("--error tells of the built-in machine, not of a scene's own [[port]].")
-        return _where_it_may(scene, progress, fmi_version)
+        return one_run(scene, progress, fmi_version)
     if scene.run.solver == "fast":
         from cosim.simulation.fast import simulate_fast
 
@@ -78,15 +79,7 @@ def simulate(
         from cosim.simulation.choose_steps import simulate_within_tolerance
 
         return simulate_within_tolerance(scene, again)
-    return _where_it_may(scene, progress, fmi_version)
-
-
-def _where_it_may(scene: Scene, progress: Progress, fmi_version: int) -> Result:
-    if scene.rung.ngspice and not in_a_worker():
-        return simulate_elsewhere(scene, progress, fmi_version)
-    from cosim.simulation.here import simulate_here
-
-    return simulate_here(scene, progress, fmi_version)
+    return one_run(scene, progress, fmi_version)
 
 
 def summary(scene: Scene, progress: Progress = lambda _: None) -> dict[str, Any]:
@@ -99,11 +92,7 @@ def summary(scene: Scene, progress: Progress = lambda _: None) -> dict[str, Any]
         scene.rung.ngspice and scene.coupling.method == "auto" and not scene.has_ports
     ):
         return simulate(scene, progress).summary
-    if scene.rung.ngspice and not in_a_worker():
-        return summary_elsewhere(scene, progress)
-    from cosim.simulation.here import summary_here
-
-    return summary_here(scene, progress)
+    return one_run(scene, progress, alone=True).summary
 
 
 def _cheapest(scene: Scene, run: Callable[[Scene], Result]) -> Result:
@@ -120,4 +109,4 @@ def _cheapest(scene: Scene, run: Callable[[Scene], Result]) -> Result:
         "circuit_model_errors": choice.errors,
         "wall_time": time.perf_counter() - began,
     }
-    return Result(result.scene, result.columns, result.summary | found)
+    return replace(result, summary=result.summary | found)

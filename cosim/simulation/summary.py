@@ -13,8 +13,7 @@ from cosim.coupling.loop.recorder import Recorder
 from cosim.files.spill import blocks
 from cosim.mechanics.part import slip_budget
 from cosim.scene import Scene
-from cosim.simulation.rungs.electrics import Electrics
-from cosim.simulation.rungs.rung import Driven, Motion, average_slope
+from cosim.simulation.rungs.rung import Driven, Electrics, Motion, average_slope
 from cosim.toolchain.versions import versions
 from cosim.trials.camera import FRAME_RATE, accelerations, instants_a_frame, shown
 

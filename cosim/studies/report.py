@@ -5,9 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any
 
-from cosim.evaluate.store import Store
 from cosim.studies.tables import Row, write_csv, write_page
 
 Progress = Callable[[int, int, str], object]
@@ -62,17 +60,3 @@ class Report:
 
     def __repr__(self) -> str:
         return self.printed or self.sentences[0]
-
-
-def reported(
-    make: Callable[[Store], Report], out: str | os.PathLike[str] | None, store: str, *asked: Any
-) -> Report:
-    """What ``make`` reports, which follows from ``asked``; a folder ``out`` gets what
-    ``Report.save`` writes. The file ``store`` there keeps what is found meanwhile: an interrupted
-    study goes on from it. Raises BadInput."""
-    with Store(None if out is None else Path(out) / store, *asked) as kept:
-        made = make(kept)
-        if out is not None:
-            made.save(out)
-        kept.remove()
-    return made

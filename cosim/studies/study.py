@@ -64,6 +64,7 @@ OVERRIDES = Option(
 )
 SEED = Option("--seed", "of the search", "N", int, 0)
 WORKERS = Option("--workers", "runs at once (default: one for each processor)", "N", int)
+SHOW = Option("--show", "also write show.html, a page to look into the results", kind=bool)
 DASK = Option("--dask", "run on the Dask cluster at this address", "ADDRESS")
 
 

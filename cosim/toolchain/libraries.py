@@ -61,7 +61,8 @@ def structures(name: str) -> dict[str, type[ctypes.Structure]]:
         kinds = [
             (field, reduce(mul, reversed(lengths), known[kind])) for field, kind, lengths in fields
         ]
-        known[structure] = type(structure, (ctypes.Structure,), {"_fields_": kinds})
+        body = {"_fields_": kinds, "__slots__": ()}  # no other names are taken
+        known[structure] = type(structure, (ctypes.Structure,), body)
     return {structure: known[structure] for structure in declared}
 
 

@@ -1,6 +1,6 @@
 """What was measured of a machine, whatever its instruments: a camera, a vibrometer, a scope."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,22 +37,32 @@ class Recording:
     """What was made of the file, for a JSON file: ``rows``, ``span`` (s), ``rate`` (1/s), ``gaps``
     (sentences), and for each of ``columns`` its header, unit, and how many values are missing."""
 
+    def rows(self, chosen: slice) -> "Recording":
+        """Some of the rows; time 0 is the first of them."""
+        return replace(
+            self,
+            time=self.time[chosen] - self.time[chosen][0],
+            signals={name: values[chosen] for name, values in self.signals.items()},
+            v_across=self.v_across[chosen],
+        )
+
     def told(self) -> list[str]:
         """What was understood, in lines."""
         read = self.understood
         if not read:
             return []
-        lines = [f"Read from {plain(self.name)}: {read['rows']} rows, "]
-        lines[0] += f"{read['span']:.4g} s, {read['rate']:.4g} rows/s"
+        size = f"{read['rows']} rows, {read['span']:.4g} s, {read['rate']:.4g} rows/s"
+        lines, others = [f"Read from {plain(self.name)}: {size}"], []
         for name, one in read["columns"].items():
+            header = plain(one["header"], 40)
             if name not in WORDS:
+                others.append(header)
                 continue
             whence = " (the published trials' unit)" if one["assumed"] else ""
             gone = f", {one['missing']} missing" if one["missing"] else ""
-            lines.append(f"  {name:<17} {plain(one['header'], 40)}, in {one['unit']}{whence}{gone}")
-        others = [one["header"] for name, one in read["columns"].items() if name not in WORDS]
+            lines.append(f"  {name:<17} {header}, in {one['unit']}{whence}{gone}")
         if others:
-            lines.append(f"  not compared: {', '.join(plain(one, 40) for one in others)}")
+            lines.append(f"  not compared: {', '.join(others)}")
         return lines + [f"  {sentence}" for sentence in read["gaps"]]
 
 
@@ -71,8 +81,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
             time = written
     else:
         notes += (f"No time column: read at {FRAME_RATE:g} frames/s, as the published trials are.",)
-    signals = {name: table.columns[name] for name in WORDS if name in table.columns}
-    signals.pop("time", None)
+    signals = {k: table.columns[k] for k in WORDS if k in table.columns and k != "time"}
     if not signals:
         raise BadInput(f"{path}: no column to compare. Understood are: {UNDERSTOOD}.")
     for body in ("surface", "part"):
@@ -84,20 +93,17 @@ def read_recording(path: Path, asked: str = "") -> Recording:
         if np.isfinite(values).sum() < 2:
             raise BadInput(f"{path}: column {table.headers[name]}: it has fewer than two values.")
     across = table.columns.get("v_across_surface", np.full(count, np.nan))
+    columns = {
+        name: {"header": column.header, "unit": column.unit, "assumed": column.assumed}
+        | {"missing": int(np.isnan(table.columns[name]).sum())}
+        for name, column in table.known.items()
+    }
     understood = {
         "rows": count,
         "span": float(time[-1]),
         "rate": 1.0 / float(np.median(np.diff(time))),
         "gaps": _gaps(time),
-        "columns": {
-            name: {
-                "header": column.header,
-                "unit": column.unit,
-                "assumed": column.assumed,
-                "missing": int(np.isnan(table.columns[name]).sum()),
-            }
-            for name, column in table.known.items()
-        },
+        "columns": columns,
     }
     return Recording(path.stem, time, signals, across, notes, understood)
 

@@ -17,13 +17,10 @@ from cosim.trials.table import BODIES, FEWEST_ROWS, Table, read_table
 
 @dataclass(frozen=True)
 class Track:
-    """Vertical motion of one body: m, m/s, m/s²; NaN where nothing is known."""
+    """Vertical motion of one body: m, m/s; NaN where nothing is known."""
 
     z: Array
     v: Array
-    a: Array
-    v_across: Array
-    """Horizontal velocity, m/s."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +106,5 @@ def read_platform(path: Path) -> tuple[Array, Track]:
 def track(table: Table, body: str) -> Track:
     """The motion of a body (a value of ``BODIES``) in a table with a time and its heights."""
     nothing = np.full(len(table.lines), np.nan)
-    z, v, a, v_across = (
-        table.columns.get(f"{quantity}_{body}", nothing) for quantity in ("z", "v", "a", "v_across")
-    )
-    return Track(z, np.where(np.isnan(v), velocities(table.columns["time"], z), v), a, v_across)
+    z, v = (table.columns.get(f"{quantity}_{body}", nothing) for quantity in ("z", "v"))
+    return Track(z, np.where(np.isnan(v), velocities(table.columns["time"], z), v))

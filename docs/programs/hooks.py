@@ -16,6 +16,8 @@ from mkdocs.structure.pages import Page
 sys.path.insert(0, str(Path(__file__).parent))
 from pages import notebook
 
+from cosim.live.page import html, opened
+
 REPOSITORY = Path(__file__).parents[2]
 OUTSIDE = (
     "results/*.md",
@@ -46,6 +48,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             if path.is_file():
                 own = path.relative_to(REPOSITORY).as_posix()
                 files.append(File.generated(config, own, abs_src_path=str(path)))
+    bench = html(opened("paper-limited")[0])
+    files.append(File.generated(config, "live.html", content=bench))
     for page in files.documentation_pages():
         if page.src_uri.startswith(TUTORIALS) and page.name != "index":
             cells = notebook(page.content_string)

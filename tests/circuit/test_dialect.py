@@ -5,22 +5,31 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import cosim
+from cosim.circuit.joined import deck
 from cosim.circuit.lint.checks import check
-from cosim.circuit.lint.deck import named, read
+from cosim.circuit.lint.deck import named, read, read_all
 from cosim.circuit.lint.outputs import measured, measures
 from cosim.circuit.lint.write import written
 from cosim.errors import BadInput, BeyondModel
+from cosim.files.resources import circuits
+from cosim.toolchain.processes import in_place
 from tests.circuit.test_found_netlists import SCENE, found
 from tests.helpers import needs, spice
 
 pytestmark = pytest.mark.filterwarnings(f"ignore::{BeyondModel.__module__}.{BeyondModel.__name__}")
 
 HEAD = "title\nV1 in 0 SIN(0 1 1k)\nV2 b 0 2\nV3 c 0 -3\nR1 in 0 1k\nR2 b 0 1k\nR3 c 0 1k\n"
+
+
+def summary_of(folder: Path, text: str) -> dict[str, Any]:
+    with in_place():
+        return found(folder, "", f"{text}.end\n").summary
 
 
 def anew(folder: Path, *lines: str, head: str = HEAD) -> list[str]:
@@ -76,8 +85,8 @@ PARTS = {
 @pytest.mark.parametrize("part", PARTS)
 def test_real_parts_have_the_impedance_of_their_circuit(part: str, tmp_path: Path) -> None:
     lines = anew(tmp_path, part, head="title\nI1 0 x 0 ac 1\nR0 x 0 1e9\n")
-    deck = "\n".join(["title", *lines, ".ac dec 3 10 10meg", ".end"])
-    result = spice.run(tmp_path, deck)
+    text = "\n".join(["title", *lines, ".ac dec 3 10 10meg", ".end"])
+    result = spice.run(tmp_path, text)
     for f, z in zip(result["frequency"], result["x"], strict=True):
         true = 1 / (1 / PARTS[part](2j * cmath.pi * f.real) + 1e-9)
         assert abs(z - true) < 1e-6 * abs(true), f
@@ -126,7 +135,7 @@ TOLD = {
     "V9 x 0 SINE(0 1 1k 0 0 0 5)": "SIN takes 6 values",
     "V9 x 0 PWL(0 0 +1m 1)": "write the times of PWL since the start",
     "V9 x 0 PWL REPEAT FOREVER (0 0 1m 1) ENDREPEAT": "instead of REPEAT write r=0",
-    "S9 x 0 in 0 W\n.model W SW(Ron=1 Vt=.5 Vh=-.2)": "a hysteresis below 0",
+    "S9 x 0 in 0 W\n.model W SW(Ron=1 Vt=.5 Vh=-.2)": "vh of w below 0 is LTspice's smooth switch",
     "D9 x 0 W\n.model W D(Vfwd=.5)": "vfwd of w is LTspice's ideal diode",
     "A9 in 0 0 0 0 x 0 0 SCHMITT Vt=.5": "is no element that a netlist may have",
     "XU9 in x level2 Avol=1Meg": "include the file with its .subckt",
@@ -144,9 +153,10 @@ TOLD = {
 
 @pytest.mark.parametrize("line", TOLD)
 def test_what_would_mean_something_else_is_told(line: str, tmp_path: Path) -> None:
-    text = f"{HEAD}R8 x 0 1k\n{line}\n.end\n"
+    path = tmp_path / "own.cir"
+    path.write_text(f"{HEAD}R8 x 0 1k\n{line}\n.end\n")
     with pytest.raises(BadInput, match=rf"^own\.cir:\d+: .*{re.escape(TOLD[line])}"):
-        found(tmp_path, "", text)
+        deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False, {})
 
 
 def test_what_is_not_used_is_not_refused(tmp_path: Path) -> None:
@@ -179,7 +189,7 @@ MEASURED = (
 
 
 def test_measurements_are_those_of_a_sine(tmp_path: Path) -> None:
-    summary = found(tmp_path, "", f"{MEASURED}.end\n").summary
+    summary = summary_of(tmp_path, MEASURED)
     for line, true in MEASURES.items():
         assert summary[f"meas.{line.split()[0]}"] == pytest.approx(true, rel=1e-4), line
 
@@ -190,7 +200,7 @@ def test_measurements_are_those_of_the_program(tmp_path: Path) -> None:
     text = MEASURED.replace("FROM 0 TO 2m", "FROM=0 TO=2m").replace("V(in)*2 AT", "V(in) AT")
     text = text.replace("{t1} to='t1+0.1m'", "1m to=1.1m").replace("v(b)=0.5 td", "v(b) val=0.5 td")
     text = re.sub(r".*m14.*\n", "", text)
-    summary = found(tmp_path, "", f"{text}.end\n").summary
+    summary = summary_of(tmp_path, text)
     path = tmp_path / "alone.cir"
     path.write_text(f"{text}.options reltol=1e-5\n.tran 1u 3m 0 1u\n.end\n")
     command = [str(shutil.which("ngspice")), "-b", str(path)]
@@ -206,14 +216,13 @@ def test_measurements_are_those_of_the_program(tmp_path: Path) -> None:
 def test_an_event_that_does_not_come_has_no_value(tmp_path: Path) -> None:
     path = tmp_path / "own.cir"
     path.write_text(f"{HEAD}.meas x WHEN V(in)=5 rise=2\n.meas y AVG V(in) from=2 to=3\n.end\n")
-    from cosim.circuit.lint.deck import read_all
-
     time = np.linspace(0, 1, 11)
     for each in measures(read_all(path)[1]):
-        assert measured(each, time, {word: np.sin(time) for word in each.words}) is None
-    result = found(tmp_path, "", path.read_text())
-    assert not [key for key in result.summary if key.startswith("meas")]
-    assert [note for note in result.summary["notes"] if "own.cir:8: .meas x has no value" in note]
+        values, (note,) = measured([each], time, {word: np.sin(time) for word in each.words})
+        assert not values and "its event does not come" in note
+    summary = summary_of(tmp_path, path.read_text().removesuffix(".end\n"))
+    assert not [key for key in summary if key.startswith("meas")]
+    assert [note for note in summary["notes"] if "own.cir:8: .meas x has no value" in note]
 
 
 def test_what_has_no_effect_is_told(tmp_path: Path) -> None:
@@ -229,11 +238,23 @@ def test_what_has_no_effect_is_told(tmp_path: Path) -> None:
 .backanno
 .tran 1m
 """
-    notes = found(tmp_path, "", f"{HEAD}{lines}.end\n").summary["notes"]
-    assert [re.match(r"own\.cir:(\d+)", note)[1] for note in notes[:-1]] == [
-        str(number) for number in range(10, 17)
-    ]
+    notes = summary_of(tmp_path, f"{HEAD}{lines}")["notes"]
+    assert [note.split(" ")[0] for note in notes[:-1]] == [f"own.cir:{n}:" for n in range(10, 17)]
     assert notes[-1] == "ngspice knows no odd of a model, and ignored it."
+
+
+def test_on_the_built_in_mechanics_it_is_told_too(tmp_path: Path) -> None:
+    text = (circuits() / "amplifier.cir").read_text(encoding="utf-8")
+    head, end, _ = text.rpartition(".end")
+    (tmp_path / "own.cir").write_text(f"{head}.save v(out)\n.meas tran x PP v(out)\n{end}\n")
+    given = {"circuit.model": "file", "circuit.netlist": tmp_path / "own.cir"}
+    with in_place():
+        result = cosim.run("reference", {"run.duration": 1e-3, **given})
+    told = [note for note in result.summary["notes"] if note.startswith("own.cir")]
+    assert [note.partition(": ")[2] for note in told] == [
+        ".save has no effect; circuit.save keeps vectors."
+    ]
+    assert result.summary["meas.x"] > 0.0
 
 
 def test_a_circuit_that_rings_is_told_with_its_node(tmp_path: Path) -> None:
@@ -244,5 +265,20 @@ def test_a_circuit_that_rings_is_told_with_its_node(tmp_path: Path) -> None:
     )
     (tmp_path / "own.toml").write_text(SCENE.format("").replace("max_step = 1e-6", "max_step=5e-5")
                                        .replace("duration = 3e-3", "duration = 2e-4"))  # fmt: skip
-    (note,) = cosim.run(tmp_path / "own.toml").summary["notes"]
+    with in_place():
+        (note,) = cosim.run(tmp_path / "own.toml").summary["notes"]
     assert re.match(r"the circuit took \d+ steps, \d+ times as many .* at node n: ", note), note
+
+
+def test_a_netlist_on_the_built_in_mechanics_measures_too(tmp_path: Path) -> None:
+    """The mean of the coil's current from 20 ms on, against the mean of the run's own column."""
+    text = (circuits() / "examples" / "h_bridge.cir").read_text(encoding="utf-8")
+    asks = ".meas tran mean AVG i(Vemf) FROM=0.02 TO=0.05\n.print i(Vemf)\n.end\n"
+    (tmp_path / "own.cir").write_text(text.replace(".end\n", asks))
+    own = {"circuit.model": "file", "circuit.netlist": tmp_path / "own.cir"}
+    result = cosim.run("paper", {**own, "run.duration": 0.05, "run.output_step": 1e-6})
+    time, current = result.columns["time"], result.columns["current"]
+    late = time >= 0.02
+    mean = np.trapezoid(current[late], time[late]) / 0.03
+    assert result.summary["meas.mean"] == pytest.approx(mean, rel=1e-3)
+    assert any(".print has no effect" in note for note in result.summary["notes"])

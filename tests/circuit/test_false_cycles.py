@@ -59,7 +59,7 @@ def scene(case: tuple, reltol: float) -> Scene:
 def trapezoidal(monkeypatch: pytest.MonkeyPatch) -> None:
     original = lead.prepare
 
-    def prepare(scene: Scene) -> tuple[str, tuple[str, ...]]:
+    def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
         deck, saved = original(scene)
         assert "method=gear" in deck
         return deck.replace("method=gear", "method=trap"), saved

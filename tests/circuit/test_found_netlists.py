@@ -100,6 +100,10 @@ def low_of(x: Array) -> Array:
     return -soft(-x, 0.8, 0.1)
 
 
+def table(x: Array) -> Array:
+    return np.interp(x - 0.1, [-5e-3, 5e-3], [0, 5])
+
+
 STATIC: dict[str, dict[str, Callable[[Array, Array], Array]]] = {
     "LTspice: functions of behavioural sources": {
         "v(a)": lambda x, t: np.clip(x, -0.7, 0.7),
@@ -110,8 +114,9 @@ STATIC: dict[str, dict[str, Callable[[Array, Array], Array]]] = {
     },
     "PSpice: tables and expressions": {
         "v(a)": lambda x, t: np.clip(2 * x, -1, 1),
-        "v(b)": lambda x, t: np.interp(x - 0.1, [-5e-3, 5e-3], [0, 5]),
+        "v(b)": lambda x, t: table(x),
         "v(c)": lambda x, t: np.interp(x, [-1, -0.5, 0.5, 1], [-1, 0, 0, 1]),
+        "v(d)": lambda x, t: 0.1 * table(x) + 0.01 * table(x) ** 2,
     },
 }
 

@@ -18,6 +18,10 @@ PIECES = (
     "{}", "{", "}", "(", ")", "'", "=", " = ", "\n", "\n+ ", "\n* ", ".", " .end\n", "1e999", "-1",
     "0", "nan", "{1/0}", " level=8", "1level=8", " v(out)", "\t", ";", "$ ", "e", "k", "meg", "µ",
     "\0", "\n.include x\n", "\n.control\nquit\n.endc\n", "\nX9 a b nothing\n", "\nR9 out out 0\n",
+    "\nE9 x9 0 POLY(2) v1 0 out 0 0 1 2\nR8 x9 0 1k\n",
+    "\nG9 0 out TABLE {v(out)} = (0,0) (1,1u)\n",
+    " Rser=1", " Cpar=1p", "table(v(v1),0,0,1,1)", "if(", "limit(", "poly(", "4k7", "§", "Ω",
+    "\n.meas tran x9 WHEN v(out)=1 rise=last\n", "\n.lib a\\standard.dio\n",
 )  # fmt: skip
 PATIENCE = 10.0
 """s of CPU time that a netlist may take, beyond the start of a worker."""

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cosim.circuit.joined import deck
 from cosim.circuit.lint.deck import MAX_BYTES, read
 from cosim.errors import BadInput
 from cosim.scene import load
@@ -193,6 +194,55 @@ def test_several_forms_are_really_dangerous(folder):
 @pytest.mark.parametrize("name", FORMS)
 def test_every_form_is_refused(folder, name):
     refused(put(folder, FORMS[name]))
+
+
+@pytest.mark.parametrize("coding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_every_form_is_refused_in_every_coding(folder, coding):
+    for name, text in FORMS.items():
+        assert refused(put(folder, text.encode(coding))), name
+
+
+HIDDEN = {
+    # What another dialect's words might carry past the checks.
+    "table of a file": line("B9 2 0 V=table(v(1), 0, 0, 1, file)", "R9 2 0 1"),
+    "table of backticks": line("B9 2 0 V=table(v(1), 0, 0, 1, `touch marker`)", "R9 2 0 1"),
+    "polynomial of backticks": line("E9 2 0 POLY(1) 1 0 0 `ls`", "R9 2 0 1"),
+    "polynomial of a string": line('E9 2 0 POLY(1) 1 0 0 "ls"', "R9 2 0 1"),
+    "parasite of backticks": line("C9 1 0 1u Rser=`ls`"),
+    "parasite of a string": line('C9 1 0 1u Rser="ls"'),
+    "unnamed string": line('C9 1 0 1u mfg="a" "b"'),
+    "maker of a file": line('C9 1 0 1u mfg="a" file=b'),
+    "section sign": line(".con§trol", "shell touch marker"),
+    "ohms": line(".c\u2126ntrol", "shell touch marker"),
+    "own models": line(".lib C:\\x\\standard.dio"),
+    "own models, above": line(".lib ../standard.bjt"),
+}
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_no_dialect_hides_a_word(folder, name):
+    (folder / "standard.dio").write_text(FILES["evil.inc"])
+    (folder / "standard.bjt").symlink_to("/etc/passwd")
+    refused(put(folder, HIDDEN[name]))
+
+
+MEASURED = [
+    "v(1)`ls`",
+    'par("ls")',
+    "file=x",
+    "v(1) > marker",
+    "'v(1)\\x'",
+    "v(1)µ",
+    "{p}",
+    "i(r1)",
+]
+
+
+@pytest.mark.parametrize("words", MEASURED)
+def test_no_measurement_hides_a_word(folder, words):
+    path = put(folder, line(f".meas tran x AVG {words}"))
+    with pytest.raises(BadInput, match=r"^my\.cir:4: "):
+        deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False, {})
 
 
 @pytest.mark.parametrize(

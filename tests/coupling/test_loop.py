@@ -220,7 +220,7 @@ def test_python_fails_below_ngspice(
 def test_a_source_that_nothing_feeds(monkeypatch: pytest.MonkeyPatch) -> None:
     original = lead.prepare
 
-    def strange(scene: Scene) -> tuple[str, tuple[str, ...]]:
+    def strange(scene: Scene) -> tuple[str, dict[str, str]]:
         deck, saved = original(scene)
         return deck.replace("\n.tran", "\nVodd odd 0 external\nRodd odd 0 1\n.tran"), saved
 

@@ -56,10 +56,8 @@ def quarter_car() -> tuple[LinearParticipant, LinearParticipant]:
     return chassis, wheel
 
 
-@pytest.mark.parametrize(
-    "order",
-    [pytest.param(0, marks=pytest.mark.slow), pytest.param(1, marks=pytest.mark.slow), 2],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("order", PUBLISHED)
 def test_steps_on_the_quarter_car(order: int) -> None:
     undivided = GUESSED_TOLERANCE / (2.0 ** (order + 1) - 1.0)
     joint = Joint(*quarter_car(), Jacobi(order, slopes=False))

@@ -1,6 +1,5 @@
 """The page in a browser: it runs, asks nobody, and what is turned turns."""
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Thread
@@ -12,11 +11,11 @@ import pytest
 
 import cosim
 from cosim.cli.main import main
-from cosim.live.page import fragment
+from cosim.files.resources import circuits
+from cosim.live.page import opened
 from cosim.live.server import Server
+from cosim.scene import load
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
-QUIET = ("--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking")
 AMPLITUDE = """() => {
   let low = Infinity, high = -Infinity;
   for (let row = history_.last - 9600; row <= history_.last; row++) {
@@ -31,25 +30,8 @@ RUNS = "() => history_.last > 3 * 48000 && state.found"
 
 
 @pytest.fixture
-def tab() -> Iterator[Any]:
-    """A tab, with what it asked for and what went wrong in it."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    if CHROMIUM is None:
-        pytest.skip("Chromium is not installed")
-    with playwright.sync_playwright() as player:
-        browser = player.chromium.launch(executable_path=CHROMIUM, args=QUIET)
-        page = browser.new_page(viewport={"width": 390, "height": 844})
-        page.asked, page.faults = [], []
-        page.on("request", lambda request: page.asked.append(request.url))
-        page.on("console", lambda message: page.faults.append(message.text))
-        page.on("pageerror", lambda error: page.faults.append(str(error)))
-        yield page
-        browser.close()
-
-
-@pytest.fixture
 def server() -> Iterator[Server]:
-    with Server(fragment("paper-limited")) as found:
+    with Server(*opened("paper-limited")) as found:
         Thread(target=found.serve_forever, daemon=True).start()
         yield found
         found.shutdown()
@@ -105,7 +87,7 @@ def test_link_of_a_stranger(tab: Any, tmp_path: Path) -> None:
 @pytest.mark.reliability
 def test_server_answers_its_own_page_alone(server: Server) -> None:
     def asked(path: str, **headers: str) -> int:
-        data = b"#scene=optimal" if path == "/run" else None
+        data = b"#scene=optimal" if path.startswith("/run") else None
         request = Request(server.address + path, data, headers)
         try:
             return urlopen(request, timeout=30).status
@@ -115,20 +97,138 @@ def test_server_answers_its_own_page_alone(server: Server) -> None:
     assert asked("/") == 200
     assert asked("/etc/passwd") == 404
     assert asked("/", Host="example.org") == 404
-    assert asked("/run") == 404
-    assert asked("/run", Origin="http://example.org") == 404
-    assert asked("/run", Origin=server.address) == 400
+    assert asked("/run/full") == 404
+    assert asked("/run/full", Origin="http://example.org") == 404
+    assert asked("/run/other", Origin=server.address) == 404
+    assert asked("/run/full", Origin=server.address) == 400
 
 
 def test_comparison_with_ngspice(tab: Any, server: Server) -> None:
     tab.goto(f"{server.address}/#scene=paper-limited&drive.amplitude=6")
     tab.wait_for_function(RUNS)
     tab.click("#compare")
-    tab.wait_for_function("() => state.other", timeout=120_000)
-    there, here = tab.evaluate("() => [1e3 * state.other.v_average, 1e3 * state.found.velocity]")
+    tab.wait_for_function("() => state.others.length", timeout=120_000)
+    there, here = tab.evaluate(
+        "() => [1e3 * state.others[0].v_average, 1e3 * state.found.velocity]"
+    )
     assert there == pytest.approx(here, abs=0.3)
     assert "difference" in tab.inner_text("#compared") and not tab.faults
     assert {url.partition("#")[0] for url in tab.asked if url.startswith("http")} == {
         f"{server.address}/",
-        f"{server.address}/run",
+        f"{server.address}/run/amplifier",
     }
+
+
+TURNED = """async () => {
+  const before = history_.last;
+  const { drive } = setupOf(state.values, state.setting.scene);
+  const wait = (rows) => new Promise((done) => {
+    const look = () => (history_.last > before + rows ? done() : setTimeout(look, 5));
+    look();
+  });
+  await wait(9600);
+  // V1 of the drive as it is now, at each row; the last one that had another
+  const lines = linesOf(drive, 400);
+  let last = before;
+  for (let row = before + 1; row <= history_.last; row++) {
+    const phase = history_.phase(row) - Math.floor(history_.phase(row));
+    const k = lines.findLastIndex(([begin]) => begin <= phase), [begin, start, end] = lines[k];
+    const until = k + 1 < lines.length ? lines[k + 1][0] : 1;
+    const v1 = start + (end - start) * (phase - begin) / (until - begin);
+    const jumps = Math.min(phase, 1 - phase) < 1e-3;
+    if (!jumps && Math.abs(history_.value(row, 0) - v1) > 1e-3) last = row;
+  }
+  return (last - before) / RATE;
+}"""
+"""Simulated seconds until V1 is that of what has been turned."""
+
+
+@pytest.mark.parametrize("sound", [False, True])
+def test_a_turned_knob_is_heard_at_once(tab: Any, server: Server, sound: bool) -> None:
+    tab.goto(f"{server.address}/#scene=paper-limited")
+    tab.wait_for_function(RUNS)
+    if sound:
+        tab.click("#sound")
+        tab.wait_for_function("() => audio && audio.state === 'running' && history_.last > 9600")
+        assert tab.evaluate("() => audio.baseLatency + audio.outputLatency") <= 0.05
+    else:
+        tab.select_option("#speed", "0.1")
+    tab.focus("#knob-amplitude")
+    tab.keyboard.press("PageDown")
+    assert tab.evaluate(TURNED) < 0.05
+    assert not tab.faults
+
+
+@pytest.mark.slow
+def test_a_minute_of_sound_has_no_gap(tab: Any, server: Server) -> None:
+    tab.goto(f"{server.address}/#scene=paper-limited")
+    tab.wait_for_function(RUNS)
+    tab.click("#sound")
+    tab.wait_for_function("() => audio && audio.state === 'running'")
+    tab.wait_for_timeout(60_000)
+    assert tab.inner_text("#gaps") == "no gap"
+
+
+SHOWN_MEAN = """async (seconds) => {
+  host.post({ kind: "speed", speed: 10 });
+  while (history_.last < seconds * RATE) await new Promise((done) => setTimeout(done, 20));
+  host.post({ kind: "speed", speed: 0 });
+  return [means().velocity, state.marks[0][0], state.marks.at(-1)[0]];
+}"""
+
+
+@pytest.mark.physics
+@pytest.mark.filterwarnings("ignore")
+def test_mean_velocity_shown_is_that_of_a_run(tab: Any, server: Server) -> None:
+    """Over the same whole periods, once the motion repeats."""
+    settings = ["", "&drive.amplitude=6&drive.frequency=30", "&drive.amplitude=7&drive.offset=-1.5"]
+    settings += ["&coil.polarity=-1&friction.normal_force=1.1", "&friction.normal_force=1.5"]
+    settings += ["&drive.waveform=falling-sawtooth&drive.frequency=50"]
+    settings += ["&drive.waveform=square&drive.frequency=35&drive.amplitude=5"]
+    settings += ["&drive.pot_max=0.75&drive.pot_frequency=0.625&drive.pot_offset=0.25"]
+    links = [f"#scene=paper-limited{changes}" for changes in settings]
+    links += [f"#scene=reference&circuit.model=limited{more}" for more in ("", "&coil.count=2")]
+    for link in links:
+        tab.goto(f"{server.address}/{link}")
+        tab.wait_for_function("() => history_.last > 0")
+        shown, begin, end = tab.evaluate(SHOWN_MEAN, 6)
+        period = 1.0 / load(link).drive.frequency
+        times = {"run.settle": round(begin / period) * period}
+        times |= {"run.duration": round(end / period) * period, "run.output_step": 1e-3}
+        expected = cosim.run(load(link, times)).summary["v_average"]
+        assert shown == pytest.approx(expected, rel=1e-6), link
+    assert not tab.faults
+
+
+def test_a_record_is_laid_over(tab: Any, tmp_path: Path) -> None:
+    """A run's own, as a camera would read it: at the phase where it is the same."""
+    run, trial = tmp_path / "run", tmp_path / "<img src=x onerror=alert(1)>.csv"
+    settings = ["--set", "run.duration=1.2", "--set", "run.settle=0.2"]
+    main(["run", "paper-limited", *settings, "--out", str(run)])
+    main(["export", str(run), "--as", "tracker"])
+    next(run.glob("*tracker*")).rename(trial)
+    path = tmp_path / "page.html"
+    assert main(["live", "paper-limited", "--trial", str(trial), "--out", str(path)]) == 0
+    tab.goto(path.as_uri())
+    tab.wait_for_function(RUNS)
+    tab.click("#record")
+    off, of = tab.evaluate("() => record.off('v_surface', history_)")
+    assert off < 0.25 * of
+    assert "<img src=x" in tab.inner_text("#compared")
+    tab.wait_for_timeout(300)
+    assert not tab.faults and tab.locator("img").count() == 0
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_an_own_circuit_is_run_by_the_server(tmp_path: Path) -> None:
+    netlist = circuits() / "examples" / "audio_amplifier.cir"
+    own = {"circuit.model": "file", "circuit.netlist": str(netlist)}
+    link, known = opened("paper", [f"{key}={value}" for key, value in own.items()])
+    assert link == "#scene=paper" and [*known] == ["amplifier", "full", "own"]
+    with Server(link, known) as found:
+        told = found.run(link, known["own"])
+        found.server_close()
+    times = {"run.settle": 0.7, "run.duration": told["begin"] + 0.3, "run.output_step": 5e-5}
+    expected = cosim.run(load("paper", {**own, **times})).waveforms
+    rows = expected.v_surface.sel(time=slice(told["begin"] - 1e-9, None)).values
+    assert told["waveforms"]["v_surface"][:6000] == pytest.approx(rows[:6000], abs=1e-9)

@@ -8,7 +8,7 @@ import pytest
 from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.live import rigs
-from cosim.live.page import fragment
+from cosim.live.page import opened
 from cosim.scene import load, to_link
 from tests.live.page_in_node import needs_node, run
 
@@ -128,4 +128,4 @@ def test_page_refuses_them_too() -> None:
 def test_scene_that_the_page_cannot_run(tmp_path: Path) -> None:
     for scene in ("optimal", "two-surfaces"):
         with pytest.raises(BadInput, match="the page runs"):
-            fragment(scene)
+            opened(scene)

@@ -2,7 +2,9 @@
 
 import hashlib
 import json
+from typing import Any
 
+import numpy as np
 import pytest
 
 import build_wasm
@@ -21,19 +23,28 @@ SETTINGS = [
     "#scene=square&circuit.model=limited",
     "#scene=paper-limited&drive.waveform=falling-sawtooth&drive.frequency=50",
     "#scene=paper-limited&coil.polarity=-1&friction.normal_force=1.1",
+    "#scene=paper-limited&drive.frequency=80&drive.amplitude=7.9&drive.offset=-2",
     "#scene=paper-limited&drive.pot_max=0.75&drive.pot_frequency=0.625&drive.pot_offset=0.25",
 ]
+EXACT = [SETTINGS[k] for k in (1, 2, 5, 6)]
+COLUMNS = {
+    **{"current": 1, "z_surface": 3, "z_ram": 4, "z_part": 5, "v_surface": 6, "v_ram": 7},
+    **{"v_part": 8, "a_surface": 9, "friction_force": 10, "sticking": 13},
+}
+"""Of a run, and where the page has them."""
 STEPPED = """
 const machines = given.map(({ link, times, settled }) => {
   const setting = settingOf(link), setup = setupOf(valuesOf(setting), setting.scene);
   const exports = started(new WebAssembly.Module(bytes));
   const machine = new Machine(exports, DATA.references, setup, 4000);
   let before = null;
-  times.forEach((time, k) => {
-    machine.go(time);
-    if (k === settled) { before = machine.totals()[1]; machine.settle(); }
+  const rows = times.map((time, k) => {
+    machine._ok(exports.machine_row(time));
+    const row = [...machine.place.subarray(0, OUTPUT_COUNT)];
+    if (k === settled) { before = machine.totals()[1]; exports.machine_settle(); }
+    return row;
   });
-  return { way: machine.totals()[1] - before, setup };
+  return { way: machine.totals()[1] - before, setup, rows };
 });
 return machines;
 """
@@ -61,14 +72,31 @@ def test_part_goes_as_far_as_in_a_run() -> None:
         settled = next(float(t) for t, what in pairs if what & 4)
         given.append({"link": link, "times": times, "settled": times.index(settled)})
         scenes.append(scene)
-    for link, scene, found in zip(SETTINGS, scenes, run(STEPPED, given), strict=True):
+    for link, scene, times, found in zip(
+        SETTINGS, scenes, [each["times"] for each in given], run(STEPPED, given), strict=True
+    ):
         reals, integers = parameters(scene)
         del reals["normal_force"], reals["tolerance"]
         assert found["setup"]["reals"] == reals, link
         assert found["setup"]["integers"] == integers, link
         span = scene.run.duration - scene.run.settle
-        expected = cosim.run(scene).summary["v_average"]
-        assert found["way"] / span == pytest.approx(expected, rel=1e-6), link
+        result = cosim.run(scene)
+        assert found["way"] / span == pytest.approx(result.summary["v_average"], rel=1e-6), link
+        _check_rows(link, result.columns, dict(zip(times, found["rows"], strict=True)))
+
+
+def _check_rows(link: str, columns: dict[str, Any], rows: dict[float, list[float]]) -> None:
+    """The same bits where the corners of the command are at the same bits of time."""
+    places = [k for k, time in enumerate(columns["time"].tolist()) if time in rows]
+    assert len(places) == 6000
+    found = np.array([rows[time] for time in columns["time"][places].tolist()])
+    for name, column in COLUMNS.items():
+        expected = columns[name][places]
+        if link in EXACT:
+            assert (found[:, column] == expected).all(), (link, name)
+        else:
+            within = 1e-9 * np.abs(expected).max()
+            np.testing.assert_allclose(found[:, column], expected, atol=within, err_msg=link)
 
 
 @needs_node

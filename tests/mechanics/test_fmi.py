@@ -812,3 +812,105 @@ def test_what_is_not_provided_says_so(version: int) -> None:
         with pytest.raises(FMICallException):
             setter([1], [1])
         assert "no variable of this type" in it.messages[-1]
+
+
+# ---- tunable parameters ----
+
+
+def test_a_smaller_friction_lets_the_part_go_from_there_on(version: int) -> None:
+    """Of a surface at rest: with mu_k F_n < m g the part falls with g - mu_k F_n/m; what comes back
+    stops it with mu_k F_n/m - g."""
+    g, mass, normal = 9.81, 0.009, 0.5
+    slow, brake = g - 0.1 * normal / mass, 0.59 * normal / mass - g
+    with rig(version) as it:
+        it.begin({"flexure_stiffness": 1e9, "flexure_damping": 1e4})
+        for _ in range(10):
+            it.step()
+        assert it.get("sticking") == 1
+        it.set(mu_s=0.12)  # mu_k is still above: no step until it is not
+        with pytest.raises(FMICallException):
+            it.step()
+        assert "mu_k" in it.messages[-1]
+        it.set(mu_k=0.1)
+        height = it.get("z_part")
+        for _ in range(100):
+            it.step()
+        assert it.get("sticking") == 0
+        assert it.get("v_part") == pytest.approx(-slow * 100 * H, rel=1e-6)
+        assert it.get("z_part") - height == pytest.approx(-slow * (100 * H) ** 2 / 2, rel=1e-5)
+        it.set(mu_s=0.72, mu_k=0.59)
+        steps = int(slow * 100 * H / brake / H)
+        for _ in range(steps):
+            it.step()
+        left = slow * 100 * H - brake * steps * H
+        assert it.get("v_part") == pytest.approx(-left, abs=1e-6)
+        for _ in range(3):
+            it.step()
+        assert it.get("sticking") == 1
+
+
+def test_a_plate_that_comes_into_touch_holds_the_part(version: int) -> None:
+    """mu_plate from 0 on, and back: the part that slides down is stopped, and let go again."""
+    with rig(version) as it:
+        it.begin({"flexure_stiffness": 1e9, "flexure_damping": 1e4, "mu_s": 0.1, "mu_k": 0.1})
+        for _ in range(100):
+            it.step()
+        falls = it.get("v_part")
+        assert falls == pytest.approx(-(9.81 - 0.1 * 0.5 / 0.009) * 100 * H, rel=1e-5)
+        it.set(mu_plate=0.3)
+        for _ in range(10):
+            it.step()
+        upwards = (0.1 + 0.3) * 0.5 / 0.009 - 9.81
+        assert it.get("v_part") == pytest.approx(falls + upwards * 10 * H, rel=1e-5)
+        for _ in range(200):
+            it.step()
+        assert it.get("v_part") == pytest.approx(0.0, abs=1e-12)
+        it.set(mu_plate=0.0)
+        for _ in range(10):
+            it.step()
+        assert it.get("v_part") == pytest.approx(-(9.81 - 0.1 * 0.5 / 0.009) * 10 * H, rel=1e-5)
+
+
+def test_limits_of_the_source_follow_their_parameters(version: int) -> None:
+    """Of a held coil: R_s I at the current limit; a clamped output's current, from the closed form
+    of a coil behind a resistance."""
+    loop, inductance = 7.1 + 4.0, 1.2e-3
+    with rig(version) as it:
+        # too heavy a ram to move: no back-EMF
+        it.begin({"source": 1, "ram_mass": 1e3, "suspension_k1": 1e12, "flexure_stiffness": 1e12})
+        it.set(command=4.0)
+        for _ in range(100):
+            it.step()
+        assert it.get("coil_current") == pytest.approx(1.0, rel=1e-6)
+        it.set(output_high=5.55)
+        for h in range(1, 8):
+            it.step()
+            settled = 5.55 / loop
+            decay = math.exp(-loop / inductance * h * H)
+            expected = settled + (1.0 - settled) * decay
+            # while the output is as low as it can be, until the current meets what it can hold
+            if it.get("output_clamped") == 1:
+                assert it.get("coil_current") == pytest.approx(expected, rel=1e-6)
+        assert it.get("output_clamped") == 1
+        it.set(output_high=14.0, current_limit=0.25)
+        for _ in range(100):
+            it.step()
+        assert it.get("coil_current") == pytest.approx(0.25, rel=1e-9)
+        assert it.get("command_limited") == 1
+        it.set(current_limit=2.5)
+        for _ in range(100):
+            it.step()
+        assert it.get("coil_current") == pytest.approx(1.0, rel=1e-9)
+
+
+def test_a_parameter_set_to_what_it_is_changes_no_bit(version: int) -> None:
+    with rig(version) as plain, rig(version) as tuned:
+        plain.begin()
+        tuned.begin()
+        for _ in range(300):
+            row = command(plain.time)
+            plain.set(current=row)
+            tuned.set(current=row, mu_s=0.72, mu_k=0.59, output_high=14.0, current_limit=2.504)
+            plain.step()
+            tuned.step()
+        assert plain.outputs() == tuned.outputs()

@@ -17,7 +17,7 @@ from cosim.errors import BadInput
 from cosim.files.resources import REPOSITORY, circuits, fmu_sources
 from cosim.mechanics import package as fmu
 
-ROW = re.compile(r'^(INT_)?(PARAMETER|INPUT|OUTPUT)\((\w+), (.*)"(.*)"\)$', re.MULTILINE)
+ROW = re.compile(r'^(INT_)?(PARAMETER|TUNABLE|INPUT|OUTPUT)\((\w+), (.*)"(.*)"\)$', re.MULTILINE)
 
 
 def table() -> list[dict[str, Any]]:
@@ -58,14 +58,15 @@ def test_the_description_is_the_table(built: dict[int, Path], version: int) -> N
     assert len(rows) > 50
     assert [v.name for v in variables] == [row["name"] for row in rows]
     for variable, row in zip(variables, rows, strict=True):
-        assert variable.causality == row["causality"]
+        causality, tunable = row["causality"], row["causality"] == "tunable"
+        assert variable.causality == ("parameter" if tunable else causality)
         assert variable.unit == row["unit"]
         assert variable.description == row["text"]
         for key in ("start", "min", "max"):
             found = getattr(variable, key)
             assert (None if found is None else float(found)) == row.get(key)
-        if row["causality"] == "parameter":
-            assert variable.variability == "fixed"
+        if variable.causality == "parameter":
+            assert variable.variability == ("tunable" if tunable else "fixed")
     reals = [v.valueReference for v in variables if v.type in ("Real", "Float64")]
     integers = [v.valueReference for v in variables if v.type in ("Integer", "Int32")]
     assert reals == list(range(1, len(reals) + 1))

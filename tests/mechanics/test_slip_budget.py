@@ -35,7 +35,7 @@ def test_sticking_breaks_at_the_budget(way: str, side: int) -> None:
             surface, knots[1:] + np.array([1e-9, 0.0]), mu_s=MU_S, mu_k=MU_K,
             force_per_mass=FORCE / MASS, gravity=G, mu_plate=MU_PLATE,
         )  # fmt: skip
-        apart = abs(float(seen.z[-1]) - np.trapezoid(surface.velocities, knots))
+        apart = abs(float(seen["z"][-1]) - np.trapezoid(surface.velocities, knots))
         assert (apart < 1e-12) == sticks, (way, share)
 
 

@@ -1,7 +1,8 @@
 /* A stranger's FMU for the tests, of FMI 2.0 and of FMI 3.0, no more than an importer needs:
    J dw/dt = u - B w, solved exactly for an input that is held; y = D u, which feeds through;
    an array x of two (FMI 3.0), whose sum is added to u; a switch that turns u off; a whole number
-   that counts steps. With crash_at it ends its process there, with fail_at its step fails. */
+   that counts steps; a ball that falls from drop (m) and leaves the floor with half its speed v (m/s),
+   whose impacts lie anywhere within a step. With crash_at it ends its process there, with fail_at its step fails. */
 
 #include <math.h>
 #include <stdbool.h>
@@ -11,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { U, OMEGA, J, B, D, ALPHA, Y, CRASH_AT, FAIL_AT, X0, X1, Z, N_REALS };
+enum { U, OMEGA, J, B, D, ALPHA, Y, CRASH_AT, FAIL_AT, X0, X1, FALLEN, V, DROP, N_REALS };
 enum { OFF = 20, STEPS = 21, X = 30, XS = 31 };
 
 typedef void Log2(void *, const char *, int, const char *, const char *, ...);
@@ -49,6 +50,21 @@ static int step(Model *m, double time, double h)
             m->log3(NULL, 3, "error", "the bearing is worn out");
         return 3;
     }
+    const double g = 9.81;
+    for (double left = h; left > 0.0;) {
+        const double v = m->r[V], height = fmax(m->r[DROP] - m->r[FALLEN], 0.0);
+        const double hit = (v + sqrt(v * v + 2.0 * g * height)) / g;
+        const double part = fmin(hit, left);
+        if (fabs(v) < 1e-6 && height == 0.0)
+            break; /* it lies there */
+        m->r[FALLEN] -= v * part - 0.5 * g * part * part;
+        m->r[V] -= g * part;
+        if (hit <= left) {
+            m->r[FALLEN] = m->r[DROP];
+            m->r[V] *= -0.5;
+        }
+        left -= part;
+    }
     const double u = input(m), rest = u / m->r[B];
     m->r[OMEGA] = rest + (m->r[OMEGA] - rest) * exp(-h * m->r[B] / m->r[J]);
     m->time = time + h;
@@ -60,6 +76,7 @@ static Model *make(void)
 {
     Model *m = calloc(1, sizeof *m);
     m->r[J] = 2e-4, m->r[B] = 1e-4, m->r[D] = 1.0;
+    m->r[DROP] = 0.01;
     m->r[CRASH_AT] = m->r[FAIL_AT] = 1e9;
     return m;
 }

@@ -16,6 +16,8 @@ _REALS = (
     ("y", 6, "output", "", ""),
     ("crash_at", 7, "parameter", 'start="1e9"', "s"),
     ("fail_at", 8, "parameter", 'start="1e9"', "s"),
+    ("v", 12, "output", "", "m/s"),
+    ("drop", 13, "parameter", 'start="0.01"', "m"),
 )
 
 
@@ -74,7 +76,8 @@ def _two(saves: bool, through: bool, derivative: bool, fixed: bool) -> str:
         + _abilities(saves, fixed, "FMUstate")
         + f"<ModelVariables>{''.join(rows)}</ModelVariables><ModelStructure><Outputs>"
         + f'<Unknown index="2"/><Unknown index="6"/><Unknown index="7"{depends}/>'
-        + '<Unknown index="11"/></Outputs></ModelStructure></fmiModelDescription>'
+        + '<Unknown index="10"/><Unknown index="13"/></Outputs>'
+        + "</ModelStructure></fmiModelDescription>"
     )
 
 
@@ -103,5 +106,6 @@ def _three(saves: bool, through: bool, derivative: bool, fixed: bool) -> str:
         + f"<ModelVariables>{''.join(rows)}</ModelVariables><ModelStructure>"
         + '<Output valueReference="1"/><Output valueReference="5"/>'
         + f'<Output valueReference="6"{depends}/><Output valueReference="21"/>'
-        + '<Output valueReference="31"/></ModelStructure></fmiModelDescription>'
+        + '<Output valueReference="12"/><Output valueReference="31"/>'
+        + "</ModelStructure></fmiModelDescription>"
     )

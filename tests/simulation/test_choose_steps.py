@@ -8,8 +8,7 @@ import pytest
 from cosim.errors import NoEffect, SimulationFailed
 from cosim.scene import Scene, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.accuracy.cases import CASES
-from cosim.studies.accuracy.runs import reference
+from cosim.studies.accuracy.cases import CASES, reference
 
 pytestmark = pytest.mark.physics
 

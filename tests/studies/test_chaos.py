@@ -14,12 +14,10 @@ def test_a_chaotic_scene_is_told_from_one_that_is_not() -> None:
     assert growth(SCENE) > CHAOTIC > growth(())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "other",
-    [
-        ("circuit.reltol=3e-6",),
-        pytest.param(METHODS["mean current, 0.2 ms"], marks=pytest.mark.slow),
-    ],
+    [("circuit.reltol=3e-6",), METHODS["mean current, 0.2 ms"]],
 )
 def test_methods_agree_in_what_an_ensemble_leaves_certain(other: Sequence[str]) -> None:
     """And a coil a third weaker does not: the spread does not hide everything."""

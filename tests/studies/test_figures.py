@@ -17,7 +17,7 @@ from benchmarks import charts
 from cosim.files.picture import Picture
 from cosim.studies.accuracy import accuracy
 from cosim.studies.accuracy import solvers as methods
-from cosim.studies.accuracy.runs import FALSE_CYCLE, Run
+from cosim.studies.accuracy.solvers import FALSE_CYCLE, Run
 from cosim.studies.stability import stability
 from cosim.studies.stability.stability import METHODS, Limit
 

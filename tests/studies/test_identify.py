@@ -18,7 +18,7 @@ from cosim.evaluate.store import Store
 from cosim.stepper import stepper
 from cosim.studies.identify import run
 from cosim.studies.identify.chain import chain
-from cosim.studies.identify.problem.space import read_space
+from cosim.studies.identify.problem.space import Space, read_space
 from cosim.studies.identify.problem.targets import (
     FINE_STEP,
     SEARCH_STEP,
@@ -30,9 +30,8 @@ from cosim.studies.identify.report.scenes import Settings, scene, trial_settings
 from cosim.studies.identify.report.verdicts import judge, rigs_meant
 from cosim.studies.identify.run import identify
 from cosim.studies.identify.search import plan
-from cosim.studies.identify.search.finish import finish
 from cosim.studies.identify.search.plan import QUICK, Effort, Searched
-from cosim.studies.identify.search.search import Found, Search
+from cosim.studies.identify.search.search import Found, Search, finish
 from cosim.trials.camera import FRAME_RATE, hermite
 from cosim.trials.recording import Recording
 
@@ -62,9 +61,9 @@ HELD = 0.6
 """Of the ranges, that hold the truth; ranges of 90 % that two short searches tell."""
 
 
-def place() -> Array:
+def point() -> Array:
     space = read_space()
-    return space.place(np.array([RIG[key] for key in space.names]))
+    return space.point(np.array([RIG[key] for key in space.names]))
 
 
 def record(label: str, frames: int, seed: int | None = 0) -> dict[str, Array]:
@@ -72,8 +71,9 @@ def record(label: str, frames: int, seed: int | None = 0) -> dict[str, Array]:
     time = np.arange(frames) / FRAME_RATE
     own = np.array(OWN[label])
     trial = _trial(time)
-    settings, first = trial_settings(read_space(), place(), trial, own)
-    settings = read_space().settings(place()) | settings
+    rig = read_space().settings(point())
+    settings, first = trial_settings(rig, trial, own)
+    settings = rig | settings
     settings |= {"run.duration": first + float(time[-1]) + 1e-3, "run.output_step": 1e-4}
     waves = cosim.run(scene(settings, "limited")).waveforms
     found = {"time": time}
@@ -137,7 +137,7 @@ def test_steps_agree_with_the_exact_rung(label: str) -> None:
     for step in (SEARCH_STEP, FINE_STEP):
         zeros = np.zeros(len(stepper.OWN))
         target = chain.Target(exact["time"], {}, {}, frozenset(), zeros, zeros, zeros, step)
-        found = chain.simulate(target, space.rigs(place()[None]), own[None])[0]
+        found = chain.simulate(target, space.rigs(point()[None]), own[None])[0]
         apart[step] = [
             nrmse(found[f"z_{body}"][0] - found[f"z_{body}"][0][0], z - z[0])
             for body in ("surface", "part")
@@ -168,7 +168,7 @@ def test_each_lane_has_its_own_machine() -> None:
 @pytest.mark.physics
 def test_a_measured_current_replaces_the_drive(tmp_path: Path) -> None:
     """The current of a run, told to the chain, moves it as the run did."""
-    settings: Settings = {**read_space().settings(place()), "drive.frequency": 20.0}
+    settings: Settings = {**read_space().settings(point()), "drive.frequency": 20.0}
     settings["run.duration"] = 0.2
     waves = cosim.run(scene(settings | {"run.output_step": 2.5e-4}, "limited")).waveforms
     columns = {name: waves[name].values for name in ("time", "current", "z_surface", "z_part")}
@@ -177,13 +177,13 @@ def test_a_measured_current_replaces_the_drive(tmp_path: Path) -> None:
     (trial,) = read_trials(tmp_path, space)
     assert not trial.target.scale[[0, 1, 2, 3, 6]].any()
     own = np.array([0, 0, 0, 0, 0, 0.5, 1.0])
-    found = chain.simulate(trial.fine, space.rigs(place()[None]), own[None])[0]
+    found = chain.simulate(trial.fine, space.rigs(point()[None]), own[None])[0]
     assert nrmse(found["z_surface"][0], columns["z_surface"]) < 0.05
 
 
 @pytest.mark.physics
 def test_own_numbers_are_found_on_the_true_rig(search: Search) -> None:
-    found = search.screen(place()[None], np.random.default_rng(2), 512, 16, 6)[0]
+    found = search.screen(point()[None], np.random.default_rng(2), 512, 16, 6)[0]
     assert found.costs.max() < 0.01
     assert found.costs.mean() < 5e-3
     truth = np.array([OWN[label] for label in OWN])
@@ -196,7 +196,7 @@ def test_own_numbers_are_found_on_the_true_rig(search: Search) -> None:
 def test_a_rig_is_recovered_from_a_start_nearby(search: Search) -> None:
     """By far less than the full search, so that it only must come closer."""
     rng = np.random.default_rng(3)
-    beside = np.clip(place() + 0.03 * rng.choice([-1.0, 1.0], len(place())), 0.0, 1.0)
+    beside = np.clip(point() + 0.03 * rng.choice([-1.0, 1.0], len(point())), 0.0, 1.0)
     start = search.screen(beside[None], rng, 96, 6, 4)[0]
     found = search.nested(start, rng, 40, 0.03, quiet)
     assert found.total < 0.5 * start.total
@@ -235,7 +235,7 @@ def test_nine_trials_give_their_rig_back(nine: list[Measured]) -> None:
     true = np.array([KNOWN["rig"][key] for key in space.names])
     found = min((_from_beside(nine, true, seed) for seed in (1, 2, 3)), key=lambda one: one.total)
     assert found.costs.mean() <= 0.005
-    share = dict(zip(space.names, space.values(found.place) / true, strict=True))
+    share = dict(zip(space.names, space.values(found.point) / true, strict=True))
     for key in (
         *("mechanics.surface_mass", "mechanics.flexure_stiffness", "friction.mu_plate"),
         *("mechanics.suspension_k2", "mechanics.suspension_k3", "coil.force_factor"),
@@ -248,10 +248,10 @@ def _from_beside(trials: list[Measured], true: Array, seed: int) -> Found:
     space, rng = read_space(), np.random.default_rng(seed)
     coarse = Search(space, [trial.target for trial in trials], 2)
     fine = Search(space, [trial.fine for trial in trials], 2)
-    beside = space.place(true) + 0.06 * rng.choice([-1.0, 1.0], len(true))
+    beside = space.point(true) + 0.06 * rng.choice([-1.0, 1.0], len(true))
     found = coarse.screen(np.clip(beside, 0.0, 1.0)[None], rng, 256, 16, 4)[0]
     found = coarse.nested(coarse.rescreened(found, rng, 256, 16, 4), rng, 250, 0.05, quiet)
-    found = fine.rescreened(fine.refined(found.place, found.own, 5), rng, 256, 16, 4)
+    found = fine.rescreened(fine.refined(found.point, found.own, 5), rng, 256, 16, 4)
     return finish(fine, found, 60)
 
 
@@ -266,11 +266,12 @@ def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(
     given = (f'[rig."{key}"]\nvalue = {value}\n' for key, value in RIG.items() if key not in free)
     bounds = tmp_path / "bounds.toml"
     bounds.write_text("".join(given))
-    brief = Effort(1, 12, ((2, 15, 0.12), (1, 30, 0.06)), ((1, 15, 0.1),), 1, 1)
+    brief = Effort(1, 6, ((2, 6, 0.12), (1, 12, 0.06)), ((1, 6, 0.1),), 1, 1)
     monkeypatch.setattr(run, "QUICK", brief)
-    monkeypatch.setattr(plan, "SCREENED", 32)
-    monkeypatch.setattr(plan, "AGAIN", (64, 8, 3))
-    monkeypatch.setattr(plan, "CAREFUL", (128, 8, 3))
+    monkeypatch.setattr(plan, "SCREENED", 16)
+    monkeypatch.setattr(plan, "AGAIN", (32, 6, 3))
+    monkeypatch.setattr(plan, "CAREFUL", (64, 6, 3))
+    monkeypatch.setattr(plan, "LAST", 10)
     more: dict[str, Any] = {"bounds": bounds, "quick": True, "seed": 4}
     whole = identify(tmp_path, workers=2, out=tmp_path / "out", **more)
     plain, done = Store.add, [0]
@@ -307,19 +308,21 @@ def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(
 
 
 def test_a_store_of_another_build_is_not_taken(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Its stages would stand among those of this one."""
     asked = run._asked(read_space(), [], QUICK)
-    assert asked == run._asked(read_space(), [], QUICK)
-    monkeypatch.setattr(run, "digest", lambda name: f"another {name}")
-    assert asked != run._asked(read_space(), [], QUICK)
+    with Store(tmp_path / "of.sqlite", *asked) as store:
+        store.add("a stage", 1)
+    monkeypatch.setattr("cosim.evaluate.store.digest", lambda name: f"another {name}")
+    with pytest.raises(BadInput, match="belongs to other work"):
+        Store(tmp_path / "of.sqlite", *run._asked(read_space(), [], QUICK))
 
 
-def made_up(place: Array, cost: float, amplitude: float = 7.0) -> Found:
+def made_up(space: Space, place: Array, cost: float, amplitude: float = 7.0) -> Found:
     own = np.tile(np.array(OWN["1"]), (2, 1))
     own[:, 0] = amplitude
-    return Found(place, own, np.full(2, cost), cost)
+    return Found(space, place, own, np.full(2, cost), cost)
 
 
 def test_verdicts() -> None:
@@ -327,30 +330,34 @@ def test_verdicts() -> None:
     every law whose searches agree, and what is reported."""
     cubic, knee = read_space(), read_space().of_law("knee")
     middle, other = np.full(len(cubic.free), 0.5), np.full(len(knee.free), 0.52)
-    best = made_up(middle, 0.1)
+    best = made_up(cubic, middle, 0.1)
     turned = []
     for turn in np.linspace(-0.35, 0.35, 6):
         moved = middle.copy()
         moved[0] += turn  # the force factor, and the amplitude against it
         ratio = float(cubic.values(middle)[0] / cubic.values(moved)[0])
-        turned.append(made_up(moved, 0.1002, 7.0 * ratio))
+        turned.append(made_up(cubic, moved, 0.1002, 7.0 * ratio))
     far = middle.copy()
     far[:] = 0.9
-    ends = [best, made_up(middle + 0.01, 0.1015)]
-    told = Searched(cubic, ends, [best, *turned, made_up(far, 0.12)])
-    split = Searched(knee, [made_up(other, 0.11), made_up(other, 0.15)], [made_up(other, 0.11)])
-    agreed = Searched(knee, [made_up(other, 0.11), made_up(other, 0.111)], [made_up(other, 0.11)])
+    ends = [best, made_up(cubic, middle + 0.01, 0.1015)]
+    told = Searched(ends, [best, *turned, made_up(cubic, far, 0.12)])
+    split = Searched(
+        [made_up(knee, other, 0.11), made_up(knee, other, 0.15)], [made_up(knee, other, 0.11)]
+    )
+    agreed = Searched(
+        [made_up(knee, other, 0.11), made_up(knee, other, 0.111)], [made_up(knee, other, 0.11)]
+    )
 
-    unknown = Searched(cubic, [best], [best, *turned, made_up(far, 0.16)])
-    for several in ([unknown], [Searched(cubic, [best, made_up(far, 0.12)], [best]), split]):
+    unknown = Searched([best], [best, *turned, made_up(cubic, far, 0.16)])
+    for several in ([unknown], [Searched([best, made_up(cubic, far, 0.12)], [best]), split]):
         meant = rigs_meant(several, 400.0)
-        kinds = {one.kind for one in judge((cubic, best), meant, False)}
+        kinds = {one.kind for one in judge(best, meant, False)}
         assert kinds == {"not converged", "law"}
     assert len(rigs_meant([unknown], 400.0)) == 8, "of a single search: far is left out"
 
     for several, most in (([told, split], 0.51), ([told, agreed], 0.52)):
         meant = rigs_meant(several, 400.0)
-        found = {one.key: one for one in judge((cubic, best), meant, True)}
+        found = {one.key: one for one in judge(best, meant, True)}
         mass = found["mechanics.surface_mass"]
         k = cubic.names.index(mass.key)
         ends_of = [cubic.values(np.full(len(middle), x))[k] for x in (0.5, most)]
@@ -367,9 +374,9 @@ def test_effective_samples_count_what_is_new(folder: Path) -> None:
     share (1 - a)/(1 + a), as theory has it."""
     space = read_space()
     (trial,) = [one for one in read_trials(folder, space) if one.label == "5"]
-    rig, own = space.rigs(place()[None])[0], np.array(OWN["5"])
+    rig, own = space.rigs(point()[None])[0], np.array(OWN["5"])
     exact, rng, found = shown(trial, rig, own)["v_surface"], np.random.default_rng(0), {}
-    whole = Found(place(), own[None], np.zeros(1), 0.0)
+    whole = Found(space, point(), own[None], np.zeros(1), 0.0)
     for a in (0.0, 0.7):
         counts = []
         for _ in range(20):
@@ -378,7 +385,7 @@ def test_effective_samples_count_what_is_new(folder: Path) -> None:
                 noise[k] = a * noise[k - 1] + (1.0 - a**2) ** 0.5 * noise[k]
             signals = {**trial.fine.signals, "v_surface": exact + 1e-3 * noise}
             noisy = replace(trial, fine=replace(trial.fine, signals=signals))
-            counts.append(samples([noisy], space, whole))
+            counts.append(samples([noisy], whole))
         found[a] = float(np.median(counts)) / len(exact)
     assert 0.3 < found[0.0] <= 1.0
     assert 0.5 * 0.3 / 1.7 < found[0.7] < 1.5 * 0.3 / 1.7
@@ -439,7 +446,7 @@ def test_missing_frames_have_no_residual(folder: Path, tmp_path: Path) -> None:
         columns["z_surface"][:2] = np.nan
         write(tmp_path, label, columns)
     own = np.array([OWN[label] for label in OWN])
-    rigs, worst = np.repeat(space.rigs(place()[None]), 3, axis=0), []
+    rigs, worst = np.repeat(space.rigs(point()[None]), 3, axis=0), []
     for where in (folder, tmp_path):
         trials = read_trials(where, space)
         found, costs = chain.refine([one.fine for one in trials], rigs, own.copy(), 3, 1)

@@ -9,7 +9,7 @@ import pytest
 from cosim.cli.main import main
 from cosim.evaluate.store import Store
 from cosim.studies.accuracy.cases import CASES
-from cosim.studies.accuracy.runs import measure
+from cosim.studies.accuracy.solvers import measure
 from cosim.studies.speed import ladder
 from cosim.studies.stability import stability as limits
 from tests.studies.test_tables import solver

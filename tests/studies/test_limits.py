@@ -21,7 +21,7 @@ from cosim.evaluate.store import Store
 from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
 from cosim.search.turns import TURN, turned
-from cosim.studies.limits import judge, report, runs, study
+from cosim.studies.limits import judge, report, runs, search, study
 from cosim.studies.limits.answer import BY_NAME, gain_on, gains, noise
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, FREE, STEPS, Machine
 from cosim.studies.limits.judge import Key, Point
@@ -263,6 +263,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Figure] = []
     monkeypatch.setattr(Picture, "write", lambda figure, *where: drawn.append(figure))
     names = ("as it is", "sine", "heat 7 W")
+    monkeypatch.setattr(search, "KEPT", 1)
     monkeypatch.setattr(report, "CHANGES", [NAMED[name] for name in names])
     monkeypatch.setattr(report, "FULL", Efforts((FEW, Effort(0, 3, 2)), (FEW, FEW), 1))
     scene = load("reference", {"run.duration": 0.2})

@@ -18,8 +18,7 @@ from cosim.simulation.simulate import simulate
 from cosim.studies.identify.problem.gauges import GAUGES
 from cosim.studies.identify.problem.space import Space, read_space
 from cosim.studies.identify.problem.targets import read_trials
-from cosim.studies.identify.search.finish import finish
-from cosim.studies.identify.search.search import SAMPLES, Found, Search
+from cosim.studies.identify.search.search import SAMPLES, Found, Search, finish
 from cosim.studies.limits.study import ensemble
 from cosim.studies.measure import measure as study
 from cosim.studies.measure import sample as sampling
@@ -27,7 +26,7 @@ from cosim.studies.measure.measure import report, worths
 from cosim.studies.measure.sample import CANDIDATES, KEPT, SPREAD, TARGETS, Sample, drawn, whole
 from cosim.studies.measure.worth import FEWEST, chance, interval, likely, worth
 from tests.studies.test_figures import assert_legible
-from tests.studies.test_identify import OWN, folder, place
+from tests.studies.test_identify import OWN, folder, point
 
 __all__ = ["folder"]
 
@@ -117,17 +116,17 @@ def test_a_measurement_weighs_as_in_a_likelihood(tmp_path: Path) -> None:
     as much as the cost's growth by a share of one in the effective samples; of all laws."""
     text = '[measured.travel]\nvalue = 4e-3\nsd = 1e-4\n[measured."force factor"]\n'
     space = space_with(tmp_path, text + "value = 1.5\nsd = 0.1\n").of_law("knee")
-    places = np.repeat(np.full((1, len(space.free)), 0.4), 2, axis=0)
-    values = space.values(places)
+    points = np.repeat(np.full((1, len(space.free)), 0.4), 2, axis=0)
+    values = space.values(points)
     values[:, space.names.index("mechanics.travel")] = 2e-3
     values[0, space.names.index("coil.force_factor")] = 1.3
     values[1, space.names.index("coil.force_factor")] = 1.5
-    places = space.place(values)
-    assert np.abs(space.misses(places)) == pytest.approx(
+    points = space.point(values)
+    assert np.abs(space.residuals(points)) == pytest.approx(
         np.array([[0.0, 2.0], [0.0, 0.0]]), abs=1e-6
     )
     costs = np.full((2, 9), 0.1)
-    apart = Search(space, [], 1).totals(costs, places) - space.prior(places)
+    apart = Search(space, [], 1).totals(costs, points) - space.prior(points)
     assert 9.0 * SAMPLES * (apart[0] / apart[1] - 1.0) == pytest.approx(4.0)
 
 
@@ -135,15 +134,15 @@ def test_a_measurement_weighs_as_in_a_likelihood(tmp_path: Path) -> None:
 def test_the_finish_goes_to_what_was_measured(folder: Path, tmp_path: Path) -> None:
     """Trials of a known rig from beside it, with the travel measured far from the truth: the finer
     that is, the nearer the finish comes to it."""
-    true = read_space().settings(place())["mechanics.travel"]
+    true = read_space().settings(point())["mechanics.travel"]
     found = []
     for sd in (1e-2, 1e-6):
         text = f"[measured.travel]\nvalue = {2.06 * true}\nsd = {sd}\n"
         space = space_with(tmp_path, text)
         search = Search(space, [trial.fine for trial in read_trials(folder, space)], 2)
         own = np.array([OWN[label] for label in OWN])
-        start: Found = search.refined(place(), own, 2)
-        found.append(space.settings(finish(search, start, 8).place)["mechanics.travel"] / true)
+        start: Found = search.refined(point(), own, 2)
+        found.append(space.settings(finish(search, start, 8).point)["mechanics.travel"] / true)
     assert found[0] == pytest.approx(1.0, abs=0.01)
     assert found[1] == pytest.approx(1.03, abs=0.002)
 

@@ -7,14 +7,21 @@ from cosim.studies.stability.stability import LONGEST, observed, predicted
 
 pytestmark = pytest.mark.physics
 
+SLOPE = "EMF's slope, linear current"
+
 
 @pytest.mark.parametrize(
     ("method", "regime"),
     [
-        ("Jacobi k = 0", Regime(DIRECT, "saturated")),
         ("Gauss-Seidel k = 1", Regime(DIRECT, "saturated")),
-        ("EMF's slope, linear current", Regime(REFERENCE, "saturated", slips=True)),
-        ("EMF's slope, linear current", Regime(REFERENCE, "saturated", cut="coil in mechanics")),
+        *(
+            pytest.param(*one, marks=pytest.mark.slow)
+            for one in (
+                ("Jacobi k = 0", Regime(DIRECT, "saturated")),
+                (SLOPE, Regime(REFERENCE, "saturated", slips=True)),
+                (SLOPE, Regime(REFERENCE, "saturated", cut="coil in mechanics")),
+            )
+        ),
     ],
 )
 def test_prediction_and_observation_agree(method: str, regime: Regime) -> None:

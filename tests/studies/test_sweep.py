@@ -139,7 +139,7 @@ def test_worker_that_keeps_dying() -> None:
             for worker in [each() for each in list(processes._living.values())]:
                 # Only that point takes so long.
                 begun = hasattr(worker, "_process")
-                if worker is not None and begun and worker.alive and worker.reached > 1.0:
+                if worker is not None and begun and worker.alive and worker.reached > 0.3:
                     worker._process.kill()
             time.sleep(0.05)
 

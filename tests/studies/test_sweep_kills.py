@@ -51,7 +51,7 @@ def kept(out: Path, *, failed: bool = False) -> int:
 @pytest.mark.parametrize(
     ("scene", "points", "kills"),
     [
-        (THREADS, 4, 2),
+        (THREADS, 3, 1),
         pytest.param(PROCESSES, 4, 1, marks=pytest.mark.slow),
         *(pytest.param(scene, 10, 6, marks=pytest.mark.slow) for scene in SHORT),
     ],

@@ -11,9 +11,8 @@ from cosim.errors import SimulationFailed
 from cosim.evaluate.store import Store
 from cosim.scene import Scene
 from cosim.studies.accuracy.accuracy import error_in, order, time_to
-from cosim.studies.accuracy.cases import CASES, Case
-from cosim.studies.accuracy.runs import FALSE_CYCLE, Run, measure, reference
-from cosim.studies.accuracy.solvers import Outcome, Solver
+from cosim.studies.accuracy.cases import CASES, Case, reference
+from cosim.studies.accuracy.solvers import FALSE_CYCLE, Outcome, Run, Solver, measure
 from cosim.studies.tables import write_csv, write_page
 
 REFERENCE = CASES["reference"]

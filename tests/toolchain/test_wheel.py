@@ -65,7 +65,7 @@ def test_the_source_distribution_is_complete(sdist: Path, tmp_path: Path) -> Non
 
 def test_the_wheel_is_for_this_platform_and_any_python(wheel: Path) -> None:
     platform = sysconfig.get_platform().replace("-", "_").split("_")[0]
-    assert wheel.name.startswith("cosim-")
+    assert wheel.name.startswith("ngcosim-")
     assert f"-py3-none-{platform}" in wheel.name
 
 
@@ -90,7 +90,7 @@ def test_the_wheel_holds_what_a_run_needs_and_nothing_of_the_checkout(wheel: Pat
         *(path.relative_to(build_c.ROOT).as_posix() for path in scenes),
     }
     assert len(compiled) > 50 and wanted - names == set()
-    assert {name.split("/")[0].split("-")[0] for name in names} == {"cosim"}
+    assert {name.split("/")[0].split("-")[0] for name in names} == {"cosim", "ngcosim"}
     assert licences == [
         "License-Expression: GPL-3.0-or-later AND BSD-2-Clause",
         "License-File: LICENSE",
@@ -139,8 +139,23 @@ def test_what_builds_it_is_what_the_lock_has() -> None:
     (needed,) = tomllib.loads((build_c.ROOT / "pyproject.toml").read_text())["build-system"][
         "requires"
     ]
-    lock = (build_c.ROOT / "requirements.lock").read_text().splitlines()
+    lock = (build_c.ROOT / "requirements/run.lock").read_text().splitlines()
     assert "==" in needed and f"{needed} \\" in lock
+
+
+def test_locks_are_hashed_agree_and_name_no_registry() -> None:
+    texts = {path.stem: path.read_text() for path in (build_c.ROOT / "requirements").iterdir()}
+    assert {*texts} == {"run", "test", "dev", "dist", "docs"}
+    pins = {
+        name: dict(re.findall(r"^([\w.-]+)==(\S+)", text, re.M)) for name, text in texts.items()
+    }
+    for name, text in texts.items():
+        entries = re.split(r"\n(?=[^\s#])", text.partition("make lock\n")[2])
+        assert all("==" in entry and "--hash=sha256:" in entry for entry in entries)
+        assert "://" not in text
+        if name != "docs":  # its environment is its own
+            assert pins["run"].items() <= pins[name].items()
+    assert pins["test"].items() <= pins["dev"].items()
 
 
 def test_actions_are_pinned() -> None:

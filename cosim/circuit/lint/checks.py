@@ -5,13 +5,12 @@ What cannot be decided without evaluating the netlist passes.
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import takewhile
 
 from cosim.circuit.lint.deck import Line, refuse, shown
 from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed
 from cosim.circuit.lint.topology import check_topology
-from cosim.circuit.lint.words import word_set, words
+from cosim.circuit.lint.words import word_set
 
 REQUIRED = (("vemf", "vcommand"), ("vemf", "vdac", "voffset"))
 """Alternatives, each a set of top-level voltage sources that a co-simulation can replace."""
@@ -19,14 +18,14 @@ REQUIRED = (("vemf", "vcommand"), ("vemf", "vdac", "voffset"))
 _NUMBER = re.compile(r"[+-]?(?:\d|\.\d)")
 _WAVES = {"pulse": 7, "sin": 6, "exp": 6}
 """Most values of each: one more is a number of periods in LTspice, and a phase in ngspice."""
-_FOREIGN = {
-    "d": ("roff vfwd vrev rrev ilimit revilimit epsilon revepsilon",
-          "LTspice's ideal diode; write is, n and rs, or a B source"),
-    "s": ("lser vser ilimit epsilon", "LTspice's own; write the part apart"),
-    "w": ("lser vser ilimit epsilon", "LTspice's own; write the part apart"),
-}  # fmt: skip
-"""Parameters of models that change the device and that ngspice would ignore."""
-_BELOW = re.compile(r"\b[vi]h\s*=\s*[{']?\s*-\s*[.\d]", re.IGNORECASE)
+_FOREIGN = (
+    ("d", re.compile(r"\b(roff|vfwd|vrev|rrev|(?:rev)?(?:ilimit|epsilon))\s*="),
+     "is LTspice's ideal diode; write is, n and rs, or a B source"),
+    ("sw", re.compile(r"\b(lser|vser|ilimit|epsilon)\s*="), "is LTspice's own; write it apart"),
+    ("sw", re.compile(r"\b([vi]h)\s*=\s*[{']?\s*-"),
+     "below 0 is LTspice's smooth switch; give one of 0, or write a B source"),
+)  # fmt: skip
+"""What models of these elements mean in LTspice alone, and ngspice would ignore."""
 _NO_VALUES = {"m", "temp", "dtemp", "tc", "tc1", "tc2", "ic", "scale", "noisy"}
 _WAVEFORMS = word_set(
     """dc ac pulse sin exp pwl sffm am trnoise trrandom external distof1 distof2 portnum z0 pwr freq
@@ -116,16 +115,10 @@ def _check_model(element: Element, scope: Scope) -> None:
         element.refuse(f": no model {shown(name)} is defined here{COPY}")
     _check_type(element, name, types)
     line = next((s.model_lines[name] for s in scope.chain() if name in s.model_lines), None)
-    foreign, cure = _FOREIGN.get(element.kind, ("", ""))
-    for key in foreign.split() if line is not None else ():
-        if any(word.startswith(f"{key}=") for word in words(line.text)):
-            refuse(line, f"{key} of {shown(name)} is {cure}")
-    if line is not None and element.kind in "sw" and _BELOW.search(line.text):
-        refuse(
-            line,
-            f"a hysteresis below 0 is LTspice's smooth switch, which ngspice lacks; give "
-            f"{shown(name)} one of 0, or write a B source",
-        )
+    text = line.text.lower() if line else ""
+    for kinds, parameter, cure in _FOREIGN:
+        if line and element.kind in kinds and (found := parameter.search(text)):
+            refuse(line, f"{found[1]} of {shown(name)} {cure}")
 
 
 def _check_type(element: Element, model: str, types: set[str]) -> None:
@@ -152,9 +145,9 @@ def _check_passive(element: Element, scope: Scope, names: Names) -> None:
 
 def _check_source(element: Element, scope: Scope, names: Names) -> None:
     for wave, most in _WAVES.items():
-        place = element.words.index(wave) + 1 if wave in element.words else len(element.words)
-        values = takewhile(_is_value, element.words[place:])
-        if len([*values]) > most:
+        after = element.words[element.words.index(wave) + 1 :] if wave in element.words else []
+        ends = (k for k, word in enumerate(after) if word in _WAVEFORMS or "=" in word)
+        if next(ends, len(after)) > most:
             element.refuse(
                 f": {wave.upper()} takes {most} values; one more means a number of periods to "
                 "LTspice and a phase to ngspice"
@@ -171,10 +164,6 @@ def _check_source(element: Element, scope: Scope, names: Names) -> None:
         if known or "=" in word or _NUMBER.match(word) or plain[:1] in ("{", "'", ""):
             continue
         element.refuse(f": {shown(word)} is neither a number, a parameter nor a waveform")
-
-
-def _is_value(word: str) -> bool:
-    return word not in _WAVEFORMS and "=" not in word
 
 
 def _check_current_controlled(element: Element, scope: Scope) -> None:

@@ -76,7 +76,9 @@ _PATH = re.compile(r"""\s*(?:"([^"]*)"|'([^']*)'|([^\s"']+))\s*([^\s"']*)\s*""")
 _NAMED = re.compile(
     r"""^[ \t]*\.(?:include|inc|lib)[\s+]+(?:"([^"\n]+)|'([^'\n]+)|([^\s"']+))""", re.I | re.M
 )
-_STANDARD = re.compile(r"\bstandard\.\w{3}\b", re.IGNORECASE)
+_STANDARD = re.compile(
+    r"(?<![\w.-])standard\.(?:bjt|dio|mos|jft|cap|ind|res|bead)\b", re.IGNORECASE
+)
 """LTspice's own models, which it names wherever it draws a part, whether it needs them or not."""
 
 

@@ -56,7 +56,7 @@ class Measure:
         return [word for word in (self.of, *needed) if word and number(word) is None]
 
 
-def told(dropped: Sequence[Line]) -> Iterator[str]:
+def without_effect(dropped: Sequence[Line]) -> Iterator[str]:
     """A sentence for each line that was left out and might be missed."""
     for line in dropped:
         text = line.text.lower()
@@ -140,9 +140,24 @@ def _event(clauses: Sequence[tuple[str, str]]) -> Event:
     return Event("", left.strip(), right, delay, edges[0], 0 if which == "last" else int(which))
 
 
-def measured(each: Measure, time: Array, known: Mapping[str, Array]) -> float | None:
-    """The measurement's value, SI; None where an event does not happen. ``known`` are the values of
-    its words at the times (s)."""
+def measured(
+    every: Sequence[Measure], time: Array, known: Mapping[str, Array]
+) -> tuple[dict[str, float], list[str]]:
+    """The measurements by the names of a summary, and a sentence for each whose event does not
+    come. ``known`` are the values of their words at the times (s)."""
+    values, notes = {}, []
+    for each in every:
+        value = _value(each, time, known)
+        if value is not None:
+            values[f"meas.{each.name}"] = value
+        else:
+            where = f"{each.line.file}:{each.line.number}"
+            notes.append(f"{where}: .meas {each.name} has no value: its event does not come.")
+    return values, notes
+
+
+def _value(each: Measure, time: Array, known: Mapping[str, Array]) -> float | None:
+    """The measurement's value, SI; None where an event does not happen."""
 
     def at(words: str, place: float) -> float:
         return float(np.interp(place, time, values(words)))

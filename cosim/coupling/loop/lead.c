@@ -72,14 +72,14 @@ static const Piece *piece_at(Lead *c, double t)
 
 enum { EMF, GAIN, COMMAND, DAC, PIN, UNKNOWN };
 
-static int kind_of(const char *name)
+static int kind_of(const Lead *c, const char *name)
 {
-    static const char *const NAMES[] = {"vemf", "vgain", "vcommand", "vdac", "voffset"};
     for (int k = 0; k < UNKNOWN; k++) {
+        const char *const known = c->names[k];
         size_t i = 0;
-        while (NAMES[k][i] && tolower((unsigned char)name[i]) == NAMES[k][i])
+        while (known[i] && tolower((unsigned char)name[i]) == known[i])
             i++;
-        if (NAMES[k][i] == name[i]) /* both at their end */
+        if (known[i] == name[i]) /* both at their end */
             return k;
     }
     return UNKNOWN;
@@ -285,7 +285,7 @@ EXPORT int lead_source(double *voltage, double time, const char *node, int ident
         *voltage = NAN;
         return 0;
     }
-    const int source = kind_of(node);
+    const int source = kind_of(c, node);
     if (source == UNKNOWN) {
         strncpy(c->source, node, sizeof c->source - 1);
         c->status = UNKNOWN_SOURCE;
@@ -359,6 +359,6 @@ int64_t loop_size(int which)
 {
     const size_t sizes[] = {sizeof(Fmu), sizeof(Schedule), sizeof(Recorder), sizeof(Lead),
                             sizeof(Piece), sizeof(Group),    sizeof(Source),   sizeof(Feed),
-                            sizeof(Stranger), sizeof(Pulse), sizeof(Ports)};
+                            sizeof(Stranger), sizeof(Pulse), sizeof(Through), sizeof(Ports)};
     return (int64_t)sizes[which];
 }

@@ -63,7 +63,7 @@ class Lead:
         scene: Scene,
         command: Command,
         recorder: Recorder,
-        deck: tuple[str, tuple[str, ...]] | None = None,
+        deck: tuple[str, dict[str, str]] | None = None,
         replay: npt.NDArray[np.float64] | None = None,
     ) -> None:
         """``deck`` and its saved vectors replace the scene's. With ``replay``, back-EMF (V),
@@ -74,7 +74,8 @@ class Lead:
         self._command = command
         self._recorder = recorder
         self._replay = replay
-        self._deck, self._saved = deck or prepare(scene)
+        self._deck, vectors = deck or prepare(scene)
+        self._saved, self._vectors = tuple(vectors), tuple(vectors.values())
         width = len(LOG) + len(self._saved)
         self._log = Tape(width)
         # With `uic`, ngspice accepts t = 0 before it has sent any value.
@@ -83,7 +84,6 @@ class Lead:
         self._pieces: list[Piece] = []
         self._row: Any = None
         self._time = 0.0
-        fineness = (_COARSEST / scene.circuit.reltol) ** (1.0 / 3.0)
         coil, loop_resistance = scene.coil, scene.circuit.sense_resistance * scene.coil.count
         motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else -1
         swing = self._saved.index("v(swing)") if "v(swing)" in self._saved else -1
@@ -94,8 +94,8 @@ class Lead:
             gain=GAIN,
             v_offset=command.v_offset,
             count=coil.count,
-            after_jump=min(_AFTER_JUMP / fineness, _SHARE_AFTER_JUMP * scene.circuit.max_step),
-            fineness=fineness,
+            after_jump=after_jump(scene),
+            fineness=_fineness(scene),
             time_constant=coil.inductance / (coil.resistance + loop_resistance),
             range=scene.drive.amplitude or 1.0,
             emf_change=_EMF_CHANGE * scene.circuit.supply,
@@ -111,6 +111,10 @@ class Lead:
             refill=callback(self._refill, self._fail),
             attend=callback(self._attend, self._fail),
         )
+        named = scene.renamed
+        names = named.get("machine.back_emf", "vemf"), "vgain", named.get("drive", "vcommand")
+        for k, name in enumerate((*names, "vdac", "voffset")):
+            self.state.names[k].value = name.lower().encode()
         emf, slope, flux = recorder.mechanics.step_outputs[:3]
         self.state.flux_at_start = flux
         segment = self.state.segment
@@ -122,7 +126,7 @@ class Lead:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         state = self.state
         try:
-            engine().transient(self._deck, self._saved, self)
+            engine().transient(self._deck, self._vectors, self)
         finally:
             self._attend()
         if state.status == FMU_FAILED:
@@ -195,6 +199,15 @@ class Lead:
         self._pieces = kept + self._command.pieces(begin, self._duration, _PIECES)
         self._row = (Piece * len(self._pieces))(*self._pieces)
         state.pieces, state.n_pieces, state.piece = ctypes.addressof(self._row), len(self._row), 0
+
+
+def after_jump(scene: Scene) -> float:
+    """Longest step after a jump of the command, s."""
+    return min(_AFTER_JUMP / _fineness(scene), _SHARE_AFTER_JUMP * scene.circuit.max_step)
+
+
+def _fineness(scene: Scene) -> float:
+    return (_COARSEST / scene.circuit.reltol) ** (1.0 / 3.0)
 
 
 def engine() -> ngspice.Engine:

@@ -198,6 +198,7 @@ typedef struct Lead {
     int64_t status;
     int64_t stopped;              /* by Python: nothing is to be done any more */
     char source[64];              /* name of the one that nothing feeds */
+    char names[5][64];            /* of the back-EMF, its gain, the command, the DAC and the pin */
     void (*refill)(void);         /* makes the first piece the one that holds at `time` */
     void (*attend)(void);         /* empties the log */
 } Lead;
@@ -227,16 +228,20 @@ typedef struct {
 /* A source of the netlist; between two communication points a line. */
 typedef struct {
     char name[64];
-    Origin from;
+    Origin origin;
     double value, rate;        /* at the communication point; in a second */
-    double guess, off;         /* of the last attempt: the value at its end, and what it lacked */
+    double line;               /* the rate before any attempt changed it */
+    double through_rate;       /* in a second; what its Throughs had in the last step */
+    double plain, correction;  /* the value is their sum */
+    double owed;               /* of the FMU's integral, as in Lead */
+    double guess, off;         /* of the last attempt: its line at the end, and what it lacked */
     double response;           /* d off / d guess, as last seen */
     double largest;            /* magnitude of its value so far */
 } Source;
 
 /* An input of an FMU. */
 typedef struct {
-    Origin from;
+    Origin origin;
     int64_t feed;
     double *input;
     double *slope;             /* of LINE; else NULL */
@@ -258,6 +263,15 @@ typedef struct {
     int64_t width;
     int64_t moved;             /* steps in which an output changed */
 } Stranger;
+
+/* Where an FMU feeds a probe through to a source, the circuit itself carries that share: it adds the
+   gain times the probe to the source. */
+typedef struct {
+    int64_t source, probe, fmu, output; /* places */
+    double *input;             /* of the FMU */
+    double scale;              /* of both ports */
+    double gain;               /* as seen last */
+} Through;
 
 /* The edges of a PULSE, which ngspice can lose; see announce(). */
 typedef struct {
@@ -285,15 +299,21 @@ typedef struct Ports {
     int64_t driven;            /* whether a port is from it */
     Pulse *pulses;
     int64_t n_pulses;
+    Through *throughs;
+    int64_t n_throughs;
+    int64_t learn;             /* whether their gains are to be looked at */
     double macro_step;         /* s; 0: each accepted step ends on a communication point */
     double duration, after_jump;
+    double jumped;             /* s; the last jump, of the drive or of an FMU */
     double time, origin, end;  /* s; last accepted point; last and next communication point */
     double told, sent;         /* as in Lead */
     int64_t repeats;           /* whether attempts are repeated until they agree with the FMUs */
     int64_t stepped;           /* the FMUs have made the step of the last attempt */
     int64_t tries;             /* of the step under way */
+    int64_t met;               /* an event in the step under way, which is short enough */
     double tolerance;          /* of that agreement, relative to the source's largest value */
-    const char *const *asked;  /* what ngspice is asked for an attempt's saved values; or NULL */
+    const char *const *asked;  /* what ngspice is asked for an attempt's saved values */
+    int64_t n_probed;          /* of these, the first ones, lead to FMUs */
     AnyFunction command, ask, plot, announce; /* ngspice's */
     char plot_name[64];
     double *log, *points;      /* rows: time, sources, saved values; time, outputs */
@@ -315,7 +335,7 @@ int ports_data(const VectorValues *data);
 int ports_step(double time, double *delta, double old_delta, int redo, int location);
 
 EXPORT int64_t loop_size(int which); /* bytes of Fmu, Schedule, Recorder, Lead,
-                                                 Piece, Group, Source, Feed, Stranger, Pulse,
+                                                 Piece, Group, Source, Feed, Stranger, Pulse, Through,
                                                  Ports */
 
 #endif

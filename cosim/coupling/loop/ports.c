@@ -13,6 +13,7 @@
 #include <ctype.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const double ON_TIME = 1e-13; /* s; as in lead.c */
@@ -22,7 +23,23 @@ static const double SHORT = 1e-3;
 
 static const int64_t ATTEND_EVERY = 4096; /* as in lead.c */
 
+static const double HALF = 0.49, LAST = 1e-3;
+/* ngspice cuts a repeated step if another one as long would end beyond the run's end, from where the
+   first one ended. So steps shrink before it; of after_jump: the last one, which is not repeated. */
+
 static const int64_t MOST_TRIES = 25; /* of one step with one length */
+
+static const double EVENT = 3e-3, EVENT_WITHIN = 1e-9;
+/* Of a source's largest value: by how much it leaves its line at an event of an FMU; s: the length
+   of a step within which the event then lies. */
+
+static const double GROWTH = 0.07;
+/* Of the time since the last jump: the longest step. By its truncation error ngspice would double its
+   steps, and lose of what answers the jump, however fast that is. */
+
+static const double CARRIED = 0.2; /* as in lead.c */
+
+static const double NUDGE = 1e-6; /* of an input, or of 1 if that is more */
 
 static const double ONE = 1e-12; /* Of a period: corners nearer than that are one. */
 
@@ -87,11 +104,33 @@ static double drive_now(Ports *c, double t)
 
 /* --- the sources --- */
 
+static double line_of(Ports *c, const Source *s, double t)
+{
+    if (s->origin.kind == FROM_DRIVE)
+        return s->origin.scale * drive_now(c, t) + s->origin.offset;
+    return s->value + s->rate * (t - c->origin);
+}
+
+/* What the circuit itself adds to a source for these values of the probes. */
+static double carried(const Ports *c, const Source *s, const double *probes)
+{
+    double sum = 0.0;
+    for (const Through *t = c->throughs; t < c->throughs + c->n_throughs; t++)
+        if (c->sources + t->source == s)
+            sum += t->gain * probes[t->probe];
+    return sum;
+}
+
+/* With what the circuit adds, at the time of the values that it has computed last. */
 static double source_value(Ports *c, const Source *s, double t)
 {
-    if (s->from.kind == FROM_DRIVE)
-        return s->from.scale * drive_now(c, t) + s->from.offset;
-    return s->value + s->rate * (t - c->origin);
+    return line_of(c, s, t) + carried(c, s, c->now) - carried(c, s, c->start);
+}
+
+/* Whether a difference over so long tells of a slope. */
+static int is_telling(const Ports *c, double h)
+{
+    return h > SHORT * c->after_jump && !c->met;
 }
 
 static double rate_of(const Ports *c, const Origin *from)
@@ -101,13 +140,33 @@ static double rate_of(const Ports *c, const Origin *from)
                                   : c->rates[from->place];
 }
 
+/* ngspice integrates a source by the trapezoidal rule. Where the FMU tells the slope, the integral of
+   a cubic through both ends is nearer to its own, and what is owed is paid back as in lead.c. */
+static double correction(Ports *c, Source *s, double value, double rate, double end)
+{
+    const double h = c->time - c->origin;
+    if (s->origin.slope != KNOWN || h <= 0.0)
+        return 0.0;
+    const double given = 0.5 * h * (s->value + end);
+    s->owed += 0.5 * h * (s->plain + value) - h * h / 12.0 * (rate - s->line) - given;
+    return CARRIED * s->owed / fmax(h, c->after_jump);
+}
+
+/* The lines from the last accepted point on; until now they have led from `origin` to it. */
 static void set_lines(Ports *c)
 {
+    const double h = c->time - c->origin;
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++) {
-        if (s->from.kind != FROM_OUTPUT)
+        if (s->origin.kind != FROM_OUTPUT)
             continue;
-        s->value = s->from.scale * c->before[s->from.place] + s->from.offset;
-        s->rate = s->from.scale * rate_of(c, &s->from);
+        const double value = s->origin.scale * c->outputs[s->origin.place] + s->origin.offset;
+        if (is_telling(c, h))
+            s->through_rate = (carried(c, s, c->now) - carried(c, s, c->start)) / h;
+        const double rate = s->origin.scale * rate_of(c, &s->origin) - s->through_rate;
+        s->correction = correction(c, s, value, rate, source_value(c, s, c->time));
+        s->plain = value;
+        s->value = value + s->correction;
+        s->rate = s->line = rate;
         s->largest = fmax(s->largest, fabs(s->value));
     }
 }
@@ -124,13 +183,13 @@ static int fmu_failed(Ports *c, const Stranger *s)
 /* An input from the communication point to `time`, which lies `h` (s) later. */
 static void feed(Ports *c, const Feed *f, double time, double h)
 {
-    const int64_t k = f->from.place;
+    const int64_t k = f->origin.place;
     double start, end, mean;
-    if (f->from.kind == FROM_PROBE) {
+    if (f->origin.kind == FROM_PROBE) {
         start = c->start[k];
         end = c->now[k];
         mean = (c->charges[k] + 0.5 * (time - c->time) * (c->last[k] + c->now[k])) / h;
-    } else if (f->from.kind == FROM_OUTPUT) {
+    } else if (f->origin.kind == FROM_OUTPUT) {
         start = c->before[k];
         end = c->outputs[k];
         mean = 0.5 * (start + end);
@@ -140,9 +199,9 @@ static void feed(Ports *c, const Feed *f, double time, double h)
         mean = 0.5 * (start + end);
     }
     const double value = f->feed == MEAN ? mean : f->feed == END ? end : start;
-    *f->input = f->from.scale * value + f->from.offset;
+    *f->input = f->origin.scale * value + f->origin.offset;
     if (f->slope)
-        *f->slope = f->from.scale * (end - start) / h;
+        *f->slope = f->origin.scale * (end - start) / h;
 }
 
 static int get_outputs(Stranger *s)
@@ -167,11 +226,11 @@ static int set_inputs(Stranger *s)
 static int refresh(Ports *c, Stranger *s)
 {
     for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++) {
-        const int64_t k = f->from.place;
-        if (f->from.kind == FROM_PROBE)
-            *f->input = f->from.scale * c->now[k] + f->from.offset;
-        if (f->from.kind == FROM_OUTPUT)
-            *f->input = f->from.scale * c->outputs[k] + f->from.offset;
+        const int64_t k = f->origin.place;
+        if (f->origin.kind == FROM_PROBE)
+            *f->input = f->origin.scale * c->now[k] + f->origin.offset;
+        if (f->origin.kind == FROM_OUTPUT)
+            *f->input = f->origin.scale * c->outputs[k] + f->origin.offset;
     }
     return set_inputs(s) && get_outputs(s);
 }
@@ -183,9 +242,9 @@ static int step_all(Ports *c, double time)
     /* What has not stepped yet is taken to go on along its line. */
     for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
         for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
-            if (f->from.kind == FROM_OUTPUT)
-                c->outputs[f->from.place] =
-                    c->before[f->from.place] + h * rate_of(c, &f->from);
+            if (f->origin.kind == FROM_OUTPUT)
+                c->outputs[f->origin.place] =
+                    c->before[f->origin.place] + h * rate_of(c, &f->origin);
     for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++) {
         for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
             feed(c, f, time, h);
@@ -224,6 +283,26 @@ static void write_point(Ports *c, double time)
     memcpy(row, c->outputs, (size_t)c->n_outputs * sizeof *row);
 }
 
+/* How much each FMU feeds through, by what it answers to a nudge. */
+static void learn(Ports *c)
+{
+    c->learn = 0;
+    for (Through *t = c->throughs; t < c->throughs + c->n_throughs; t++) {
+        Stranger *const s = &c->fmus[t->fmu];
+        const double given = *t->input, nudge = NUDGE * fmax(fabs(given), 1.0);
+        *t->input = given + nudge;
+        if (!set_inputs(s) || !get_outputs(s)) {
+            fmu_failed(c, s);
+            return;
+        }
+        t->gain = t->scale * (c->outputs[t->output] - c->before[t->output]) / nudge;
+        *t->input = given;
+        memcpy(c->outputs, c->before, (size_t)c->n_outputs * sizeof *c->outputs);
+        if (!fmu_restore(s->fmu, s->restore, s->state))
+            fmu_failed(c, s);
+    }
+}
+
 /* A communication point at the time of the last accepted one: from here on a new one begins. */
 static void begin_exchange(Ports *c)
 {
@@ -232,20 +311,22 @@ static void begin_exchange(Ports *c)
         const double *before = c->before + (s->row - c->outputs);
         s->moved += memcmp(before, s->row, (size_t)s->width * sizeof *before) != 0;
     }
-    if (h > SHORT * c->after_jump)
+    if (is_telling(c, h))
         for (int64_t k = 0; k < c->n_outputs; k++)
             c->rates[k] = (c->outputs[k] - c->before[k]) / h;
     memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
+    set_lines(c);
     memcpy(c->start, c->now, (size_t)c->n_saved * sizeof *c->start);
     memset(c->charges, 0, (size_t)c->n_saved * sizeof *c->charges);
     c->origin = time;
-    set_lines(c);
+    c->met = 0;
     c->end = c->macro_step > 0.0 ? fmin(time + c->macro_step, c->jump) : -INFINITY;
     if (c->macro_step > 0.0 && time < c->duration - ON_TIME)
         c->end = fmin(c->end, c->duration);
     c->exchanged++;
     write_point(c, time);
-    save_all(c);
+    if (save_all(c) && c->learn)
+        learn(c);
 }
 
 /* ngspice sets the next edge of a PULSE only if a step was cut to end on this one. A step that ends
@@ -263,6 +344,16 @@ static void announce(Ports *c, double time)
             if (p->announced > time && p->announced - p->previous > ONE * p->period)
                 ((Announce *)c->announce)(p->announced);
         }
+}
+
+/* How long the next step may be for the sake of a time at which one is to end. Where an edge is
+   announced, ngspice ends one itself; between two ends that are apart by rounding alone it fails. */
+static double until(const Ports *c, double at)
+{
+    for (const Pulse *p = c->pulses; p < c->pulses + c->n_pulses; p++)
+        if (fabs(p->previous - at) <= ON_TIME || fabs(p->announced - at) <= ON_TIME)
+            return INFINITY;
+    return at > c->time ? at - c->time : INFINITY;
 }
 
 static double *log_row(const Ports *c)
@@ -289,6 +380,7 @@ static double accepted(Ports *c, double time, double next_step)
     memcpy(row, c->now, (size_t)c->n_saved * sizeof *row);
     c->n_log++;
     c->logged++;
+    c->learn |= c->tries > 0;
     c->tries = 0;
     const int at_jump = c->driven && time >= c->jump - ON_TIME;
     if (at_jump)
@@ -311,70 +403,119 @@ static double accepted(Ports *c, double time, double next_step)
     }
     announce(c, time);
     if (time <= 0.0 || at_jump)
-        next_step = fmin(next_step, c->after_jump);
-    if (c->end > time)
-        next_step = fmin(next_step, c->end - time);
-    if (c->driven) {
-        const double corner = piece_at(c, time)->until;
-        if (corner > time)
-            next_step = fmin(next_step, corner - time);
-        next_step = fmin(next_step, c->jump - time);
-    }
+        c->jumped = time;
+    next_step = fmin(next_step, c->after_jump + GROWTH * (time - c->jumped));
+    if (c->repeats)
+        next_step = fmin(next_step, fmax(HALF * (c->duration - time), LAST * c->after_jump));
+    next_step = fmin(next_step, until(c, c->end));
+    if (c->driven)
+        next_step = fmin(next_step, fmin(until(c, piece_at(c, time)->until), until(c, c->jump)));
     return next_step;
 }
 
 /* --- attempts that are repeated --- */
 
-/* Device parameters are asked for in ngspice's constant plot: an asked one becomes a vector of the
-   current plot, whose next values are not those that SendData then sends. */
+/* Device parameters are asked for in another plot: an asked one becomes a vector of the current plot,
+   over which SendData then runs. Where nothing is asked for but what leads to FMUs, ngspice stays in
+   that plot, which has no more vectors than the run's own, and what it sends is not looked at. */
+
+static int stays_aside(const Ports *c)
+{
+    return c->repeats && c->n_saved && c->n_probed == c->n_saved;
+}
+
+static void set_plot(Ports *c, const char *name)
+{
+    char text[160];
+    snprintf(text, sizeof text, "setplot %s", name);
+    ((Command *)c->command)(text);
+}
+
+static void go_aside(Ports *c)
+{
+    if (c->plot_name[0]) {
+        set_plot(c, "const");
+        return;
+    }
+    snprintf(c->plot_name, sizeof c->plot_name, "%s", ((PlotName *)c->plot)());
+    set_plot(c, stays_aside(c) ? "new" : "const");
+}
+
 static int ask(Ports *c)
 {
-    Command *const command = (Command *)c->command;
     char text[160];
-    if (!c->plot_name[0])
-        snprintf(c->plot_name, sizeof c->plot_name, "%s", ((PlotName *)c->plot)());
-    command("setplot const");
-    for (int64_t k = 0; k < c->n_saved; k++) {
-        if (!c->asked[k])
-            continue;
+    if (!stays_aside(c) || !c->plot_name[0])
+        go_aside(c);
+    for (int64_t k = 0; k < c->n_probed; k++) {
+        /* What was asked for last is still there: SendData needs a vector. */
+        snprintf(text, sizeof text, "unlet %s", c->asked[k]);
+        ((Command *)c->command)(text);
         snprintf(text, sizeof text, "%s", c->asked[k]);
         const VectorInfo *found = ((Ask *)c->ask)(text);
         if (found && found->real && found->length > 0)
             c->now[k] = *found->real;
         else
             c->status = NOT_FINITE;
-        snprintf(text, sizeof text, "unlet %s", c->asked[k]);
-        command(text);
     }
-    snprintf(text, sizeof text, "setplot %s", c->plot_name);
-    command(text);
+    if (!stays_aside(c))
+        set_plot(c, c->plot_name);
     return going(c);
+}
+
+/* Whether an FMU's output ends far from where its line from the communication point leads. */
+static int leaves_line(const Ports *c, double time)
+{
+    for (const Source *s = c->sources; s < c->sources + c->n_sources; s++) {
+        const double ahead = s->value + s->line * (time - c->origin);
+        const int known = s->origin.slope != DIFFERENCE || c->exchanged > 1;
+        if (s->origin.kind == FROM_OUTPUT && known && fabs(s->guess - ahead) > EVENT * s->largest)
+            return 1;
+    }
+    return 0;
 }
 
 /* Whether the attempt that has converged at `time` is to be repeated. */
 static int to_repeat(Ports *c, double time, double *delta, double old_delta)
 {
-    if (time <= c->origin || !ask(c) || (c->stepped && !restore_all(c)))
+    if (c->stepped && !restore_all(c))
+        return 0;
+    c->stepped = 0;
+    /* At its end ngspice may go on in steps that do not change the time. */
+    if (time <= c->origin || !ask(c) || time + old_delta > c->duration)
         return 0;
     c->stepped = 1;
     if (!step_all(c, time))
         return 0;
     int agree = 1;
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++) {
-        if (s->from.kind != FROM_OUTPUT)
+        if (s->origin.kind != FROM_OUTPUT)
             continue;
-        const double used = source_value(c, s, time);
-        const double off = s->from.scale * c->outputs[s->from.place] + s->from.offset - used;
+        const double used = source_value(c, s, time), line = line_of(c, s, time);
+        const double off = s->origin.scale * c->outputs[s->origin.place] + s->origin.offset +
+                           s->correction - used;
         s->largest = fmax(s->largest, fabs(used));
         if (fabs(off) > c->tolerance * s->largest)
             agree = 0;
-        if (c->tries > 0 && used != s->guess) {
-            const double response = (off - s->off) / (used - s->guess);
+        if (c->tries > 0 && line != s->guess) {
+            const double response = (off - s->off) / (line - s->guess);
             if (isfinite(response) && response < -1e-3)
                 s->response = response;
         }
-        s->guess = used;
+        s->guess = line;
         s->off = off;
+    }
+    if (agree && leaves_line(c, time)) {
+        c->met = time - c->origin <= EVENT_WITHIN;
+        if (c->met) {
+            c->jumped = time;
+        } else { /* a shorter step, to find when */
+            c->tries = 0;
+            c->redone++;
+            for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
+                s->rate = s->origin.kind == FROM_OUTPUT ? s->line : s->rate;
+            *delta = 0.5 * (time - c->origin);
+            return 1;
+        }
     }
     if (agree)
         return 0;
@@ -383,7 +524,7 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
         return 0;
     }
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
-        if (s->from.kind == FROM_OUTPUT)
+        if (s->origin.kind == FROM_OUTPUT)
             s->rate = (s->guess - s->off / s->response - s->value) / (time - c->origin);
     c->redone++;
     *delta = old_delta;
@@ -422,6 +563,8 @@ int ports_turns(int place)
 
 /* --- what ngspice calls --- */
 
+static const char GAIN_NAME[] = "vcosim_gain"; /* then a place among the Throughs */
+
 static int is_named(const Source *s, const char *node)
 {
     size_t k = 0;
@@ -436,6 +579,10 @@ int ports_source(double *value, double time, const char *node)
     *value = NAN;
     if (!going(c))
         return 0;
+    if (strncmp(node, GAIN_NAME, sizeof GAIN_NAME - 1) == 0) {
+        *value = c->throughs[atoi(node + sizeof GAIN_NAME - 1)].gain;
+        return 0;
+    }
     const Source *s = c->sources;
     while (s < c->sources + c->n_sources && !is_named(s, node))
         s++;
@@ -444,7 +591,7 @@ int ports_source(double *value, double time, const char *node)
         c->status = UNKNOWN_SOURCE;
         return 0;
     }
-    *value = source_value(c, s, time);
+    *value = line_of(c, s, time) - carried(c, s, c->start);
     if (!going(c))
         *value = NAN;
     return 0;
@@ -454,6 +601,8 @@ int ports_data(const VectorValues *data)
 {
     Ports *c = run;
     if (!c)
+        return 0;
+    if (stays_aside(c) && c->plot_name[0])
         return 0;
     for (int64_t k = 0; k < c->n_saved; k++)
         c->now[k] = data->vectors[c->places[k]]->creal;
@@ -474,6 +623,8 @@ int ports_step(double time, double *delta, double old_delta, int redo, int locat
     } else {
         c->attempts++;
         c->quiet++;
+        if (stays_aside(c) && !redo)
+            c->sent = time;
         if (redo) /* ngspice itself repeats it, shorter */
             c->tries = 0;
         else if (c->repeats)
@@ -495,10 +646,11 @@ void ports_begin(Ports *c)
     for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
         if (!get_outputs(s))
             fmu_failed(c, s);
-    memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
         s->response = -1.0;
+    memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
     set_lines(c);
+    c->learn = c->n_throughs > 0;
     c->jump = c->driven ? piece_at(c, 0.0)->jump : INFINITY;
     late = loop_milliseconds() + LOOP_PATIENCE;
     run = c;

@@ -16,11 +16,6 @@ GOOD, FMU_FAILED, NOT_FINITE, UNKNOWN_SOURCE, NO_AGREEMENT = range(5)
 """Values of ``LeadState.status`` and ``PortsState.status``."""
 
 
-def of(kind: Any, *names: str) -> tuple[tuple[str, Any], ...]:
-    """Fields of one kind."""
-    return tuple((name, kind) for name in names)
-
-
 def callback(act: Callable[[], None], fail: Callable[[BaseException], None]) -> Any:
     """The method ``act`` as C can call it; the method ``fail`` is told what it raises, since an
     exception cannot pass through C.

@@ -3,7 +3,7 @@
 The same equations as ``circuits/amplifier.cir``: one pole whose output v_a obeys
 dv_a/dt = clip(2π GBW (V1 - R_s i) - 2π GBW v_a / A_ol, ±slew) and stays within its swing, then coil
 and sense resistor. While no limit begins or ceases to act it is linear and advanced by a matrix
-exponential; where one does is found by looking at points a fraction of the loop's ringing apart.
+exponential; where one does is found by checks a fraction of the loop's ringing apart.
 Input: back-EMF of one coil (V); output: its current (A). Commands of straight pieces only.
 """
 
@@ -21,7 +21,7 @@ from cosim.errors import SimulationFailed
 from cosim.scene import Scene
 
 _SAME_TIME = 1e-13  # s
-_LOOKS_PER_RADIAN = 4.0
+_CHECKS_PER_RADIAN = 4.0
 _MOST_PIECES = 10_000  # in one step
 _REMEMBERED = 64  # stacks of propagators
 _SIZE = 9
@@ -46,7 +46,7 @@ class Amplifier:
         high, low = circuit.swing_loss_high, circuit.swing_loss_low
         self._limits = {1: circuit.supply - high, -1: low - circuit.supply}
         ringing = np.sqrt(self._pole * self._sense / self._inductance)
-        self._look = 1.0 / (_LOOKS_PER_RADIAN * ringing)
+        self._check_every = 1.0 / (_CHECKS_PER_RADIAN * ringing)
         self._propagators = lru_cache(_REMEMBERED)(self._new_propagators)
         self.time = 0.0
         self.mean: Array = np.zeros(1)
@@ -162,12 +162,12 @@ class Amplifier:
         return a
 
     def _new_propagators(self, length: float, mode: Mode, gain: float) -> Array:
-        """exp(A s) at the equally spaced looks s up to ``length``."""
-        looks = max(1, int(np.ceil(length / self._look)))
-        first = expm(self._matrix(mode, gain) * (length / looks))
-        found = np.empty((looks, _SIZE, _SIZE))
+        """exp(A s) at the equally spaced times s of the checks up to ``length``."""
+        checks = max(1, int(np.ceil(length / self._check_every)))
+        first = expm(self._matrix(mode, gain) * (length / checks))
+        found = np.empty((checks, _SIZE, _SIZE))
         found[0] = first
-        for k in range(1, looks):
+        for k in range(1, checks):
             found[k] = first @ found[k - 1]
         return found
 

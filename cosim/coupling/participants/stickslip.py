@@ -21,8 +21,8 @@ class FmuMechanics(Mechanics):
     moment (:func:`cosim.coupling.polynomials.projected`).
     """
 
-    def __init__(self, scene: Scene, fmi_version: int = 3) -> None:
-        super().__init__(scene, fmi_version)
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene)
         if self.normal_force is not None:
             raise NotImplementedError("a normal force that changes in time")
         self.time = 0.0

@@ -1,15 +1,18 @@
 """A scene's ports, checked against its FMUs and brought into the numbers of ``ports.c``."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
+from cosim.circuit import netlist
 from cosim.circuit.joined import Deck, deck
 from cosim.coupling.ports.sides import Side
 from cosim.coupling.ports.strangers import Variable, stranger
-from cosim.coupling.ports.structures import Feed, Origin, Source
+from cosim.coupling.ports.structures import DRIVE, OUTPUT, PROBE, Feed, Origin, Source, Through
+from cosim.mechanics.package import unpacked
+from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
-from cosim.scene.tables import Port
+from cosim.scene.tables import MACHINE, Fmu, Port
 
-_PROBE, _OUTPUT, _DRIVE = range(3)
 _HELD, _DIFFERENCE, _KNOWN = range(3)
 _FEEDS = {"mean": 0, "line": 1, "end": 2}
 
@@ -20,15 +23,20 @@ class Plan:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         sides = {each.name: Side(each, stranger(each.file)) for each in scene.fmu}
+        ends = [port.origin or port.to or "" for port in scene.port]
+        self._has_machine = any(end.startswith(f"{MACHINE}.") for end in ends)
+        if self._has_machine:
+            sides[MACHINE] = Side(_machine(scene), stranger(str(unpacked(2))))
         self.sides = _in_order(scene, sides)
         """In the order in which they step: after those that feed them, as far as that can be."""
-        probes = [port.probe for port in scene.port if port.probe is not None]
-        self.words = tuple(dict.fromkeys([*probes, *(scene.circuit.save or ())]))
-        """What is read of the circuit."""
+        self.probes = tuple(dict.fromkeys(p.probe for p in scene.port if p.probe is not None))
+        self.words = tuple(dict.fromkeys([*self.probes, *(scene.circuit.save or ())]))
+        """What is read of the circuit, first what leads to FMUs."""
         self.sources: list[Source] = []
         self.names: list[str] = []
         """Of the sources that ports feed, as the scene spells them."""
         self._from: list[tuple[Side, Origin]] = []
+        self._fed: list[tuple[int, Side, Variable]] = []  # sources that FMUs feed
         for port in scene.port:
             self._join(port, sides)
         # Slopes of outputs make rows longer, so places in the row of all are known only now.
@@ -41,6 +49,8 @@ class Plan:
         self.width = first
         """Of the row of all outputs."""
         self.method = _method(scene, self.sides)
+        self.throughs = [*self._throughs()] if self.method == "redo" else []
+        """What the circuit itself carries of the FMUs' feedthrough, and what leads to it."""
 
     def deck(self) -> Deck:
         """Of the circuit."""
@@ -49,6 +59,8 @@ class Plan:
         return deck(
             *(Path(circuit.netlist), self.names, self.words, circuit.param or {}),
             *(run.duration, circuit.reltol, circuit.max_step, self.method == "redo"),
+            netlist.parameters(self.scene) if self._has_machine else {},
+            through=[(self.names[t.source], self.words[t.probe]) for t, _ in self.throughs],
         )
 
     @property
@@ -56,32 +68,58 @@ class Plan:
         """Whether the command of ``[drive]`` leads to something."""
         return any(port.origin == "drive" for port in self.scene.port)
 
+    def _throughs(self) -> Iterator[tuple[Through, Feed]]:
+        for at, side, output in self._fed:
+            origin, known = self.sources[at].origin, side.of.feedthrough.get(output.name)
+            for into, feed in side.probed():
+                if known is None or into.name in known:
+                    scale = origin.scale * feed.origin.scale
+                    fmu = self.sides.index(side)
+                    yield (
+                        Through(at, feed.origin.place, fmu, origin.place, scale=scale),
+                        feed,
+                    )
+
     def _join(self, port: Port, sides: dict[str, Side]) -> None:
         origin = Origin(scale=port.scale, offset=port.offset)
         side, output = None, None
         if port.probe is not None:
-            origin.kind, origin.place = _PROBE, self.words.index(port.probe)
+            origin.kind, origin.place = PROBE, self.words.index(port.probe)
         elif port.origin == "drive":
-            origin.kind = _DRIVE
+            origin.kind = DRIVE
         else:
             side, output, place = _end(port, "from", str(port.origin), sides, "output")
-            origin.kind, origin.place = _OUTPUT, side.places[output.name] + place
+            origin.kind, origin.place = OUTPUT, side.places[output.name] + place
             _set_slope(origin, port, side, output, place)
         if port.source is not None:
             self.names.append(port.source)
             self.sources.append(Source(name=port.source.lower().encode(), origin=origin))
+            if side is not None and output is not None and output.real:
+                self._fed.append((len(self.sources) - 1, side, output))
             kept = self.sources[-1].origin  # the structure holds a copy
         else:
-            feed = Feed(origin=origin, feed=_FEEDS[port.feed])
             into, variable, place = _end(port, "to", str(port.to), sides, "input")
-            if not variable.real:
-                feed.feed = _FEEDS["end"]  # a mean of truth values is none
-            elif port.feed == "line":
-                _check_line(into, variable)
+            able = into.of.version == 2 and into.of.abilities.canInterpolateInputs
+            able = able and variable.size == 1
+            if port.feed == "line" and variable.real and not able:
+                raise into.of.bad(
+                    f'[[port]] feed = "line" into {into.name}.{variable.name} needs an FMU of FMI '
+                    '2.0 with canInterpolateInputs; take "mean" or "end"'
+                )
+            kind = port.feed if port.feed != "auto" else "line" if able else "mean"
+            # A mean of truth values is none.
+            feed = Feed(origin=origin, feed=_FEEDS[kind if variable.real else "end"])
             into.feed(variable, place, feed)
             kept = feed.origin
         if side is not None:
             self._from.append((side, kept))
+
+
+def _machine(scene: Scene) -> Fmu:
+    """The built-in machine as an FMU like others, with the parameters of the scene's tables."""
+    reals, wholes = parameters(scene)
+    given = {**reals, **wholes, "normal_force": scene.friction.normal_force}
+    return Fmu(name=MACHINE, file=str(unpacked(2)), parameters=given)
 
 
 def _end(
@@ -109,14 +147,6 @@ def _set_slope(origin: Origin, port: Port, side: Side, output: Variable, place: 
         name = kind.removeprefix(f"{side.name}.")
         known, at = side.of.find(name, "output", f'[[port]] slope = "{kind}"')
         origin.slope, origin.slope_place = _KNOWN, side.places[known.name] + at
-
-
-def _check_line(side: Side, variable: Variable) -> None:
-    if side.of.version != 2 or not side.of.abilities.canInterpolateInputs or variable.size > 1:
-        raise side.of.bad(
-            f'[[port]] feed = "line" into {side.name}.{variable.name} needs an FMU of FMI 2.0 with '
-            'canInterpolateInputs; take "mean" or "end"'
-        )
 
 
 def _in_order(scene: Scene, sides: dict[str, Side]) -> list[Side]:

@@ -40,6 +40,10 @@ def joined(
         for name, _, times, values, continuous in signals
         for what, value in _numbers(scene.run.settle, times, values, continuous).items()
     }
+    log = run.log.array()
+    known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
+    values, without = measured(run.deck.measures, log[:, 0], known)
+    summary |= values
     summary |= {
         "circuit_steps": run.steps,
         "circuit_rejected": run.state.attempts - run.steps,
@@ -48,26 +52,9 @@ def joined(
         "wall_time": time.perf_counter() - began,
         "method": run.plan.method,
         "versions": {**versions(), **run.versions},
-        "notes": [*run.deck.notes, *_notes(run)],
+        "notes": [*run.deck.notes, *_notes(run), *without],
     }
-    summary = _measured(run, summary)
     return columns, summary, units
-
-
-def _measured(run: Run, summary: dict[str, Any]) -> dict[str, Any]:
-    """The summary with the netlist's measurements, and a note for each event that did not come."""
-    log = run.log.array()
-    known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
-    for each in run.deck.measures:
-        value = measured(each, log[:, 0], known)
-        if value is not None:
-            summary[f"meas.{each.name}"] = value
-        else:
-            where = f"{each.line.file}:{each.line.number}"
-            summary["notes"].append(
-                f"{where}: .meas {each.name} has no value: its event does not come."
-            )
-    return summary
 
 
 Signal = tuple[str, str, Array, Array, bool]
@@ -119,8 +106,9 @@ def _numbers(settle: float, times: Array, values: Array, continuous: bool) -> di
     return found | {"least": least, "greatest": greatest}
 
 
-_OFTEN, _LONG = 10, 10_000
-"""How many times as many steps as ``circuit.max_step`` asks for tell of ringing; of so many."""
+_OFTEN, _LONG, _WITHIN = 10, 10_000, 20
+"""How many times as many steps as ``circuit.max_step`` asks for tell of ringing; of so many; by how
+much more a node within a subcircuit has to ring to be named."""
 _SELDOM, _MANY = 0.5, 100
 """Share of its steps in which an FMU's outputs change that is too small; of so many steps."""
 
@@ -130,12 +118,17 @@ def _notes(run: Run) -> Iterator[str]:
         yield f"ngspice knows no {', '.join(ignored)} of a model, and ignored it."
     often = run.steps * run.plan.scene.circuit.max_step / run.state.duration
     if often > _OFTEN and run.steps > _LONG:
-        nodes = [k for k, name in enumerate(engine().sent) if not re.search("#|cosim_", name)]
-        turns, place = max((loop().ports_turns(k), k) for k in nodes)
+        turns = {
+            name: loop().ports_turns(k)
+            for k, name in enumerate(engine().sent)
+            if not re.search("#|cosim_", name)
+        }
+        # A node that the user has named tells more than one within a model, if it rings at all.
+        node = max(turns, key=lambda n: turns[n] if "." not in n else turns[n] / _WITHIN)
         yield (
             f"the circuit took {run.steps} steps, {often:.0f} times as many as circuit.max_step "
-            f"asks for. It turned most often, {turns} times, at node {engine().sent[place]}: if it "
-            "rings there, damp it, say by a resistor and a capacitor to ground."
+            f"asks for. It turned most often, {turns[node]} times, at node {node}: if it rings "
+            "there, damp it, say by a resistor and a capacitor to ground."
         )
     for side, state in zip(run.plan.sides, run.fmus, strict=False):
         steps, moved = side.fmu.steps, state.moved

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cosim.circuit import ngspice
-from cosim.coupling.loop.lead import engine
+from cosim.coupling.loop.lead import after_jump, engine
 from cosim.coupling.loop.structures import (
     FMU_FAILED,
     NO_AGREEMENT,
@@ -18,20 +18,17 @@ from cosim.coupling.loop.structures import (
     loop,
 )
 from cosim.coupling.ports.plan import Plan
-from cosim.coupling.ports.structures import PortsState, Pulse, Source, StrangerState
+from cosim.coupling.ports.structures import PortsState, Pulse, Source, StrangerState, Through
 from cosim.drive.command import command
 from cosim.drive.pieces import Piece
 from cosim.errors import SimulationFailed, plain
 from cosim.files.spill import Tape
 from cosim.scene import Scene
 
-_AFTER_JUMP = 1e-2
-"""Longest step after a jump of the drive, in ``circuit.max_step``."""
-
 _POINTS, _PIECES = 2048, 512
 """Places of the logs between two emptyings; pieces of the drive that are prepared at a time."""
 
-_AGREEMENT = 10.0
+_AGREEMENT = 2.0
 """Of ``circuit.reltol``: how far an FMU and ngspice may be apart where steps are repeated."""
 
 
@@ -65,9 +62,13 @@ class Run:
             states.append(side.state(row, repeats))
             row += 8 * side.width
         self.fmus = (StrangerState * max(len(states), 1))(*states)
+        for through, feed in plan.throughs:
+            through.input = feed.input
+        count_through = len(plan.throughs)
+        self._throughs = (Through * max(count_through, 1))(*(t for t, _ in plan.throughs))
         macro = scene.coupling.macro_step if plan.method == "macro-steps" else 0.0
         self.state = PortsState(
-            fmus=self.fmus,
+            fmus=ctypes.addressof(self.fmus),
             n_fmus=len(states),
             sources=ctypes.addressof(self._sources),
             n_sources=len(plan.sources),
@@ -79,11 +80,14 @@ class Run:
             driven=int(plan.driven),
             macro_step=macro,
             duration=scene.run.duration,
-            after_jump=_AFTER_JUMP * scene.circuit.max_step,
+            after_jump=after_jump(scene),
             end=-np.inf,
             repeats=int(repeats),
+            throughs=ctypes.addressof(self._throughs),
+            n_throughs=count_through,
             tolerance=_AGREEMENT * scene.circuit.reltol,
-            asked=self._asked,
+            asked=ctypes.addressof(self._asked),
+            n_probed=len(plan.probes),
             log=self._blocks[0].ctypes.data,
             points=self._blocks[1].ctypes.data,
             log_rows=_POINTS,
@@ -185,7 +189,7 @@ class Run:
         begin = self._pieces[-1].until if self._pieces else 0.0
         self._pieces = kept + self._command.pieces(begin, self._scene.run.duration, _PIECES)
         self._row = (Piece * len(self._pieces))(*self._pieces)
-        state.pieces, state.n_pieces, state.piece = self._row, len(self._pieces), 0
+        state.pieces, state.n_pieces, state.piece = ctypes.addressof(self._row), len(self._row), 0
 
 
 def _named(names: tuple[str, ...], arrays: list[Any]) -> dict[str, int]:

@@ -2,14 +2,14 @@
 
 import ctypes
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from ctypes import c_double, c_uint32, c_void_p
 from typing import Any
 
 from cosim.coupling.loop.structures import Fmu, loop
 from cosim.coupling.ports.strangers import Stranger, Variable
-from cosim.coupling.ports.structures import Feed, Group, StrangerState
+from cosim.coupling.ports.structures import PROBE, Feed, Group, StrangerState
 from cosim.scene import tables
 
 _FUNCTIONS = {
@@ -63,6 +63,12 @@ class Side:
             self.inputs.append(into)
         self._feeds.append((into, place, feed))
 
+    def probed(self) -> Iterator[tuple[Variable, Feed]]:
+        """What leads from the circuit into real inputs."""
+        for into, _, feed in self._feeds:
+            if into.real and feed.origin.kind == PROBE:
+                yield into, feed
+
     def state(self, row: int, repeats: bool) -> StrangerState:
         """Ready to run: a new instance, with its part of the row at that address."""
         self.instance = self.of.instance(self._parameters)
@@ -91,7 +97,7 @@ class Side:
             self._groups("Get", self.outputs, row),
         )
         state = StrangerState(
-            fmu=ctypes.pointer(self.fmu),
+            fmu=ctypes.addressof(self.fmu),
             **{"inputs": ctypes.addressof(sets), "n_inputs": sets.used},
             **{"outputs": ctypes.addressof(gets), "n_outputs": gets.used},
             **{"feeds": ctypes.addressof(feeds), "n_feeds": len(self._feeds)},

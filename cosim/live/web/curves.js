@@ -1,5 +1,4 @@
-"use strict";
-/* The rows of the last seconds, curves of them over the drive's phase, and two cursors. */
+/* The rows of the last seconds, curves of them over the drive's phase, and what is laid over them. */
 
 const KEPT = 3 * RATE; // rows
 
@@ -38,6 +37,68 @@ class History {
   phase(row) {
     return (row / RATE - this.origin) * this.frequency;
   }
+
+  /* The row at a phase within the newest whole period. */
+  inPeriod(phase) {
+    const begin = (Math.floor(this.phase(this.last)) - 1) / this.frequency + this.origin;
+    return Math.round((begin + (phase - Math.floor(phase)) / this.frequency) * RATE);
+  }
+}
+
+/* A run of the server, or a trial's record: `waveforms` by name, in steps of `step` from `begin` on, s;
+   null where nothing is known. */
+class Overlay {
+  constructor(found, dash, names) {
+    Object.assign(this, found, { dash, names, shift: 0, lift: 0 });
+  }
+
+  values(name) {
+    return this.waveforms[has(this.names, name) ? this.names[name] : name];
+  }
+
+  phase(k) {
+    return (this.begin + k * this.step) * this.frequency + this.shift;
+  }
+
+  /* What is known of a waveform, each with what the page's newest period has at its phase. */
+  pairs(name, history) {
+    const own = COLUMNS.indexOf(name), row = (k) => history.inPeriod(this.phase(k));
+    return (this.values(name) ?? []).flatMap((x, k) => (x === null ? [] : [[x, history.value(row(k), own)]]));
+  }
+
+  /* A record's phase and its origin of heights are not known: those at which the surfaces agree best. */
+  fit(history) {
+    const agree = Array.from({ length: 200 }, (_, n) => {
+      this.shift = n / 200;
+      return this.pairs("v_surface", history).reduce((all, [x, y]) => all + x * y, 0);
+    });
+    this.shift = agree.indexOf(Math.max(...agree)) / 200;
+    this.lift = this.pairs("z_surface", history).reduce((mean, [x, y], _, { length }) => mean + (x - y) / length, 0);
+  }
+
+  /* Root of the mean squared difference of a waveform to the newest period, and that of itself. */
+  off(name, history) {
+    const pairs = this.pairs(name, history), root = (of) => Math.sqrt(pairs.reduce((all, pair) => all + of(pair) ** 2, 0) / pairs.length);
+    return pairs.length ? [root(([x, y]) => x - y), root(([x]) => x)] : null;
+  }
+
+  /* Points of the last periods: share of the window, and value. */
+  points(name, factor, periods, onSurface) {
+    const values = this.values(name), { z_part: part, z_surface: surface } = this.waveforms;
+    if (!values) return [];
+    const begin = Math.max(0, values.length - Math.round(periods / this.frequency / this.step));
+    const height = name.startsWith("z_") ? this.lift : 0;
+    const travelled = name === "z_part" && surface ? part[begin] - surface[begin] : 0;
+    const found = [];
+    for (let k = begin, last = 0; k < values.length; k++) {
+      const phase = this.phase(k) / periods, share = phase - Math.floor(phase);
+      const on = name === "z_part" && onSurface ? surface[k] - height : 0;
+      if (share < last) found.push([share, NaN]);
+      found.push([share, values[k] === null ? NaN : factor * (values[k] - height - travelled - on)]);
+      last = share;
+    }
+    return found;
+  }
 }
 
 const PANELS = [
@@ -52,54 +113,27 @@ const V_SURFACE = COLUMNS.indexOf("v_surface");
 
 class Curves {
   constructor(place, tell) {
-    this.cursors = [0.25, 0.75]; // shares of the window
+    this.cursors = new Cursors([0.25, 0.75], () => {}); // in shares of the window
     this.tell = tell;
     this.limits = PANELS.map(() => null);
-    this.canvases = PANELS.map((panel) => {
-      const canvas = document.createElement("canvas");
-      canvas.tabIndex = 0;
-      canvas.setAttribute("role", "img");
-      canvas.setAttribute("aria-label", `${panel.name}; arrow keys move cursor A, with shift cursor B`);
-      place.append(canvas);
-      this._grab(canvas);
-      return canvas;
-    });
+    this.plots = PANELS.map((panel) => new Plot(place, panel.name, "arrow keys move cursor A, with shift cursor B"));
+    for (const plot of this.plots) this.cursors.add(plot);
   }
 
-  _grab(canvas) {
-    let which = -1;
-    const share = (event) => (event.offsetX - LEFT) / (canvas.clientWidth - LEFT - RIGHT);
-    const move = (event) => { this.cursors[which] = Math.max(0, Math.min(1, share(event))); };
-    canvas.addEventListener("pointerdown", (event) => {
-      const [a, b] = this.cursors.map((at) => Math.abs(at - share(event)));
-      which = a <= b ? 0 : 1;
-      canvas.setPointerCapture(event.pointerId);
-      move(event);
-    });
-    canvas.addEventListener("pointermove", (event) => { if (which >= 0) move(event); });
-    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => { which = -1; });
-    canvas.addEventListener("keydown", (event) => {
-      const step = { ArrowLeft: -0.002, ArrowRight: 0.002 }[event.key];
-      if (!step) return;
-      event.preventDefault();
-      const k = event.shiftKey ? 1 : 0;
-      this.cursors[k] = Math.max(0, Math.min(1, this.cursors[k] + step));
-    });
-  }
-
-  /* The curves of `periods` periods, newest parts over the last ones'; `other`, a run to compare. */
-  draw(history, periods, { slow, onSurface, other, budget }) {
+  /* The curves of `periods` periods, newest parts over the last ones'; `others`, laid over them. */
+  draw(history, periods, { slow, onSurface, others, budget }) {
     periods = Math.max(1, Math.min(periods, Math.floor(history.frequency * 2.4)));
     const span = periods / history.frequency * RATE; // rows of the window
     // In real time whole windows up to the last period's end; slowly, the present one over the last.
     const last = slow ? history.last : Math.floor((Math.floor(history.phase(history.last)) / history.frequency + history.origin) * RATE);
     const first = Math.max(history.first, last - Math.floor(span) + 1, history.turned + 1);
     this.window = { history, periods, first, last, span, slow };
-    const now = this.share(history.last);
     this.base = {};
     for (const name of ["z_surface", "z_part"]) this.base[name] = history.value(first, COLUMNS.indexOf(name));
     this.onSurface = onSurface;
-    PANELS.forEach((panel, k) => this._panel(k, panel, { now, slow, other, budget }));
+    const alone = [["part on surface", "z_part", "b", 1e3]];
+    this.panels = PANELS.map((panel) => (onSurface && panel.unit === "mm" ? { ...panel, lines: alone } : panel));
+    this.panels.forEach((panel, k) => this._panel(k, panel, others, budget));
     this._measure();
   }
 
@@ -109,161 +143,57 @@ class Curves {
     return slow ? phase - Math.floor(phase) : 1 - (last - row) / span;
   }
 
-  _value(name, factor) {
+  value(name, factor) {
     const { history } = this.window;
     if (name === "mean") {
       return (row) => (row - HALF < history.first || row + HALF > history.last ? NaN
         : (history.value(row + HALF, V_SURFACE) - history.value(row - HALF, V_SURFACE)) / (2 * HALF) * RATE);
     }
-    const column = COLUMNS.indexOf(name);
-    if (name === "z_part" && this.onSurface) {
-      const surface = COLUMNS.indexOf("z_surface"), base = this.base.z_part - this.base.z_surface;
-      return (row) => factor * (history.value(row, column) - history.value(row, surface) - base);
-    }
+    const column = COLUMNS.indexOf(name), surface = COLUMNS.indexOf("z_surface");
     // The part travels: its way since the window's begin is drawn, from where the surface is.
     const base = name === "z_part" ? this.base.z_part - this.base.z_surface : 0;
-    return (row) => factor * (history.value(row, column) - base);
+    const on = name === "z_part" && this.onSurface ? (row) => history.value(row, surface) : () => 0;
+    return (row) => factor * (history.value(row, column) - base - on(row));
   }
 
-  _lines(panel) {
-    const only = this.onSurface && panel.unit === "mm";
-    return only ? [["part on surface", "z_part", "b", 1e3]] : panel.lines;
+  /* Lowest and highest of each column of pixels. */
+  _shape(name, factor, columns) {
+    const { first, last, span } = this.window, value = this.value(name, factor), found = new Envelope(columns);
+    const stride = Math.max(1, Math.floor(span / columns / 40));
+    for (let row = first; row <= last; row += stride) found.put(Math.floor(this.share(row) * columns), value(row));
+    return found;
   }
 
-  _panel(k, panel, { now, slow, other, budget }) {
-    const { ink, width, height } = inked(this.canvases[k]), colour = colours();
-    const { first, last: newest, span } = this.window, right = width - RIGHT, wide = right - LEFT;
-    const lines = this._lines(panel), columns = Math.max(1, Math.floor(wide));
-    const shapes = lines.map(([, name, , factor]) => {
-      // Lowest and highest of each column of pixels.
-      const low = new Float32Array(columns).fill(Infinity), high = new Float32Array(columns).fill(-Infinity);
-      const value = this._value(name, factor), stride = Math.max(1, Math.floor(span / columns / 40));
-      for (let row = first; row <= newest; row += stride) {
-        const x = Math.max(0, Math.min(columns - 1, Math.floor(this.share(row) * columns))), v = value(row);
-        if (v < low[x]) low[x] = v;
-        if (v > high[x]) high[x] = v;
-      }
-      return { low, high };
-    });
-    const others = other ? lines.map(([, name, , factor]) => other.line(name, factor, this.onSurface)) : [];
-    let least = Infinity, most = -Infinity;
-    for (const { low, high } of shapes) for (let x = 0; x < columns; x++) {
-      if (low[x] < least) least = low[x];
-      if (high[x] > most) most = high[x];
-    }
-    for (const line of others) for (const [, v] of line ?? []) { least = Math.min(least, v); most = Math.max(most, v); }
+  _panel(k, panel, others, budget) {
+    const plot = this.plots[k], { lines } = panel, { periods, span, slow, history } = this.window;
+    const columns = Math.max(1, Math.floor(plot.canvas.clientWidth - LEFT - RIGHT));
+    const shapes = lines.map(([, name, , factor]) => this._shape(name, factor, columns));
+    const laid = others.flatMap((other) => lines.map(([, name, of, factor]) =>
+      ({ dash: other.dash, of, points: other.points(name, factor, periods, this.onSurface) })));
+    let [least, most] = extent([...shapes.flatMap(({ low, high }) => [...low, ...high]), ...laid.flatMap(({ points }) => points.map(([, v]) => v))]);
     if (!(most >= least)) [least, most] = [-1, 1];
     if (most - least < panel.least) [least, most] = [(least + most - panel.least) / 2, (least + most + panel.least) / 2];
     // The limits follow at once outwards, slowly inwards, so that a curve does not pump.
-    const before = this.limits[k], ease = (new_, old) => old + 0.04 * (new_ - old);
-    const own = before && before.lines === lines.length
-      ? { low: Math.min(least, ease(least, before.low)), high: Math.max(most, ease(most, before.high)) }
-      : { low: least, high: most };
-    this.limits[k] = { ...own, lines: lines.length };
-    const margin = 0.06 * (own.high - own.low), low = own.low - margin, high = own.high + margin;
-    const top = 18, bottom = height - 4;
-    const bend = panel.bend ? (v) => Math.asinh(v / panel.bend) : (v) => v;
-    const y = (v) => bottom - (bend(v) - bend(low)) / (bend(high) - bend(low)) * (bottom - top);
-
-    ink.font = "11.5px system-ui, sans-serif";
-    ink.textBaseline = "middle";
-    ink.strokeStyle = colour("line");
-    ink.fillStyle = colour("soft");
-    ink.textAlign = "right";
-    const step = niceStep((high - low) / 5), levels = panel.bend ? [-1000, -100, 0, 100, 1000].filter((v) => v > low && v < high) : [];
-    for (let v = Math.ceil(low / step) * step; v <= high && !panel.bend; v += step) levels.push(v);
-    ink.beginPath();
-    for (const v of levels) {
-      ink.moveTo(LEFT, y(v));
-      ink.lineTo(right, y(v));
-      ink.fillText(String(Number((Math.abs(v) < step / 1e3 ? 0 : v).toPrecision(4))), LEFT - 5, Math.max(top, Math.min(bottom - 6, y(v))));
-    }
-    for (let n = 0; n <= this.window.periods; n++) {
-      const x = LEFT + wide * n / this.window.periods;
-      ink.moveTo(x, top);
-      ink.lineTo(x, bottom);
-    }
-    ink.stroke();
-    ink.save();
-    ink.beginPath();
-    ink.rect(LEFT, top - 2, wide, bottom - top + 4);
-    ink.clip();
-    if (panel.unit === "m/s²" && budget) this._slips(ink, budget, y, right, colour);
-    const gap = slow ? now : -1;
-    shapes.forEach(({ low, high }, n) => {
-      ink.strokeStyle = colour(lines[n][2]);
-      ink.lineWidth = 1.4;
-      ink.beginPath();
-      let last = -9, at = null;
-      for (let x = 0; x < columns; x++) {
-        if (low[x] > high[x]) continue;
-        const joined = x - last < 3 + columns / Math.max(1, span) * 2 && !(gap >= 0 && last < gap * columns && x > gap * columns);
-        const near = at === null || Math.abs(y(low[x]) - at) < Math.abs(y(high[x]) - at);
-        const ends = y(low[x]) - y(high[x]) < 1 ? [high[x]] : near ? [low[x], high[x]] : [high[x], low[x]];
-        at = y(ends.at(-1));
-        if (!joined) ink.moveTo(LEFT + x, y(ends[0]));
-        for (const v of ends) ink.lineTo(LEFT + x, y(v));
-        last = x;
-      }
-      ink.stroke();
-    });
-    others.forEach((line, n) => {
-      if (!line) return;
-      ink.strokeStyle = colour(lines[n][2]);
-      ink.setLineDash([5, 4]);
-      ink.beginPath();
-      line.forEach(([phase, v], at) => {
-        const x = LEFT + wide * phase / this.window.periods;
-        if (at && phase > line[at - 1][0]) ink.lineTo(x, y(v)); else ink.moveTo(x, y(v));
-      });
-      ink.stroke();
-      ink.setLineDash([]);
-    });
-    ink.restore();
-    ink.lineWidth = 1;
-    if (slow) {
-      ink.strokeStyle = colour("ink");
-      ink.beginPath();
-      ink.moveTo(LEFT + now * wide, top);
-      ink.lineTo(LEFT + now * wide, bottom);
-      ink.stroke();
-    }
-    ink.strokeStyle = ink.fillStyle = colour("warn");
-    ink.setLineDash([3, 3]);
-    ink.textAlign = "center";
-    this.cursors.forEach((share, n) => {
-      const x = LEFT + share * wide;
-      ink.beginPath();
-      ink.moveTo(x, top);
-      ink.lineTo(x, bottom);
-      ink.stroke();
-      ink.fillText("AB"[n], x > right - 14 ? x - 7 : x + 7, top + 5);
-    });
-    ink.setLineDash([]);
-    ink.textAlign = "left";
-    ink.fillStyle = colour("ink");
-    ink.fillText(panel.name, LEFT, 8);
-    let x = LEFT + ink.measureText(panel.name).width + 14;
-    for (const [name, , of] of lines) {
-      ink.fillStyle = colour(of);
-      ink.fillRect(x, 7, 12, 2.5);
-      ink.fillText(name, x + 16, 8);
-      x += ink.measureText(name).width + 28;
-    }
+    const before = this.limits[k]?.lines === lines.length ? this.limits[k] : { least, most };
+    least = Math.min(least, before.least + 0.04 * (least - before.least));
+    most = Math.max(most, before.most + 0.04 * (most - before.most));
+    this.limits[k] = { least, most, lines: lines.length };
+    const upright = Array.from({ length: periods + 1 }, (_, n) => [n / periods, ""]);
+    plot.begin([0, 1], [least, most], { legend: lines.map(([words, , of]) => [words, of]), bend: panel.bend, upright });
+    if (panel.unit === "m/s²") this._slips(plot, budget);
+    const now = this.share(history.last), gap = slow ? now * columns : -1;
+    shapes.forEach((shape, n) => plot.envelope(shape, lines[n][2], { near: 3 + columns / Math.max(1, span) * 2, gap }));
+    for (const { points, of, dash } of laid) plot.line(points, of, { dash });
+    if (slow) plot.line([[now, least], [now, most]], "ink", { width: 1 });
+    this.cursors.draw(plot);
   }
 
-  _slips(ink, budget, y, right, colour) {
-    ink.setLineDash([2, 4]);
-    ink.strokeStyle = ink.fillStyle = colour("c");
-    ink.textAlign = "right";
+  _slips(plot, budget) {
     for (const [way, ends] of Object.entries(budget)) for (const end of ends) {
-      ink.beginPath();
-      ink.moveTo(LEFT, y(end));
-      ink.lineTo(right, y(end));
-      ink.stroke();
-      ink.fillText(`slips ${way}`, right - (way === "up" ? 4 : 70), y(end) + (end < 0 ? 7 : -6));
+      plot.line([[0, end], [1, end]], "c", { dash: [2, 4], width: 1 });
+      const at = plot.up(end) + (end < 0 ? 7 : -6);
+      if (at > TOP && at < plot.bottom) write(plot.ink, `slips ${way}`, plot.right - (way === "up" ? 4 : 70), at, plot.colour("c"), "right");
     }
-    ink.setLineDash([]);
   }
 
   /* The row that is drawn at a share of the window. */
@@ -274,25 +204,17 @@ class Curves {
   }
 
   _measure() {
-    const [a, b] = this.cursors.map((share) => this._row(share)), { span } = this.window;
-    const time = (this.cursors[1] - this.cursors[0]) * span / RATE;
+    const [from, to] = this.cursors.at, [a, b] = [from, to].map((share) => this._row(share));
+    const time = (to - from) * this.window.span / RATE;
     const words = [`B−A ${(time * 1e3).toFixed(2)} ms (${time ? (1 / Math.abs(time)).toFixed(1) : "∞"} Hz)`];
     if (a !== null && b !== null) {
-      for (const panel of PANELS) for (const [label, name, , factor] of this._lines(panel)) {
+      for (const panel of this.panels) for (const [label, name, , factor] of panel.lines) {
         if (name === "mean") continue;
-        const value = this._value(name, factor), from = value(a), to = value(b);
-        const digits = panel.unit === "mm" || panel.unit === "A" ? 3 : 1;
-        const what = panel.lines.length > 1 || panel.unit === "A" ? `${label} ` : "";
-        words.push(`${what}${from.toFixed(digits)} → ${to.toFixed(digits)} ${panel.unit}`);
+        const value = this.value(name, factor), digits = panel.unit === "mm" || panel.unit === "A" ? 3 : 1;
+        const what = panel.lines.length > 1 || panel.unit.length < 3 ? `${label} ` : "";
+        words.push(`${what}${value(a).toFixed(digits)} → ${value(b).toFixed(digits)} ${panel.unit}`);
       }
     }
     this.tell(words);
   }
-}
-
-const LEFT = 46, RIGHT = 8;
-
-function niceStep(rough) {
-  const ten = 10 ** Math.floor(Math.log10(rough));
-  return [1, 2, 5, 10].find((n) => n * ten >= rough) * ten;
 }

@@ -1,14 +1,10 @@
-"use strict";
 /* Who owns the machine: a worker with a timer, or the audio worklet, which also plays the surface. */
+
+const BUFFER = 50; // ms
 
 class Player {
   constructor(post) {
-    this.post = post;
-    this.speed = 1;
-    this.position = 0; // of what is heard, in rows
-    this.sent = 0;
-    this.running = false;
-    this.before = this.now = 0;
+    Object.assign(this, { post, speed: 1, running: false });
   }
 
   message({ kind, ...told }) {
@@ -27,18 +23,11 @@ class Player {
     this.running = false;
     this.generation = generation;
     if (binary) this.exports = started(new WebAssembly.Module(binary));
-    this.machine?.free();
     this.machine = null;
     this.machine = new Machine(this.exports, references, setup, 400);
-    this.position = 0;
-    this.before = this.now = 0;
-    this.fresh();
-    this.running = true;
-  }
-
-  fresh() {
-    this.rows = new Float32Array(1024 * OUTPUT_COUNT);
+    this.position = this.before = this.now = 0; // of what is heard: the row; its value and the one before
     this.count = 0;
+    this.running = true;
   }
 
   fail(error) {
@@ -49,6 +38,7 @@ class Player {
   /* One row on; its velocity of the surface is what is heard. */
   next() {
     if (this.count === 1024) this.send();
+    if (!this.count) this.rows = new Float32Array(1024 * OUTPUT_COUNT);
     const at = this.count * OUTPUT_COUNT;
     this.machine.next(this.rows, at);
     this.count++;
@@ -58,12 +48,9 @@ class Player {
 
   send() {
     if (!this.count) return;
-    const { rows, count, machine } = this;
-    const origin = machine.command.origin, frequency = machine.command.frequency;
-    this.post({ kind: "rows", rows, count, last: machine.row, marks: machine.marks, origin, frequency,
-      generation: this.generation }, [rows.buffer]);
-    machine.marks = [];
-    this.fresh();
+    const { rows, count, machine, generation, gaps } = this, { row: last, origin, frequency } = machine;
+    this.post({ kind: "rows", rows, count, last, origin, frequency, marks: machine.marks(), generation, gaps }, [rows.buffer]);
+    this.count = 0;
   }
 
   /* `n` samples of sound, `rate` a second. */
@@ -92,11 +79,22 @@ if (typeof registerProcessor === "function") {
         else if (data.kind === "gain") this.gain = data.gain;
         else this.player.message(data);
       };
-      this.blocks = this.mean = this.gain = 0;
+      this.blocks = this.mean = this.gain = this.player.gaps = 0;
+      this.least = Infinity;
+    }
+
+    /* What is played lags behind the clock by more than a buffer: there was a gap. */
+    watch() {
+      const late = Date.now() - 1000 * currentTime;
+      this.least = Math.min(this.least + 1e-3, late); // the two clocks drift apart
+      if (late - this.least < BUFFER) return;
+      this.player.gaps++;
+      this.least = late;
     }
 
     process(_, [[out]]) {
       if (this.ended) return false;
+      this.watch();
       this.player.play(out.length, sampleRate, out);
       for (let k = 0; k < out.length; k++) {
         this.mean += 5e-4 * (out[k] - this.mean); // a loudspeaker has no constant part
@@ -111,8 +109,7 @@ if (typeof registerProcessor === "function") {
   let last = performance.now();
   onmessage = ({ data }) => player.message(data);
   setInterval(() => {
-    const now = performance.now();
-    const n = Math.round(Math.min(now - last, 60) * RATE / 1000); // what is late is left out
+    const now = performance.now(), n = Math.round(Math.min(now - last, 60) * RATE / 1000); // what is late is left out
     last = now;
     player.play(n, RATE, null);
     if (player.running) player.send();

@@ -1,21 +1,15 @@
-"use strict";
 /* The page: what is turned, who plays it, what is told of it. */
 
-const $ = (id) => document.getElementById(id);
-const START = settingOf(DATA.start);
-const state = { setting: START, values: valuesOf(START), speed: 1, paused: false, generation: 0, marks: [], other: null };
+const first = opened();
+const state = { setting: first, values: valuesOf(first), speed: 1, paused: false, generation: 0, marks: [], others: [] };
 const history_ = new History();
-const curves = new Curves($("curves"), measured);
-function measured(words) {
-  const place = $("measure");
-  while (place.children.length < words.length) place.append(document.createElement("span"));
-  while (place.children.length > words.length) place.lastChild.remove();
-  words.forEach((word, k) => { place.children[k].textContent = word.replaceAll("-", "−"); });
-}
-const lit = { time: -1e9, side: 0 };
+const curves = new Curves($("curves"), (words) => {
+  $("measure").replaceChildren();
+  for (const word of words) made($("measure"), "span", word.replaceAll("-", "−"));
+});
+const WALL = COLUMNS.indexOf("wall_contact"), lit = { time: -1e9, side: 0 };
 
 // --- who plays ------------------------------------------------------------------------------------
-
 const binary = Uint8Array.from(atob(BINARY), (c) => c.charCodeAt(0)).buffer;
 const workerSource = URL.createObjectURL(new Blob([CORE], { type: "text/javascript" }));
 let host = null, audio = null;
@@ -54,14 +48,11 @@ const pace = () => host.post({ kind: "speed", speed: state.paused ? 0 : state.sp
 
 function heard(told) {
   if (told.generation !== state.generation) return;
-  if (told.kind === "fault") {
-    fault(told.text);
-    return;
-  }
+  if (told.kind === "fault") return fault(told.text);
   history_.add(told);
-  const wall = COLUMNS.indexOf("wall_contact"), count = told.count;
-  for (let k = 0; k < count; k++) {
-    const side = told.rows[k * OUTPUT_COUNT + wall];
+  if (told.gaps !== undefined) $("gaps").textContent = told.gaps ? `${told.gaps} gaps` : "no gap";
+  for (let row = told.last - told.count + 1; row <= told.last; row++) {
+    const side = history_.value(row, WALL);
     if (side) Object.assign(lit, { time: performance.now(), side });
   }
   state.marks.push(...told.marks);
@@ -70,19 +61,17 @@ function heard(told) {
   while (state.marks.length > 3 && state.marks[1][0] < newest - 1) state.marks.shift();
 }
 
-const fault = (text) => { $("fault").textContent = text; };
+function fault(text) {
+  $("fault").textContent = text;
+}
 
 // --- what is turned -------------------------------------------------------------------------------
-
 function take(setting, again) {
   const before = state.setting, values = valuesOf(setting), setup = setupOf(values, setting.scene);
-  if (values["drive.reset_time"] * values["drive.frequency"] >= 1) {
-    fault("drive.reset_time must be below the period.");
-    return;
-  }
+  if (values["drive.reset_time"] * values["drive.frequency"] >= 1) return fault("drive.reset_time must be below the period.");
   const was = setupOf(state.values, before.scene);
   Object.assign(state, { setting, values });
-  state.other = null;
+  state.others = state.others.filter((other) => other === record);
   $("compared").textContent = "";
   fault("");
   const same = (name) => JSON.stringify(was[name]) === JSON.stringify(setup[name]);
@@ -108,30 +97,24 @@ function turnKnob(index, code) {
 }
 
 const GRIP = 2; // N, the end of the grip's scale
-const KNOBS = [
-  { name: "amplitude", text: (v) => `${v["drive.amplitude"].toFixed(2)} V`, at: (v) => codesOf(v)[0] / 1023, turn: (x) => turnKnob(0, x * 1023) },
-  { name: "frequency", text: (v) => `${v["drive.frequency"].toFixed(2)} Hz`, at: (v) => codesOf(v)[1] / 1023, turn: (x) => turnKnob(1, x * 1023) },
-  { name: "offset", text: (v) => `${v["drive.offset"].toFixed(2)} V`, at: (v) => codesOf(v)[2] / 1023, turn: (x) => turnKnob(2, x * 1023) },
-  { name: "grip", text: (v) => `${v["friction.normal_force"].toFixed(3)} N`, at: (v) => Math.min(1, v["friction.normal_force"] / GRIP),
-    turn: (x) => set({ "friction.normal_force": Math.round(x * GRIP * 200) / 200 }) },
-];
+const pot = (name, unit, index) =>
+  ({ name, key: `drive.${name}`, digits: 2, unit, at: (v) => codesOf(v)[index] / 1023, turn: (x) => turnKnob(index, x * 1023) });
+const KNOBS = [pot("amplitude", "V", 0), pot("frequency", "Hz", 1), pot("offset", "V", 2),
+  { name: "grip", key: "friction.normal_force", digits: 3, unit: "N", at: (v) => Math.min(1, v["friction.normal_force"] / GRIP),
+    turn: (x) => set({ "friction.normal_force": Math.round(x * GRIP * 200) / 200 }) }];
 
 function makeKnob(knob) {
-  const place = document.createElement("div");
-  place.className = "knob";
-  place.id = `knob-${knob.name}`;
-  place.tabIndex = 0;
+  const place = Object.assign(made($("knobs"), "div"), { className: "knob", id: `knob-${knob.name}`, tabIndex: 0 });
   const own = { role: "slider", "aria-label": knob.name, "aria-valuemin": 0, "aria-valuemax": 1 };
   for (const [name, value] of Object.entries(own)) place.setAttribute(name, value);
-  const [canvas, name, text] = ["canvas", "b", "span"].map((tag) => place.appendChild(document.createElement(tag)));
-  name.textContent = knob.name;
-  const step = 1 / 1023, clamp = (x) => Math.max(0, Math.min(1, x));
+  const [, , text] = ["i", "b", "span"].map((tag, k) => made(place, tag, k ? knob.name : ""));
+  const step = 1 / 1023, turn = (x) => knob.turn(Math.max(0, Math.min(1, x)));
   const keys = { ArrowUp: 4, ArrowRight: 4, ArrowDown: -4, ArrowLeft: -4, PageUp: 40, PageDown: -40, Home: -1e9, End: 1e9 };
   place.addEventListener("keydown", (event) => {
     if (!(event.key in keys)) return;
     event.preventDefault();
     const many = event.shiftKey ? Math.sign(keys[event.key]) : keys[event.key];
-    knob.turn(clamp(knob.at(state.values) + many * step * (knob.name === "grip" ? 3 : 1)));
+    turn(knob.at(state.values) + many * step * (knob.name === "grip" ? 3 : 1));
   });
   let from = null;
   place.addEventListener("pointerdown", (event) => {
@@ -139,41 +122,20 @@ function makeKnob(knob) {
     from = { x: event.clientX, y: event.clientY, at: knob.at(state.values) };
   });
   place.addEventListener("pointermove", (event) => {
-    if (from) knob.turn(clamp(from.at + (from.y - event.clientY + event.clientX - from.x) / (event.shiftKey ? 2000 : 250)));
+    if (from) turn(from.at + (from.y - event.clientY + event.clientX - from.x) / (event.shiftKey ? 2000 : 250));
   });
   for (const end of ["pointerup", "pointercancel"]) place.addEventListener(end, () => { from = null; });
   place.addEventListener("wheel", (event) => {
     if (document.activeElement !== place) return; // the page scrolls
     event.preventDefault();
-    knob.turn(clamp(knob.at(state.values) - Math.sign(event.deltaY) * 4 * step));
+    turn(knob.at(state.values) - Math.sign(event.deltaY) * 4 * step);
   }, { passive: false });
-  $("knobs").append(place);
   knob.show = () => {
-    const at = knob.at(state.values), { ink, width, height } = inked(canvas), colour = colours();
-    const angle = (x) => (0.75 + 1.5 * x) * Math.PI, r = width / 2 - 6;
-    const arc = (from_, to, what) => {
-      ink.strokeStyle = colour(what);
-      ink.lineWidth = 4;
-      ink.beginPath();
-      ink.arc(width / 2, height / 2, r, angle(from_), angle(to));
-      ink.stroke();
-    };
-    arc(0, 1, "fill");
-    arc(0, at, "a");
-    ink.fillStyle = colour("fill");
-    ink.beginPath();
-    ink.arc(width / 2, height / 2, r - 7, 0, 2 * Math.PI);
-    ink.fill();
-    ink.strokeStyle = colour("ink");
-    ink.lineWidth = 2.5;
-    ink.beginPath();
-    const [x, y] = [Math.cos(angle(at)), Math.sin(angle(at))];
-    ink.moveTo(width / 2 + 0.35 * r * x, height / 2 + 0.35 * r * y);
-    ink.lineTo(width / 2 + (r - 9) * x, height / 2 + (r - 9) * y);
-    ink.stroke();
-    text.textContent = knob.text(state.values);
+    const at = knob.at(state.values), words = `${state.values[knob.key].toFixed(knob.digits)} ${knob.unit}`;
+    place.style.setProperty("--at", at);
+    text.textContent = words;
     place.setAttribute("aria-valuenow", at.toFixed(4));
-    place.setAttribute("aria-valuetext", knob.text(state.values));
+    place.setAttribute("aria-valuetext", words);
   };
 }
 
@@ -186,25 +148,7 @@ function show() {
 }
 
 // --- what is told ---------------------------------------------------------------------------------
-
-const TOLD_OF = [["v", "mean velocity of the part"], ["stick", "sticks"], ["hits", "impacts a period"], ["heat", "heat of a coil"],
-  ["slip", "part slips beyond"], ["peak", "surface reached, mean of 4 ms"]];
-for (const [id, name] of TOLD_OF) {
-  const card = document.createElement("div"), dd = document.createElement("dd");
-  card.className = "card";
-  card.appendChild(document.createElement("dt")).textContent = name;
-  dd.id = `told-${id}`;
-  dd.append(document.createElement("span"), document.createElement("small"));
-  card.append(dd);
-  $("told").append(card);
-}
-
-function tell(id, text, small) {
-  const [big, more] = $(`told-${id}`).children;
-  if (big.textContent !== text) big.textContent = text;
-  if (more.textContent !== small) more.textContent = small;
-}
-
+const tell = (id, ...words) => words.forEach((text, k) => { $(`told-${id}`).children[k].textContent = text; });
 const signed = (value, digits) => `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(digits)}`;
 
 /* Means over the whole periods of the newest second. */
@@ -231,77 +175,74 @@ function tellAll() {
     tell("heat", `${found.heat.toFixed(2)} W`, found.heat > DATA.heat ? `above the ${DATA.heat.toFixed(1)} W of its data sheet's drives`
       : `in the long run some ${rise.toFixed(0)} K warmer`);
     $("told-heat").style.color = found.heat > DATA.heat ? "var(--warn)" : "";
-  } else for (const [id] of TOLD_OF.slice(0, 4)) tell(id, "…", "from whole periods");
-  let least = Infinity, most = -Infinity;
-  const mean = curves._value("mean", 1), from = Math.max(history_.first, history_.last - RATE, history_.turned + 1);
-  for (let row = from; row <= history_.last; row += 8) {
-    const a = mean(row);
-    if (a < least) least = a;
-    if (a > most) most = a;
-  }
+  } else for (const id of ["v", "stick", "hits", "heat"]) tell(id, "…", "from whole periods");
+  const mean = curves.value("mean", 1), reached = new Envelope(1);
+  for (let row = Math.max(history_.first, history_.last - RATE, history_.turned + 1); row <= history_.last; row += 8) reached.put(0, mean(row));
+  const [[least], [most]] = [reached.low, reached.high];
   tell("slip", `${signed(budget.up[0], 0)} / ${signed(budget.down[0], 0)} m/s²`, `going up / down; where the surface rises ${signed(budget.up[1], 0)} / ${signed(budget.down[1], 0)}`);
-  if (most >= least) tell("peak", `${signed(least, 0)} … ${signed(most, 0)} m/s²`, slipsBy(least, most, budget));
+  const ways = Object.keys(budget).filter((way) => least < budget[way][0] || most > budget[way][1]).join(" or ");
+  if (most >= least) tell("peak", `${signed(least, 0)} … ${signed(most, 0)} m/s²`, ways ? `a part going ${ways} slips` : "by this no part slips");
 }
 
-function slipsBy(least, most, budget) {
-  const ways = Object.keys(budget).filter((way) => least < budget[way][0] || most > budget[way][1]);
-  return ways.length ? `a part going ${ways.join(" or ")} slips` : "by this no part slips";
+// --- laid over: a run of the server, a trial's record --------------------------------------------------
+const NAMED = { coil_current: "current" }, DASHED = [5, 4], DOTTED = [2, 3];
+const record = DATA.record && new Overlay({ ...DATA.record, begin: 0 }, DOTTED,
+  { ...NAMED, mean: "a_surface", a_surface: "" });
+
+/* How far the page's newest period is from what is laid over it, in words. */
+function apart(name, other, theirs) {
+  const own = state.found, there = 1e3 * theirs, here = own ? 1e3 * own.velocity : NaN, words = [];
+  if (theirs !== null) words.push(`${signed(there, 2)} mm/s, here ${signed(here, 2)}, difference ${signed(here - there, 2)}`);
+  for (const [which, factor, digits, unit] of [["coil_current", 1, 3, "A"], ["v_surface", 1e3, 1, "mm/s"]]) {
+    const off = other.off(which, history_)?.map((v) => (factor * v).toFixed(digits));
+    if (off) words.push(`${which === "coil_current" ? "current" : "surface"} off by ${off[0]} of ${off[1]} ${unit} rms`);
+  }
+  return `${name}: ${words.join("; ")}`;
 }
 
-// --- a run of the server, beside --------------------------------------------------------------------
-
-class Other {
-  constructor(answer) {
-    Object.assign(this, answer);
-  }
-
-  /* Phase in periods of the window, and value. */
-  line(name, factor, onSurface) {
-    const names = { coil_current: "current" }, values = this.waveforms[names[name] ?? name];
-    if (!values) return null;
-    const periods = Number($("window").value), z = this.waveforms, begin = values.length - Math.min(values.length, Math.round(periods / this.frequency / this.step));
-    const base = name === "z_part" ? z.z_part[begin] - z.z_surface[begin] : 0;
-    return values.slice(begin).map((v, k) => {
-      const phase = (this.begin + (begin + k) * this.step) * this.frequency / periods;
-      const on = name === "z_part" && onSurface ? z.z_surface[begin + k] : 0;
-      return [(phase - Math.floor(phase)) * periods, factor * (v - base - on)];
-    });
-  }
+function lay(other, name, velocity) {
+  state.others = [...state.others.filter(({ dash }) => dash !== other.dash), other];
+  $("compared").textContent = apart(name, other, velocity);
 }
 
 async function compare() {
-  const own = state.found, setting = state.setting;
+  const setting = state.setting, model = $("model").value, content = { "Content-Type": "text/plain" };
   $("compare").disabled = true;
   $("compared").textContent = "ngspice runs …";
   try {
-    const answer = await fetch("run", { method: "POST", headers: { "Content-Type": "text/plain" }, body: linkOf(setting) });
+    const answer = await fetch(`run/${model}`, { method: "POST", headers: content, body: linkOf(setting) });
     const told = await answer.json();
     if (!answer.ok) throw new Error(told.error);
     if (setting !== state.setting) throw new Error("The setting has been turned meanwhile.");
-    state.other = new Other(told);
-    const there = 1e3 * told.v_average, here = own ? 1e3 * own.velocity : NaN;
-    $("compared").textContent = `amplifier (dashed): ${signed(there, 2)} mm/s, here ${signed(here, 2)}, difference ${signed(here - there, 2)}`;
+    lay(new Overlay(told, DASHED, NAMED), `${model} (dashed)`, told.v_average);
   } catch (error) {
     $("compared").textContent = error.message;
-  } finally {
-    $("compare").disabled = false;
   }
+  $("compare").disabled = false;
+}
+
+function layRecord() {
+  const on = !state.others.includes(record), f = state.values["drive.frequency"], part = record.values("v_part") ?? [];
+  const whole = Math.floor(part.length * record.step * f) / f, v = part.slice(0, Math.round(whole / record.step)).filter((x) => x !== null);
+  $("record").setAttribute("aria-pressed", String(on));
+  state.others = state.others.filter((one) => one !== record);
+  if (!on) return;
+  record.frequency = f;
+  record.fit(history_);
+  lay(record, `${record.name} (dotted)`, v.length ? v.reduce((a, b) => a + b) / v.length : null);
 }
 
 // --- begin ------------------------------------------------------------------------------------------
+const options = (select, names) => { for (const name of names) made(select, "option", name); };
 
-function options(select, names) {
-  for (const name of names) select.appendChild(document.createElement("option")).textContent = name;
-}
-
+/* The setting of the address, or of the page itself. */
 function opened() {
-  if (location.hash.length < 2) return START;
   try {
-    return settingOf(location.hash);
+    if (location.hash.length > 1) return settingOf(location.hash);
   } catch (error) {
     fault(error.message);
-    return START;
   }
+  return settingOf(DATA.start);
 }
 
 async function change(sound) {
@@ -321,14 +262,12 @@ options($("waveform"), DATA.keys["drive.waveform"].choices);
 KNOBS.forEach(makeKnob);
 $("scene").onchange = () => take({ scene: $("scene").value, changes: {} }, true);
 $("waveform").onchange = () => {
-  const waveform = $("waveform").value, values = { "drive.waveform": waveform };
+  const waveform = $("waveform").value, own = ["steps", "pieces"].includes(waveform), values = { "drive.waveform": waveform };
   if (!waveform.includes("sawtooth") && state.values["drive.reset_time"]) values["drive.reset_time"] = 0;
   if (waveform !== "square" && state.values["drive.duty"] !== 0.5) values["drive.duty"] = 0.5;
-  if (["steps", "pieces"].includes(waveform) && !state.values["drive.table"]) {
-    values["drive.table"] = [[0, 0.5], [0.25, 0], [0.5, -0.5], [0.75, 0]];
-  }
+  if (own) values["drive.table"] = state.values["drive.table"] ?? [[0, 0.5], [0.25, 0], [0.5, -0.5], [0.75, 0]];
   const next = changed(state.setting, values);
-  if (!["steps", "pieces"].includes(waveform)) delete next.changes["drive.table"];
+  if (!own) delete next.changes["drive.table"];
   take(next);
 };
 $("polarity").onchange = () => set({ "coil.polarity": Number($("polarity").value) });
@@ -337,43 +276,32 @@ $("pause").onclick = () => { state.paused = !state.paused; $("pause").setAttribu
 $("sound").onclick = () => change($("sound").getAttribute("aria-pressed") !== "true").catch((error) => fault(`No sound: ${error.message}`));
 $("gain").oninput = () => loudness();
 $("again").onclick = () => take({ scene: state.setting.scene, changes: {} }, true);
-$("copy").onclick = async () => {
-  const link = linkOf(state.setting);
+$("copy").onclick = () => {
+  const link = linkOf(state.setting), told = `cosim run '${link}'`;
   history.replaceState(null, "", link);
-  try {
-    await navigator.clipboard.writeText(location.href);
-    $("compared").textContent = `Copied. In a shell: cosim run '${link}'`;
-  } catch {
-    $("compared").textContent = `cosim run '${link}'`;
-  }
+  $("compared").textContent = told;
+  navigator.clipboard?.writeText(location.href).then(() => { $("compared").textContent = `Copied. In a shell: ${told}`; }, () => {});
 };
-$("compare").hidden = !SERVED;
+$("asking").hidden = !DATA.models.length;
+options($("model"), DATA.models);
 $("compare").onclick = compare;
+$("record").hidden = !record;
+$("record").onclick = layRecord;
 addEventListener("hashchange", () => take(opened(), true));
-addEventListener("resize", show);
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
-$("foot").textContent = "The machine's own C, as WebAssembly, with the circuit “limited” inside: the current follows the command while the output stays "
-  + "within its swing. Widths of the drawing are made up. Instants of the acceleration, currents and voltages are not validated by measurements. "
-  + "Knobs: drag, or arrow keys (shift: one code). The frequency knob turns as the device's: right is slow.";
 
-state.setting = opened();
-state.values = valuesOf(state.setting);
 change(false);
 show();
-let told = 0;
+const due = { curves: 0, told: 0 };
 function frame(time) {
-  if (history_.last) {
-    const slow = state.speed < 1;
-    drawMachine($("picture"), history_.now(), state.values, lit);
-    if (time - told > 45) {
-      curves.draw(history_, Number($("window").value), { slow, onSurface: $("heights").value === "slip", other: state.other, budget: slipBudget(state.values) });
-      if (time - (state.toldAt ?? 0) > 200) {
-        tellAll();
-        state.toldAt = time;
-      }
-      told = time;
-    }
-  }
   requestAnimationFrame(frame);
+  if (!history_.last) return;
+  drawMachine($("picture"), history_.now(), state.values, lit);
+  if (time < due.curves) return;
+  due.curves = time + 45;
+  const how = { slow: state.speed < 1, onSurface: $("heights").value === "slip", others: state.others, budget: slipBudget(state.values) };
+  curves.draw(history_, Number($("window").value), how);
+  if (time < due.told) return;
+  due.told = time + 200;
+  tellAll();
 }
 requestAnimationFrame(frame);

@@ -1,4 +1,3 @@
-"use strict";
 /* A setting is a built-in scene and its changed keys; its link is the address's fragment. DATA is
    what cosim/live/rigs.py has made of the scenes, their keys and the firmware. */
 
@@ -7,23 +6,17 @@ const TWINS = { "drive.pot_max": "drive.amplitude", "drive.pot_frequency": "driv
 for (const [knob, key] of Object.entries(TWINS)) TWINS[key] = knob;
 const has = (object, name) => Object.prototype.hasOwnProperty.call(object, name);
 
+const refuse = (sentence) => { throw new Error(sentence); };
+
 /* The value that a link's text stands for; throws a sentence. */
 function valueOf(key, text) {
   if (/^(run|coupling)\.[a-z_]+$/.test(key)) return text; // for cosim run; nothing here
-  const known = has(DATA.keys, key) ? DATA.keys[key] : null;
-  if (!known) throw new Error(`This page cannot turn “${key.slice(0, 60)}”; cosim run may know it.`);
-  if (known.choices) {
-    const found = known.choices.find((one) => String(one) === text);
-    if (found === undefined) throw new Error(`${key} must be ${known.choices.join(", ")}.`);
-    return found;
-  }
+  const known = has(DATA.keys, key) ? DATA.keys[key] : refuse(`This page cannot turn “${key.slice(0, 60)}”; cosim run may know it.`);
+  if (known.choices) return known.choices.find((one) => String(one) === text) ?? refuse(`${key} must be ${known.choices.join(", ")}.`);
   if (known.table) return tableOf(key, text);
   const value = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(text) ? Number(text) : NaN;
-  const whole = !known.whole || Number.isInteger(value);
-  if (!(value >= known.low && value <= known.high && whole)) {
-    throw new Error(`${key} must be a ${known.whole ? "whole " : ""}number from ${known.low} to ${known.high}.`);
-  }
-  return value;
+  if (value >= known.low && value <= known.high && (!known.whole || Number.isInteger(value))) return value;
+  return refuse(`${key} must be a ${known.whole ? "whole " : ""}number from ${known.low} to ${known.high}.`);
 }
 
 function tableOf(key, text) {
@@ -32,30 +25,29 @@ function tableOf(key, text) {
   const fits = Array.isArray(pairs) && pairs.length >= 1 && pairs.length <= 64 && pairs.every((pair, k) =>
     Array.isArray(pair) && pair.length === 2 && pair.every(Number.isFinite) && Math.abs(pair[1]) <= 0.5 &&
     pair[0] >= (k ? pairs[k - 1][0] : 0) && pair[0] <= 1);
-  if (!fits) throw new Error(`${key} must be 1 to 64 pairs of phase, 0 to 1, and level, -0.5 to 0.5.`);
-  return pairs;
+  return fits ? pairs : refuse(`${key} must be 1 to 64 pairs of phase, 0 to 1, and level, -0.5 to 0.5.`);
 }
 
 /* The setting of a link; throws a sentence. */
 function settingOf(link) {
   const at = link.indexOf("#"), text = at < 0 ? link : link.slice(at + 1);
-  if (text.length > DATA.longest) throw new Error("The link is too long.");
+  if (text.length > DATA.longest) refuse("The link is too long.");
   const [[first, scene], ...pairs] = text.split("&").map((part) => {
     const equals = part.indexOf("=");
-    if (equals < 1) throw new Error("A link is #scene=NAME&table.key=value&…");
+    if (equals < 1) refuse("A link is #scene=NAME&table.key=value&…");
     try {
       return [part.slice(0, equals), part.slice(equals + 1)].map(decodeURIComponent);
     } catch {
-      throw new Error("The link has a % without two digits.");
+      refuse("The link has a % without two digits.");
     }
   });
-  if (first !== "scene") throw new Error("A link begins with #scene=NAME.");
-  if (!has(DATA.scenes, scene)) throw new Error(`This page has no scene “${scene.slice(0, 60)}”.`);
+  if (first !== "scene") refuse("A link begins with #scene=NAME.");
+  if (!has(DATA.scenes, scene)) refuse(`This page has no scene “${scene.slice(0, 60)}”.`);
   const changes = {};
   for (const [key, value] of pairs) {
-    if (has(changes, key)) throw new Error(`The link has ${key.slice(0, 60)} twice.`);
+    if (has(changes, key)) refuse(`The link has ${key.slice(0, 60)} twice.`);
     changes[key] = valueOf(key, value);
-    if (has(TWINS, key) && has(changes, TWINS[key])) throw new Error(`${key} and ${TWINS[key]} say the same thing twice.`);
+    if (has(TWINS, key) && has(changes, TWINS[key])) refuse(`${key} and ${TWINS[key]} say the same thing twice.`);
   }
   return { scene, changes };
 }

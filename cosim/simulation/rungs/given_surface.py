@@ -12,7 +12,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.coupling.loop.agenda import exposures, grid
 from cosim.errors import BadInput, plain
-from cosim.files.columns import read_timetable
+from cosim.files.cells import read_timetable
 from cosim.mechanics import part
 from cosim.mechanics.surface import Surface
 from cosim.scene import Scene
@@ -25,7 +25,7 @@ def surface(scene: Scene) -> Surface:
     """The surface of a scene that gives its velocity, as often as it takes to reach
     ``run.duration``. Raises BadInput for a file that cannot be used.
     """
-    drive = scene.drive
+    drive, friction = scene.drive, scene.friction
     if drive.waveform == "file":
         if drive.file is None:
             raise BadInput(
@@ -35,7 +35,8 @@ def surface(scene: Scene) -> Surface:
         return Surface(*read_surface(Path(drive.file)))
     periods = max(1, math.ceil(scene.run.duration * drive.frequency - 1e-9))
     if drive.waveform == "sine":
-        bounds = part.bounds(**_law(scene))
+        law = (friction.mu_s, force_per_mass(scene), scene.mechanics.gravity, friction.mu_plate)
+        bounds = part.bounds(*law)
         return Surface.sine(drive.velocity_amplitude, drive.frequency, periods, bounds)
     return Surface(*_cycle(scene), periods)
 
@@ -103,27 +104,33 @@ def move_part(scene: Scene) -> tuple[dict[str, Array], Motion]:
     rows = grid(run.output_step, run.duration)
     frames = exposures(run.duration, run.settle, run.shutter)
     wanted = np.unique(np.concatenate([rows, frames, [run.settle, run.duration]]))
-    found = part.account(moved, wanted, mu_k=scene.friction.mu_k, **_law(scene))
+    friction, gravity = scene.friction, scene.mechanics.gravity
+    found = part.account(
+        moved,
+        wanted,
+        mu_s=friction.mu_s,
+        mu_k=friction.mu_k,
+        mu_plate=friction.mu_plate,
+        force_per_mass=force_per_mass(scene),
+        gravity=gravity,
+    )
     mass = scene.mechanics.part_mass / scene.mechanics.n_surfaces
     at = np.searchsorted(wanted, rows)
-    columns = {
-        "time": wanted,
-        "z_surface": found.z_surface,
-        "v_surface": found.v_surface,
-        "a_surface": found.a_surface,
-        "z_part": found.z,
-        "v_part": found.v,
-        "friction_force": mass * found.friction,
-        "sticking": found.sticks,
+    columns = {"time": wanted} | {name: found[name] for name in found if name.endswith("_surface")}
+    columns |= {
+        "z_part": found["z"],
+        "v_part": found["v"],
+        "friction_force": mass * found["friction"],
+        "sticking": found["sticks"],
     }
-    held = mass * (0.5 * found.v**2 + scene.mechanics.gravity * found.z)
+    held = mass * (0.5 * found["v"] ** 2 + gravity * found["z"])
     start = 0.5 * mass * float(moved.velocities[0]) ** 2
     totals = {
-        "z_part": found.z,
-        "stick_time": found.stuck,
-        "stick_slip_events": found.events,
-        "energy_in": mass * found.work,
-        "energy_friction": mass * found.heat,
+        "z_part": found["z"],
+        "stick_time": found["stuck"],
+        "stick_slip_events": found["events"],
+        "energy_in": mass * found["work"],
+        "energy_friction": mass * found["heat"],
         "energy_stored": held - start,
     }
     none = dict.fromkeys(("impacts", "energy_impact", "energy_damping"), 0)
@@ -132,18 +139,7 @@ def move_part(scene: Scene) -> tuple[dict[str, Array], Motion]:
         totals={name: values[-1].item() for name, values in totals.items()} | none,
         at_settle={name: values[settled].item() for name, values in totals.items()} | none,
         extremes=moved.extremes(run.settle, run.duration),
-        frames=found.z_surface[np.searchsorted(wanted, frames)],
-        slope=average_slope(run, wanted, found.z),
+        frames=found["z_surface"][np.searchsorted(wanted, frames)],
+        slope=average_slope(run, wanted, found["z"]),
     )
     return {name: values[at] for name, values in columns.items()}, motion
-
-
-def _law(scene: Scene) -> dict[str, float]:
-    """What decides whether the part sticks, by the names of :class:`cosim.mechanics.part.Case`."""
-    friction = scene.friction
-    return {
-        "mu_s": friction.mu_s,
-        "force_per_mass": force_per_mass(scene),
-        "gravity": scene.mechanics.gravity,
-        "mu_plate": friction.mu_plate,
-    }

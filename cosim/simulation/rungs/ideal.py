@@ -1,6 +1,5 @@
 """Rung ``ideal``: the coil's current is the command's, whatever voltage it takes."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -10,49 +9,37 @@ from cosim.arrays import Array
 from cosim.coupling.loop.agenda import SAME_TIME, count
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import commands
-from cosim.drive.pieces import Command
 from cosim.drive.straights import straights
 from cosim.files.spill import Tape, blocks
 from cosim.scene import Scene
-from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
-from cosim.simulation.rungs.rung import Driven, Rung
+from cosim.simulation.rungs.rung import Driven, Eddy, Electrics, coil_waves, magnetic, total
 from cosim.toolchain.libraries import library
 
 
-class Ideal(Rung):
+def drive(scene: Scene, recorder: Recorder) -> Driven:
     """The current is given; the coil's voltage follows from it."""
-
-    names = ("ideal",)
-
-    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
-        drives = commands(scene)
-        share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
-        coils = [_Coil(scene) for _ in drives]
-        for edges, start, end in straights(drives, scene.run.duration):
-            start, end = share * start, share * end
-            recorder.follow(edges[1:], start, end)
-            for k, coil in enumerate(coils):
-                coil.follow(edges, start[:, k], end[:, k])
-        motion = recorder.at_end["energy_in"]
-        electric = coils[0].electrics(motion)
-        if len(drives) > 1:
-            # The work that both coils did is in the first one's account.
-            other = coils[1].electrics(0.0)
-            energies = ("energy_in", "energy_copper", "energy_magnetic")
-            sums = {name: getattr(electric, name) + getattr(other, name) for name in energies}
-            electric = replace(electric, **sums)
-        return Driven(electric, waves=partial(_waves, drives, coils, recorder))
-
-
-def _waves(
-    drives: Sequence[Command], coils: "Sequence[_Coil]", recorder: Recorder
-) -> dict[str, Array]:
-    found: dict[str, Array] = {}
-    for drive, coil, surface in zip(drives, coils, ("", "_2"), strict=False):
-        found[f"command{surface}"] = commanded(drive, recorder.time)
-        current, voltage = coil.waves(recorder.column(f"back_emf{surface}"))
-        found |= {f"current{surface}": current, f"coil_voltage{surface}": voltage}
-    return found
+    drives = commands(scene)
+    share = 1.0 / (scene.circuit.sense_resistance * scene.coil.count)
+    coils = [_Coil(scene) for _ in drives]
+    for edges, start, end in straights(drives, scene.run.duration):
+        start, end = share * start, share * end
+        recorder.follow(edges[1:], start, end)
+        for k, coil in enumerate(coils):
+            coil.follow(edges, start[:, k], end[:, k])
+    motion = recorder.at_end["energy_in"]
+    electric = coils[0].electrics(motion)
+    if len(drives) > 1:
+        # The work that both coils did is in the first one's account.
+        other = coils[1].electrics(0.0)
+        energies = ("energy_in", "energy_copper", "energy_magnetic")
+        sums = {name: getattr(electric, name) + getattr(other, name) for name in energies}
+        electric = replace(electric, **sums)
+    return Driven(
+        electric,
+        waves=lambda: coil_waves(
+            drives, recorder, lambda k, end: coils[k].waves(recorder.column(f"back_emf{end}"))
+        ),
+    )
 
 
 class _Coil:

@@ -3,39 +3,30 @@
 The source's command is an input of the FMU; there is no ngspice.
 """
 
-from collections.abc import Sequence
 from functools import partial
 
 from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import commands
-from cosim.drive.pieces import Command
 from cosim.drive.straights import straights
 from cosim.scene import Scene
-from cosim.simulation.rungs.electrics import Electrics, commanded
-from cosim.simulation.rungs.rung import Driven, Rung
+from cosim.simulation.rungs.rung import Driven, Electrics, coil_waves
 
 
-class Limited(Rung):
+def drive(scene: Scene, recorder: Recorder) -> Driven:
     """One monolithic solution of source, coil and mechanics."""
+    drives = commands(scene)
+    for edges, start, end in straights(drives, scene.run.duration):
+        recorder.follow(edges[1:], start, end)
 
-    names = ("limited",)
+    def waves(_: int, end: str) -> tuple[Array, Array]:
+        return recorder.column(f"coil_current{end}"), recorder.column(f"coil_voltage{end}")
 
-    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
-        drives = commands(scene)
-        for edges, start, end in straights(drives, scene.run.duration):
-            recorder.follow(edges[1:], start, end)
-        waves = partial(_waves, drives, recorder)
-        return Driven(_electrics(scene, recorder), method="monolithic", waves=waves)
-
-
-def _waves(drives: Sequence[Command], recorder: Recorder) -> dict[str, Array]:
-    found: dict[str, Array] = {}
-    for drive, surface in zip(drives, ("", "_2"), strict=False):
-        found[f"command{surface}"] = commanded(drive, recorder.time)
-        found[f"current{surface}"] = recorder.column(f"coil_current{surface}")
-        found[f"coil_voltage{surface}"] = recorder.column(f"coil_voltage{surface}")
-    return found
+    return Driven(
+        _electrics(scene, recorder),
+        method="monolithic",
+        waves=partial(coil_waves, drives, recorder, waves),
+    )
 
 
 def _electrics(scene: Scene, recorder: Recorder) -> Electrics:

@@ -1,24 +1,46 @@
-"""What each rung with mechanics does with them; one rung a file.
+"""What each rung with mechanics makes of them, and what they share; one rung a file.
 
-``cosim/scene/rungs.py`` declares the rungs and the keys that each uses.
+A rung's file has the function ``drive``, which moves the recorder's mechanics from 0 to
+``run.duration`` and raises BadInput and SimulationFailed; ``cosim/scene/rungs.py`` declares the
+rungs and the keys that each uses. Energies are those of all ``coil.count`` coils, J; currents and
+voltages those of one coil.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from typing import ClassVar
+from functools import partial
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.arrays import Array, slope
 from cosim.coupling.loop.recorder import Recorder
-from cosim.files.declared import modules
+from cosim.drive.pieces import Command
+from cosim.files.spill import Tape, blocks
 from cosim.scene import Scene
 from cosim.scene.tables import Run
-from cosim.simulation.rungs.electrics import Electrics
 from cosim.trials.camera import FRAME_RATE, frame_times
+
+
+@dataclass(frozen=True)
+class Electrics:
+    """What the electrical side did, in numbers."""
+
+    energy_in: float
+    """Delivered to coils and sense resistor, J."""
+    energy_copper: float
+    """Turned into heat in coils (copper and eddy currents) and sense resistor, J."""
+    energy_magnetic: float
+    """In the coils' inductances at the end, J."""
+    current_max: float
+    """Largest current of one coil after settling, A."""
+    current_min: float
+    """Smallest current of one coil after settling, A."""
+    limited: dict[str, float]
+    """Share of the time after settling in which each limit of the amplifier acted, by name, and
+    ``output`` for its output being at any."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +54,9 @@ class Driven:
     circuit_steps: int = 0
     circuit_rejected: int = 0
     versions: Mapping[str, str] = field(default_factory=dict)
+    measured: Mapping[str, float] = field(default_factory=dict)
+    """Numbers for the summary that the netlist itself asks for."""
+    notes: Sequence[str] = ()
     waves: Callable[[], Mapping[str, Array]] = dict
     """Makes the columns of the coils: a value for each row of the waveforms. In a row at a jump
     stands what is before it, as in the mechanics' columns, whose state a row is: the first row is
@@ -69,22 +94,83 @@ def average_slope(run: Run, time: Array, heights: Array) -> float | None:
     return slope(frames, np.interp(frames, time, heights))
 
 
-class Rung(ABC):
-    """A way to drive the mechanics."""
+def drive(scene: Scene, recorder: Recorder) -> Driven:
+    """What the scene's rung does."""
+    name = "spice" if scene.rung.ngspice else scene.circuit.model
+    return import_module(f"{__package__}.{name}").drive(scene, recorder)
 
-    names: ClassVar[tuple[str, ...]]
-    """Values of ``circuit.model``."""
 
-    @abstractmethod
-    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
-        """Move the recorder's mechanics from 0 to ``run.duration``.
+def commanded(command: Command, rows: Array) -> Array:
+    """V1 (V) at the times of the rows (s), at a jump the value before it; 0 in the first row, where
+    the command has not begun."""
+    made = Tape(1, len(rows))
 
-        Raises BadInput and SimulationFailed.
+    def write(at: Array, values: Array) -> None:
+        command.values_before(at, values)
+        values[: at.searchsorted(0.0, "right")] = 0.0
+
+    for part in blocks(len(rows)):
+        made.add(part.stop - part.start, partial(write, rows[part]))
+    return made.column()
+
+
+def coil_waves(
+    drives: Sequence[Command],
+    recorder: Recorder,
+    waves: Callable[[int, str], tuple[Array, Array]],
+) -> dict[str, Array]:
+    """Columns of each surface's coil: the command, and what ``waves`` makes of its number and the
+    end of its columns' names: current (A) and voltage (V)."""
+    found: dict[str, Array] = {}
+    for k, (drive, surface) in enumerate(zip(drives, ("", "_2"), strict=False)):
+        found[f"command{surface}"] = commanded(drive, recorder.time)
+        found[f"current{surface}"], found[f"coil_voltage{surface}"] = waves(k, surface)
+    return found
+
+
+def total(shares: Array, values: npt.NDArray[Any]) -> float:
+    """Sum of the products, without BLAS: its threads cost more than the sum itself."""
+    return float((shares * values).sum())
+
+
+def magnetic(scene: Scene, current: float, eddy_current: float) -> float:
+    """Energy in the inductances of all coils, J, at these currents of one (A)."""
+    coil = scene.coil
+    own = 0.5 * coil.inductance * current**2
+    return coil.count * (own + 0.5 * (coil.eddy_inductance or 0.0) * eddy_current**2)
+
+
+class Eddy:
+    """The LR2 branch of one coil, whose current is linear on intervals; solved exactly."""
+
+    def __init__(self, scene: Scene) -> None:
+        inductance = scene.coil.eddy_inductance or 0.0
+        self.resistance = scene.coil.eddy_resistance or 0.0
+        self.tau = inductance / self.resistance if self.resistance else 0.0
+        """Its time constant, s; 0 where the coil has no such branch."""
+        self.heat = 0.0
+        """In its resistance so far, J."""
+        self.current = 0.0
+        """In its inductance at the end, A."""
+
+    def follow(self, h: Array, start: Array, end: Array) -> Array | None:
+        """Go on through intervals of lengths ``h`` (s), the coil's current (A) between ``start``
+        and ``end``; gives the branch's current at the beginning of each.
         """
-
-
-@cache
-def rungs() -> dict[str, Rung]:
-    """Each rung with mechanics by its names; a file in this folder is a rung."""
-    modules(__name__.rpartition(".")[0])
-    return {name: kind() for kind in Rung.__subclasses__() for name in kind.names}
+        if not self.tau:
+            return None
+        tau, own, heat = self.tau, self.current, self.heat
+        branch = np.empty(len(h))
+        for k in range(len(h)):
+            branch[k] = own
+            lag = (end[k] - start[k]) / h[k] * tau
+            rest = start[k] - own - lag
+            decay = np.exp(-h[k] / tau)
+            heat += self.resistance * (
+                lag**2 * h[k]
+                + 2.0 * lag * rest * tau * (1.0 - decay)
+                + 0.5 * rest**2 * tau * (1.0 - decay**2)
+            )
+            own = end[k] - lag - rest * decay
+        self.current, self.heat = float(own), float(heat)
+        return branch

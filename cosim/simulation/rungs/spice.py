@@ -1,6 +1,7 @@
 """The rungs in ngspice, which solves the circuit and leads the coupling."""
 
 from collections.abc import Iterator
+from contextlib import closing
 
 import numpy as np
 
@@ -12,50 +13,49 @@ from cosim.errors import BadInput
 from cosim.files.spill import Tape, blocks
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
-from cosim.scene.rungs import RUNGS
-from cosim.simulation.rungs.electrics import Eddy, Electrics, commanded, magnetic, total
-from cosim.simulation.rungs.rung import Driven, Rung
+from cosim.simulation.rungs.rung import Driven, Eddy, Electrics, commanded, magnetic, total
 
 
-class Spice(Rung):
+def drive(scene: Scene, recorder: Recorder) -> Driven:
     """The coupling method of the scene joins ngspice and the mechanics."""
+    # Only those who run a circuit load PySpice, which takes a while.
+    from cosim.circuit.false_cycles import refuse_false
+    from cosim.circuit.lint.outputs import measured
+    from cosim.circuit.netlist import asked_for
+    from cosim.coupling.loop.macro_steps import coupled
 
-    names = tuple(name for name, rung in RUNGS.items() if rung.ngspice and not rung.automatic)
-
-    def drive(self, scene: Scene, recorder: Recorder) -> Driven:
-        # Only those who run a circuit load PySpice, which takes a while.
-        from cosim.circuit.false_cycles import refuse_false
-        from cosim.coupling.loop.macro_steps import coupled
-
-        lead = coupled(scene, recorder)
-        lead.run()
-        log = lead.log()
-        version = recorder.mechanics.instance.version
-        refuse_false(scene, log, lambda finer: _log_alone(finer, version))
-        if scene.circuit.netlist is not None:
-            _refuse_foreign_coil(scene, log)
-        electric, waves = _electrics(scene, command(scene), log, recorder.time)
-        return Driven(
-            electric,
-            method=scene.coupling.method,
-            circuit_steps=lead.steps,
-            circuit_rejected=lead.state.attempts - lead.steps,
-            versions={"ngspice": lead.ngspice},
-            waves=lambda: waves,
-        )
+    lead = coupled(scene, recorder)
+    lead.run()
+    log = lead.log()
+    version = recorder.mechanics.instance.version
+    refuse_false(scene, log, lambda finer: _log_alone(finer, version))
+    values, notes = {}, []
+    if scene.circuit.netlist is not None:
+        _refuse_foreign_coil(scene, log)
+        asks, notes = asked_for(scene)
+        values, without = measured(asks, log["time"], log)
+        notes += without
+    electric, waves = _electrics(scene, command(scene), log, recorder.time)
+    return Driven(
+        electric,
+        method=scene.coupling.method,
+        circuit_steps=lead.steps,
+        circuit_rejected=lead.state.attempts - lead.steps,
+        versions={"ngspice": lead.ngspice},
+        measured=values,
+        notes=notes,
+        waves=lambda: waves,
+    )
 
 
 def _log_alone(scene: Scene, fmi_version: int) -> dict[str, Array]:
     """The circuit's waveforms of a run of which nothing else is wanted."""
     from cosim.coupling.loop.macro_steps import coupled
 
-    mechanics = Mechanics(scene, fmi_version)
-    try:
+    with closing(Mechanics(scene, fmi_version)) as mechanics:
         lead = coupled(scene, Recorder(scene, mechanics, lambda _: None))
         lead.run()
         return lead.log()
-    finally:
-        mechanics.close()
 
 
 def _electrics(
@@ -73,7 +73,8 @@ def _electrics(
     made = "v(v1)" in log and circuit.model != "amplifier"  # by the circuit, not given to it
     delivered, squares, eddy = 0.0, 0.0, Eddy(scene)
     most, least = -np.inf, np.inf
-    waves, done = Tape(3 if made else 2), 0
+    saved = circuit.save or []
+    waves, done = Tape(2 + len(saved) + made), 0
     end = log["time"][-1]
     for part in _points(log):
         time, coils, out, sense = (part[k] for k in ("time", "i(vemf)", "v(out)", "v(sense)"))
@@ -88,7 +89,8 @@ def _electrics(
         settled = current[time >= settle]
         most, least = settled.max(initial=most), settled.min(initial=least)
         stop = len(rows) if time[-1] == end else int(np.searchsorted(rows, time[-1]))
-        known = [current, out - sense, *([part["v(v1)"]] if made else [])]
+        known = [current, out - sense, *(part[name] for name in saved)]
+        known += [part["v(v1)"]] if made else []
         for here in blocks(stop - done):
             at = rows[done:stop][here]
             waves.append(np.stack([np.interp(at, time, values) for values in known], axis=1))
@@ -102,9 +104,10 @@ def _electrics(
         limited=_limited(scene, log),
     )
     return electric, {
-        "command": waves.column(2) if made else commanded(command, rows),
+        "command": waves.column(2 + len(saved)) if made else commanded(command, rows),
         "current": waves.column(0),
         "coil_voltage": waves.column(1),
+        **{name: waves.column(2 + k) for k, name in enumerate(saved)},
     }
 
 

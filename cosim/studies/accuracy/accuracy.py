@@ -16,12 +16,11 @@ from textwrap import fill
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.evaluate.store import Store
-from cosim.studies.accuracy.cases import CASES
-from cosim.studies.accuracy.runs import Run, measure, reference
-from cosim.studies.accuracy.solvers import DEFAULT, SOLVERS, Solver
+from cosim.evaluate.store import Store, reported
+from cosim.studies.accuracy.cases import CASES, reference
+from cosim.studies.accuracy.solvers import DEFAULT, SOLVERS, Run, Solver, measure
 from cosim.studies.plots import BLUE, FAINT, GREEN, PURPLE, SKY, VERMILION, End, label_ends, panels
-from cosim.studies.report import Progress, Report, reported, silent
+from cosim.studies.report import Progress, Report, silent
 from cosim.studies.tables import Row, brief, span
 
 EQUAL_TIME, EQUAL_ERROR = 0.5, 1e-3

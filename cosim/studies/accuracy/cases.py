@@ -1,6 +1,11 @@
-"""The scenes of the studies, and the participants that can go back to run them with."""
+"""The scenes of the studies, their reference solutions, which were calculated once
+(``reference.json``), and the participants that can go back to run them with."""
 
+import json
 from dataclasses import dataclass, replace
+from importlib.resources import files
+
+import numpy as np
 
 from cosim.coupling.participants.amplifier import Amplifier
 from cosim.coupling.participants.linear import LinearParticipant, regulated_coil
@@ -81,6 +86,28 @@ CASES = {
         Case("reference", "reference: compliant walls, stick and slip", (), 0.2),
     )
 }
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A scene's reference solution and how far it can be trusted."""
+
+    signals: np.ndarray
+    other_method: float
+    growth: float
+
+    def error(self, found: np.ndarray) -> float:
+        """Greatest over time and signals, in units of their ranges; inf if it left the numbers."""
+        off = np.abs(found - self.signals).max(axis=1) / np.ptp(self.signals, axis=1)
+        return float(off.max()) if np.isfinite(off).all() else np.inf
+
+
+def reference(name: str) -> Reference:
+    """That of a case of :data:`CASES`."""
+    text = (files("cosim.studies.accuracy") / "reference.json").read_text(encoding="utf-8")
+    entry = json.loads(text)["cases"][name]
+    signals = np.array(list(entry["signals"].values()))
+    return Reference(signals, entry["other_method"], entry["growth"])
 
 
 def participants(scene: Scene) -> tuple[LinearParticipant | Amplifier, FmuMechanics]:

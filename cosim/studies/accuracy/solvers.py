@@ -1,8 +1,14 @@
-"""What the accuracy study compares: each solver with its ladder of settings, and how it is run."""
+"""What the accuracy study compares: each solver with its ladder of settings, and how it is run.
+
+The error is the greatest over time of what a scene judges, in units of its range; the time is the
+process's CPU time.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from math import nan
+from statistics import median
 from time import process_time
 from typing import Any
 
@@ -13,11 +19,18 @@ from cosim.coupling.polynomials import Array
 from cosim.coupling.rewind.joint import Joint
 from cosim.coupling.rewind.methods import variants
 from cosim.drive.command import command
+from cosim.errors import SimulationFailed
+from cosim.evaluate.store import Store
 from cosim.scene import Scene, load
 from cosim.simulation.choose_steps import LEVELS
 from cosim.simulation.simulate import simulate
-from cosim.studies.accuracy.cases import Case, participants
+from cosim.studies.accuracy.cases import Case, participants, reference
 from cosim.toolchain.processes import in_place
+
+_WORSE = 1.5
+"""An error this many times that of the next coarser setting marks a run as not monotone."""
+_DIVERGED = 1.0
+NOT_MONOTONE, FALSE_CYCLE = "not monotone", "false limit cycle"
 
 SAME_TIME = 1e-12
 """s; a method this close before a jump has reached it."""
@@ -32,7 +45,7 @@ class Outcome:
     steps: int
 
 
-Run = Callable[[Scene, Case, float], Outcome]
+Solve = Callable[[Scene, Case, float], Outcome]
 """Runs a case with a setting."""
 
 
@@ -42,7 +55,7 @@ class Solver:
 
     name: str
     setting: str
-    run: Run
+    run: Solve
     values: Callable[[Case], Sequence[float]]
     order: int | None = None
     """Order in ``setting`` where all is smooth; None where it is not a step."""
@@ -77,7 +90,7 @@ Advance = Callable[[Joint, Jumps, Case, float], Iterator[int]]
 """Takes both sides from each of a case's times to the next; gives the steps so far."""
 
 
-def rewinding(make: Callable[[Any, Any], Joint], advance: Advance) -> Run:
+def rewinding(make: Callable[[Any, Any], Joint], advance: Advance) -> Solve:
     """With participants that can go back."""
 
     def run(scene: Scene, case: Case, setting: float) -> Outcome:
@@ -110,7 +123,7 @@ def of_case(case: Case, *overrides: str) -> Scene:
     return load("reference", [*case.overrides, f"run.duration={case.duration!r}", *overrides])
 
 
-def _led(*overrides: str) -> Run:
+def _led(*overrides: str) -> Solve:
     """ngspice leads; ``overrides`` contain ``{}`` where the setting goes."""
 
     def run(scene: Scene, case: Case, setting: float) -> Outcome:
@@ -198,3 +211,65 @@ SOLVERS = (
     ),
 )
 """Every line of the diagrams."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One point of a diagram, a row of ``accuracy.csv``; ``error`` is nan where the run failed."""
+
+    scene: str
+    method: str
+    setting: str
+    value: float
+    error: float
+    seconds: float
+    """CPU time, until it failed where it did."""
+    steps: int
+    """Of the circuit; macro steps where these are the circuit's; 0 where unknown."""
+    failure: str
+
+    @property
+    def counts(self) -> bool:
+        """Whether its error is one: not that of a false limit cycle, nor of a diverged run."""
+        return self.failure in ("", NOT_MONOTONE)
+
+
+def measure(case: Case, solvers: Sequence[Solver], rounds: int, store: Store) -> list[Run]:
+    """All settings of all solvers on a scene, interleaved; times are medians over the rounds."""
+    scene = load("reference", case.overrides)
+    plan = [(solver, value) for solver in solvers for value in solver.values(case)]
+
+    def once(solver: Solver, value: float) -> tuple[float, float, int, str]:
+        """CPU time (s), error, steps and failure of a run."""
+        began = process_time()
+        try:
+            outcome = solver.run(scene, case, value)
+        except SimulationFailed as failed:
+            failure = FALSE_CYCLE if "limit cycle" in str(failed) else "failed"
+            return process_time() - began, nan, 0, failure
+        leaky = case.smooth and solver.netlist
+        judge = reference(f"{case.name}, netlist" if leaky else case.name)
+        return outcome.seconds, judge.error(outcome.signals), outcome.steps, ""
+
+    done: list[tuple[float, float, int, str]] = []
+    seconds: list[list[float]] = [[] for _ in plan]
+    for turn in range(rounds):
+        for k, (solver, value) in enumerate(plan):
+            if turn and (done[k][3] or seconds[k][0] > 1.0):
+                continue
+            name = f"{case.name}, {solver.name}, {value!r}, {turn}"
+            found = store.once(name, lambda solver=solver, value=value: once(solver, value))
+            seconds[k].append(found[0])
+            if not turn:
+                done.append(found)
+    runs: list[Run] = []
+    for (solver, value), (_, error, steps, failure), spent in zip(plan, done, seconds, strict=True):
+        if not failure:
+            before = runs[-1] if runs and runs[-1].method == solver.name else None
+            if error > _DIVERGED:
+                failure = "diverged"
+            elif before is not None and error > _WORSE * before.error:
+                failure = NOT_MONOTONE
+        given = (case.name, solver.name, solver.setting, value)
+        runs.append(Run(*given, error, median(spent), steps, failure))
+    return runs

@@ -5,7 +5,7 @@ its tracker does; velocities, currents and voltages that were measured by themse
 they are. Only then are they laid over the measured ones.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from cosim.studies.compare.scores import (
     both_sides,
     explained,
     horizontal_share,
+    mean_distance,
     scores,
 )
 from cosim.trials.camera import heights, velocities
@@ -36,6 +37,9 @@ GUIDES = ("v_surface", "current", "coil_voltage", "command", "v_part")
 
 PHASES = 101
 """Of a period, at which hints are looked for."""
+
+DIGITS = 6e-7, 6e-12
+"""Relative, and m: of the heights of an exported trial."""
 
 APART = 0.05
 """Of a period by which run and recording may drift apart before their frequencies differ."""
@@ -56,6 +60,73 @@ class Found:
     notes: list[str]
 
 
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A run (its waveforms, SI) as a recording's instruments show it; ``exposure`` of a frame, s.
+    A start is the time (s) of the run at which it meets the recording's first row."""
+
+    waveforms: Mapping[str, Array]
+    recording: Recording
+    exposure: float
+
+    def signal(self, name: str, start: float) -> Array:
+        """A signal at the recording's times."""
+        at, (quantity, _, body) = self.recording.time + start, name.partition("_")
+        if f"z_{body}" not in self.recording.signals:
+            return np.interp(at, self.waveforms["time"], self.waveforms[name])
+        z = heights(self.waveforms, body, at, self.exposure)
+        return z if quantity == "z" else velocities(at, z)
+
+    def is_own(self, start: float) -> bool:
+        """Whether the heights are this run's, to the digits of an exported trial: seven, and eight
+        places of a millimetre. A recording without heights is no trial."""
+        at, signals = self.recording.time + start, self.recording.signals
+        names = [name for name in ("z_surface", "z_part") if name in signals]
+        if not names or at[-1] > self.waveforms["time"][-1] + 1e-9:
+            return False
+        pairs = [(self.signal(name, start), signals[name]) for name in names]
+        return all(np.allclose(*_known(run, seen), *DIGITS) for run, seen in pairs)
+
+    def best_start(self, earliest: float, latest: float) -> float:
+        """The start at which the run explains most of the guiding signal."""
+        name = next(name for name in GUIDES if name in self.recording.signals)
+        wanted = self.recording.signals[name]
+
+        def missed(start: float) -> float:
+            return -explained(self.signal(name, start), wanted)
+
+        starts = np.linspace(earliest, latest, SHIFTS)
+        best = int(np.argmin([missed(float(start)) for start in starts]))
+        around = starts[max(best - 1, 0)], starts[min(best + 1, SHIFTS - 1)]
+        finer = minimize_scalar(missed, bounds=around, method="bounded", options={"xatol": 1e-6})
+        return min((float(starts[best]), float(finer.x)), key=missed)
+
+    def camera_errors(self, start: float) -> list[Number]:
+        """Mean distances of the run's rows from the straight lines between the frames, as scripts
+        that interpolate a trial draw them."""
+        found, time, signals = [], self.waveforms["time"], self.recording.signals
+        for signal, name, unit, scale, words in (
+            ("z_surface", "camera_surface_mm", "mm", 1e3, "height of the surface"),
+            ("z_part", "camera_part_mm", "mm", 1e3, "height of the part"),
+            ("v_surface", "camera_velocity", "m/s", 1.0, "velocity of the surface"),
+        ):
+            if signal not in signals:
+                continue
+            known = np.isfinite(signals.get("v_surface", self.recording.time))
+            frames = (self.recording.time + start)[known]
+            shown = (time >= frames[0] - 1e-9) & (time <= frames[-1] + 1e-9)
+            drawn = np.interp(time[shown], frames, signals[signal][known])
+            value = scale * mean_distance(self.waveforms[signal][shown], drawn)
+            meaning = f"mean error of the {words} that the camera alone makes"
+            found.append(Number(name, value, unit, meaning))
+        return found
+
+
+def _known(run: Array, seen: Array) -> tuple[Array, Array]:
+    known = np.isfinite(seen)
+    return run[known], seen[known]
+
+
 def measure(
     waveforms: Mapping[str, Array],
     recording: Recording,
@@ -73,11 +144,12 @@ def measure(
     """
     recording, notes = _comparable(recording, waveforms)
     row = float(np.median(np.diff(recording.time)))
-    exposure = shutter * row
-    own = made_of(waveforms, recording, earliest, exposure)
+    seen = Seen(waveforms, recording, shutter * row)
+    own = seen.is_own(earliest)
     end = float(waveforms["time"][-1])
     if period is None and not own:
         recording = _covered(recording, end - earliest)
+        seen = replace(seen, recording=recording)
     rows, span = len(recording.time), float(recording.time[-1])
     if earliest + span > end + 1e-9:
         needed = earliest + span * rows / (rows - 1)
@@ -87,37 +159,19 @@ def measure(
         )
     start = earliest
     if period is not None and not own and not aligned:
-        latest = max(earliest, min(end - span, earliest + period))
-        start = _laid_over(waveforms, recording, earliest, latest, exposure)
-    simulated = observe(waveforms, recording, start, exposure)
+        start = seen.best_start(earliest, max(earliest, min(end - span, earliest + period)))
+    simulated = {name: seen.signal(name, start) for name in recording.signals}
     guide, repeats = _period(recording, period)
-    if repeats is None:
-        notes.append("The recording does not repeat: there is no ceiling, and no whole period.")
-    elif (
-        period and (apart := abs(1.0 / repeats - 1.0 / period) * span) > APART + 0.5 * row / repeats
-    ):
-        notes.append(
-            f"The frequencies differ: the recording repeats at {1.0 / repeats:.4g} Hz, the run is "
-            f"driven at {1.0 / period:.4g} Hz (drive.frequency). At the end of the recording they "
-            f"are {apart:.2g} periods apart, which spoils the scores."
-        )
-        power = round(np.log10(period / repeats))
-        if power and abs(period / repeats / 10.0**power - 1.0) < APART:
-            notes.append(f"Hint: with times multiplied by {10.0**power:g} they would not differ.")
-    if period and span < period:
-        notes.append(
-            f"The recording is {span:.3g} s long, and a period of the run {period:.3g} s: is the "
-            "time's unit right?"
-        )
+    notes += _of_periods(repeats, period, span, row)
     if not own and guide:
         phases = np.linspace(-0.5, 0.5, 0 if aligned or period is None else PHASES)
         others = start + phases * (period or 0.0)
         others = others[(others >= 0.0) & (others + span <= end)]
 
-        def seen(at: Recording, name: str, first: float) -> Array:
-            return _signal(waveforms, at, name, first, 0.0)
+        def shown(at: Recording, name: str, first: float) -> Array:
+            return Seen(waveforms, at, 0.0).signal(name, first)
 
-        notes += hints(recording, seen, guide, np.concatenate([[start], others]))
+        notes += hints(recording, shown, guide, np.concatenate([[start], others]))
     numbers = both_sides(recording, simulated, (repeats, period or repeats))
     numbers += [
         *filter(None, [horizontal_share(recording)]),
@@ -125,7 +179,7 @@ def measure(
         Number("start", start, "s", "time of the run that is laid over the recording's first row"),
     ]
     if own:
-        numbers += _camera_errors(waveforms, recording, start)
+        numbers += seen.camera_errors(start)
         notes.append(
             "This trial is the run's own. Both sides went through the same camera: mean_error_mm "
             "is what the digits of the file make, and camera_… is the error that the camera alone "
@@ -135,40 +189,45 @@ def measure(
     return Found(recording, simulated, start, found, numbers, notes)
 
 
-def observe(
-    waveforms: Mapping[str, Array], recording: Recording, start: float, exposure: float
-) -> Signals:
-    """The recording's signals, of the run from ``start`` (s) on; ``exposure`` of a frame, s."""
-    return {
-        name: _signal(waveforms, recording, name, start, exposure) for name in recording.signals
-    }
-
-
-def _signal(
-    waveforms: Mapping[str, Array], recording: Recording, name: str, start: float, exposure: float
-) -> Array:
-    at, (quantity, _, body) = recording.time + start, name.partition("_")
-    if f"z_{body}" not in recording.signals:
-        return np.interp(at, waveforms["time"], waveforms[name])
-    z = heights(waveforms, body, at, exposure)
-    return z if quantity == "z" else velocities(at, z)
+def _of_periods(
+    repeats: float | None, period: float | None, span: float, row: float
+) -> Iterator[str]:
+    """Notes on the periods (s) of a recording of length ``span`` and of the run."""
+    if repeats is None:
+        yield "The recording does not repeat: there is no ceiling, and no whole period."
+    elif (
+        period and (apart := abs(1.0 / repeats - 1.0 / period) * span) > APART + 0.5 * row / repeats
+    ):
+        yield (
+            f"The frequencies differ: the recording repeats at {1.0 / repeats:.4g} Hz, the run is "
+            f"driven at {1.0 / period:.4g} Hz (drive.frequency). At the end of the recording they "
+            f"are {apart:.2g} periods apart, which spoils the scores."
+        )
+        power = round(np.log10(period / repeats))
+        if power and abs(period / repeats / 10.0**power - 1.0) < APART:
+            yield f"Hint: with times multiplied by {10.0**power:g} they would not differ."
+    if period and span < period:
+        yield (
+            f"The recording is {span:.3g} s long, and a period of the run {period:.3g} s: is the "
+            "time's unit right?"
+        )
 
 
 def _comparable(
     recording: Recording, waveforms: Mapping[str, Array]
 ) -> tuple[Recording, list[str]]:
     """The recording with those of its signals that the run has, and its notes."""
-    notes = list(recording.notes)
+    notes, name = list(recording.notes), plain(recording.name)
     kept = {name: values for name, values in recording.signals.items() if name in waveforms}
-    names = ", ".join(COLUMNS[name].long_name for name in recording.signals if name not in kept)
+    others = ", ".join(COLUMNS[one].long_name for one in recording.signals if one not in kept)
     if not kept:
-        raise BadInput(f"{plain(recording.name)}: the run has no {names} to compare it with.")
-    if names:
-        notes.append(f"Left out, since the run has none: {names}.")
-    for name, values in kept.items():
+        raise BadInput(f"{name}: the run has no {others} to compare it with.")
+    if others:
+        notes.append(f"Left out, since the run has none: {others}.")
+    for signal, values in kept.items():
         if np.ptp(values[np.isfinite(values)]) == 0.0:
-            words = f"the {COLUMNS[name].long_name} does not change"
-            raise BadInput(f"{plain(recording.name)}: {words}: there is nothing to compare.")
+            words = f"the {COLUMNS[signal].long_name} does not change"
+            raise BadInput(f"{name}: {words}: there is nothing to compare.")
     return replace(recording, signals=kept), notes
 
 
@@ -179,34 +238,7 @@ def _covered(recording: Recording, length: float) -> Recording:
     v = recording.signals.get("v_surface")
     first = 0 if v is None else int(np.argmax(np.isfinite(v)))
     time = recording.time - recording.time[first]
-    rows = slice(first, int(np.searchsorted(time, length + 1e-9, side="right")))
-    return replace(
-        recording,
-        time=time[rows],
-        signals={name: values[rows] for name, values in recording.signals.items()},
-        v_across=recording.v_across[rows],
-    )
-
-
-def _laid_over(
-    waveforms: Mapping[str, Array],
-    recording: Recording,
-    earliest: float,
-    latest: float,
-    exposure: float,
-) -> float:
-    """The time (s) of the run at which it explains most of the guiding signal."""
-    name = next(name for name in GUIDES if name in recording.signals)
-    wanted = recording.signals[name]
-
-    def missed(start: float) -> float:
-        return -explained(_signal(waveforms, recording, name, start, exposure), wanted)
-
-    starts = np.linspace(earliest, latest, SHIFTS)
-    best = int(np.argmin([missed(float(start)) for start in starts]))
-    around = starts[max(best - 1, 0)], starts[min(best + 1, SHIFTS - 1)]
-    finer = minimize_scalar(missed, bounds=around, method="bounded", options={"xatol": 1e-6})
-    return min((float(starts[best]), float(finer.x)), key=missed)
+    return recording.rows(slice(first, int(np.searchsorted(time, length + 1e-9, side="right"))))
 
 
 def _period(recording: Recording, hint: float | None) -> tuple[str, float | None]:
@@ -214,47 +246,3 @@ def _period(recording: Recording, hint: float | None) -> tuple[str, float | None
     guides = [name for name in GUIDES if name in recording.signals]
     found = (period_of(recording.time, recording.signals[name], hint) for name in guides)
     return next(iter(guides), ""), next(filter(None, found), None)
-
-
-def made_of(
-    waveforms: Mapping[str, Array], recording: Recording, start: float, exposure: float
-) -> bool:
-    """Whether the heights are this run's from ``start`` (s) on, to the digits of an exported trial:
-    seven, and eight places of a millimetre. A recording without heights is no trial.
-    """
-    at, signals = recording.time + start, recording.signals
-    bodies = [body for body in ("surface", "part") if f"z_{body}" in signals]
-    if not bodies or at[-1] > waveforms["time"][-1] + 1e-9:
-        return False
-    return all(
-        np.allclose(
-            heights(waveforms, body, at, exposure)[known := np.isfinite(signals[f"z_{body}"])],
-            signals[f"z_{body}"][known],
-            *(6e-7, 6e-12),
-        )
-        for body in bodies
-    )
-
-
-def _camera_errors(
-    waveforms: Mapping[str, Array], recording: Recording, start: float
-) -> list[Number]:
-    """Mean distances of the run's rows from the straight lines between the frames, as scripts that
-    interpolate a trial draw them.
-    """
-    found, time = [], waveforms["time"]
-    for signal, name, unit, scale, words in (
-        ("z_surface", "camera_surface_mm", "mm", 1e3, "height of the surface"),
-        ("z_part", "camera_part_mm", "mm", 1e3, "height of the part"),
-        ("v_surface", "camera_velocity", "m/s", 1.0, "velocity of the surface"),
-    ):
-        if signal not in recording.signals:
-            continue
-        known = np.isfinite(recording.signals.get("v_surface", recording.time))
-        frames = (recording.time + start)[known]
-        shown = (time >= frames[0] - 1e-9) & (time <= frames[-1] + 1e-9)
-        drawn = np.interp(time[shown], frames, recording.signals[signal][known])
-        value = scale * float(np.mean(np.abs(waveforms[signal][shown] - drawn)))
-        meaning = f"mean error of the {words} that the camera alone makes"
-        found.append(Number(name, value, unit, meaning))
-    return found

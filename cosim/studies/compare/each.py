@@ -7,9 +7,6 @@ from functools import partial
 from math import nan
 from pathlib import Path
 from statistics import median
-from typing import Any
-
-from matplotlib.axes import Axes
 
 from cosim.errors import BadInput, plain
 from cosim.scene import load
@@ -61,12 +58,11 @@ COLUMNS: dict[str, tuple[str, float]] = {
 
 def row(found: Comparison) -> Row:
     """A trial's row of the table."""
-    numbers = found.numbers
-    told = ((title, numbers.get(name), scale) for title, (name, scale) in COLUMNS.items())
-    return {
-        "scene": found.run,
-        **{title: nan if value is None else value * scale for title, value, scale in told},
-    }
+    numbers, told = found.numbers, {}
+    for title, (name, scale) in COLUMNS.items():
+        value = numbers.get(name)
+        told[title] = nan if value is None else value * scale
+    return {"scene": found.run, **told}
 
 
 def trials(
@@ -125,34 +121,24 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         (12.0, 4.6),
         columns=3,
     )
-    names = [one["scene"].removeprefix("trial-").lstrip("0") for one in rows]
+    at, speed = range(len(rows)), "Part's mean velocity [mm/s]"
     first, centred, line, from_first = ([*COLUMNS][k] for k in (0, 4, 5, 6))
     for axis, bars, marks, title, label in (
         (shares, first, "its ceiling", "Surface's velocity: R²", "its own, a period later"),
-        (
-            *(errors, centred, line),
-            *("Part's height: mean error, means removed [mm]", "best straight line"),
-        ),
-        (
-            *(drifts, "drift [mm/s]", "measured drift [mm/s]"),
-            *("Part's mean velocity [mm/s]", "measured"),
-        ),
+        (errors, centred, line, centred[0].upper() + centred[1:], "best straight line"),
+        (drifts, "drift [mm/s]", "measured drift [mm/s]", speed, "measured"),
     ):
-        _panel(axis, names, [one[bars] for one in rows], [one[marks] for one in rows], label)
+        axis.bar(at, [one[bars] for one in rows], 0.6, color=BLUE, label="simulated")
+        values = [one[marks] for one in rows]
+        axis.plot(at, values, color=VERMILION, ls="", marker="_", ms=18, mew=2.5, label=label)
+        axis.set_xticks(at, [one["scene"].removeprefix("trial-").lstrip("0") for one in rows])
+        axis.set_xlabel("trial")
+        axis.margins(y=0.25)
+        axis.legend(fontsize=8, ncols=2, loc="upper left")
         axis.set_title(title, loc="left", fontsize=10.5)
     values = [one[from_first] for one in rows]
-    errors.plot(range(len(rows)), values, "k.", label="from the first frame (the paper's)")
+    errors.plot(at, values, "k.", label="from the first frame (the paper's)")
     errors.margins(y=0.5)
     errors.legend(fontsize=8, loc="upper left")
     shares.set_ylim(min(0.0, *(one[first] for one in rows)), 1.25)
     figure.write(path)
-
-
-def _panel(axis: Axes, names: list[str], bars: list[Any], marks: list[Any], label: str) -> None:
-    at = range(len(names))
-    axis.bar(at, bars, 0.6, color=BLUE, label="simulated")
-    axis.plot(at, marks, color=VERMILION, ls="", marker="_", ms=18, mew=2.5, label=label)
-    axis.set_xticks(at, names)
-    axis.set_xlabel("trial")
-    axis.margins(y=0.25)
-    axis.legend(fontsize=8, ncols=2, loc="upper left")

@@ -40,13 +40,12 @@ def draw(title: str, found: Found) -> Picture:
 
 def _panel(axis: Axes, name: str, color: str, found: Found) -> None:
     scale, unit = SCALED.get(COLUMNS[name].unit, (1.0, COLUMNS[name].unit))
-    time = found.recording.time * 1e3
-    measured, simulated = found.recording.signals[name], found.simulated[name]
+    time, measured = found.recording.time * 1e3, found.recording.signals[name]
     # Dots of a long recording cover each other, and the run's line.
     size = 3.0 if len(time) < 2000 else 1.0
     for values, style in (
         (measured, {"color": "0.25", "ls": "", "marker": ".", "ms": size, "label": "measured"}),
-        (simulated, {"color": color, "lw": 1.4, "label": "simulated"}),
+        (found.simulated[name], {"color": color, "lw": 1.4, "label": "simulated"}),
     ):
         first = values[np.isfinite(measured)][0] if name.startswith("z") else 0.0
         axis.plot(time, (values - first) * scale, **style)
@@ -55,27 +54,29 @@ def _panel(axis: Axes, name: str, color: str, found: Found) -> None:
     axis.set_title(_words(name, found), fontsize=10, loc="left")
 
 
+WORDS = {
+    "z_part": ("mean_error_mm", "mean error from the first row {:.3f} mm", " (ceiling {:.3f})")
+}
+WORDS |= {name: (score, "R² {:.2f}", " (ceiling {:.2f})") for name, (score, _) in R2.items()}
+"""Of a panel's score, and of its ceiling."""
+BOTH = {
+    "z_part": ("drift", "drift {:+.1f} mm/s (measured {:+.1f})"),
+    "v_surface": ("kick", "largest change {:.0f} mm/s (measured {:.0f})"),
+}
+"""What both sides say of a panel's signal."""
+
+
 def _words(name: str, found: Found) -> str:
     """The scores of a panel, and what both sides say of it."""
+    scores = {score.name: score.values for score in found.scores}
     numbers = {number.name: number.value for number in found.numbers}
-    said = [
-        f"{words} {score.values[0]:{form}}{unit}"
-        + ("" if score.values[1] is None else f" (ceiling {score.values[1]:{form}})")
-        for score in found.scores
-        for wanted, words, form, unit in (
-            ("mean_error_mm", "mean error from the first row", ".3f", " mm"),
-            (R2.get(name, ("",))[0], "R²", ".2f", ""),
-        )
-        if score.name == wanted and (wanted != "mean_error_mm" or name == "z_part")
-    ]
-    both, words = {
-        "z_part": ("drift", "drift"),
-        "v_surface": ("kick", "largest change"),
-    }.get(name, ("", ""))
-    if f"{both}_measured" in numbers:
-        run, measured = (
-            1e3 * (numbers[f"{both}_{side}"] or 0.0) for side in ("simulated", "measured")
-        )
-        form = "+.1f" if both == "drift" else ".0f"
-        said.append(f"{words} {run:{form}} mm/s (measured {measured:{form}})")
+    said = []
+    if name in WORDS:
+        score, words, beside = WORDS[name]
+        run, ceiling, *_ = scores[score]
+        said.append(words.format(run) + ("" if ceiling is None else beside.format(ceiling)))
+    if name in BOTH:
+        number, words = BOTH[name]
+        sides = (numbers[f"{number}_{side}"] or 0.0 for side in ("simulated", "measured"))
+        said.append(words.format(*(1e3 * value for value in sides)))
     return "; ".join(said)

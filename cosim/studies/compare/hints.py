@@ -32,8 +32,8 @@ Observe = Callable[[Recording, str, float], Array]
 def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> Iterator[str]:
     """A sentence for each guess that explains the misfit. ``starts`` (s) are the times at which the
     run may meet the first row, the first of them that at which it does; ``guide`` tells which."""
-    signals = {name: values[:ROWS] for name, values in recording.signals.items()}
-    recording = replace(recording, time=recording.time[:ROWS], signals=signals)
+    recording = recording.rows(slice(ROWS))
+    signals = recording.signals
     laid = [observe(recording, guide, start) for start in starts]
     if {"z_surface", "v_surface", "z_part", "v_part"} <= signals.keys():
         before, after = (

@@ -1,7 +1,7 @@
 """A run and a recording side by side, as a user asks for it."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -44,9 +44,9 @@ class Comparison:
     def _all(self) -> list[Number]:
         found = []
         for score in self.found.scores:
-            for line, value in zip(LINES, score.values, strict=True):
+            for (line, of), value in zip(LINES.items(), score.values, strict=True):
                 name = score.name if line == "run" else f"{score.name}_{line}"
-                found.append(Number(name, value, score.unit, f"{score.meaning}{OF[line]}"))
+                found.append(Number(name, value, score.unit, f"{score.meaning}{of}"))
         return found + self.found.numbers
 
     def plot(self) -> Picture:
@@ -59,9 +59,7 @@ class Comparison:
         about = {"understood": self.found.recording.understood, "notes": self.found.notes}
         told = {"run": self.run, "trial": self.trial, **self.numbers, **about}
         write_json(out / "compare.json", told)
-        columns = ("name", "value", "unit", "meaning")
-        rows = [(n.name, n.value, n.unit, n.meaning) for n in self._all()]
-        write_rows(out / "compare.csv", [dict(zip(columns, row, strict=True)) for row in rows])
+        write_rows(out / "compare.csv", [asdict(number) for number in self._all()])
         recording, simulated = self.found.recording, self.found.simulated
         table, units = {"time": recording.time}, {"time": "s"}
         for side, signals in (("measured", recording.signals), ("simulated", simulated)):
@@ -71,14 +69,11 @@ class Comparison:
         self.plot().write(out / "compare.png")
 
     def __repr__(self) -> str:
+        found, read = self.found, self.found.recording.told()
         heads = [line.replace("_", " ") for line in LINES]
-        rows = [
-            (f"{score.name} [{score.unit}]", score.values, score.meaning)
-            for score in self.found.scores
-        ]
-        read = self.found.recording.told()
+        rows = [(f"{one.name} [{one.unit}]", one.values, one.meaning) for one in found.scores]
         lines = [*read, *[""] * bool(read), *_table(heads, rows), *LEGEND, ""]
-        numbers = {number.name: number for number in self.found.numbers}
+        numbers = {number.name: number for number in found.numbers}
         pairs, alone = [], []
         for name, number in numbers.items():
             quantity, _, side = name.rpartition("_")
@@ -88,15 +83,9 @@ class Comparison:
             elif side != "simulated":
                 alone.append((f"{name} [{number.unit}]", (number.value,), number.meaning))
         lines += [*_table(["measured", "simulated"], pairs), "", *_table([], alone)]
-        return "\n".join(lines + [""] * bool(self.found.notes) + self.found.notes)
+        return "\n".join(lines + [""] * bool(found.notes) + found.notes)
 
 
-OF = {
-    "run": "",
-    "ceiling": "; of the measured motion's forecast of itself one period later",
-    "no_motion": "; of nothing that moves",
-    "straight_line": "; of the best straight line",
-}
 FEWEST_ROWS = 2.1
 """In a period of the run."""
 

@@ -13,9 +13,14 @@ from cosim.trials.recording import Recording
 STICKS = 0.01
 """m/s; part and surface that differ by less between frames count as sticking, on both sides."""
 
-LINES = ("run", "ceiling", "no_motion", "straight_line")
-"""What a score is given for: the run; the measured motion's forecast of itself one period later,
-which no model need beat; and, as floors, nothing that moves and the best straight line."""
+LINES = {
+    "run": "",
+    "ceiling": "; of the measured motion's forecast of itself one period later",
+    "no_motion": "; of nothing that moves",
+    "straight_line": "; of the best straight line",
+}
+"""What a score is given for, with what that adds to its meaning. No model need beat the ceiling;
+the last two are floors."""
 
 Signals = dict[str, Array]
 Distance = Callable[[Array, Array], float]
@@ -76,21 +81,19 @@ def scores(recording: Recording, simulated: Signals, period: float | None) -> li
         measured, run = (side["z_part"] for side in (recording.signals, simulated))
         first = int(np.argmax(np.isfinite(measured)))
         measured, run = measured - measured[first], run - run[first]
-        moved = measured
-        gained = drift(time, moved, period) * period if period else 0.0
-        values = _lines(time, moved, run, period, gained, mean_distance)
-        apart = "mean distance of the part's heights, both from their first"
-        largest = float(np.nanmax(np.abs(moved)))
-        for name, unit, scale, words in (
-            ("mean_error_mm", "mm", 1e3, f"{apart}: the paper's error"),
-            ("mean_error_percent", "%", 100.0 / largest, "the same, of the part's greatest height"),
+        gained = drift(time, measured, period) * period if period else 0.0
+        largest = float(np.nanmax(np.abs(measured)))
+        apart = "mean distance of the part's heights, both from their first: the paper's error"
+        of_height = "the same, of the part's greatest height"
+        centred = "the same, both from their means: what the first frame is does not count"
+        for name, unit, scale, distance, words in (
+            ("mean_error_mm", "mm", 1e3, mean_distance, apart),
+            ("mean_error_percent", "%", 100.0 / largest, mean_distance, of_height),
+            ("centred_error_mm", "mm", 1e3, centred_distance, centred),
         ):
+            values = _lines(time, measured, run, period, gained, distance)
             scaled = tuple(value and value * scale for value in values)
             found.append(Score(name, unit, words, scaled))
-        values = _lines(time, moved, run, period, gained, centred_distance)
-        words = "the same, both from their means: what the first frame is does not count"
-        in_mm = tuple(value and value * 1e3 for value in values)
-        found.append(Score("centred_error_mm", "mm", words, in_mm))
     for signal, (name, words) in R2.items():
         if signal in simulated:
             values = _lines(

@@ -1,13 +1,10 @@
 """The figures of a fit: each trial, how good each friction is, normal forces with intervals."""
 
-import math
 from collections.abc import Sequence
 from textwrap import fill
 from typing import Any
 
-from matplotlib.axes import Axes
-
-from cosim.files.picture import Picture
+from cosim.files.picture import Picture, grid
 from cosim.studies.fit.forces import Force
 from cosim.studies.fit.results import Shown, headline
 from cosim.studies.fit.search import LOSS
@@ -27,19 +24,21 @@ def trials(shown: Sequence[Shown], result: dict[str, Any]) -> Picture:
     published parameters; a panel for each trial."""
     fitted = result["parameters"] == "fitted"
     columns = min(2, len(shown))
-    rows = math.ceil(len(shown) / columns)
-    figure = Picture(6.5 * columns, 1.0 + 2.35 * rows, "constrained")
-    axes = figure.subplots(rows, columns, squeeze=False)
+    figure, axes = grid(len(shown), columns, 6.5 * columns, 2.35, 1.0)
     said = "part, predicted in each slide" if fitted else "part, simulated"
-    for axis, one, row in zip(axes.flat, shown, result["trials"], strict=False):
-        _trial(axis, one, said)
+    for axis, one, row in zip(axes, shown, result["trials"], strict=True):
+        for time, z, label, color, width, dashes in (
+            (one.time, one.z_surface, "surface, measured", SURFACE, 0.8, "-"),
+            (one.time, one.z_part, "part, measured", MEASURED, 1.3, "-"),
+            (*one.simulated, said, SIMULATED, 2.0, DASHED),
+        ):
+            axis.plot(time * 1e3, z * 1e3, label=label, color=color, lw=width, ls=dashes)
+        axis.set(xlim=(0, one.time[-1] * 1e3), ylabel="height [mm]")
         title = _slides(row) if fitted else _whole_path(row)
         axis.set_title(f"{one.name}: {title}", loc="left", fontsize=10)
-    for axis in list(axes.flat)[len(shown) :]:
-        axis.set_visible(False)
-    for axis in axes[-1]:
+    for axis in axes[-columns:]:
         axis.set_xlabel("time [ms]")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
+    handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
     title = (
         headline(result)
@@ -51,18 +50,6 @@ def trials(shown: Sequence[Shown], result: dict[str, Any]) -> Picture:
     )
     figure.suptitle(fill(title, 60 * columns), fontsize=12)
     return figure
-
-
-def _trial(axis: Axes, shown: Shown, said: str) -> None:
-    for time, z, label, color, width, dashes in (
-        (shown.time, shown.z_surface, "surface, measured", SURFACE, 0.8, "-"),
-        (shown.time, shown.z_part, "part, measured", MEASURED, 1.3, "-"),
-        (*shown.simulated, said, SIMULATED, 2.0, DASHED),
-    ):
-        axis.plot(time * 1e3, z * 1e3, label=label, color=color, lw=width, ls=dashes)
-    axis.set_xlim(0, shown.time[-1] * 1e3)
-    axis.grid(alpha=0.25)
-    axis.set_ylabel("height [mm]")
 
 
 def _slides(row: dict[str, Any]) -> str:
@@ -84,22 +71,13 @@ def _whole_path(row: dict[str, Any]) -> str:
 
 def profiles(result: dict[str, Any]) -> Picture:
     """How much less likely than the best each µ_k F_n of a trial is, all else fitted anew."""
-    figure = Picture(9.0, 5.2, "constrained")
-    axis = figure.subplots()
+    figure, (axis,) = grid(1, 1, 9.0, 5.2, 0.0)
+    style: dict[str, Any] = {"lw": 1.4, "marker": ".", "ms": 4}
     for (name, profile), row in zip(result["profiles"].items(), result["trials"], strict=True):
-        if row["normal_force_weights"] is None:
-            continue
-        axis.plot(
-            profile["kinetic_friction_weights"],
-            profile["loss"],
-            lw=1.4,
-            marker=".",
-            ms=4,
-            label=name,
-        )
+        if row["normal_force_weights"] is not None:
+            axis.plot(profile["kinetic_friction_weights"], profile["loss"], label=name, **style)
     axis.axhline(LOSS, color="0.3", lw=1.0, ls="--", label="90 %, of slides that do not scatter")
     axis.set(xlabel="µ_k F_n [m g]", ylabel="loss of log-likelihood", ylim=(0, LARGEST_LOSS))
-    axis.grid(alpha=0.25)
     axis.legend(fontsize=8, frameon=False, ncols=2)
     axis.set_title(
         "How well each friction explains its trial, all else fitted; determined trials", fontsize=11
@@ -110,10 +88,10 @@ def profiles(result: dict[str, Any]) -> Picture:
 def forces(known: Sequence[Force], result: dict[str, Any]) -> Picture:
     """Normal forces, trial by trial, with their intervals, measured ones and bounds."""
     rows = result["trials"]
-    figure = Picture(8.0, 4.6, "constrained")
-    axis = figure.subplots()
+    figure, (axis,) = grid(1, 1, 8.0, 4.6, 0.0)
     bounds: dict[str, Any] = {"color": SURFACE, "lw": 7.0, "alpha": 0.5}
     measured: dict[str, Any] = {"marker": "D", "ls": "", "mfc": "none", "color": MEASURED}
+    dots: dict[str, Any] = {"color": SIMULATED, "ms": 6}
     drawn = set()
     for x, (force, row) in enumerate(zip(known, rows, strict=True)):
         if force.lower is not None and force.upper is not None:
@@ -127,19 +105,12 @@ def forces(known: Sequence[Force], result: dict[str, Any]) -> Picture:
             axis.text(x, 0.0, " not determined", rotation=90, ha="center", va="bottom", fontsize=8)
             continue
         low, high = row.get("normal_force_90_percent", (found, found))
-        axis.errorbar(
-            x,
-            found,
-            [[max(0.0, found - low)], [max(0.0, high - found)]],
-            fmt="o",
-            color=SIMULATED,
-            ms=6,
-            capsize=4,
-        )
+        reach = [[max(0.0, found - low)], [max(0.0, high - found)]]
+        axis.errorbar(x, found, reach, fmt="o", capsize=4, **dots)
     if "measured" in drawn:
         axis.plot([], [], label="measured", **measured)
     interval = " and 90 %" if "profiles" in result else ""
-    axis.plot([], [], "o", color=SIMULATED, ms=6, label=result["parameters"] + interval)
+    axis.plot([], [], "o", label=result["parameters"] + interval, **dots)
     if "bounds" in drawn:
         axis.plot([], [], label="bounds of the fit", **bounds)
     axis.set_xticks(range(len(rows)), [str(row["trial"]) for row in rows], fontsize=8)
@@ -147,7 +118,6 @@ def forces(known: Sequence[Force], result: dict[str, Any]) -> Picture:
     axis.set_xlim(-0.5, len(rows) - 0.5)
     axis.set_ylim(0, None)
     axis.set(xlabel="trial", ylabel="normal force [m g]")
-    axis.grid(alpha=0.25)
     axis.legend(fontsize=9, frameon=False, loc="upper center", ncols=3)
     change = result["normal_force_change_mean_percent"]
     off = "" if change is None else f"; {change:.1f} % off the measured on average"

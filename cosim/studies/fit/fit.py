@@ -6,6 +6,7 @@ all. With a given µ_k that is each trial's normal force; with known forces it i
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,45 +16,40 @@ from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.files.atomic import write_json
 from cosim.files.picture import Picture
-from cosim.studies.fit.cases import Solver, simulated
+from cosim.mechanics import part
+from cosim.studies.fit import figures
 from cosim.studies.fit.forces import Force, read_forces
-from cosim.studies.fit.results import Shown, together, told
+from cosim.studies.fit.results import Shown, change, together, told
 from cosim.studies.fit.search import FRICTIONS, Fit, Found, Interval, search
 from cosim.studies.fit.slides import Slide, noise_of
-from cosim.studies.tables import write_csv
+from cosim.studies.tables import Row, write_csv
 from cosim.trials import published
 from cosim.trials.tracked import Trial, read_folder
 
+Solver = Literal["exact", "published"]
+
 POINTS = 100  # of the line that is drawn for a slide
 
+FIRST_ROW, LAST_ROWS = 3, 2
+"""Rows of a trial that the authors' procedure leaves out before and behind."""
 
+
+@dataclass(frozen=True, eq=False, repr=False)
 class TrialResults:
     """Trials with their parameters and simulated motions: ``numbers``, figures and files."""
 
-    def __init__(
-        self,
-        shown: Sequence[Shown],
-        forces: Sequence[Force],
-        numbers: dict[str, Any],
-        found: Sequence[dict[str, Any]],
-        errors: Sequence[dict[str, Any]],
-    ) -> None:
-        self.shown, self.forces = shown, forces
-        """What is known of each trial's normal force beside it."""
-        names = [one.name for one in shown]
-        self.numbers = numbers | together(names, forces, found, errors)
-        """What ``fit.json`` holds; units as the names say, forces in weights of the part."""
+    shown: Sequence[Shown]
+    forces: Sequence[Force]
+    """What is known of each trial's normal force beside it."""
+    numbers: dict[str, Any]
+    """What ``fit.json`` holds; units as the names say, forces in weights of the part."""
 
     def plot(self) -> Picture:
         """Measured and predicted heights of the part, a panel for each trial."""
-        from cosim.studies.fit import figures
-
         return figures.trials(self.shown, self.numbers)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``fit.json``, ``fit.csv`` and the figures ``fit-*.png``."""
-        from cosim.studies.fit import figures
-
         out = Path(folder)
         write_json(out / "fit.json", self.numbers)
         write_csv(out / "fit.csv", [_cells(row) for row in self.numbers["trials"]])
@@ -130,37 +126,39 @@ def _fitted(
     law = search(trials, limits, plate)
     told = [x.determined(limit) for x, limit in zip(law.kinetic, limits, strict=True)]
     mu_k, mu_k_range = (given, (given, given)) if given else _from_forces(law, known, told)
-    shown, rows, errors = [], [], []
-    for trial, kinetic, made, how in zip(trials, law.kinetic, law.slides, told, strict=True):
+    shown, rows = [], []
+    every = zip(trials, known, law.kinetic, law.slides, told, strict=True)
+    for trial, force, kinetic, made, how in every:
         here, misfit = _predicted(trial, made if how == "yes" else [], kinetic, law.ratio)
         shown.append(here)
         value = kinetic.value if how == "yes" else None
         low = kinetic.low if how in ("yes", "at least") else None
         high = kinetic.high if how in ("yes", "at most") else None
+        weights = value and value / mu_k
+        ends = [low and low / mu_k_range[1], high and high / mu_k_range[0]]
         rows.append(
             {
-                "normal_force_weights": value and value / mu_k,
-                "normal_force_90_percent": [
-                    low and low / mu_k_range[1],
-                    high and high / mu_k_range[0],
-                ],
+                "trial": trial.name,
+                "normal_force_weights": weights,
+                "normal_force_90_percent": ends,
                 "kinetic_friction_weights": value,
                 "kinetic_friction_90_percent": [low, high],
                 "kinetic_friction_determined": how,
                 "slides": len(made),
+                **change(weights, force.measured),
+                "misfit_um": misfit and misfit * 1e6,
+                "noise_um": noise_of(trial) * 1e6,
             }
         )
-        errors.append({"misfit_um": misfit and misfit * 1e6, "noise_um": noise_of(trial) * 1e6})
     untold = plate and "yes" not in told  # no trial determines its friction, let alone the plate's
+    ratio = law.ratio
     numbers: dict[str, Any] = {
         "parameters": "fitted",
         "mu_k": mu_k,
         "mu_k_given": given is not None,
-        "mu_plate": None if untold else law.ratio.value * mu_k,
-        "plate_over_kinetic": None if untold else law.ratio.value,
-        "plate_over_kinetic_90_percent": (
-            [law.ratio.low, law.ratio.high] if plate and not untold else None
-        ),
+        "mu_plate": None if untold else ratio.value * mu_k,
+        "plate_over_kinetic": None if untold else ratio.value,
+        "plate_over_kinetic_90_percent": [ratio.low, ratio.high] if plate and not untold else None,
         "profiles": {
             trial.name: {"kinetic_friction_weights": x.tolist(), "loss": y.tolist()}
             for trial, (x, y) in zip(trials, law.profile, strict=True)
@@ -168,7 +166,7 @@ def _fitted(
     }
     if not given:
         numbers["mu_k_90_percent"] = list(mu_k_range)
-    return TrialResults(shown, known, numbers, rows, errors)
+    return TrialResults(shown, known, numbers | together(rows))
 
 
 def _predicted(
@@ -211,16 +209,36 @@ def _from_forces(law: Fit, known: Sequence[Force], told: Sequence[str]) -> tuple
 
 
 def _evaluated(trials: list[Trial], known: Sequence[Force], solver: Solver) -> TrialResults:
+    """The whole paths by the published parameters and their authors' procedure: times and heights
+    count from the first row that is kept, the surface's tracked velocity is joined by straight
+    lines, the part starts with its own tracked velocity, and the error is the mean of |z measured −
+    z simulated| every 0.1 ms. Source: see `cosim.trials.published`."""
     shown: list[Shown] = []
-    rows: list[dict[str, Any]] = []
-    for trial, force in zip(trials, published.FORCES_FITTED, strict=True):
-        path, motion = simulated(trial, force, solver)
-        shown.append(path)
+    rows: list[Row] = []
+    for trial, known_force, force in zip(trials, known, published.FORCES_FITTED, strict=True):
+        kept = slice(FIRST_ROW, len(trial.time) - LAST_ROWS)
+        time = np.ascontiguousarray(trial.time[kept] - trial.time[FIRST_ROW])
+        steps = int(np.floor(time[-1] / part.PUBLISHED_STEP + 1e-6))
+        motion = (part.exact if solver == "exact" else part.published)(
+            time,
+            np.ascontiguousarray(trial.platform.v[kept]),
+            mu_s=published.MU_S,
+            mu_k=published.MU_K_FITTED,
+            force_per_mass=force * published.GRAVITY,
+            gravity=published.GRAVITY,
+            v0=float(trial.part.v[FIRST_ROW]),
+            output=np.arange(steps + 1) * part.PUBLISHED_STEP,
+        )
+        surface, moved = (x.z[kept] - x.z[FIRST_ROW] for x in (trial.platform, trial.part))
+        shown.append(Shown(trial.name, time, surface, moved, (motion.time, motion.z)))
         rows.append(
             {
+                "trial": trial.name,
                 "normal_force_weights": force,
                 "stick_fraction": motion.stick_fraction,
                 "stick_slip_events": motion.stick_slip_events,
+                **change(force, known_force.measured),
+                **shown[-1].errors(),
             }
         )
     numbers = {
@@ -230,7 +248,7 @@ def _evaluated(trials: list[Trial], known: Sequence[Force], solver: Solver) -> T
         "mu_k": published.MU_K_FITTED,
         "mu_plate": 0.0,
     }
-    return TrialResults(shown, known, numbers, rows, [path.errors() for path in shown])
+    return TrialResults(shown, known, numbers | together(rows))
 
 
 def _cells(row: dict[str, Any]) -> dict[str, Any]:

@@ -9,16 +9,15 @@ A CSV has the column ``trial``, which holds names of files without their ending,
 A TOML file has a table for each trial with the same keys: ``["Trial 1"]``, ``force = 0.5``.
 """
 
-import csv
 import os
-import tomllib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from cosim.errors import BadInput, plain
+from cosim.files.cells import read_cells
+from cosim.scene import toml
 from cosim.trials import published
 
 KEYS = ("force", "lower", "upper", "mass")
@@ -50,8 +49,13 @@ def read_forces(source: str | os.PathLike[str], trials: Collection[str]) -> dict
     if source == "published":
         path, found = "The published forces", PUBLISHED
     else:
-        path = plain(os.fspath(source))
-        found = {name: _force(*row) for name, row in _rows(Path(source)).items()}
+        path, found = plain(os.fspath(source)), {}
+        for trial, where, row in _rows(Path(source)):
+            if trial in found:
+                raise BadInput(f"{where}: the trial “{plain(trial)}” stands there twice.")
+            found[trial] = _force(where, row)
+        if not found:
+            raise BadInput(f"{path}: this file holds no forces.")
     unknown = next((name for name in found if name not in trials), None)
     if unknown is not None:
         known = plain(", ".join(sorted(trials)))
@@ -59,49 +63,25 @@ def read_forces(source: str | os.PathLike[str], trials: Collection[str]) -> dict
     return found
 
 
-def _rows(path: Path) -> dict[str, tuple[str, dict[str, Any]]]:
-    """What the file says of each trial, and where."""
-    name = plain(str(path))
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise BadInput(f"{name}: cannot be read ({error.strerror}).") from error
-    except UnicodeDecodeError as error:
-        raise BadInput(f"{name}: this is not UTF-8.") from error
+def _rows(path: Path) -> list[tuple[str, str, dict[str, Any]]]:
+    """The trials of a file, where each stands, and what the file says of it."""
+    name, found = plain(str(path)), []
     if path.suffix.lower() == ".toml":
-        try:
-            data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise BadInput(f"{name}: this is not TOML ({error}).") from error
-        loose = next((key for key, value in data.items() if not isinstance(value, dict)), None)
-        if loose is not None:
-            raise BadInput(f"{name}: “{plain(loose)}” must be the table of a trial.")
-        rows = [(trial, f"{name}, [{plain(trial)}]", row) for trial, row in data.items()]
-    else:
-        rows = list(_table(name, text))
-    found: dict[str, tuple[str, dict[str, Any]]] = {}
-    for trial, where, row in rows:
-        if trial in found:
-            raise BadInput(f"{where}: the trial “{plain(trial)}” stands there twice.")
-        found[trial] = where, row
-    if not found:
-        raise BadInput(f"{name}: this file holds no forces.")
-    return found
-
-
-def _table(name: str, text: str) -> Iterable[tuple[str, str, dict[str, Any]]]:
-    reader = csv.reader(StringIO(text))
-    head = [cell.strip() for cell in next(reader, [])]
+        for trial, row in toml.read(path).items():
+            if not isinstance(row, dict):
+                raise BadInput(f"{name}: “{plain(trial)}” must be the table of a trial.")
+            found.append((trial, f"{name}, [{plain(trial)}]", row))
+        return found
+    cells = read_cells(path)
+    (line, head), *rows = cells.rows
     if "trial" not in head:
-        raise BadInput(f"{name}: row 1: the column “trial” is missing (found: {plain(str(head))}).")
-    for cells in reader:
-        if not any(cell.strip() for cell in cells):
-            continue
-        where = f"{name}: row {reader.line_num}"
-        if len(cells) != len(head):
-            raise BadInput(f"{where}: it has {len(cells)} cells, the header {len(head)}.")
-        row = {key: cell.strip() for key, cell in zip(head, cells, strict=True)}
-        yield row.pop("trial"), where, {key: cell for key, cell in row.items() if cell}
+        said = plain(str(head))
+        raise BadInput(f"{name}: row {line}: the column “trial” is missing (found: {said}).")
+    cells.even(1)
+    for line, row in rows:
+        known = {key: cell for key, cell in zip(head, row, strict=False) if cell}
+        found.append((known.pop("trial", ""), f"{name}: row {line}", known))
+    return found
 
 
 def _force(where: str, row: dict[str, Any]) -> Force:

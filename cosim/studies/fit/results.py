@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.studies.fit.forces import Force
+from cosim.studies.tables import Row
 
 
 @dataclass(frozen=True)
@@ -54,53 +54,43 @@ MEANS = {
 """Means over trials, and of which of their numbers."""
 
 
-def together(
-    names: Sequence[str],
-    forces: Sequence[Force],
-    found: Sequence[dict[str, Any]],
-    errors: Sequence[dict[str, Any]],
-) -> dict[str, Any]:
-    """``trials``, a row each: what was found, beside what is known of its normal force, and how
-    far off it is; and means over the trials whose force was found."""
-    rows: list[dict[str, Any]] = [
-        {"trial": name} | own | _change(own["normal_force_weights"], force.measured) | off
-        for name, force, own, off in zip(names, forces, found, errors, strict=True)
-    ]
+def together(rows: Sequence[Row]) -> dict[str, Any]:
+    """``trials``, a row each, and means over the trials whose force was found."""
     told = [row for row in rows if row["normal_force_weights"] is not None]
+    columns = {key: [row[of] for row in told] for key, of in MEANS.items() if of in rows[0]}
     changes = [row["normal_force_change_percent"] for row in told]
-    changes = [x for x in changes if x is not None]
-    means = {key: [row[of] for row in told] for key, of in MEANS.items() if of in rows[0]}
+    columns["normal_force_change_mean_percent"] = [x for x in changes if x is not None]
+    found = {key: float(np.mean(x)) if x else None for key, x in columns.items()}
+    known = columns["normal_force_change_mean_percent"]
     return {
         "normal_force_weights": [row["normal_force_weights"] for row in rows],
-        **{key: float(np.mean(values)) if values else None for key, values in means.items()},
-        "normal_force_change_mean_percent": float(np.mean(changes)) if changes else None,
-        "normal_force_change_median_percent": float(np.median(changes)) if changes else None,
+        **found,
+        "normal_force_change_median_percent": float(np.median(known)) if known else None,
         "trials": rows,
     }
 
 
-def _change(found: float | None, measured: float | None) -> dict[str, Any]:
-    change = None if found is None else measured and 100 * abs(found - measured) / measured
-    return {"normal_force_measured_weights": measured, "normal_force_change_percent": change}
+def change(found: float | None, measured: float | None) -> Row:
+    """A normal force beside the measured one, and how far off it is."""
+    off = None if found is None else measured and 100 * abs(found - measured) / measured
+    return {"normal_force_measured_weights": measured, "normal_force_change_percent": off}
 
 
 def told(numbers: dict[str, Any]) -> str:
     """Fitted or published parameters, trial by trial and together."""
-    fitted, rows = numbers["parameters"] == "fitted", numbers["trials"]
-    heads = ("error [mm]", "sticks", "error [%]")
-    if fitted:
-        heads = ("µ_k F_n [m g], 90 %", "slides", "misfit [µm]", "noise [µm]")
-    table = [("trial", "force [m g]", "measured", *heads)]
-    for row in rows:
-        cells = (row["trial"], _or_dash(row["normal_force_weights"], ".2f"))
-        cells += (_or_dash(row["normal_force_measured_weights"], ".2f"),)
+    fitted = numbers["parameters"] == "fitted"
+    table: list[tuple[str, ...]] = [
+        ("trial", "force [m g]", "measured", *(FITTED if fitted else EVALUATED))
+    ]
+    for row in numbers["trials"]:
+        forces = (row["normal_force_weights"], row["normal_force_measured_weights"])
         if fitted:
-            cells += (_friction(row), str(row["slides"]))
+            cells = (_friction(row), str(row["slides"]))
             cells += (_or_dash(row["misfit_um"], ".1f"), f"{row['noise_um']:.1f}")
         else:
-            cells += (f"{row['mean_error_mm']:.3f}", f"{row['stick_fraction']:.0%}")
+            cells = (f"{row['mean_error_mm']:.3f}", f"{row['stick_fraction']:.0%}")
             cells += (f"{row['mean_error_percent']:.2f}",)
-        table.append(cells)
+        table.append((row["trial"], *(_or_dash(force, ".2f") for force in forces), *cells))
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     lines = ["  ".join(map(str.rjust, row, widths)) for row in table]
     lines += _shared(numbers) if fitted else _whole_paths(numbers)
@@ -110,6 +100,10 @@ def told(numbers: dict[str, Any]) -> str:
             f"normal force off the measured one by {mean:.2f} % mean, {median:.2f} % median"
         )
     return "\n".join(lines)
+
+
+FITTED = ("µ_k F_n [m g], 90 %", "slides", "misfit [µm]", "noise [µm]")
+EVALUATED = ("error [mm]", "sticks", "error [%]")
 
 
 def _whole_paths(numbers: dict[str, Any]) -> list[str]:
@@ -154,7 +148,7 @@ def _interval(interval: list[float], form: str) -> str:
     return f"({interval[0]:{form}} … {interval[1]:{form}})"
 
 
-def _friction(row: dict[str, Any]) -> str:
+def _friction(row: Row) -> str:
     """µ_k F_n with its interval, or with the end of it that the trial tells."""
     interval, determined = row["kinetic_friction_90_percent"], row["kinetic_friction_determined"]
     if determined == "no":

@@ -15,8 +15,7 @@ import numpy.typing as npt
 from scipy.stats import t as student
 
 from cosim.arrays import Array
-from cosim.studies.fit import slides
-from cosim.studies.fit.slides import Slide, marginal
+from cosim.studies.fit.slides import Slide, marginal, slides_of
 from cosim.trials.published import GRAVITY
 from cosim.trials.tracked import Trial
 
@@ -39,31 +38,24 @@ after a slide may be wrong by. On trials of this bench, whose friction is known,
 of 16)."""
 
 
-class Friction:
-    """The friction of the part alone, of tracked trials: they share µ_p/µ_k, and each has its own
-    µ_k F_n, in weights of the part."""
+def _laws(kinetic: Array, ratios: Array) -> tuple[Array, Array]:
+    """µ_k F_n/m and µ_p F_n/m, m/s², of all pairs of these, kinetic friction by ratio."""
+    first, second = (x.ravel() for x in np.meshgrid(kinetic, ratios, indexing="ij"))
+    return first * GRAVITY, first * second * GRAVITY
 
-    def __init__(self, trials: Sequence[Trial]) -> None:
-        self.coarse = np.stack(
-            np.meshgrid(np.geomspace(*FRICTIONS, COARSE), RATIOS, indexing="ij"), axis=-1
-        )
-        kinetic, ratio = self.coarse.reshape(-1, 2).T
-        laws = kinetic * GRAVITY, kinetic * ratio * GRAVITY
-        self.slides: list[list[Slide]] = [slides.slides(trial, *laws) for trial in trials]
 
-    def residuals(self, trial: int, shared: Array, own: Array) -> Array:
-        """Deviance residuals of the slides of a trial (slides by laws), for laws (…) with the
-        ratios ``shared`` and the kinetic frictions ``own``."""
-        kinetic, ratio = (x.ravel() for x in np.broadcast_arrays(own, shared))
-        laws = kinetic * GRAVITY, kinetic * ratio * GRAVITY
-        found = [marginal(one.log_likelihoods(*laws)) for one in self.slides[trial]]
-        return slides.residuals(found) if found else np.empty((0, len(kinetic)))
+def _losses(slides: Sequence[Slide], kinetic: Array, ratios: Array) -> Array:
+    """Negative log-likelihood of each slide of a trial (slides by frictions by ratios).
 
-    def losses(self, trial: int, shared: Array, own: Array) -> Array:
-        """Negative log-likelihood of each slide (slides by frictions by ratios)."""
-        found = self.residuals(trial, shared[None], own[:, None])
-        loss = (FREEDOM + 1) / 2 * np.log1p(found**2 / FREEDOM)
-        return loss.reshape(-1, len(own), len(shared))
+    It is that of the deviance residuals, the root of twice what each law loses to the slide's own
+    best one, and they are Student's. Source: P. McCullagh, J. A. Nelder, *Generalized Linear
+    Models*, 2nd edition 1989, section 2.4."""
+    laws = _laws(kinetic, ratios)
+    found = np.array([marginal(one.log_likelihoods(*laws)) for one in slides])
+    found = found.reshape(len(slides), len(laws[0]))
+    residuals = np.sqrt(2 * (found.max(axis=1, keepdims=True) - found))
+    loss = (FREEDOM + 1) / 2 * np.log1p(residuals**2 / FREEDOM)
+    return loss.reshape(-1, len(kinetic), len(ratios))
 
 
 @dataclass(frozen=True)
@@ -96,10 +88,11 @@ class Fit:
 def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> Fit:
     """The likeliest law, each trial's µ_k F_n [weights] within its limits; without ``plate`` the
     springed plate has no friction."""
-    problem, every = Friction(trials), range(len(trials))
+    coarse = np.geomspace(*FRICTIONS, COARSE)
+    slides = [slides_of(trial, *_laws(coarse, RATIOS)) for trial in trials]
     ratios = RATIOS if plate else np.zeros(1)
-    grids = [problem.coarse[:, 0, 0].clip(*limit) for limit in limits]
-    tables = [problem.losses(k, ratios, grids[k]) for k in every]
+    grids = [coarse.clip(*limit) for limit in limits]
+    tables = [_losses(each, grid, ratios) for each, grid in zip(slides, grids, strict=True)]
     row, best = _best(_summed(tables))
     if plate:
         ratios = np.unique((ratios[row] + NEAR).clip(0.0))
@@ -107,7 +100,7 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
     around = np.geomspace(1 / AROUND, AROUND, FINE)
     for _ in range(2):
         grids = [(x * around).clip(*limit) for x, limit in zip(middles, limits, strict=True)]
-        tables = [problem.losses(k, ratios, grids[k]) for k in every]
+        tables = [_losses(each, grid, ratios) for each, grid in zip(slides, grids, strict=True)]
         row, best = _best(_summed(tables))
         middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
         if not {0, FINE - 1} & set(best):  # none is at the edge of its grid
@@ -130,7 +123,7 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
         found.append(_interval(value, likely, grid[drawn[:, k]], count[k], limit))
     likely = ratios[whole - whole.min() <= LOSS]
     ratio = _interval(float(ratios[row]), likely, ratios[rows], sum(count), (0.0, 9.0))
-    return Fit(ratio, found, problem.slides, profiles)
+    return Fit(ratio, found, slides, profiles)
 
 
 def _summed(tables: Sequence[Array]) -> list[Array]:

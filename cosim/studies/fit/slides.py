@@ -11,7 +11,6 @@ Where part and surface move together the acceleration is a random walk, as in a 
 source: G. Wahba, *Spline Models for Observational Data*, SIAM 1990, chapter 1. Units: s, m.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 
@@ -241,7 +240,7 @@ def marginal(log_likelihoods: Array) -> Array:
     return most + np.log(np.exp(log_likelihoods - most[..., None]).sum(axis=-1))
 
 
-def slides(trial: Trial, kinetic: Array, plate: Array) -> list[Slide]:
+def slides_of(trial: Trial, kinetic: Array, plate: Array) -> list[Slide]:
     """All slides of a trial, with the roughness and noise that make the best of the laws likeliest,
     and with those pairs of instants that are likely with any of the laws."""
     noise, best = noise_of(trial), (-np.inf, [])
@@ -259,11 +258,3 @@ def slides(trial: Trial, kinetic: Array, plate: Array) -> list[Slide]:
         likely = (told - told.max(axis=1, keepdims=True)).max(axis=0) > -IMPROBABLE
         found.append(one.only(likely))
     return found
-
-
-def residuals(log_likelihoods: Sequence[Array]) -> Array:
-    """Deviance residuals, slides by laws, of the logarithms of the slides' likelihoods: the root of
-    twice what each law loses to the slide's own best one. Source: P. McCullagh, J. A. Nelder,
-    *Generalized Linear Models*, 2nd edition 1989, section 2.4."""
-    every = np.array(log_likelihoods)
-    return np.sqrt(2 * (every.max(axis=1, keepdims=True) - every))

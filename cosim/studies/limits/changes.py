@@ -138,15 +138,16 @@ CHANGES: Sequence[Change] = (
     Change("heat 7 W", "heat", lambda _: Machine(heat=7.0)),
     Change("half the grip force", "grip", _times(0.5, "friction.normal_force")),
     Change("twice the grip force", "grip", _times(2.0, "friction.normal_force")),
-    Change("supply ±10 V", "circuit", _set("circuit.supply", value=10.0)),
-    Change("supply ±14 V", "circuit", _set("circuit.supply", value=14.0)),
-    Change("supply ±24 V", "circuit", _set("circuit.supply", value=24.0)),
-    Change("supply ±30 V", "circuit", _set("circuit.supply", value=30.0)),
+    *(
+        Change(f"supply ±{volts} V", "circuit", _set("circuit.supply", value=float(volts)))
+        for volts in (10, 14, 24, 30)
+    ),
     Change("output swings to its rails", "circuit", _set(*_SWING, value=0.0)),
-    Change("coil of half the resistance", "circuit", _times(0.5, "coil.resistance")),
-    Change("coil of twice the resistance", "circuit", _times(2.0, "coil.resistance")),
-    Change("coil of half the inductance", "circuit", _times(0.5, "coil.inductance")),
-    Change("coil of twice the inductance", "circuit", _times(2.0, "coil.inductance")),
+    *(
+        Change(f"coil of {words} the {name}", "circuit", _times(factor, f"coil.{name}"))
+        for name in ("resistance", "inductance")
+        for words, factor in (("half", 0.5), ("twice", 2.0))
+    ),
     Change("coil of 0.7 times the force factor", "circuit", _times(0.7, "coil.force_factor")),
     Change("coil of 1.4 times the force factor", "circuit", _times(1.4, "coil.force_factor")),
     Change("sense resistor 2 Ω", "circuit", partial(_sense, 2.0)),

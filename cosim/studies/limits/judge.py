@@ -88,8 +88,8 @@ def judged(
     good = _settled(bench, machines, asked)
     runs = [[machines[key[0]].at(one, SETTLE, SPAN) for one in around(p)] for key, p in good]
     found: dict[Key, Point] = {}
-    for (key, place), each, turns in zip(good, runs, bench.outcomes(runs), strict=True):
-        point = _point(key[1], place.tolist(), turns, each[0])
+    for (key, middle), each, turns in zip(good, runs, bench.outcomes(runs), strict=True):
+        point = _point(key[1], middle.tolist(), turns, each[0])
         best = found.get(key)
         if point.rank(key[2]) > (best.rank(key[2]) if best else 0.0):
             found[key] = point
@@ -117,13 +117,13 @@ def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked) -> _A
     return found
 
 
-def _point(goal: str, place: list[float], turns: Sequence[Outcome], settings: Settings) -> Point:
+def _point(goal: str, middle: list[float], turns: Sequence[Outcome], settings: Settings) -> Point:
     scores = np.array([scored(one)[NUMBER[goal]] for one in turns])
     numbers = turns[0].numbers
     return Point(
         *(float(scores[0]), float(np.median(scores)), float(scores.min())),
         *(numbers["coil_heat"], numbers["v_average"], -numbers["a_camera_min"]),
-        *(place, settings),
+        *(middle, settings),
     )
 
 

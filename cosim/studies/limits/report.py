@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator
-from cosim.evaluate.store import Store
+from cosim.evaluate.store import Store, reported
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
 from cosim.studies.limits import figures
@@ -16,7 +16,7 @@ from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Settings
 from cosim.studies.limits.judge import Key, Point
 from cosim.studies.limits.runs import GOALS, NEEDED, Goal, command
 from cosim.studies.limits.study import FULL, QUICK, Study, checked, ensemble, steps, study
-from cosim.studies.report import Progress, Report, counted, reported, silent
+from cosim.studies.report import Progress, Report, counted, silent
 from cosim.studies.tables import Row
 
 STORE = "limits.sqlite"

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 
@@ -81,8 +80,8 @@ class Bench:
 
     def outcomes(self, groups: Sequence[Sequence[Settings]]) -> list[list[Outcome]]:
         """What becomes of groups of settings, all run at once."""
-        found = iter(self.evaluator.outcomes([one for group in groups for one in group]))
-        return [[*islice(found, len(group))] for group in groups]
+        found = dict(self.evaluator.groups(groups))
+        return [found[number] for number in range(len(groups))]
 
     def feasible(self, machine: Machine, outcome: Outcome) -> bool:
         """Whether a run keeps within what the coil and the power amplifier bear."""

@@ -51,15 +51,15 @@ def searched(
     effort: Effort,
     seed: Sequence[int],
     own: Candidates | None = None,
-    hints: Sequence[Candidates] = (),
+    warm: Sequence[Candidates] = (),
 ) -> Candidates:
-    """The candidates of a machine; it begins with its ``own``, as far as they are known, and with
-    those of others, ``hints``, whose cubes have the same dimensions: of these, too, the turns are
-    run where a single run shows that they do well here."""
+    """The candidates of a machine, from its ``own``, as far as they are known, and from ``warm``
+    starts, those of others whose cubes have the same dimensions: of these, too, the turns are run
+    where a single run shows that they do well here."""
     keys = machine.keys
     once = Known(keys, len(GOALS), STEPS, bench.once(machine))
     over_turns = Known(keys, len(GOALS), STEPS, bench.over_turns(machine))
-    for one in [own, *hints] if own else hints:
+    for one in [own, *warm] if own else warm:
         for kind in KINDS:
             once.rows(_points(one[kind], keys))
     if effort.design:

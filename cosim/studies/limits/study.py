@@ -155,15 +155,15 @@ class _Work:
         those of all ``others``."""
         found: dict[str, Candidates] = {}
         for number, change in enumerate(changes):
-            hints = [self._hint(change, other, others) for other in changes if others]
+            warm = [self._warm(change, other, others) for other in changes if others]
             machine, own = change.machine(self.bench.scene), known.get(change.name)
             seeds = [*seed, number]
-            search = partial(searched, self.bench, machine, effort, seeds, own, hints)
+            search = partial(searched, self.bench, machine, effort, seeds, own, warm)
             found[change.name] = self.store.once(f"{change.name} {seeds}", search)
             self.told(f"rig {self.rig}{words}: {change.name}")
         return found
 
-    def _hint(self, change: Change, other: Change, found: Mapping[str, Candidates]) -> Candidates:
+    def _warm(self, change: Change, other: Change, found: Mapping[str, Candidates]) -> Candidates:
         """The best one for each goal of another change, its shape as levels where this one's
         command has such: the nearest that it has."""
         machine, there = (one.machine(self.bench.scene) for one in (change, other))

@@ -98,14 +98,11 @@ def report(found: Sample, given: int, seed: int) -> Report:
     values = dict(zip(CANDIDATES, found.values, strict=True))
     luck = chance(found.targets, np.random.default_rng(seed))
     words = "a fine measurement of something that has nothing to do with it"
-    rows: list[Row] = [
-        _row(NOTHING, "", "", "", now, now),
-        _row(USELESS, words, "", "", luck, now),
+    told = [(NOTHING, "", "", "", now), (USELESS, words, "", "", luck)]
+    told += [
+        (one.name, one.how, _accuracy(one), _range(one, values[one]), after) for one, after in each
     ]
-    rows += [
-        _row(one.name, one.how, _accuracy(one), _range(one, values[one]), after, now)
-        for one, after in each
-    ]
+    rows = [_row(*one, now) for one in told]
     (first, best), (second, next_) = each[:2]
     left = [100.0 * a.width / n.width for a, n in zip(best, now, strict=True)]
     other, leaves = min(each, key=lambda pair: pair[1][1].width)

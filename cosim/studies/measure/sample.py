@@ -1,7 +1,7 @@
 """The rigs that may be meant, and what each one shows: on every gauge, in every film, and robustly
 at most as velocity upwards."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
 
@@ -163,19 +163,18 @@ def sample(
     rig, ``open_`` makes the evaluator of one. Those on which nothing goes up are left out. Raises
     BadInput where the first is one of these."""
 
-    def ask(
-        number: int, effort: Effort, own: Mapping[str, Candidates]
-    ) -> dict[str, tuple[Candidates, float]]:
+    def ask(number: int, names: Iterable[str], effort: Effort) -> dict[str, _Found]:
         base = Bench.base(scene, rigs[number], f"rig {number}")
-        names = TARGETS if number else dict.fromkeys(drive for _, drive in FILMS.values())
         with open_(base) as evaluator:
             bench = _Upwards(base, evaluator)
             return {
                 name: _robust(bench, name, effort, [seed, number], own.get(name)) for name in names
             }
 
-    found = store.once("drives", lambda: ask(0, OWN, {}))
-    own: dict[str, Candidates] = {name: candidates for name, (candidates, _) in found.items()}
+    own: dict[str, Candidates] = {}
+    drives = dict.fromkeys(drive for _, drive in FILMS.values())
+    found = store.once("drives", lambda: ask(0, drives, OWN))
+    own |= {name: candidates for name, (candidates, _) in found.items()}
     for name, (_, speed) in found.items():
         if not speed > 0.0:
             raise BadInput(f"scene {scene.name}: {name}: no setting of the knobs moves it upwards.")
@@ -183,15 +182,13 @@ def sample(
     targets, values = [], []
     for number, rig in enumerate(rigs):
         base = Bench.base(scene, rig, f"rig {number}")
+
+        def speeds_of(number: int = number) -> list[float]:
+            each = ask(number, TARGETS, OTHERS) if number else found
+            return [each[name][1] for name in TARGETS]
+
         shown = store.once(f"films {number}", lambda base=base: _films(base, open_, own))
-        speeds = store.once(
-            f"rig {number}",
-            lambda number=number: (
-                [ask(number, OTHERS, own)[name][1] for name in TARGETS]
-                if number
-                else [found[name][1] for name in TARGETS]
-            ),
-        )
+        speeds = store.once(f"rig {number}", speeds_of)
         gauged = [[gauge.of(numbers_of(base))] for gauge in GAUGES.values()]
         told(f"rig {number}")
         if np.isfinite([*speeds, *(one for some in shown for one in some)]).all():
@@ -208,12 +205,12 @@ def _robust(
     machine = BY_NAME[name].machine(bench.scene)
     every = searched(bench, machine, effort, seed, own)
     found = {
-        kind: [some if n == UP else [] for n, some in enumerate(every[kind])] for kind in every
+        kind: [some if n == UP else [] for n, some in enumerate(each)]
+        for kind, each in every.items()
     }
     points = found["robust"][UP][:1]
-    if not points:
-        return found, nan
-    return found, float(bench.over_turns(machine)(np.array(points))[0][0, UP])
+    speed = float(bench.over_turns(machine)(np.array(points))[0][0, UP]) if points else nan
+    return found, speed
 
 
 def _films(

@@ -14,7 +14,7 @@ from typing import Any
 from cosim.studies.paper.exact import Contact, Phase, closed_cycle, simulate
 
 MU_S, MU_K = Fraction(7, 10), Fraction(6, 10)
-SCENE_F, SCENE_A = Fraction(5), Fraction(10)  # the paper's figure 3
+F, A = Fraction(5), Fraction(10)  # of the paper's figure 3
 
 WIDTH = 92  # of the text, in characters
 
@@ -33,8 +33,8 @@ class Erratum:
 
 def errata() -> list[Erratum]:
     """The misprints; computing the proofs takes about a second."""
-    proofs = (_first_phase, _interval, _force_limit, _sticking_limit)
-    return [proof() for proof in (*proofs, _force_guideline, _order_of_coefficients, _growth)]
+    first = _first_phase(), _interval(), _force_limit(), _sticking_limit()
+    return [*first, _force_guideline(), _order_of_coefficients(), _growth()]
 
 
 def errata_text() -> str:
@@ -60,11 +60,10 @@ def errata_text() -> str:
 
 
 def _first_phase() -> Erratum:
-    f, peak = SCENE_F, SCENE_A
-    right = _optimal(f, peak)
-    printed: list[Phase] = [(right[0][0], MU_K * f - 1), *right[1:]]
-    gain = float(simulate(printed, _contact(f))[0].surface_gain)
-    moved, closed = _moved(right, f), float(simulate(right, _contact(f))[0].surface_gain)
+    right = _optimal(F, A)
+    printed: list[Phase] = [(right[0][0], MU_K * F - 1), *right[1:]]
+    gain, closed = (float(simulate(x, _contact(F))[0].surface_gain) for x in (printed, right))
+    moved = _moved(right, F)
     return Erratum(
         where="Acceleration of the optimal waveform's first phase, with T1 and T2 as printed",
         printed="(µ_k F_n/m_P − g) on [0, T1]",
@@ -78,11 +77,10 @@ def _first_phase() -> Erratum:
 
 
 def _interval() -> Erratum:
-    f, peak = SCENE_F, SCENE_A
-    first, slowed = MU_S * f - 1, MU_K * f + 1
-    best = _moved(_optimal(f, peak), f)
-    less_down = _moved(closed_cycle(first, slowed, peak / 2, peak), f)
-    less_up = _moved(closed_cycle(first, slowed, peak, peak / 2), f)
+    first, slowed = MU_S * F - 1, MU_K * F + 1
+    best, less_down, less_up = (
+        _moved(closed_cycle(first, slowed, *ends), F) for ends in ((A, A), (A / 2, A), (A, A / 2))
+    )
     return Erratum(
         where="The interval that the surface's acceleration is taken from",
         printed="(its ends are misprinted)",
@@ -96,9 +94,8 @@ def _interval() -> Erratum:
 
 
 def _force_limit() -> Erratum:
-    peak = SCENE_A
-    cap = (peak - 1) / MU_K
-    below, at = (_moved(_optimal(f, peak), f, _sliding(f)) for f in (cap - Fraction(1, 10), cap))
+    cap = (A - 1) / MU_K
+    below, at = (_moved(_optimal(f, A), f, _sliding(f)) for f in (cap - Fraction(1, 10), cap))
     down = float(-MU_K * cap - 1)
     return Erratum(
         where="The condition at f_n,max",
@@ -113,10 +110,8 @@ def _force_limit() -> Erratum:
 
 
 def _sticking_limit() -> Erratum:
-    peak = SCENE_A
-    cap, printed = (peak - 1) / MU_S, (peak - 1) / MU_K
-    small = Fraction(1, 1000)
-    below, above = (_moved(_optimal(f, peak), f) for f in (cap - small, cap + small))
+    cap, printed, small = (A - 1) / MU_S, (A - 1) / MU_K, Fraction(1, 1000)
+    below, above = (_moved(_optimal(f, A), f) for f in (cap - small, cap + small))
     return Erratum(
         where="The largest normal force at which a part that sticks is transported",
         printed="f_n,max = (A − 1)/µ_k",

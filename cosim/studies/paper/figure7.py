@@ -17,8 +17,7 @@ from cosim.arrays import Array
 from cosim.files.picture import Picture
 from cosim.studies.compare.each import each
 from cosim.studies.compare.run import Comparison
-from cosim.studies.fit.cases import FIRST_ROW
-from cosim.studies.fit.fit import fit
+from cosim.studies.fit.fit import FIRST_ROW, fit
 from cosim.studies.fit.results import Shown
 from cosim.studies.paper.figures import DASHED, PART, SURFACE
 from cosim.studies.report import Progress, Report, silent
@@ -53,17 +52,12 @@ class Trial:
         numbers = self.machine.numbers
         frequency = numbers["frequency_measured"]
         period = 1.0 / frequency if frequency else None
-        velocities = {
-            "measured": numbers["drift_measured"],
-            "theirs": drift(*self.theirs.simulated, period),
-            "exact": drift(*self.exact.simulated, period),
-            "machine": numbers["drift_simulated"],
-        }
-        errors = {
-            "theirs": self.theirs.error * 1e3,
-            "exact": self.exact.error * 1e3,
-            "machine": numbers["mean_error_mm"],
-        }
+        solved = {"theirs": self.theirs, "exact": self.exact}
+        velocities: dict[str, float | None] = {"measured": numbers["drift_measured"]}
+        velocities |= {side: drift(*one.simulated, period) for side, one in solved.items()}
+        velocities["machine"] = numbers["drift_simulated"]
+        errors: dict[str, float | None] = {side: one.error * 1e3 for side, one in solved.items()}
+        errors["machine"] = numbers["mean_error_mm"]
         return {
             "trial": self.number,
             **{f"v_{side} [mm/s]": (v or 0.0) * 1e3 for side, v in velocities.items()},

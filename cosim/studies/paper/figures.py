@@ -13,7 +13,7 @@ from cosim.arrays import Array
 from cosim.drive.surface import formulas
 from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import Cycle, optimal_cycle
-from cosim.files.picture import Picture
+from cosim.files.picture import Picture, grid
 
 # The colours of surface and part in all figures.
 SURFACE, PART, STICKING = "#1f6fb2", "#d1495b", "#f4e3c1"
@@ -113,14 +113,12 @@ def _name_phases(above: Axes, between: Axes, cycle: Cycle) -> None:
 
 def draw_velocities(case: Transport, peaks: Sequence[float]) -> Picture:
     """Figure 4: v_ave over the normal force for several a_max, m/s²."""
-    figure = Picture(9.0, 6.0, "constrained")
-    axis = figure.subplots()
+    figure, (axis,) = grid(1, 1, 9.0, 6.0, 0.0)
     axis.axvspan(*(weight / case.mu_s for weight in GUIDELINE), color=STICKING, alpha=0.45, lw=0)
     for peak, color in zip(peaks, CURVES, strict=False):
         _curve(axis, case, peak, color)
     ratios, speeds = optima(case, max(peaks))
     axis.plot(ratios, speeds * 1e3, color="0.15", lw=1.3, ls=DASHED, zorder=2, label=OPTIMA)
-    axis.grid(alpha=0.25)
     axis.axhline(0.0, color="0.5", lw=0.8, zorder=1)
     axis.set(
         xlabel="normal force F$_n$/(m$_P$g) [1]",
@@ -179,20 +177,15 @@ def _curve(axis: Axes, case: Transport, peak: float, color: str) -> None:
 
 def _legend(axis: Axes) -> list[Artist]:
     curves = [line for line in axis.get_lines() if not str(line.get_label()).startswith("_")]
-    grey = "0.35"
+    marks = (
+        ("o", "f$_{opt}$"),
+        ("s", "f$_{max}$ of a part that sticks"),
+        ("v", "f$_{n,max}$ as printed: of one that slides"),
+    )
     return [
         *curves,
-        Line2D([], [], color=grey, marker="o", ls="", label="f$_{opt}$"),
-        Line2D([], [], color=grey, marker="s", ls="", label="f$_{max}$ of a part that sticks"),
-        Line2D(
-            [],
-            [],
-            color=grey,
-            marker="v",
-            ls="",
-            label="f$_{n,max}$ as printed: of one that slides",
-        ),
-        Line2D([], [], color=grey, lw=1.1, ls=BEYOND, label="the formula beyond f$_{max}$"),
+        *(Line2D([], [], color="0.35", marker=mark, ls="", label=words) for mark, words in marks),
+        Line2D([], [], color="0.35", lw=1.1, ls=BEYOND, label="the formula beyond f$_{max}$"),
         Patch(color=STICKING, alpha=0.45, label="the paper's guideline, µ$_s$F$_n$ = 4…16 m$_P$g"),
     ]
 

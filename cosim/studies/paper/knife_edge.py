@@ -16,7 +16,7 @@ import numpy as np
 
 from cosim.drive.surface.formulas import Transport, average_velocity, largest_force_ratio
 from cosim.drive.surface.waveforms import Cycle, closed_cycle, optimal_cycle
-from cosim.files.picture import Picture
+from cosim.files.picture import grid
 from cosim.mechanics import part
 from cosim.studies.tables import write_csv
 
@@ -24,18 +24,15 @@ PERIODS = 20
 STEP, V_MIN = part.PUBLISHED_STEP, part.PUBLISHED_V_MIN
 
 Method = Callable[..., part.PartMotion]
-METHODS: dict[str, Method] = {
-    "exact": part.exact,
-    f"Moreau, {STEP * 1e3:g} ms": partial(part.moreau, step=STEP),
-    f"threshold {V_MIN * 1e6:g} µm/s, {STEP * 1e3:g} ms": partial(
-        part.threshold, step=STEP, v_min=V_MIN
-    ),
-    f"threshold {V_MIN * 1e6:g} µm/s, {STEP * 1e4:g} µs": partial(
-        part.threshold, step=STEP / 100, v_min=V_MIN
-    ),
+_THRESHOLD, _NAME = partial(part.threshold, v_min=V_MIN), f"threshold {V_MIN * 1e6:g} µm/s"
+METHODS: dict[str, tuple[Method, str, str]] = {
+    "exact": (part.exact, "#1f6fb2", "-"),
+    f"Moreau, {STEP * 1e3:g} ms": (partial(part.moreau, step=STEP), "#2a9d8f", "--"),
+    f"{_NAME}, {STEP * 1e3:g} ms": (partial(_THRESHOLD, step=STEP), "#e9a03b", "-"),
+    f"{_NAME}, {STEP * 1e4:g} µs": (partial(_THRESHOLD, step=STEP / 100), "#d1495b", "-"),
 }
-COLORS = ("#1f6fb2", "#2a9d8f", "#e9a03b", "#d1495b")
-STYLES = ("-", "--", "-", "-")
+"""Ways to solve, with colours and styles of their curves."""
+TIMING, FORCE = "timing error [periods]", "f_n [m_P g]"
 CLOSED_FORM: dict[str, Any] = {"color": "0.2", "alpha": 0.3, "label": "closed form"}
 
 
@@ -69,36 +66,24 @@ def write(out_dir: Path, case: Transport) -> None:
     most = largest_force_ratio(case.mu_s, case.a_max, case.gravity) * 0.99
     ratios = np.linspace(1.05 / case.mu_k, most, 40).tolist()
     pressed = [replace(case, f_n=ratio) for ratio in ratios]
-    mistaken = [(mistimed(optimum, error), case) for error in errors]
-    delayed = [(optimal_cycle(one, margin=1e-6), one) for one in pressed]
     theory = [average_velocity(one) for one in pressed]
 
-    figure = Picture(13.0, 4.8, "constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = grid(2, 2, 13.0, 4.8, 0.0)
     left.set_xscale("symlog", linthresh=1e-9, linscale=0.4)
     left.axhline(average_velocity(case) * 1e3, lw=3.0, **CLOSED_FORM)
     right.plot(ratios, np.array(theory) * 1e3, lw=4.0, **CLOSED_FORM)
-    rows = []
-
-    def add(over: str, values: list[float], name: str, curve: list[float]) -> None:
-        rows.extend(
-            {"over": over, "value": x, "method": name, "v_average [m/s]": y}
-            for x, y in zip(values, curve, strict=True)
-        )
-
+    curves = []
     for axis, over, values, cycles in (
-        (left, "timing error [periods]", errors, mistaken),
-        (right, "f_n [m_P g]", ratios, delayed),
+        (left, TIMING, errors, [(mistimed(optimum, error), case) for error in errors]),
+        (right, FORCE, ratios, [(optimal_cycle(one, margin=1e-6), one) for one in pressed]),
     ):
-        for (name, method), color, style in zip(METHODS.items(), COLORS, STYLES, strict=True):
+        for name, (method, color, style) in METHODS.items():
             curve = [simulated(method, *one) for one in cycles]
-            add(over, values, name, curve)
+            curves.append((over, values, name, curve))
             axis.plot(values, np.array(curve) * 1e3, color=color, ls=style, lw=1.4, label=name)
         axis.set_ylabel("mean velocity of the part [mm/s]")
-        axis.grid(alpha=0.25)
         axis.axhline(0.0, color="0.5", lw=0.6)
         axis.legend(fontsize=8)
-    add("f_n [m_P g]", ratios, "theory", theory)
     left.set_xticks([-1e-2, -1e-4, -1e-6, -1e-8, 0, 1e-8, 1e-6, 1e-4, 1e-2])
     left.set(
         xlabel="first phase ends later than the optimum by [periods]",
@@ -108,5 +93,10 @@ def write(out_dir: Path, case: Transport) -> None:
         xlabel="normal force over the part's weight, f_n",
         title="A solver with a velocity threshold meets it early by itself",
     )
+    rows = [
+        {"over": over, "value": x, "method": name, "v_average [m/s]": y}
+        for over, values, name, curve in (*curves, (FORCE, ratios, "theory", theory))
+        for x, y in zip(values, curve, strict=True)
+    ]
     write_csv(out_dir / "knife_edge.csv", rows)
     figure.write(out_dir / "knife_edge.png")

@@ -12,13 +12,13 @@ from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.point import periods_made_whole
-from cosim.evaluate.store import Store, hashed
+from cosim.evaluate.store import Store, hashed, reported
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.fidelity import relative_error
 from cosim.simulation.simulate import simulate
 from cosim.studies.plots import GREEN, panels
-from cosim.studies.report import Progress, Report, counted, reported, silent
+from cosim.studies.report import Progress, Report, counted, silent
 from cosim.studies.tables import Row, brief, markdown
 
 RUNGS = ("ideal", "limited", "amplifier", "full")

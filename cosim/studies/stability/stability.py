@@ -20,10 +20,10 @@ from cosim.coupling.rewind.joint import Joint
 from cosim.coupling.rewind.methods import variants
 from cosim.coupling.rewind.stability import largest_stable_step, observed_limit
 from cosim.drive.command import command
-from cosim.evaluate.store import Store
+from cosim.evaluate.store import Store, reported
 from cosim.scene import changed
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, End, label_ends, panels
-from cosim.studies.report import Progress, Report, reported, silent
+from cosim.studies.report import Progress, Report, silent
 from cosim.studies.stability.machines import (
     DIRECT,
     REFERENCE,
@@ -126,12 +126,13 @@ def limits(regimes: Sequence[Regime], store: Store) -> Iterator[Limit]:
         m, part = regime.machine, "slips" if regime.slips else "sticks"
         given = (m.name, m.strength, regime.output, part, regime.cut)
         for method in METHODS:
+            both = store.once(f"{method}, {given}", partial(_both, method, regime))
+            yield Limit(*given, method, *both)
 
-            def found(method: str = method, regime: Regime = regime) -> list[float]:
-                expected = predicted(method, regime)
-                return [expected, observed(method, regime, expected)]
 
-            yield Limit(*given, method, *store.once(f"{method}, {given}", found))
+def _both(method: str, regime: Regime) -> list[float]:
+    expected = predicted(method, regime)
+    return [expected, observed(method, regime, expected)]
 
 
 def with_limits(steps: Sequence[float]) -> Iterator[Row]:

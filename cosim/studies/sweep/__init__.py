@@ -1,6 +1,6 @@
 """Sweeps: one scene at many settings of its keys."""
 
-from cosim.studies.study import DASK, OVERRIDES, SCENE, WORKERS, Option, Study
+from cosim.studies.study import DASK, OVERRIDES, SCENE, SHOW, WORKERS, Option, Study
 
 OVER = Option(
     "--over",
@@ -21,7 +21,11 @@ STUDIES = (
             Option("--samples", SAMPLES, "N", int),
             Option("--random", "independent samples instead of it", kind=bool),
             Option("--seed", "of the samples", "N", int, 0),
-            *(WORKERS, DASK),
+            Option(
+                *("--keep", "also keep these waveforms of every point"),
+                *("current,v_surface", lambda text: text.split(",")),
+            ),
+            *(WORKERS, DASK, SHOW),
         ),
         command="sweep",
         out="results/<scene>-sweep",

@@ -1,7 +1,7 @@
 """The result of a sweep as a labelled dataset, and as netCDF."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -30,14 +30,12 @@ POINT = "point"
 class Numbers:
     """The numbers of ``count`` points, by name and number of the point, and why some failed."""
 
-    def __init__(self, count: int, outcomes: Iterable[tuple[int, Outcome]] = ()) -> None:
+    def __init__(self, count: int) -> None:
         self._count = count
         self._values: dict[str, Array] = {}
         self._first: dict[tuple[str, ...], int] = {}  # points with these names
         self.failures = np.full(count, "", dtype=object)
         self.failed = 0
-        for index, outcome in outcomes:
-            self.add(index, outcome)
 
     def add(self, index: int, outcome: Outcome) -> None:
         """Take up a point that has been run, or run again."""

@@ -57,7 +57,7 @@ def draw(data: xr.Dataset, title: str) -> Picture:
         figure.suptitle(title, fontsize=12)
         return figure
     if POINT in data.dims:
-        _clouds(figure, data, swept(data))
+        _scatters(figure, data, swept(data))
     else:
         names = [str(name) for name in data.dims]
         varied = [name for name in names if data.sizes[name] > 1] or names[:1]
@@ -156,7 +156,7 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
         others[0].set_title(f"{OTHERS[0].title}\nat {', '.join(said)}", loc="left", fontsize=10.5)
 
 
-def _clouds(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
+def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
     """The velocity over each key, and three quantities over the first two keys."""
     rows = figure.subfigures(2, 1)
     v = _values(data, V_AVERAGE).values

@@ -4,6 +4,7 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,7 +17,7 @@ from cosim.evaluate.point import Number
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
-from cosim.studies.sweep import dataset
+from cosim.studies.sweep import dataset, families
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.toolchain.versions import versions
 
@@ -40,6 +41,7 @@ def sweep(
     samples: int | None = None,
     random: bool = False,
     seed: int = 0,
+    keep: Sequence[str] = (),
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
     dask: str | None = None,
@@ -57,9 +59,10 @@ def sweep(
     long as the scene's own.
 
     In the folder ``out`` it leaves ``sweep.nc`` and ``figure.png``, and takes up what an
-    interrupted sweep has left there. ``workers`` local processes (default: one for each processor),
-    or the Dask cluster at the address ``dask``. ``progress`` is told the points done, how many of
-    them failed, and their number.
+    interrupted sweep has left there; with ``keep``, names of waveforms, also those of every point,
+    as ``points/NUMBER.nc``. ``workers`` local processes (default: one for each processor), or the
+    Dask cluster at the address ``dask``. ``progress`` is told the points done, how many of them
+    failed, and their number.
 
     Raises BadInput for keys and values that cannot be, or where ``out`` holds another sweep.
 
@@ -71,14 +74,14 @@ def sweep(
     if random and samples is None:
         raise BadInput("--random needs --samples N.")
     design = grid(over) if samples is None else sample(over, samples, seed, random)
-    if out is None:
-        with TemporaryDirectory() as folder:
-            return _sweep(scene, design, Path(folder), workers, dask, progress)
-    folder = Path(out)
-    data = _sweep(scene, design, folder, workers, dask, progress)
-    from cosim.studies.sweep import figure
+    if keep and out is None:
+        raise BadInput("keep: waveforms are kept in a folder; name one as out.")
+    with TemporaryDirectory() if out is None else nullcontext(out) as folder:
+        data = _sweep(scene, design, Path(folder), keep, workers, dask, progress)
+        if out is not None:
+            from cosim.studies.sweep import figure
 
-    figure.draw(data, scene.name).write(folder / FIGURE)
+            figure.draw(data, scene.name).write(Path(out) / FIGURE)
     return data
 
 
@@ -86,6 +89,7 @@ def _sweep(
     scene: Scene,
     design: Design,
     folder: Path,
+    keep: Sequence[str],
     workers: int | None,
     dask: str | None,
     progress: Callable[[int, int, int], None],
@@ -103,19 +107,17 @@ def _sweep(
     with Evaluator(
         scene, folder / STORE, *asked, whole_periods=whole_periods, workers=workers, dask=dask
     ) as bench:
-        done: set[int] = set()
+        before: set[int] = set()
         for number in range(total) if bench.resumed else ():
             if (outcome := bench.known(design.point(number))) is not None:
                 numbers.add(number, outcome)
-                done.add(number)
-        before = frozenset(done)
-        progress(len(done), numbers.failed, total)
+                before.add(number)
+        progress(len(before), numbers.failed, total)
         due = time.monotonic() + _REFRESH
         points = ((n, design.point(n)) for n in range(total) if n not in before)
-        for number, outcome in bench.run(points):
+        for done, (number, outcome) in enumerate(bench.run(points), len(before) + 1):
             numbers.add(number, outcome)
-            done.add(number)
-            progress(len(done), numbers.failed, total)
+            progress(done, numbers.failed, total)
             if time.monotonic() >= due:
                 began = time.monotonic()
                 try:
@@ -127,7 +129,11 @@ def _sweep(
         if scene.run.solver == "fast":
             for number, outcome in bench.run(_judged(design, numbers)):
                 numbers.judge(number, outcome)
-        return refreshed()
+        data = refreshed()
+        if keep:
+            points = [n for n in range(total) if not numbers.failures[n]]
+            families.keep(folder / "points", scene, design, keep, points, bench)
+        return data
 
 
 def _judged(design: Design, numbers: dataset.Numbers) -> Iterator[tuple[int, Settings]]:

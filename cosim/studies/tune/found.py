@@ -76,64 +76,157 @@ class Tuning:
 
         As a share of the best value; inf where such a run failed; None where there is none.
         """
-        assert self.best.value is not None
         losses = []
         for key, values in self.neighbours.items():
             low, high = self.ranges[key]
             for turn, value in zip((-TURN, TURN), values, strict=True):
                 if low <= self.best.values[key] + turn * (high - low) <= high:
-                    change = inf if value is None else self.best.value - value
+                    change = inf if value is None else self.value - value
                     losses.append(change if self.largest or value is None else -change)
-        return max(losses) / (abs(self.best.value) or 1.0) if losses else None
+        return max(losses) / (abs(self.value) or 1.0) if losses else None
+
+    @property
+    def value(self) -> float:
+        """That of the best run."""
+        assert self.best.value is not None
+        return self.best.value
+
+    @property
+    def robustness(self) -> str:
+        """What it costs to turn a key a little, in words."""
+        if not self.neighbours:
+            return "the budget ended before its neighbours were run: a larger one may help"
+        if (lost := self.lost) is None:
+            return ""
+        cost = "loses it altogether" if lost >= 1.0 else f"costs at most {max(lost, 0.0):.1%}"
+        if lost == inf:
+            cost = "leads to a run that fails or is too hot"
+        return f"turning one key by {TURN:.0%} of its range {cost}"
 
     def plot(self) -> Picture:
-        """The path of the search, where it listened, and what a small turn costs."""
-        return _figure(self)
+        """The path of the search, which settings it ran, and what a small turn costs."""
+        from matplotlib.ticker import MaxNLocator
+
+        figure = Picture(13.0, 8.0, "constrained")
+        rows: Any = figure.subfigures(2, 1)
+        top, bottom = rows
+        unit, scale = bench_unit(self.quantity)
+        ylabel = label(self.quantity, unit)
+        values = np.array([np.nan if run.value is None else run.value for run in self.runs]) * scale
+        number = np.arange(1, len(values) + 1)
+
+        path_axis, turn_axis = top.subplots(1, 2)
+        path_axis.scatter(number, values, c=number, cmap="viridis", s=14)
+        ranked = values if self.largest else -values
+        so_far = np.fmax.accumulate(ranked)
+        path_axis.step(number, so_far if self.largest else -so_far, where="post", color="#d1495b")
+        failed = number[~np.isfinite(values)]
+        path_axis.plot(
+            failed, np.full(len(failed), 0.02), "x", color="#d1495b", ms=6,
+            transform=path_axis.get_xaxis_transform(),
+        )  # fmt: skip
+        path_axis.set(xlabel="run", ylabel=ylabel)
+        words = "Every run, and the best so far" + (
+            f"; {len(failed)} failed or too hot (×)" if len(failed) else ""
+        )
+        path_axis.set_title(words, loc="left", fontsize=10.5)
+
+        turns = 100 * np.array([-TURN, 0.0, TURN])
+        styles = [(color, style) for style in ("-", "--", ":") for color in COLORS]
+        for (key, row), (color, style) in zip(self.neighbours.items(), styles, strict=False):
+            low, high = (np.nan if value is None else value * scale for value in row)
+            heights = [low, self.value * scale, high]
+            turn_axis.plot(turns, heights, color=color, ls=style, marker="o", ms=4, label=key)
+        turn_axis.set(xlabel="turned by [% of the key's range]", ylabel=ylabel)
+        turn_axis.set_title("The neighbourhood of the best", loc="left", fontsize=10.5)
+        if self.neighbours:
+            turn_axis.legend(fontsize=8.5)
+
+        keys = list(self.ranges)[:MOST_KEYS]
+        for axis, key in zip(np.atleast_1d(bottom.subplots(1, len(keys))), keys, strict=True):
+            settings = [run.values[key] for run in self.runs]
+            shown = axis.scatter(settings, values, c=number, cmap="viridis", s=14)
+            axis.axvline(self.best.values[key], color="#d1495b", lw=0.9)
+            axis.set(xlabel=label(key, numeric_key(key).unit), ylabel=ylabel)
+            axis.xaxis.set_major_locator(MaxNLocator(6))
+            if key == keys[-1]:
+                bottom.colorbar(shown, ax=axis, label="run")
+        for axis in figure.axes:
+            if axis.get_label() != "<colorbar>":
+                axis.grid(alpha=0.25)
+        best = with_unit(self.value * scale, unit, 4)
+        figure.suptitle(
+            f"{self.scene.name}{self.waveform and f', {self.waveform}'}: "
+            f"{'robust ' * self.robust}{self.quantity} {best} after {len(values)} runs"
+            + (f", and {self.scouts} ahead, cheaper" if self.scouts else ""),
+            fontsize=12,
+        )
+        return figure
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``tune.json``, ``tune.csv``, ``best.toml`` and ``figure.png``; of each other
         waveform ``best-WAVEFORM.toml``."""
-        _write(Path(folder), self)
-        self.plot().write(Path(folder) / "figure.png")
+        out = Path(folder)
+        drive, summary = self.scene.drive, self.best.outcome.numbers
+        numbers = {
+            "quantity": self.quantity,
+            "largest": self.largest,
+            "value": self.value,
+            "settings": self.best.values,
+            "drive": {name: getattr(drive, name) for name in ("frequency", "amplitude", "offset")},
+            "ranges": self.ranges,
+            "runs": len(self.runs),
+            "failed": self.failed,
+            "seed": self.seed,
+            "search": "Sobol sequence, then CMA-ES",
+            "scouts": self.scouts,
+            "value_by_fast_solver": self.by_fast,
+            "waveforms": {
+                one.waveform: {"value": one.value, "settings": one.best.values}
+                for one in (self, *self.others)
+                if one.waveform
+            },
+            "robust": self.robust,
+            "heat_limit": self.heat if isfinite(self.heat) else None,
+            "turns": [-TURN, TURN],
+            "neighbours": self.neighbours,
+            "robustness": self.robustness,
+            "summary": {name: x if isfinite(x) else None for name, x in summary.items()},
+        }
+        write_runs(out / "tune.csv", self.runs, self.quantity)
+        aim = f"{'largest' if self.largest else 'least'} {self.quantity}"
+        found = {"name": f"{self.scene.name}-tuned"[:64], "description": f"Tuned for the {aim}"}
+        write_json(out / "tune.json", numbers)
+        for one in (self, *self.others):
+            name = "best" if one is self else f"best-{one.waveform.replace(':', '-')}"
+            write_text(out / f"{name}.toml", to_toml(one.scene.model_copy(update=found)))
+        self.plot().write(out / "figure.png")
 
     def __repr__(self) -> str:
-        return _table(self)
-
-
-def _write(folder: Path, tuning: Tuning) -> None:
-    drive, summary = tuning.scene.drive, tuning.best.outcome.numbers
-    numbers = {
-        "quantity": tuning.quantity,
-        "largest": tuning.largest,
-        "value": tuning.best.value,
-        "settings": tuning.best.values,
-        "drive": {name: getattr(drive, name) for name in ("frequency", "amplitude", "offset")},
-        "ranges": tuning.ranges,
-        "runs": len(tuning.runs),
-        "failed": tuning.failed,
-        "seed": tuning.seed,
-        "search": "Sobol sequence, then CMA-ES",
-        "scouts": tuning.scouts,
-        "value_by_fast_solver": tuning.by_fast,
-        "waveforms": {
-            one.waveform: {"value": one.best.value, "settings": one.best.values}
-            for one in (tuning, *tuning.others)
-            if one.waveform
-        },
-        "robust": tuning.robust,
-        "heat_limit": tuning.heat if isfinite(tuning.heat) else None,
-        "turns": [-TURN, TURN],
-        "neighbours": tuning.neighbours,
-        "robustness": _robustness(tuning),
-        "summary": {name: x if isfinite(x) else None for name, x in summary.items()},
-    }
-    write_runs(folder / "tune.csv", tuning.runs, tuning.quantity)
-    aim = f"{'largest' if tuning.largest else 'least'} {tuning.quantity}"
-    found = {"name": f"{tuning.scene.name}-tuned"[:64], "description": f"Tuned for the {aim}"}
-    write_json(folder / "tune.json", numbers)
-    for one in (tuning, *tuning.others):
-        name = "best" if one is tuning else f"best-{one.waveform.replace(':', '-')}"
-        write_text(folder / f"{name}.toml", to_toml(one.scene.model_copy(update=found)))
+        """The best settings for a reader."""
+        unit, scale = bench_unit(self.quantity)
+        ahead = f" ({self.scouts} ahead, cheaper)" if self.scouts else ""
+        value = with_unit(self.value * scale, unit, 5)
+        lines = [
+            f"{self.quantity} = {value} after {len(self.runs)} runs{ahead}, {self.failed} failed "
+            "or too hot, at"
+        ]
+        if self.by_fast is not None:
+            told = with_unit(self.by_fast * scale, unit, 5)
+            lines.append(f"  by the FMU; the fast solver, which searched, has {told}")
+        for name, setting in self.best.values.items():
+            line = f"  {name} = {with_unit(setting, numeric_key(name).unit)}"
+            if key := KNOBS.get(name.removeprefix("drive.")):
+                meant, unit_of_it = getattr(self.scene.drive, key), numeric_key(f"drive.{key}").unit
+                line += f" ({key} {with_unit(meant, unit_of_it, 4)})"
+            lines.append(line)
+        if words := self.robustness:
+            lines.append(f"  {words}")
+        if self.robust:
+            lines.append(f"  values are medians over the keys' turns by {TURN:.0%}")
+        for one in (self, *self.others) if self.others else ():
+            lines.append(f"  {one.waveform}: {with_unit(one.value * scale, unit, 4)}")
+        return "\n".join(lines)
 
 
 def write_runs(path: Path, runs: Sequence[Run], quantity: str) -> None:
@@ -148,18 +241,6 @@ def write_runs(path: Path, runs: Sequence[Run], quantity: str) -> None:
         write_csv(path, rows)
 
 
-def _robustness(tuning: Tuning) -> str:
-    """What it costs to turn a key a little, in words."""
-    if not tuning.neighbours:
-        return "the budget ended before its neighbourhood was heard: a larger one may help"
-    if (lost := tuning.lost) is None:
-        return ""
-    cost = "loses it altogether" if lost >= 1.0 else f"costs at most {max(lost, 0.0):.1%}"
-    if lost == inf:
-        cost = "leads to a run that fails or is too hot"
-    return f"turning one key by {TURN:.0%} of its range {cost}"
-
-
 def ranges_of(over: Sequence[str]) -> dict[str, tuple[float, float]]:
     """The ranges that ``--over table.key=low:high`` options give. Raises BadInput."""
     ranges: dict[str, tuple[float, float]] = {}
@@ -170,93 +251,3 @@ def ranges_of(over: Sequence[str]) -> dict[str, tuple[float, float]]:
             raise BadInput(f"--over {plain(text)}: must be table.key=low:high.") from None
         ranges[name] = (low, high)
     return ranges
-
-
-def _table(tuning: Tuning) -> str:
-    """The best settings for a reader."""
-    value = tuning.best.value
-    assert value is not None
-    unit, scale = bench_unit(tuning.quantity)
-    ahead = f" ({tuning.scouts} ahead, cheaper)" if tuning.scouts else ""
-    lines = [
-        f"{tuning.quantity} = {with_unit(value * scale, unit, 5)} after {len(tuning.runs)} runs"
-        f"{ahead}, {tuning.failed} failed or too hot, at"
-    ]
-    if tuning.by_fast is not None:
-        told = with_unit(tuning.by_fast * scale, unit, 5)
-        lines.append(f"  by the FMU; the fast solver, which searched, has {told}")
-    for name, setting in tuning.best.values.items():
-        line = f"  {name} = {with_unit(setting, numeric_key(name).unit)}"
-        if key := KNOBS.get(name.removeprefix("drive.")):
-            meant = with_unit(getattr(tuning.scene.drive, key), numeric_key(f"drive.{key}").unit, 4)
-            line += f" ({key} {meant})"
-        lines.append(line)
-    if words := _robustness(tuning):
-        lines.append(f"  {words}")
-    if tuning.robust:
-        lines.append(f"  values are medians over the keys' turns by {TURN:.0%}")
-    for one in (tuning, *tuning.others) if tuning.others else ():
-        assert one.best.value is not None
-        lines.append(f"  {one.waveform}: {with_unit(one.best.value * scale, unit, 4)}")
-    return "\n".join(lines)
-
-
-def _figure(tuning: Tuning) -> Picture:
-    from matplotlib.ticker import MaxNLocator
-
-    figure = Picture(13.0, 8.0, "constrained")
-    rows: Any = figure.subfigures(2, 1)
-    top, bottom = rows
-    unit, scale = bench_unit(tuning.quantity)
-    ylabel = label(tuning.quantity, unit)
-    values = np.array([np.nan if run.value is None else run.value for run in tuning.runs]) * scale
-    number = np.arange(1, len(values) + 1)
-
-    path_axis, turn_axis = top.subplots(1, 2)
-    path_axis.scatter(number, values, c=number, cmap="viridis", s=14)
-    ranked = values if tuning.largest else -values
-    so_far = np.fmax.accumulate(ranked)
-    path_axis.step(number, so_far if tuning.largest else -so_far, where="post", color="#d1495b")
-    failed = number[~np.isfinite(values)]
-    path_axis.plot(
-        failed, np.full(len(failed), 0.02), "x", color="#d1495b", ms=6,
-        transform=path_axis.get_xaxis_transform(),
-    )  # fmt: skip
-    path_axis.set(xlabel="run", ylabel=ylabel)
-    words = "Every run, and the best so far" + (
-        f"; {len(failed)} failed or too hot (×)" if len(failed) else ""
-    )
-    path_axis.set_title(words, loc="left", fontsize=10.5)
-
-    assert tuning.best.value is not None
-    turns = 100 * np.array([-TURN, 0.0, TURN])
-    styles = [(color, style) for style in ("-", "--", ":") for color in COLORS]
-    for (key, row), (color, style) in zip(tuning.neighbours.items(), styles, strict=False):
-        low, high = (np.nan if value is None else value * scale for value in row)
-        heights = [low, tuning.best.value * scale, high]
-        turn_axis.plot(turns, heights, color=color, ls=style, marker="o", ms=4, label=key)
-    turn_axis.set(xlabel="turned by [% of the key's range]", ylabel=ylabel)
-    turn_axis.set_title("The neighbourhood of the best", loc="left", fontsize=10.5)
-    if tuning.neighbours:
-        turn_axis.legend(fontsize=8.5)
-
-    keys = list(tuning.ranges)[:MOST_KEYS]
-    for axis, key in zip(np.atleast_1d(bottom.subplots(1, len(keys))), keys, strict=True):
-        settings = [run.values[key] for run in tuning.runs]
-        shown = axis.scatter(settings, values, c=number, cmap="viridis", s=14)
-        axis.axvline(tuning.best.values[key], color="#d1495b", lw=0.9)
-        axis.set(xlabel=label(key, numeric_key(key).unit), ylabel=ylabel)
-        axis.xaxis.set_major_locator(MaxNLocator(6))
-        if key == keys[-1]:
-            bottom.colorbar(shown, ax=axis, label="run")
-    for axis in figure.axes:
-        if axis.get_label() != "<colorbar>":
-            axis.grid(alpha=0.25)
-    best = with_unit(tuning.best.value * scale, unit, 4)
-    figure.suptitle(
-        f"{tuning.scene.name}{tuning.waveform and f', {tuning.waveform}'}: "
-        f"{'robust ' * tuning.robust}{tuning.quantity} {best} after {len(values)} runs"
-        + (f", and {tuning.scouts} ahead, cheaper" if tuning.scouts else ""),
-        fontsize=12,
-    )
-    return figure

@@ -270,22 +270,17 @@ class _Trial:
             [self._settings(near.tolist()) for near in turned(point, self._aim.turned)]
             for point in points
         ]
-        count = len(each[0])
-        asked = ({**self._circuit, **values} for around in each for values in around)
-        heard: list[dict[int, Outcome]] = [{} for _ in each]
+        asked = [[{**self._circuit, **values} for values in around] for around in each]
         found: dict[int, Run] = {}
-        for number, outcome in self._aim.bench.run(enumerate(asked)):
-            n, k = divmod(number, count)
-            heard[n][k] = outcome
-            if len(heard[n]) == count:
-                found[n] = self._heard(each[n][0], [heard[n][k] for k in range(count)])
-                self._progress(found[n], self.best)
+        for number, outcomes in self._aim.bench.groups(asked):
+            found[number] = self._judged(each[number][0], outcomes)
+            self._progress(found[number], self.best)
         runs = [found[number] for number in range(len(points))]
         self.runs += runs
         scores = np.array([[self._score(run.value)] for run in runs])
         return scores, np.isfinite(scores[:, 0])
 
-    def _heard(self, settings: dict[str, Number], outcomes: Sequence[Outcome]) -> Run:
+    def _judged(self, settings: dict[str, Number], outcomes: Sequence[Outcome]) -> Run:
         """A setting with its own outcome, the first, and those of its turns, which are judged by
         their motion alone: a hand that is off turns back."""
         own, most = outcomes[0], self._aim.heat

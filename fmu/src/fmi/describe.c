@@ -145,25 +145,35 @@ static void unit_definitions(void)
 
 /* ---- variables ---- */
 
+/* FMI 2.0 counts variables from 1 in the order of the file, where time is the first. */
+static unsigned real_key(int version, size_t place)
+{
+    return version == 2 ? (unsigned)place + 2 : (unsigned)place + REFERENCE_REALS;
+}
+
 static void common_attributes(unsigned reference, const VariableInfo *info, int real)
 {
     static const char *const CAUSALITIES[] = {
-        [KIND_PARAMETER] = "parameter", [KIND_INPUT] = "input", [KIND_OUTPUT] = "output"};
+        [KIND_PARAMETER] = "parameter", [KIND_TUNABLE] = "parameter", [KIND_INPUT] = "input",
+        [KIND_OUTPUT] = "output"};
     attribute("name", info->name);
     printf(" valueReference=\"%u\"", reference);
     attribute("description", info->text);
     attribute("causality", CAUSALITIES[info->kind]);
     attribute("variability", info->kind == KIND_PARAMETER ? "fixed"
+                             : info->kind == KIND_TUNABLE ? "tunable"
                              : real                       ? "continuous"
                                                           : "discrete");
     if (info->kind != KIND_INPUT)
-        attribute("initial", info->kind == KIND_PARAMETER ? "exact" : "calculated");
+        attribute("initial", info->kind == KIND_OUTPUT ? "calculated" : "exact");
 }
 
-static void type_attributes(const VariableInfo *info, int real)
+static void type_attributes(int version, const VariableInfo *info, int real)
 {
     if (real)
         attribute("unit", info->unit);
+    if (real && info == &stickslip_real_info[PLACE(back_emf_slope)])
+        printf(" derivative=\"%u\"", real_key(version, PLACE(back_emf)));
     if (info->kind == KIND_OUTPUT)
         return;
     number("min", info->min);
@@ -177,12 +187,12 @@ static void variable(int version, unsigned reference, const VariableInfo *info, 
         printf("    <ScalarVariable");
         common_attributes(reference, info, real);
         printf("><%s", real ? "Real" : "Integer");
-        type_attributes(info, real);
+        type_attributes(version, info, real);
         puts("/></ScalarVariable>");
     } else {
         printf("    <%s", real ? "Float64" : "Int32");
         common_attributes(reference, info, real);
-        type_attributes(info, real);
+        type_attributes(version, info, real);
         puts("/>");
     }
 }
@@ -225,12 +235,6 @@ static int has_feedthrough(size_t place)
         return 1;
     }
     return 0;
-}
-
-/* FMI 2.0 counts variables from 1 in the order of the file, where time is the first. */
-static unsigned real_key(int version, size_t place)
-{
-    return version == 2 ? (unsigned)place + 2 : (unsigned)place + REFERENCE_REALS;
 }
 
 static unsigned integer_key(int version, size_t place)

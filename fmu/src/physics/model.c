@@ -13,6 +13,7 @@
 #include "source.h"
 
 #define PARAMETER(name, unit, start, min, max, text) {#name, unit, text, KIND_PARAMETER, start, min, max},
+#define TUNABLE(name, unit, start, min, max, text) {#name, unit, text, KIND_TUNABLE, start, min, max},
 #define INPUT(name, unit, start, min, max, text) {#name, unit, text, KIND_INPUT, start, min, max},
 #define OUTPUT(name, unit, text) {#name, unit, text, KIND_OUTPUT, 0.0, 0.0, 0.0},
 #define INT_PARAMETER(name, start, min, max, text)
@@ -21,12 +22,14 @@ const VariableInfo stickslip_real_info[N_REALS] = {
 #include "variables.def"
 };
 #undef PARAMETER
+#undef TUNABLE
 #undef INPUT
 #undef OUTPUT
 #undef INT_PARAMETER
 #undef INT_OUTPUT
 
 #define PARAMETER(name, unit, start, min, max, text)
+#define TUNABLE(name, unit, start, min, max, text)
 #define INPUT(name, unit, start, min, max, text)
 #define OUTPUT(name, unit, text)
 #define INT_PARAMETER(name, start, min, max, text) {#name, "1", text, KIND_PARAMETER, start, min, max},
@@ -283,6 +286,8 @@ int stickslip_model_step(Model *m, double h, char *message)
         return say(message, "a step before initialisation");
     if (!(h > 0.0) || !isfinite(h))
         return say(message, "the step must be a positive number of seconds");
+    if (stickslip_model_contradiction(m, message)) /* of tunable parameters, set one by one */
+        return -1;
     const double normal = m->r.normal_force + m->r.normal_force_slope * h;
     if (normal < -1e-12 * m->r.normal_force)
         return say(message, "normal_force falls below 0 N within the step; its slope is too steep");

@@ -5,7 +5,7 @@
  * platform computes the same bits (build with -ffp-contract=off).
  *
  * Call order: stickslip_model_defaults; ..._set_* (parameters); ..._initialise; then any number of
- * { ..._set_* (inputs); ..._step; ..._outputs }. */
+ * { ..._set_* (inputs, tunable parameters); ..._step; ..._outputs }. */
 #ifndef STICKSLIP_MODEL_H
 #define STICKSLIP_MODEL_H
 
@@ -14,7 +14,7 @@
 
 STICKSLIP_INTERNAL_BEGIN
 
-typedef enum { KIND_PARAMETER, KIND_INPUT, KIND_OUTPUT } Kind;
+typedef enum { KIND_PARAMETER, KIND_TUNABLE, KIND_INPUT, KIND_OUTPUT } Kind;
 
 typedef struct {
     const char *name, *unit, *text;
@@ -28,7 +28,7 @@ extern const VariableInfo stickslip_integer_info[N_INTEGERS];
 void stickslip_model_defaults(Model *m);
 
 /* Set one variable by its place, or only see whether it can be. 0, or -1 with a sentence in message: unknown place, an output, a
- * parameter after initialisation, not finite, out of range. */
+ * fixed parameter after initialisation, not finite, out of range. */
 int stickslip_model_set_real(Model *m, size_t place, double value, char *message);
 int stickslip_model_check_real(const Model *m, size_t place, double value, char *message);
 /* Set what can be. */

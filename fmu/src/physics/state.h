@@ -12,12 +12,14 @@
 /* The variables, by their names in variables.def. */
 typedef struct {
 #define PARAMETER(name, unit, start, min, max, text) double name;
+#define TUNABLE(name, unit, start, min, max, text) double name;
 #define INPUT(name, unit, start, min, max, text) double name;
 #define OUTPUT(name, unit, text) double name;
 #define INT_PARAMETER(name, start, min, max, text)
 #define INT_OUTPUT(name, text)
 #include "variables.def"
 #undef PARAMETER
+#undef TUNABLE
 #undef INPUT
 #undef OUTPUT
 #undef INT_PARAMETER
@@ -26,12 +28,14 @@ typedef struct {
 
 typedef struct {
 #define PARAMETER(name, unit, start, min, max, text)
+#define TUNABLE(name, unit, start, min, max, text)
 #define INPUT(name, unit, start, min, max, text)
 #define OUTPUT(name, unit, text)
 #define INT_PARAMETER(name, start, min, max, text) int name;
 #define INT_OUTPUT(name, text) int name;
 #include "variables.def"
 #undef PARAMETER
+#undef TUNABLE
 #undef INPUT
 #undef OUTPUT
 #undef INT_PARAMETER

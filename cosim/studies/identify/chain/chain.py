@@ -1,11 +1,11 @@
 """The compiled chain: what the machine does with given numbers, how far that is from measured
-trials, and the fit of each trial's own numbers. See ``refine.h`` and
+trials, and the fit of each trial's own parameters. See ``refine.h`` and
 ``cosim/stepper/stepper.h``.
 """
 
 import ctypes
-import threading
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, Structure, addressof, byref, c_double, c_int64, c_longlong, c_void_p
 from dataclasses import dataclass, field
 from functools import cache
@@ -39,11 +39,9 @@ class _Trial(Structure):
     )
 
 
-class _Job(Structure):
-    _fields_ = (
-        *((name, c_void_p) for name in ("trial", "rig", "own", "cost")),
-        ("rounds", c_int64),
-    )
+_JOB = np.dtype(
+    [*((name, np.uintp) for name in ("trial", "rig", "own", "cost")), ("rounds", np.int64)]
+)
 
 
 @cache
@@ -64,7 +62,7 @@ class Target:
     ``signals`` hold the measured values by the names of ``OUTPUTS`` at ``time`` (s, from 0 on), NaN
     where nothing is known, and ``weights`` what a squared residual counts, 1/m² or 1/(m/s)²;
     ``differenced`` names the velocities that are made of heights. ``low``, ``high`` and ``scale``
-    are of ``OWN``; a number whose scale is 0 is not fitted. ``step`` (s) is the longest of the
+    are of ``OWN``; a parameter whose scale is 0 is not fitted. ``step`` (s) is the longest of the
     simulation; ``current`` (A, at the times) replaces the drive.
     """
 
@@ -112,18 +110,18 @@ class Target:
         self._state = state
 
     @property
-    def place(self) -> int:
-        """The address of the compiled code's structure."""
+    def address(self) -> int:
+        """Of the compiled code's structure."""
         return addressof(self._state)
 
 
 def refine(
     targets: Sequence[Target], rigs: Array, own: Array, rounds: int, workers: int
 ) -> tuple[Array, Array]:
-    """Fit own numbers, by ``rounds`` of Gauss–Newton from ``own`` on.
+    """Fit own parameters, by ``rounds`` of Gauss–Newton from ``own`` on.
 
     ``targets`` (n), ``rigs`` (n × RIG) and ``own`` (n × OWN) belong to each other row by row.
-    Returns the numbers found (n × OWN) and their costs (n).
+    Returns the parameters found (n × OWN) and their costs (n).
     """
     rigs, own = np.ascontiguousarray(rigs), np.array(own, dtype=np.float64, order="C")
     cost = np.empty(len(targets))
@@ -134,10 +132,10 @@ def refine(
 def look_around(
     targets: Sequence[Target], rigs: Array, own: Array, workers: int
 ) -> tuple[Array, Array]:
-    """Costs (n × m) of m sets of own numbers (n × m × OWN) for each target and rig (n × RIG).
+    """Costs (n × m) of m sets of own parameters (n × m × OWN) for each target and rig (n × RIG).
 
     The phases are first moved to where the surface moves as it was measured. Returns the own
-    numbers with these, and the costs.
+    parameters with these, and the costs.
     """
     n, m, _ = own.shape
     blocks = -(-m // LANES)
@@ -152,24 +150,21 @@ def look_around(
 def _work(
     targets: Sequence[Target], rigs: Array, own: Array, cost: Array, rounds: int, workers: int
 ) -> None:
-    n = len(targets)
-    jobs = (_Job * n)()
-    for i, target in enumerate(targets):
-        jobs[i].trial, jobs[i].rounds = target.place, rounds
-        jobs[i].rig, jobs[i].own = rigs[i].ctypes.data, own[i].ctypes.data
-        jobs[i].cost = cost.ctypes.data + i * cost.strides[0]
-    done, functions = c_longlong(0), compiled()
-    failed: list[int] = []
+    n, done = len(targets), c_longlong(0)
+    jobs = np.zeros(n, _JOB)
+    jobs["trial"], jobs["rounds"] = [target.address for target in targets], rounds
+    for name, each in (("rig", rigs), ("own", own), ("cost", cost)):
+        jobs[name] = each.ctypes.data + np.arange(n) * each.strides[0]
 
-    def work() -> None:
-        failed.append(functions.chain_work(byref(jobs), n, byref(done)))
+    def work(_: int) -> int:
+        return compiled().chain_work(jobs.ctypes.data, n, byref(done))
 
-    threads = [threading.Thread(target=work) for _ in range(min(workers, n) - 1)]
-    for thread in threads:
-        thread.start()
-    work()
-    for thread in threads:
-        thread.join()
+    threads = range(min(workers, n))
+    if len(threads) == 1:
+        failed = [work(0)]
+    else:
+        with ThreadPoolExecutor(len(threads)) as pool:
+            failed = [*pool.map(work, threads)]
     if any(failed):
         raise SimulationFailed("There is no memory for the simulation of the trials.")
 
@@ -189,7 +184,7 @@ def simulate(target: Target, rigs: Array, own: Array) -> tuple[dict[str, Array],
         rows = np.minimum(np.arange(start, start + LANES), n - 1)
         both = np.ascontiguousarray(np.concatenate([rigs[rows], own[rows]], axis=1).T)
         pointers = (both.ctypes.data, out.ctypes.data, apart.ctypes.data)
-        count = compiled().chain_look(target.place, *pointers)
+        count = compiled().chain_look(target.address, *pointers)
         used = slice(start, min(start + LANES, n))
         k = used.stop - used.start
         found[used] = out.reshape(samples, len(OUTPUTS), LANES).transpose(2, 1, 0)[:k]
@@ -200,4 +195,4 @@ def simulate(target: Target, rigs: Array, own: Array) -> tuple[dict[str, Array],
 def sizes() -> tuple[tuple[int, int], tuple[int, int]]:
     """Bytes of the two structures, here and in the compiled code."""
     there = compiled().chain_sizes
-    return (ctypes.sizeof(_Trial), there(0)), (ctypes.sizeof(_Job), there(1))
+    return (ctypes.sizeof(_Trial), there(0)), (_JOB.itemsize, there(1))

@@ -28,14 +28,14 @@ show the fast part of a motion, heights the slow one, from which transport follo
 
 SURFACE = {name: WEIGHTS[name] for name in ("v_surface", "z_surface")}
 TRANSPORT = WEIGHTS | {"z_part": 0.2}
-"""For a trial's own numbers on a rig found elsewhere: of the surface alone; and with the part,
+"""For a trial's own parameters on a rig found elsewhere: of the surface alone; and with the part,
 whose heights count twice there, since they tell the normal force."""
 
 SEARCH_STEP, FINE_STEP = 1.0 / 960 / 14, 1.0 / 960 / 80
 """Longest steps (s) of the search, and of its finish and all that is reported."""
 
 DRIVE = ("amplitude", "offset", "phase", "start", "frequency")
-"""Numbers of a trial that a measured current makes superfluous."""
+"""Parameters of a trial that a measured current makes superfluous."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,10 +94,9 @@ def measured(recording: Recording, path: Path, space: Space) -> Measured:
         raise BadInput(f"{path}: the surface's motion does not repeat, so its drive is not known.")
     low, high, scale = own_bounds(space, frequency)
     if current is not None:
-        for name in DRIVE:
-            k = OWN.index(name)
-            low[k] = high[k] = 1.0 if name == "frequency" else 0.0
-            scale[k] = 0.0
+        needless = [OWN.index(name) for name in DRIVE]
+        low[needless] = high[needless] = [float(name == "frequency") for name in DRIVE]
+        scale[needless] = 0.0
 
     def target(step: float, weights: Mapping[str, float]) -> Target:
         chosen = {name: signals[name] for name in weights if name in signals}
@@ -106,24 +105,23 @@ def measured(recording: Recording, path: Path, space: Space) -> Measured:
             name: weights[name] / whole / np.isfinite(values).sum() / np.nanvar(values)
             for name, values in chosen.items()
         }
-        return Target(
-            *(recording.time, chosen, each, frozenset(differenced)),
-            *(low, high, scale, step, current),
-        )
+        ends = low, high, scale
+        return Target(recording.time, chosen, each, frozenset(differenced), *ends, step, current)
 
+    number = number_of(path)
     return Measured(
-        *(
-            str(number) if (number := number_of(path)) is not None else path.stem,
-            recording,
-            frequency,
-        ),
-        *(target(SEARCH_STEP, WEIGHTS), target(FINE_STEP, WEIGHTS)),
-        *(target(FINE_STEP, SURFACE), target(FINE_STEP, TRANSPORT)),
+        path.stem if number is None else str(number),
+        recording,
+        frequency,
+        target=target(SEARCH_STEP, WEIGHTS),
+        fine=target(FINE_STEP, WEIGHTS),
+        surface=target(FINE_STEP, SURFACE),
+        transport=target(FINE_STEP, TRANSPORT),
     )
 
 
 def draws(target: Target, count: int, rng: np.random.Generator) -> Array:
-    """Random own numbers (count × OWN) within the bounds; the lift near the middle, where most
+    """Random own parameters (count × OWN) within the bounds; the lift near the middle, where most
     trials rest, and the frequency as it was measured."""
     low, high = target.low.copy(), target.high.copy()
     cycle, lift, rate = (OWN.index(name) for name in ("phase", "lift", "frequency"))

@@ -1,15 +1,16 @@
 """The files of an identification, and its words."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from cosim.files.atomic import write_json, write_text
 from cosim.studies.identify.problem.gauges import GAUGES
 from cosim.studies.identify.report import figures
-from cosim.studies.identify.report.measures import Row
-from cosim.studies.identify.report.scenes import rig_settings, toml, trial_settings
+from cosim.studies.identify.report.scenes import rounded, scene_file, trial_settings
 from cosim.studies.identify.report.solved import Solved
-from cosim.studies.tables import write_csv, write_page
+from cosim.studies.report import Report
+from cosim.studies.tables import Row
 
 COLUMNS = {
     "nrmse_v_surface": "velocity",
@@ -21,6 +22,17 @@ COLUMNS = {
     "v_average_measured_mm_per_s": "measured [mm/s]",
 }
 """Of the tables, by the names in ``identify.json``."""
+
+LINE = {
+    "trial": "trial",
+    "nrmse_v_surface": "velocity",
+    "nrmse_z_surface": "height",
+    "floor_late": "floor",
+    "part_error_mm": "part [mm]",
+    "v_average_mm_per_s": "v_average [mm/s]",
+    "v_average_measured_mm_per_s": "measured",
+}
+"""Of a trial's line in the summary, by the same."""
 
 WORST = "nrmse_v_surface_worst"
 WIDTH = 17
@@ -41,49 +53,55 @@ NOTES = (
 
 def write(folder: Path, found: Solved) -> None:
     """Everything that :meth:`Identification.save` names."""
-    numbers = found.numbers
+    numbers, rig = found.numbers, rounded(found.rig)
+    rows = [*numbers["trials"], *numbers["apart"]]
+    names = dict.fromkeys(name for row in rows for name in row)
+    Report(
+        *("identify", "The identified rig"),
+        [{name: row.get(name) for name in names} for row in rows],
+        [*NOTES, *_priors(found), *findings(numbers)],
+        tables(numbers),
+        {f"-{name}": partial(_draw, name, found) for name in figures.FIGURES},
+    ).save(folder)
     write_json(folder / "identify.json", numbers)
-    write_csv(folder / "identify.csv", _aligned([*numbers["trials"], *numbers["apart"]]))
-    notes = [*NOTES, *_priors(found), *findings(numbers)]
-    write_page(folder / "identify.md", "The identified rig", notes, tables(numbers))
-    for name, draw in figures.FIGURES.items():
-        draw(found).write(folder / f"identify-{name}.png")
     words = f"The rig identified from {len(found.trials)} trials"
-    write_text(folder / "rig.toml", toml(words, rig_settings(found.space, found.best.place)))
-    for trials, owns in ((found.trials, found.best.own), (found.apart, found.apart_own)):
-        for trial, own in zip(trials, owns, strict=True):
-            if trial.target.current is not None:
-                continue
-            rig = rig_settings(found.space, found.best.place)
-            settings, first = trial_settings(found.space, found.best.place, trial, own)
-            told = f"Trial {trial.label} on the identified rig; its record begins at {first:.4g} s"
-            if trial in found.apart:
-                told = f"Trial {trial.label} on the identified rig, which does not reproduce it"
-            label = f"{int(trial.label):02d}" if trial.label.isdecimal() else trial.label
-            write_text(folder / f"trial-{label}.toml", toml(told, rig | settings))
+    write_text(folder / "rig.toml", scene_file(words, rig))
+    fitted = zip(found.trials, found.best.own, strict=True)
+    for trial, own in (*fitted, *zip(found.apart, found.apart_own, strict=True)):
+        if trial.target.current is not None:
+            continue
+        settings, first = trial_settings(found.rig, trial, own)
+        told = f"Trial {trial.label} on the identified rig; its record begins at {first:.4g} s"
+        if trial in found.apart:
+            told = f"Trial {trial.label} on the identified rig, which does not reproduce it"
+        label = f"{int(trial.label):02d}" if trial.label.isdecimal() else trial.label
+        write_text(folder / f"trial-{label}.toml", scene_file(told, rig | settings))
+
+
+def _draw(name: str, found: Solved, path: Path) -> None:
+    figures.FIGURES[name](found).write(path)
 
 
 def _priors(found: Solved) -> list[str]:
+    """What took part in the cost beside the trials; a paragraph each."""
+    said, rig = [], found.best.numbers
     weighed = [
         f"{entry.key} {entry.prior:.4g} (σ {entry.sigma:.2g}{' of it' if entry.log else ''})"
-        for entry in found.space.free
+        for entry in found.best.space.free
         if entry.prior is not None and entry.sigma is not None
     ]
-    words = (
-        f"Weak priors, a thousandth of the cost for each σ², took part: {'; '.join(weighed)}. They "
-        "decide where the trials do not tell."
-    )
-    numbers = found.space.numbers(found.best.place)
+    if weighed:
+        said.append(
+            "Weak priors, a thousandth of the cost for each σ², took part: "
+            f"{'; '.join(weighed)}. They decide where the trials do not tell."
+        )
     other = [
         f"{name} {value * gauge.scale:.4g} ± {sd * gauge.scale:.2g} {gauge.unit}, on the rig "
-        f"{gauge.of(numbers) * gauge.scale:.4g}"
-        for name, (value, sd) in found.space.measured.items()
+        f"{gauge.of(rig) * gauge.scale:.4g}"
+        for name, (value, sd) in found.best.space.measured.items()
         for gauge in (GAUGES[name],)
     ]
-    return [
-        *([words] if weighed else []),
-        *([f"Measured besides: {'; '.join(other)}."] * bool(other)),
-    ]
+    return said + [f"Measured besides: {'; '.join(other)}."] * bool(other)
 
 
 def findings(numbers: dict[str, Any]) -> list[str]:
@@ -105,15 +123,17 @@ def findings(numbers: dict[str, Any]) -> list[str]:
             f"({'; '.join(shares)}), so the spread of their solutions is the search's own, and no "
             "range is told."
         )
-    rests = [
-        f"{one['law']} at q = {', '.join(f'{q:.3g}' for q in one['rests_mm'])} mm"
-        for one in laws
-        if len(one["rests_mm"]) > 1
-    ]
-    several = f"Without a current the ram rests at more than one place: {'; '.join(rests)}."
+    said, laws = [words], [one for one in laws if len(one["rests_mm"]) > 1]
+    if laws:
+        rests = (
+            f"{one['law']} at q = {', '.join(f'{q:.3g}' for q in one['rests_mm'])} mm"
+            for one in laws
+        )
+        said.append(f"Without a current the ram rests at more than one place: {'; '.join(rests)}.")
     ends = [f"{row['trial']} ({row['at_bounds']})" for row in numbers["trials"] if row["at_bounds"]]
-    bound = f"At a bound of the search lie numbers of the trials {'; '.join(ends)}."
-    return [words, *([several] if rests else []), *([bound] if ends else [])]
+    if ends:
+        said.append(f"At a bound of the search lie numbers of the trials {'; '.join(ends)}.")
+    return said
 
 
 def summary(found: Solved) -> str:
@@ -122,8 +142,7 @@ def summary(found: Solved) -> str:
     rig = numbers["rig"]
     lines = [f"{one.key:<32}{rig[one.key]:>10.4g}  {one.words}" for one in found.verdicts]
     lines += ["", *findings(numbers)]
-    heads = ("trial", "velocity", "height", "floor", "part [mm]", "v_average [mm/s]", "measured")
-    lines += ["", "".join(f"{head:>{WIDTH}}" for head in heads)]
+    lines += ["", "".join(f"{head:>{WIDTH}}" for head in LINE.values())]
     lines += [_line(row) for row in numbers["trials"]]
     lines += [f"{_line(row)}   (not fitted)" for row in numbers["apart"]]
     lines += [_line(numbers["overall"] | {"trial": "mean"})]
@@ -135,21 +154,12 @@ def summary(found: Solved) -> str:
 
 
 def _line(row: Row) -> str:
-    names = ("nrmse_v_surface", "nrmse_z_surface", "floor_late", "part_error_mm")
-    names += ("v_average_mm_per_s", "v_average_measured_mm_per_s")
-    cells = [row["trial"], *(_brief(row, name) for name in names)]
-    return "".join(f"{cell:>{WIDTH}}" for cell in cells)
+    return "".join(f"{_brief(row, name):>{WIDTH}}" for name in LINE)
 
 
 def _brief(row: Row, name: str) -> str:
     value = row.get(name)
-    return "–" if value is None else f"{value:.3f}"
-
-
-def _aligned(rows: list[Row]) -> list[Row]:
-    """The same columns in all rows."""
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    return [{name: row.get(name) for name in names} for row in rows]
+    return "–" if value is None else value if isinstance(value, str) else f"{value:.3f}"
 
 
 def _between(row: Row, unit: str) -> str:
@@ -160,10 +170,11 @@ def _between(row: Row, unit: str) -> str:
 def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
     """Of ``identify.json``: the tables of the page, by heading."""
     agreed = "" if numbers["converged"] else " (not converged: the search's own scatter)"
+    rig, whole = numbers["rig"], _whole(numbers["overall"]) | {"floor": "", "late": ""}
     tables: dict[str, list[Row]] = {
         "The rig": [
-            {"key": v["key"], "value": numbers["rig"][v["key"]], "verdict": v["words"]}
-            for v in numbers["verdicts"]
+            {"key": one["key"], "value": rig[one["key"]], "verdict": one["words"]}
+            for one in numbers["verdicts"]
         ],
         "Laws of the suspension": [
             {
@@ -177,34 +188,24 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
             for one in numbers["laws"]
         ],
         f"The suspension's force F(q) - F(0) on {len(numbers['ensemble'])} rigs{agreed}": [
-            {
-                "q [mm]": row["q_mm"],
-                "force [N]": _between(row, "N"),
-                "force/Bl [A]": _between(row, "A"),
-            }
+            {"q [mm]": row["q_mm"]}
+            | {"force [N]": _between(row, "N"), "force/Bl [A]": _between(row, "A")}
             for row in numbers["force"]
         ],
-        "The trials": [_told(row, floors=True) for row in numbers["trials"]],
+        "The trials": [*map(_told, numbers["trials"]), whole],
     }
     if numbers["apart"]:
-        tables["Trials that were not fitted"] = [
-            _told(row, floors=True) for row in numbers["apart"]
-        ]
+        tables["Trials that were not fitted"] = [*map(_told, numbers["apart"])]
     both = "surface and part, whose heights count twice"
     for kind, words in (("surface", "surface alone"), ("surface_and_part", both)):
-        rows = [one[kind] for one in numbers["held_out"]]
-        if rows:
-            tables[f"Held out: rig from the other folds, own numbers from the trial's {words}"] = [
-                *map(_told, rows), _whole(numbers["held_out_overall"][kind])
-            ]  # fmt: skip
+        if numbers["held_out"]:
+            heading = f"Held out: rig from the other folds, own numbers from the trial's {words}"
+            rows = [_told(one[kind]) for one in numbers["held_out"]]
+            tables[heading] = [*rows, _whole(numbers["held_out_overall"][kind])]
     made_up = numbers["made_up_rig"]
-    tables["The rig of the scenes' defaults with its best drives"] = [
-        *map(_told, made_up["trials"]),
-        _whole(made_up["overall"]),
-    ]
-    tables["The trials"].append(_whole(numbers["overall"]) | {"floor": "", "late": ""})
-    if numbers["exact_rungs_v_average_mm_per_s"]:
-        checks = numbers["exact_rungs_v_average_mm_per_s"]
+    heading = "The rig of the scenes' defaults with its best drives"
+    tables[heading] = [*map(_told, made_up["trials"]), _whole(made_up["overall"])]
+    if checks := numbers["exact_rungs_v_average_mm_per_s"]:
         names = ("trial", "steps", "limited", "amplifier")
         tables["v_average [mm/s] by the search's steps and on the bench's rungs"] = [
             {name: "-" if row.get(name) is None else row[name] for name in names} for row in checks
@@ -212,15 +213,15 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
     return tables
 
 
-def _told(row: Row, floors: bool = False) -> Row:
-    found: Row = {"trial": row["trial"]}
-    found |= {words: row[name] for name, words in COLUMNS.items() if name in row}
-    if floors:
-        found |= {"floor": row["floor"] or "-", "late": row["floor_late"] or "-"}
-    return found
+def _told(row: Row) -> Row:
+    """A trial's row; with its repeatability where that is in it."""
+    floors = {"floor": "floor", "late": "floor_late"}
+    return (
+        {"trial": row["trial"]}
+        | {words: row[name] for name, words in COLUMNS.items() if name in row}
+        | {words: row[name] or "-" for words, name in floors.items() if name in row}
+    )
 
 
 def _whole(overall: Row) -> Row:
-    return {"trial": "mean"} | {
-        words: overall[name] for name, words in COLUMNS.items() if name in overall
-    }
+    return _told({name: overall[name] for name in COLUMNS if name in overall} | {"trial": "mean"})

@@ -7,16 +7,15 @@ straight line through its height.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from cosim.arrays import Array, slope
 from cosim.stepper.stepper import OWN
 from cosim.studies.identify.chain.chain import simulate
-from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import Measured
 from cosim.studies.identify.search.search import Found
+from cosim.studies.tables import Row
 from cosim.trials.camera import velocities
 
 LATE = 5
@@ -25,20 +24,15 @@ LATE = 5
 BANDS = (0.0, 15.0, 30.0, 80.0, 150.0, 300.0, 480.0)
 """Ends of the frequency bands, Hz."""
 
-Row = dict[str, Any]
-
 
 def shown(trial: Measured, rig: Array, own: Array) -> dict[str, Array]:
     """The simulated signals as the trial's instruments show them, heights at the measured mean."""
-    out = {
-        name: values[0] for name, values in simulate(trial.fine, rig[None], own[None])[0].items()
-    }
-    found = {}
+    out, found = simulate(trial.fine, rig[None], own[None])[0], {}
     for name, measured in trial.fine.signals.items():
         if name in trial.fine.differenced:
-            found[name] = velocities(trial.fine.time, out[f"z{name[1:]}"])
+            found[name] = velocities(trial.fine.time, out[f"z{name[1:]}"][0])
         else:
-            found[name] = out[name]
+            found[name] = out[name][0]
         if name.startswith("z"):
             found[name] = found[name] + np.nanmean(measured - found[name])
     return found
@@ -57,18 +51,16 @@ def errors(trial: Measured, rig: Array, own: Array) -> Row:
         row["part_error_mm"] = float(np.abs(apart).mean())
         row["part_error_from_start_mm"] = float(np.abs(apart - apart[0]).mean())
         row["straight_line_error_mm"] = float(np.abs(line(time) - z * 1e3).mean())
-        row["v_average_mm_per_s"] = slope(time, simulated["z_part"][known]) * 1e3
-        row["v_average_measured_mm_per_s"] = slope(time, z) * 1e3
-        row["v_average_error_mm_per_s"] = abs(
-            row["v_average_mm_per_s"] - row["v_average_measured_mm_per_s"]
-        )
+        run, measured = (slope(time, heights) * 1e3 for heights in (simulated["z_part"][known], z))
+        row |= {"v_average_mm_per_s": run, "v_average_measured_mm_per_s": measured}
+        row["v_average_error_mm_per_s"] = abs(run - measured)
     return row
 
 
-def samples(trials: Sequence[Measured], space: Space, found: Found) -> float:
+def samples(trials: Sequence[Measured], found: Found) -> float:
     """The effective number of the surface's measured velocities, for the likelihood: those whose
     residuals do not follow from others a moment or whole periods ago, by their autocorrelation."""
-    rig, total = space.rigs(found.place[None])[0], 0.0
+    rig, total = found.rig, 0.0
     for trial, own in zip(trials, found.own, strict=True):
         left = trial.fine.signals["v_surface"] - shown(trial, rig, own)["v_surface"]
         left = np.where(np.isfinite(left), left - np.nanmean(left), 0.0)
@@ -84,8 +76,8 @@ def samples(trials: Sequence[Measured], space: Space, found: Found) -> float:
     return max(total, 1.0)
 
 
-def own_numbers(own: Array) -> Row:
-    """A trial's own numbers by name, SI."""
+def own_parameters(own: Array) -> Row:
+    """A trial's own parameters by name, SI."""
     return dict(zip(OWN, own.tolist(), strict=True))
 
 
@@ -100,15 +92,11 @@ def repeatability(trial: Measured) -> Row:
     count = int((time[known][-1] - time[known][0]) / period)
     within = np.arange(0.0, period, float(np.median(np.diff(time))))
     at = time[known][0] + np.add.outer(period * np.arange(count), within)
-    cycles = np.interp(at, time[known], v[known])
-    late = cycles[1:] if count >= LATE else cycles
-    return {name: _spread(some, v) for name, some in (("floor", cycles), ("floor_late", late))}
-
-
-def _spread(cycles: Array, v: Array) -> float | None:
-    if len(cycles) < 2:
-        return None
-    return float(np.sqrt(cycles.var(axis=0, ddof=1).mean()) / np.nanstd(v))
+    cycles, found = np.interp(at, time[known], v[known]), {}
+    for name, some in (("floor", cycles), ("floor_late", cycles[int(count >= LATE) :])):
+        spread = np.sqrt(some.var(axis=0, ddof=1).mean()) if len(some) > 1 else None
+        found[name] = None if spread is None else float(spread / np.nanstd(v))
+    return found
 
 
 def nrmse(simulated: Array, measured: Array) -> float:
@@ -132,9 +120,7 @@ def bands(trial: Measured, rig: Array, own: Array) -> list[Row]:
     rows = []
     for low, high in pairwise(BANDS):
         chosen = (f >= low) & (f < high)
-        rows.append(
-            {"trial": trial.label, "from_hz": low, "to_hz": high}
-            | {"measured": float(powers[0][chosen].sum() / whole)}
-            | {"residual": float(powers[1][chosen].sum() / whole)}
-        )
+        measured, left = (float(power[chosen].sum() / whole) for power in powers)
+        told = {"measured": measured, "residual": left}
+        rows.append({"trial": trial.label, "from_hz": low, "to_hz": high} | told)
     return rows

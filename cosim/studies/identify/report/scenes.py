@@ -8,48 +8,38 @@ import numpy as np
 from cosim.arrays import Array, slope
 from cosim.errors import BadInput, Note, SimulationFailed
 from cosim.scene import Scene, keys, load
+from cosim.scene.model import toml_value
 from cosim.simulation.simulate import simulate
-from cosim.stepper.stepper import OWN
-from cosim.studies.identify.problem.space import Space
-from cosim.studies.identify.problem.targets import DRIVE, Measured
+from cosim.studies.identify.problem.targets import Measured
+from cosim.studies.identify.report.measures import own_parameters
 from cosim.trials.camera import hermite
 
 Settings = dict[str, float | str]
 
-DIGITS = 6
+RIG_DIGITS, TRIAL_DIGITS = 6, 9
 """Of the numbers in a scene."""
 
 
-def rig_settings(space: Space, place: Array) -> Settings:
-    """The rig by the keys of a scene, rounded as its scene has it."""
-    return {key: _rounded(value) for key, value in space.settings(place).items()}
-
-
-def trial_settings(
-    space: Space, place: Array, trial: Measured, own: Array
-) -> tuple[Settings, float]:
-    """A trial by the keys of a scene, and when in its run (s) the record's first row is.
+def trial_settings(rig: Settings, trial: Measured, own: Array) -> tuple[Settings, float]:
+    """A trial on a rig (by the keys of a scene) by the keys of a scene, and when in its run (s) the
+    record's first row is.
 
     The run begins at rest, with the record or with the drive, whichever is earlier.
     """
-    rig, numbers = space.settings(place), dict(zip(OWN, own.tolist(), strict=True))
-    held = rig["friction.mu_plate"] * numbers["normal_force"]
-    first = max(0.0, -numbers["start"])
+    told = own_parameters(own)
+    held = float(rig["friction.mu_plate"]) * told["normal_force"]
+    first = max(0.0, -told["start"])
     found: Settings = {
-        "friction.normal_force": numbers["normal_force"],
-        "mechanics.initial_lift": numbers["lift"] * held / rig["mechanics.flexure_stiffness"],
+        "friction.normal_force": told["normal_force"],
+        "mechanics.initial_lift": told["lift"] * held / float(rig["mechanics.flexure_stiffness"]),
     }
     if trial.target.current is None:
-        begun = numbers["phase"] + numbers["frequency"] * numbers["start"]
-        found |= {
-            f"drive.{name}": numbers[name] for name in DRIVE if name in ("amplitude", "offset")
-        }
-        found |= {"drive.frequency": numbers["frequency"], "drive.start_phase": float(begun % 1.0)}
-        found |= {"drive.start_time": max(0.0, numbers["start"])}
+        found |= {f"drive.{name}": told[name] for name in ("amplitude", "offset", "frequency")}
+        begun = told["phase"] + told["frequency"] * told["start"]
+        found |= {"drive.start_phase": begun % 1.0, "drive.start_time": max(0.0, told["start"])}
     lasts = float(trial.recording.time[-1])
-    found |= {"run.duration": first + lasts, "run.settle": first}
-    found["run.average"] = "slope"
-    return {key: _rounded(value, 9) for key, value in found.items()}, first
+    found |= {"run.duration": first + lasts, "run.settle": first, "run.average": "slope"}
+    return rounded(found, TRIAL_DIGITS), first
 
 
 def scene(settings: Settings, circuit: str) -> Scene:
@@ -57,32 +47,28 @@ def scene(settings: Settings, circuit: str) -> Scene:
     return load("reference", settings | {"circuit.model": circuit})
 
 
-def toml(description: str, settings: Settings) -> str:
-    """A scene file that holds these keys, each with its unit and meaning."""
-    lines = [f'description = "{description}"']
-    table = ""
+def rounded(settings: Settings, digits: int = RIG_DIGITS) -> Settings:
+    """As the scene of a rig has them, or with other digits that of a trial."""
+    return {
+        key: value
+        if isinstance(value, str) or value == 0.0
+        else float(np.format_float_positional(value, digits, unique=False, fractional=False))
+        for key, value in settings.items()
+    }
+
+
+def scene_file(description: str, settings: Settings) -> str:
+    """A scene file that holds these keys, each with its unit."""
+    lines, table = [f'description = "{description}"'], ""
     for key in keys():
         if key.full not in settings:
             continue
         if key.table != table:
             table = key.table
             lines += ["", f"[{table}]"]
-        value = settings[key.full]
-        unit = "" if key.unit in ("1", "") else f" # {key.unit}"
-        lines.append(f"{key.name} = {_spelt(value)}{unit}")
+        value, unit = settings[key.full], "" if key.unit in ("1", "") else f" # {key.unit}"
+        lines.append(f"{key.name} = {toml_value(value)}{unit}")
     return "\n".join(lines) + "\n"
-
-
-def _rounded(value: float | str, digits: int = DIGITS) -> float | str:
-    if isinstance(value, str) or value == 0.0:
-        return value
-    return float(np.format_float_positional(value, digits, unique=False, fractional=False))
-
-
-def _spelt(value: float | str) -> str:
-    if isinstance(value, str):
-        return f'"{value}"'
-    return repr(float(value))
 
 
 CIRCUITS = ("limited", "amplifier")

@@ -15,7 +15,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.mechanics.stickslip import suspension_force
 from cosim.stepper.stepper import OWN
-from cosim.studies.identify.problem.space import OF_LAWS, Space
+from cosim.studies.identify.problem.space import OF_LAWS
 from cosim.studies.identify.search.plan import Searched
 from cosim.studies.identify.search.search import Found
 
@@ -32,8 +32,6 @@ SCATTER, FEWEST = 0.05, 4
 END = 0.01
 """Of a bound's range: nearer than this a value is at the bound."""
 
-Rig = tuple[Space, Found]
-
 
 @dataclass(frozen=True)
 class Verdict:
@@ -48,47 +46,43 @@ class Verdict:
     words: str
 
 
-def rigs_meant(found: Sequence[Searched], samples: float) -> list[Rig]:
+def rigs_meant(found: Sequence[Searched], samples: float) -> list[Found]:
     """The rigs that may be meant, the best first: of the laws whose searches agree, all that are as
     likely as the worse of the two; where none agree, of all laws, all within the searches' own
     scatter. ``samples`` is the effective number of what was measured."""
-    meant: list[Rig] = []
+    meant: list[Found] = []
     for one in [one for one in found if one.converged] or found:
         scatter = one.scatter if len(one.ends) > 1 else ALONE
-        near = one.within(scatter * float(np.exp(LIKELY / samples)))
-        meant += [(one.space, solution) for solution in [*one.ends, *near]]
-    return sorted(meant, key=lambda rig: rig[1].total)
+        meant += [*one.ends, *one.within(scatter * float(np.exp(LIKELY / samples)))]
+    return sorted(meant, key=lambda rig: rig.total)
 
 
-def judge(best: Rig, meant: Sequence[Rig], converged: bool) -> list[Verdict]:
+def judge(best: Found, meant: Sequence[Found], converged: bool) -> list[Verdict]:
     """A verdict for each free key of the rig that is reported."""
-    (space, solution), found = best, []
-    values = {key: _column(key, meant) for key in space.names if key not in OF_LAWS}
+    space, found = best.space, []
+    every = [dict(zip(one.space.names, one.space.values(one.point), strict=True)) for one in meant]
+    values = {k: np.array([rig[k] for rig in every]) for k in space.names if k not in OF_LAWS}
     partners = {key: np.log(x) for key, x in values.items() if (x > 0.0).all()}
     for name in ("amplitude", "normal_force"):
-        numbers = np.array([one.own[:, OWN.index(name)] for _, one in meant])
-        if (numbers > 0.0).all():
-            partners[f"the trials' {name.replace('_', ' ')}s"] = np.log(numbers).mean(axis=1)
-    for k, key in enumerate(space.names):
-        value, ends = float(space.values(solution.place)[k]), (None, None)
+        own = np.array([one.own[:, OWN.index(name)] for one in meant])
+        if (own > 0.0).all():
+            partners[f"the trials' {name.replace('_', ' ')}s"] = np.log(own).mean(axis=1)
+    reported = space.values(best.point)
+    for k, (key, value) in enumerate(zip(space.names, reported.tolist(), strict=True)):
+        ends = None, None
         if key in OF_LAWS:
             kind, words = "law", f"of the law {space.law} alone; what holds is the force below"
         elif not converged:
             kind, words = "not converged", "not converged"
         else:
-            every = np.append(values[key], value)
-            ends = float(every.min()), float(every.max())
-            at = np.repeat(space.values(solution.place)[None], 2, axis=0)
+            ends = min(value, float(values[key].min())), max(value, float(values[key].max()))
+            at = np.repeat(reported[None], 2, axis=0)
             at[:, k] = ends
-            low, high = space.place(at)[:, k].tolist()
+            low, high = space.point(at)[:, k].tolist()
             edges = low < END, high > 1.0 - END
             kind, words = _told(value, *ends, *edges, _tie(key, partners))
         found.append(Verdict(key, value, *ends, kind, words))
     return found
-
-
-def _column(key: str, rigs: Sequence[Rig]) -> Array:
-    return np.array([space.values(one.place)[space.names.index(key)] for space, one in rigs])
 
 
 def _told(
@@ -125,17 +119,16 @@ def _tie(key: str, partners: Mapping[str, Array]) -> str:
     return words if spread < TIED * float(np.std(alone)) else ""
 
 
-def forces(rig: Rig, places: Array) -> tuple[Array, Array]:
+def forces(rig: Found, places: Array) -> tuple[Array, Array]:
     """The suspension's force at ``places`` (q, m) less that at the centre, N; over Bl, A."""
-    space, solution = rig
-    numbers = space.numbers(solution.place)
+    numbers = rig.numbers
     found = suspension_force(numbers, np.append(places, 0.0))
     apart = found[:-1] - found[-1]
     return apart, apart / numbers["force_factor"]
 
 
 def at_bounds(low: Array, high: Array, scale: Array, own: Array) -> list[str]:
-    """The names of a trial's own numbers that lie at a bound."""
+    """The names of a trial's own parameters that lie at a bound."""
     near = END * scale
     there = (scale > 0.0) & ((own <= low + near) | (own >= high - near))
     return [name for name, one in zip(OWN, there, strict=True) if one]

@@ -6,7 +6,7 @@ and fewer for longer and longer. Each law of the suspension is searched twice, f
 numbers: only where both come to the same cost does a range mean the trials and not the search.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 from zlib import crc32
@@ -14,9 +14,7 @@ from zlib import crc32
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.studies.identify.problem.space import Space
-from cosim.studies.identify.search.finish import finish
-from cosim.studies.identify.search.search import Found, Progress, Search
+from cosim.studies.identify.search.search import Found, Progress, Search, best_of, finish
 
 FOLDS = 3
 
@@ -50,11 +48,13 @@ SCALE, WALLS = 0.25, 1.5
 """Standard deviations of the logarithms by which starts are moved."""
 
 SCREENED, KEPT, SCREEN_ROUNDS = 128, 8, 4
-"""Own numbers that are drawn for a new rig, those that are refined, and the rounds for them."""
+"""Own parameters that are drawn for a new rig, those that are refined, and the rounds for them."""
 AGAIN = 256, 16, 4
 """The same before a solution is searched further."""
 CAREFUL = 512, 24, 5
-"""The same where a trial's own numbers must be the best there are."""
+"""The same where a trial's own parameters must be the best there are."""
+LAST = 40
+"""Generations at the finish's step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,23 +78,28 @@ class Plan:
         numbers of its own, so it comes out the same whichever of those before it were done."""
         name = f"{self.name}: {name}"
         rng = np.random.default_rng([self.seed, crc32(name.encode())])
-        found = self.once(name, lambda: [_plain(one) for one in work(rng)])
-        return [_found(one) for one in found]
+
+        def plain() -> list[Any]:
+            arrays = [((one.point, one.own, one.costs), one.total) for one in work(rng)]
+            return [[[array.tolist() for array in each], total] for each, total in arrays]
+
+        found = []
+        for arrays, total in self.once(name, plain):
+            point, own, costs = (np.array(array, np.float64) for array in arrays)
+            found.append(Found(self.coarse.space, point, own, costs, total))
+        return found
 
     def singles(self) -> list[Found]:
         """Rigs that fit one trial each, ``effort.singles`` of each."""
-        found = []
-        for k in range(len(self.coarse.targets)):
-            for n in range(self.effort.singles):
-                found += self._stage(
-                    f"single {k + 1}-{n + 1}", lambda rng, k=k: [self._single(k, rng)]
-                )
-        return found
+        return [
+            self._stage(f"single {k + 1}-{n + 1}", lambda rng, k=k: [self._single(k, rng)])[0]
+            for k in range(len(self.coarse.targets))
+            for n in range(self.effort.singles)
+        ]
 
     def _single(self, k: int, rng: np.random.Generator) -> Found:
         alone = self.coarse.part([k])
-        places = rng.random((24, len(self.coarse.space.free)))
-        start = min(alone.screen(places, rng, 64, 4, 2), key=lambda one: one.total)
+        start = best_of(alone.screen(rng.random((24, len(alone.space.free))), rng, 64, 4, 2))
         told = self._telling(f"trial {k + 1} alone")
         return alone.nested(start, rng, self.effort.single_generations, 0.15, told, 12)
 
@@ -104,15 +109,14 @@ class Plan:
         """Solutions for the trials ``rows``, from the rigs of these trials alone on, the best
         first; each has ended its search, most of them early."""
         search, each = self.coarse.part(rows), self.effort.singles
-        places = np.array([one.place for i, one in enumerate(self.singles()) if i // each in rows])
+        points = np.array([one.point for i, one in enumerate(self.singles()) if i // each in rows])
 
         def starts(rng: np.random.Generator) -> list[Found]:
-            scale, walls = (np.exp(s * rng.standard_normal(len(places))) for s in (SCALE, WALLS))
-            every = np.concatenate([places, search.space.scaled(places, scale, walls)])
+            scale, walls = (np.exp(s * rng.standard_normal(len(points))) for s in (SCALE, WALLS))
+            every = np.concatenate([points, search.space.scaled(points, scale, walls)])
             return search.screen(every, rng, SCREENED, KEPT, SCREEN_ROUNDS)
 
-        several = self._stage(f"{name}: starts", starts)
-        ended: list[Found] = []
+        several, ended = self._stage(f"{name}: starts", starts), []
         for number, (count, generations, sigma) in enumerate(rounds, 1):
             several = sorted(several, key=lambda one: one.total)
             several, left = several[:count], several[count:]
@@ -133,11 +137,9 @@ class Plan:
         generations: int,
         sigma: float,
     ) -> list[Found]:
-        told = self._telling(title)
-
         def work(rng: np.random.Generator) -> list[Found]:
             begun = search.rescreened(search.borrowed(start, others), rng, *AGAIN)
-            return [search.nested(begun, rng, generations, sigma, told)]
+            return [search.nested(begun, rng, generations, sigma, self._telling(title))]
 
         return self._stage(title, work)
 
@@ -146,15 +148,15 @@ class Plan:
         fine = self.fine.part(rows)
 
         def work(rng: np.random.Generator) -> list[Found]:
-            start = fine.rescreened(fine.refined(found.place, found.own, 4), rng, *CAREFUL)
-            nested = fine.nested(start, rng, 40, 0.01, self._telling(f"{name}: finish"))
-            return [finish(fine, min(start, nested, key=lambda one: one.total), 12)]
+            start = fine.rescreened(fine.refined(found.point, found.own, 4), rng, *CAREFUL)
+            nested = fine.nested(start, rng, LAST, 0.01, self._telling(f"{name}: finish"))
+            return [finish(fine, best_of([start, nested]), 12)]
 
         return self._stage(f"{name}: finish", work)[0]
 
-    def drives(self, name: str, place: Array, targets: Search) -> Found:
-        """The best own numbers of trials on a rig, of many starts."""
-        return self._stage(name, lambda rng: targets.screen(place[None], rng, *CAREFUL))[0]
+    def drives(self, name: str, point: Array, targets: Search) -> Found:
+        """The best own parameters of trials on a rig, of many starts."""
+        return self._stage(name, lambda rng: targets.screen(point[None], rng, *CAREFUL))[0]
 
     def _telling(self, title: str) -> Progress:
         return lambda what, best: self.progress(f"{self.name}: {title}, {what}", best)
@@ -164,7 +166,6 @@ class Plan:
 class Searched:
     """What the searches with one law of the suspension have found."""
 
-    space: Space
     ends: list[Found]
     """The best of each search, finished."""
     candidates: list[Found]
@@ -173,7 +174,7 @@ class Searched:
     @property
     def best(self) -> Found:
         """The best of the ends."""
-        return min(self.ends, key=lambda one: one.total)
+        return best_of(self.ends)
 
     @property
     def scatter(self) -> float:
@@ -197,19 +198,9 @@ def searched(plans: Sequence[Plan]) -> Searched:
     both = zip(plans, every, strict=True)
     ends = [plan.finished("all trials", rows, found[0]) for plan, found in both]
     order = sorted([one for found in every for one in found], key=lambda one: one.total)
-    return Searched(plans[0].coarse.space, ends, order)
+    return Searched(ends, order)
 
 
 def folds(count: int) -> list[list[int]]:
     """The trials' numbers (from 0) of each fold: every third."""
     return [[*range(k, count, FOLDS)] for k in range(min(FOLDS, count))]
-
-
-def _plain(found: Found) -> dict[str, Any]:
-    arrays = {name: getattr(found, name).tolist() for name in ("place", "own", "costs")}
-    return arrays | {"total": found.total}
-
-
-def _found(plain: Mapping[str, Any]) -> Found:
-    place, own, costs = (np.array(plain[name], np.float64) for name in ("place", "own", "costs"))
-    return Found(place, own, costs, plain["total"])

@@ -1,10 +1,11 @@
 """The search for one rig that explains several trials.
 
-CMA-ES goes over the rig. Each of its candidates gets the trials' own numbers that the nearest good
-candidate of the last generation had, moved along as the rig differs (`sensitivity`), and one round
-of Gauss–Newton on each trial: so the search over the rig sees a cost from which the own numbers are
-nearly eliminated. Since a trial's cost has many minima over its own numbers, they are drawn anew
-from time to time (`screen`).
+CMA-ES goes over the rig. Each of its candidates gets the trial-specific parameters (``own``) that
+the nearest good candidate of the last generation had, moved along as the rig differs
+(`sensitivity`), and one round of Gauss–Newton on each trial: so the search over the rig sees a cost
+from which these nuisance parameters are nearly eliminated. Since a trial's cost has many minima
+over them, they are drawn anew from time to time (`screen`). Least squares over all of them together
+ends it (`finish`).
 """
 
 from collections.abc import Callable, Sequence
@@ -14,6 +15,8 @@ from typing import Any
 
 import numpy as np
 from cmaes import CMA
+from scipy.linalg import block_diag
+from scipy.optimize import least_squares
 
 from cosim.arrays import Array
 from cosim.stepper.stepper import OWN, RIG
@@ -21,47 +24,82 @@ from cosim.studies.identify.chain.chain import Target, look_around, refine, simu
 from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import draws
 
-TURN = 2e-3
+STEP = 2e-3
 """Of a bound's range, for derivatives: below it impacts make the cost rough."""
 SOFT = 0.03
 """Damping of the sensitivities, relative to the diagonal of the normal matrix."""
 POPULATION = 16
 REFRESH, RESCREEN = 4, 30
-"""Generations after which sensitivities are found anew, and own numbers drawn anew."""
-FORCE = RIG.index("force_factor")
+"""Generations after which sensitivities are found anew, and own parameters drawn anew."""
 STARTS = 15
 """Moments of the drive's start that are tried."""
 BETTER = 0.97
-"""Of a trial's cost, which other own numbers must reach to take the place of the present ones."""
+"""Own parameters are replaced only if the trial's cost falls by 3 %."""
 SAMPLES = 46.0
 """Effective ones of a trial: 412 of the nine published ones."""
 NARROW = 1e-3
 """Step of CMA-ES, of the bounds' ranges, at which it ends."""
+ENDS_AT = 1e-5
+"""Relative gain of a step of least squares below which it ends."""
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A rig and the trials' numbers on it: ``place`` (free), ``own`` (trials × OWN), ``costs`` (one
-    for each trial) and ``total``, their mean and what the priors add."""
+    """A rig, a ``point`` of its ``space``, and the trials on it: their parameters ``own`` (trials ×
+    OWN), their ``costs`` and ``total``, the mean of these and what the priors add."""
 
-    place: Array
+    space: Space
+    point: Array
     own: Array
     costs: Array
     total: float
+
+    @property
+    def rig(self) -> Array:
+        """The stepper's numbers of the rig (RIG)."""
+        return self.space.rigs(self.point[None])[0]
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The same by name."""
+        return dict(zip(RIG, self.rig.tolist(), strict=True))
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The rig by the keys of a scene, SI."""
+        return self.space.settings(self.point)
 
 
 Progress = Callable[[str, float], None]
 """What is being done, and the best cost so far."""
 
 
+def best_of(several: Sequence[Found]) -> Found:
+    """The one whose cost is lowest, the first of equal ones."""
+    return min(several, key=lambda one: one.total)
+
+
 def _started(targets: Sequence[Target], own: Array) -> Array:
-    """Own numbers (n × m × OWN), each as it is and with the drive switched on at other times."""
+    """Own parameters (n × m × OWN), each as it is and with the drive switched on at other times."""
     k = OWN.index("start")
     found = np.repeat(own[:, :, None], 1 + STARTS, axis=2)
     for rows, target in zip(found, targets, strict=True):
         if target.scale[k] > 0.0:
             rows[:, 1:, k] = target.low[k] + (np.arange(STARTS) + 0.5) / STARTS * target.scale[k]
     return found.reshape(len(own), -1, len(OWN))
+
+
+def _best(own: Array, cost: Array, kept: int) -> tuple[Array, Array]:
+    """The best of several own parameters (n × m × OWN) with costs (n × m)."""
+    order = np.argsort(cost, axis=1)[:, :kept]
+    best = np.take_along_axis(own, order[:, :, None], axis=1)
+    return best, np.take_along_axis(cost, order, 1)
+
+
+def _perturbed(point: Array, step: float) -> tuple[Array, Array]:
+    """A point and its neighbours, each a step away in one coordinate (rows); the steps."""
+    steps = np.where(point + step <= 1.0, step, -step)
+    return np.concatenate([point[None], point + np.diag(steps)]), steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,53 +110,53 @@ class Search:
     targets: Sequence[Target]
     workers: int
 
-    def made(self, place: Array, own: Array, found: Array) -> Found:
+    def part(self, rows: Sequence[int]) -> "Search":
+        """The same with some of the trials."""
+        return replace(self, targets=[self.targets[k] for k in rows])
+
+    def bounds(self, name: str) -> Array:
+        """``low``, ``high`` or ``scale`` of all targets (trials × OWN)."""
+        return np.array([getattr(target, name) for target in self.targets])
+
+    def made(self, point: Array, own: Array, costs: Array) -> Found:
         """A solution whose costs are known."""
-        total = float(self.totals(found[None], place[None])[0])
-        return Found(place.copy(), own.copy(), found.copy(), total)
+        total = float(self.totals(costs[None], point[None])[0])
+        return Found(self.space, point.copy(), own.copy(), costs.copy(), total)
 
-    def totals(self, costs: Array, places: Array) -> Array:
-        """Of rigs at places (n × free) whose trials have ``costs`` (n × trials). -2 ln L is the
+    def totals(self, costs: Array, points: Array) -> Array:
+        """Of rigs at points (n × free) whose trials have ``costs`` (n × trials). -2 ln L is the
         effective samples times ln cost, to which a measurement beside the trials adds the square of
-        its miss in standard deviations; so it weighs as much as the trials let it."""
-        off = (self.space.misses(places) ** 2).sum(axis=1) / (SAMPLES * costs.shape[1])
-        return costs.mean(axis=1) * (1.0 + off) + self.space.prior(places)
+        its residual in standard deviations; so it weighs as much as the trials let it."""
+        off = (self.space.residuals(points) ** 2).sum(axis=1) / (SAMPLES * costs.shape[1])
+        return costs.mean(axis=1) * (1.0 + off) + self.space.prior(points)
 
-    def refined(self, place: Array, own: Array, rounds: int) -> Found:
-        """The trials' numbers fitted on a given rig from ``own`` on."""
-        rigs = np.repeat(self.space.rigs(place[None]), len(self.targets), axis=0)
-        return self.made(place, *refine(self.targets, rigs, own, rounds, self.workers))
+    def refined(self, point: Array, own: Array, rounds: int) -> Found:
+        """The trials' parameters fitted on a given rig from ``own`` on."""
+        rigs = np.repeat(self.space.rigs(point[None]), len(self.targets), axis=0)
+        return self.made(point, *refine(self.targets, rigs, own, rounds, self.workers))
 
     def screen(
-        self, places: Array, rng: np.random.Generator, count: int, kept: int, rounds: int
+        self, points: Array, rng: np.random.Generator, count: int, kept: int, rounds: int
     ) -> list[Found]:
-        """For each rig the best of ``count`` random own numbers, ``kept`` of which are refined."""
+        """For each rig the best of ``count`` random own parameters, ``kept`` of which are
+        refined."""
         trials = len(self.targets)
-        rigs = np.repeat(self.space.rigs(places), trials, axis=0)
-        each = [*self.targets] * len(places)
+        rigs = np.repeat(self.space.rigs(points), trials, axis=0)
+        each = [*self.targets] * len(points)
         drawn = np.stack([draws(target, count, rng) for target in each])
-        own, cost = self._best(*look_around(each, rigs, drawn, self.workers), kept)
+        own, cost = _best(*look_around(each, rigs, drawn, self.workers), kept)
         own, cost = self._refined_each(each, rigs, own, 1)
         # The cost is rugged over the moment of the start: all of them are tried.
-        own, cost = self._best(*look_around(each, rigs, _started(each, own), self.workers), kept)
-        own, cost = self._refined_each(each, rigs, own, rounds)
-        own, cost = self._best(own, cost, 1)
-        shape = (len(places), trials)
-        solutions = zip(places, own.reshape(*shape, len(OWN)), cost.reshape(shape), strict=True)
+        own, cost = _best(*look_around(each, rigs, _started(each, own), self.workers), kept)
+        own, cost = _best(*self._refined_each(each, rigs, own, rounds), 1)
+        shape = (len(points), trials)
+        solutions = zip(points, own.reshape(*shape, len(OWN)), cost.reshape(shape), strict=True)
         return [self.made(*one) for one in solutions]
-
-    @staticmethod
-    def _best(own: Array, cost: Array, kept: int) -> tuple[Array, Array]:
-        """The best of several own numbers (n × m × OWN) with costs (n × m)."""
-        order = np.argsort(cost, axis=1)[:, :kept]
-        return np.take_along_axis(own, order[:, :, None], axis=1), np.take_along_axis(
-            cost, order, 1
-        )
 
     def _refined_each(
         self, targets: Sequence[Target], rigs: Array, own: Array, rounds: int
     ) -> tuple[Array, Array]:
-        """Several own numbers (n × m × OWN) of each target and rig, fitted, and their costs."""
+        """Several own parameters (n × m × OWN) of each target and rig, fitted, and their costs."""
         n, m, _ = own.shape
         each = [target for target in targets for _ in range(m)]
         wide = np.repeat(rigs, m, axis=0)
@@ -133,50 +171,46 @@ class Search:
         kept: int = 8,
         rounds: int = 3,
     ) -> Found:
-        """With other own numbers where random ones led to clearly less."""
-        (other,) = self.screen(found.place[None], rng, count, kept, rounds)
-        same = self.refined(found.place, found.own, rounds)
+        """With other own parameters where random ones led to clearly less."""
+        (other,) = self.screen(found.point[None], rng, count, kept, rounds)
+        same = self.refined(found.point, found.own, rounds)
         take = other.costs < BETTER * same.costs
         own = np.where(take[:, None], other.own, same.own)
-        return self.made(found.place, own, np.where(take, other.costs, same.costs))
+        return self.made(found.point, own, np.where(take, other.costs, same.costs))
 
     def borrowed(self, found: Found, others: Sequence[Found]) -> Found:
-        """With the own numbers of other rigs' trials where they fit this one better, the drives
+        """With the own parameters of other rigs' trials where they fit this one better, the drives
         scaled to the same force."""
-        force = self.space.rigs(np.array([one.place for one in [found, *others]]))[:, FORCE]
+        every = [found, *others]
+        rigs = self.space.rigs(np.array([one.point for one in every]))
+        force = rigs[:, RIG.index("force_factor")]
+        tried = np.array([one.own for one in every])
         drives = [OWN.index(name) for name in ("amplitude", "offset")]
-        tried = np.array([found.own, *(one.own for one in others)])
         tried[:, :, drives] *= (force / force[0])[:, None, None]
-        low, high = ([getattr(t, end) for t in self.targets] for end in ("low", "high"))
-        rigs = np.repeat(self.space.rigs(found.place[None]), len(self.targets), axis=0)
-        own, cost = self._refined_each(
-            self.targets, rigs, np.clip(tried, low, high).transpose(1, 0, 2), 3
-        )
-        own, cost = self._best(own, cost, 1)
-        return self.made(found.place, own[:, 0], cost[:, 0])
+        tried = np.clip(tried, self.bounds("low"), self.bounds("high")).transpose(1, 0, 2)
+        here = np.repeat(rigs[:1], len(self.targets), axis=0)
+        own, cost = _best(*self._refined_each(self.targets, here, tried, 3), 1)
+        return self.made(found.point, own[:, 0], cost[:, 0])
 
-    def slopes(self, place: Array, own: Array, k: int, turn: float = TURN) -> tuple[Array, Array]:
-        """Residuals of trial ``k``, and their slopes by the rig's place and the fitted own numbers
+    def slopes(self, point: Array, own: Array, k: int) -> Array:
+        """Of the residuals of trial ``k``, by the rig's coordinates and the fitted own parameters
         in units of their scales (rows)."""
         target = self.targets[k]
         free = np.flatnonzero(target.scale > 0.0)
-        turns = np.where(place + turn <= 1.0, turn, -turn)
-        rigs = self.space.rigs(np.concatenate([place[None], place + np.diag(turns)]))
+        points, steps = _perturbed(point, STEP)
+        rigs = self.space.rigs(points)
         rigs = np.concatenate([rigs, np.repeat(rigs[:1], len(free), axis=0)])
-        own_turns = np.where(own[k] + turn * target.scale <= target.high, turn, -turn)[free]
-        numbers = np.repeat(own[k][None], len(rigs), axis=0)
-        rows = 1 + len(place) + np.arange(len(free))
-        numbers[rows, free] += own_turns * target.scale[free]
-        residuals = simulate(target, rigs, numbers)[1]
-        steps = np.concatenate([turns, own_turns])[:, None]
-        return residuals[0], (residuals[1:] - residuals[0]) / steps
+        own_steps = np.where(own[k] + STEP * target.scale <= target.high, STEP, -STEP)[free]
+        several = np.repeat(own[k][None], len(rigs), axis=0)
+        several[len(points) + np.arange(len(free)), free] += own_steps * target.scale[free]
+        residuals = simulate(target, rigs, several)[1]
+        return (residuals[1:] - residuals[0]) / np.concatenate([steps, own_steps])[:, None]
 
-    def sensitivity(self, place: Array, own: Array) -> Array:
-        """How the own numbers follow the rig's place: trials × OWN × free."""
+    def sensitivity(self, point: Array, own: Array) -> Array:
+        """How the own parameters follow the rig's point: trials × OWN × free."""
 
         def one(k: int) -> Array:
-            _, slopes = self.slopes(place, own, k)
-            d = len(place)
+            slopes, d = self.slopes(point, own, k), len(point)
             normal = np.einsum("ij,kj->ik", slopes, slopes)  # on any number of threads the same
             inner = normal[d:, d:] + SOFT * np.diag(np.diag(normal)[d:] + 1e-9)
             found = np.zeros((len(OWN), d))
@@ -208,48 +242,91 @@ class Search:
         """CMA-ES over the rig from ``start`` on."""
         space, trials = self.space, len(self.targets)
         search = CMA(
-            mean=np.clip(start.place, 1e-3, 1 - 1e-3),
+            mean=np.clip(start.point, 1e-3, 1 - 1e-3),
             sigma=sigma,
-            bounds=np.tile([0.0, 1.0], (len(start.place), 1)),
+            bounds=np.tile([0.0, 1.0], (len(start.point), 1)),
             population_size=population,
             seed=int(rng.integers(2**31)),
         )
-        low, high = (np.array([getattr(t, end) for t in self.targets]) for end in ("low", "high"))
-        best = here = self.refined(start.place, start.own, 2)
-        follow = self.sensitivity(here.place, here.own)
-        parents, theirs = here.place[None], here.own[None]
+        low, high = self.bounds("low"), self.bounds("high")
+        best = here = self.refined(start.point, start.own, 2)
+        follow = self.sensitivity(here.point, here.own)
+        parents, theirs = here.point[None], here.own[None]
         for generation in range(1, generations + 1):
             asked = [search.ask() for _ in range(population)]
-            places = np.array(asked)
+            points = np.array(asked)
+            # Each begins with the nearest parent's own parameters, moved by the sensitivities.
             spread = parents.std(axis=0) + 1e-6
-            apart = ((places[:, None] - parents) / spread) ** 2
+            apart = ((points[:, None] - parents) / spread) ** 2
             nearest = apart.sum(axis=2).argmin(axis=1)
-            moved = theirs[nearest] + np.einsum("tkd,nd->ntk", follow, places - parents[nearest])
-            own, found = refine(
+            moved = theirs[nearest] + np.einsum("tkd,nd->ntk", follow, points - parents[nearest])
+            own, costs = refine(
                 [*self.targets] * population,
-                np.repeat(space.rigs(places), trials, axis=0),
+                np.repeat(space.rigs(points), trials, axis=0),
                 np.clip(moved, low, high).reshape(-1, len(OWN)),
                 *(1, self.workers),
             )
-            found = found.reshape(population, trials)
-            totals = self.totals(found, places)
+            own, costs = own.reshape(population, trials, -1), costs.reshape(population, trials)
+            totals = self.totals(costs, points)
             search.tell([*zip(asked, totals.tolist(), strict=True)])
             k = int(totals.argmin())
-            own = own.reshape(population, trials, -1)
-            here = self.made(places[k], own[k], found[k])
+            here = self.made(points[k], own[k], costs[k])
             good = np.argsort(totals)[: population // 2]
-            parents, theirs = places[good], own[good]
+            parents, theirs = points[good], own[good]
             if generation % RESCREEN == 0:
                 here = self.rescreened(here, rng)
-                parents, theirs = here.place[None], here.own[None]
-            best = min(best, here, key=lambda one: one.total)
+                parents, theirs = here.point[None], here.own[None]
+            best = best_of([best, here])
             if generation % REFRESH == 0:
-                follow = self.sensitivity(here.place, here.own)
+                follow = self.sensitivity(here.point, here.own)
             progress(f"generation {generation}", best.total)
             if search._sigma < NARROW:
                 break
         return best
 
-    def part(self, rows: Sequence[int]) -> "Search":
-        """The same with some of the trials."""
-        return replace(self, targets=[self.targets[k] for k in rows])
+
+def finish(search: Search, found: Found, steps: int) -> Found:
+    """The solution after at most ``steps`` steps of least squares, if it is better; priors, too,
+    are in that. What was measured beside the trials is among the residuals, with the weight of
+    ``Search.totals``.
+
+    The unknowns are the point and the fitted own parameters in units of their scales.
+    """
+    space, targets, d = search.space, search.targets, len(found.point)
+    low, high, scale = (search.bounds(name) for name in ("low", "high", "scale"))
+    free = scale > 0.0
+    weight = np.sqrt(found.costs.mean() / SAMPLES)
+
+    def apart(x: Array) -> tuple[Array, Array]:
+        own = found.own.copy()
+        own[free] = x[d:] * scale[free]
+        return x[:d], own
+
+    def residuals(x: Array) -> Array:
+        point, own = apart(x)
+        rig = space.rigs(point[None])
+        rows = search.each(lambda k: simulate(targets[k], rig, own[k][None])[1][0])
+        return np.concatenate([*rows, weight * space.residuals(point[None])[0]])
+
+    def slopes(x: Array) -> Array:
+        point, own = apart(x)
+        each = search.each(lambda k: search.slopes(point, own, k))
+        points, turns = _perturbed(point, STEP)
+        beside = space.residuals(points)
+        beside = weight * (beside[1:] - beside[0]) / turns[:, None]
+        # Own parameters move their trial's residuals alone.
+        alone: Array = np.asarray(block_diag(*(one[d:] for one in each)))
+        shared = np.hstack([one[:d] for one in each])
+        return np.block([[shared, beside], [alone, np.zeros((len(alone), beside.shape[1]))]]).T
+
+    start = np.concatenate([found.point, found.own[free] / scale[free]])
+    ends = [
+        np.concatenate([np.full(d, end), bound[free] / scale[free]])
+        for end, bound in ((0.0, low), (1.0, high))
+    ]
+    inside = np.clip(start, ends[0] + 1e-9, ends[1] - 1e-9)
+    jacobian: Any = slopes  # a callable, which scipy's annotations do not know
+    fitted = least_squares(
+        residuals, inside, jacobian, (ends[0], ends[1]), ftol=ENDS_AT, xtol=1e-8, max_nfev=steps
+    )
+    return best_of([found, search.refined(*apart(fitted.x), 2)])

@@ -1,0 +1,74 @@
+"""The command that makes a scene to begin with."""
+
+from pathlib import Path
+
+from cosim.cli.command import Command
+from cosim.studies.study import Option
+
+_KINDS = ("machine", "circuit", "fmu")
+_SCHEMA = "scene.schema.json"
+
+
+def _new(file: Path, kind: str = "machine", base: str = "paper-limited") -> None:
+    import json
+
+    from cosim.errors import BadInput, plain
+    from cosim.files.atomic import write_text
+    from cosim.files.resources import circuits
+    from cosim.scene.loading import list_scenes, load
+    from cosim.scene.messages import suggestion
+    from cosim.scene.model import to_toml
+    from cosim.scene.schema import schema
+
+    name = plain(str(file))
+    if file.suffix != ".toml" or not file.stem.replace("-", "").replace("_", "").isalnum():
+        raise BadInput(f"{name}: must end in .toml, its name have letters, digits, - and _ alone.")
+    if base not in (known := [scene for scene, *_ in list_scenes()]):
+        raise BadInput(f"--base {plain(base)}: must be a built-in scene{suggestion(base, known)}.")
+    texts = {}
+    if kind == "fmu":
+        texts[file] = (circuits() / "new" / "fmu.toml").read_text(encoding="utf-8")
+    else:
+        texts[file] = to_toml(load(base), base)
+    if kind == "circuit":
+        own = f'[circuit]\nmodel = "file"\nnetlist = "{file.stem}.cir"  # beside this file\n'
+        texts[file] = texts[file].replace("[circuit]\n", own)
+    if kind != "machine":
+        text = (circuits() / "new" / f"{kind}.cir").read_text(encoding="utf-8")
+        texts[file.with_suffix(".cir")] = text
+    fmu = file.with_suffix(".fmu")
+    for path in (*texts, fmu) if kind == "fmu" else texts:
+        if path.exists():
+            raise BadInput(f"{plain(str(path))}: is there already; choose another name.")
+    if not file.parent.is_dir():
+        raise BadInput(f"{plain(str(file.parent))}: there is no such folder.")
+    if kind == "fmu":
+        from cosim.mechanics import package
+
+        package.write(fmu, 3)
+    for path, text in texts.items():
+        write_text(path, text.replace("NAME.", f"{file.stem}."))
+    write_text(file.with_name(_SCHEMA), json.dumps(schema(), indent=1) + "\n")
+    beside = [path.name for path in (*texts, fmu, file.with_name(_SCHEMA)) if path.exists()][1:]
+    print(f"Written: {file}, beside it {', '.join(beside)}. Now: cosim run {file}")
+
+
+COMMANDS = (
+    Command(
+        "new",
+        "make a commented scene to begin with: a machine, a circuit or an FMU of one's own",
+        _new,
+        (
+            Option("file", "the scene, which must not be there yet", "FILE.toml", Path),
+            Option(
+                "--kind",
+                "machine: every key with its unit and meaning; circuit: also a netlist; fmu: a "
+                "netlist, an FMU, and the ports that join them (default: machine)",
+                choices=_KINDS,
+            ),
+            Option(
+                "--base", "the built-in scene that it starts from", "SCENE", str, "paper-limited"
+            ),
+        ),
+    ),
+)

@@ -1,0 +1,182 @@
+"""The page of `cosim show`: what a folder of results holds, as one HTML file to look into and mail.
+
+A file begins with the page, its script and, of long runs, lowest and highest values of each
+``BUCKET`` rows; so it is there before the rows, which follow in blocks.
+"""
+
+import json
+import re
+from base64 import b64encode
+from io import BytesIO
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.arrays import Array
+from cosim.errors import BadInput, plain
+from cosim.files import reader
+from cosim.files.atomic import whole
+from cosim.files.cells import read_cells
+from cosim.live.page import page, script_of
+from cosim.scene import load
+from cosim.waveforms import formats
+from cosim.waveforms.report import table
+from cosim.waveforms.storage import LARGEST, read_netcdf
+
+BLOCK = 1 << 15
+BUCKET = 256
+"""Rows."""
+
+MOST_POINTS = 100_000
+_HEAD = re.compile(r"(.+) \[(.+)\]")
+
+Run = list[Array]
+"""Columns; the first is what they go over."""
+
+
+def show(results: Path, out: Path | None = None) -> Path:
+    """Write the page of a folder that run, sweep, compare or a chart wrote, or of a chart's table,
+    to ``out``, by default beside them. Raises BadInput."""
+    path = out or (results if results.is_dir() else results.parent) / "show.html"
+    shown, runs = _read(results)
+    given = {"title": results.name, "about": "", "words": "", "pictures": {}, "cloud": None}
+    given |= {"signals": None, "block": BLOCK, "bucket": BUCKET} | shown
+    code = script_of({"SHOWN": given}, ("plot.js", "show.js"))
+    with whole(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+        file.write(page("show.html", code, "'none'"))
+        for number, run in enumerate(runs):
+            for column, values in enumerate(run):
+                for k, start in enumerate(range(0, len(values), BLOCK)):
+                    head = f'<script type="text/plain" id="r{number}-{column}-{k}">'
+                    file.write(f"{head}{_coded(values[start : start + BLOCK])}</script>\n")
+        file.write("</body>\n</html>\n")
+    return path
+
+
+def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
+    """What the page's script takes, and the rows behind it."""
+    if (results / "waveforms.nc").exists():
+        found, scene = formats.read(results), load(results / "scene.toml")
+        runs = [[*found.waveforms.values()]]
+        words = table(scene, _json(results / "summary.json"))
+        told = {"title": scene.name, "about": scene.description, "words": words}
+        return told | {"signals": _signals(found.units, runs)}, runs
+    if (results / "sweep.nc").exists():
+        return _sweep(results)
+    if (results / "compare.json").exists():
+        told = _json(results / "compare.json")
+        shown, runs = _table(results / "frames.csv")
+        shown["words"] = "\n".join(f"{name}: {value}" for name, value in told.items())
+        return shown | {"title": f"{told.get('run')} against {told.get('trial')}"}, runs
+    tables = sorted(results.glob("*.csv")) if results.is_dir() else [results]
+    if len(tables) != 1:
+        names = ", ".join(path.name for path in tables) or "no table"
+        raise BadInput(f"{plain(str(results))}: no run, sweep or comparison; name one of: {names}.")
+    return _table(tables[0])
+
+
+def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
+    import xarray as xr
+
+    path = folder / "sweep.nc"
+    content = BytesIO(reader.read(path, LARGEST))
+    try:
+        data = xr.load_dataset(content, engine="scipy")
+        grid = data["failure"]
+    except Exception as error:  # there is little that scipy does not raise on a damaged file
+        raise BadInput(f"{plain(str(path))}: not a whole sweep ({plain(str(error))}).") from None
+    swept = [str(name) for name in data.coords if "key" in data[name].attrs]
+    if grid.size > MOST_POINTS:
+        raise BadInput(f"{plain(str(path))}: a page shows at most {MOST_POINTS} points.")
+    columns = []
+    for name in [*swept, *sorted({*data.coords} - {*swept, *grid.dims}), *data.data_vars]:
+        values = data[name].broadcast_like(grid).transpose(*grid.dims).values.ravel()
+        unit, text = (data[name].attrs.get(key, "") for key in ("units", "long_name"))
+        columns.append(_column(str(name), unit, values.tolist(), text))
+    best = "v_average" if "v_average" in data else columns[len(swept)]["name"]
+    ways = [swept[0], swept[1] if len(swept) > 1 else best, best]
+    axes = swept if grid.ndim > 1 else []
+    cloud = {"columns": columns, "keys": axes[2:], "ways": ways, "grid": axes}
+    shown = {"title": data.attrs["title"], "cloud": cloud | {"count": grid.size, "family": None}}
+    points = sorted(int(kept.stem) for kept in (folder / "points").glob("*.nc"))
+    if not points:
+        return shown, []
+    kept = [read_netcdf(folder / "points" / f"{number}.nc") for number in points]
+    runs = [[*columns.values()] for columns, _, _ in kept]
+    shown["signals"] = _signals(kept[0][1], runs)
+    for run, (_, _, about) in zip(shown["signals"]["runs"], kept, strict=True):
+        run["frequency"] = float(about["frequency"])
+    shown["cloud"]["family"] = points
+    return shown, runs
+
+
+def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
+    """Curves of a table that begins with the time; a cloud of any other, and a chart's pictures."""
+    cells = read_cells(path)
+    matches = {cell: _HEAD.fullmatch(cell) for cell in cells.rows[0][1]}
+    heads = dict((m[1], m[2]) if m else (cell, "") for cell, m in matches.items())
+    if next(iter(heads)) == "time":
+        runs = [[cells.numbers(1, k, name, {"nan", ""}) for k, name in enumerate(heads)]]
+        return {"title": path.stem, "signals": _signals(heads, runs)}, runs
+    columns = []
+    for k, (name, unit) in enumerate(heads.items()):
+        values = [row[k] if k < len(row) else "" for _, row in cells.rows[1:]]
+        try:
+            columns.append(_column(name, unit, [float(v) if v else None for v in values]))
+        except ValueError:
+            columns.append(_column(name, unit, values))
+    ways = [column["name"] for column in columns if column["most"] is not None]
+    if not ways:
+        raise BadInput(f"{plain(str(path))}: this table has no column of numbers.")
+    cloud = {"columns": columns, "keys": [], "ways": (ways * 3)[:3], "family": None, "grid": []}
+    cloud["count"] = len(cells.rows) - 1
+    pictures = [p for p in path.parent.glob("*.png") if f"{p.stem}-".startswith(f"{path.stem}-")]
+    content = {p.name: b64encode(reader.read(p, LARGEST)).decode() for p in sorted(pictures)}
+    return {"title": path.stem, "cloud": cloud, "pictures": content}, []
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        return dict(json.loads(reader.read(path, LARGEST)))
+    except (ValueError, TypeError):
+        raise BadInput(f"{plain(str(path))}: this is no whole JSON file.") from None
+
+
+def _column(name: str, unit: str, values: list[Any], text: str = "") -> dict[str, Any]:
+    """A column of a cloud; ``most`` is None where it has words."""
+    kept = [v if isinstance(v, str) or (v is not None and isfinite(v)) else None for v in values]
+    known = [v for v in kept if v is not None]
+    words = not known or any(isinstance(v, str) for v in known)
+    most = None if words else max(map(abs, known))
+    return {"name": name, "unit": unit, "text": text, "values": kept, "most": most}
+
+
+def _signals(units: dict[str, str], runs: list[Run]) -> dict[str, Any]:
+    """Of the runs' columns, by name, what is there before the rows; a panel for each unit."""
+    (x, unit), *others = units.items()
+    panels: dict[str, list[int]] = {}
+    columns = [{"name": x, "unit": unit, "most": 0.0}]
+    for k, (name, unit) in enumerate(others, 1):
+        panels.setdefault(unit, []).append(k)
+        most = max(float(np.nanmax(np.abs(run[k]), initial=0.0)) for run in runs)
+        columns.append({"name": name, "unit": unit, "most": most})
+    heads = [_head(run) for run in runs]
+    return {"columns": columns, "panels": [*panels.values()], "runs": heads}
+
+
+def _head(run: Run) -> dict[str, Any]:
+    time, count = run[0], len(run[0])
+    step = float(time[-1] - time[0]) / max(1, count - 1)
+    even = np.abs(time - (time[0] + step * np.arange(count))) <= 1e-6 * step
+    found = {"count": count, "begin": float(time[0]), "step": step if even.all() else None}
+    if count > 4 * BLOCK:
+        starts = np.arange(0, count, BUCKET)
+        ends = [(np.fmin.reduceat(x, starts), np.fmax.reduceat(x, starts)) for x in run]
+        found["peaks"] = [_coded(np.stack(pair, axis=1)) for pair in ends]
+    return found
+
+
+def _coded(values: Array) -> str:
+    return b64encode(np.ascontiguousarray(values, dtype="<f8").tobytes()).decode()

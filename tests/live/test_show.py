@@ -1,0 +1,171 @@
+"""The files of `cosim show`: exact under zoom, words as text, nobody asked."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cosim
+from cosim.cli.main import main
+from cosim.live.show import BLOCK, show
+from cosim.waveforms import formats
+from cosim.waveforms.storage import netcdf
+
+MARKUP = "</script><img src=x onerror=alert(1)><b>bold</b>"
+DRAWN = "() => document.readyState === 'complete'"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of a scene whose own words are markup."""
+    folder = tmp_path_factory.mktemp("results")
+    scene = folder / "mine.toml"
+    scene.write_text(f'base = "paper-limited"\ndescription = "{MARKUP}"\n', encoding="utf-8")
+    settings = ["--set", "run.duration=0.3", "--set", "run.settle=0.1"]
+    assert main(["run", str(scene), *settings, "--show", "--out", str(folder / "run")]) == 0
+    return folder / "run"
+
+
+def opened(tab: Any, path: Path) -> None:
+    tab.goto(path.as_uri())
+    tab.wait_for_function(DRAWN)
+    tab.wait_for_timeout(100)
+    assert not tab.faults
+    assert tab.asked == [path.as_uri()]
+
+
+def test_a_run(tab: Any, run: Path) -> None:
+    """Every number is that of waveforms.nc, to the last bit."""
+    opened(tab, run / "show.html")
+    columns = formats.read(run).waveforms
+    for place, (name, values) in enumerate(columns.items()):
+        assert tab.evaluate("(k) => signals.columns[k].name", place) == name
+        code = """(k) => Array.from({ length: signals.runs[0].count },
+            (_, row) => signals.runs[0].value(k, row))"""
+        assert tab.evaluate(code, place) == values.tolist()
+    assert tab.inner_text("#about") == MARKUP
+    assert tab.locator("img, b").count() == 0
+    assert "mean velocity" in tab.inner_text("#words")
+    assert tab.evaluate("() => document.documentElement.scrollWidth") <= 390
+
+    # to a stretch, by drag; then a cursor, by key
+    box = tab.locator("#signals canvas").first.bounding_box()
+    tab.mouse.move(box["x"] + 100, box["y"] + 80)
+    tab.mouse.down()
+    tab.mouse.move(box["x"] + 200, box["y"] + 80, steps=4)
+    tab.mouse.up()
+    begin, end = tab.evaluate("() => signals.view")
+    share = 100 / (box["width"] - 62)
+    assert end - begin == pytest.approx(share * 0.3, rel=0.05)
+    before = tab.evaluate("() => signals.cursors.at[0]")
+    tab.locator("#signals canvas").first.press("ArrowLeft")
+    assert tab.evaluate("() => signals.cursors.at[0]") != before
+
+
+def test_many_rows(tab: Any, run: Path, tmp_path: Path) -> None:
+    """Far out, lowest and highest of all rows in each column of pixels; close up, each row."""
+    source, count = formats.read(run), 5 * BLOCK
+    columns = {"time": 1e-5 * np.arange(count), "current": np.sin(np.arange(count) / 700.0)}
+    columns["current"][[5, 77_777]] = 7.125, -3.0625
+    for name in ("scene.toml", "summary.json"):
+        shutil.copy(run / name, tmp_path / name)
+    units = {"time": "s", "current": "A"}
+    with open(tmp_path / "waveforms.nc", "wb") as file:
+        netcdf(file, columns, units, dict(source.attributes))
+    opened(tab, show(tmp_path))
+    shape = """(view) => {
+      const { low, high } = signals.runs[0].shape(1, 1, view, 300);
+      return [[...low], [...high]];
+    }"""
+    whole = [0.0, 1e-5 * (count - 1)]
+    low, high = np.array(tab.evaluate(shape, whole))
+    assert (low.min(), high.max()) == (-3.0625, 7.125)
+    assert (high.argmax(), low.argmin()) == (0, int(77_777 / (count - 1) * 300))
+    close = [0.7, 0.9]
+    low, high = np.array(tab.evaluate(shape, close))
+    rows = np.flatnonzero((columns["time"] >= close[0]) & (columns["time"] < close[1]))
+    places = ((columns["time"][rows] - 0.7) / 0.2 * 300).astype(int)
+    for place in (0, 117, 299):
+        own = columns["current"][rows[places == place]]
+        assert low[place] == pytest.approx(own.min(), abs=2e-3)
+        assert high[place] == pytest.approx(own.max(), abs=2e-3)
+
+
+def test_a_sweep_with_its_families(tab: Any, tmp_path: Path) -> None:
+    """A click on a point shows its run."""
+    over = ["--over", "drive.amplitude=6,8", "--over", "drive.frequency=20,40"]
+    settings = ["--set", "run.duration=0.3", "--set", "run.settle=0.1"]
+    kept = ["--keep", "current,v_surface", "--show", "--out", str(tmp_path)]
+    assert main(["sweep", "paper-limited", *over, *settings, *kept]) == 0
+    opened(tab, tmp_path / "show.html")
+    code = """([x, y]) => Array.from({ length: 4 }, (_, k) => k).find((k) =>
+        cloud.columns.find(({ name }) => name === "frequency").values[k] === x &&
+        cloud.columns.find(({ name }) => name === "amplitude").values[k] === y)"""
+    point = tab.evaluate(code, [40, 6])
+    left, top = tab.evaluate("(k) => cloud.places(k)", point)
+    tab.locator("#cloud canvas").click(position={"x": left, "y": top})
+    assert tab.evaluate("() => [cloud.chosen, signals.chosen]") == [point, point]
+    changes = {"drive.amplitude": 6, "drive.frequency": 40}
+    times = {"run.settle": 0.1, "run.duration": 0.3}
+    expected = cosim.run("paper-limited", changes | times)
+    later = expected.columns["time"] >= 0.1
+    found = tab.evaluate("""() => { const run = signals.runs[signals.chosen];
+        return Array.from({ length: run.count }, (_, row) => run.value(2, row)); }""")
+    assert found == expected.columns["v_surface"][later].tolist()
+    shown = f"{1e3 * expected.summary['v_average']:.4f}".replace("-", "−")[:5]
+    assert shown in tab.inner_text("#cloud dl")
+
+
+def test_a_comparison_and_a_chart(tab: Any, tmp_path: Path) -> None:
+    (tmp_path / "frames.csv").write_text(
+        "time [s],v_surface_measured [m/s],v_surface_simulated [m/s]\n"
+        "0,nan,0.5\n0.1,-0.25,0.125\n0.2,0.75,\n",
+        encoding="utf-8",
+    )
+    told = {"run": "paper", "trial": MARKUP, "v_surface": 0.1}
+    (tmp_path / "compare.json").write_text(json.dumps(told), encoding="utf-8")
+    opened(tab, show(tmp_path))
+    values = "() => [1, 2].map((k) => [0, 1, 2].map((row) => signals.runs[0].value(k, row)))"
+    found = np.array(tab.evaluate(values), dtype=float)
+    np.testing.assert_array_equal(found, [[np.nan, -0.25, 0.75], [0.5, 0.125, np.nan]])
+    assert tab.locator("img").count() == 0
+
+    table = tmp_path / "mine" / "table.csv"
+    table.parent.mkdir()
+    table.write_text(f'name,"size [mm]",gain\n{MARKUP},1,2\nb,3,4\n', encoding="utf-8")
+    tab.asked.clear()
+    opened(tab, show(table))
+    assert tab.evaluate("() => cloud.ways.map(({ name, unit }) => name + unit)") == [
+        *("sizemm", "gain", "sizemm"),
+    ]
+    assert tab.evaluate("() => cloud.chosen") == 1
+    tab.locator("#cloud canvas").press("ArrowRight")
+    assert MARKUP in tab.inner_text("#cloud dl") and tab.locator("img").count() == 0
+
+
+@pytest.mark.reliability
+def test_what_cannot_be_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "two").mkdir()
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / "two" / name).write_text("x\n1\n", encoding="utf-8")
+    (tmp_path / "words.csv").write_text("x\nword\n", encoding="utf-8")
+    (tmp_path / "torn").mkdir()
+    (tmp_path / "torn" / "sweep.nc").write_bytes(b"CDF\x02\x00\x00")
+    (tmp_path / "half").mkdir()
+    (tmp_path / "half" / "waveforms.nc").write_bytes(b"CDF\x01")
+    for name, said in (
+        ("empty", "no run, sweep or comparison"),
+        ("two", "name one of: a.csv, b.csv"),
+        ("words.csv", "no column of numbers"),
+        ("torn", "not a whole"),
+        ("half", "not a whole"),
+        ("nothing", "nothing"),
+    ):
+        assert main(["show", str(tmp_path / name)]) == 2
+        told = capsys.readouterr().err
+        assert said in told and told.startswith("cosim: ") and told.count("\n") == 1
+    assert not list(tmp_path.rglob("*.html"))

@@ -1,0 +1,141 @@
+"""The built-in machine through ports: under a netlist's own names, and beside other FMUs."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cosim
+from cosim.cli.main import main
+from cosim.files.resources import circuits
+from cosim.toolchain.processes import in_place
+from tests.ports.foreign import build
+
+NAMES = {"Vemf": "Vmot", "Vcommand": "Vin", "out": "amp", "sense": "shunt", "v1": "inp"}
+"""Of the example with half-bridges, and others."""
+
+OWN = """
+base = "paper"
+[circuit]
+model = "file"
+netlist = "own.cir"
+save = ["v(left)", "v(amp,shunt)*i(Vmot)"]
+[[port]]
+from = "drive"
+source = "Vin"
+[[port]]
+from = "machine.back_emf"
+source = "Vmot"
+[[port]]
+probe = "i(Vmot)"
+to = "machine.current"
+"""
+ENDS = """
+[[port]]
+probe = "v(amp)"
+to = "machine.out"
+[[port]]
+probe = "v(shunt)"
+to = "machine.sense"
+"""
+RUN = """
+[run]
+duration = 0.1
+output_step = 1e-4
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    text = (circuits() / "examples" / "h_bridge.cir").read_text()
+    (tmp_path / "agreed.cir").write_text(text)
+    own = "\n".join(line for line in text.splitlines() if not line.startswith("*"))
+    for old, new in NAMES.items():
+        own = re.sub(rf"\b{old}\b", new, own, flags=re.IGNORECASE)
+    (tmp_path / "own.cir").write_text(own)
+    return tmp_path
+
+
+def agreed(folder: Path, base: str = "paper", **given: Any) -> cosim.Result:
+    with in_place():
+        return cosim.run(
+            base,
+            {
+                **{"circuit.model": "file", "circuit.netlist": str(folder / "agreed.cir")},
+                **{"run.duration": 0.1, "run.output_step": 1e-4},
+                **{key.replace("_", ".", 1): value for key, value in given.items()},
+            },
+        )
+
+
+def test_a_netlist_with_names_of_its_own_is_the_same_circuit(folder: Path) -> None:
+    text = OWN + ENDS + RUN
+    (folder / "own.toml").write_text("".join(x for x in text.splitlines(True) if "save" not in x))
+    with in_place():
+        result = cosim.run(folder / "own.toml")
+    expected = agreed(folder)
+    assert list(result.columns) == list(expected.columns)
+    for name, values in expected.columns.items():
+        # The example has a node v1, whose voltage the circuit itself computes.
+        least = 1e-12 if name == "command" else 0.0
+        assert result.columns[name] == pytest.approx(values, rel=0.0, abs=least), name
+    assert result.summary["energy_residual"] < 1e-4
+
+
+def test_what_is_saved_of_it_is_in_the_waveforms(folder: Path) -> None:
+    (folder / "own.toml").write_text(OWN + ENDS + RUN)
+    with in_place():
+        result = cosim.run(folder / "own.toml")
+    power = result.columns["v(amp,shunt)*i(Vmot)"]
+    alone = result.columns["coil_voltage"] * result.columns["current"]
+    assert power == pytest.approx(alone, abs=1e-3 * np.abs(alone).max())
+    assert (result.units["v(left)"], result.units["v(amp,shunt)*i(Vmot)"]) == ("V", "W")
+
+
+@pytest.mark.parametrize(("base", "contact"), [("paper", "compliant"), ("reference", "rigid")])
+def test_beside_another_fmu_the_machine_moves_alike(folder: Path, base: str, contact: str) -> None:
+    """There it is an FMU like others, which tells nobody when its ram meets a wall."""
+    build(folder, "Load")
+    fmu = '[[fmu]]\nname = "other"\nfile = "Load.fmu"\n[[port]]'
+    text = OWN.replace("[[port]]", fmu, 1).replace("paper", base)
+    (folder / "own.toml").write_text(text + RUN)
+    given = {"mechanics_contact": contact}
+    fine = agreed(folder, base, circuit_reltol=1e-7, circuit_max_step=1e-6, **given)
+    own = agreed(folder, base, **given)
+    with in_place():
+        result = cosim.run(
+            folder / "own.toml", {"coupling.method": "redo", "mechanics.contact": contact}
+        )
+    for name, other in (("z_surface", "machine.z_surface"), ("current", "i(Vmot)")):
+        true = fine.columns[name]
+        error = np.sqrt(np.mean((result.columns[other] - true) ** 2))
+        assert error < 3.0 * np.sqrt(np.mean((own.columns[name] - true) ** 2)), name
+
+
+WRONG = {
+    "two ends": ('source = "Vin"', 'source = "Vin"\n[[port]]\nfrom="drive"\nsource="Vx"', "twice"),
+    "no current": (
+        *('[[port]]\nprobe = "i(Vmot)"\nto = "machine.current"\n', ""),
+        'joined to "machine.current"',
+    ),
+    "another's current": (*('probe = "i(Vmot)"', 'probe = "i(Lcoil)"', 'probe = "i(Vmot)"'),),
+    "a scale": ('source = "Vin"', 'source = "Vin"\nscale = 2', "scale must be 1"),
+    "an unknown end": ("machine.current", "machine.force", "must be one of from"),
+    "no source": ('"Vin"', '"Vout"', "the sources Vmot and Vout"),
+    "a resistor": ('"Vin"', '"Rleft"', "must be a V source"),
+    "no node": ('"v(amp)"', '"v(ampp)"', "no node ampp"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_is_wrong_is_told(folder: Path, capsys: pytest.CaptureFixture[str], what: str) -> None:
+    old, new, said = WRONG[what]
+    text = OWN + ENDS + RUN
+    assert old in text
+    (folder / "own.toml").write_text(text.replace(old, new, 1))
+    with in_place():
+        assert main(["run", str(folder / "own.toml"), "--out", str(folder / "o")]) == 2
+    told = [line for line in capsys.readouterr().err.splitlines() if "note" not in line]
+    assert len(told) == 1 and said in told[0], told
