@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import compare, errors, instructions, part, parts
+from benchmarks.peers import masters
 from cosim.files.atomic import write_json
 from cosim.studies.speed import bench
 from cosim.toolchain.processes import in_place
@@ -24,6 +25,8 @@ TITLES = bench.TITLES | {
     "all_in_ngspice_over_ours": "The whole machine in one netlist, over ours",
     "naive_over_ours": "PySpice's and fmpy's plain calls, over ours",
     "solve_ivp_over_ours": "SciPy's solve_ivp (LSODA, events), over ours",
+    "masters_over_jacobi": "Other masters with the .ssp, CPU time over our Jacobi",
+    "masters_error_over_jacobi": "The same, their error over that of our Jacobi",
     "part": "The part on a given surface",
 }
 TARGETS: bench.Targets = bench.TARGETS | {
@@ -33,6 +36,7 @@ TARGETS: bench.Targets = bench.TARGETS | {
     "all_in_ngspice_over_ours": (5.0, inf),
     "naive_over_ours": (4.0, inf),
     "solve_ivp_over_ours": (3.0, inf),
+    **{f"masters_error_over_jacobi.{name}": (-inf, 1.1) for name in masters.PACKAGES},
 }
 
 Measure = Callable[[bool, Path | None], Any]
@@ -41,6 +45,7 @@ Measure = Callable[[bool, Path | None], Any]
 MEASURES: dict[str, Measure] = {
     "parts": lambda quick, _: {"coupled_over_parts": parts.measure(3 if quick else 11)},
     "peers": lambda quick, _: compare.compare(3 if quick else 11),
+    "masters": lambda quick, _: masters.compare(1 if quick else 5),
     "growth": lambda quick, _: {
         "cost_exponent": errors.cost_exponent(
             2 if quick else 5, (20, 60, 200) if quick else (10, 100, 1000)

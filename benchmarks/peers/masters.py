@@ -12,6 +12,7 @@ prints times (s), heights of the surface (m) and the CPU seconds as JSON.
 import json
 import subprocess
 import sys
+import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 from time import process_time
@@ -20,6 +21,13 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.fmus.ssp import ssp
+from cosim.scene import load
+from cosim.simulation.simulate import simulate
+from cosim.studies.speed.bench import cpu, ratios, spread
+
+MACRO_STEP, DURATION = 1e-4, 0.1
+"""s; of what is compared."""
 
 PACKAGES = {"fmpy": "fmpy", "ecos": "ecospy", "libcosim": "libcosimpy"}
 
@@ -32,6 +40,36 @@ def run(master: str, file: Path, step: float, duration: float) -> tuple[Array, A
     done = subprocess.run(words, capture_output=True, text=True, check=True, timeout=600)
     found = json.loads(done.stdout[done.stdout.rindex('{"times"') :])
     return np.array(found["times"]), np.array(found["heights"]), found["cpu"]
+
+
+def compare(rounds: int) -> dict[str, Any]:
+    """Of each master that is installed its CPU time and its error over those of our Jacobi, which
+    exchanges the same at the same times; errors are rms of the surface's height over its rms."""
+    short = {"run.duration": DURATION, "run.settle": 0.0, "run.output_step": MACRO_STEP}
+    ours = load("reference", short | {"coupling.method": "jacobi", "coupling.order": 0,
+                                      "coupling.macro_step": MACRO_STEP})  # fmt: skip
+    fine = load("reference", short | {"circuit.max_step": 1e-5, "circuit.reltol": 1e-6})
+    true, own = simulate(fine).columns["z_surface"], simulate(ours).columns["z_surface"]
+
+    def error(found: Array, true: Array) -> float:
+        return float(np.sqrt(np.mean((found - true) ** 2) / np.mean(true**2)))
+
+    cost: dict[str, Any] = {}
+    off: dict[str, Any] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "machine.ssp"
+        ssp(ours, file)
+        for master in PACKAGES:
+            runs = [run(master, file, MACRO_STEP, DURATION) for _ in range(rounds)]
+            done = [each for each in runs if each is not None]
+            if not done:
+                continue
+            cost[master] = ratios(
+                [each[2] for each in done], [cpu(lambda: simulate(ours)) for _ in done]
+            )
+            reached, wanted = error(done[0][1], true[1:]), error(own, true)
+            off[master] = spread([reached / wanted]) | {"error": wanted, "error_of_peer": reached}
+    return {"masters_over_jacobi": cost, "masters_error_over_jacobi": off}
 
 
 def _fmpy(file: Path, step: float, duration: float) -> list[tuple[float, float]]:

@@ -200,6 +200,7 @@ def test_built_in_scenes() -> None:
         "optimal", "quaid", "trial", "umbanhowar",
         "direct-drive", "direct-drive-stops", "gripper-17g", "gripper-169g", "square",
         "down-grip", "down-waveform", "closed-loop-grasp", "two-surfaces", "reference",
+        "dc-motor", "relay", "closed-grip",
         *(f"trial-{n:02}" for n in range(1, 11)),
     }  # fmt: skip
     for name, description in scenes.items():
