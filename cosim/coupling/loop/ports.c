@@ -127,10 +127,11 @@ static double source_value(Ports *c, const Source *s, double t)
     return line_of(c, s, t) + carried(c, s, c->now) - carried(c, s, c->start);
 }
 
-/* Whether a difference over so long tells of a slope. */
+/* Whether a difference over so long tells of a slope. One event after another tells that the slope
+   is wrong. */
 static int is_telling(const Ports *c, double h)
 {
-    return h > SHORT * c->after_jump && !c->met;
+    return h > SHORT * c->after_jump && (!c->met || c->met_before);
 }
 
 static double rate_of(const Ports *c, const Origin *from)
@@ -319,6 +320,7 @@ static void begin_exchange(Ports *c)
     memcpy(c->start, c->now, (size_t)c->n_saved * sizeof *c->start);
     memset(c->charges, 0, (size_t)c->n_saved * sizeof *c->charges);
     c->origin = time;
+    c->met_before = c->met;
     c->met = 0;
     c->end = c->macro_step > 0.0 ? fmin(time + c->macro_step, c->jump) : -INFINITY;
     if (c->macro_step > 0.0 && time < c->duration - ON_TIME)

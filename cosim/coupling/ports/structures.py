@@ -94,7 +94,7 @@ class PortsState(Structure):
         *(("throughs", c_void_p), *of(c_int64, "n_throughs", "learn")),
         *of(c_double, "macro_step", "duration", "after_jump", "jumped", "time", "origin", "end"),
         *of(c_double, "told", "sent"),
-        *of(c_int64, "repeats", "stepped", "tries", "met"),
+        *of(c_int64, "repeats", "stepped", "tries", "met", "met_before"),
         *(("tolerance", c_double), ("asked", POINTER(c_char_p)), ("n_probed", c_int64)),
         *of(c_void_p, "command", "ask", "plot", "announce"),
         ("plot_name", c_char * 64),
