@@ -124,6 +124,12 @@ def test_what_an_fmu_says_of_its_slope_is_taken(tmp_path: Path) -> None:
     assert off(here(scene, macro), true) > 0.0 and known < 0.05
 
 
+def test_slopes_that_an_fmu_tells_only_after_its_first_step_are_taken(tmp_path: Path) -> None:
+    """OpenModelica's FMUs tell of a derivative that is no number before it."""
+    scene, true = motor(tmp_path, slopes=True), plain(tmp_path, 0.02)
+    assert off(here(scene, {}), true) < 5e-5
+
+
 LOAD = """
 [circuit]
 model = "file"

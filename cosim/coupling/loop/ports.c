@@ -134,11 +134,11 @@ static int is_telling(const Ports *c, double h)
     return h > SHORT * c->after_jump && (!c->met || c->met_before);
 }
 
+/* Some FMUs tell no slope before their first step. */
 static double rate_of(const Ports *c, const Origin *from)
 {
-    return from->slope == HELD    ? 0.0
-           : from->slope == KNOWN ? c->before[from->slope_place]
-                                  : c->rates[from->place];
+    const double known = from->slope == KNOWN ? c->before[from->slope_place] : NAN;
+    return from->slope == HELD ? 0.0 : isfinite(known) ? known : c->rates[from->place];
 }
 
 /* ngspice integrates a source by the trapezoidal rule. Where the FMU tells the slope, the integral of
@@ -368,8 +368,9 @@ static double accepted(Ports *c, double time, double next_step)
     double sum = 0.0;
     for (int64_t k = 0; k < c->n_saved; k++)
         sum += c->now[k];
-    for (int64_t k = 0; k < c->n_outputs; k++)
-        sum += c->outputs[k];
+    for (const Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
+        for (int64_t k = 0; k < s->width - s->n_output_slopes; k++)
+            sum += s->row[k];
     if (!isfinite(sum)) {
         c->told = time;
         c->status = NOT_FINITE;
