@@ -32,7 +32,8 @@ def build(
     slopes: bool = False,
 ) -> Path:
     """An FMU of FMI 2.0 or 3.0; what it says of itself: whether it saves its state, that y depends
-    on u at once, that alpha is the derivative of omega, that its steps are fixed, and that it tells slopes."""
+    on u at once, that alpha is the derivative of omega, that its steps are fixed, and that it tells
+    slopes."""
     library = folder / f"foreign{sharedLibraryExtension}"
     if not library.exists():
         source = Path(__file__).with_name("foreign.c")
