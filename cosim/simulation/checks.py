@@ -127,6 +127,38 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
     return replace(result, summary=result.summary | told_of)
 
 
+def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
+    """The result of ``run``, which runs a scene with ports, and as ``NAME.mean_error`` how far each
+    mean is from that of a run with all steps COARSER times as long; nothing where that one fails.
+    Raises what ``run`` raises.
+    """
+    stopped = Event()
+
+    def going(_: float) -> None:
+        if stopped.is_set():
+            raise _Stopped
+
+    longer = min(scene.coupling.macro_step * COARSER, 1e-2)
+    coarse = _longer(scene, COARSER).having(coupling={"macro_step": longer})
+    with ThreadPoolExecutor(1) as threads:
+        other = threads.submit(one_run, few_rows(coarse), going, alone=True)
+        try:
+            result = run()
+        except BaseException:
+            stopped.set()
+            raise
+        try:
+            told = other.result().summary
+        except CosimError:
+            return result
+    errors = {
+        f"{name}_error": abs(value - told[name])
+        for name, value in result.summary.items()
+        if name.endswith(".mean")
+    }
+    return replace(result, summary=result.summary | errors)
+
+
 def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
     """The kind of motion of a scene, by the keys of a summary; empty where it is not known: nothing
     repeats, there is no simpler circuit, or too few periods are run.
@@ -248,8 +280,10 @@ def _steps(scene: Scene, longer: float) -> Scene | None:
         if longer < 1.0:
             return scene.having(mechanics={"tolerance": scene.mechanics.tolerance * longer**3})
         return _looser(scene) if scene.mechanics.tolerance < LOOSER else None
-    if scene.coupling.method != "step-locked":
-        return None
+    return _longer(scene, longer) if scene.coupling.method == "step-locked" else None
+
+
+def _longer(scene: Scene, longer: float) -> Scene:
     circuit = scene.circuit
     steps = {"reltol": circuit.reltol * longer**3, "max_step": circuit.max_step * longer}
     return scene.having(circuit={name: min(value, 1e-2) for name, value in steps.items()})

@@ -63,6 +63,10 @@ def simulate(
     if scene.has_ports:
         if checks == "strict":
             raise BadInput("--error tells of the built-in machine, not of a scene's own [[port]].")
+        if checks == "usual":
+            from cosim.simulation.checks import checked_ports
+
+            return checked_ports(scene, lambda: one_run(scene, progress, fmi_version))
         return one_run(scene, progress, fmi_version)
     if scene.run.solver == "fast":
         from cosim.simulation.fast import simulate_fast

@@ -51,15 +51,19 @@ def _own(scene: Scene, summary: dict[str, Any]) -> str:
     """The numbers of a scene with its own FMUs, a line for each waveform."""
     names = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
     width = max(20, *map(len, names))
-    whats = ("mean", "rms", "least", "greatest")
-    lines = [f"  {'':<{width}}" + "".join(f"{what:>13}" for what in whats)]
+    whats = ["mean", "rms", "least", "greatest"]
+    told = any(name.endswith(".mean_error") for name in summary)
+    whats += ["mean_error"] if told else []
+    lines = [f"  {'':<{width}}" + "".join(f"{what.replace('_', ' '):>13}" for what in whats)]
     for name in names:
         values = "".join(f"{summary[f'{name}.{what}']:>13.6g}" for what in whats)
         lines.append(f"  {name:<{width}}{values}")
     steps = f"{summary['circuit_steps']} of ngspice, {summary['fmu_steps']} of FMUs"
     repeated = f", {summary['steps_repeated']} repeated" if summary["steps_repeated"] else ""
     time = f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"
+    powers = [name.removesuffix(".power") for name in summary if name.endswith(".power")]
     for what, words in (
+        *(("power at " + name, f"{summary[f'{name}.power']:.6g} W") for name in powers),
         ("coupling", summary["method"]),
         ("steps", steps + repeated),
         ("run time", time),

@@ -137,6 +137,17 @@ int fmi2GetInteger(void *p, const uint32_t *places, size_t n, int *values)
     return 0;
 }
 
+/* Known from the first step on only. */
+int fmi2GetRealOutputDerivatives(void *p, const uint32_t *places, size_t n, const int *orders,
+                                 double *values)
+{
+    (void)orders;
+    const Model *m = p;
+    for (size_t k = 0; k < n; k++)
+        values[k] = m->steps == 0 ? NAN : places[k] == OMEGA ? value(m, ALPHA) : 0.0;
+    return 0;
+}
+
 int fmi2DoStep(void *m, double time, double h, int a) { return (void)a, step(m, time, h); }
 
 int fmi2GetFMUstate(void *m, void **state)
@@ -240,7 +251,6 @@ STUB(fmi2GetBoolean)
 STUB(fmi2GetBooleanStatus)
 STUB(fmi2GetDirectionalDerivative)
 STUB(fmi2GetIntegerStatus)
-STUB(fmi2GetRealOutputDerivatives)
 STUB(fmi2GetRealStatus)
 STUB(fmi2GetStatus)
 STUB(fmi2GetString)

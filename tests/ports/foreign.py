@@ -29,9 +29,11 @@ def build(
     through: bool = False,
     derivative: bool = False,
     fixed: bool = False,
+    slopes: bool = False,
 ) -> Path:
     """An FMU of FMI 2.0 or 3.0; what it says of itself: whether it saves its state, that y depends
-    on u at once, that alpha is the derivative of omega, and that its steps are fixed."""
+    on u at once, that alpha is the derivative of omega, that its steps are fixed, and that it tells
+    slopes."""
     library = folder / f"foreign{sharedLibraryExtension}"
     if not library.exists():
         source = Path(__file__).with_name("foreign.c")
@@ -42,7 +44,10 @@ def build(
     place = platform if version == 2 else {"linux64": "x86_64-linux"}.get(platform, platform)
     path = folder / f"{name}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", describe(saves, through, derivative, fixed))
+        text = describe(saves, through, derivative, fixed)
+        if slopes:
+            text = text.replace("<CoSimulation ", '<CoSimulation maxOutputDerivativeOrder="1" ')
+        archive.writestr("modelDescription.xml", text)
         archive.write(library, f"binaries/{place}/foreign{sharedLibraryExtension}")
     return path
 

@@ -310,7 +310,7 @@ typedef struct Ports {
     int64_t repeats;           /* whether attempts are repeated until they agree with the FMUs */
     int64_t stepped;           /* the FMUs have made the step of the last attempt */
     int64_t tries;             /* of the step under way */
-    int64_t met;               /* an event in the step under way, which is short enough */
+    int64_t met, met_before;   /* an event in the step under way, which is short enough; the last one */
     double tolerance;          /* of that agreement, relative to the source's largest value */
     const char *const *asked;  /* what ngspice is asked for an attempt's saved values */
     int64_t n_probed;          /* of these, the first ones, lead to FMUs */

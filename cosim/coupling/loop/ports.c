@@ -127,17 +127,18 @@ static double source_value(Ports *c, const Source *s, double t)
     return line_of(c, s, t) + carried(c, s, c->now) - carried(c, s, c->start);
 }
 
-/* Whether a difference over so long tells of a slope. */
+/* Whether a difference over so long tells of a slope. One event after another tells that the slope
+   is wrong. */
 static int is_telling(const Ports *c, double h)
 {
-    return h > SHORT * c->after_jump && !c->met;
+    return h > SHORT * c->after_jump && (!c->met || c->met_before);
 }
 
+/* Some FMUs tell no slope before their first step. */
 static double rate_of(const Ports *c, const Origin *from)
 {
-    return from->slope == HELD    ? 0.0
-           : from->slope == KNOWN ? c->before[from->slope_place]
-                                  : c->rates[from->place];
+    const double known = from->slope == KNOWN ? c->before[from->slope_place] : NAN;
+    return from->slope == HELD ? 0.0 : isfinite(known) ? known : c->rates[from->place];
 }
 
 /* ngspice integrates a source by the trapezoidal rule. Where the FMU tells the slope, the integral of
@@ -319,6 +320,7 @@ static void begin_exchange(Ports *c)
     memcpy(c->start, c->now, (size_t)c->n_saved * sizeof *c->start);
     memset(c->charges, 0, (size_t)c->n_saved * sizeof *c->charges);
     c->origin = time;
+    c->met_before = c->met;
     c->met = 0;
     c->end = c->macro_step > 0.0 ? fmin(time + c->macro_step, c->jump) : -INFINITY;
     if (c->macro_step > 0.0 && time < c->duration - ON_TIME)
@@ -366,8 +368,9 @@ static double accepted(Ports *c, double time, double next_step)
     double sum = 0.0;
     for (int64_t k = 0; k < c->n_saved; k++)
         sum += c->now[k];
-    for (int64_t k = 0; k < c->n_outputs; k++)
-        sum += c->outputs[k];
+    for (const Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
+        for (int64_t k = 0; k < s->width - s->n_output_slopes; k++)
+            sum += s->row[k];
     if (!isfinite(sum)) {
         c->told = time;
         c->status = NOT_FINITE;

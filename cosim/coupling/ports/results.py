@@ -44,6 +44,10 @@ def joined(
     known = {w: log[:, 1 + len(run.plan.names) + k] for k, w in enumerate(run.deck.words)}
     values, without = measured(run.deck.measures, log[:, 0], known)
     summary |= values
+    length = scene.run.duration - scene.run.settle
+    for source, times, power in _powers(scene, signals):
+        mean = _numbers(scene.run.settle, times, power, True)["mean"]
+        summary |= {f"{source}.power": mean, f"{source}.energy": mean * length}
     summary |= {
         "circuit_steps": run.steps,
         "circuit_rejected": run.state.attempts - run.steps,
@@ -73,6 +77,23 @@ def _signals(run: Run) -> Iterator[Signal]:
         yield name, "V" if kind == "v" else "A", log[:, 0], log[:, 1 + k], True
     for k, words in enumerate(run.plan.words):
         yield words, unit(words), log[:, 0], log[:, 1 + len(run.plan.names) + k], True
+
+
+def _powers(scene: Scene, signals: list[Signal]) -> Iterator[tuple[str, Array, Array]]:
+    """Where an FMU gives a voltage source its value and takes its current: the source, times (s)
+    and the power (W) that the circuit gives to the FMU there."""
+    known = {name: (times, values) for name, _, times, values, _ in signals}
+    currents = {
+        ("".join(port.probe.lower().split()), str(port.to).partition(".")[0]): port.probe
+        for port in scene.port
+        if port.probe is not None
+    }
+    for port in scene.port:
+        source, fmu = port.source or "", str(port.origin).partition(".")[0]
+        probe = currents.get((f"i({source.lower()})", fmu))
+        if source and probe is not None:
+            times, voltage = known[source]
+            yield source, times, voltage * known[probe][1]
 
 
 def _at(signal: Signal, at: Array) -> Array:
