@@ -304,7 +304,7 @@ parameters = { J = 1e-3, B = 1.0 }
 [[fmu]]
 name = "b"
 file = "Three.fmu"
-parameters = { J = 1e-3, B = 1.0 }
+parameters = { J = 1e-3, B = 1.0, "x[0]" = 0.5, "x[1]" = -0.5 }
 [[port]]
 from = "drive"
 source = "Vin"

@@ -6,7 +6,8 @@
    probe what the circuit has computed, and of another FMU what that has computed if it has stepped
    already, else a line. So an explicit exchange is sequential, circuit first. Where steps are
    repeated, each attempt of ngspice is a step of the FMUs too, from their saved state, and the next
-   attempt has other values at its end until both agree. */
+   attempt has other values at its end until both agree. What an FMU feeds through the circuit itself
+   carries then, in a source beside the one that the FMU feeds, so that both agree at once. */
 
 #include "loop.h"
 
@@ -296,7 +297,8 @@ static void learn(Ports *c)
             fmu_failed(c, s);
             return;
         }
-        t->gain = t->scale * (c->outputs[t->output] - c->before[t->output]) / nudge;
+        const double gain = t->scale * (c->outputs[t->output] - c->before[t->output]) / nudge;
+        t->gain = isfinite(gain) ? gain : 0.0;
         *t->input = given;
         memcpy(c->outputs, c->before, (size_t)c->n_outputs * sizeof *c->outputs);
         if (!fmu_restore(s->fmu, s->restore, s->state))

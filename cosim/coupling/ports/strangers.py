@@ -163,8 +163,9 @@ class Stranger:
         made = None
         try:
             made = INTERFACES[self.version](self.loaded)
+            arrays: dict[str, list[Any]] = {}
             for name, value in parameters.items():
-                self._set(made, name, value)
+                self._set(made, name, value, arrays)
             made.initialise()
         except BadInput:
             raise
@@ -173,7 +174,8 @@ class Stranger:
             raise self.bad(f"the FMU cannot be initialised{said}") from error
         return made
 
-    def _set(self, made: Interface, name: str, value: Any) -> None:
+    def _set(self, made: Interface, name: str, value: Any, arrays: dict[str, list[Any]]) -> None:
+        """Set one, or an element of an array; ``arrays`` has those that were set before."""
         where = f"[[fmu]] parameters {name} = {shown(value)}"
         text = isinstance(value, str)
         if text:
@@ -183,7 +185,7 @@ class Stranger:
         found, place = self.find(name, "input" if is_input else "parameter", where)
         if found.variability == "constant":
             raise self.bad(f"{where}: it is a constant")
-        values = [*found.start]
+        values = arrays.setdefault(found.name, [*found.start])
         values[place] = _allowed(found, value, where, self)
         kind = found.type if self.version == 3 else _AS_2.get(found.type, found.type)
         kind = "Int64" if kind == "Enumeration" else kind
