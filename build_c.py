@@ -206,7 +206,10 @@ def compiler_version() -> str:
 def link(inputs: list[Path], target: Path, *flags: str) -> None:
     """Make a program, or with ``-shared`` a library, of objects or C files."""
     sources = map(str, inputs)
-    _run(*compiler(), *FLAGS, *hardening(), *sources, "-o", str(target), *flags, "-lm")
+    # A library of macOS has its own name inside: not where it was made.
+    named = SYSTEM == "darwin" and "-shared" in flags
+    name = (f"-Wl,-install_name,@rpath/{target.name}",) if named else ()
+    _run(*compiler(), *FLAGS, *hardening(), *sources, "-o", str(target), *flags, *name, "-lm")
 
 
 def _link_here(files: list[Path], target: Path, *flags: str) -> None:

@@ -8,6 +8,7 @@
 zig compiles for all of them on one machine, and the same sources give the same bytes.
 """
 
+import gzip
 import hashlib
 import os
 import shutil
@@ -61,6 +62,7 @@ def main() -> None:
         with tarfile.open(sdist) as archive:
             archive.extractall(work, filter="data")
         sources = sdist.with_name(sdist.name.removesuffix(".tar.gz"))
+        pack(sources, sdist)
         wheels = {}
         for platform in PLATFORMS:
             print(f"{platform.name}: compiling, and making the wheel", flush=True)
@@ -74,6 +76,22 @@ def main() -> None:
     (DIST / "SHA256SUMS").write_text("".join(sums))
     for path in made:
         print(f"{path.stat().st_size:9d}  dist/{path.name}")
+
+
+def pack(folder: Path, target: Path) -> None:
+    """A tar file of a folder, with nothing in it of when, where and by whom it was made."""
+
+    def plain(info: tarfile.TarInfo) -> tarfile.TarInfo:
+        info.mtime, info.uid, info.gid, info.uname, info.gname = int(DATE), 0, 0, "", ""
+        info.mode = 0o755 if info.isdir() or info.mode & 0o100 else 0o644
+        return info
+
+    with (
+        target.open("wb") as file,
+        gzip.GzipFile("", "wb", fileobj=file, mtime=0) as packed,
+        tarfile.open(fileobj=packed, mode="w") as archive,
+    ):
+        archive.add(folder, folder.name, filter=plain)
 
 
 def build(kind: str, folder: Path, out: Path, *options: str, **environment: str) -> None:

@@ -158,6 +158,16 @@ def test_locks_are_hashed_agree_and_name_no_registry() -> None:
     assert pins["test"].items() <= pins["dev"].items()
 
 
+def test_the_recipe_of_conda_needs_what_the_package_needs() -> None:
+    project = tomllib.loads((build_c.ROOT / "pyproject.toml").read_text())["project"]
+    recipe = (build_c.ROOT / "recipe/recipe.yaml").read_text()
+    assert f'version: "{project["version"]}"' in recipe and f"name: {project['name']}\n" in recipe
+    run = recipe.partition("  run:\n")[2].partition("    - if:")[0].replace("-base ", " ")
+    needed = [f"python{project['requires-python']}", *project["dependencies"]]
+    found = {line.strip(" -").replace(" ", "").lower() for line in run.splitlines()}
+    assert found == {one.lower() for one in needed}
+
+
 def test_actions_are_pinned() -> None:
     """By the hash of a commit, with its version beside it; no checkout keeps a password."""
     for path in (build_c.ROOT / ".github/workflows").glob("*.yml"):
