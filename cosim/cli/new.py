@@ -15,10 +15,10 @@ def _new(file: Path, kind: str = "machine", base: str = "paper-limited") -> None
     from cosim.errors import BadInput, plain
     from cosim.files.atomic import write_text
     from cosim.files.resources import circuits
+    from cosim.scene.describe import schema
     from cosim.scene.loading import list_scenes, load
     from cosim.scene.messages import suggestion
     from cosim.scene.model import to_toml
-    from cosim.scene.schema import schema
 
     name = plain(str(file))
     if file.suffix != ".toml" or not file.stem.replace("-", "").replace("_", "").isalnum():

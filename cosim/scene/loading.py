@@ -121,7 +121,7 @@ def _layers(source: str) -> list[_Layer]:
     name = re.sub(r"[^\w.+-]+", "-", path.stem).strip("-.+")[:64]
     data.setdefault("name", name or "scene")
     _check_names(data, origin)
-    own = [circuits() / "examples", *compiled_fmus()] if source in builtin else []
+    own = [circuits() / "ports", *compiled_fmus()] if source in builtin else []
     _find_files(data, path.parent, *own)
     base = data.pop("base", None)
     if base is None:
@@ -292,7 +292,7 @@ def _find_files(tables: dict[str, Any], folder: Path, *more: Path) -> None:
 
     def found(file: str) -> str:
         there = (place / file for place in (folder, *more))
-        return os.path.abspath(next((path for path in there if path.exists()), folder / file))
+        return os.path.abspath(next(filter(os.path.exists, there), folder / file))
 
     for table, key in PATHS:
         path = tables.get(table, {}).get(key)

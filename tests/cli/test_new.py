@@ -9,8 +9,8 @@ import pytest
 
 from cosim.cli.main import main
 from cosim.scene import list_scenes, load
+from cosim.scene.describe import schema
 from cosim.scene.loading import groups
-from cosim.scene.schema import schema
 from cosim.toolchain.processes import in_place
 
 LIBRARY = Path(load.__code__.co_filename).with_name("library")

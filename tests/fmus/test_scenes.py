@@ -16,7 +16,7 @@ from tests.helpers import spice
 
 def circuit(name: str) -> str:
     """The netlist of a scene without its title, analysis and end."""
-    lines = (circuits() / "examples" / name).read_text().splitlines()
+    lines = (circuits() / "ports" / name).read_text().splitlines()
     return "\n".join(line for line in lines[1:] if not line.startswith((".tran", ".end")))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import cosim
 from cosim.cli.main import main
-from cosim.studies.study import Option, Study, studies
+from cosim.studies.study import SHOW, Option, Study, studies
 
 FOLDER = Path(cosim.__file__).parent / "studies"
 EVERY = pytest.mark.parametrize("study", studies(), ids=lambda study: study.name)
@@ -24,7 +24,8 @@ def test_what_is_declared_is_what_the_function_takes(study: Study) -> None:
     """Its parameters, and the defaults that the help names."""
     parameters = inspect.signature(study.function).parameters
     assert study.function.__doc__
-    given = {option.argument for option in study.options if not option.prints}
+    options = (option for option in study.options if option is not SHOW and not option.prints)
+    given = {option.argument for option in options}
     given |= {"out"} if study.command and study.saves else set()
     given |= set(study.tells)
     assert given <= set(parameters)
