@@ -51,7 +51,7 @@ def kept(out: Path, *, failed: bool = False) -> int:
 @pytest.mark.parametrize(
     ("scene", "points", "kills"),
     [
-        (THREADS, 3, 1),
+        (THREADS, 5, 1),
         pytest.param(PROCESSES, 4, 1, marks=pytest.mark.slow),
         *(pytest.param(scene, 10, 6, marks=pytest.mark.slow) for scene in SHORT),
     ],
@@ -161,7 +161,7 @@ sys.exit(main(sys.argv[1:]))
 def test_a_pause_spoils_no_point(whole: bool, tmp_path: Path) -> None:
     """Stopped for longer than a point may work without progress, with and without the parent."""
     command = [
-        "sweep", "paper", "--over=friction.mu_k=0.4,0.5", "--set=run.duration=5",
+        "sweep", "paper", "--over=friction.mu_k=0.4,0.5", "--set=run.duration=12",
         "--workers=2", f"--out={tmp_path}",
     ]  # fmt: skip
     process = subprocess.Popen(
