@@ -53,10 +53,10 @@ def peak(*overrides: str) -> float:
 @pytest.mark.parametrize(
     ("model", "durations", "rows"),
     [
-        ("ideal", (4, 40), 5e-5),
+        ("ideal", (2, 20), 5e-5),
         pytest.param("limited", (20, 200), 5e-5, marks=pytest.mark.slow),
         pytest.param("amplifier", (10, 100), 5e-5, marks=pytest.mark.slow),
-        ("amplifier", (2, 30), 5e-4),
+        ("amplifier", (2, 20), 5e-4),
     ],
 )
 def test_memory_is_bounded(model: str, durations: tuple[float, float], rows: float) -> None:
