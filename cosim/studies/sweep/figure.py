@@ -16,7 +16,7 @@ from cosim.arrays import Array
 from cosim.files.picture import Picture
 from cosim.scene import firmware
 from cosim.studies.sweep.dataset import FAILURE, POINT, swept
-from cosim.studies.sweep.report import setting
+from cosim.studies.sweep.report import at, fastest, setting
 from cosim.waveforms.quantities import label
 
 STAYS = 0.05e-3
@@ -71,7 +71,12 @@ def draw(data: xr.Dataset, title: str) -> Picture:
         words += f"; hatched: the part stays (below {STAYS * 1e3:g} mm/s)"
         if POINT not in data.dims:
             words += "; dots: rugged, neighbours tell nothing of it"
-    figure.suptitle(f"{title}: {words}", fontsize=12)
+    best = [
+        f"fastest {way}, {data['v_average'].values.ravel()[place] * 1e3:+.3g} mm/s, at "
+        f"{at(data, place, 4)}"
+        for way, place in fastest(data)[:1]
+    ]
+    figure.suptitle(f"{title}: {', '.join(best) or 'the part stays'}\n{words}", fontsize=12)
     return figure
 
 
@@ -107,9 +112,17 @@ def _curves(figure: Figure, data: xr.Dataset, name: str) -> None:
         values = _values(data, quantity).values
         axis.plot(data[name].values, values, color="#1f6fb2", marker=".", lw=1.3)
         _over_key(axis, data, name)
+        if _are_decades(data[name].values):
+            axis.set_xscale("log")
         axis.set(ylabel=f"[{quantity.unit}]")
         _head(axis, quantity, values)
     figure.axes[0].axhline(0.0, color="0.3", lw=0.8)
+
+
+def _are_decades(values: Array) -> bool:
+    """Whether values were chosen by their ratios."""
+    steps = np.diff(np.log(np.sort(values))) if np.min(values) > 0.0 else np.array([])
+    return bool(len(steps) > 2 and values.max() > 20.0 * values.min() and np.ptp(steps) < 0.2)
 
 
 def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from cosim.errors import SimulationFailed
+from cosim.scene.tables import KNOBS
 from cosim.studies.sweep.dataset import FAILURE, JUDGED, swept
 from cosim.waveforms.quantities import with_unit
 
@@ -24,24 +25,27 @@ def table(data: xr.Dataset) -> str:
     count = data[FAILURE].size
     name = str(data.attrs["title"]).removeprefix("Sweep of ")
     lines = [f"{name}: {count} points, {sum(reasons.values())} failed"]
-    if "v_average" in data and np.isfinite(data["v_average"].values).any():
-        v = data["v_average"].values
-        for way, place in (("up", np.nanargmax(v)), ("down", np.nanargmin(v))):
-            speed = v.ravel()[place]
-            if (speed > 0) == (way == "up"):
-                judged = ""
-                if JUDGED in data:
-                    judged = f" (by the FMU {data[JUDGED].values.ravel()[place] * 1e3:+.3f})"
-                lines.append(
-                    f"  fastest {way:<5}{speed * 1e3:+10.3f} mm/s{judged} at {_at(data, place)}"
-                )
-        lines += _judgement(data) if JUDGED in data else []
+    for way, place in fastest(data):
+        speed, judged = data["v_average"].values.ravel()[place], ""
+        if JUDGED in data:
+            judged = f" (by the FMU {data[JUDGED].values.ravel()[place] * 1e3:+.3f})"
+        lines.append(f"  fastest {way:<5}{speed * 1e3:+10.3f} mm/s{judged} at {at(data, place)}")
+    lines += _judgement(data) if JUDGED in data else []
     lines += [f"  {n} failed: {reason}" for reason, n in reasons.most_common(MOST_REASONS)]
     if len(reasons) > MOST_REASONS:
         lines.append(
             f"  and for {len(reasons) - MOST_REASONS} more reasons: see {FAILURE} in sweep.nc"
         )
     return "\n".join(lines)
+
+
+def fastest(data: xr.Dataset) -> list[tuple[str, np.intp]]:
+    """The points at which the part is fastest "up" and "down", where it goes that way."""
+    v = data["v_average"].values if "v_average" in data else np.array(np.nan)
+    if not np.isfinite(v).any():
+        return []
+    ends = ("up", np.nanargmax(v)), ("down", np.nanargmin(v))
+    return [(way, place) for way, place in ends if (v.ravel()[place] > 0) == (way == "up")]
 
 
 def check(data: xr.Dataset) -> None:
@@ -65,15 +69,21 @@ def _judgement(data: xr.Dataset) -> list[str]:
         f"{np.median(error) * 100:.2g} %, beyond {BEYOND * 100:g} % at "
         f"{(error > BEYOND).mean() * 100:.3g} % of them (of v_average, at least {LEAST * 1e3:g} "
         "mm/s)",
-        f"  furthest off {error.max() * 100:.2g} % at {_at(data, worst)}",
+        f"  furthest off {error.max() * 100:.2g} % at {at(data, worst)}",
     ]
 
 
-def _at(data: xr.Dataset, place: np.intp) -> str:
-    """The settings of a point by its number."""
+def at(data: xr.Dataset, place: np.intp, digits: int = 6) -> str:
+    """The settings of a point by its number; of knobs also what they stand for."""
     v = data["v_average"]
     point = v[dict(zip(v.dims, np.unravel_index(place, v.shape), strict=True))]
-    return ", ".join(setting(point[name]) for name in swept(data))
+    found = [setting(point[name], digits) for name in swept(data)]
+    meant = [
+        f"{name} {with_unit(float(value), value.units, 4)}"
+        for name, value in point.coords.items()
+        if str(name) in KNOBS.values() and "key" not in value.attrs
+    ]
+    return ", ".join(found) + (f" ({', '.join(meant)})" if meant else "")
 
 
 def setting(value: xr.DataArray, digits: int = 6) -> str:
