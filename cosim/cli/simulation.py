@@ -100,9 +100,9 @@ def _export_options() -> list[Option]:
 
     known = ", ".join(f"{one.name} ({one.help})" for one in formats().values())
     return [
-        Option("run", "a folder that cosim run wrote", "DIR", Path),
+        Option("run", "a folder that cosim run or sweep wrote", "DIR", Path),
         Option(
-            *("--as", f"{known}; repeatable", "FORM,..."),
+            *("--as", f"{known}; of a sweep csv, parquet, mat; repeatable", "FORM,..."),
             parameter="forms",
             many="repeat",
             needed=True,
@@ -113,11 +113,17 @@ def _export_options() -> list[Option]:
 def _export(run: Path, forms: list[str], out: Path | None = None) -> None:
     from cosim.waveforms import formats
 
-    chosen = formats.parse(forms)
-    result = formats.read(run)
     folder = out or run
-    with writable(folder):
-        files = formats.export(result, chosen, folder)
+    if (run / "sweep.nc").exists():
+        from cosim.studies.sweep import export
+
+        with writable(folder):
+            files = export.export(run, forms, folder)
+    else:
+        chosen = formats.parse(forms)
+        result = formats.read(run)
+        with writable(folder):
+            files = formats.export(result, chosen, folder)
     width = max(map(len, files))
     print(f"Written to {folder}:")
     for name, note in files.items():

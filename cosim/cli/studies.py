@@ -1,6 +1,8 @@
 """The commands that studies are."""
 
+import sys
 from contextlib import nullcontext
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -45,9 +47,15 @@ def _run(study: Study, out: Path | None = None, **asked: Any) -> None:
             asked[option.argument] = loaded(option.read)(asked.get(option.argument, []))
     known = {option.argument: option.default for option in study.options} | asked
     bar = progress_bar(title, known.get(study.total), study.unit) if study.tells else nullcontext()
+    steps = _Steps(study.unit)
     with writable(out, shared=not study.writes), bar as seen:
-        shows = {name: partial(_show, seen, means) for name, means in study.tells.items()}
-        found = study.function(**asked, **shows, **({"out": out} if study.saves else {}))
+        shows = {name: partial(_show, seen, steps, means) for name, means in study.tells.items()}
+        try:
+            found = study.function(**asked, **shows, **({"out": out} if study.saves else {}))
+        except KeyboardInterrupt:
+            if study.saves and steps.done:
+                print(f"cosim: {steps} kept in {out}; the same command goes on.", file=sys.stderr)
+            raise
         results = found if isinstance(found, tuple) else (found,)
         for result in () if study.saves else results:
             result.save(out)
@@ -66,9 +74,24 @@ def _run(study: Study, out: Path | None = None, **asked: Any) -> None:
         loaded(study.check)(found)
 
 
-def _show(bar: Any, means: Told, *told: Any) -> None:
+@dataclass
+class _Steps:
+    """How far a study is; a bar that is not shown does not count."""
+
+    unit: str
+    done: int = 0
+    total: int | None = None
+
+    def __str__(self) -> str:
+        of = f" of {self.total}" if self.total else ""
+        return f"{self.done}{of} {self.unit}{'s' * (self.done > 1 or bool(self.total))} are"
+
+
+def _show(bar: Any, steps: _Steps, means: Told, *told: Any) -> None:
     """Move the bar as ``means`` makes of what was ``told``."""
     done, total, words = means(*told)
+    steps.done = steps.done + 1 if done is None else done
+    steps.total = total or steps.total
     if total is not None and bar.total is None:
         bar.reset(total)
         bar.initial = done or 0  # steps of an earlier study tell nothing of the rate

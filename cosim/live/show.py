@@ -7,7 +7,6 @@ A file begins with the page, its script and, of long runs, lowest and highest va
 import json
 import re
 from base64 import b64encode
-from io import BytesIO
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from cosim.live.page import page, script_of
 from cosim.scene import load
 from cosim.waveforms import formats
 from cosim.waveforms.report import table
-from cosim.waveforms.storage import LARGEST, read_netcdf
+from cosim.waveforms.storage import LARGEST, read_netcdf, read_sweep
 
 BLOCK = 1 << 15
 BUCKET = 256
@@ -78,15 +77,8 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
 
 
 def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
-    import xarray as xr
-
-    path = folder / "sweep.nc"
-    content = BytesIO(reader.read(path, LARGEST))
-    try:
-        data = xr.load_dataset(content, engine="scipy")
-        grid = data["failure"]
-    except Exception as error:  # there is little that scipy does not raise on a damaged file
-        raise BadInput(f"{plain(str(path))}: not a whole sweep ({plain(str(error))}).") from None
+    data = read_sweep(folder)
+    grid, path = data["failure"], folder / "sweep.nc"
     swept = [str(name) for name in data.coords if "key" in data[name].attrs]
     if grid.size > MOST_POINTS:
         raise BadInput(f"{plain(str(path))}: a page shows at most {MOST_POINTS} points.")

@@ -1,18 +1,23 @@
 """Waveforms as files: CSV and netCDF, each written whole or not at all."""
 
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 from struct import pack
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
+from cosim.files import reader
 from cosim.files.atomic import whole
 from cosim.files.reader import opened
 from cosim.files.spill import blocks
 from cosim.waveforms.columns import about, netcdf_name
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _CSV_ROWS = 1024
 
@@ -124,3 +129,17 @@ def _text(value: object) -> str:
     if not all(char.isprintable() or char in "\n\t" for char in text):
         raise ValueError("a text has control characters")
     return text
+
+
+def read_sweep(folder: Path) -> "xr.Dataset":
+    """The dataset in a folder that ``cosim sweep`` wrote. Raises BadInput."""
+    import xarray as xr
+
+    path = folder / "sweep.nc"
+    content = BytesIO(reader.read(path, LARGEST))
+    try:
+        data = xr.load_dataset(content, engine="scipy")
+        data["failure"]
+    except Exception as error:  # there is little that scipy does not raise on a damaged file
+        raise BadInput(f"{plain(str(path))}: not a whole sweep ({plain(str(error))}).") from None
+    return data

@@ -9,9 +9,11 @@ from typing import Any
 
 import netCDF4
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from matplotlib.colors import Normalize
+from scipy.io import loadmat
 
 from cosim.cli.main import main
 from cosim.errors import BadInput
@@ -286,3 +288,23 @@ def test_a_kill_leaves_no_older_figure(tmp_path: Path, monkeypatch: pytest.Monke
     with pytest.raises(ZeroDivisionError):
         sweep("held", {"coil.count": [1]}, {"run.duration": 0.01}, out=tmp_path, workers=1)
     assert {path.name for path in tmp_path.iterdir()} == {"sweep.nc", "sweep.sqlite"}
+
+
+def test_a_sweep_in_other_programs_forms(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What pandas and SciPy read back is what the dataset has."""
+    data = sweep(
+        load("held", ["run.duration=0.02"]),
+        {"friction.mu_s": [0.72, 0.8], "drive.pot_max": [0.4, 0.5, 0.6]},
+        out=tmp_path,
+    )
+    assert main(["export", str(tmp_path), "--as", "csv,mat"]) == 0
+    assert "6 points" in capsys.readouterr().out
+    rows = pd.read_csv(tmp_path / "sweep.csv")
+    assert rows["z_surface_pp [m]"].to_numpy() == pytest.approx(data.z_surface_pp.values.ravel())
+    assert rows["pot_max"].tolist() == [0.4, 0.5, 0.6] * 2
+    found = loadmat(tmp_path / "sweep.mat", squeeze_me=True, struct_as_record=False)["sweep"]
+    assert found.stick_fraction.tolist() == data.stick_fraction.values.ravel().tolist()
+    assert main(["export", str(tmp_path), "--as", "wav"]) == 2
+    assert 'of a sweep "wav" must be one of csv, parquet, mat' in capsys.readouterr().err

@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import re
 import signal
 import sqlite3
 import subprocess
@@ -104,8 +105,10 @@ def test_interrupted(scene: str, tmp_path: Path) -> None:
     workers = psutil.Process(process.pid).children()
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=300)
-    assert process.returncode == 130 and said.splitlines()[-1] == "cosim: interrupted."
-    assert kept(tmp_path) >= 20
+    *before, last = said.splitlines()
+    assert process.returncode == 130 and last == "cosim: interrupted."
+    told = re.search(r"cosim: (\d+) of 1000 points are kept in .*the same command", before[-1])
+    assert told is not None and 20 <= int(told[1]) <= kept(tmp_path)
     _, alive = psutil.wait_procs(workers, timeout=120)
     assert not alive
 

@@ -1,0 +1,47 @@
+"""A finished sweep in the forms of other programs: a row for each point, SI."""
+
+from io import BytesIO
+from pathlib import Path
+
+from cosim.errors import BadInput, plain
+from cosim.files.atomic import whole
+from cosim.waveforms.storage import read_sweep
+
+FORMS = ("csv", "parquet", "mat")
+
+
+def export(folder: Path, lists: list[str], out: Path) -> dict[str, str]:
+    """Write the points of a sweep as ``sweep.csv``, ``.parquet`` or ``.mat``; the name of each file
+    with a line on what it holds. Raises BadInput."""
+    names = [name.strip() for text in lists for name in text.split(",")]
+    for name in names:
+        if name not in FORMS or names.count(name) > 1:
+            raise BadInput(
+                f'--as: of a sweep "{plain(name)}" must be one of {", ".join(FORMS)}, once.'
+            )
+    data = read_sweep(folder)
+    units = {str(name): str(data[name].attrs.get("units", "")) for name in data.variables}
+    frame = data.to_dataframe().reset_index()
+    if data.failure.ndim == 0:
+        frame = frame.drop(columns="index")
+    files, note = {name: BytesIO() for name in names}, f"{len(frame)} points, SI"
+    for name, file in files.items():
+        if name == "csv":
+            heads = {each: f"{each} [{units[each]}]" if units.get(each) else each for each in frame}
+            frame.rename(columns=heads).to_csv(file, index=False)
+        elif name == "mat":
+            from scipy.io import savemat
+
+            columns = {each: frame[each].to_numpy() for each in frame}
+            savemat(
+                file, {"sweep": columns, "units": units}, long_field_names=True, oned_as="column"
+            )
+        else:
+            try:
+                frame.to_parquet(file, index=False)
+            except ImportError:
+                raise BadInput("--as parquet needs the package pyarrow: install it.") from None
+    for name, file in files.items():
+        with whole(out / f"sweep.{name}") as temporary:
+            temporary.write_bytes(file.getvalue())
+    return {f"sweep.{name}": note for name in names}
