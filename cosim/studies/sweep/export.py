@@ -27,7 +27,10 @@ def export(folder: Path, lists: list[str], out: Path) -> dict[str, str]:
     files, note = {name: BytesIO() for name in names}, f"{len(frame)} points, SI"
     for name, file in files.items():
         if name == "csv":
-            heads = {each: f"{each} [{units[each]}]" if units.get(each) else each for each in frame}
+            heads = {
+                each: f"{each} [{units[each]}]" if units.get(each, "1") != "1" else each
+                for each in frame
+            }
             frame.rename(columns=heads).to_csv(file, index=False)
         elif name == "mat":
             from scipy.io import savemat
