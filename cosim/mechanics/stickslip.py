@@ -204,7 +204,7 @@ def _settings(scene: Scene) -> _Settings:
     often the drive alone, and then the other tables are the same objects."""
     tables = (scene.circuit, scene.coil, scene.mechanics, scene.friction)
     of = (*tables, scene.drive.phase_deg is None)
-    for known, settings in _last:
+    for known, settings in tuple(_last):  # another thread may put its own there meanwhile
         if all(map(is_, known, of)):
             return settings
     reals, integers = parameters(scene)

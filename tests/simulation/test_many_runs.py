@@ -1,10 +1,13 @@
 """Many runs in one process: equal to the bit, and without a leak."""
 
 import gc
+import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
+from cosim.mechanics import stickslip
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 
@@ -62,3 +65,18 @@ def test_a_run_leaks_less_than_1_kB(model: str, runs: int) -> None:
         simulate(scene)
     gc.collect()
     assert (resident() - before) * 1024 / runs < 1.0, "kB a run"
+
+
+def test_threads_that_alternate_scenes_disturb_no_other() -> None:
+    """Each finds the parameters of its own scene, however often it is interrupted."""
+    scenes = [load("held", {"mechanics.part_mass": mass}) for mass in (0.01, 0.02, 0.03, 0.04)]
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as threads:
+            asked = [scenes[k % 4] for k in range(2000)]
+            found = [*threads.map(stickslip._settings, asked)]
+    finally:
+        sys.setswitchinterval(usual)
+    for scene, ((names, values), _) in zip(asked, found, strict=True):
+        assert dict(zip(names, values, strict=True))["part_mass"] == scene.mechanics.part_mass
