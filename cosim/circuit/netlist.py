@@ -74,10 +74,10 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
     """
     path, words = path_of(scene), _words(scene)
     if scene.circuit.netlist is None:
-        title, top = _packaged(path)
+        (title, top), every = _packaged(path), [*dict.fromkeys(words.values())]
     else:  # may have changed since it was read last
         title, top, every = _checked(path, scene.renamed, tuple(words.values()))
-        words |= {each: each for each in every[len(words) :]}
+        words |= {each: each for each in every if each not in words}
     elements = top.elements
     external = _external_sources(elements, scene.renamed)
     present = {node for element in elements for node in element.nodes}
@@ -99,8 +99,8 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
     saved |= {f"v({name})": f"v({name})" for name in OPTIONAL if name in present}
     if companion:
         saved[MOTIONAL] = MOTIONAL
-    read = zip(words, reading(list(words.values())), strict=True)
-    saved |= {name: vector for name, (vector, _) in read}
+    read = dict(zip(every, reading(every), strict=True))
+    saved |= {name: read[word][0] for name, word in words.items()}
     run, circuit = scene.run, scene.circuit
     deck += [
         # Without norefvalue it asks for the CPU time at each step, to print how far it is.

@@ -276,7 +276,10 @@ def test_a_netlist_on_the_built_in_mechanics_measures_too(tmp_path: Path) -> Non
     asks = ".meas tran mean AVG i(Vemf) FROM=0.02 TO=0.05\n.print i(Vemf)\n.end\n"
     (tmp_path / "own.cir").write_text(text.replace(".end\n", asks))
     own = {"circuit.model": "file", "circuit.netlist": tmp_path / "own.cir"}
+    own["circuit.save"] = ["v(out)*i(Vemf)", "v(out)"]  # the latter is saved under its name anyway
     result = cosim.run("paper", {**own, "run.duration": 0.05, "run.output_step": 1e-6})
+    power = result.columns["v(out)"] * result.columns["current"]
+    assert result.columns["v(out)*i(Vemf)"] == pytest.approx(power, abs=1e-3 * abs(power).max())
     time, current = result.columns["time"], result.columns["current"]
     late = time >= 0.02
     mean = np.trapezoid(current[late], time[late]) / 0.03
