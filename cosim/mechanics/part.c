@@ -3,7 +3,7 @@
    All forces stand as accelerations, force over the part's mass, m/s^2. law[] holds
        [0] mu_s F_n/m   the most that the surface can do while the part sticks to it
        [1] mu_k F_n/m   what it does while the part slips
-       [2] mu_p F_n/m   friction of the springed plate, against the part's own velocity
+       [2] mu_p F_n/m   friction of the spring-loaded plate, against the part's own velocity
        [3] g            gravity along the motion, downwards
    The surface's velocity is linear between knots (time, v), or part of a sine; a time that is
    repeated is a jump. The knots repeat `periods` times. Every function writes height, velocity and

@@ -4,8 +4,9 @@ The part of mass m is pressed with a constant normal force F_n; the surface's ve
 between knots (time, v), and a time given twice is a jump of it. Coulomb's law is set-valued: the
 part sticks while that needs no more friction than µ_s F_n, |a_surface + g| ≤ µ_s F_n/m, else it
 slips and the surface pulls it with µ_k F_n. So a part that meets the surface and needs between µ_k
-F_n and µ_s F_n sticks, although to slip on would agree with the law too. The springed plate behind
-it may rub with µ_p F_n against the part's own velocity, set-valued at rest. Units: s, m, m/s, m/s².
+F_n and µ_s F_n sticks, although to slip on would agree with the law too. The spring-loaded plate
+behind it may rub with µ_p F_n against the part's own velocity, set-valued at rest. Units: s, m,
+m/s, m/s².
 
 `exact` goes from event to event in closed form. `threshold` and `moreau` step through the time, for
 comparison; `published` is `threshold` as in the simulation of Yako, Nowak, Yuan and Salisbury.
@@ -130,8 +131,8 @@ def slip_budget(
     mu_s: float, force_per_mass: float, gravity: float = 9.81, mu_plate: float = 0.0
 ) -> dict[str, tuple[float, float]]:
     """Between which accelerations of the surface, m/s², a part goes with it that sticks and goes
-    "up" or "down". The springed plate, which rubs against the part's way, helps one side and costs
-    the other: (µ_s ± µ_p) F_n/m -+ g."""
+    "up" or "down". The spring-loaded plate, which rubs against the part's way, helps one side and
+    costs the other: (µ_s ± µ_p) F_n/m -+ g."""
     every = bounds(mu_s, force_per_mass, gravity, mu_plate).reshape(2, 3).tolist()
     return {way: (every[1][k], every[0][k]) for way, k in (("up", 0), ("down", 2))}
 

@@ -1,5 +1,5 @@
-/* The whole chain, current source, coil, ram, surface, part and springed plate, stepped through time
- * for LANES sets of parameters at once: what the search of an identification runs on, and scenes with
+/* The whole chain, current source, coil, ram, surface, part and spring-loaded plate, stepped through
+ * time for LANES sets of parameters at once: what the search of an identification runs on, and scenes with
  * run.solver = "fast". The laws are those of the FMU (fmu/src/physics); tests hold the two together.
  * SI. */
 

@@ -4,7 +4,7 @@ Three forms are read, with commas, semicolons or tabs between the cells:
 
 - words with units: ``time [s]``, ``velocity [mm/s]``, ``current (mA)`` and so on, see ``WORDS``;
 - the columns ``t, xp, zp, vzp, azp, xo, zo, vzo, azo, zs, vzs, azs`` (p the platform, that is the
-  surface; o the part; s the springed plate) among others, as the published trials have them;
+  surface; o the part; s the spring-loaded plate) among others, as the published trials have them;
 - what Tracker (physlets.org/tracker) exports for several tracks: lines that begin with ``#``, a
   line with the tracks' names, and a line ``t x y v_{y} …`` with their columns; y is the height.
 
@@ -66,7 +66,7 @@ UNUSED = {f"{quantity}{letter}" for quantity in ("x", "ax") for letter in BODIES
 TRACKS = {
     "p": ("p", "platform", "surface"),
     "o": ("o", "part", "object"),
-    "s": ("s", "spring", "springed plate", "spring plate"),
+    "s": ("s", "spring", "spring-loaded plate", "spring plate"),
 }
 QUANTITIES = {"y": "z", "z": "z", "vy": "vz", "vz": "vz", "ay": "az", "az": "az"}
 

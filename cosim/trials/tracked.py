@@ -1,4 +1,4 @@
-"""Tracked trials: heights and velocities of surface, part and springed plate from a video.
+"""Tracked trials: heights and velocities of surface, part and spring-loaded plate from a video.
 
 A velocity that is missing, or its whole column, is made by central differences, as Tracker does.
 """

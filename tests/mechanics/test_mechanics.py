@@ -739,7 +739,7 @@ def test_a_lifted_surface_swings_about_its_equilibrium() -> None:
 
 
 @pytest.mark.parametrize(("share", "stays"), [(0.99, True), (-0.99, True), (1.01, False)])
-def test_the_springed_plate_holds_a_lifted_surface(share: float, stays: bool) -> None:
+def test_the_spring_loaded_plate_holds_a_lifted_surface(share: float, stays: bool) -> None:
     """As long as the flexure pulls with no more than the plate's friction."""
     held = 0.18 * 1.0 / 560.0
     with Bench(initial_lift=share * held, mu_plate=0.18, normal_force=1.0) as bench:

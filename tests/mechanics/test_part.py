@@ -82,7 +82,7 @@ def test_slip_is_reversed_without_sticking():
     assert motion.stick_fraction == 0.0
 
 
-def test_the_springed_plate_holds_a_part_that_the_surface_cannot_lift():
+def test_the_spring_loaded_plate_holds_a_part_that_the_surface_cannot_lift():
     # mu_p F/m > mu_k F/m + g: at rest behind a surface that slides either way
     time, speed = [0.0, 0.1, 0.2, 0.2, 0.3], [0.0, 9.0, -9.0, 5.0, 5.0]
     motion = exact(time, speed, mu_plate=0.79, v0=0.0, **FRICTION)
@@ -90,7 +90,7 @@ def test_the_springed_plate_holds_a_part_that_the_surface_cannot_lift():
     assert not motion.z.any()
 
 
-def test_the_springed_plate_brakes_to_rest_and_no_further():
+def test_the_spring_loaded_plate_brakes_to_rest_and_no_further():
     # thrown upwards with no grip on the surface: brakes with g + mu_p F/m, then stays
     friction: dict[str, Any] = {"mu_s": 0.0, "mu_k": 0.0, "force_per_mass": 50.0, "mu_plate": 0.2}
     motion = exact([0.0, 1.0], [7.0, 7.0], v0=3.0, **friction)
@@ -101,7 +101,7 @@ def test_the_springed_plate_brakes_to_rest_and_no_further():
     assert sliding.v[-1] == pytest.approx(-(G - 5.0) * (1 - 3.0 / (G + 5.0)), rel=1e-14)
 
 
-def test_the_springed_plate_and_the_surface_share_the_weight():
+def test_the_spring_loaded_plate_and_the_surface_share_the_weight():
     # Neither holds m g alone; together they do, and a little less of either lets go.
     both: dict[str, Any] = {"mu_s": 0.5, "mu_k": 0.5, "gravity": 10.0}
     held = exact([0.0, 1.0], [0.0, 0.0], force_per_mass=12.5, mu_plate=0.3, **both)

@@ -102,7 +102,7 @@ def check_determined(found: TrialResults) -> None:
     assert f"means over the {len(told)} of {len(rows)} trials" in said
 
 
-def test_the_fit_with_the_springed_plate(fitted: TrialResults):
+def test_the_fit_with_the_spring_loaded_plate(fitted: TrialResults):
     check_bounds(fitted)
 
 

@@ -72,7 +72,7 @@ function drawMachine(canvas, now, values, lit) {
   });
   box(ink, part.x - 2, y(zs) - 62, 4, 124, colour(of));
 
-  // The springed plate that presses the part.
+  // The spring-loaded plate that presses the part.
   const press = part.x + part.w, end = left + wide - 30;
   box(ink, press, middle - 46, 8, 92, body, line);
   spring(ink, [press + 8, middle], [end, middle], 4, steel);

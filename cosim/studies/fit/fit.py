@@ -75,8 +75,8 @@ def fit(
 
     ``forces`` is a file with what is known of normal forces (:mod:`cosim.studies.fit.forces`), or
     “published”. The normal forces follow from ``mu_k``, or, “free”, it follows from bounds of
-    forces. The springed plate moves as tracked, or rests where it was not; without ``plate`` it has
-    no friction.
+    forces. The spring-loaded plate moves as tracked, or rests where it was not; without ``plate``
+    it has no friction.
 
     ``evaluate="published"`` takes the paper's µ_k and forces instead, by the authors' procedure,
     with the exact solution or with their scheme (``solver``). Raises BadInput.

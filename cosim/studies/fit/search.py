@@ -87,7 +87,7 @@ class Fit:
 
 def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> Fit:
     """The likeliest law, each trial's µ_k F_n [weights] within its limits; without ``plate`` the
-    springed plate has no friction."""
+    spring-loaded plate has no friction."""
     coarse = np.geomspace(*FRICTIONS, COARSE)
     slides = [slides_of(trial, *_laws(coarse, RATIOS)) for trial in trials]
     ratios = RATIOS if plate else np.zeros(1)

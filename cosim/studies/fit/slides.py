@@ -1,11 +1,11 @@
 """The part's path while it slides on the tracked surface, and how likely a law makes it.
 
 While the part slides its acceleration is known but for the law: ±µ_k F_n/m − g, and µ_p F_n/m
-against its velocity over the springed plate. Before and after, it moves with the surface, smoothly.
-The tracked surface tells between which frames a slide begins and ends, and its sign; the instants
-between the frames are not known, least of all where an impact begins the slide. So all instants
-count, each by the likelihood of the part's heights about the slide (the marginal likelihood), and
-the surface's motion between the frames need not be reconstructed.
+against its velocity over the spring-loaded plate. Before and after, it moves with the surface,
+smoothly. The tracked surface tells between which frames a slide begins and ends, and its sign; the
+instants between the frames are not known, least of all where an impact begins the slide. So all
+instants count, each by the likelihood of the part's heights about the slide (the marginal
+likelihood), and the surface's motion between the frames need not be reconstructed.
 
 Where part and surface move together the acceleration is a random walk, as in a smoothing spline;
 source: G. Wahba, *Spline Models for Observational Data*, SIAM 1990, chapter 1. Units: s, m.
@@ -227,7 +227,7 @@ def _walk(x: Array, y: Array) -> Array:
 
 
 def plate_velocity(trial: Trial) -> Array:
-    """Of the springed plate [m/s] at the frames, as tracked, or 0 where it was not."""
+    """Of the spring-loaded plate [m/s] at the frames, as tracked, or 0 where it was not."""
     if trial.plate is None or not np.isfinite(trial.plate.v).any():
         return np.zeros(len(trial.time))
     known = np.isfinite(trial.plate.v)

@@ -1,7 +1,8 @@
 """A tracked trial made of a run: the header, units, sampling and digits of the published trials.
 
 The camera is that of `cosim compare`, with the shutter of the run's scene and without noise. What
-the model holds at rest is written as resting: platform and part across, and the springed plate.
+the model holds at rest is written as resting: platform and part across, and the spring-loaded
+plate.
 """
 
 from functools import partial
@@ -31,7 +32,7 @@ MISSING = "\ufffd"
 
 
 def write(run: Run, file: BytesIO) -> str:
-    """Platform p, part o and springed plate s, mm, frame by frame."""
+    """Platform p, part o and spring-loaded plate s, mm, frame by frame."""
     scene = machine(run, "tracker")
     start, _ = laid_over(scene)
     n = frame_count(run.waveforms, start)

@@ -14,7 +14,7 @@ typedef enum {
     EVENT_SLIP_DOWN, /* the part can no longer keep up: w becomes negative */
     EVENT_SLIP_UP,
     EVENT_PLATE_STOPS,
-    EVENT_PLATE_DOWN, /* the part breaks away from the springed plate */
+    EVENT_PLATE_DOWN, /* the part breaks away from the spring-loaded plate */
     EVENT_PLATE_UP,
     EVENT_COMMAND_HIGH, /* the source is asked for more than its current limit */
     EVENT_COMMAND_LOW,

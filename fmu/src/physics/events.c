@@ -164,7 +164,7 @@ static double pressing(const Model *m, int s, double tau, int side)
     return side * f.a_q;
 }
 
-/* The surface comes to rest, held through the part by the springed plate. */
+/* The surface comes to rest, held through the part by the spring-loaded plate. */
 static void stop_surface(Model *m, int s)
 {
     double *y = m->y + s * N_STATES;
@@ -242,7 +242,7 @@ static int starts(double acceleration, double scale, double slack)
     return slack > 0.0 ? acceleration >= -slack * scale : acceleration > 0.0;
 }
 
-/* Beside a surface's slip a second friction has a mode: that of the springed plate or, where two
+/* Beside a surface's slip a second friction has a mode: that of the spring-loaded plate or, where two
  * surfaces move by themselves, that of the other surface. There is no plate then. */
 static int second_mode(const Model *m, int s)
 {

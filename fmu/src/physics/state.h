@@ -69,7 +69,7 @@ typedef struct {
     WallMode wall;
     int side;  /* of a touched wall: +1 above, -1 below */
     int slip;  /* 0 sticking; else the sign of w */
-    int plate; /* 0 part held by the springed plate; else the sign of the part's velocity */
+    int plate; /* 0 part held by the spring-loaded plate; else the sign of the part's velocity */
     int output;  /* of the source: 0 the current follows its target; else the limit of that sign
                     holds the output, and the current is on its way to the target */
     int limited; /* 0 the target is the command; else the current limit of that sign */
