@@ -14,9 +14,10 @@ from io import TextIOWrapper
 from typing import Any, NoReturn
 
 from cosim.cli import live, new, simulation, studies
-from cosim.cli.command import add_commands
+from cosim.cli.command import Command, add_commands
 from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain
 from cosim.files.reader import watched
+from cosim.studies.study import Option
 from cosim.toolchain import memory
 from cosim.toolchain.interrupts import ended_alike
 from cosim.version import __version__
@@ -45,9 +46,24 @@ def _parser(arguments: list[str] | None) -> argparse.ArgumentParser:
         description="Runs a vibrating gripper: its circuit in ngspice, its mechanics in an FMU.",
     )
     parser.add_argument("--version", action="version", version=f"cosim {__version__}")
-    commands = [*simulation.COMMANDS, *live.COMMANDS, *new.COMMANDS, *studies.commands()]
+    commands = [*simulation.COMMANDS, *live.COMMANDS, *new.COMMANDS, _COMPLETION]
+    commands += studies.commands()
     add_commands(parser, sorted(commands, key=lambda one: one.name), arguments, "COMMAND")
     return parser
+
+
+def _completion(shell: str) -> None:
+    from cosim.cli.completion import script
+
+    print(script(_parser(None), shell))
+
+
+_COMPLETION = Command(
+    "completion",
+    "print what a shell completes commands, options, scenes and files by",
+    _completion,
+    [Option("shell", "whose start-up file evaluates it", choices=("bash", "zsh"))],
+)
 
 
 def main(argv: list[str] | None = None) -> int:
