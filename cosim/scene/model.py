@@ -117,7 +117,7 @@ class Scene(BaseModel):
         """What can be known of ports before the FMUs and the netlist are read."""
         method, model = self.coupling.method, self.circuit.model
         if not self.has_ports and method in OF_PORTS[2:]:
-            raise fault(f'coupling.method = "{method}" is for scenes with their own [[fmu]]')
+            raise fault(f'coupling.method = "{method}" is for scenes with [[port]]')
         if not self.fmu and not self.port:
             return self
         if not self.rung.own_netlist:
@@ -356,8 +356,10 @@ class Scene(BaseModel):
 
     @property
     def has_ports(self) -> bool:
-        """Whether ports join more than the built-in machine to the circuit."""
-        return bool(self.fmu) or (bool(self.port) and not self.renamed)
+        """Whether ports join more than the built-in machine to the circuit, or join that as an FMU
+        like others, whose steps are done again."""
+        again = self.coupling.method == "redo"
+        return bool(self.fmu) or (bool(self.port) and (again or not self.renamed))
 
     @property
     def renamed(self) -> dict[str, str]:

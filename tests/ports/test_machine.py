@@ -94,12 +94,20 @@ def test_what_is_saved_of_it_is_in_the_waveforms(folder: Path) -> None:
     assert (result.units["v(left)"], result.units["v(amp,shunt)*i(Vmot)"]) == ("V", "W")
 
 
-@pytest.mark.parametrize(("base", "contact"), [("paper", "compliant"), ("reference", "rigid")])
-def test_beside_another_fmu_the_machine_moves_alike(folder: Path, base: str, contact: str) -> None:
-    """There it is an FMU like others, which tells nobody when its ram meets a wall."""
-    build(folder, "Load")
-    fmu = '[[fmu]]\nname = "other"\nfile = "Load.fmu"\n[[port]]'
-    text = OWN.replace("[[port]]", fmu, 1).replace("paper", base)
+@pytest.mark.parametrize(
+    ("base", "contact", "alone"),
+    [("paper", "compliant", False), ("reference", "rigid", False), ("paper", "compliant", True)],
+)
+def test_as_an_fmu_like_others_the_machine_moves_alike(
+    folder: Path, base: str, contact: str, alone: bool
+) -> None:
+    """Beside another, or with steps that are done again: it tells nobody when its ram meets a
+    wall."""
+    text = OWN.replace("paper", base)
+    if not alone:
+        build(folder, "Load")
+        fmu = '[[fmu]]\nname = "other"\nfile = "Load.fmu"\n[[port]]'
+        text = text.replace("[[port]]", fmu, 1)
     (folder / "own.toml").write_text(text + RUN)
     given = {"mechanics_contact": contact}
     fine = agreed(folder, base, circuit_reltol=1e-7, circuit_max_step=1e-6, **given)
