@@ -156,6 +156,8 @@ def _notes(run: Run) -> Iterator[str]:
         if steps > _MANY and 0 < moved < _SELDOM * steps:
             yield (
                 f"the outputs of {side.name} changed in only {moved} of its {steps} steps: it "
-                'moves in steps of its own; coupling.method = "macro-steps" with '
-                f"coupling.macro_step = {run.state.duration / moved:.2g} s or more suits it."
+                f"moves in steps of its own, of {run.state.duration / moved:.2g} s on average. A "
+                "controller that samples is to do so; where it is a model that integrates by fixed "
+                'steps, coupling.method = "macro-steps" with a coupling.macro_step of that length '
+                "or more suits it."
             )
