@@ -121,7 +121,11 @@ _peer = partial(Solver, peer=True, limits="knows compliant walls and the sawtoot
 SOLVERS = (
     _with_control("error-controlled", audited=False),
     _with_control("error-controlled, audited", audited=True),
-    Solver("redo in ngspice", "circuit.reltol", _redone, lambda case: tenths(2, 7), netlist=True),
+    Solver(
+        *("redo in ngspice", "circuit.reltol", _redone, lambda case: tenths(2, 7)),
+        netlist=True,
+        peer=True,
+    ),
     _peer("all in ngspice", "circuit.reltol", _all_in_ngspice, partial(_values, 4, 9)),
     _peer("SciPy's LSODA with events", "tolerance", _solve_ivp, partial(_values, 3, 6)),
 )

@@ -19,7 +19,7 @@ VERMILION, BLUE, GREEN, ORANGE, SKY, PURPLE = (
     "#aa4499",
 )
 """Okabe and Ito's colours, which the colour-blind tell apart; a darker purple."""
-FAINT: dict[str, Any] = {"color": "0.74", "lw": 0.8, "zorder": 1}
+FAINT: dict[str, Any] = {"color": "0.74", "marker": ".", "ms": 4, "lw": 0.0, "zorder": 1}
 """Style of a line that is there to be counted, not to be read."""
 
 

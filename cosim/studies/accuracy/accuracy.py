@@ -19,7 +19,18 @@ from matplotlib.axes import Axes
 from cosim.evaluate.store import Store, reported
 from cosim.studies.accuracy.cases import CASES, reference
 from cosim.studies.accuracy.solvers import DEFAULT, SOLVERS, Run, Solver, measure
-from cosim.studies.plots import BLUE, FAINT, GREEN, PURPLE, SKY, VERMILION, End, label_ends, panels
+from cosim.studies.plots import (
+    BLUE,
+    FAINT,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    End,
+    label_ends,
+    panels,
+)
 from cosim.studies.report import Progress, Report, silent
 from cosim.studies.tables import Row, brief, span
 
@@ -31,7 +42,8 @@ _HALVINGS = 4  # over which an order is fitted
 STORE = "accuracy.sqlite"
 
 _ROUNDS = 3
-_STYLES = tuple(zip((VERMILION, SKY, BLUE, GREEN, "black", PURPLE), "ovsDPX", strict=True))
+_COLORS = VERMILION, SKY, BLUE, GREEN, ORANGE, "black", PURPLE
+_STYLES = tuple(zip(_COLORS, "ovsD^PX", strict=True))
 """Colours and markers of the strong lines, in their order."""
 
 
@@ -202,7 +214,8 @@ def draw(runs: Sequence[Run], strong: Mapping[str, str], title: str, path: Path)
     wide = min(len(scenes), 2)
     high = -(-len(scenes) // wide)
     note = (
-        "Grey: the other methods. ×: diverged; at the top edge: failed or in a false limit cycle."
+        "Dots: runs of the other methods. ×: diverged; at the top edge: failed or in a false limit "
+        "cycle."
     )
     figure, axes = panels(title, note, (5.5 * wide, 4.0 * high + 0.5), high, wide)
     for axis, scene in zip(axes, scenes, strict=True):

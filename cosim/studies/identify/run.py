@@ -11,7 +11,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import workers_asked
-from cosim.evaluate.store import Store
+from cosim.evaluate.store import Store, reported
 from cosim.files.picture import Picture
 from cosim.scene import keys
 from cosim.studies.identify.problem.space import Space, read_space
@@ -81,9 +81,8 @@ def identify(
     if not steady:
         raise BadInput(f"{trials}: no trial is left to be fitted: none repeats itself.")
     effort, count = QUICK if quick else FULL, workers_asked(workers)
-    path = None if out is None else Path(out) / STORE
-    with Store(path, seed, *_asked(space, steady, effort)) as store:
 
+    def made(store: Store) -> Identification:
         def plan(law: str, number: int) -> Plan:
             own = space.of_law(law)
             return Plan(
@@ -98,12 +97,10 @@ def identify(
 
         laws = space.laws[: effort.laws]
         plans = [[plan(law, k) for k in range(1, effort.searches + 1)] for law in laws]
-        made = _identified(plans, steady, others)
-        made = replace(made, numbers={"seed": seed, "quick": quick} | made.numbers)
-        if out is not None:
-            made.save(out)
-            store.remove()
-    return made
+        found = _identified(plans, steady, others)
+        return replace(found, numbers={"seed": seed, "quick": quick} | found.numbers)
+
+    return reported(made, out, STORE, seed, *_asked(space, steady, effort))
 
 
 def _identified(

@@ -10,7 +10,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator
-from cosim.evaluate.store import Store
+from cosim.evaluate.store import Store, reported
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
 from cosim.studies.limits.study import checked, ensemble
@@ -70,14 +70,12 @@ def measure(
     count = max(len(given), QUICK if quick else RIGS)
     more = drawn(base, given, count - len(given), np.random.default_rng(seed))
     tick = counted(progress, 1 + len(given) + len(more))
-    path = None if out is None else Path(out) / "measure.sqlite"
-    with Store(path, base.as_dict(), others, seed, quick) as store:
-        open_ = partial(Evaluator, kept=KEPT, workers=workers)
-        found = report(sample(base, [*given, *more], store, open_, seed, tick), len(given), seed)
-        if out is not None:
-            found.save(out)
-        store.remove()
-    return found
+    open_ = partial(Evaluator, kept=KEPT, workers=workers)
+
+    def found(store: Store) -> Report:
+        return report(sample(base, [*given, *more], store, open_, seed, tick), len(given), seed)
+
+    return reported(found, out, "measure.sqlite", base.as_dict(), others, seed, quick)
 
 
 def worths(found: Sample, seed: int) -> tuple[list[Worth], list[tuple[Candidate, list[Worth]]]]:
