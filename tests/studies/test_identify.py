@@ -31,7 +31,7 @@ from cosim.studies.identify.report.verdicts import judge, rigs_meant
 from cosim.studies.identify.run import identify
 from cosim.studies.identify.search import plan
 from cosim.studies.identify.search.plan import QUICK, Effort, Searched
-from cosim.studies.identify.search.search import Found, Search, finish
+from cosim.studies.identify.search.search import Found, Search, deviations, finish
 from cosim.trials.camera import FRAME_RATE, hermite
 from cosim.trials.recording import Recording
 
@@ -351,22 +351,54 @@ def test_verdicts() -> None:
     unknown = Searched([best], [best, *turned, made_up(cubic, far, 0.16)])
     for several in ([unknown], [Searched([best, made_up(cubic, far, 0.12)], [best]), split]):
         meant = rigs_meant(several, 400.0)
-        kinds = {one.kind for one in judge(best, meant, False)}
+        kinds = {one.kind for one in judge(best, meant)}
         assert kinds == {"not converged", "law"}
     assert len(rigs_meant([unknown], 400.0)) == 8, "of a single search: far is left out"
 
-    for several, most in (([told, split], 0.51), ([told, agreed], 0.52)):
+    for several, apart in (([told, split], 0.0), ([told, agreed], 0.0), ([told, split], 0.01)):
         meant = rigs_meant(several, 400.0)
-        found = {one.key: one for one in judge(best, meant, True)}
+        found = {v.key: v for v in judge(best, meant, [one.point * 0.0 + apart for one in meant])}
         mass = found["mechanics.surface_mass"]
         k = cubic.names.index(mass.key)
-        ends_of = [cubic.values(np.full(len(middle), x))[k] for x in (0.5, most)]
+        least, most = 0.5 - 1.645 * apart, 0.52 + 1.645 * apart
+        ends_of = [cubic.values(np.full(len(middle), x))[k] for x in (least, most)]
         assert (mass.low, mass.high) == pytest.approx(ends_of)
         assert mass.kind == "identified"
         assert found["mechanics.suspension_k2"].kind == "law"
         force = found["coil.force_factor"]
         assert force.kind == "product" and "amplitudes" in force.words
         assert all(v.low <= v.value <= v.high for v in found.values() if v.low and v.high)
+
+
+@pytest.mark.physics
+def test_deviations_are_of_the_size_of_the_scatter_of_fits(folder: Path) -> None:
+    """Fits from beside the truth to records whose noise alone differs, where that is white."""
+    space, rig, own = read_space(), read_space().rigs(point()[None])[0], np.array([*OWN.values()])
+    trials = read_trials(folder, space)
+    exact = [shown(trial, rig, row) for trial, row in zip(trials, own, strict=True)]
+    count = float(sum(len(trial.fine.time) * len(trial.fine.signals) for trial in trials))
+    ends, told = [], []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        targets = [
+            replace(
+                trial.fine,
+                signals={
+                    name: values + 0.3 * np.std(values) * rng.standard_normal(len(values))
+                    for name, values in each.items()
+                },
+            )
+            for trial, each in zip(trials, exact, strict=True)
+        ]
+        noisy = Search(space, targets, 2)
+        beside = np.clip(point() + 0.01 * rng.standard_normal(len(point())), 0.0, 1.0)
+        found = finish(noisy, noisy.refined(beside, own, 4), 20)
+        ends.append(found.point)
+        told.append(deviations(noisy, found, count))
+    scatter, said = np.std(ends, axis=0, ddof=1), np.median(told, axis=0)
+    for key in ("surface_mass", "flexure_stiffness", "travel"):
+        k = space.names.index(f"mechanics.{key}")
+        assert said[k] / 3.0 < scatter[k] < 3.0 * said[k], key
 
 
 def test_effective_samples_count_what_is_new(folder: Path) -> None:

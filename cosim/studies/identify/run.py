@@ -19,7 +19,7 @@ from cosim.studies.identify.problem.targets import TRANSPORT, WEIGHTS, Measured,
 from cosim.studies.identify.report import figures, files, measures, solved
 from cosim.studies.identify.report.verdicts import judge, rigs_meant
 from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds, searched
-from cosim.studies.identify.search.search import Found, Progress, Search, best_of
+from cosim.studies.identify.search.search import Found, Progress, Search, best_of, deviations
 from cosim.studies.tables import Row
 
 UNSTEADY = 0.5
@@ -111,7 +111,13 @@ def _identified(
     plan = plans[[law.best for law in laws].index(best)][0]
     effective = measures.samples(trials, best)
     meant = rigs_meant(laws, effective)
-    verdicts = judge(best, meant, any(law.converged for law in laws))
+    apart_by = None
+    if any(law.converged for law in laws):
+        searches = [replace(plan.fine, space=one.space) for one in meant]
+        apart_by = [
+            deviations(search, one, effective) for search, one in zip(searches, meant, strict=True)
+        ]
+    verdicts = judge(best, meant, apart_by)
     rigs, held_out = _folds(plan, trials) if len(trials) >= 3 else ([], [])
     aside = replace(plan.fine, targets=[trial.fine for trial in apart])
     own = plan.drives("trials apart", best.point, aside).own if apart else np.empty((0, 0))

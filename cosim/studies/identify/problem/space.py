@@ -162,6 +162,13 @@ class Space:
                 total += WEAK * ((column - middle) / entry.sigma) ** 2
         return total
 
+    @property
+    def curvature(self) -> Array:
+        """Half the second derivative of ``prior`` by each coordinate of a point."""
+        low, high = self._ends
+        sigmas = np.array([entry.sigma or np.inf for entry in self.free])
+        return WEAK * ((high - low) / sigmas) ** 2
+
     def residuals(self, points: Array) -> Array:
         """How far rigs at points (n × free) are from what was measured beside the trials, in
         standard deviations (n × measured)."""

@@ -1,10 +1,10 @@
 """What the trials say of each key of a rig: a value and how far to trust it, or that they do not.
 
-A local covariance would be far too small: the cost has many minima, and a search ends in any of
-them. So no range is told until two searches with one law of the suspension have come to the same
-cost. Then a range holds the values of all solutions that are as likely, whichever search and
-whichever such law they are of. What a law's own keys come out as holds for that law alone; what all
-laws tell is the suspension's force.
+A local covariance alone would be far too small: the cost has many minima, and a search ends in any
+of them. So no range is told until two searches with one law of the suspension have come to the same
+cost. Then a range holds the 90 % intervals about all solutions that are as likely, whichever search
+and whichever such law they are of, and about the best of every law. What a law's own keys come out
+as holds for that law alone; what all laws tell is the suspension's force.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,6 +21,8 @@ from cosim.studies.identify.search.search import Found
 
 LIKELY = 2.71
 """Of -2 ln L = (effective samples) ln cost: above the least up to this, one key is in its 90 %."""
+WITHIN = 1.645
+"""Standard deviations to either side, which hold 90 %."""
 ALONE = 1.5
 """Of a single search, whose scatter is not known: the candidates that are told, over the best."""
 TRUSTED = 0.35
@@ -47,21 +49,26 @@ class Verdict:
 
 
 def rigs_meant(found: Sequence[Searched], samples: float) -> list[Found]:
-    """The rigs that may be meant, the best first: of the laws whose searches agree, all that are as
-    likely as the worse of the two; where none agree, of all laws, all within the searches' own
-    scatter. ``samples`` is the effective number of what was measured."""
-    meant: list[Found] = []
-    for one in [one for one in found if one.converged] or found:
+    """The rigs that may be meant, the best first: the best of each law; of the laws whose searches
+    agree, all that are as likely as the worse of the two; where none agree, of all laws, all within
+    the searches' own scatter. ``samples`` is the effective number of what was measured."""
+    agreed = [one for one in found if one.converged] or found
+    meant = [one.best for one in found if one not in agreed]
+    for one in agreed:
         scatter = one.scatter if len(one.ends) > 1 else ALONE
         meant += [*one.ends, *one.within(scatter * float(np.exp(LIKELY / samples)))]
     return sorted(meant, key=lambda rig: rig.total)
 
 
-def judge(best: Found, meant: Sequence[Found], converged: bool) -> list[Verdict]:
-    """A verdict for each free key of the rig that is reported."""
+def judge(
+    best: Found, meant: Sequence[Found], apart: Sequence[Array] | None = None
+) -> list[Verdict]:
+    """A verdict for each free key of the rig that is reported. ``apart`` are the standard
+    deviations of the coordinates of each rig that may be meant; None where no searches agree."""
     space, found = best.space, []
     every = [dict(zip(one.space.names, one.space.values(one.point), strict=True)) for one in meant]
     values = {k: np.array([rig[k] for rig in every]) for k in space.names if k not in OF_LAWS}
+    ranges = [_ends(*one) for one in zip(meant, apart, strict=True)] if apart is not None else []
     partners = {key: np.log(x) for key, x in values.items() if (x > 0.0).all()}
     for name in ("amplitude", "normal_force"):
         own = np.array([one.own[:, OWN.index(name)] for one in meant])
@@ -72,10 +79,13 @@ def judge(best: Found, meant: Sequence[Found], converged: bool) -> list[Verdict]
         ends = None, None
         if key in OF_LAWS:
             kind, words = "law", f"of the law {space.law} alone; what holds is the force below"
-        elif not converged:
+        elif apart is None:
             kind, words = "not converged", "not converged"
         else:
-            ends = min(value, float(values[key].min())), max(value, float(values[key].max()))
+            ends = (
+                min(value, *(one[key][0] for one in ranges)),
+                max(value, *(one[key][1] for one in ranges)),
+            )
             at = np.repeat(reported[None], 2, axis=0)
             at[:, k] = ends
             low, high = space.point(at)[:, k].tolist()
@@ -83,6 +93,16 @@ def judge(best: Found, meant: Sequence[Found], converged: bool) -> list[Verdict]
             kind, words = _told(value, *ends, *edges, _tie(key, partners))
         found.append(Verdict(key, value, *ends, kind, words))
     return found
+
+
+def _ends(found: Found, deviations: Array) -> dict[str, tuple[float, float]]:
+    """The 90 % interval about a solution, by key."""
+    off = WITHIN * deviations
+    ends = found.space.values(np.stack([found.point - off, found.point + off]))
+    return {
+        key: (low, high)
+        for key, (low, high) in zip(found.space.names, ends.T.tolist(), strict=True)
+    }
 
 
 def _told(

@@ -39,6 +39,8 @@ SAMPLES = 46.0
 """Effective ones of a trial: 412 of the nine published ones."""
 NARROW = 1e-3
 """Step of CMA-ES, of the bounds' ranges, at which it ends."""
+TINY = 1e-12
+"""Of the normal matrix' trace."""
 ENDS_AT = 1e-5
 """Relative gain of a step of least squares below which it ends."""
 
@@ -285,6 +287,42 @@ class Search:
         return best
 
 
+def _unknowns(search: Search, point: Array, own: Array, weight: float) -> Array:
+    """Slopes of all residuals, the trials' and ``weight`` times those of what was measured beside
+    them, by the unknowns (rows): the point, then each trial's fitted own parameters in units of
+    their scales, which move that trial's residuals alone."""
+    d = len(point)
+    each = search.each(lambda k: search.slopes(point, own, k))
+    points, turns = _perturbed(point, STEP)
+    beside = search.space.residuals(points)
+    beside = weight * (beside[1:] - beside[0]) / turns[:, None]
+    alone: Array = np.asarray(block_diag(*(one[d:] for one in each)))
+    shared = np.hstack([one[:d] for one in each])
+    return np.block([[shared, beside], [alone, np.zeros((len(alone), beside.shape[1]))]])
+
+
+def deviations(search: Search, found: Found, samples: float) -> Array:
+    """Standard deviations of the rig's coordinates, the own parameters fitted anew, where the cost
+    is as curved as at the solution: its neighbourhood alone, no other minimum.
+
+    -2 ln L is the effective ``samples`` times ln cost, so the covariance is the inverse of the
+    normal matrix times the sum of squares over the samples (G. A. F. Seber, C. J. Wild, *Nonlinear
+    Regression*, Wiley 1989, section 5.1).
+    """
+    space, d, total = search.space, len(found.point), float(found.costs.sum())
+    slopes = _unknowns(search, found.point, found.own, _weight(found))
+    normal = np.einsum("ij,kj->ik", slopes, slopes)
+    normal[range(d), range(d)] += len(found.costs) * space.curvature
+    normal += TINY * np.trace(normal) * np.eye(len(normal))  # of what moves nothing
+    covariance = np.linalg.inv(normal) * total / samples
+    return np.asarray(np.sqrt(np.diag(covariance)[:d]))
+
+
+def _weight(found: Found) -> float:
+    """Of a residual of what was measured beside the trials, in units of theirs."""
+    return float(np.sqrt(found.costs.mean() / SAMPLES))
+
+
 def finish(search: Search, found: Found, steps: int) -> Found:
     """The solution after at most ``steps`` steps of least squares, if it is better; priors, too,
     are in that. What was measured beside the trials is among the residuals, with the weight of
@@ -295,7 +333,7 @@ def finish(search: Search, found: Found, steps: int) -> Found:
     space, targets, d = search.space, search.targets, len(found.point)
     low, high, scale = (search.bounds(name) for name in ("low", "high", "scale"))
     free = scale > 0.0
-    weight = np.sqrt(found.costs.mean() / SAMPLES)
+    weight = _weight(found)
 
     def apart(x: Array) -> tuple[Array, Array]:
         own = found.own.copy()
@@ -309,15 +347,7 @@ def finish(search: Search, found: Found, steps: int) -> Found:
         return np.concatenate([*rows, weight * space.residuals(point[None])[0]])
 
     def slopes(x: Array) -> Array:
-        point, own = apart(x)
-        each = search.each(lambda k: search.slopes(point, own, k))
-        points, turns = _perturbed(point, STEP)
-        beside = space.residuals(points)
-        beside = weight * (beside[1:] - beside[0]) / turns[:, None]
-        # Own parameters move their trial's residuals alone.
-        alone: Array = np.asarray(block_diag(*(one[d:] for one in each)))
-        shared = np.hstack([one[:d] for one in each])
-        return np.block([[shared, beside], [alone, np.zeros((len(alone), beside.shape[1]))]]).T
+        return _unknowns(search, *apart(x), weight).T
 
     start = np.concatenate([found.point, found.own[free] / scale[free]])
     ends = [
