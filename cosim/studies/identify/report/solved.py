@@ -96,6 +96,10 @@ def told_of_law(trials: Sequence[Measured], found: Searched) -> Row:
         "rests_mm": [q * 1e3 for q in rests_of(best.numbers)],
         **{name: whole.get(name) for name in names},
         "rig": best.settings,
+        "trials": [
+            {"trial": trial.label} | own_parameters(own)
+            for trial, own in zip(trials, best.own, strict=True)
+        ],
     }
 
 
