@@ -14,6 +14,7 @@ import pytest
 import cosim
 from cosim.arrays import Array
 from cosim.coupling.loop.structures import loop
+from cosim.coupling.ports import run as ports_run
 from cosim.coupling.ports.run import Run
 from cosim.coupling.ports.structures import (
     Feed,
@@ -136,6 +137,16 @@ def test_a_motor_on_a_bridge_is_that_of_one_netlist(tmp_path: Path, version: int
             np.interp(result.columns["time"], true["time"], true["a"] * true["vsense#branch"]),
             abs=0.05 * np.abs(power).max(),
         )
+
+
+def test_a_run_without_end_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if a run of an hour took too many steps; it begins no worse than any other."""
+    scene = motor(tmp_path)
+    monkeypatch.setattr(ports_run, "ENOUGH", 1000)
+    monkeypatch.setattr(ports_run, "BUDGET", 1e6)
+    here(scene, {})
+    with pytest.raises(SimulationFailed, match=r"too short to come to an end: \d+ until t = 0\.0"):
+        here(scene, {"run.duration": 3600.0, "run.output_step": 1.0})
 
 
 def test_what_an_fmu_says_of_its_slope_is_taken(tmp_path: Path) -> None:

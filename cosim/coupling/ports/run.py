@@ -28,6 +28,9 @@ from cosim.scene import Scene
 _POINTS, _PIECES = 2048, 512
 """Places of the logs between two emptyings; pieces of the drive that are prepared at a time."""
 
+ENOUGH, BEGINNING, BUDGET = 1_000_000, 10_000_000, 1e9
+"""Steps after which a run is judged, after which it no longer is, and that it may take (hours)."""
+
 _AGREEMENT = 2.0
 """Of ``circuit.reltol``: how far an FMU and ngspice may be apart where steps are repeated."""
 
@@ -92,7 +95,7 @@ class Run:
             points=self._blocks[1].ctypes.data,
             log_rows=_POINTS,
             refill=callback(self._refill, self._fail),
-            attend=callback(self._attend, self._fail),
+            attend=callback(self._attend_and_judge, self._fail),
         )
         self._refill()
 
@@ -181,6 +184,18 @@ class Run:
         self.points.append(self._blocks[1][: state.n_points])
         state.n_log = state.n_points = 0
         self._progress(state.time)
+
+    def _attend_and_judge(self) -> None:
+        """Also end a run whose steps have become so short that it has no end, as those of `redo` do
+        about an FMU whose outputs never come to rest."""
+        self._attend()
+        steps, time, duration = self.steps, self.state.time, self._scene.run.duration
+        if ENOUGH < steps < BEGINNING and steps * duration > BUDGET * time:
+            raise SimulationFailed(
+                f"The steps are too short to come to an end: {steps} until t = {time:.3g} s of "
+                f'{duration:g} s. Where coupling.method is "redo", an FMU\'s outputs may jump '
+                "without end."
+            )
 
     def _refill(self) -> None:
         """Keep the pieces of the drive that are still needed, and prepare those that follow."""
