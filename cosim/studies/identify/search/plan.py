@@ -172,6 +172,8 @@ class Searched:
     """The best of each search, finished."""
     candidates: list[Found]
     """All at which a search has ended, the best first, at the step of the search."""
+    begun: Sequence[Found] = ()
+    """Those of them that the ends were finished from, and so are the same again."""
 
     @property
     def best(self) -> Found:
@@ -189,8 +191,10 @@ class Searched:
         return len(self.ends) > 1 and self.scatter <= AGREED
 
     def within(self, factor: float) -> list[Found]:
-        """The candidates whose cost is at most ``factor`` times the lowest."""
-        return [one for one in self.candidates if one.total <= factor * self.candidates[0].total]
+        """The candidates whose cost is at most ``factor`` times the lowest; none that was
+        finished."""
+        most = factor * self.candidates[0].total
+        return [one for one in self.candidates if one.total <= most and one not in self.begun]
 
 
 def searched(plans: Sequence[Plan]) -> Searched:
@@ -200,7 +204,7 @@ def searched(plans: Sequence[Plan]) -> Searched:
     both = zip(plans, every, strict=True)
     ends = [plan.finished("all trials", rows, found[0]) for plan, found in both]
     order = sorted([one for found in every for one in found], key=lambda one: one.total)
-    return Searched(ends, order)
+    return Searched(ends, order, [found[0] for found in every])
 
 
 def folds(count: int) -> list[list[int]]:
