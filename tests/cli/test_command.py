@@ -481,7 +481,7 @@ def test_scenes(tmp_path: Path) -> None:
     names = [line.split()[0] for line in done.stdout.splitlines() if line.startswith("  ")]
     assert names[0] == "paper"
     assert sorted(names) == sorted([
-        "paper", "paper-full", "paper-limited", "closed-loop-grasp", "closed-grip", "dc-motor",
+        "paper", "paper-full", "paper-knee", "paper-limited", "closed-loop-grasp", "closed-grip", "dc-motor",
         "relay", "direct-drive", "direct-drive-stops", "down-grip", "down-waveform", "gripper",
         "gripper-169g", "gripper-17g", "held", "ideal-current", "optimal", "quaid", "reference",
         "square", "trial",

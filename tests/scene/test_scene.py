@@ -196,7 +196,7 @@ def test_built_in_scenes() -> None:
     scenes = dict(list_scenes())
     assert next(iter(scenes)) == "paper"
     assert set(scenes) == {
-        "paper", "paper-full", "paper-limited", "gripper", "ideal-current", "held",
+        "paper", "paper-full", "paper-knee", "paper-limited", "gripper", "ideal-current", "held",
         "optimal", "quaid", "trial", "umbanhowar",
         "direct-drive", "direct-drive-stops", "gripper-17g", "gripper-169g", "square",
         "down-grip", "down-waveform", "closed-loop-grasp", "two-surfaces", "reference",
