@@ -481,9 +481,10 @@ def test_scenes(tmp_path: Path) -> None:
     names = [line.split()[0] for line in done.stdout.splitlines() if line.startswith("  ")]
     assert names[0] == "paper"
     assert sorted(names) == sorted([
-        "paper", "paper-full", "paper-knee", "paper-limited", "closed-loop-grasp", "closed-grip", "dc-motor",
-        "relay", "direct-drive", "direct-drive-stops", "down-grip", "down-waveform", "gripper",
-        "gripper-169g", "gripper-17g", "held", "ideal-current", "optimal", "quaid", "reference",
+        "paper", "paper-full", "paper-knee", "paper-limited", "closed-loop-grasp", "closed-grip",
+        "dc-motor", "relay", "direct-drive", "direct-drive-stops", "down-grip", "down-waveform",
+        "gripper", "gripper-169g", "gripper-17g", "held", "ideal-current", "optimal", "quaid",
+        "reference",
         "square", "trial",
         "trial-01", "trial-02", "trial-03", "trial-04", "trial-05", "trial-06", "trial-07",
         "trial-08", "trial-09", "trial-10", "two-surfaces", "umbanhowar",
