@@ -20,7 +20,13 @@ VERMILION, BLUE, GREEN, ORANGE, SKY, PURPLE = (
 )
 """Okabe and Ito's colours, which the colour-blind tell apart; a darker purple."""
 FAINT: dict[str, Any] = {"color": "0.74", "marker": ".", "ms": 4, "lw": 0.0, "zorder": 1}
-"""Style of a line that is there to be counted, not to be read."""
+"""Style of points that are there to be counted, not to be read."""
+
+
+def headline(figure: Picture, message: str) -> None:
+    """Write the message of a figure above it."""
+    lines = fill(message, round(10.0 * figure.get_figwidth()))
+    figure.suptitle(lines, x=0.01, ha="left", fontsize=12, fontweight="bold")
 
 
 def panels(
@@ -37,8 +43,7 @@ def panels(
     """
     figure = Picture(*size, "constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options)
-    lines = fill(title, round(10.0 * size[0]))
-    figure.suptitle(lines, x=0.01, ha="left", fontsize=12, fontweight="bold")
+    headline(figure, title)
     figure.supxlabel(note, x=0.01, ha="left", fontsize=9, color="0.35")
     for axis in axes.flat:
         axis.grid(alpha=0.25)

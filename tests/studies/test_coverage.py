@@ -5,7 +5,6 @@ not know: rigid walls, or a normal force that changes with the period as the mov
 and what the identified rig leaves of the real trials is added to their heights.
 """
 
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +24,7 @@ from cosim.studies.identify.report.verdicts import Verdict, judge, rigs_meant
 from cosim.studies.identify.search.plan import Effort, Plan, searched
 from cosim.studies.identify.search.search import Search, deviations
 from cosim.trials.camera import hermite
+from tests.studies.test_identify import write
 
 FOUND = json.loads((Path(__file__).parents[2] / "results" / "identify.json").read_text())
 LAW = "knee"
@@ -47,13 +47,6 @@ def _truth(space: Space, rng: np.random.Generator) -> tuple[dict[str, Any], Arra
     (law,) = [one for one in FOUND["laws"] if one["law"] == LAW]
     point = space.point(np.array([law["rig"][key] for key in space.names]))
     return law, point, np.clip(point + MOVED * rng.standard_normal(len(point)), 0.05, 0.95)
-
-
-def _write(folder: Path, label: str, columns: dict[str, Array]) -> None:
-    with (folder / f"Trial {label}.csv").open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow([f"{name} [{'s' if name == 'time' else 'm'}]" for name in columns])
-        writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
 
 
 def _made(real: Measured, own: Array, rigs: tuple[Array, Any], kind: str, folder: Path) -> None:
@@ -87,7 +80,7 @@ def _made(real: Measured, own: Array, rigs: tuple[Array, Any], kind: str, folder
         knots = (waves[name].values for name in ("time", f"z_{body}", f"v_{body}"))
         off = real.fine.signals[f"z_{body}"] - left[f"z_{body}"]
         columns[f"z_{body}"] = hermite(time + first, *knots) + np.where(np.isfinite(off), off, 0.0)
-    _write(folder, real.label, columns)
+    write(folder, real.label, columns)
 
 
 def told(
@@ -140,6 +133,6 @@ def test_ranges_hold_the_truth_as_often_as_they_say(trials: Path, tmp_path: Path
         if one.low is not None and one.high is not None
     ]
     assert held, "nothing was told"
-    assert 0.8 <= np.mean(held) <= 1.0, every
+    assert 0.8 <= np.mean(held) <= 0.97, every
     whole = [bool(found) for (_, count, _), found in every.items() if count == max(COUNTS)]
     assert np.mean(whole) >= 0.5

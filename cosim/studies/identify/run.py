@@ -111,12 +111,8 @@ def _identified(
     plan = plans[[law.best for law in laws].index(best)][0]
     effective = measures.samples(trials, best)
     meant = rigs_meant(laws, effective)
-    apart_by = None
-    if any(law.converged for law in laws):
-        searches = [replace(plan.fine, space=one.space) for one in meant]
-        apart_by = [
-            deviations(search, one, effective) for search, one in zip(searches, meant, strict=True)
-        ]
+    agreed = any(law.converged for law in laws)
+    apart_by = [deviations(plan.fine, one, effective) for one in meant] if agreed else None
     verdicts = judge(best, meant, apart_by)
     rigs, held_out = _folds(plan, trials) if len(trials) >= 3 else ([], [])
     aside = replace(plan.fine, targets=[trial.fine for trial in apart])

@@ -13,12 +13,16 @@ from cosim.studies.identify.problem.space import OF_LAWS
 from cosim.studies.identify.report.measures import shown
 from cosim.studies.identify.report.solved import KINDS, Solved
 from cosim.studies.identify.report.verdicts import TRUSTED, forces
+from cosim.studies.plots import headline
 from cosim.studies.tables import Row
 
 MEASURED, SIMULATED, OTHER, FLOOR = "0.15", "#d1495b", "#1f6fb2", "#2a9d8f"
 
+VELOCITY = "nrmse_v_surface"
+"""By which a figure's message tells how near the rig is."""
+
 COMPARED = (
-    ("nrmse_v_surface", "floor_late", "Velocity, NRMSE (black: its own cycles among themselves)"),
+    (VELOCITY, "floor_late", "Velocity, NRMSE (black: its own cycles among themselves)"),
     ("nrmse_z_surface", "", "Height of the surface, NRMSE"),
     ("part_error_mm", "straight_line_error_mm", "Part, mean error [mm] (black: straight line)"),
     (
@@ -27,9 +31,6 @@ COMPARED = (
     ),
 )
 """What the bars of a panel are, and what its black marks, by their names in ``identify.json``."""
-
-
-VELOCITY = "nrmse_v_surface"
 
 
 def overlays(found: Solved) -> Picture:
@@ -59,14 +60,10 @@ def overlays(found: Solved) -> Picture:
     for axis in axes[-3:]:
         axis.set_xlabel("time [ms]")
     _legend(figure, axes[0], "outside upper right", 2)
-    told = [1.0 - rows[trial.label]["nrmse_v_surface"] ** 2 for trial in found.trials]
+    told = [1.0 - rows[trial.label][VELOCITY] ** 2 for trial in found.trials]
     whole = f"{min(told):.0%} to {max(told):.0%}" if len(told) > 1 else f"{told[0]:.0%}"
-    _title(figure, f"One rig explains {whole} of the variance of the surface's velocity")
+    headline(figure, f"One rig explains {whole} of the variance of the surface's velocity")
     return figure
-
-
-def _title(figure: Picture, message: str) -> None:
-    figure.suptitle(message, x=0.01, ha="left", fontsize=12, fontweight="bold")
 
 
 def _legend(figure: Picture, axis: Axes, place: Any, columns: int) -> None:
@@ -103,7 +100,7 @@ def errors(found: Solved) -> Picture:
     if held:
         apart = numbers["held_out_overall"][KINDS[0]][VELOCITY]
         message += f", {apart:.2f} where the rig is of other trials"
-    _title(figure, message)
+    headline(figure, message)
     return figure
 
 
@@ -115,6 +112,7 @@ def rigs(found: Solved) -> Picture:
     """The suspension's force on each rig that may be meant, and their costs over each key, whose
     range is shaded."""
     units, space = {key.full: key.unit for key in keys()}, found.best.space
+    verdicts = {verdict.key: verdict for verdict in found.verdicts}
     names = [name for name in space.names if name not in OF_LAWS]
     figure, (first, *others) = grid(len(names) + 1, 4, 12.8, 2.8, 0.6)
     places = np.linspace(-2e-3, 2e-3, 81)
@@ -138,9 +136,9 @@ def rigs(found: Solved) -> Picture:
             axis.xaxis.set_minor_formatter(NullFormatter())
         else:
             axis.locator_params(axis="x", nbins=4)
-        (one,) = [verdict for verdict in found.verdicts if verdict.key == name]
-        if one.low is not None and one.high is not None:
-            axis.axvspan(one.low, one.high, color="0.92", zorder=0)
+        low, high = verdicts[name].low, verdicts[name].high
+        if low is not None and high is not None:
+            axis.axvspan(low, high, color="0.92", zorder=0)
         unit = "" if units[name] in ("1", "") else f" [{units[name]}]"
         axis.set_title(f"{name.partition('.')[2]}{unit}: cost", loc="left", fontsize=9)
     for axis in (first, *others):
@@ -148,7 +146,7 @@ def rigs(found: Solved) -> Picture:
     _legend(figure, first, "outside upper right", 3)
     known = sum(verdict.kind == "identified" for verdict in found.verdicts)
     message = f"The trials tell {known} of {len(names)} keys within {TRUSTED:.0%}; shaded: ranges"
-    _title(figure, message if found.numbers["converged"] else "Not converged: no range is told")
+    headline(figure, message if found.numbers["converged"] else "Not converged: no range is told")
     return figure
 
 
@@ -177,7 +175,7 @@ def spectrum(found: Solved) -> Picture:
         band = f"{row['from_hz']:.0f} to {row['to_hz']:.0f} Hz"
         missed[band] = missed.get(band, 0.0) + row["residual"]
     most = max(missed, key=missed.__getitem__)
-    _title(figure, f"Most of what the rig misses of the velocity lies at {most}")
+    headline(figure, f"Most of what the rig misses of the velocity lies at {most}")
     figure.supylabel("share of the measured velocity's power", fontsize=10)
     figure.supxlabel("frequency [Hz]", fontsize=10)
     return figure

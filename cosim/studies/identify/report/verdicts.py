@@ -95,14 +95,11 @@ def judge(
     return found
 
 
-def _ends(found: Found, deviations: Array) -> dict[str, tuple[float, float]]:
-    """The 90 % interval about a solution, by key."""
+def _ends(found: Found, deviations: Array) -> dict[str, list[float]]:
+    """The two ends of the 90 % interval about a solution, by key."""
     off = WITHIN * deviations
     ends = found.space.values(np.stack([found.point - off, found.point + off]))
-    return {
-        key: (low, high)
-        for key, (low, high) in zip(found.space.names, ends.T.tolist(), strict=True)
-    }
+    return dict(zip(found.space.names, ends.T.tolist(), strict=True))
 
 
 def _told(

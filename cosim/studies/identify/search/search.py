@@ -303,16 +303,18 @@ def _unknowns(search: Search, point: Array, own: Array, weight: float) -> Array:
 
 def deviations(search: Search, found: Found, samples: float) -> Array:
     """Standard deviations of the rig's coordinates, the own parameters fitted anew, where the cost
-    is as curved as at the solution: its neighbourhood alone, no other minimum.
+    is as curved as at the solution: its neighbourhood alone, no other minimum. The solution may be
+    of another law than ``search``.
 
     -2 ln L is the effective ``samples`` times ln cost, so the covariance is the inverse of the
     normal matrix times the sum of squares over the samples (G. A. F. Seber, C. J. Wild, *Nonlinear
     Regression*, Wiley 1989, section 5.1).
     """
-    space, d, total = search.space, len(found.point), float(found.costs.sum())
-    slopes = _unknowns(search, found.point, found.own, _weight(found))
+    d, total = len(found.point), float(found.costs.sum())
+    alike = replace(search, space=found.space)
+    slopes = _unknowns(alike, found.point, found.own, _weight(found))
     normal = np.einsum("ij,kj->ik", slopes, slopes)
-    normal[range(d), range(d)] += len(found.costs) * space.curvature
+    normal[range(d), range(d)] += len(found.costs) * found.space.curvature
     normal += TINY * np.trace(normal) * np.eye(len(normal))  # of what moves nothing
     covariance = np.linalg.inv(normal) * total / samples
     return np.asarray(np.sqrt(np.diag(covariance)[:d]))
