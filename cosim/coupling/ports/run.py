@@ -31,6 +31,9 @@ _POINTS, _PIECES = 2048, 512
 ENOUGH, BEGINNING, BUDGET = 1_000_000, 10_000_000, 1e9
 """Steps after which a run is judged, after which it no longer is, and that it may take (hours)."""
 
+ORDINARY = 1000
+"""Steps, over what ``circuit.max_step`` asks for, that no budget forbids: a run may be long."""
+
 _AGREEMENT = 2.0
 """Of ``circuit.reltol``: how far an FMU and ngspice may be apart where steps are repeated."""
 
@@ -190,11 +193,12 @@ class Run:
         about an FMU whose outputs never come to rest."""
         self._attend()
         steps, time, duration = self.steps, self.state.time, self._scene.run.duration
-        if ENOUGH < steps < BEGINNING and steps * duration > BUDGET * time:
+        often = steps * self._scene.circuit.max_step > ORDINARY * time
+        if often and ENOUGH < steps < BEGINNING and steps * duration > BUDGET * time:
             raise SimulationFailed(
                 f"The steps are too short to come to an end: {steps} until t = {time:.3g} s of "
-                f'{duration:g} s. Where coupling.method is "redo", an FMU\'s outputs may jump '
-                "without end."
+                f"{duration:g} s. A node may ring undamped; where coupling.method is "
+                '"redo", an FMU\'s outputs may jump without end.'
             )
 
     def _refill(self) -> None:
