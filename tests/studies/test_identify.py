@@ -360,7 +360,7 @@ def test_verdicts() -> None:
         found = {v.key: v for v in judge(best, meant, [one.point * 0.0 + apart for one in meant])}
         mass = found["mechanics.surface_mass"]
         k = cubic.names.index(mass.key)
-        least, most = 0.5 - 1.645 * apart, 0.52 + 1.645 * apart
+        least, most = 0.5 - 2 * 1.645 * apart, 0.52 + 2 * 1.645 * apart
         ends_of = [cubic.values(np.full(len(middle), x))[k] for x in (least, most)]
         assert (mass.low, mass.high) == pytest.approx(ends_of)
         assert mass.kind == "identified"

@@ -113,7 +113,8 @@ def findings(numbers: dict[str, Any]) -> list[str]:
         words = (
             f"Two searches with the law {' or '.join(agreed)} have come to the same cost, within "
             "2 %. Ranges hold the 90 % intervals about all their solutions that are as likely (of "
-            f"{numbers['effective_samples']:.0f} effective samples), and about each law's best."
+            f"{numbers['effective_samples']:.0f} effective samples, twice as wide as if the model "
+            "lacked nothing), and about each law's best."
         )
     elif max(len(one["costs"]) for one in laws) < 2:
         words = "Not converged: one search tells no range. A range needs two that come to the same."
