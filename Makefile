@@ -32,7 +32,8 @@ VENV := .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check --no-input -q
 # A lock names all that is needed: pip need not look again, nor bring what the lock leaves out.
-# Python compiles what it imports by itself.
+# Python compiles what it imports by itself, and keeps that: else each process would take a second more.
+unexport PYTHONDONTWRITEBYTECODE
 LOCKED := install --require-hashes --no-deps --no-compile -r
 
 # An environment that was moved, or whose Python is gone, counts as not made.
