@@ -54,7 +54,7 @@ run: $(COMPILED)
 	@$(VENV)/bin/cosim run $(SCENE) $(ARGS)
 
 test: $(COMPILED) $(VENV)/.locked-test
-	@$(PY) -m pytest -n auto -m "not slow" $(ARGS)
+	@$(PY) -m pytest -n auto --dist worksteal -m "not slow" $(ARGS)
 
 test-all: $(COMPILED) $(VENV)/.locked-test
 	@$(PY) -m pytest $(ARGS)

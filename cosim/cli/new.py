@@ -10,10 +10,8 @@ _SCHEMA = "scene.schema.json"
 
 
 def _new(file: Path, kind: str = "machine", base: str = "paper-limited") -> None:
-    import json
-
     from cosim.errors import BadInput, plain
-    from cosim.files.atomic import write_text
+    from cosim.files.atomic import as_json, together
     from cosim.files.resources import circuits
     from cosim.scene.describe import schema
     from cosim.scene.loading import list_scenes, load
@@ -36,21 +34,24 @@ def _new(file: Path, kind: str = "machine", base: str = "paper-limited") -> None
     if kind != "machine":
         text = (circuits() / "new" / f"{kind}.cir").read_text(encoding="utf-8")
         texts[file.with_suffix(".cir")] = text
-    fmu = file.with_suffix(".fmu")
-    for path in (*texts, fmu) if kind == "fmu" else texts:
+    fmus = [file.with_suffix(".fmu")] if kind == "fmu" else []
+    for path in (*texts, *fmus):
         if path.exists():
             raise BadInput(f"{plain(str(path))}: is there already; choose another name.")
     if not file.parent.is_dir():
         raise BadInput(f"{plain(str(file.parent))}: there is no such folder.")
-    if kind == "fmu":
-        from cosim.mechanics import package
+    texts = {path: text.replace("NAME.", f"{file.stem}.") for path, text in texts.items()}
+    texts[file.with_name(_SCHEMA)] = as_json(schema())
+    paths = [*texts, *fmus]
+    with together(paths) as temporary:
+        for target, text in zip(temporary, texts.values(), strict=False):
+            target.write_text(text, encoding="utf-8")
+        for target in temporary[len(texts) :]:
+            from cosim.mechanics import package
 
-        package.write(fmu, 3)
-    for path, text in texts.items():
-        write_text(path, text.replace("NAME.", f"{file.stem}."))
-    write_text(file.with_name(_SCHEMA), json.dumps(schema(), indent=1) + "\n")
-    beside = [path.name for path in (*texts, fmu, file.with_name(_SCHEMA)) if path.exists()][1:]
-    print(f"Written: {file}, beside it {', '.join(beside)}. Now: cosim run {file}")
+            package.write(target, 3)
+    beside = ", ".join(path.name for path in paths[1:])
+    print(f"Written: {file}, beside it {beside}. Now: cosim run {file}")
 
 
 COMMANDS = (

@@ -8,6 +8,7 @@ import jsonschema
 import pytest
 
 from cosim.cli.main import main
+from cosim.mechanics import package
 from cosim.scene import list_scenes, load
 from cosim.scene.describe import schema
 from cosim.scene.loading import groups
@@ -66,6 +67,16 @@ def test_what_cannot_be_made_is_told(
     said = capsys.readouterr().err
     assert told in said and said.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["there.toml"]
+
+
+def test_nothing_is_half_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def spoilt(path: Path, version: int) -> None:
+        path.write_text("half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(package, "write", spoilt)
+    assert main(["new", str(tmp_path / "mine.toml"), "--kind", "fmu"]) == 2
+    assert [*tmp_path.iterdir()] == []
 
 
 @pytest.mark.parametrize("path", sorted(LIBRARY.glob("*.toml")), ids=lambda path: path.stem)

@@ -164,7 +164,7 @@ sys.exit(main(sys.argv[1:]))
 def test_a_pause_spoils_no_point(whole: bool, tmp_path: Path) -> None:
     """Stopped for longer than a point may work without progress, with and without the parent."""
     command = [
-        "sweep", "paper", "--over=friction.mu_k=0.4,0.5", "--set=run.duration=24",
+        "sweep", "paper", "--over=friction.mu_k=0.4,0.5", "--set=run.duration=16",
         "--workers=2", f"--out={tmp_path}",
     ]  # fmt: skip
     process = subprocess.Popen(
