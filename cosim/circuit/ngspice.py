@@ -214,9 +214,12 @@ class Engine(Shared.NgSpiceShared):
             self.sent = tuple(name.lower() for name in names)
             if self._leader is not None:
                 wanted = [*(_vector(name) for name in self._save), "time"]
-                self._leader.places[:] = [self.sent.index(name) for name in wanted]
-        except ValueError as error:
-            self.fail(SimulationFailed(f"The netlist has no such vector: {error}."))
+                for place, name in enumerate(wanted):
+                    if name not in self.sent:
+                        raise SimulationFailed(f"The netlist has no {plain(self._save[place])}.")
+                    self._leader.places[place] = self.sent.index(name)
+        except (ValueError, SimulationFailed) as error:
+            self.fail(error)
         return 0
 
 

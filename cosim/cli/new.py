@@ -10,6 +10,8 @@ _SCHEMA = "scene.schema.json"
 
 
 def _new(file: Path, kind: str = "machine", base: str = "paper-limited") -> None:
+    import re
+
     from cosim.errors import BadInput, plain
     from cosim.files.atomic import as_json, together
     from cosim.files.resources import circuits
@@ -30,7 +32,11 @@ def _new(file: Path, kind: str = "machine", base: str = "paper-limited") -> None
         texts[file] = to_toml(load(base), base)
     if kind == "circuit":
         own = f'[circuit]\nmodel = "file"\nnetlist = "{file.stem}.cir"  # beside this file\n'
-        texts[file] = texts[file].replace("[circuit]\n", own)
+        text = texts[file].replace("[circuit]\n", own)
+        text = re.sub(
+            "description = .*", 'description = "The machine on a circuit of my own"', text
+        )
+        texts[file] = re.sub("(?m)^# (model|netlist) = .*\\n", "", text)
     if kind != "machine":
         text = (circuits() / "new" / f"{kind}.cir").read_text(encoding="utf-8")
         texts[file.with_suffix(".cir")] = text

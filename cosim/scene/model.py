@@ -357,9 +357,9 @@ class Scene(BaseModel):
     @property
     def has_ports(self) -> bool:
         """Whether ports join more than the built-in machine to the circuit, or join that as an FMU
-        like others, whose steps are done again."""
-        again = self.coupling.method == "redo"
-        return bool(self.fmu) or (bool(self.port) and (again or not self.renamed))
+        like others, by a method for these alone."""
+        alike = self.coupling.method in OF_PORTS[2:]
+        return bool(self.fmu) or (bool(self.port) and (alike or not self.renamed))
 
     @property
     def renamed(self) -> dict[str, str]:

@@ -72,8 +72,9 @@ def _told_of(found: list[float], travel: float) -> Iterator[str]:
         for q in found
     ]
     yield (
-        f"without a current the ram rests at {len(found)} places: {'; '.join(places)}. A pulse may "
-        "leave it at another than it came from."
+        f"without a current the ram rests at {len(found)} places: {'; '.join(places)}. q is its "
+        "way up from the middle between the walls. A pulse may leave it at another than it came "
+        "from."
     )
 
 

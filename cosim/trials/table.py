@@ -49,7 +49,7 @@ MAP = "surface=NAME[:unit],part=NAME[:unit],time=NAME[:unit]"
 """Which column of a table is what; the unit may stand in the header instead."""
 HOW = (
     "write what it is and its unit, such as time [s], surface [mm], part [mm], or name the "
-    "columns, such as --columns time=t:s,surface=zs:mm,part=zp:mm"
+    "columns, such as --columns time=t:s,surface=top:mm,part=cube:mm"
 )
 BODIES = {"p": "surface", "o": "part", "s": "plate"}
 TRIALS = {"t": "time"} | {

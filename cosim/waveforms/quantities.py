@@ -34,12 +34,12 @@ def meaning(name: str) -> dict[str, str]:
 
 def with_unit(value: float, unit: str, digits: int = 6) -> str:
     """``number unit``; a plain number has no unit."""
-    return f"{value:.{digits}g}" + ("" if unit == "1" else f" {unit}")
+    return f"{value:.{digits}g}" + ("" if unit in ("1", "?") else f" {unit}")
 
 
 def label(name: str, unit: str) -> str:
     """``name [unit]`` for an axis."""
-    return name if unit == "1" else f"{name} [{unit}]"
+    return name if unit in ("1", "?") else f"{name} [{unit}]"
 
 
 def bench_unit(quantity: str) -> tuple[str, float]:

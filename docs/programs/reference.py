@@ -9,13 +9,16 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
 import cosim
 from cosim.cli.main import _parser
 from cosim.scene.describe import Key, keys
 from cosim.scene.loading import list_scenes
 from cosim.scene.methods import METHODS
 from cosim.scene.rungs import RUNGS
-from cosim.scene.tables import TABLES
+from cosim.scene.tables import PORT_LISTS, TABLES
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.formats import formats
 from cosim.waveforms.quantities import SUMMARY
@@ -62,6 +65,13 @@ REGISTRIES = {
 }
 
 
+_LISTS = {
+    "drive.table": "`[[phase, level], …]`",
+    "circuit.save": '`["v(out)", …]`',
+    "circuit.param": "`{ NAME = number, … }`",
+}
+
+
 def default(key: Key) -> str:
     if key.default is None:
         return "none"
@@ -78,7 +88,7 @@ def allowed(key: Key) -> str:
     if key.kind is str:
         return "path of a file"
     if key.kind is list:
-        return "`[[phase, level], …]`"
+        return str(_LISTS[key.full])
     assert key.low is not None and key.high is not None
     whole = "whole, " if key.kind is int else ""
     return f"{whole}{number(key.low)} … {number(key.high)}"
@@ -89,6 +99,17 @@ def meaning(key: Key) -> str:
     rungs = [name for name, rung in RUNGS.items() if key.name in rung.keys]
     acts = f" Acts in {', '.join(rungs)}." if key.table == "circuit" and rungs else ""
     return sentence(text).removesuffix(".") + "." + acts
+
+
+def _entry(name: str, about: FieldInfo) -> list[str]:
+    """The row of a key of a list of tables."""
+    extra = about.json_schema_extra
+    words = str(extra.get("words", "number")) if isinstance(extra, dict) else "number"
+    if about.default is PydanticUndefined:
+        usual = "none" if about.default_factory else "needed"
+    else:
+        usual = "none" if about.default is None else code(json.dumps(about.default))
+    return [code(name), usual, sentence(words), sentence(about.description or "") + "."]
 
 
 def scene() -> str:
@@ -115,6 +136,11 @@ def scene() -> str:
                 parts.append(f"The values of `{full}`:")
                 rows = [[code(f'"{one.name}"'), sentence(one.text)] for one in registry.values()]
                 parts.append(table(["value", "meaning"], rows))
+    for name, model in PORT_LISTS.items():
+        words = sentence((model.__doc__ or "").removesuffix("."))
+        parts += [f"## [[{name}]]", f"{words}; one table for each. See [ports](../howto/ports.md)."]
+        rows = [_entry(about.alias or key, about) for key, about in model.model_fields.items()]
+        parts.append(table(["key", "default", "value", "meaning"], rows))
     return "\n\n".join(parts)
 
 

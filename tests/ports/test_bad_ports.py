@@ -27,6 +27,7 @@ WRONG = {
     "no such source": ('"Vemf"\n', '"Vemg"\n', r"bridge\.cir: .*\"Vemg\".*did you mean vemf"),
     "no source at all": ('"Vemf"\n', '"Rm"\n', r"bridge\.cir: .*\"Rm\" must be a V or I source"),
     "no such node": ('"v(gp)"', '"v(gpp)"', r"bridge\.cir: \"v\(gpp\)\".*no node gpp"),
+    "within a device": ('"v(gp)"', '"@d1[id]"', r"\"@d1\[id\]\" .*source of 0 V in series"),
     "no such current": ('"i(Vemf)"', '"i(Rm)"', r"bridge\.cir: .*no V, L, E or H element rm"),
     "a command as probe": ('"v(gp)"', '"v(gp)\\n.control"', r"cannot stand in a netlist"),
     "a parameter": ("J = 2e-4", "K = 2e-4", r"Rotor\.fmu: .*parameters K = 0\.0002"),

@@ -102,8 +102,8 @@ def test_as_an_fmu_like_others_the_machine_moves_alike(
     folder: Path, base: str, contact: str, alone: bool
 ) -> None:
     """Beside another, or with steps that are done again: it tells nobody when its ram meets a
-    wall."""
-    text = OWN.replace("paper", base)
+    wall, and is asked for no voltage of its coil."""
+    text = OWN.replace("paper", base) + ENDS
     if not alone:
         build(folder, "Load")
         fmu = '[[fmu]]\nname = "other"\nfile = "Load.fmu"\n[[port]]'
@@ -120,6 +120,16 @@ def test_as_an_fmu_like_others_the_machine_moves_alike(
         true = fine.columns[name]
         error = np.sqrt(np.mean((result.columns[other] - true) ** 2))
         assert error < 3.0 * np.sqrt(np.mean((own.columns[name] - true) ** 2)), name
+
+
+def test_by_macro_steps_the_machine_is_an_fmu_like_others(folder: Path) -> None:
+    (folder / "own.toml").write_text(OWN + ENDS + RUN)
+    given = {"coupling.method": "macro-steps", "coupling.macro_step": 2e-5, "run.duration": 0.02}
+    with in_place():
+        result = cosim.run(folder / "own.toml", given)
+    expected = agreed(folder, run_duration=0.02).columns["current"]
+    error = np.abs(result.columns["i(Vmot)"] - expected).max()
+    assert error < 1e-3 * np.abs(expected).max()
 
 
 WRONG = {

@@ -12,7 +12,7 @@ from cosim.coupling.ports.structures import DRIVE, OUTPUT, PROBE, Feed, Origin, 
 from cosim.mechanics.package import unpacked
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
-from cosim.scene.tables import MACHINE, Fmu, Port
+from cosim.scene.tables import MACHINE, MACHINE_ENDS, Fmu, Port
 
 _HELD, _DIFFERENCE, _KNOWN = range(3)
 _FEEDS = {"mean": 0, "line": 1, "end": 2}
@@ -24,13 +24,15 @@ class Plan:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         sides = {each.name: Side(each, stranger(each.file)) for each in scene.fmu}
-        ends = [port.origin or port.to or "" for port in scene.port]
+        # As an FMU like others the machine asks for no voltage of its coil.
+        ports = [port for port in scene.port if port.to not in MACHINE_ENDS[3:]]
+        ends = [port.origin or port.to or "" for port in ports]
         self._has_machine = any(end.startswith(f"{MACHINE}.") for end in ends)
         if self._has_machine:
             sides[MACHINE] = Side(_machine(scene), stranger(str(unpacked(2))))
         self.sides = _in_order(scene, sides)
         """In the order in which they step: after those that feed them, as far as that can be."""
-        self.probes = tuple(dict.fromkeys(p.probe for p in scene.port if p.probe is not None))
+        self.probes = tuple(dict.fromkeys(p.probe for p in ports if p.probe is not None))
         self.words = tuple(dict.fromkeys([*self.probes, *(scene.circuit.save or ())]))
         """What is read of the circuit, first what leads to FMUs."""
         self.sources: list[Any] = []
@@ -38,7 +40,7 @@ class Plan:
         """Of the sources that ports feed, as the scene spells them."""
         self._from: list[tuple[Side, Any]] = []
         self._fed: list[tuple[int, Side, Variable]] = []  # sources that FMUs feed
-        for port in scene.port:
+        for port in ports:
             self._join(port, sides)
         # Slopes of outputs make rows longer, so places in the row of all are known only now.
         first = 0

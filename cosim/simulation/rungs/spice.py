@@ -163,8 +163,11 @@ def _refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
         missing, worst = float(sums[-1]), max(worst, float(np.abs(sums).max()))
         swept += float(np.abs(given).sum() + np.abs(emf).sum())
     if worst > 0.01 * swept + 1e-12:
+        ends = {"out": "v(out)", "sense": "v(sense)", "back_emf": "Vemf"}
+        out, sense, emf = (scene.renamed.get(f"machine.{k}", word) for k, word in ends.items())
         raise BadInput(
-            f"{scene.circuit.netlist}: v(out) - v(sense) is not the voltage of the scene's coil at "
-            "the current i(Vemf): Vemf must be in series with the coil, + towards out, and the "
-            "coil's values must come from .param lines (coil_resistance, coil_inductance, count)."
+            f"{scene.circuit.netlist}: {out} - {sense} is not the voltage of the scene's coil at "
+            f"the current i({emf}): {emf} must be in series with the coil, + towards {out}, and "
+            "the coil's resistance and inductance must be those of [coil] (as .param lines "
+            "coil_resistance, coil_inductance and count they are)."
         )

@@ -115,8 +115,8 @@ def compare(
 ) -> Comparison:
     """Compare a run with a recording (a CSV): a tracked trial, or what any instrument measured of
     surface, part, current or voltage (:mod:`cosim.trials.table` has the columns and units), or
-    ``columns`` names them: ``"time=t:s,surface=zs:mm,part=zp:mm"``. What was understood is printed
-    first; what is not clear is refused.
+    ``columns`` names them: ``"time=t:s,surface=top:mm,part=cube:mm"``. What was understood is
+    printed first; what is not clear is refused.
 
     ``run`` is a result, a folder that ``Result.save`` wrote, or a scene, which is then run, with
     ``overrides`` for its keys, long enough to cover the recording. Where in its period the run
