@@ -58,13 +58,16 @@ def _own(scene: Scene, summary: dict[str, Any]) -> str:
     for name in names:
         values = "".join(f"{summary[f'{name}.{what}']:>13.6g}" for what in whats)
         lines.append(f"  {name:<{width}}{values}")
-    steps = f"{summary['circuit_steps']} of ngspice, {summary['fmu_steps']} of FMUs"
+    steps, coupling = f"{summary['circuit_steps']} of ngspice", []
+    if summary["fmu_steps"]:
+        steps += f", {summary['fmu_steps']} of FMUs"
+        coupling = [("coupling", summary["method"])]
     repeated = f", {summary['steps_repeated']} repeated" if summary["steps_repeated"] else ""
     time = f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"
     powers = [name.removesuffix(".power") for name in summary if name.endswith(".power")]
     for what, words in (
         *(("power at " + name, f"{summary[f'{name}.power']:.6g} W") for name in powers),
-        ("coupling", summary["method"]),
+        *coupling,
         ("steps", steps + repeated),
         ("run time", time),
     ):

@@ -134,6 +134,9 @@ class Stranger:
             return slave(**names, unzipDirectory=folder)
         except Exception as error:
             words = str(error).replace(folder, "…")
+            _, lacks, function = words.partition("undefined symbol: ")
+            if lacks:
+                raise self.bad(f"its library lacks the function {function} of FMI") from error
             raise self.bad(f"it has no library that runs here ({words})") from error
 
     def find(self, name: str, causality: str, where: str) -> tuple[Variable, int]:

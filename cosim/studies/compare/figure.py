@@ -60,7 +60,7 @@ WORDS = {
 WORDS |= {name: (score, "R² {:.2f}", " (ceiling {:.2f})") for name, (score, _) in R2.items()}
 """Of a panel's score, and of its ceiling."""
 BOTH = {
-    "z_part": ("drift", "drift {:+.1f} mm/s (measured {:+.1f})"),
+    "z_part": ("drift", "mean velocity {:+.1f} mm/s (measured {:+.1f})"),
     "v_surface": ("kick", "largest change {:.0f} mm/s (measured {:.0f})"),
 }
 """What both sides say of a panel's signal."""
@@ -79,4 +79,4 @@ def _words(name: str, found: Found) -> str:
         number, words = BOTH[name]
         sides = (numbers[f"{number}_{side}"] or 0.0 for side in ("simulated", "measured"))
         said.append(words.format(*(1e3 * value for value in sides)))
-    return "; ".join(said)
+    return "\n".join(said)

@@ -57,7 +57,7 @@ def _slides(row: dict[str, Any]) -> str:
     if row["normal_force_weights"] is None:
         return f"not determined: {count}"
     return (
-        f"F_n {row['normal_force_weights']:.2f} m g from {count}, misfit {row['misfit_um']:.1f} µm "
+        f"F_n {row['normal_force_weights']:.2f} m·g from {count}, misfit {row['misfit_um']:.1f} µm "
         f"(noise {row['noise_um']:.1f} µm)"
     )
 
@@ -65,7 +65,7 @@ def _slides(row: dict[str, Any]) -> str:
 def _whole_path(row: dict[str, Any]) -> str:
     return (
         f"error {row['mean_error_mm']:.3f} mm, {row['mean_error_percent']:.1f} %; "
-        f"F_n {row['normal_force_weights']:.2f} m g"
+        f"F_n {row['normal_force_weights']:.2f} m·g"
     )
 
 
@@ -77,7 +77,7 @@ def profiles(result: dict[str, Any]) -> Picture:
         if row["normal_force_weights"] is not None:
             axis.plot(profile["kinetic_friction_weights"], profile["loss"], label=name, **style)
     axis.axhline(LOSS, color="0.3", lw=1.0, ls="--", label="90 %, of slides that do not scatter")
-    axis.set(xlabel="µ_k F_n [m g]", ylabel="loss of log-likelihood", ylim=(0, LARGEST_LOSS))
+    axis.set(xlabel="µ_k F_n [m·g]", ylabel="loss of log-likelihood", ylim=(0, LARGEST_LOSS))
     axis.legend(fontsize=8, frameon=False, ncols=2)
     axis.set_title(
         "How well each friction explains its trial, all else fitted; determined trials", fontsize=11
@@ -117,7 +117,7 @@ def forces(known: Sequence[Force], result: dict[str, Any]) -> Picture:
     axis.margins(y=0.2)  # room for the legend
     axis.set_xlim(-0.5, len(rows) - 0.5)
     axis.set_ylim(0, None)
-    axis.set(xlabel="trial", ylabel="normal force [m g]")
+    axis.set(xlabel="trial", ylabel="normal force [m·g]")
     axis.legend(fontsize=9, frameon=False, loc="upper center", ncols=3)
     change = result["normal_force_change_mean_percent"]
     off = "" if change is None else f"; {change:.1f} % off the measured on average"

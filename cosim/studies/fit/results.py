@@ -80,7 +80,7 @@ def told(numbers: dict[str, Any]) -> str:
     """Fitted or published parameters, trial by trial and together."""
     fitted = numbers["parameters"] == "fitted"
     table: list[tuple[str, ...]] = [
-        ("trial", "force [m g]", "measured", *(FITTED if fitted else EVALUATED))
+        ("trial", "force [m·g]", "measured", *(FITTED if fitted else EVALUATED))
     ]
     for row in numbers["trials"]:
         forces = (row["normal_force_weights"], row["normal_force_measured_weights"])
@@ -102,7 +102,7 @@ def told(numbers: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-FITTED = ("µ_k F_n [m g], 90 %", "slides", "misfit [µm]", "noise [µm]")
+FITTED = ("µ_k F_n [m·g], 90 %", "slides", "misfit [µm]", "noise [µm]")
 EVALUATED = ("error [mm]", "sticks", "error [%]")
 
 
