@@ -207,7 +207,7 @@ def _command(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) -> No
     axis.plot(time, cut["current"], color=DRIVE, lw=1.3, label="one coil (left)")
     axis.set(ylabel="current [A]")
     right = axis.twinx()
-    right.plot(time, cut["command"], color="0.45", lw=0.9, ls="--", label="V1 (right)")
+    right.plot(time, cut["command"], color="0.1", lw=1.1, ls=(0, (3, 4)), label="V1 (right)")
     if "current_2" in cut:
         axis.plot(time, cut["current_2"], color=SECOND, lw=1.1, ls="--", label="second (left)")
     right.set_ylabel("V1 [V]")
@@ -286,10 +286,12 @@ def _acceleration(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) 
         read = accelerations(film(cut, frames, exposure).z_surface)
         label = f"read from {FRAME_RATE:.0f} frames/s"
         axis.plot(frames * 1e3, read, color="0.2", lw=0.9, marker=".", ms=4, label=label)
+    beyond = ""
     if np.abs(axis.dataLim.intervaly).max() > LINEAR:
+        beyond = f"\nlogarithmic beyond {LINEAR:g}"
         axis.set_yscale("symlog", linthresh=LINEAR)
         axis.yaxis.set_major_formatter(_power_of_ten)
     _at_least(axis, 2.0)
-    axis.set(ylabel="acceleration [m/s²]")
+    axis.set(ylabel=f"acceleration [m/s²]{beyond}")
     rigid = scene.mechanics.contact == "rigid" and not scene.surface_is_given
     _head(axis, "Acceleration of the surface" + (", without its jumps" if rigid else ""))
