@@ -257,7 +257,7 @@ def test_the_recommended_measurement_narrows_more_than_others() -> None:
     recommended narrows the interval more than the median of the others does, and it holds the
     truth, in at least five of six."""
     given = whole(SCENE, ensemble(RIGS, SCENE))
-    more = drawn(SCENE, given, 34, np.random.default_rng(0))
+    more = drawn(SCENE, given, study.RIGS - len(given), np.random.default_rng(0))
     made = drawn(SCENE, given, MADE, np.random.default_rng(2))
     rigs, many = [*given, *more, *made], len(given) + len(more)
     with Store(None) as store:

@@ -17,7 +17,7 @@ DRAWS = 8
 """Of the measurement's noise, on each rig."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Worth:
     """Of one measurement for one target, over rigs taken as the truth and left out."""
 
@@ -27,6 +27,8 @@ class Worth:
     """Its standard error."""
     held: float
     """The share of them that holds the truth."""
+    each: Array
+    """The widths, rig by rig, means over the noise."""
 
 
 def likely(values: Array, shown: Array, sd: Array) -> Array:
@@ -66,8 +68,8 @@ def worth(values: Array, sd: Array, targets: Array, rng: np.random.Generator) ->
             held[truth, draw] = (low <= targets[truth]) & (targets[truth] <= high)
     each = widths.mean(axis=1)
     errors = each.std(axis=0, ddof=1) / np.sqrt(n)
-    told = zip(each.mean(axis=0), errors, held.mean(axis=(0, 1)), strict=True)
-    return [Worth(*map(float, one)) for one in told]
+    told = zip(each.mean(axis=0), errors, held.mean(axis=(0, 1)), each.T, strict=True)
+    return [Worth(float(width), float(error), float(h), one) for width, error, h, one in told]
 
 
 def chance(targets: Array, rng: np.random.Generator) -> list[Worth]:
@@ -75,5 +77,6 @@ def chance(targets: Array, rng: np.random.Generator) -> list[Worth]:
     its intervals stand on fewer rigs: of four, in turn, the means."""
     n = len(targets)
     found = [worth(rng.random((n, 1)), np.full((n, 1), 1e-3), targets, rng) for _ in range(4)]
-    means = np.array([[[*vars(one).values()] for one in each] for each in found]).mean(axis=0)
-    return [Worth(*one) for one in means.tolist()]
+    rows = [[[one.width, one.error, one.held, *one.each] for one in each] for each in found]
+    means: Array = np.mean(rows, axis=0)
+    return [Worth(float(one[0]), float(one[1]), float(one[2]), one[3:]) for one in means]
