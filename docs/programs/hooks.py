@@ -27,6 +27,8 @@ OUTSIDE = (
     "circuits/**/*",
     "fmu/README.md",
     "fmu/src/physics/variables.def",
+    "fmu/models/*.c",
+    "fmu/thin/*.h",
     "cosim/studies/identify/problem/bounds.toml",
     "CHANGELOG.md",
     "SECURITY.md",

@@ -3,7 +3,9 @@
 A page is a program: its blocks run in order in one folder, as :mod:`docs.programs.pages` has it.
 """
 
+import ast
 import contextlib
+import functools
 import os
 import re
 import shutil
@@ -18,6 +20,7 @@ import pytest
 from docs.programs.pages import Block, blocks
 
 REPOSITORY = Path(__file__).parents[2]
+DOCS = REPOSITORY / "docs"
 MADE = REPOSITORY / "docs" / "reference"
 PAGES = [
     *(REPOSITORY / name for name in ("README.md", "circuits/README.md", "fmu/README.md")),
@@ -157,6 +160,16 @@ def test_blocks_say_what_they_are(page: Path) -> None:
             assert not hidden, f"line {block.line}: a command in a block that is not run"
 
 
+@functools.cache
+def outside() -> tuple[str, ...]:
+    """What the site takes from beside docs/; the module that says it needs MkDocs."""
+    text = (DOCS / "programs" / "hooks.py").read_text(encoding="utf-8")
+    found: tuple[str, ...] = ast.literal_eval(
+        text.partition("\nOUTSIDE = ")[2].partition('\n"""')[0]
+    )
+    return found
+
+
 def headings(page: Path) -> set[str]:
     """The anchors of a page."""
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
@@ -170,5 +183,8 @@ def test_links_lead_somewhere(page: Path) -> None:
     for file, heading in LINK.findall(text):
         target = (page.parent / file).resolve() if file else page
         assert target.exists(), f"{name(page)} links to {file}"
+        if DOCS in page.parents and DOCS not in (target, *target.parents) and target.is_file():
+            taken = any(target in REPOSITORY.glob(pattern) for pattern in outside())
+            assert taken, f"{name(page)} links to {file}, which the site does not have"
         if heading and target.suffix == ".md":
             assert heading in headings(target), f"{name(page)} links to {file}#{heading}"
