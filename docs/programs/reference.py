@@ -105,6 +105,7 @@ def _entry(name: str, about: FieldInfo) -> list[str]:
     """The row of a key of a list of tables."""
     extra = about.json_schema_extra
     words = str(extra.get("words", "number")) if isinstance(extra, dict) else "number"
+    words = re.sub(r"\{.*\}", r"`\g<0>`", words)
     if about.default is PydanticUndefined:
         usual = "none" if about.default_factory else "needed"
     else:
