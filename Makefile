@@ -141,7 +141,7 @@ dist: $(COMPILED) $(VENV)/.locked-dist
 	@$(PY) build_dist.py
 
 # The largest first: the others have its versions. cmake is for `fmpy compile` alone.
-COMPILE = $(UV) pip compile --quiet --universal --fork-strategy fewest --generate-hashes --no-emit-index-url \
+COMPILE = $(UV) pip compile --quiet --universal --fork-strategy fewest --generate-hashes \
 	--python-version 3.11 --custom-compile-command "make lock" --no-emit-package cmake pyproject.toml
 
 lock:

@@ -191,19 +191,18 @@ def _check_vectors(top: Scope, name: str, words: Sequence[str], wanted: Iterable
         "i": {each.name for each in top.elements if each.kind in _CURRENTS},
     }
     for each in wanted:
+        where = name if each.text in words else f"{each.file}:{each.number}"
+        asked = f'{where}: "{plain(each.text)}" is asked for, but'
         if "@" in each.text:
             raise BadInput(
-                f"{name if each.text in words else f'{each.file}:{each.number}'}: "
-                f'"{plain(each.text)}" is asked for, but what is within a device is not read; for '
-                "its current put a source of 0 V in series, and ask for i of that."
+                f"{asked} what is within a device is not read; for its current put a source of 0 V "
+                "in series, and ask for i of that."
             )
         for kind, what in (("v", "node"), ("i", "V, L, E or H element")):
             for inner in sensed(f"b 1 0 v={each.text}", kind):
                 if not re.search(r"[.:]", inner) and inner not in known[kind]:
-                    where = name if each.text in words else f"{each.file}:{each.number}"
                     hint = suggestion(inner, known[kind])
-                    said = f'"{plain(each.text)}" is asked for, but there is no {what}'
-                    raise BadInput(ended(f"{where}: {said} {plain(inner)}{hint}"))
+                    raise BadInput(ended(f"{asked} there is no {what} {plain(inner)}{hint}"))
 
 
 def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:

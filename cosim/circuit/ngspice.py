@@ -213,13 +213,13 @@ class Engine(Shared.NgSpiceShared):
             names = [_ffi.string(data.vecs[i].vecname).decode() for i in range(data.veccount)]
             self.sent = tuple(name.lower() for name in names)
             if self._leader is not None:
+                for name in self._save:
+                    if _vector(name) not in self.sent:
+                        raise ValueError(plain(name))
                 wanted = [*(_vector(name) for name in self._save), "time"]
-                for place, name in enumerate(wanted):
-                    if name not in self.sent:
-                        raise SimulationFailed(f"The netlist has no {plain(self._save[place])}.")
-                    self._leader.places[place] = self.sent.index(name)
-        except (ValueError, SimulationFailed) as error:
-            self.fail(error)
+                self._leader.places[:] = [self.sent.index(name) for name in wanted]
+        except ValueError as error:
+            self.fail(SimulationFailed(f"The netlist has no such vector: {error}."))
         return 0
 
 
