@@ -2,9 +2,11 @@
  * include this with WIDTH, INLINE and FUNCTION defined. Without branches between lanes, and without
  * contraction, each width gives the same bits.
  *
- * Moreau's time stepping with the midpoint rule: of second order, since what is not smooth is either
- * linear within a step (the current at its limits) or solved for at its end (friction), and since
- * steps end where the command jumps. */
+ * Moreau's time stepping with the midpoint rule. What is not smooth is either linear within a step
+ * (the current at its limits) or solved for at its end (friction), and steps end where the command
+ * jumps. That leaves errors of first order where friction turns within a step, and, in the source, by
+ * the speed at the step's begin in the back-EMF; in runs of scenes neither is left, which makes them of
+ * second order. The search through a trial's drives and rigs does without, for its time. */
 
 #include <string.h>
 
@@ -23,6 +25,14 @@ INLINE Wide least(Wide a, Wide b) { return choose(a < b, a, b); }
 INLINE Wide most(Wide a, Wide b) { return choose(a > b, a, b); }
 INLINE Wide within(Wide x, Wide bound) { return least(most(x, -bound), bound); }
 
+INLINE int any(Mask mask)
+{
+    int64_t found = 0;
+    for (int l = 0; l < WIDTH; l++)
+        found |= mask[l];
+    return found != 0;
+}
+
 INLINE Wide root(Wide x)
 {
     Wide y;
@@ -38,6 +48,7 @@ typedef struct {
     Wide jump;                      /* when the line of the command ends */
     Wide top, slope;                /* V1 at its end, V, and its slope, V/s */
     Wide line;                      /* its number */
+    Wide rate;                      /* of the ram over the surface, mean of the last step, m/s^2 */
 } State;
 
 /* Friction of the surface (first) and the plate (second) on the part, as impulses. Both are set-valued:
@@ -59,6 +70,25 @@ INLINE Wide of_surface(const Contact *c, Wide bound, Wide *plate)
     *plate = within(wanted, c->held);
     const Wide rubbing = within((c->surface - c->part - c->a * *plate) * c->alone, bound);
     return choose(*plate == wanted, resting, rubbing);
+}
+
+/* By what share of a step the part, with the friction it had at the begin, comes to rest on the plate
+ * or, if `slip` (its sign, else 0) says that it slips, on the surface; 1 where it does not. `on` and
+ * `off` are its velocities over the plate and under the surface at the begin. The plate's impulse was
+ * `plate` by the state at the end. */
+INLINE Wide turning(const Contact *c, Wide slip, Wide on, Wide off, Wide loose, Wide plate)
+{
+    const Wide zero = {0}, one = zero + 1.0;
+    const Wide against = choose(on > zero, -c->held, c->held);
+    const Wide rubbing = within((c->surface - c->part - c->a * against) * c->alone, loose);
+    const Wide then = c->part + c->a * (rubbing + against) - (c->plate - c->d * against);
+    const Wide on_plate = choose((on * then < zero) & (plate != against), on / (on - then), one);
+
+    const Wide goes_on = -slip * loose;
+    const Wide held = within((c->plate - c->part - c->a * goes_on) * c->second, c->held);
+    const Wide left = c->surface - c->b * goes_on - (c->part + c->a * (goes_on + held));
+    const Wide on_surface = choose((slip != zero) & (off * left < zero), off / (off - left), one);
+    return least(on_plate, on_surface);
 }
 
 /* As the FMU numbers the laws of the suspension. What a lane's law does not have becomes 0, so that
@@ -95,20 +125,31 @@ typedef struct {
     Wide friction, plate; /* impulses of surface and plate on the part, N s */
     Wide wall, wall_damping; /* force of the walls' springs, down, N; their dampers, N s/m */
     Mask drops;              /* the line of the command has ended */
+    Wide divide;             /* the share after which the step is better divided; 1: nowhere */
 } Effect;
+
+/* A turn this early in a step is not worth another one. */
+#define EARLY 0.05
+
+/* The share of its depth in the wall from which on the ram's way in a step is worth two. */
+#define DEEP 0.3
 
 /* One step of all lanes, whose plate is moving or stands on the ground. It ends at `edge`, or where
  * the command jumps, if that lies between `low` and `high`. `lifted` is as choose_laws() has it. i0
- * and i1 give the current at both ends where it is measured; then the effect has no limits. What of it
- * nobody reads costs nothing. */
+ * and i1 give the current at both ends where it is measured; then the effect has no limits. In the run
+ * of a `scene` it tells where to divide the step; `*made` of the step is made, or all without one. What
+ * of the effect nobody reads costs nothing. */
 INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double high, int lifted,
-                 int moving, int measured, double i0, double i1, Effect *effect)
+                 int moving, int measured, double i0, double i1, int scene, const Wide *made,
+                 Effect *effect)
 {
     const Wide zero = {0}, one = zero + 1.0;
     const Wide start = p[START], jump = m->jump, t = m->t;
     Wide end = choose((start > low) & (start <= high), start, zero + edge);
     const Mask drops = jump <= high;
     end = choose(drops, most(jump, 0.5 * (t + low)), end);
+    if (made)
+        end = t + *made * (end - t);
     const Wide h = end - t, half = 0.5 * h;
 
     /* The coil. What it can reach within the step lies between `lowest` and `highest`. */
@@ -125,8 +166,11 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
         const Wide target0 = choose(on, within(gain * v1, limit), zero);
         const Wide target1 = choose(on, within(gain * (v1 + slope * h), limit), zero);
         const Wide drop = half * (p[RESISTANCE] + p[SENSE_RESISTANCE]);
-        const Wide inverse = 1.0 / (p[INDUCTANCE] + drop);
-        const Wide own = (p[INDUCTANCE] - drop) * i - h * p[FORCE_FACTOR] * u;
+        /* With `bend` the decay is a Padé approximant of fourth order, and its mean that of a parabola. */
+        const Wide bend = scene ? drop * (1.0 / (3.0 * p[INDUCTANCE])) : zero;
+        const Wide inductance = p[INDUCTANCE] + bend * drop, inverse = 1.0 / (inductance + drop);
+        const Wide middle = scene ? u + half * m->rate : u;
+        const Wide own = (inductance - drop) * i - h * p[FORCE_FACTOR] * middle;
         const Wide highest = (own + h * p[OUTPUT_HIGH]) * inverse;
         const Wide lowest = (own + h * p[OUTPUT_LOW]) * inverse;
         now = least(most(target1, lowest), highest);
@@ -136,7 +180,7 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
         const Wide share = choose(gap == 0.0, zero, least(most(gap / closing, zero), one));
         const Wide met = target0 + share * (target1 - target0);
         const Wide meeting = 0.5 * (share * (i + met) + (1.0 - share) * (met + target1));
-        mean = choose(now == target1, meeting, 0.5 * (i + now));
+        mean = choose(now == target1, meeting, 0.5 * (i + now + bend * (now - i)));
         const Wide clamped = choose(now == target1, share, one);
         effect->high = choose((now < target1) | ((now == target1) & (gap > 0.0)), clamped, zero);
         effect->low = clamped - effect->high;
@@ -201,9 +245,19 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
     const Wide plate = choose(sticks, plate_stick, plate_slip);
     effect->friction = impulse;
     effect->plate = plate;
+    if (scene) {
+        const Wide deep = up + down;
+        const Mask hits = (deep > zero) & (h * most(u, -u) > DEEP * deep);
+        Wide share = turning(&k, m->slip, m->w - m->s, m->v - m->w, loose, plate);
+        share = choose(share < EARLY, one, share);
+        share = choose(hits & (share == one), zero + 0.5, share);
+        effect->divide = choose(drops, one, share);
+    }
 
     const Wide v1 = k.surface - k.b * impulse, r1 = (on_ram + c * v1) * inverse_ram;
     const Wide w1 = k.part + k.a * (impulse + plate), s1 = k.plate - k.d * plate;
+    if (scene)
+        m->rate = (r1 - v1 - u) / h;
     m->x += half * (m->w + w1);
     m->z = zm + half * v1;
     m->y = ym + half * r1;
@@ -244,13 +298,13 @@ FUNCTION(chain_lanes)(const Schedule *c, const Parameters all, const Rest *rest,
             const double i0 = c->current ? c->current[k < 1 ? 0 : k - 1] : 0.0;
             Effect e;
             if (!c->current && !moving)
-                step(p, &m, low, edge, high, lifted, 0, 0, i0, i1, &e);
+                step(p, &m, low, edge, high, lifted, 0, 0, i0, i1, 0, NULL, &e);
             else if (!c->current)
-                step(p, &m, low, edge, high, lifted, 1, 0, i0, i1, &e);
+                step(p, &m, low, edge, high, lifted, 1, 0, i0, i1, 0, NULL, &e);
             else if (!moving)
-                step(p, &m, low, edge, high, lifted, 0, 1, i0, i1, &e);
+                step(p, &m, low, edge, high, lifted, 0, 1, i0, i1, 0, NULL, &e);
             else
-                step(p, &m, low, edge, high, lifted, 1, 1, i0, i1, &e);
+                step(p, &m, low, edge, high, lifted, 1, 1, i0, i1, 0, NULL, &e);
             m.jump = choose(e.drops, m.jump + 1.0 / p[FREQUENCY], m.jump);
         }
         if (k < 0 || c->sample[k] < 0)
@@ -373,12 +427,60 @@ INLINE void pass_corners(const Drive *drives, const Wide p[N_ALL], Mask drops, S
     }
 }
 
+/* When settling and the run end in some lanes, s; what is to be noted of the step at hand. */
+typedef struct {
+    Wide settle, until;
+    int settled, ends;
+} Notes;
+
+INLINE void note(const Wide p[N_ALL], const State *a, const State *b, const Effect *e,
+                 const Notes *notes, Sums *sum)
+{
+    add_energies(p, a, b, e, notes->until, sum);
+    if (notes->settled)
+        add_settled(a, b, e, notes->settle, notes->until, sum);
+    if (notes->ends)
+        note_ends(a, b, notes->settle, notes->until, sum);
+}
+
+/* A step of all lanes to `edge`, in two where that is better; a lane's `before` and the effect's friction
+ * are those of its last. */
+INLINE void advance(const Wide p[N_ALL], State *before, State *m, double edge, double half, int lifted,
+                    const Notes *notes, Effect *e, Sums *sum)
+{
+    const State start = *m;
+    *before = start;
+    step(p, m, edge - half, edge, edge + half, lifted, 0, 0, 0.0, 0.0, 1, NULL, e);
+    const Wide share = e->divide;
+    const Mask divided = share < 1.0, drops = e->drops;
+    if (!any(divided)) {
+        note(p, before, m, e, notes, sum);
+        return;
+    }
+    *m = start;
+    step(p, m, edge - half, edge, edge + half, lifted, 0, 0, 0.0, 0.0, 1, &share, e);
+    note(p, before, m, e, notes, sum);
+    const State middle = *m;
+    const Wide friction = e->friction;
+    step(p, m, edge - half, edge, edge + half, lifted, 0, 0, 0.0, 0.0, 1, NULL, e);
+    for (int k = 0; k < N_STATE; k++) { /* lanes that are not divided are there already */
+        Wide *then = (Wide *)before + k, *now = (Wide *)m + k;
+        const Wide between = ((const Wide *)&middle)[k];
+        *now = choose(divided, *now, between);
+        *then = choose(divided, between, *then);
+    }
+    note(p, &middle, m, e, notes, sum);
+    e->friction = choose(divided, e->friction, friction);
+    e->drops = drops;
+}
+
 /* As many groups of WIDTH lanes, step by step in turn: while one waits for its quotients, the other
  * is computed. */
 INLINE void follow(const Stretch *c, const Parameters all, const Span *span, const int groups,
                    Kept *kept, double *out)
 {
-    Wide p[LANES / WIDTH][N_ALL], settle[LANES / WIDTH], until[LANES / WIDTH];
+    Wide p[LANES / WIDTH][N_ALL];
+    Notes notes[LANES / WIDTH];
     State m[LANES / WIDTH], before[LANES / WIDTH];
     Sums sum[LANES / WIDTH];
     Effect e[LANES / WIDTH];
@@ -388,36 +490,31 @@ INLINE void follow(const Stretch *c, const Parameters all, const Span *span, con
         for (int k = 0; k < N_ALL; k++)
             memcpy(p[g] + k, all[k] + from, sizeof(Wide));
         lifted |= choose_laws(p[g]);
-        memcpy(settle + g, span->settle + from, sizeof(Wide));
-        memcpy(until + g, span->until + from, sizeof(Wide));
+        memcpy(&notes[g].settle, span->settle + from, sizeof(Wide));
+        memcpy(&notes[g].until, span->until + from, sizeof(Wide));
         for (int k = 0; k < N_STATE; k++)
             memcpy((Wide *)(m + g) + k, kept->state[k] + from, sizeof(Wide));
         for (int k = 0; k < N_SUMS; k++)
             memcpy((Wide *)(sum + g) + k, kept->sums[k] + from, sizeof(Wide));
         for (int l = 0; l < WIDTH; l++) {
-            settled = fmin(settled, settle[g][l]);
-            all_settled = fmax(all_settled, settle[g][l]);
-            ended = fmin(ended, until[g][l]);
+            settled = fmin(settled, notes[g].settle[l]);
+            all_settled = fmax(all_settled, notes[g].settle[l]);
+            ended = fmin(ended, notes[g].until[l]);
         }
     }
     int64_t sample = 0;
     for (int64_t k = c->first + 1; k <= c->last; k++) {
         const double edge = (double)k * c->step, half = 0.5 * c->step;
+        /* No step ends further than a half one from its edge. */
+        const int late = edge + c->step > settled;
+        const int ends = (late && edge - 2.0 * c->step < all_settled) || edge + c->step > ended;
 #pragma GCC unroll 4
         for (int g = 0; g < groups; g++) {
-            before[g] = m[g];
-            step(p[g], m + g, edge - half, edge, edge + half, lifted, 0, 0, 0.0, 0.0, e + g);
+            notes[g].settled = late;
+            notes[g].ends = ends;
+            advance(p[g], before + g, m + g, edge, half, lifted, notes + g, e + g, sum + g);
             pass_corners(c->drives + g * WIDTH, p[g], e[g].drops, m + g);
-            add_energies(p[g], before + g, m + g, e + g, until[g], sum + g);
         }
-        /* No step ends further than a half one from its edge. */
-        if (edge + c->step > settled)
-            for (int g = 0; g < groups; g++)
-                add_settled(before + g, m + g, e + g, settle[g], until[g], sum + g);
-        if ((edge + c->step > settled && edge - 2.0 * c->step < all_settled) ||
-            edge + c->step > ended)
-            for (int g = 0; g < groups; g++)
-                note_ends(before + g, m + g, settle[g], until[g], sum + g);
         for (; sample < c->samples && c->times[sample] <= edge; sample++) {
             if (c->rows) {
                 const Wide late = c->times[sample] - m->t;

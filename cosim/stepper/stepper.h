@@ -55,7 +55,7 @@ void chain_run(const Schedule *schedule, const Parameters parameters, double *ou
 
 /* ---- runs of scenes: without a plate that moves, in pieces ---- */
 
-enum { N_STATE = 15, N_SUMS = 18 };
+enum { N_STATE = 16, N_SUMS = 18 };
 
 /* A period of V1 in one lane as straight lines: where each begins, as a share of the period, and V1 (V)
  * where it begins and ends. */
