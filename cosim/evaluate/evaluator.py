@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, Self
 
@@ -75,23 +76,31 @@ class Evaluator:
         known: deque[tuple[int, Outcome]] = deque()
         keys: dict[int, str] = {}
 
+        since: set[str] = set()
+        """What was found since the store was asked last."""
+
         def new() -> Iterator[_Numbered]:
-            for number, settings in points:
-                key = hashed(settings)
-                found = outcome_of(self._store.get(key))
-                if found is not None:
-                    known.append((number, found))
-                elif key in waiting:
-                    waiting[key].append(number)
-                else:
-                    waiting[key], keys[number] = [number], key
-                    yield number, settings
+            rest = iter(points)
+            while some := list(islice(rest, TOGETHER)):
+                hashes = [hashed(settings) for _, settings in some]
+                stored = self._store.some(hashes)
+                since.clear()
+                for key, (number, settings) in zip(hashes, some, strict=True):
+                    found = outcome_of(self._store.get(key) if key in since else stored.get(key))
+                    if found is not None:
+                        known.append((number, found))
+                    elif key in waiting:
+                        waiting[key].append(number)
+                    else:
+                        waiting[key], keys[number] = [number], key
+                        yield number, settings
 
         for number, outcome in self._run(new()):
             key = keys.pop(number)
             if self._kept:
                 outcome = outcome.only(self._kept)
             self._store.add(key, vars(outcome))
+            since.add(key)
             known.extend((other, outcome) for other in waiting.pop(key))
             while known:
                 yield known.popleft()

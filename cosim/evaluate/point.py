@@ -89,7 +89,7 @@ def point(base: Scene, values: Mapping[str, Number | str], whole_periods: bool) 
     if few_rows != base.run.output_step and base.run.average == "ends":
         values = {"run.output_step": few_rows, **values}
     scene = changed(base, values, "--over")
-    return changed(scene, periods_made_whole(scene), "--over") if whole_periods else scene
+    return in_whole_periods(scene) if whole_periods else scene
 
 
 def outcome(summary: Mapping[str, Any]) -> Outcome:
@@ -126,15 +126,15 @@ def outcome_of(record: Any) -> Outcome | None:
     return Outcome(dict(zip(numbers, values, strict=True)), failure)
 
 
-def periods_made_whole(scene: Scene) -> dict[str, Number]:
-    """``run.settle`` and ``run.duration``, s, at least as long as now and whole periods apart.
+def in_whole_periods(scene: Scene) -> Scene:
+    """The scene with ``run.settle`` and ``run.duration`` at least as long and whole periods apart.
 
     The mean over a broken period is off by per cents, which differ from frequency to frequency.
     They stay as they are where nothing repeats.
     """
     length = scene.period
     if isinf(length):
-        return {"run.settle": scene.run.settle, "run.duration": scene.run.duration}
+        return scene
     times = scene.run.settle, scene.run.duration - scene.run.settle
     settle, span = (max(1, ceil(time / length - 1e-9)) for time in times)
-    return {"run.settle": settle * length, "run.duration": (settle + span) * length}
+    return scene.having(run={"settle": settle * length, "duration": (settle + span) * length})

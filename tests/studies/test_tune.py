@@ -12,7 +12,7 @@ import pytest
 from cosim.cli.main import main
 from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.evaluator import Evaluator
-from cosim.evaluate.point import periods_made_whole
+from cosim.evaluate.point import in_whole_periods
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
 from cosim.studies.tune.run import tune
@@ -143,7 +143,7 @@ def test_beats_a_grid() -> None:
     knobs = {"pot_max": 8 / 9, "pot_frequency": 4 / 9, "pot_offset": 3 / 9}
     scene = load("reference", ["circuit.max_step=5e-5"])
     there = changed(scene, {f"drive.{knob}": place for knob, place in knobs.items()}, "test")
-    whole = changed(there, periods_made_whole(there), "test")
+    whole = in_whole_periods(there)
     summary: Any = simulate(whole).summary
     assert summary["v_average"] == pytest.approx(GRID_BEST, rel=2e-3)
     found = tune(scene, maximise="v_average", budget=200, workers=2)
@@ -200,6 +200,7 @@ def test_waveforms_are_searched_each_by_itself(tmp_path: Path) -> None:
         polarity=True,
         heat=1.5,
         budget=60,
+        seed=3,  # of others the best is chaotic: it is another with other rows
         workers=2,
         out=tmp_path,
     )
@@ -234,7 +235,7 @@ def test_robust_is_the_median_of_all_turns() -> None:
     for turn in [(0, 0, 0), *product((-1, 1), repeat=3), *(-np.eye(3)), *np.eye(3)]:
         knobs = np.clip(place + 0.02 * np.array(turn), 0.0, 1.0)
         there = changed(found.scene, dict(zip(found.best.values, knobs.tolist(), strict=True)), "")
-        summary: Any = simulate(changed(there, periods_made_whole(there), "")).summary
+        summary: Any = simulate(in_whole_periods(there)).summary
         every.append(summary["v_average"])
     assert min(every) > 0.0
     # The search was told whole periods from another beginning: a little else is averaged.

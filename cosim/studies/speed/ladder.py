@@ -11,7 +11,7 @@ from statistics import median
 from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
-from cosim.evaluate.point import periods_made_whole
+from cosim.evaluate.point import in_whole_periods
 from cosim.evaluate.store import Store, hashed, reported
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
@@ -108,9 +108,8 @@ def _on(scene: Scene, model: str) -> Scene:
     settings: dict[str, Any] = {"circuit.model": model, "drive.pwm_ripple": False}
     if staircase and not scene.drive.reset_time:
         settings["drive.quantised"] = True
-    there = changed(scene, settings, f"scene {scene.name}")
-    times = periods_made_whole(there)
-    return changed(there, times | {"run.output_step": times["run.duration"] / 2.0}, "ladder")
+    there = in_whole_periods(changed(scene, settings, f"scene {scene.name}"))
+    return there.having(run={"output_step": there.run.duration / 2.0})
 
 
 Found = Sequence[tuple[Scene, list[Rung]]]

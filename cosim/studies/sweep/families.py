@@ -5,7 +5,7 @@ from pathlib import Path
 
 from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import Evaluator
-from cosim.evaluate.point import periods_made_whole
+from cosim.evaluate.point import in_whole_periods
 from cosim.files.atomic import whole
 from cosim.scene import Scene, changed
 from cosim.studies.sweep.design import Design
@@ -28,7 +28,7 @@ def keep(
     def kept(_: Scene, number: int, progress: Progress) -> None:
         of = changed(scene, design.point(number), "--over")  # the bench's own has no rows
         if design.changes_frequency:
-            of = changed(of, periods_made_whole(of), "--over")
+            of = in_whole_periods(of)
         result = simulate(of, progress)
         if unknown := [name for name in names if name not in result.columns]:
             known = ", ".join(result.columns)

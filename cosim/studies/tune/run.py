@@ -13,7 +13,7 @@ from cosim.arrays import Array
 from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.evaluator import Evaluator, Settings
 from cosim.evaluate.keys import FREQUENCIES, numeric_key
-from cosim.evaluate.point import Number, Outcome, periods_made_whole
+from cosim.evaluate.point import Number, Outcome, in_whole_periods
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.scene.tables import COMMANDS
@@ -141,7 +141,7 @@ def tune(
                 raise
             tuned = changed(base, {**best.values, **aim.judge}, "tune")
             if whole:
-                tuned = changed(tuned, periods_made_whole(tuned), "tune")
+                tuned = in_whole_periods(tuned)
             by_fast = None
             if aim.judge:
                 by_fast = next((run.value for run in ahead if run.values == best.values), None)
