@@ -1,12 +1,13 @@
 /* The steps of WIDTH lanes side by side, for each kind of processor: lanes2.c, lanes4.c and lanes8.c
- * include this with WIDTH, INLINE and FUNCTION defined. Without branches between lanes, and without
- * contraction, each width gives the same bits.
+ * include this with WIDTH, INLINE and FUNCTION defined. No lane's numbers depend on another's, and
+ * nothing is contracted, so each width gives the same bits.
  *
  * Moreau's time stepping with the midpoint rule. What is not smooth is either linear within a step
  * (the current at its limits) or solved for at its end (friction), and steps end where the command
  * jumps. That leaves errors of first order where friction turns within a step, and, in the source, by
- * the speed at the step's begin in the back-EMF; in runs of scenes neither is left, which makes them of
- * second order. The search through a trial's drives and rigs does without, for its time. */
+ * the speed at the step's begin in the back-EMF. In runs of scenes the back-EMF is that of the middle,
+ * and steps are divided where friction turns or the ram begins to press on a wall: they are of second
+ * order. The search through a trial's drives and rigs does without, for its time. */
 
 #include <string.h>
 
@@ -149,7 +150,7 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
     const Mask drops = jump <= high;
     end = choose(drops, most(jump, 0.5 * (t + low)), end);
     if (made)
-        end = t + *made * (end - t);
+        end = choose(*made < 1.0, t + *made * (end - t), end);
     const Wide h = end - t, half = 0.5 * h;
 
     /* The coil. What it can reach within the step lies between `lowest` and `highest`. */
