@@ -129,11 +129,14 @@ typedef struct {
     Wide divide;             /* the share after which the step is better divided; 1: nowhere */
 } Effect;
 
-/* A turn this early in a step is not worth another one. */
+/* Where a step is worth two: where the part turns, not as early in it as EARLY; and where the ram goes
+ * on by a share DEEP of its depth in a wall whose damper presses DAMPED times as hard as its spring. But
+ * nowhere if the step, times the wall's frequency by its secant, is over SOFT when squared: steps of one
+ * length keep the energy of a bounce. */
 #define EARLY 0.05
-
-/* The share of its depth in the wall from which on the ram's way in a step is worth two. */
 #define DEEP 0.3
+#define DAMPED 0.5
+#define SOFT 0.1
 
 /* One step of all lanes, whose plate is moving or stands on the ground. It ends at `edge`, or where
  * the command jumps, if that lies between `low` and `high`. `lifted` is as choose_laws() has it. i0
@@ -248,11 +251,13 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
     effect->plate = plate;
     if (scene) {
         const Wide deep = up + down;
-        const Mask hits = (deep > zero) & (h * most(u, -u) > DEEP * deep);
+        const Wide speed = most(u, -u);
+        const Mask hits = (deep > zero) & (h * speed > DEEP * deep) & (damping * speed > DAMPED);
         Wide share = turning(&k, m->slip, m->w - m->s, m->v - m->w, loose, plate);
         share = choose(share < EARLY, one, share);
         share = choose(hits & (share == one), zero + 0.5, share);
-        effect->divide = choose(drops, one, share);
+        const Mask soft = h * h * (above + below) <= SOFT * ram * deep;
+        effect->divide = choose(soft & ~drops, share, one);
     }
 
     const Wide v1 = k.surface - k.b * impulse, r1 = (on_ram + c * v1) * inverse_ram;

@@ -136,7 +136,7 @@ def test_waveforms_are_those_of_the_fmu() -> None:
 
 def test_lanes_do_not_know_each_other() -> None:
     """A point has the same numbers alone, and among others of other durations."""
-    scene = load("paper-limited", {"run.duration": 0.3, "run.settle": 0.1} | FAST)
+    scene = load("paper-limited", {"run.duration": 1.0, "run.settle": 0.1} | FAST)
     knobs = np.random.default_rng(0).random((11, 3)).tolist()
     names = ("drive.pot_max", "drive.pot_frequency", "drive.pot_offset")
     points: list[Settings] = [dict(zip(names, knob, strict=True)) for knob in knobs]
