@@ -25,7 +25,8 @@ FAINT: dict[str, Any] = {"color": "0.74", "marker": ".", "ms": 4, "lw": 0.0, "zo
 
 def headline(figure: Picture, message: str) -> None:
     """Write the message of a figure above it."""
-    lines = fill(message, round(10.0 * figure.get_figwidth()))
+    width = round(10.0 * figure.get_figwidth())
+    lines = "\n".join(fill(line, width) for line in message.splitlines())
     figure.suptitle(lines, x=0.01, ha="left", fontsize=12, fontweight="bold")
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from cosim.arrays import Array
 from cosim.files.picture import Picture
 from cosim.scene import firmware
+from cosim.studies.plots import headline
 from cosim.studies.sweep.dataset import FAILURE, POINT, swept
 from cosim.studies.sweep.report import at, fastest, setting
 from cosim.waveforms.quantities import label
@@ -54,7 +55,7 @@ def draw(data: xr.Dataset, title: str) -> Picture:
     figure = Picture(13.0, 8.4, "constrained")
     if "v_average" not in data and any(str(name).endswith(".mean") for name in data):
         _own(figure, data, swept(data))
-        figure.suptitle(title, fontsize=12)
+        headline(figure, title)
         return figure
     if POINT in data.dims:
         _scatters(figure, data, swept(data))
@@ -76,7 +77,7 @@ def draw(data: xr.Dataset, title: str) -> Picture:
         f"{at(data, place, 4)}"
         for way, place in fastest(data)[:1]
     ]
-    figure.suptitle(f"{title}: {', '.join(best) or 'the part stays'}\n{words}", fontsize=12)
+    headline(figure, f"{title}: {', '.join(best) or 'the part stays'}\n{words}")
     return figure
 
 
