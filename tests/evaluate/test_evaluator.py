@@ -13,7 +13,7 @@ import pytest
 
 import cosim
 from cosim.evaluate import point
-from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.evaluator import TOGETHER, Evaluator
 from cosim.evaluate.point import Outcome
 from cosim.scene import load
 from cosim.studies.limits import report
@@ -47,6 +47,22 @@ def test_each_settings_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
             assert bench.known(points[3][1]) is None
             assert bench.known(points[0][1]) == Outcome({"v_average": 0.7})
     assert Counter(ran) == {0.7: 1, 0.8: 1, 0.9: 4}
+
+
+def test_each_settings_once_however_many_lie_between(monkeypatch: pytest.MonkeyPatch) -> None:
+    """More points than are looked up at a time, of which many are alike."""
+    ran: list[float] = []
+
+    def counted(scene: Any, settings: Any, *more: Any) -> Outcome:
+        ran.append(settings["friction.mu_s"])
+        return Outcome({"v_average": ran[-1]})
+
+    monkeypatch.setattr(point, "evaluate", counted)
+    values = [0.6 + 1e-3 * (n * n % 97) for n in range(3 * TOGETHER + 5)]
+    with Evaluator(load("held", SHORT), workers=1) as bench:
+        found = dict(bench.run(enumerate({"friction.mu_s": value} for value in values)))
+    assert [found[n].numbers["v_average"] for n in range(len(values))] == values
+    assert Counter(ran) == dict.fromkeys(values, 1)
 
 
 def test_only_what_is_kept(tmp_path: Path) -> None:
