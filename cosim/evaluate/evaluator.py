@@ -76,17 +76,17 @@ class Evaluator:
         known: deque[tuple[int, Outcome]] = deque()
         keys: dict[int, str] = {}
 
-        since: set[str] = set()
-        """What was found since the store was asked last."""
+        stored: dict[str, Any] = {}
+        """What the store has of the points at hand, and what was found meanwhile."""
 
         def new() -> Iterator[_Numbered]:
             rest = iter(points)
             while some := list(islice(rest, TOGETHER)):
                 hashes = [hashed(settings) for _, settings in some]
-                stored = self._store.some(hashes)
-                since.clear()
+                stored.clear()
+                stored.update(self._store.some(hashes))
                 for key, (number, settings) in zip(hashes, some, strict=True):
-                    found = outcome_of(self._store.get(key) if key in since else stored.get(key))
+                    found = outcome_of(stored.get(key))
                     if found is not None:
                         known.append((number, found))
                     elif key in waiting:
@@ -99,8 +99,8 @@ class Evaluator:
             key = keys.pop(number)
             if self._kept:
                 outcome = outcome.only(self._kept)
-            self._store.add(key, vars(outcome))
-            since.add(key)
+            stored[key] = vars(outcome)
+            self._store.add(key, stored[key])
             known.extend((other, outcome) for other in waiting.pop(key))
             while known:
                 yield known.popleft()

@@ -454,8 +454,7 @@ INLINE void note(const Wide p[N_ALL], const State *a, const State *b, const Effe
 INLINE void advance(const Wide p[N_ALL], State *before, State *m, double edge, double half, int lifted,
                     const Notes *notes, Effect *e, Sums *sum)
 {
-    const State start = *m;
-    *before = start;
+    *before = *m;
     step(p, m, edge - half, edge, edge + half, lifted, 0, 0, 0.0, 0.0, 1, NULL, e);
     const Wide share = e->divide;
     const Mask divided = share < 1.0, drops = e->drops;
@@ -463,7 +462,7 @@ INLINE void advance(const Wide p[N_ALL], State *before, State *m, double edge, d
         note(p, before, m, e, notes, sum);
         return;
     }
-    *m = start;
+    *m = *before;
     step(p, m, edge - half, edge, edge + half, lifted, 0, 0, 0.0, 0.0, 1, &share, e);
     note(p, before, m, e, notes, sum);
     const State middle = *m;

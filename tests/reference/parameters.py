@@ -25,4 +25,5 @@ def reference_parameters(scene: Scene) -> dict[str, Any]:
     flat = scene.mechanics.model_dump(exclude={"contact", "initial_lift", "tolerance"})
     for table, names in _OF_THE_REFERENCE.items():
         flat |= getattr(scene, table).model_dump(include=set(names))
+    flat["force_factor"] *= scene.coil.polarity
     return flat
