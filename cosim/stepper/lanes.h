@@ -4,10 +4,8 @@
  *
  * Moreau's time stepping with the midpoint rule. What is not smooth is either linear within a step
  * (the current at its limits) or solved for at its end (friction), and steps end where the command
- * jumps. That leaves errors of first order where friction turns within a step, and, in the source, by
- * the speed at the step's begin in the back-EMF. In runs of scenes the back-EMF is that of the middle,
- * and steps are divided where friction turns or the ram begins to press on a wall: they are of second
- * order. The search through a trial's drives and rigs does without, for its time. */
+ * jumps. Friction that turns within a step would leave an error of first order, so steps are divided
+ * there, and where the ram begins to press on a damped wall. */
 
 #include <string.h>
 
@@ -58,7 +56,7 @@ typedef struct {
     Wide part, surface, plate; /* velocities without friction */
     Wide a, b, d;              /* by which an impulse changes them: 1/mass */
     Wide both, alone, second;  /* 1/(resistance to an impulse) */
-    Wide held;                 /* greatest impulse of the plate */
+    Wide loose, held;          /* impulse of the surface while it slips; greatest of the plate */
 } Contact;
 
 INLINE Wide of_surface(const Contact *c, Wide bound, Wide *plate)
@@ -71,25 +69,6 @@ INLINE Wide of_surface(const Contact *c, Wide bound, Wide *plate)
     *plate = within(wanted, c->held);
     const Wide rubbing = within((c->surface - c->part - c->a * *plate) * c->alone, bound);
     return choose(*plate == wanted, resting, rubbing);
-}
-
-/* By what share of a step the part, with the friction it had at the begin, comes to rest on the plate
- * or, if `slip` (its sign, else 0) says that it slips, on the surface; 1 where it does not. `on` and
- * `off` are its velocities over the plate and under the surface at the begin. The plate's impulse was
- * `plate` by the state at the end. */
-INLINE Wide turning(const Contact *c, Wide slip, Wide on, Wide off, Wide loose, Wide plate)
-{
-    const Wide zero = {0}, one = zero + 1.0;
-    const Wide against = choose(on > zero, -c->held, c->held);
-    const Wide rubbing = within((c->surface - c->part - c->a * against) * c->alone, loose);
-    const Wide then = c->part + c->a * (rubbing + against) - (c->plate - c->d * against);
-    const Wide on_plate = choose((on * then < zero) & (plate != against), on / (on - then), one);
-
-    const Wide goes_on = -slip * loose;
-    const Wide held = within((c->plate - c->part - c->a * goes_on) * c->second, c->held);
-    const Wide left = c->surface - c->b * goes_on - (c->part + c->a * (goes_on + held));
-    const Wide on_surface = choose((slip != zero) & (off * left < zero), off / (off - left), one);
-    return least(on_plate, on_surface);
 }
 
 /* As the FMU numbers the laws of the suspension. What a lane's law does not have becomes 0, so that
@@ -118,17 +97,6 @@ INLINE Wide lift_of(const Wide p[N_ALL], Wide q)
     return p[SUSPENSION_HARDENING] * below * below + (force - slope * (q - place));
 }
 
-/* What acted within a step. */
-typedef struct {
-    Wide current;         /* mean, A */
-    Wide high, low;       /* share of the step that the output was at its highest, lowest */
-    Wide limited;         /* share at the current limit */
-    Wide friction, plate; /* impulses of surface and plate on the part, N s */
-    Wide wall, wall_damping; /* force of the walls' springs, down, N; their dampers, N s/m */
-    Mask drops;              /* the line of the command has ended */
-    Wide divide;             /* the share after which the step is better divided; 1: nowhere */
-} Effect;
-
 /* Where a step is worth two: where the part turns, not as early in it as EARLY; and where the ram goes
  * on by a share DEEP of its depth in a wall whose damper presses DAMPED times as hard as its spring. But
  * nowhere if the step, times the wall's frequency by its secant, is over SOFT when squared: steps of one
@@ -138,20 +106,40 @@ typedef struct {
 #define DAMPED 0.5
 #define SOFT 0.1
 
-/* One step of all lanes, whose plate is moving or stands on the ground. It ends at `edge`, or where
- * the command jumps, if that lies between `low` and `high`. `lifted` is as choose_laws() has it. i0
- * and i1 give the current at both ends where it is measured; then the effect has no limits. In the run
- * of a `scene` it tells where to divide the step; `*made` of the step is made, or all without one. What
- * of the effect nobody reads costs nothing. */
-INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double high, int lifted,
-                 int moving, int measured, double i0, double i1, int scene, const Wide *made,
+/* What is left by rounding of the speed of a part that rests on the plate is less, m/s. */
+#define REST 1e-10
+
+/* What acted within a step. */
+typedef struct {
+    Wide current;         /* mean, A */
+    Wide high, low;       /* share of the step that the output was at its highest, lowest */
+    Wide limited;         /* share at the current limit */
+    Wide friction, plate; /* impulses of surface and plate on the part, N s */
+    Wide wall, wall_damping; /* force of the walls' springs, down, N; their dampers, N s/m */
+    Mask drops;              /* the line of the command has ended */
+    Mask turns, hits, hard;  /* the part may turn; the ram begins to press on a wall; one that is hard */
+    Contact contact;
+} Effect;
+
+/* A step ends at `edge`, or where the command jumps, if that lies between `low` and `high`; s. */
+typedef struct {
+    double low, edge, high;
+    int lifted;      /* as choose_laws() has it */
+    int moving;      /* whether the plate is, or stands on the ground */
+    int measured;    /* whether the current is; then no effect has limits */
+    double current;  /* A, at `edge`, where it is measured */
+} Step;
+
+/* One step of all lanes from `m` to `then`; `*made` of it is made, or all without one. What of the effect
+ * nobody reads costs nothing. */
+INLINE void step(const Wide p[N_ALL], const State *m, State *then, const Step *c, const Wide *made,
                  Effect *effect)
 {
     const Wide zero = {0}, one = zero + 1.0;
     const Wide start = p[START], jump = m->jump, t = m->t;
-    Wide end = choose((start > low) & (start <= high), start, zero + edge);
-    const Mask drops = jump <= high;
-    end = choose(drops, most(jump, 0.5 * (t + low)), end);
+    Wide end = choose((start > c->low) & (start <= c->high), start, zero + c->edge);
+    const Mask drops = jump <= c->high;
+    end = choose(drops, most(jump, 0.5 * (t + c->low)), end);
     if (made)
         end = choose(*made < 1.0, t + *made * (end - t), end);
     const Wide h = end - t, half = 0.5 * h;
@@ -159,9 +147,9 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
     /* The coil. What it can reach within the step lies between `lowest` and `highest`. */
     const Wide v = m->v, r = m->r, u = r - v, i = m->i;
     Wide now, mean;
-    if (measured) {
-        now = zero + i1;
-        mean = zero + 0.5 * (i0 + i1);
+    if (c->measured) {
+        now = made ? i + *made * (c->current - i) : zero + c->current;
+        mean = 0.5 * (i + now);
     } else {
         const Mask on = t + half > start;
         const Wide gain = 1.0 / p[SENSE_RESISTANCE], limit = p[CURRENT_LIMIT];
@@ -170,11 +158,11 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
         const Wide target0 = choose(on, within(gain * v1, limit), zero);
         const Wide target1 = choose(on, within(gain * (v1 + slope * h), limit), zero);
         const Wide drop = half * (p[RESISTANCE] + p[SENSE_RESISTANCE]);
-        /* With `bend` the decay is a Padé approximant of fourth order, and its mean that of a parabola. */
-        const Wide bend = scene ? drop * (1.0 / (3.0 * p[INDUCTANCE])) : zero;
+        /* By `bend` the decay is a Padé approximant of fourth order, and its mean that of a parabola. */
+        const Wide bend = drop * (1.0 / (3.0 * p[INDUCTANCE]));
         const Wide inductance = p[INDUCTANCE] + bend * drop, inverse = 1.0 / (inductance + drop);
-        const Wide middle = scene ? u + half * m->rate : u;
-        const Wide own = (inductance - drop) * i - h * p[FORCE_FACTOR] * middle;
+        const Wide own =
+            (inductance - drop) * i - h * p[FORCE_FACTOR] * (u + half * m->rate);
         const Wide highest = (own + h * p[OUTPUT_HIGH]) * inverse;
         const Wide lowest = (own + h * p[OUTPUT_LOW]) * inverse;
         now = least(most(target1, lowest), highest);
@@ -202,29 +190,29 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
     below = choose(1.0 - damping * u > 0.0, below, zero);
     Wide force = p[FORCE_FACTOR] * mean + below - above -
                  q * (p[SUSPENSION_K1] + q * (p[SUSPENSION_K2] + q * p[SUSPENSION_K3]));
-    if (lifted)
+    if (c->lifted)
         force += lift_of(p, q);
-    const Wide c = half * (p[SUSPENSION_DAMPING] + damping * (above + below));
+    const Wide d = half * (p[SUSPENSION_DAMPING] + damping * (above + below));
     effect->wall = above - below;
     effect->wall_damping = damping * (above + below);
 
     /* Velocities without friction: of the surface with the ram eliminated. */
     const Wide ram = p[RAM_MASS], body = p[SURFACE_MASS], g = p[GRAVITY];
     const Wide flexure = half * p[FLEXURE_DAMPING];
-    const Wide inverse_ram = 1.0 / (ram + c);
-    const Wide on_ram = ram * r + h * (force - ram * g) - c * u;
+    const Wide inverse_ram = 1.0 / (ram + d);
+    const Wide on_ram = ram * r + h * (force - ram * g) - d * u;
     const Wide on_body =
-        body * v - h * (force + p[FLEXURE_STIFFNESS] * zm + body * g) + c * u - flexure * v;
-    const Wide mass = body + flexure + c * ram * inverse_ram;
+        body * v - h * (force + p[FLEXURE_STIFFNESS] * zm + body * g) + d * u - flexure * v;
+    const Wide mass = body + flexure + d * ram * inverse_ram;
     const Wide pm = m->p + half * m->s;
 
     Contact k;
     k.a = 1.0 / p[PART_MASS];
     k.b = 1.0 / mass;
     k.part = m->w - h * g;
-    k.surface = (on_body + c * inverse_ram * on_ram) * k.b;
+    k.surface = (on_body + d * inverse_ram * on_ram) * k.b;
     k.alone = 1.0 / (k.a + k.b);
-    if (moving) {
+    if (c->moving) {
         const Wide damper = half * p[PLATE_DAMPING];
         k.d = 1.0 / (p[PLATE_MASS] + damper);
         k.plate = k.d * ((p[PLATE_MASS] - damper) * m->s - h * p[PLATE_STIFFNESS] * pm);
@@ -237,9 +225,10 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
     }
     const Wide normal = h * p[NORMAL_FORCE];
     k.held = normal * p[MU_PLATE];
+    k.loose = normal * p[MU_K];
 
     /* Sticking takes µ_s; who slips sticks once the slip has come to rest within the step. */
-    const Wide loose = normal * p[MU_K], firm = normal * p[MU_S];
+    const Wide loose = k.loose, firm = normal * p[MU_S];
     Wide plate_slip, plate_stick;
     const Wide slipping = of_surface(&k, loose, &plate_slip);
     const Wide sticking = of_surface(&k, firm, &plate_stick);
@@ -249,80 +238,63 @@ INLINE void step(const Wide p[N_ALL], State *m, double low, double edge, double 
     const Wide plate = choose(sticks, plate_stick, plate_slip);
     effect->friction = impulse;
     effect->plate = plate;
-    if (scene) {
-        const Wide deep = up + down;
-        const Wide speed = most(u, -u);
-        const Mask hits = (deep > zero) & (h * speed > DEEP * deep) & (damping * speed > DAMPED);
-        Wide share = turning(&k, m->slip, m->w - m->s, m->v - m->w, loose, plate);
-        share = choose(share < EARLY, one, share);
-        share = choose(hits & (share == one), zero + 0.5, share);
-        const Mask soft = h * h * (above + below) <= SOFT * ram * deep;
-        effect->divide = choose(soft & ~drops, share, one);
-    }
+    const Wide slip = choose(sticks, zero, choose(slipping > 0.0, -one, one));
+    const Wide on = m->w - m->s, deep = up + down, speed = most(u, -u);
+    effect->turns = ((m->slip != zero) & (slip != m->slip)) |
+                    (((on > REST) | (on < -REST)) & (plate != choose(on > zero, -k.held, k.held)));
+    effect->hits = (deep > zero) & (h * speed > DEEP * deep) & (damping * speed > DAMPED);
+    effect->hard = h * h * (above + below) > SOFT * ram * deep;
+    effect->contact = k;
 
-    const Wide v1 = k.surface - k.b * impulse, r1 = (on_ram + c * v1) * inverse_ram;
+    const Wide v1 = k.surface - k.b * impulse, r1 = (on_ram + d * v1) * inverse_ram;
     const Wide w1 = k.part + k.a * (impulse + plate), s1 = k.plate - k.d * plate;
-    if (scene)
-        m->rate = (r1 - v1 - u) / h;
-    m->x += half * (m->w + w1);
-    m->z = zm + half * v1;
-    m->y = ym + half * r1;
-    m->p = moving ? pm + half * s1 : zero;
-    m->v = v1;
-    m->r = r1;
-    m->w = w1;
-    m->s = moving ? s1 : zero;
-    m->i = now;
-    m->slip = choose(sticks, zero, choose(slipping > 0.0, -one, one));
-    m->t = end;
+    then->x = m->x + half * (m->w + w1);
+    then->z = zm + half * v1;
+    then->y = ym + half * r1;
+    then->p = c->moving ? pm + half * s1 : zero;
+    then->v = v1;
+    then->r = r1;
+    then->w = w1;
+    then->s = c->moving ? s1 : zero;
+    then->i = now;
+    then->slip = slip;
+    then->t = end;
+    then->jump = jump;
+    then->top = m->top;
+    then->slope = m->slope;
+    then->line = m->line;
+    then->rate = (r1 - v1 - u) / h;
     effect->drops = drops;
 }
 
-FUNCTION(chain_lanes)(const Schedule *c, const Parameters all, const Rest *rest, int from, double *out)
+/* By what share of a step from `m` the part, with the friction it had at the begin, comes to rest on the
+ * plate or, if it slips, on the surface; 1 where it does not. The plate's impulse was `plate` by the state
+ * at the end. */
+INLINE Wide turning(const State *m, const Contact *c, Wide plate)
 {
-    Wide p[N_ALL];
-    for (int k = 0; k < N_ALL; k++)
-        memcpy(p + k, all[k] + from, sizeof *p);
-    const int lifted = choose_laws(p);
-    State m;
-    memset(&m, 0, sizeof m);
-    m.t += -(double)rest->steps * c->edges[1];
-    memcpy(&m.z, rest->surface + from, sizeof m.z);
-    memcpy(&m.y, rest->ram + from, sizeof m.y);
-    memcpy(&m.p, rest->plate + from, sizeof m.p);
-    memcpy(&m.jump, rest->jump + from, sizeof m.jump);
-    m.x = m.z;
-    m.top = p[OFFSET] + 0.5 * p[AMPLITUDE];
-    m.slope = p[AMPLITUDE] * p[FREQUENCY];
-    const int moving = all[PLATE_MASS][0] > 0.0;
-    for (int64_t k = -rest->steps; k <= c->steps; k++) {
-        const double edge = chain_edge(c, k);
-        if (k > -rest->steps) {
-            const double low = 0.5 * (chain_edge(c, k - 1) + edge);
-            const double high = 0.5 * (edge + chain_edge(c, k + 1));
-            const double i1 = c->current ? c->current[k < 0 ? 0 : k] : 0.0;
-            const double i0 = c->current ? c->current[k < 1 ? 0 : k - 1] : 0.0;
-            Effect e;
-            if (!c->current && !moving)
-                step(p, &m, low, edge, high, lifted, 0, 0, i0, i1, 0, NULL, &e);
-            else if (!c->current)
-                step(p, &m, low, edge, high, lifted, 1, 0, i0, i1, 0, NULL, &e);
-            else if (!moving)
-                step(p, &m, low, edge, high, lifted, 0, 1, i0, i1, 0, NULL, &e);
-            else
-                step(p, &m, low, edge, high, lifted, 1, 1, i0, i1, 0, NULL, &e);
-            m.jump = choose(e.drops, m.jump + 1.0 / p[FREQUENCY], m.jump);
-        }
-        if (k < 0 || c->sample[k] < 0)
-            continue;
-        /* Where a jump has moved the step's end, the sample is a little apart. */
-        const Wide late = edge - m.t;
-        const Wide shown[N_OUTPUTS] = {m.z + late * m.v, m.v, m.x + late * m.w, m.w,
-                                       m.p + late * m.s};
-        double *row = out + (int64_t)c->sample[k] * N_OUTPUTS * LANES + from;
-        for (int n = 0; n < N_OUTPUTS; n++)
-            memcpy(row + n * LANES, shown + n, sizeof *shown);
-    }
+    const Wide zero = {0}, one = zero + 1.0;
+    const Wide on = m->w - m->s, off = m->v - m->w; /* velocities over the plate, under the surface */
+    const Wide against = choose(on > zero, -c->held, c->held);
+    const Wide rubbing = within((c->surface - c->part - c->a * against) * c->alone, c->loose);
+    const Wide then = c->part + c->a * (rubbing + against) - (c->plate - c->d * against);
+    const Wide on_plate = choose((on * then < zero) & (plate != against), on / (on - then), one);
+
+    const Wide goes_on = -m->slip * c->loose;
+    const Wide held = within((c->plate - c->part - c->a * goes_on) * c->second, c->held);
+    const Wide left = c->surface - c->b * goes_on - (c->part + c->a * (goes_on + held));
+    const Wide on_surface =
+        choose((m->slip != zero) & (off * left < zero), off / (off - left), one);
+    return least(on_plate, on_surface);
+}
+
+/* The share after which a step from `m` is better divided; 1: nowhere. */
+INLINE Wide divide(const State *m, const Effect *e)
+{
+    const Wide one = (Wide){0} + 1.0;
+    Wide share = turning(m, &e->contact, e->plate);
+    share = choose(share < EARLY, one, share);
+    share = choose(e->hits & (share == one), 0.5 * one, share);
+    return choose(e->hard | e->drops, one, share);
 }
 
 /* ---- the runs of scenes ---- */
@@ -449,32 +421,37 @@ INLINE void note(const Wide p[N_ALL], const State *a, const State *b, const Effe
         note_ends(a, b, notes->settle, notes->until, sum);
 }
 
-/* A step of all lanes to `edge`, in two where that is better; a lane's `before` and the effect's friction
- * are those of its last. */
-INLINE void advance(const Wide p[N_ALL], State *before, State *m, double edge, double half, int lifted,
-                    const Notes *notes, Effect *e, Sums *sum)
+/* A step of all lanes from `before` to `m`, in two where that is better; then a lane's `before` and the
+ * effect's friction are those of its last. */
+INLINE void advance(const Wide p[N_ALL], State *before, State *m, const Step *c, const Notes *notes,
+                    Effect *e, Sums *sum)
 {
-    *before = *m;
-    step(p, m, edge - half, edge, edge + half, lifted, 0, 0, 0.0, 0.0, 1, NULL, e);
-    const Wide share = e->divide;
+    step(p, before, m, c, NULL, e);
+    Wide share = {0};
+    if (any(e->turns | e->hits))
+        share = divide(before, e);
+    else
+        share += 1.0;
     const Mask divided = share < 1.0, drops = e->drops;
     if (!any(divided)) {
-        note(p, before, m, e, notes, sum);
+        if (notes)
+            note(p, before, m, e, notes, sum);
         return;
     }
-    *m = *before;
-    step(p, m, edge - half, edge, edge + half, lifted, 0, 0, 0.0, 0.0, 1, &share, e);
-    note(p, before, m, e, notes, sum);
-    const State middle = *m;
+    State middle;
+    step(p, before, &middle, c, &share, e);
+    if (notes)
+        note(p, before, &middle, e, notes, sum);
     const Wide friction = e->friction;
-    step(p, m, edge - half, edge, edge + half, lifted, 0, 0, 0.0, 0.0, 1, NULL, e);
+    step(p, &middle, m, c, NULL, e);
     for (int k = 0; k < N_STATE; k++) { /* lanes that are not divided are there already */
         Wide *then = (Wide *)before + k, *now = (Wide *)m + k;
         const Wide between = ((const Wide *)&middle)[k];
         *now = choose(divided, *now, between);
         *then = choose(divided, between, *then);
     }
-    note(p, &middle, m, e, notes, sum);
+    if (notes)
+        note(p, &middle, m, e, notes, sum);
     e->friction = choose(divided, e->friction, friction);
     e->drops = drops;
 }
@@ -486,7 +463,8 @@ INLINE void follow(const Stretch *c, const Parameters all, const Span *span, con
 {
     Wide p[LANES / WIDTH][N_ALL];
     Notes notes[LANES / WIDTH];
-    State m[LANES / WIDTH], before[LANES / WIDTH];
+    State states[2][LANES / WIDTH]; /* before a step and after it, in turn */
+    State *before, *m = states[(c->first + 1) & 1];
     Sums sum[LANES / WIDTH];
     Effect e[LANES / WIDTH];
     double settled = INFINITY, all_settled = 0.0, ended = INFINITY;
@@ -510,6 +488,7 @@ INLINE void follow(const Stretch *c, const Parameters all, const Span *span, con
     int64_t sample = 0;
     for (int64_t k = c->first + 1; k <= c->last; k++) {
         const double edge = (double)k * c->step, half = 0.5 * c->step;
+        before = states[k & 1], m = states[(k + 1) & 1];
         /* No step ends further than a half one from its edge. */
         const int late = edge + c->step > settled;
         const int ends = (late && edge - 2.0 * c->step < all_settled) || edge + c->step > ended;
@@ -517,7 +496,8 @@ INLINE void follow(const Stretch *c, const Parameters all, const Span *span, con
         for (int g = 0; g < groups; g++) {
             notes[g].settled = late;
             notes[g].ends = ends;
-            advance(p[g], before + g, m + g, edge, half, lifted, notes + g, e + g, sum + g);
+            const Step each = {edge - half, edge, edge + half, lifted, 0, 0, 0.0};
+            advance(p[g], before + g, m + g, &each, notes + g, e + g, sum + g);
             pass_corners(c->drives + g * WIDTH, p[g], e[g].drops, m + g);
         }
         for (; sample < c->samples && c->times[sample] <= edge; sample++) {
@@ -548,4 +528,46 @@ FUNCTION(stepper_follow)(const Stretch *c, const Parameters all, const Span *spa
         follow(c, all, span, 1, kept, out);
     else
         follow(c, all, span, LANES / WIDTH, kept, out);
+}
+
+/* ---- trials ---- */
+
+FUNCTION(chain_lanes)(const Schedule *c, const Parameters all, const Rest *rest, int from, double *out)
+{
+    Wide p[N_ALL];
+    for (int k = 0; k < N_ALL; k++)
+        memcpy(p + k, all[k] + from, sizeof *p);
+    const int lifted = choose_laws(p);
+    State states[2] = {{{0}}}, *before, *m = states; /* before a step and after it, in turn */
+    m->t += -(double)rest->steps * c->edges[1];
+    memcpy(&m->z, rest->surface + from, sizeof m->z);
+    memcpy(&m->y, rest->ram + from, sizeof m->y);
+    memcpy(&m->p, rest->plate + from, sizeof m->p);
+    memcpy(&m->jump, rest->jump + from, sizeof m->jump);
+    m->x = m->z;
+    m->i += c->current ? c->current[0] : 0.0;
+    m->top = p[OFFSET] + 0.5 * p[AMPLITUDE];
+    m->slope = p[AMPLITUDE] * p[FREQUENCY];
+    const int moving = all[PLATE_MASS][0] > 0.0;
+    for (int64_t k = -rest->steps; k <= c->steps; k++) {
+        const double edge = chain_edge(c, k);
+        if (k > -rest->steps) {
+            const Step each = {0.5 * (chain_edge(c, k - 1) + edge), edge,
+                               0.5 * (edge + chain_edge(c, k + 1)), lifted, moving,
+                               c->current != NULL, c->current ? c->current[k < 0 ? 0 : k] : 0.0};
+            Effect e;
+            before = m, m = before == states ? states + 1 : states;
+            advance(p, before, m, &each, NULL, &e, NULL);
+            m->jump = choose(e.drops, m->jump + 1.0 / p[FREQUENCY], m->jump);
+        }
+        if (k < 0 || c->sample[k] < 0)
+            continue;
+        /* Where a jump has moved the step's end, the sample is a little apart. */
+        const Wide late = edge - m->t;
+        const Wide shown[N_OUTPUTS] = {m->z + late * m->v, m->v, m->x + late * m->w, m->w,
+                                       m->p + late * m->s};
+        double *row = out + (int64_t)c->sample[k] * N_OUTPUTS * LANES + from;
+        for (int n = 0; n < N_OUTPUTS; n++)
+            memcpy(row + n * LANES, shown + n, sizeof *shown);
+    }
 }

@@ -134,7 +134,7 @@ def test_steps_agree_with_the_exact_rung(label: str) -> None:
     exact = record(label, 300, None)
     space, own = read_space(), np.array(OWN[label])
     apart = {}
-    for step in (SEARCH_STEP, FINE_STEP):
+    for step in (SEARCH_STEP, FINE_STEP, FINE_STEP / 2.0):
         zeros = np.zeros(len(stepper.OWN))
         target = chain.Target(exact["time"], {}, {}, frozenset(), zeros, zeros, zeros, step)
         found = chain.simulate(target, space.rigs(point()[None]), own[None])[0]
@@ -144,9 +144,9 @@ def test_steps_agree_with_the_exact_rung(label: str) -> None:
             for z in [exact[f"z_{body}"]]
         ]
         assert found["z_surface"][0][0] == pytest.approx(exact["z_surface"][0], abs=1e-5)
-    assert max(apart[FINE_STEP]) < 0.012
-    assert max(apart[SEARCH_STEP]) < 0.04
-    assert sum(apart[FINE_STEP]) < 0.6 * sum(apart[SEARCH_STEP])
+    assert max(apart[FINE_STEP]) < 0.004
+    assert max(apart[SEARCH_STEP]) < 0.01
+    assert sum(apart[FINE_STEP / 2.0]) < 0.6 * sum(apart[FINE_STEP])
 
 
 def test_each_lane_has_its_own_machine() -> None:
@@ -183,7 +183,11 @@ def test_a_measured_current_replaces_the_drive(tmp_path: Path) -> None:
 
 @pytest.mark.physics
 def test_own_numbers_are_found_on_the_true_rig(search: Search) -> None:
-    found = search.screen(point()[None], np.random.default_rng(2), 512, 16, 6)[0]
+    """Half of the draws end in another minimum, in one trial at least."""
+    rng = np.random.default_rng(2)
+    found = search.screen(point()[None], rng, 512, 16, 6)[0]
+    for _ in range(4):
+        found = search.rescreened(found, rng, 512, 16, 6)
     assert found.costs.max() < 0.01
     assert found.costs.mean() < 5e-3
     truth = np.array([OWN[label] for label in OWN])

@@ -31,7 +31,7 @@ TRANSPORT = WEIGHTS | {"z_part": 0.2}
 """For a trial's own parameters on a rig found elsewhere: of the surface alone; and with the part,
 whose heights count twice there, since they tell the normal force."""
 
-SEARCH_STEP, FINE_STEP = 1.0 / 960 / 14, 1.0 / 960 / 80
+SEARCH_STEP, FINE_STEP = 1.0 / 960 / 14, 1.0 / 960 / 40
 """Longest steps (s) of the search, and of its finish and all that is reported."""
 
 DRIVE = ("amplitude", "offset", "phase", "start", "frequency")
