@@ -10,6 +10,7 @@ Winding, assumed: the 0.9 to 3.6 g of copper that make 7.1 Ohm of wire of 0.14 t
 of a few tenths of a millimetre.
 """
 
+from functools import lru_cache
 from math import expm1, inf, sqrt
 from typing import Any
 
@@ -52,7 +53,12 @@ def rise(coil: Coil, on_time: float = inf, duty: float = 1.0, side: int = 0) -> 
     (s) of each of many cycles, their share ``duty``, where 0 is a single one. ``side`` 1 and -1
     take the upper and lower end of the estimate.
     """
-    given = {name: getattr(coil, name) for name in SPREAD}
+    return _rise(tuple(getattr(coil, name) for name in SPREAD), on_time, duty, side)
+
+
+@lru_cache  # all settings of a study have one coil
+def _rise(estimate: tuple[float, ...], on_time: float, duty: float, side: int) -> float:
+    given = dict(zip(SPREAD, estimate, strict=True))
     for name, factor in SPREAD.items():
         given[name] *= factor ** (-side if name.endswith("capacity") else side)
     cycle = on_time / duty if duty else inf

@@ -5,6 +5,7 @@ Exit codes: 0 done; 2 bad input, told in one sentence; 3 the simulation failed; 
 
 import argparse
 import errno
+import gc
 import os
 import re
 import sys
@@ -69,6 +70,7 @@ _COMPLETION = Command(
 def main(argv: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
     _open_standard_streams()
+    gc.set_threshold(50_000)  # by default it takes a twentieth of a large sweep's time
     # Nothing here gains by BLAS's threads, and where one cannot be made it sends itself SIGINT.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if isinstance(sys.stdout, TextIOWrapper):

@@ -27,8 +27,9 @@ def straights(
     start and the end of each interval between two of them, until ``duration``, block after block.
     The commands are of one shape; of a sine there are ``chords`` a period.
     """
-    if len(commands) == 1 and commands[0].lines(0.0, 0.0, 1) is not None:
-        yield from _lines(commands[0], duration)
+    found = commands[0].lines(0.0, duration, _TOGETHER) if len(commands) == 1 else None
+    if found is not None:
+        yield from _lines(commands[0], duration, found)
         return
     edges = [0.0]
     pieces = [command.piece(0.0) for command in commands]
@@ -54,12 +55,12 @@ def straights(
             edges, rows = edges[-1:], []
 
 
-def _lines(command: Command, duration: float) -> Iterator[tuple[Array, Array, Array]]:
-    """The straights of a command that knows them at once."""
+def _lines(
+    command: Command, duration: float, found: tuple[Array, Array, Array] | None
+) -> Iterator[tuple[Array, Array, Array]]:
+    """The straights of a command that knows them at once, from the first ones, ``found``, on."""
     begin = 0.0
-    while begin < duration:
-        found = command.lines(begin, duration, _TOGETHER)
-        assert found is not None
+    while begin < duration and found is not None:
         corners, start, end = found
         count = int(corners.searchsorted(duration))
         if count < len(corners):
@@ -69,6 +70,7 @@ def _lines(command: Command, duration: float) -> Iterator[tuple[Array, Array, Ar
                 corners, end = np.append(corners[:count], duration), np.append(end[:-1], last)
         yield corners, start[:, np.newaxis], end[:, np.newaxis]
         begin = float(corners[-1])
+        found = command.lines(begin, duration, _TOGETHER) if begin < duration else None
 
 
 def straight(piece: Piece, begin: float) -> tuple[float, float, float]:

@@ -37,7 +37,7 @@ PAUSE = 0.1
 MOST_OWED = 64 << 20
 """Bytes that are kept for a disk that takes them later."""
 
-_TABLE = "CREATE TABLE found (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID"
+_TABLE = "CREATE TABLE found (key TEXT PRIMARY KEY, value TEXT NOT NULL)"
 _WORK = ""
 """The key of the hash of what the findings follow from."""
 
@@ -161,7 +161,9 @@ class Store:
     def _take_up(self, work: str) -> None:
         for pragma in ("trusted_schema = OFF", "journal_mode = WAL", "synchronous = NORMAL"):
             self._base.execute(f"PRAGMA {pragma}")
-        tables = self._base.execute("SELECT type, name, sql FROM sqlite_master").fetchall()
+        tables = self._base.execute(
+            "SELECT type, name, sql FROM sqlite_master WHERE sql NOT NULL"  # the key's index has none
+        ).fetchall()
         if not tables:  # a kill may have left it so
             with self._base:
                 self._base.execute("BEGIN")

@@ -119,7 +119,7 @@ def test_kills_at_any_moment_lose_a_moment_at_most(tmp_path: Path) -> None:
 def test_a_disk_that_is_full_for_a_while(tmp_path: Path) -> None:
     path = tmp_path / "any.sqlite"
     with Store(path) as store:
-        with disk_of(100_000), pytest.warns(Note, match="cannot be written") as told:
+        with disk_of(150_000), pytest.warns(Note, match="cannot be written") as told:
             for number in range(300):
                 store.add(f"{number}", f"{number}" * 200)
             assert store.get("299") == "299" * 200
