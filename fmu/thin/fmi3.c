@@ -143,13 +143,13 @@ IDLE(UInt64)
 IDLE(Boolean)
 IDLE(String)
 
-#define NONE(FUNCTION, ...)                                                                        \
-    fmi3Status FUNCTION(__VA_ARGS__)                                                               \
-    {                                                                                              \
-        return status_of(c && thin_refuse(c, "it does not provide " #FUNCTION));                   \
-    }
-#define UNSUPPORTED(FUNCTION, ...) NONE(FUNCTION, fmi3Instance c, __VA_ARGS__)
-#define UNSUPPORTED_PLAIN(FUNCTION) NONE(FUNCTION, fmi3Instance c)
+static fmi3Status unsupported(fmi3Instance c, const char *function)
+{
+    return status_of(c && thin_refuse(c, "it does not provide %s", function));
+}
+
+#include "fmi3Unsupported.h"
+
 UNSUPPORTED(fmi3GetBinary, const fmi3ValueReference p[], size_t n, size_t sizes[], fmi3Binary v[],
             size_t m)
 UNSUPPORTED(fmi3SetBinary, const fmi3ValueReference p[], size_t n, const size_t sizes[],
@@ -162,47 +162,3 @@ UNSUPPORTED(fmi3DeserializeFMUState, const fmi3Byte b[], size_t n, fmi3FMUState 
 UNSUPPORTED(fmi3GetDirectionalDerivative, const fmi3ValueReference u[], size_t n,
             const fmi3ValueReference k[], size_t m, const fmi3Float64 s[], size_t ns,
             fmi3Float64 d[], size_t nd)
-UNSUPPORTED_PLAIN(fmi3EnterEventMode)
-UNSUPPORTED_PLAIN(fmi3EnterStepMode)
-UNSUPPORTED_PLAIN(fmi3EnterConfigurationMode)
-UNSUPPORTED_PLAIN(fmi3ExitConfigurationMode)
-UNSUPPORTED_PLAIN(fmi3EnterContinuousTimeMode)
-UNSUPPORTED_PLAIN(fmi3EvaluateDiscreteStates)
-UNSUPPORTED(fmi3GetNumberOfVariableDependencies, fmi3ValueReference vr, size_t *n)
-UNSUPPORTED(fmi3GetVariableDependencies, fmi3ValueReference dependent, size_t elements[],
-            fmi3ValueReference independents[], size_t elements_of[], fmi3DependencyKind kinds[],
-            size_t n)
-UNSUPPORTED(fmi3GetAdjointDerivative, const fmi3ValueReference unknowns[], size_t n_unknowns,
-            const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64 seed[],
-            size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity)
-UNSUPPORTED(fmi3GetIntervalDecimal, const fmi3ValueReference vr[], size_t n, fmi3Float64 intervals[],
-            fmi3IntervalQualifier qualifiers[])
-UNSUPPORTED(fmi3GetIntervalFraction, const fmi3ValueReference vr[], size_t n, fmi3UInt64 counters[],
-            fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
-UNSUPPORTED(fmi3GetShiftDecimal, const fmi3ValueReference vr[], size_t n, fmi3Float64 shifts[])
-UNSUPPORTED(fmi3GetShiftFraction, const fmi3ValueReference vr[], size_t n, fmi3UInt64 counters[],
-            fmi3UInt64 resolutions[])
-UNSUPPORTED(fmi3SetIntervalDecimal, const fmi3ValueReference vr[], size_t n,
-            const fmi3Float64 intervals[])
-UNSUPPORTED(fmi3SetIntervalFraction, const fmi3ValueReference vr[], size_t n,
-            const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-UNSUPPORTED(fmi3SetShiftDecimal, const fmi3ValueReference vr[], size_t n,
-            const fmi3Float64 shifts[])
-UNSUPPORTED(fmi3SetShiftFraction, const fmi3ValueReference vr[], size_t n,
-            const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-UNSUPPORTED(fmi3UpdateDiscreteStates, fmi3Boolean *need_update, fmi3Boolean *terminate,
-            fmi3Boolean *nominals_changed, fmi3Boolean *values_changed,
-            fmi3Boolean *next_time_defined, fmi3Float64 *next_time)
-UNSUPPORTED(fmi3CompletedIntegratorStep, fmi3Boolean no_set_state_before, fmi3Boolean *enter,
-            fmi3Boolean *terminate)
-UNSUPPORTED(fmi3SetTime, fmi3Float64 time)
-UNSUPPORTED(fmi3SetContinuousStates, const fmi3Float64 x[], size_t n)
-UNSUPPORTED(fmi3GetContinuousStateDerivatives, fmi3Float64 dx[], size_t n)
-UNSUPPORTED(fmi3GetEventIndicators, fmi3Float64 indicators[], size_t n)
-UNSUPPORTED(fmi3GetContinuousStates, fmi3Float64 x[], size_t n)
-UNSUPPORTED(fmi3GetNominalsOfContinuousStates, fmi3Float64 nominals[], size_t n)
-UNSUPPORTED(fmi3GetNumberOfEventIndicators, size_t *n)
-UNSUPPORTED(fmi3GetNumberOfContinuousStates, size_t *n)
-UNSUPPORTED(fmi3GetOutputDerivatives, const fmi3ValueReference vr[], size_t n,
-            const fmi3Int32 orders[], fmi3Float64 values[], size_t n_values)
-UNSUPPORTED(fmi3ActivateModelPartition, fmi3ValueReference clock, fmi3Float64 time)
