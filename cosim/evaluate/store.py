@@ -162,7 +162,7 @@ class Store:
         for pragma in ("trusted_schema = OFF", "journal_mode = WAL", "synchronous = NORMAL"):
             self._base.execute(f"PRAGMA {pragma}")
         tables = self._base.execute(
-            "SELECT type, name, sql FROM sqlite_master WHERE sql NOT NULL"  # the key's index has none
+            "SELECT type, name, sql FROM sqlite_master WHERE sql NOT NULL"  # as the index's is
         ).fetchall()
         if not tables:  # a kill may have left it so
             with self._base:

@@ -65,7 +65,8 @@ NETLISTS = {
         edited("Vemf c3 sense 0", "R9 c3 sense 1m\nR8 x8 0 1k\nVemf x8 0 0"),
         r"in series with",
     ),
-    "a coil of the netlist's own": (edited("{coil_resistance/count}", "5"), r"coil_resistance"),
+    "another resistance": (edited("{coil_resistance/count}", "7.4"), r"has 7\.4 Ohm .* 7\.1 Ohm"),
+    "another inductance": (edited("{coil_inductance/count}", "1.3m"), r"1\.3 mH, .* 1\.2 mH"),
     "command in the netlist": (
         edited(SENSE, f"{SENSE}\n.control\nshell touch marker\n.endc"),
         r"own\.cir:\d+: .*control",

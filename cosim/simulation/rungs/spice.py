@@ -142,32 +142,50 @@ def _points(log: dict[str, Array]) -> Iterator[dict[str, Array]]:
 def _refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
     """Refuse a netlist whose voltage between ``out`` and ``sense`` is not that of the scene's coil.
 
-    Over the run, v = R i + L di/dt + e must hold in its integral, with the scene's coil; one with
-    an eddy branch is not checked. Raises BadInput: a source the wrong way round, not in series with
-    the coil, or values of the netlist's own would make a result without meaning.
+    v = R i + L di/dt + e must hold in its integral over each step, with an R and L, which least
+    squares find, and these must be the scene's; a coil with an eddy branch is not checked. Raises
+    BadInput: a source the wrong way round, not in series with the coil, or values of the netlist's
+    own would make a result without meaning.
     """
     coil = scene.coil
     if coil.eddy_inductance:
         return
+    normal, right = np.zeros((2, 2)), np.zeros(2)
+    for slopes, flux, _ in _fluxes(scene, log):
+        normal += np.einsum("ik,jk->ij", slopes, slopes)
+        right += np.einsum("ik,k->i", slopes, flux)
+    own = np.array([coil.resistance, coil.inductance])
+    # Both are told by a current that flows and changes.
+    known = np.linalg.det(normal) > 1e-9 * normal[0, 0] * normal[1, 1]
+    found = np.linalg.solve(normal, right) if known else own
     missing, worst, swept = 0.0, 0.0, 0.0
-    for part in _points(log):
-        current = part["i(vemf)"] / coil.count
-        h = np.diff(part["time"])
-        mean = 0.5 * (current[1:] + current[:-1])
-        voltage = part["v(out)"] - part["v(sense)"]
-        expected = coil.resistance * mean * h + coil.inductance * np.diff(current)
-        given = 0.5 * (voltage[1:] + voltage[:-1]) * h
-        emf = 0.5 * (part["emf"][1:] + part["emf"][:-1]) * h
+    for slopes, flux, whole in _fluxes(scene, log):
         # Running sums: single steps of a stiff circuit need not obey to the digit.
-        sums = missing + np.cumsum(given - expected - emf)
+        sums = missing + np.cumsum(flux - found @ slopes)
         missing, worst = float(sums[-1]), max(worst, float(np.abs(sums).max()))
-        swept += float(np.abs(given).sum() + np.abs(emf).sum())
+        swept += float(whole.sum())
+    ends = {"out": "v(out)", "sense": "v(sense)", "back_emf": "Vemf"}
+    out, sense, emf = (scene.renamed.get(f"machine.{k}", word) for k, word in ends.items())
     if worst > 0.01 * swept + 1e-12:
-        ends = {"out": "v(out)", "sense": "v(sense)", "back_emf": "Vemf"}
-        out, sense, emf = (scene.renamed.get(f"machine.{k}", word) for k, word in ends.items())
         raise BadInput(
-            f"{scene.circuit.netlist}: {out} - {sense} is not the voltage of the scene's coil at "
-            f"the current i({emf}): {emf} must be in series with the coil, + towards {out}, and "
-            "the coil's resistance and inductance must be those of [coil] (as .param lines "
-            "coil_resistance, coil_inductance and count they are)."
+            f"{scene.circuit.netlist}: {out} - {sense} is not the voltage of a coil at the current "
+            f"i({emf}): {emf} must be in series with the coil, + towards {out}."
         )
+    if (abs(found - own) > 0.01 * own).any():
+        (resistance, inductance), count = found.tolist(), coil.count
+        raise BadInput(
+            f"{scene.circuit.netlist}: the coil between {out} and {sense} has "
+            f"{resistance / count:.4g} Ohm and {inductance / count * 1e3:.4g} mH, that of [coil] "
+            f"{coil.resistance / count:.4g} Ohm and {coil.inductance / count * 1e3:.4g} mH; they "
+            "must be the same, as .param coil_resistance, coil_inductance and count make them."
+        )
+
+
+def _fluxes(scene: Scene, log: dict[str, Array]) -> Iterator[tuple[Array, Array, Array]]:
+    """Of each step, part by part: the integral of one coil's current (A s) and its change (A), as
+    rows; the integral of its voltage less the back-EMF (V s); and those of both without signs."""
+    for part in _points(log):
+        current, h = part["i(vemf)"] / scene.coil.count, np.diff(part["time"])
+        voltage, emf = part["v(out)"] - part["v(sense)"], part["emf"]
+        charge, given, back = (0.5 * (x[1:] + x[:-1]) * h for x in (current, voltage, emf))
+        yield np.stack([charge, np.diff(current)]), given - back, np.abs(given) + np.abs(back)
