@@ -122,12 +122,14 @@ def test_a_measurement_weighs_as_in_a_likelihood(tmp_path: Path) -> None:
     values[0, space.names.index("coil.force_factor")] = 1.3
     values[1, space.names.index("coil.force_factor")] = 1.5
     points = space.point(values)
-    assert np.abs(space.residuals(points)) == pytest.approx(
-        np.array([[0.0, 2.0], [0.0, 0.0]]), abs=1e-6
-    )
+    off = space.residuals(points)
+    assert np.abs(off[:, :2]) == pytest.approx(np.array([[0.0, 2.0], [0.0, 0.0]]), abs=1e-6)
+    entry = space.entries["coil.force_factor"]
+    priors = [np.log(value / entry.prior) / entry.sigma for value in (1.3, 1.5)]
+    assert off[:, 2] == pytest.approx(priors)
     costs = np.full((2, 9), 0.1)
-    apart = Search(space, [], 1).totals(costs, points) - space.prior(points)
-    assert 9.0 * SAMPLES * (apart[0] / apart[1] - 1.0) == pytest.approx(4.0)
+    totals = Search(space, [], 1).totals(costs, points)
+    assert 9.0 * SAMPLES * (totals / 0.1 - 1.0) == pytest.approx((off**2).sum(axis=1))
 
 
 @pytest.mark.usefixtures("folder")

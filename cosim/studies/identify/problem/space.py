@@ -20,9 +20,6 @@ from cosim.studies.identify.problem.gauges import GAUGES
 
 SHIPPED = Path(__file__).parent / "bounds.toml"
 
-WEAK = 1e-3
-"""Of a prior: what a deviation by its sigma adds to the cost."""
-
 _ALIASES = {
     "mechanics.travel": ("travel_up", "travel_down"),
     "mechanics.contact_stiffness": ("wall_up", "wall_down"),
@@ -153,31 +150,21 @@ class Space:
                 values[:, k] *= forces * (walls if name == "mechanics.contact_stiffness" else 1.0)
         return self.point(values)
 
-    def prior(self, points: Array) -> Array:
-        """What the priors add to the costs of rigs at points (n × free)."""
-        values, total = _coordinates(self.values(points), self.log), np.zeros(len(points))
-        for column, entry in zip(values.T, self.free, strict=True):
-            if entry.prior is not None and entry.sigma:
-                middle = np.log(entry.prior) if entry.log else entry.prior
-                total += WEAK * ((column - middle) / entry.sigma) ** 2
-        return total
-
-    @property
-    def curvature(self) -> Array:
-        """Half the second derivative of ``prior`` by each coordinate of a point."""
-        low, high = self._ends
-        sigmas = np.array([entry.sigma or np.inf for entry in self.free])
-        return WEAK * ((high - low) / sigmas) ** 2
-
     def residuals(self, points: Array) -> Array:
-        """How far rigs at points (n × free) are from what was measured beside the trials, in
-        standard deviations (n × measured)."""
+        """How far rigs at points (n × free) are from what was measured beside the trials, and from
+        the middles of the priors, in standard deviations (n × these)."""
         rigs = [dict(zip(RIG, row, strict=True)) for row in self.rigs(points).tolist()]
-        found = [
+        beside = [
             [(GAUGES[name].of(rig) - value) / sd for name, (value, sd) in self.measured.items()]
             for rig in rigs
         ]
-        return np.array(found).reshape(len(points), len(self.measured))
+        values = _coordinates(self.values(points), self.log)
+        priors = [
+            (column - (np.log(entry.prior) if entry.log else entry.prior)) / entry.sigma
+            for column, entry in zip(values.T, self.free, strict=True)
+            if entry.prior is not None and entry.sigma
+        ]
+        return np.column_stack([np.array(beside).reshape(len(points), -1), *priors])
 
     def settings(self, point: Array) -> dict[str, Any]:
         """All keys of the rig at a point, as overrides of a scene."""

@@ -92,8 +92,8 @@ def _priors(found: Solved) -> list[str]:
     ]
     if weighed:
         said.append(
-            "Weak priors, a thousandth of the cost for each σ², took part: "
-            f"{'; '.join(weighed)}. They decide where the trials do not tell."
+            f"Priors took part, normal ones in a likelihood: {'; '.join(weighed)}. They decide "
+            "where the trials do not tell."
         )
     other = [
         f"{name} {value * gauge.scale:.4g} ± {sd * gauge.scale:.2g} {gauge.unit}, on the rig "

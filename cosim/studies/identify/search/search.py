@@ -48,7 +48,7 @@ ENDS_AT = 1e-5
 @dataclass(frozen=True, eq=False)
 class Found:
     """A rig, a ``point`` of its ``space``, and the trials on it: their parameters ``own`` (trials ×
-    OWN), their ``costs`` and ``total``, the mean of these and what the priors add."""
+    OWN), their ``costs`` and ``total``, which is the mean of these but for what is known beside."""
 
     space: Space
     point: Array
@@ -127,10 +127,11 @@ class Search:
 
     def totals(self, costs: Array, points: Array) -> Array:
         """Of rigs at points (n × free) whose trials have ``costs`` (n × trials). -2 ln L is the
-        effective samples times ln cost, to which a measurement beside the trials adds the square of
-        its residual in standard deviations; so it weighs as much as the trials let it."""
+        effective samples times ln cost, to which a measurement beside the trials, or a prior, adds
+        the square of its residual in standard deviations; so it weighs as much as the trials let
+        it."""
         off = (self.space.residuals(points) ** 2).sum(axis=1) / (SAMPLES * costs.shape[1])
-        return costs.mean(axis=1) * (1.0 + off) + self.space.prior(points)
+        return costs.mean(axis=1) * (1.0 + off)
 
     def refined(self, point: Array, own: Array, rounds: int) -> Found:
         """The trials' parameters fitted on a given rig from ``own`` on."""
@@ -288,7 +289,7 @@ class Search:
 
 
 def _unknowns(search: Search, point: Array, own: Array, weight: float) -> Array:
-    """Slopes of all residuals, the trials' and ``weight`` times those of what was measured beside
+    """Slopes of all residuals, the trials' and ``weight`` times those of what is known beside
     them, by the unknowns (rows): the point, then each trial's fitted own parameters in units of
     their scales, which move that trial's residuals alone."""
     d = len(point)
@@ -314,21 +315,19 @@ def deviations(search: Search, found: Found, samples: float) -> Array:
     alike = replace(search, space=found.space)
     slopes = _unknowns(alike, found.point, found.own, _weight(found))
     normal = np.einsum("ij,kj->ik", slopes, slopes)
-    normal[range(d), range(d)] += len(found.costs) * found.space.curvature
     normal += TINY * np.trace(normal) * np.eye(len(normal))  # of what moves nothing
     covariance = np.linalg.inv(normal) * total / samples
     return np.asarray(np.sqrt(np.diag(covariance)[:d]))
 
 
 def _weight(found: Found) -> float:
-    """Of a residual of what was measured beside the trials, in units of theirs."""
+    """Of a residual of what is known beside the trials, in units of theirs."""
     return float(np.sqrt(found.costs.mean() / SAMPLES))
 
 
 def finish(search: Search, found: Found, steps: int) -> Found:
-    """The solution after at most ``steps`` steps of least squares, if it is better; priors, too,
-    are in that. What was measured beside the trials is among the residuals, with the weight of
-    ``Search.totals``.
+    """The solution after at most ``steps`` steps of least squares, if it is better. What is known
+    beside the trials is among the residuals, with the weight of ``Search.totals``.
 
     The unknowns are the point and the fitted own parameters in units of their scales.
     """
