@@ -20,7 +20,8 @@ from cosim.circuit.lint.write import written
 from cosim.errors import BadInput, plain
 from cosim.scene.messages import ended, suggestion
 
-_VECTOR = re.compile(r"([vi])\s*\(\s*([^\s(),]+)\s*\)", re.IGNORECASE)
+# Ground is no vector of ngspice's, but may stand in an expression.
+_VECTOR = re.compile(r"([vi])\s*\(\s*(?!(?:0|gnd)\s*\))([^\s(),]+)\s*\)", re.IGNORECASE)
 _FACTOR = re.compile(r"[vi]\s*\([^()]*\)", re.IGNORECASE)
 _UNITS = {"v": "V", "i": "A", "iv": "W", "vv": "V2", "ii": "A2"}
 _CURRENTS = "vleh"  # elements whose current ngspice computes as an unknown

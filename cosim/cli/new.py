@@ -9,7 +9,7 @@ _KINDS = ("machine", "circuit", "fmu")
 _SCHEMA = "scene.schema.json"
 
 
-def _new(file: Path, kind: str = "machine", base: str = "paper-limited") -> None:
+def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
     import re
 
     from cosim.errors import BadInput, plain
@@ -18,18 +18,24 @@ def _new(file: Path, kind: str = "machine", base: str = "paper-limited") -> None
     from cosim.scene.describe import schema
     from cosim.scene.loading import list_scenes, load
     from cosim.scene.messages import suggestion
-    from cosim.scene.model import to_toml
+    from cosim.scene.model import CAREFUL, to_toml
 
     name = plain(str(file))
     if file.suffix != ".toml" or not file.stem.replace("-", "").replace("_", "").isalnum():
         raise BadInput(f"{name}: must end in .toml, its name have letters, digits, - and _ alone.")
+    if kind == "fmu" and base is not None:
+        raise BadInput(f"--base {plain(base)}: a scene of kind fmu starts from none.")
+    base = base or "paper-limited"
     if base not in (known := [scene for scene, *_ in list_scenes()]):
         raise BadInput(f"--base {plain(base)}: must be a built-in scene{suggestion(base, known)}.")
     texts = {}
     if kind == "fmu":
         texts[file] = (circuits() / "new" / "fmu.toml").read_text(encoding="utf-8")
     else:
-        texts[file] = to_toml(load(base), base)
+        scene = load(base)
+        if kind == "circuit":
+            scene = scene.having(circuit=CAREFUL)
+        texts[file] = to_toml(scene, base)
     if kind == "circuit":
         own = f'[circuit]\nmodel = "file"\nnetlist = "{file.stem}.cir"  # beside this file\n'
         text = texts[file].replace("[circuit]\n", own)
@@ -74,7 +80,9 @@ COMMANDS = (
                 choices=_KINDS,
             ),
             Option(
-                "--base", "the built-in scene that it starts from", "SCENE", str, "paper-limited"
+                "--base",
+                "the built-in scene that a machine or circuit starts from (default: paper-limited)",
+                "SCENE",
             ),
         ),
     ),

@@ -190,6 +190,8 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
         hint = messages.suggestion(Path(source).stem, builtin, "the built-in scene ")
         if source.endswith(".toml") or os.sep in source:
             raise messages.bad(f"{origin}: there is no such file{hint}") from None
+        if os.path.isfile(f"{source}.toml"):
+            hint = f"; did you mean {origin}.toml?"
         hint = hint or f" (built-in: {', '.join(builtin)})"
         raise messages.bad(f'there is no built-in scene and no file "{origin}"{hint}') from None
     try:

@@ -34,7 +34,7 @@ from cosim.scene.tables import (
 )
 from cosim.stepper.stepper import VARIABLES
 
-_CAREFUL = {"max_step": 2e-5, "reltol": 1e-5}
+CAREFUL = {"max_step": 2e-5, "reltol": 1e-5}
 """For circuits that nobody here knows; s, 1."""
 
 FASTEST = 1e-6
@@ -95,7 +95,7 @@ class Scene(BaseModel):
         circuit = data.get("circuit", {})
         model = circuit.get("model") if isinstance(circuit, dict) else None
         rung = RUNGS.get(model) if isinstance(model, str) else None
-        return data | {"circuit": _CAREFUL | circuit} if rung and rung.own_netlist else data
+        return data | {"circuit": CAREFUL | circuit} if rung and rung.own_netlist else data
 
     @model_validator(mode="after")
     def _fit_times(self) -> "Scene":

@@ -11,7 +11,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from cosim.arrays import Array
-from cosim.files.picture import Picture
+from cosim.files.picture import Picture, grid
 from cosim.files.spill import release
 from cosim.scene import Scene
 from cosim.trials.camera import FRAME_RATE, accelerations, film
@@ -70,19 +70,24 @@ MOST_PANELS = 12
 
 def draw_own(scene: Scene, waves: dict[str, Array], units: Mapping[str, str]) -> Picture:
     """The figure of a run of a scene with its own FMUs: a panel for each waveform, up to
-    MOST_PANELS, the whole run above all."""
-    names = [name for name in waves if name != "time"][:MOST_PANELS]
-    columns = 1 if len(names) < 4 else 2
-    rows = -(-len(names) // columns)
-    figure = Picture(13.0, 1.2 + 1.9 * rows, layout="constrained")
-    for axis, name in zip(figure.subplots(rows, columns, squeeze=False).flat, names, strict=False):
+    MOST_PANELS, the whole run. What is kept or joined comes first, what stays the same last."""
+    chosen = {*(scene.circuit.save or ())}
+    for port in scene.port:
+        chosen |= {str(port.probe), str(port.source), str(port.origin), str(port.to)}
+    every = [name for name in waves if name != "time"]
+    names = sorted(every, key=lambda name: (np.ptp(waves[name]) == 0.0, name not in chosen))
+    names = [name for name in every if name in names[:MOST_PANELS]]
+    figure, axes = grid(len(names), 1 if len(names) < 4 else 2, 13.0, 1.9, 1.2)
+    for axis, name in zip(axes, names, strict=True):
         axis.plot(*_outline(waves["time"], waves[name]), color=SURFACE, lw=0.8)
         if scene.run.settle > 0:
             axis.axvspan(0, scene.run.settle, color="0.93", zorder=0)
         axis.set(xlim=(0, scene.run.duration), xlabel="time [s]", ylabel=f"[{units[name]}]")
         axis.set_title(name.replace("$", "\\$"), loc="left", fontsize=10.5)
-        axis.grid(alpha=0.25)
-    figure.suptitle((scene.description or scene.name).replace("$", "\\$"), fontsize=12)
+    words = [scene.description or scene.name]
+    words += [f"{len(names)} of {len(every)} waveforms"] * (len(names) < len(every))
+    words += ["grey: settling"] * (scene.run.settle > 0)
+    figure.suptitle("; ".join(words).replace("$", "\\$"), fontsize=12)
     return figure
 
 

@@ -396,6 +396,16 @@ def test_an_fmu_that_ends_its_process_or_fails_is_told(tmp_path: Path) -> None:
         cosim.run(scene, {"run.duration": 2e-3, "fmu.rotor.crash_at": 1e-3})
     with pytest.raises(SimulationFailed, match=r"rotor failed at t = .*the bearing is worn out"):
         cosim.run(scene, {"run.duration": 2e-3, "fmu.rotor.fail_at": 1e-3})
+    for method in ("step-locked", "redo"):
+        given = {"run.duration": 2e-3, "fmu.rotor.B": 0.0, "coupling.method": method}
+        with pytest.raises(SimulationFailed, match=r"output rotor\.\w+ is not a finite number"):
+            cosim.run(scene, given)
+
+
+def test_ground_may_be_kept(tmp_path: Path) -> None:
+    scene = motor(tmp_path)
+    given = {"run.duration": 1e-3, "circuit.save": ["v(0)", "v(a, 0)"]}
+    assert not here(scene, given).columns["v(0)"].any()
 
 
 def test_structures_have_the_sizes_that_the_compiled_ones_have() -> None:

@@ -113,9 +113,10 @@ class Run:
                 side.close(state_of.state)
         if state.status == FMU_FAILED:
             raise self._fmu_failure()
+        self._refuse_what_is_no_number()
         if state.status == NOT_FINITE:
             raise SimulationFailed(
-                f"The circuit or an FMU left the range of numbers at t = {state.told:.6g} s."
+                f"The circuit left the range of numbers at t = {state.told:.6g} s."
             )
         if state.status == UNKNOWN_SOURCE:
             name = state.source.decode().lower()
@@ -142,6 +143,18 @@ class Run:
     def versions(self) -> dict[str, str]:
         """Of ngspice."""
         return {"ngspice": str(engine().ngspice_version)}
+
+    def _refuse_what_is_no_number(self) -> None:
+        """ngspice would end at it, and tell of its own steps. Raises SimulationFailed."""
+        time, place = self.state.time, 0
+        for side in self.plan.sides:
+            for name, *_ in side.columns:
+                if not np.isfinite(self._rows[0][place]):
+                    raise SimulationFailed(
+                        f"The output {name} is not a finite number at t = {time:.6g} s."
+                    )
+                place += 1
+            place += side.width - len(side.columns)
 
     def _fmu_failure(self) -> SimulationFailed:
         side = self.plan.sides[self.state.failed]
