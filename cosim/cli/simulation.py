@@ -57,7 +57,7 @@ def _run(
             saved = json.loads(path.read_text(encoding="utf-8"))
             write_json(path, saved | {"spread": found.summary()})
     print(f"{base.name}: {base.description}" if base.description else base.name)
-    print(table(result.scene, result.summary))
+    print(table(result.scene, result.summary, result.units))
     if found is not None:
         print(found)
     print(f"Written to {folder}: waveforms.csv, waveforms.nc, summary.json, scene.toml")

@@ -59,7 +59,7 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
     if (results / "waveforms.nc").exists():
         found, scene = formats.read(results), load(results / "scene.toml")
         runs = [[*found.waveforms.values()]]
-        words = table(scene, _json(results / "summary.json"))
+        words = table(scene, _json(results / "summary.json"), found.units)
         told = {"title": scene.name, "about": scene.description, "words": words}
         return told | {"signals": _signals(found.units, runs)}, runs
     if (results / "sweep.nc").exists():

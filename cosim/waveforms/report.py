@@ -7,10 +7,10 @@ from cosim.scene import Scene
 from cosim.trials.measured import measured
 
 
-def table(scene: Scene, summary: dict[str, Any]) -> str:
-    """The summary in a few lines, in the units of the bench."""
+def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str:
+    """The summary in a few lines, in the units of the bench; ``units`` are those of waveforms."""
     if scene.has_ports:
-        return _own(scene, summary)
+        return _own(scene, summary, units)
     lost = summary.get("energy_residual")
     warning = ": too much, take finer steps" if lost and lost > SUSPICIOUS else ""
     taken = "{circuit_model}: {circuit_model_why}" if "circuit_model" in summary else ""
@@ -47,17 +47,21 @@ def table(scene: Scene, summary: dict[str, Any]) -> str:
     return "\n".join(f"  {name:<24}{value}" for name, value in rows)
 
 
-def _own(scene: Scene, summary: dict[str, Any]) -> str:
-    """The numbers of a scene with its own FMUs, a line for each waveform."""
-    names = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
-    width = max(20, *map(len, names))
+def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str:
+    """The numbers of a scene with its own FMUs, a line for each waveform that is not 0 for good."""
+    every = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
+    names = [name for name in every if summary[f"{name}.rms"] != 0.0]
+    shown = [name + (f" [{units[name]}]" if units[name] not in ("", "1") else "") for name in names]
+    width = max(20, *map(len, shown))
     whats = ["mean", "rms", "least", "greatest"]
     told = any(name.endswith(".mean_error") for name in summary)
     whats += ["mean_error"] if told else []
     lines = [f"  {'':<{width}}" + "".join(f"{what.replace('_', ' '):>13}" for what in whats)]
-    for name in names:
+    for name, words in zip(names, shown, strict=True):
         values = "".join(f"{summary[f'{name}.{what}']:>13.6g}" for what in whats)
-        lines.append(f"  {name:<{width}}{values}")
+        lines.append(f"  {words:<{width}}{values}")
+    if len(names) < len(every):
+        lines.append(f"  {len(every) - len(names)} others are 0 all the time")
     steps, coupling = f"{summary['circuit_steps']} of ngspice", []
     if summary["fmu_steps"]:
         steps += f", {summary['fmu_steps']} of FMUs"

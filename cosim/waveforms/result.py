@@ -88,5 +88,5 @@ class Result:
         image = b64encode(self.plot().png()).decode()
         return (
             f'<img src="data:image/png;base64,{image}">'
-            f"<pre>{escape(table(self.scene, self.summary))}</pre>"
+            f"<pre>{escape(table(self.scene, self.summary, self.units))}</pre>"
         )

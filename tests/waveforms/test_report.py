@@ -8,6 +8,7 @@ import pytest
 
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
+from cosim.waveforms.columns import UNITS
 from cosim.waveforms.formats.tracker import laid_over
 from cosim.waveforms.report import LIMITS, table
 
@@ -28,7 +29,7 @@ SLOW = ["drive.quantised=true", "drive.loop_time=2.2e-5"]
 )
 def test_broken_periods_are_told(overrides: list[str], told: str | None) -> None:
     scene = load("reference", ["circuit.model=ideal", *overrides])
-    text = table(scene, simulate(scene).summary)
+    text = table(scene, simulate(scene).summary, UNITS)
     assert ("truer mean" in text) == (told is not None)
     assert told is None or told in text
 
@@ -55,8 +56,8 @@ def test_a_cycle_is_one_of_the_real_command(more: list[str]) -> None:
 def test_a_large_energy_residual_is_told() -> None:
     scene = load("reference", ["circuit.model=ideal", *SHORT])
     summary = dict(simulate(scene).summary)
-    assert "too much" not in table(scene, summary)
-    assert "too much" in table(scene, summary | {"energy_residual": 0.02})
+    assert "too much" not in table(scene, summary, UNITS)
+    assert "too much" in table(scene, summary | {"energy_residual": 0.02}, UNITS)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +79,7 @@ def test_limits_that_a_netlist_does_not_tell_of_are_not_known(
     summary = simulate(scene).summary
     limits = {key for key in summary if key in ("saturated_fraction", *LIMITS)}
     assert limits == (set() if climit is None else {"current_limit_fraction"})
-    lines = table(scene, summary).splitlines()
+    lines = table(scene, summary, UNITS).splitlines()
     line = next(line for line in lines if "amplifier at a limit" in line)
     assert "not known: the netlist has no node swing" in line and "never" not in line
     assert ("current limit 100 % of the time" in line) == (climit == 1)
@@ -86,7 +87,7 @@ def test_limits_that_a_netlist_does_not_tell_of_are_not_known(
 
 def test_rigid_walls_have_no_peak_and_rest_no_sign() -> None:
     rigid = load("reference", ["circuit.model=ideal", *SHORT, "mechanics.contact=rigid"])
-    assert "without bound" in table(rigid, simulate(rigid).summary)
+    assert "without bound" in table(rigid, simulate(rigid).summary, UNITS)
     held = load("held", SHORT)
-    lines = table(held, simulate(held).summary).splitlines()
+    lines = table(held, simulate(held).summary, UNITS).splitlines()
     assert any(line.split() == ["surface", "velocity", "0", "…", "0", "mm/s"] for line in lines)
