@@ -44,7 +44,7 @@ def draw(scene: Scene, waves: dict[str, Array], numbers: dict[str, Any]) -> Pict
     # Room that was measured once: a layout engine would double the time of a short run.
     top = 1 - (0.85 if beside else 0.62) / height
     figure.subplots_adjust(
-        left=0.06, right=0.985, bottom=0.5 / height, top=top, wspace=0.29, hspace=0.4
+        left=0.06, right=0.955, bottom=0.5 / height, top=top, wspace=0.29, hspace=0.4
     )
     shown = _last_periods(scene, waves["time"])
     time = waves["time"][shown] * 1e3
@@ -247,16 +247,20 @@ def _positions(axis: Axes, _: Scene, time: Array, cut: dict[str, Array]) -> None
 
 
 def _velocities(axis: Axes, _: Scene, time: Array, cut: dict[str, Array]) -> None:
-    if "v_ram" in cut:
-        relative = (cut["v_ram"] - cut["v_surface"]) * 1e3
-        axis.plot(time, relative, color=RAM, lw=0.8, label="ram, relative")
+    behind = []
+    if "v_ram" in cut:  # several times as fast as what it drives
+        right = axis.twinx()
+        relative = cut["v_ram"] - cut["v_surface"]
+        behind = right.plot(time, relative, color=RAM, lw=0.8, label="ram on surface (right)")
+        right.set(ylabel="of the ram [m/s]")
+        axis.set(zorder=right.get_zorder() + 1, frame_on=False)
     for body, style in BODIES.items():
         if (velocity := cut.get(f"v_{body}")) is not None:
             axis.plot(time, velocity * 1e3, **style)
     axis.set(ylabel="velocity [mm/s]")
     _at_least(axis, 1.0)
     _shade_sticking(axis, time, cut["sticking"])
-    _head(axis, "Velocities")
+    _head(axis, "Velocities", [*behind, *axis.get_legend_handles_labels()[0]])
 
 
 def _shade_sticking(axis: Axes, time: Array, sticking: Array) -> None:
