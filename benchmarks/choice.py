@@ -240,7 +240,10 @@ def report(rows: Sequence[Row], kinds: Mapping[str, Counter[str]], second: float
 
 def draw(rows: Sequence[Row], title: str, path: Path) -> None:
     """Draw error over cost into ``path`` (a PNG): of the solver alone, and in all."""
-    note = "A line from coarse to fine steps; ring: default. Solid: the median; dotted: the worst."
+    note = (
+        "A line from coarse to fine steps; ring: default. Solid: the median; dotted: the worst. "
+        f"What is less stands at {LEAST:g} %."
+    )
     figure, axes = panels(title, note, (11.0, 5.2), 1, 2, sharex=True, sharey=True)
     lines = dict.fromkeys(row["line"] for row in rows)
     colors = dict(zip(lines, (ORANGE, GREEN, BLUE, PURPLE, VERMILION), strict=True))

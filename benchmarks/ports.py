@@ -31,7 +31,10 @@ def main() -> None:
     aim = cosim.load("closed-grip").fmu[2].parameters
     change, end = float(aim["change"]), cosim.load("closed-grip").run.duration
     targets = [1e3 * float(aim[key]) for key in ("target", "target_2")]
-    panels[0, 2].step([0.0, change, end], [targets[0], targets[1], targets[1]], "k:", where="post")
+    heights = [targets[0], targets[1], targets[1]]
+    panels[0, 2].step([0.0, change, end], heights, "k:", where="post", label="asked for")
+    panels[0, 2].legend(loc="lower right", frameon=False)
+    figure.suptitle("Three circuits in ngspice, each with the mechanics of its own FMUs")
     figure.write(Path("results/ports.png"))
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from cosim.files.picture import Picture
 from cosim.studies.compare.compare import Found
@@ -33,7 +34,9 @@ def draw(title: str, found: Found) -> Picture:
             axis.set_visible(False)
         axes[len(column) - 1, k].set_xlabel("time [ms]")
         axes[len(column) - 1, k].tick_params(labelbottom=True)
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    kinds = (Line2D([], [], color="0.25", ls="", marker="."), Line2D([], [], color="0.25", lw=1.4))
+    words = ("measured: dots", "simulated: lines, in the body's colour")
+    figure.legend(kinds, words, loc="outside lower center", ncols=2)
     figure.suptitle(title, fontsize=12)
     return figure
 
@@ -44,8 +47,8 @@ def _panel(axis: Axes, name: str, color: str, found: Found) -> None:
     # Dots of a long recording cover each other, and the run's line.
     size = 3.0 if len(time) < 2000 else 1.0
     for values, style in (
-        (measured, {"color": "0.25", "ls": "", "marker": ".", "ms": size, "label": "measured"}),
-        (found.simulated[name], {"color": color, "lw": 1.4, "label": "simulated"}),
+        (measured, {"color": "0.25", "ls": "", "marker": ".", "ms": size}),
+        (found.simulated[name], {"color": color, "lw": 1.4}),
     ):
         first = values[np.isfinite(measured)][0] if name.startswith("z") else 0.0
         axis.plot(time, (values - first) * scale, **style)

@@ -42,9 +42,10 @@ def changes(path: Path, study: Study, goal: Goal) -> None:
     base = own.median * goal.scale if own else 1.0
     note = (
         "Robust: the median over turns of the knobs by ±2 %, the knobs set anew for each change. "
-        "Dot: the identified rig; thin bar: the same change on the other rigs that may be meant, "
-        "relative to each one's own; grey band: what repeated searches differ by. All trials that "
-        "were measured have a rising sawtooth."
+        "Dot: the identified rig, hollow where the gain is within the noise; thin bar: the same "
+        "change on the other rigs that may be meant, relative to each one's own; grey band: "
+        "what repeated searches differ by. Red changes the waveform, orange the heat, green the "
+        "grip, blue the circuit. All trials that were measured have a rising sawtooth."
     )
     title = goal.title
     if every:

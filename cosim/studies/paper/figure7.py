@@ -121,8 +121,8 @@ def _paths(axis: Axes, trial: Trial) -> None:
     row = trial.row()
     theirs, exact, machine = (row[f"error_{side} [mm]"] for side, *_ in SIDES)
     axis.set_title(
-        f"Trial {trial.number}, the paper's; mean error from the first frame {theirs:.2f} mm as "
-        f"published, {exact:.2f} exactly, {machine:.2f} the machine",
+        f"Trial {trial.number}, the paper's; mean error from the first frame {theirs:.2f} mm\n"
+        f"as published, {exact:.2f} mm exactly, {machine:.2f} mm the machine",
         fontsize=11,
     )
 

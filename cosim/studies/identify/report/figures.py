@@ -175,7 +175,8 @@ def spectrum(found: Solved) -> Picture:
         band = f"{row['from_hz']:.0f} to {row['to_hz']:.0f} Hz"
         missed[band] = missed.get(band, 0.0) + row["residual"]
     most = max(missed, key=missed.__getitem__)
-    headline(figure, f"Most of what the rig misses of the velocity lies at {most}")
+    share = missed[most] / sum(missed.values())
+    headline(figure, f"{share:.0%} of what the rig misses of the velocity lies at {most}")
     figure.supylabel("share of the measured velocity's power", fontsize=10)
     figure.supxlabel("frequency [Hz]", fontsize=10)
     return figure

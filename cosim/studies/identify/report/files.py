@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.files.atomic import write_json, write_text
+from cosim.scene import keys
 from cosim.studies.identify.problem.gauges import GAUGES
 from cosim.studies.identify.report import figures
 from cosim.studies.identify.report.scenes import rounded, scene_file, trial_settings
@@ -174,7 +175,7 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
     rig, whole = numbers["rig"], _whole(numbers["overall"]) | {"floor": "", "late": ""}
     tables: dict[str, list[Row]] = {
         "The rig": [
-            {"key": one["key"], "value": rig[one["key"]], "verdict": one["words"]}
+            {"key": _with_unit(one["key"]), "value": rig[one["key"]], "verdict": one["words"]}
             for one in numbers["verdicts"]
         ],
         "Laws of the suspension": [
@@ -212,6 +213,13 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
             {name: "-" if row.get(name) is None else row[name] for name in names} for row in checks
         ]
     return tables
+
+
+def _with_unit(name: str) -> str:
+    (unit,) = (key.unit for key in keys() if key.full == name)
+    for plain, raised in (("1.5", "^1.5"), ("2", "²"), ("3", "³")):
+        unit = unit.replace(plain, raised)
+    return name if unit in ("", "1") else f"{name} [{unit}]"
 
 
 def _told(row: Row) -> Row:
