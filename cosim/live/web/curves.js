@@ -108,6 +108,7 @@ const PANELS = [
   { name: "velocities, mm/s", unit: "mm/s", lines: [["surface", "v_surface", "a", 1e3], ["ram", "v_ram", "d", 1e3], ["part", "v_part", "b", 1e3]], least: 20 },
   { name: "acceleration, m/s²", unit: "m/s²", lines: [["instant", "a_surface", "d", 1], ["mean of 4 ms", "mean", "a", 1]], least: 20, bend: 40 },
 ];
+const SLIPS = { up: ["slips going up", "c", [5, 2]], down: ["slips going down", "b", [2, 3]] };
 const HALF = Math.round(0.002 * RATE); // rows of half of the 4 ms that a camera's reading spans
 const V_SURFACE = COLUMNS.indexOf("v_surface");
 
@@ -178,22 +179,16 @@ class Curves {
     least = Math.min(least, before.least + 0.04 * (least - before.least));
     most = Math.max(most, before.most + 0.04 * (most - before.most));
     this.limits[k] = { least, most, lines: lines.length };
-    const upright = Array.from({ length: periods + 1 }, (_, n) => [n / periods, ""]);
-    plot.begin([0, 1], [least, most], { legend: lines.map(([words, , of]) => [words, of]), bend: panel.bend, upright });
-    if (panel.unit === "m/s²") this._slips(plot, budget);
+    const long = 1e3 * span / RATE, upright = ticks(0, long, Math.max(2, columns / 60)).map(([v, words]) => [v / long, v ? words : "0 ms"]);
+    const legend = [...lines.map(([words, , of]) => [words, of]), ...(panel.bend ? Object.values(SLIPS) : [])];
+    plot.begin([0, 1], [least, most], { legend, bend: panel.bend, upright });
+    for (let n = 1; n < periods; n++) plot.line([[n / periods, least], [n / periods, most]], "steel", { width: 1 });
+    if (panel.bend) for (const [way, [, of, dash]] of Object.entries(SLIPS)) for (const end of budget[way]) plot.line([[0, end], [1, end]], of, { dash, width: 1 });
     const now = this.share(history.last), gap = slow ? now * columns : -1;
     shapes.forEach((shape, n) => plot.envelope(shape, lines[n][2], { near: 3 + columns / Math.max(1, span) * 2, gap }));
     for (const { points, of, dash } of laid) plot.line(points, of, { dash });
     if (slow) plot.line([[now, least], [now, most]], "ink", { width: 1 });
     this.cursors.draw(plot);
-  }
-
-  _slips(plot, budget) {
-    for (const [way, ends] of Object.entries(budget)) for (const end of ends) {
-      plot.line([[0, end], [1, end]], "c", { dash: [2, 4], width: 1 });
-      const at = plot.up(end) + (end < 0 ? 7 : -6);
-      if (at > TOP && at < plot.bottom) write(plot.ink, `slips ${way}`, plot.right - (way === "up" ? 4 : 70), at, plot.colour("c"), "right");
-    }
   }
 
   /* The row that is drawn at a share of the window. */

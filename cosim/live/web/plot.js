@@ -2,7 +2,7 @@
    `cosim show` share it. */
 
 const $ = (id) => document.getElementById(id);
-const LEFT = 54, RIGHT = 8, TOP = 18;
+const LEFT = 54, RIGHT = 8;
 
 const colours = () => {
   const style = getComputedStyle(document.documentElement);
@@ -106,40 +106,42 @@ class Plot {
     this.name = name;
   }
 
-  /* Axes over `x` and `y`, lowest and highest, with margins at `y`; `legend`: [words, colour]s. `bend`
-     stretches y about 0 as asinh(y/bend); `upright`: where lines stand instead of a scale of x. */
-  begin(x, [low, high], { legend = [], bend, upright, below = "" }) {
-    const { ink, width, height } = inked(this.canvas), colour = colours();
-    const right = width - RIGHT, bottom = height - (upright ? 4 : 18), margin = 0.06 * (high - low);
-    const bent = (v) => (bend ? Math.asinh(v / bend) : v), least = bent(low - margin), most = bent(high + margin);
-    Object.assign(this, { ink, colour, x, right, bottom, wide: Math.max(1, right - LEFT) });
-    this.at = (v) => LEFT + (v - x[0]) / (x[1] - x[0]) * this.wide;
-    this.up = (v) => bottom - (bent(v) - least) / (most - least) * (bottom - TOP);
+  /* Axes over x and y, each from lowest to highest and a share of that more, `margin`; `legend`: [words,
+     colour, dash]s. `bend` stretches y about 0 as asinh(y/bend); `upright`: a scale of x other than its own. */
+  begin(across, along, { legend = [], bend, upright, below = "", margin = [0, 0.06] }) {
+    const { ink, width, height } = inked(this.canvas), colour = colours(), right = width - RIGHT, bottom = height - 18;
+    const [x, [low, high]] = [across, along].map(([a, b], k) => [a - margin[k] * (b - a), b + margin[k] * (b - a)]);
+    const bent = (v) => (bend ? Math.asinh(v / bend) : v), least = bent(low), most = bent(high);
     Object.assign(ink, { font: "11.5px system-ui, sans-serif", textBaseline: "middle" });
+    write(ink, this.name + below, LEFT, 8, colour("ink"));
+    let place = LEFT + ink.measureText(this.name + below).width + 14, top = 18;
+    for (const [words, of, dash] of legend) {
+      const wide = ink.measureText(words).width + 16;
+      if (place + wide > right) [place, top] = [LEFT, top + 15];
+      stroke(ink, [[place, top - 10], [place + 12, top - 10]], colour(of), dash ? 1.5 : 2.5, dash);
+      write(ink, words, place + 16, top - 10, colour(of));
+      place += wide + 12;
+    }
+    Object.assign(this, { ink, colour, x, right, top, bottom, wide: Math.max(1, right - LEFT) });
+    this.at = (v) => LEFT + (v - x[0]) / (x[1] - x[0]) * this.wide;
+    this.up = (v) => bottom - (bent(v) - least) / (most - least) * (bottom - top);
     const [line, soft] = ["line", "soft"].map(colour);
     const rows = bend ? [-1000, -100, 0, 100, 1000].filter((v) => v > low && v < high).map((v) => [v, String(v)])
-      : ticks(low - margin, high + margin, Math.max(2, (bottom - TOP) / 24));
+      : ticks(low, high, Math.max(2, (bottom - top) / 20));
     for (const [v, words] of rows) {
       stroke(ink, [[LEFT, this.up(v)], [right, this.up(v)]], line);
-      write(ink, words, LEFT - 5, Math.max(TOP, Math.min(bottom - 5, this.up(v))), soft, "right");
+      write(ink, words, LEFT - 5, Math.max(top, Math.min(bottom - 5, this.up(v))), soft, "right");
     }
     for (const [v, words] of upright ?? ticks(...x, Math.max(2, this.wide / 90))) {
       const half = ink.measureText(words).width / 2;
-      stroke(ink, [[this.at(v), TOP], [this.at(v), bottom]], line);
+      stroke(ink, [[this.at(v), top], [this.at(v), bottom]], line);
       write(ink, words, Math.min(right - half, Math.max(LEFT + half, this.at(v))), bottom + 9, soft, "center");
-    }
-    write(ink, this.name + below, LEFT, 8, colour("ink"));
-    let place = LEFT + ink.measureText(this.name + below).width + 14;
-    for (const [words, of] of legend) {
-      stroke(ink, [[place, 8], [place + 12, 8]], colour(of), 2.5);
-      write(ink, words, place + 16, 8, colour(of));
-      place += ink.measureText(words).width + 28;
     }
   }
 
   _line(points, colour, width, dash) {
-    const { ink, wide, bottom } = this;
-    within(ink, [LEFT, TOP - 2, wide, bottom - TOP + 4], () => stroke(ink, points, this.colour(colour), width, dash));
+    const { ink, wide, top, bottom } = this;
+    within(ink, [LEFT, top - 2, wide, bottom - top + 4], () => stroke(ink, points, this.colour(colour), width, dash));
   }
 
   /* Through points of the axes; one without a number parts it. */
@@ -205,17 +207,17 @@ class Cursors {
   }
 
   draw(plot) {
-    const { ink, right, bottom, colour } = plot, warn = colour("warn");
+    const { ink, right, top, bottom, colour } = plot, warn = colour("warn");
     if (this.band) {
       const [from, to] = this.band.map(plot.at);
       Object.assign(ink, { fillStyle: warn, globalAlpha: 0.15 });
-      ink.fillRect(from, TOP, to - from, bottom - TOP);
+      ink.fillRect(from, top, to - from, bottom - top);
       ink.globalAlpha = 1;
     }
     this.at.map(plot.at).forEach((x, n) => {
       if (x < LEFT - 0.5 || x > right + 0.5) return;
-      stroke(ink, [[x, TOP], [x, bottom]], warn, 1, [3, 3]);
-      write(ink, "AB"[n], x > right - 14 ? x - 7 : x + 7, TOP + 5, warn, "center");
+      stroke(ink, [[x, top], [x, bottom]], warn, 1, [3, 3]);
+      write(ink, "AB"[n], x > right - 14 ? x - 7 : x + 7, top + 5, warn, "center");
     });
     ink.setLineDash([]);
   }

@@ -115,7 +115,8 @@ class Signals {
     for (const { plot, lines, factor } of this.plots) {
       const [low, high] = extent(this.runs.flatMap((run) => lines.map(([, , k]) => run.shape(k, factor, this.view, 1)))
         .flatMap((one) => [one.low[0], one.high[0]]));
-      plot.begin(this.view, high > low ? [low, high] : high === low ? [low - 0.5, low + 0.5] : [-1, 1], { legend: lines, below: ` over ${x}` });
+      const legend = lines.map(([name, of]) => [name, of]);
+      plot.begin(this.view, high > low ? [low, high] : high === low ? [low - 0.5, low + 0.5] : [-1, 1], { legend, below: ` over ${x}` });
       for (const [, of, k] of lines) {
         for (const run of this.runs) if (run !== own) run.draw(plot, k, factor, "steel", 0.6);
         own.draw(plot, k, factor, of);
@@ -192,7 +193,7 @@ class Cloud {
     this.shown = Array.from({ length: this.count }, (_, k) => k).filter((k) => x.values[k] !== null && y.values[k] !== null
       && [...this.only].every(([values, one]) => one === undefined || values[k] === one));
     const cells = [x, y].map(({ name, values }) => (this.grid.includes(name) ? new Set(values).size + 1 : Infinity));
-    const [w, h] = [plot.wide, plot.bottom - TOP].map((long, k) => Math.max(9, Math.min(60, 0.9 * long / cells[k])));
+    const [w, h] = [plot.wide, plot.bottom - plot.top].map((long, k) => Math.max(9, Math.min(60, 0.9 * long / cells[k])));
     for (const k of this.shown) {
       const [left, top] = this.places(k), share = (of.values[k] * this.axes[2].factor - deep[0]) / (deep[1] - deep[0]);
       plot.ink.fillStyle = of.values[k] === null ? "#888" : `hsl(${250 - 200 * share} 65% ${42 + 18 * share}%)`;
