@@ -152,6 +152,8 @@ def _signals(units: dict[str, str], runs: list[Run]) -> dict[str, Any]:
     panels: dict[str, list[int]] = {}
     columns = [{"name": x, "unit": unit, "most": 0.0}]
     for k, (name, unit) in enumerate(others, 1):
+        if unit == "1" and all(np.isin(run[k], (0.0, 1.0)).all() for run in runs):
+            unit = "0 or 1"
         panels.setdefault(unit, []).append(k)
         most = max(float(np.nanmax(np.abs(run[k]), initial=0.0)) for run in runs)
         columns.append({"name": name, "unit": unit, "most": most})

@@ -49,6 +49,8 @@ def test_a_run(tab: Any, run: Path) -> None:
     assert tab.inner_text("#about") == MARKUP
     assert tab.locator("img, b").count() == 0
     assert "mean velocity" in tab.inner_text("#words")
+    titles = tab.evaluate("() => signals.plots.map(({ plot }) => plot.name)")
+    assert titles[0] == "V" and "sticking, 0 or 1" in titles
     assert tab.evaluate("() => document.documentElement.scrollWidth") <= 390
 
     # to a stretch, by drag; then a cursor, by key

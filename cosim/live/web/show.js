@@ -84,8 +84,8 @@ class Signals {
     }
     this.cursors = new Cursors([0, 0], () => this.soon(), (band) => this.look(band));
     this.plots = panels.map((own) => {
-      const { factor, unit } = readable({ ...columns[own[0]], most: Math.max(...own.map((k) => columns[k].most)) });
-      const plot = new Plot(place, unit, "arrow keys move cursor A, with shift cursor B");
+      const { factor, unit, words } = readable({ ...columns[own[0]], most: Math.max(...own.map((k) => columns[k].most)) });
+      const plot = new Plot(place, own.length > 1 ? unit || "values" : words, "arrow keys move cursor A, with shift cursor B");
       this.cursors.add(plot);
       return { plot, factor, unit, lines: own.map((k, n) => [columns[k].name, ["a", "b", "d", "c", "ink"][n % 5], k]) };
     });
@@ -115,8 +115,8 @@ class Signals {
     for (const { plot, lines, factor } of this.plots) {
       const [low, high] = extent(this.runs.flatMap((run) => lines.map(([, , k]) => run.shape(k, factor, this.view, 1)))
         .flatMap((one) => [one.low[0], one.high[0]]));
-      const legend = lines.map(([name, of]) => [name, of]);
-      plot.begin(this.view, high > low ? [low, high] : high === low ? [low - 0.5, low + 0.5] : [-1, 1], { legend, below: ` over ${x}` });
+      const legend = lines.length > 1 ? lines.map(([name, of]) => [name, of]) : [];
+      plot.begin(this.view, high > low ? [low, high] : high === low ? [low - 0.5, low + 0.5] : [-1, 1], { legend, below: `, over ${x}` });
       for (const [, of, k] of lines) {
         for (const run of this.runs) if (run !== own) run.draw(plot, k, factor, "steel", 0.6);
         own.draw(plot, k, factor, of);
