@@ -103,6 +103,10 @@ def test_a_sweep_with_its_families(tab: Any, tmp_path: Path) -> None:
     kept = ["--keep", "current,v_surface", "--show", "--out", str(tmp_path)]
     assert main(["sweep", "paper-limited", *over, *settings, *kept]) == 0
     opened(tab, tmp_path / "show.html")
+    free = tab.evaluate("""() => [0, 1, 2, 3].map((k) => cloud.places(k)).flatMap(([x, y]) =>
+        [x - LEFT, cloud.plot.right - x, y - cloud.plot.top, cloud.plot.bottom - y])""")
+    assert min(free) >= 30  # pixels: half of the largest square
+    assert "v_average, mm/s" in tab.inner_text("#cloud .scale")
     code = """([x, y]) => Array.from({ length: 4 }, (_, k) => k).find((k) =>
         cloud.columns.find(({ name }) => name === "frequency").values[k] === x &&
         cloud.columns.find(({ name }) => name === "amplitude").values[k] === y)"""

@@ -133,6 +133,8 @@ class Signals {
   }
 }
 
+const shaded = (share) => `hsl(${250 - 200 * share} 65% ${42 + 18 * share}%)`;
+
 /* Points of a table over two of its columns, coloured by a third; one is chosen. */
 class Cloud {
   constructor(place, { columns, count, keys, ways, family, grid }, chose) {
@@ -146,7 +148,9 @@ class Cloud {
       const { values } = columns.find((column) => column.name === name), all = [...new Set(values)];
       choice(bar, name, ["all", ...all.map(spelt)], (n) => { this.only.set(values, all[n - 1]); this.draw(); });
     }
-    this.axesTold = made(place, "small");
+    const [told, scale] = ["", "scale"].map((kind) => made(place, "small", "", kind));
+    this.scale = [told, ...["span", "i", "span"].map((tag) => made(scale, tag))];
+    this.scale[2].style.background = `linear-gradient(90deg, ${[0, 0.2, 0.4, 0.6, 0.8, 1].map(shaded)})`;
     this.plot = new Plot(place, "", "arrow keys choose another point");
     this.told = made(place, "dl");
     const { canvas } = this.plot;
@@ -186,17 +190,16 @@ class Cloud {
       const [low, most] = extent(values.filter((v) => v !== null)).map((v) => v * this.axes[k].factor);
       return low < most ? [low, most] : [low - 0.5, low + 0.5];
     });
-    const margin = 0.05 * (wide[1] - wide[0]);
     const [across, up, shade] = this.axes.map(({ words }) => words);
-    this.axesTold.textContent = `${up} over ${across}; colour: ${shade}, ${deep.map(spelt).join(" … ")}`;
-    plot.begin([wide[0] - margin, wide[1] + margin], high, {});
+    [`${up} over ${across}`, `${shade}: ${spelt(deep[0])}`, "", spelt(deep[1])].forEach((words, k) => { this.scale[k].textContent = words; });
+    const cells = [x, y].map(({ name, values }) => (this.grid.includes(name) ? Math.max(2, new Set(values).size) : Infinity));
+    plot.begin(wide, high, { margin: cells.map((n) => Math.max(0.05, 0.5 / (n - 1))) });
     this.shown = Array.from({ length: this.count }, (_, k) => k).filter((k) => x.values[k] !== null && y.values[k] !== null
       && [...this.only].every(([values, one]) => one === undefined || values[k] === one));
-    const cells = [x, y].map(({ name, values }) => (this.grid.includes(name) ? new Set(values).size + 1 : Infinity));
     const [w, h] = [plot.wide, plot.bottom - plot.top].map((long, k) => Math.max(9, Math.min(60, 0.9 * long / cells[k])));
     for (const k of this.shown) {
       const [left, top] = this.places(k), share = (of.values[k] * this.axes[2].factor - deep[0]) / (deep[1] - deep[0]);
-      plot.ink.fillStyle = of.values[k] === null ? "#888" : `hsl(${250 - 200 * share} 65% ${42 + 18 * share}%)`;
+      plot.ink.fillStyle = of.values[k] === null ? "#888" : shaded(share);
       plot.ink.fillRect(left - w / 2, top - h / 2, w, h);
       if (k !== this.chosen) continue;
       Object.assign(plot.ink, { strokeStyle: plot.colour("warn"), lineWidth: 2.5 });
