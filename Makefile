@@ -112,7 +112,7 @@ bench: setup
 	@cp results/bench/bench.json results/bench.json
 	@$(PY) -m benchmarks.stale results/bench.json
 
-# In an environment of its own, without what is compiled: it takes the tables from the sources.
+# In an environment of its own. The tables come from modules that load what is compiled.
 DOCS := .venv-docs
 DOCS_PY := PYTHONPATH=. $(DOCS)/bin/python
 
@@ -122,7 +122,7 @@ $(DOCS)/.installed: requirements/docs.lock $(VENV)/.created
 	@$(DOCS)/bin/python -m pip --disable-pip-version-check --no-input -q $(LOCKED) $<
 	@touch $@
 
-docs: $(DOCS)/.installed
+docs: $(COMPILED) $(DOCS)/.installed
 	@for drawing in machine circuit coupling; do $(DOCS_PY) docs/drawings/$$drawing.py || exit; done
 	@$(DOCS_PY) docs/programs/reference.py
 	@NO_MKDOCS_2_WARNING=1 $(DOCS_PY) -m mkdocs build --strict
