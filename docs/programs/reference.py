@@ -7,6 +7,7 @@ import argparse
 import json
 import re
 from collections.abc import Iterable, Sequence
+from html import escape
 from pathlib import Path
 
 from pydantic.fields import FieldInfo
@@ -46,7 +47,9 @@ def sentence(text: str) -> str:
         text = text.replace(plain, better)
     text = re.sub(r"(?<=\d) us\b", " µs", " ".join(text.split()))
     first = text.partition(" ")[0]
-    return text if "_" in first else text[:1].upper() + text[1:]  # names stay as they are
+    if "_" in first or first.startswith("ngspice"):  # names stay as they are
+        return text
+    return "FMU" + text[3:] if first.startswith("fmu") else text[:1].upper() + text[1:]
 
 
 def number(value: float) -> str:
@@ -54,7 +57,9 @@ def number(value: float) -> str:
 
 
 def code(value: object) -> str:
-    return f"`{value}`"
+    """The value as code; in a table a bar must not look like the end of a cell."""
+    text = str(value)
+    return f"<code>{escape(text).replace('|', '&#124;')}</code>" if "|" in text else f"`{text}`"
 
 
 # --- the scene ------------------------------------------------------------------------------------
@@ -110,7 +115,7 @@ def _entry(name: str, about: FieldInfo) -> list[str]:
         usual = "none" if about.default_factory else "needed"
     else:
         usual = "none" if about.default is None else code(json.dumps(about.default))
-    return [code(name), usual, sentence(words), sentence(about.description or "") + "."]
+    return [code(name), sentence(about.description or "") + ".", usual, sentence(words)]
 
 
 def scene() -> str:
@@ -127,11 +132,11 @@ def scene() -> str:
     for name, model in TABLES.items():
         parts += [f"## [{name}]", sentence((model.__doc__ or "").partition("\n")[0])]
         rows = [
-            [code(key.name), default(key), pretty(key.unit), allowed(key), meaning(key)]
+            [code(key.name), meaning(key), default(key), pretty(key.unit), allowed(key)]
             for key in keys()
             if key.table == name
         ]
-        parts.append(table(["key", "default", "unit", "range", "meaning"], rows))
+        parts.append(table(["key", "meaning", "default", "unit", "range"], rows))
         for full, (registry, _) in REGISTRIES.items():
             if full.startswith(f"{name}."):
                 parts.append(f"The values of `{full}`:")
@@ -141,7 +146,7 @@ def scene() -> str:
         words = sentence((model.__doc__ or "").removesuffix("."))
         parts += [f"## [[{name}]]", f"{words}; one table for each. See [ports](../howto/ports.md)."]
         rows = [_entry(about.alias or key, about) for key, about in model.model_fields.items()]
-        parts.append(table(["key", "default", "value", "meaning"], rows))
+        parts.append(table(["key", "meaning", "default", "value"], rows))
     return "\n\n".join(parts)
 
 
@@ -214,7 +219,7 @@ def option(action: argparse.Action) -> list[str]:
         name += f" {words}"
     required = " Needed." if action.required and action.option_strings else ""
     text = sentence((action.help or "") % vars(action)).removesuffix(".") + "."
-    return [code(name.replace("|", "\\|")), text + required]
+    return [code(name), text + required]
 
 
 def command(parser: argparse.ArgumentParser, text: str, level: int) -> list[str]:
@@ -233,7 +238,10 @@ def command(parser: argparse.ArgumentParser, text: str, level: int) -> list[str]
 
 def command_line() -> str:
     parser = _parser(None)
-    about = "`python -m cosim` is the same command. `--help` after any of these prints its options."
+    about = (
+        "`python -m cosim` is the same command. `--help` after any of these prints its options. "
+        "[The glossary](../glossary.md) has the words."
+    )
     codes = table(
         ["exit code", "meaning"],
         [
