@@ -119,7 +119,7 @@ def body(
     axes: Axes, left: float, width: float, color: str, name: str, up: list[str], down: list[str]
 ) -> None:
     """A free body with the forces on it, each drawn in the direction in which it is positive."""
-    low, high = 5.6, 7.0
+    low, high = 4.8, 6.2
     block(axes, left, low, width, high - low, color)
     axes.text(left + width / 2, (low + high) / 2, name, ha="center", va="center")
     for words, start, end in ((up, high, high + 1.1), (down, low, low - 1.1)):
@@ -152,18 +152,11 @@ def bodies(axes: Axes) -> None:
     body(axes, 21.2, 2.4, PART, "part", ["$F_f$", "$F_{plate}$"], ["$m_p g$"])
     axes.text(
         18.1,
-        9.35,
+        8.55,
         "Forces on each body, drawn in their positive direction",
         ha="center",
         fontsize=SMALL,
     )
-    rows = (
-        "$m_r \\ddot z_r = Bl\\,i + F_m + F_w - m_r g$",
-        "$m_s \\ddot z_s = -(Bl\\,i + F_m + F_w) - k_f z_s - c_f \\dot z_s - F_f - m_s g$",
-        "$m_p \\ddot z_p = F_f + F_{plate} - m_p g$",
-    )
-    for n, row in enumerate(rows):
-        axes.text(12.6, 3.0 - 0.75 * n, row, fontsize=11.5, va="center")
 
 
 def main() -> None:
