@@ -11,7 +11,12 @@ STUDIES = (
         (
             Option("run", "a folder that cosim run wrote or a scene", "RUN|SCENE"),
             Option("trial", "a tracked trial, or other measurements", "TRIAL.csv", Path),
-            Option("--columns", "which column of TRIAL.csv is what", "surface=NAME[:unit],…"),
+            Option(
+                "--columns",
+                "which column of TRIAL.csv is what: time, surface, part, v_surface, v_part, "
+                "current, voltage or command",
+                "surface=NAME[:unit],…",
+            ),
             OVERRIDES,
         ),
         command="compare",
