@@ -117,21 +117,21 @@ typedef struct {
     Wide friction, plate; /* impulses of surface and plate on the part, N s */
     Wide wall, wall_damping; /* force of the walls' springs, down, N; their dampers, N s/m */
     Mask drops;              /* the line of the command has ended */
-    Mask turns, hits, hard;  /* the part may turn; the ram begins to press on a wall; one that is hard */
+    Mask turns, hits, hard;  /* the part may turn; the ram begins to press on a wall; that is stiff */
     Contact contact;
 } Effect;
 
 /* A step ends at `edge`, or where the command jumps, if that lies between `low` and `high`; s. */
 typedef struct {
     double low, edge, high;
-    int lifted;      /* as choose_laws() has it */
-    int moving;      /* whether the plate is, or stands on the ground */
-    int measured;    /* whether the current is; then no effect has limits */
-    double current;  /* A, at `edge`, where it is measured */
+    int lifted;     /* as choose_laws() has it */
+    int moving;     /* whether the plate moves, or stands on the ground */
+    int measured;   /* whether the current is given; then no effect has limits */
+    double current; /* A, at `edge`, where it is given */
 } Step;
 
-/* One step of all lanes from `m` to `then`; `*made` of it is made, or all without one. What of the effect
- * nobody reads costs nothing. */
+/* One step of all lanes from `m` to `then`: the share `*made` of it, or all where that is NULL. What of
+ * the effect nobody reads costs nothing. */
 INLINE void step(const Wide p[N_ALL], const State *m, State *then, const Step *c, const Wide *made,
                  Effect *effect)
 {
