@@ -144,9 +144,11 @@ class Cloud {
     ["x", "y", "colour"].forEach((words, k) => {
       choice(bar, words, numeric.map(({ name }) => name), (n) => { this.ways[k] = numeric[n]; this.draw(); }, ways[k]);
     });
-    for (const name of keys) { // a grid of many keys: one plane of it
+    const { values: worth } = this.ways[2], best = worth.indexOf(extent(worth.filter((v) => v !== null))[1]);
+    for (const name of keys) { // a grid of many keys: one plane of it, at first the best point's
       const { values } = columns.find((column) => column.name === name), all = [...new Set(values)];
-      choice(bar, name, ["all", ...all.map(spelt)], (n) => { this.only.set(values, all[n - 1]); this.draw(); });
+      this.only.set(values, values[best]);
+      choice(bar, name, ["all", ...all.map(spelt)], (n) => { this.only.set(values, all[n - 1]); this.draw(); }, spelt(values[best] ?? NaN));
     }
     const [told, scale] = ["", "scale"].map((kind) => made(place, "small", "", kind));
     this.scale = [told, ...["span", "i", "span"].map((tag) => made(scale, tag))];
@@ -162,8 +164,7 @@ class Cloud {
       const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key], n = this.shown.length;
       if (step && n) this.choose(this.shown[(this.shown.indexOf(this.chosen) + step + n) % n]);
     });
-    const { values } = this.ways[2];
-    this.choose(values.indexOf(extent(values.filter((v) => v !== null))[1]));
+    this.choose(best);
   }
 
   choose(k = 0) {
@@ -197,7 +198,7 @@ class Cloud {
     this.shown = Array.from({ length: this.count }, (_, k) => k).filter((k) => x.values[k] !== null && y.values[k] !== null
       && [...this.only].every(([values, one]) => one === undefined || values[k] === one));
     const [w, h] = [plot.wide, plot.bottom - plot.top].map((long, k) => Math.max(9, Math.min(60, 0.9 * long / cells[k])));
-    for (const k of this.shown) {
+    for (const k of [...this.shown, ...this.shown.filter((k) => k === this.chosen)]) {
       const [left, top] = this.places(k), share = (of.values[k] * this.axes[2].factor - deep[0]) / (deep[1] - deep[0]);
       plot.ink.fillStyle = of.values[k] === null ? "#888" : shaded(share);
       plot.ink.fillRect(left - w / 2, top - h / 2, w, h);
