@@ -18,7 +18,7 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
         ("part's mean velocity", _scaled(summary["v_average"], 1e3, "mm/s", "+.3f")),
         ("  off by its own steps", _own_error(summary)),
         ("  averaged over", _periods(scene)),
-        ("motion", _motion(summary)),
+        ("motion", motion_in_words(summary)),
         ("transport per cycle", _scaled(summary["transport_per_cycle"], 1e6, "µm", "+.1f")),
         ("sticking", _scaled(summary["stick_fraction"], 100, "% of the time", ".1f")),
         ("surface, peak-to-peak", _scaled(summary["z_surface_pp"], 1e3, "mm", ".3f")),
@@ -125,8 +125,8 @@ def _own_error(summary: dict[str, Any]) -> str:
     return "" if error is None else f"not more than about {2e3 * error:.1g} mm/s"
 
 
-def _motion(summary: dict[str, Any]) -> str:
-    """The kind of motion, and what it means for the mean velocity."""
+def motion_in_words(summary: Mapping[str, Any]) -> str:
+    """The kind of motion that a summary tells, and what it means for the mean velocity."""
     kind = summary.get("motion")
     if kind is None:
         return ""
@@ -143,7 +143,7 @@ def _motion(summary: dict[str, Any]) -> str:
     return f"the start decides: {answers} mm/s"
 
 
-def _repeating(summary: dict[str, Any]) -> str:
+def _repeating(summary: Mapping[str, Any]) -> str:
     count, settled = summary["motion_periods"], summary["motion_settled"]
     each = "every period" if count == 1 else f"every {count} periods"
     return f"repeats {each}, to 0.1 % from {settled:.2g} s on"

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,10 @@ from cosim.files.picture import Picture
 from cosim.scene import Scene, to_toml
 from cosim.scene.tables import KNOBS
 from cosim.search.turns import TURN
+from cosim.simulation.checks import motion
 from cosim.studies.tables import write_csv
 from cosim.waveforms.quantities import bench_unit, label, with_unit
+from cosim.waveforms.report import motion_in_words
 
 COLORS = ("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#8d99ae", "#6a4c93")
 MOST_KEYS = 4
@@ -90,6 +93,12 @@ class Tuning:
         """That of the best run."""
         assert self.best.value is not None
         return self.best.value
+
+    @cached_property
+    def motion(self) -> dict[str, Any]:
+        """The kind of motion at the best settings, by the keys of a summary. Where it is chaotic,
+        the value is one of many."""
+        return motion(self.scene, lambda time: None)
 
     @property
     def robustness(self) -> str:
@@ -191,6 +200,7 @@ class Tuning:
             "turns": [-TURN, TURN],
             "neighbours": self.neighbours,
             "robustness": self.robustness,
+            **self.motion,
             "summary": {name: x if isfinite(x) else None for name, x in summary.items()},
         }
         write_runs(out / "tune.csv", self.runs, self.quantity)
@@ -222,6 +232,8 @@ class Tuning:
             lines.append(line)
         if words := self.robustness:
             lines.append(f"  {words}")
+        if words := motion_in_words(self.motion):
+            lines.append(f"  motion: {words}")
         if self.robust:
             lines.append(f"  values are medians over the keys' turns by {TURN:.0%}")
         for one in (self, *self.others) if self.others else ():
