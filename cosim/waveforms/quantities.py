@@ -44,5 +44,5 @@ def label(name: str, unit: str) -> str:
 
 def bench_unit(quantity: str) -> tuple[str, float]:
     """The unit in which a number of the summary is shown, and how many of it are one in SI."""
-    si = SUMMARY[quantity].unit
+    si = meaning(quantity)["units"]
     return ("mm/s", 1e3) if si == "m/s" else (si, 1.0)

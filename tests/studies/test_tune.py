@@ -261,3 +261,16 @@ def test_waveforms_and_heats_that_are_none(
     assert main(["tune", "held", "--maximise", "v_average", *words, "--out", str(out)]) == 2
     said = capsys.readouterr().err
     assert why in said and said.count("\n") == 1 and not out.exists()
+
+
+def test_a_scene_with_ports_is_tuned() -> None:
+    """By the numbers of its own waveforms, whose units the summary does not have."""
+    found = tune(
+        "dc-motor",
+        {"run.duration": 2e-3},
+        over={"circuit.param.supply": (10.0, 20.0)},
+        maximise="gear.speed.greatest",
+        budget=22,
+    )
+    assert found.best.values["circuit.param.supply"] > 19.0
+    assert "gear.speed.greatest = " in repr(found)
