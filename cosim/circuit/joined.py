@@ -21,7 +21,7 @@ from cosim.errors import BadInput, plain
 from cosim.scene.messages import ended, suggestion
 
 # Ground is no vector of ngspice's, but may stand in an expression.
-_VECTOR = re.compile(r"([vi])\s*\(\s*(?!(?:0|gnd)\s*\))([^\s(),]+)\s*\)", re.IGNORECASE)
+_VECTOR = re.compile(r"(v(?!\s*\(\s*(?:0|gnd)\s*\))|i)\s*\(\s*([^\s(),]+)\s*\)", re.IGNORECASE)
 _FACTOR = re.compile(r"[vi]\s*\([^()]*\)", re.IGNORECASE)
 _UNITS = {"v": "V", "i": "A", "iv": "W", "vv": "V2", "ii": "A2"}
 _CURRENTS = "vleh"  # elements whose current ngspice computes as an unknown

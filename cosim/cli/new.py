@@ -25,7 +25,7 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
         raise BadInput(f"{name}: must end in .toml, its name have letters, digits, - and _ alone.")
     if kind == "fmu" and base is not None:
         raise BadInput(f"--base {plain(base)}: a scene of kind fmu starts from none.")
-    base = base or "paper-limited"
+    base = "paper-limited" if base is None else base
     if base not in (known := [scene for scene, *_ in list_scenes()]):
         raise BadInput(f"--base {plain(base)}: must be a built-in scene{suggestion(base, known)}.")
     texts = {}
@@ -33,6 +33,8 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
         texts[file] = (circuits() / "new" / "fmu.toml").read_text(encoding="utf-8")
     else:
         scene = load(base)
+        if kind == "circuit" and scene.has_ports:
+            raise BadInput(f"--base {base}: has FMUs of its own; take a scene without.")
         if kind == "circuit":
             scene = scene.having(circuit=CAREFUL)
         texts[file] = to_toml(scene, base)

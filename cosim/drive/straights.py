@@ -60,7 +60,8 @@ def _lines(
 ) -> Iterator[tuple[Array, Array, Array]]:
     """The straights of a command that knows them at once, from the first ones, ``found``, on."""
     begin = 0.0
-    while begin < duration and found is not None:
+    while begin < duration:
+        assert found is not None
         corners, start, end = found
         count = int(corners.searchsorted(duration))
         if count < len(corners):

@@ -148,7 +148,9 @@ INLINE void step(const Wide p[N_ALL], const State *m, State *then, const Step *c
     const Wide v = m->v, r = m->r, u = r - v, i = m->i;
     Wide now, mean;
     if (c->measured) {
-        now = made ? i + *made * (c->current - i) : zero + c->current;
+        now = zero + c->current;
+        if (made)
+            now = choose(*made < 1.0, i + *made * (now - i), now);
         mean = 0.5 * (i + now);
     } else {
         const Mask on = t + half > start;

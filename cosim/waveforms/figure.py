@@ -70,7 +70,8 @@ MOST_PANELS = 12
 
 def draw_own(scene: Scene, waves: dict[str, Array], units: Mapping[str, str]) -> Picture:
     """The figure of a run of a scene with its own FMUs: a panel for each waveform, up to
-    MOST_PANELS, the whole run. What is kept or joined comes first, what stays the same last."""
+    MOST_PANELS, the whole run. Of more those that are kept or joined are drawn, and those that stay
+    the same are not."""
     chosen = {*(scene.circuit.save or ())}
     for port in scene.port:
         chosen |= {str(port.probe), str(port.source), str(port.origin), str(port.to)}

@@ -5,6 +5,7 @@ from typing import Any
 
 from cosim.scene import Scene
 from cosim.trials.measured import measured
+from cosim.waveforms.quantities import label
 
 
 def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str:
@@ -48,10 +49,10 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
 
 
 def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str:
-    """The numbers of a scene with its own FMUs, a line for each waveform that is not 0 for good."""
+    """The numbers of a scene with its own FMUs, a line for each waveform that is not 0."""
     every = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
     names = [name for name in every if summary[f"{name}.rms"] != 0.0]
-    shown = [name + (f" [{units[name]}]" if units[name] not in ("", "1") else "") for name in names]
+    shown = [label(name, units[name] or "1") for name in names]
     width = max(20, *map(len, shown))
     whats = ["mean", "rms", "least", "greatest"]
     told = any(name.endswith(".mean_error") for name in summary)
@@ -61,7 +62,8 @@ def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str
         values = "".join(f"{summary[f'{name}.{what}']:>13.6g}" for what in whats)
         lines.append(f"  {words:<{width}}{values}")
     if len(names) < len(every):
-        lines.append(f"  {len(every) - len(names)} others are 0 all the time")
+        others = len(every) - len(names)
+        lines.append(f"  {others} other{'s are' if others > 1 else ' is'} 0 after settling")
     steps, coupling = f"{summary['circuit_steps']} of ngspice", []
     if summary["fmu_steps"]:
         steps += f", {summary['fmu_steps']} of FMUs"

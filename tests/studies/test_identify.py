@@ -149,12 +149,14 @@ def test_steps_agree_with_the_exact_rung(label: str) -> None:
     assert sum(apart[FINE_STEP / 2.0]) < 0.6 * sum(apart[FINE_STEP])
 
 
-def test_each_lane_has_its_own_machine() -> None:
+@pytest.mark.parametrize("measured", [False, True])
+def test_each_lane_has_its_own_machine(measured: bool) -> None:
     """Whatever stands in the other lanes, and in whichever lane."""
     rng = np.random.default_rng(1)
     space, time = read_space(), np.arange(60) / FRAME_RATE
     zeros = np.zeros(len(stepper.OWN))
-    target = chain.Target(time, {}, {}, frozenset(), zeros, zeros, zeros, SEARCH_STEP)
+    current = rng.standard_normal(len(time)) if measured else None
+    target = chain.Target(time, {}, {}, frozenset(), zeros, zeros, zeros, SEARCH_STEP, current)
     rigs = space.rigs(rng.random((11, len(space.free))))
     own = np.array(
         [OWN[label] for label in ["1", "4", "5", "4", "1", "5", "5", "4", "1", "4", "5"]]

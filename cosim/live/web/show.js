@@ -196,7 +196,7 @@ class Cloud {
     const cells = [x, y].map(({ name, values }) => (this.grid.includes(name) ? Math.max(2, new Set(values).size) : Infinity));
     plot.begin(wide, high, { margin: cells.map((n) => Math.max(0.05, 0.5 / (n - 1))) });
     this.shown = Array.from({ length: this.count }, (_, k) => k).filter((k) => x.values[k] !== null && y.values[k] !== null
-      && [...this.only].every(([values, one]) => one === undefined || values[k] === one));
+      && [...this.only].every(([values, one]) => one === undefined || values === x.values || values === y.values || values[k] === one));
     const [w, h] = [plot.wide, plot.bottom - plot.top].map((long, k) => Math.max(9, Math.min(60, 0.9 * long / cells[k])));
     for (const k of [...this.shown, ...this.shown.filter((k) => k === this.chosen)]) {
       const [left, top] = this.places(k), share = (of.values[k] * this.axes[2].factor - deep[0]) / (deep[1] - deep[0]);

@@ -1,9 +1,8 @@
 """What a search leaves: every run, the best settings, and a sentence on how safe they are."""
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,6 @@ from cosim.files.picture import Picture
 from cosim.scene import Scene, to_toml
 from cosim.scene.tables import KNOBS
 from cosim.search.turns import TURN
-from cosim.simulation.checks import motion
 from cosim.studies.tables import write_csv
 from cosim.waveforms.quantities import bench_unit, label, with_unit
 from cosim.waveforms.report import motion_in_words
@@ -65,6 +63,9 @@ class Tuning:
     """Whether values are medians over the turns of the keys."""
     heat: float = inf
     """W: the most in a coil."""
+    motion: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """The kind of motion at the best settings, by the keys of a summary. Where it is chaotic, the
+    value is one of many."""
     others: tuple["Tuning", ...] = ()
     """What was found for other waveforms."""
 
@@ -93,12 +94,6 @@ class Tuning:
         """That of the best run."""
         assert self.best.value is not None
         return self.best.value
-
-    @cached_property
-    def motion(self) -> dict[str, Any]:
-        """The kind of motion at the best settings, by the keys of a summary. Where it is chaotic,
-        the value is one of many."""
-        return motion(self.scene, lambda time: None)
 
     @property
     def robustness(self) -> str:

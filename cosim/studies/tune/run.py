@@ -22,6 +22,7 @@ from cosim.search.design import Design
 from cosim.search.known import Known
 from cosim.search.protocol import Feasible
 from cosim.search.turns import TURN, faces, turned
+from cosim.simulation.checks import motion
 from cosim.simulation.fidelity import Fidelity
 from cosim.studies.tune.families import family, most_heat
 from cosim.studies.tune.found import Run, Tuning, write_runs
@@ -152,7 +153,8 @@ def tune(
                 )
             )
         tunings.sort(key=lambda one: one.best.value or 0.0, reverse=largest)
-        found = replace(tunings[0], others=tuple(tunings[1:]))
+        kind = motion(tunings[0].scene, lambda time: None)
+        found = replace(tunings[0], motion=kind, others=tuple(tunings[1:]))
         if out is not None:
             found.save(out)
             for bench in benches:
