@@ -130,7 +130,9 @@ def rigs(found: Solved) -> Picture:
             low, high = axis.get_xlim()
             many = high > 5.0 * low
             axis.xaxis.set_major_locator(
-                LogLocator(subs=(1.0, 2.0, 5.0)) if many else MaxNLocator(4)
+                LogLocator(subs=(1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,))
+                if many
+                else MaxNLocator(4)
             )
             axis.xaxis.set_major_formatter("{x:.3g}")
             axis.xaxis.set_minor_formatter(NullFormatter())
