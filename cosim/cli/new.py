@@ -33,9 +33,9 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
         texts[file] = (circuits() / "new" / "fmu.toml").read_text(encoding="utf-8")
     else:
         scene = load(base)
-        if kind == "circuit" and scene.has_ports:
-            raise BadInput(f"--base {base}: has FMUs of its own; take a scene without.")
         if kind == "circuit":
+            if scene.has_ports:
+                raise BadInput(f"--base {base}: has FMUs of its own; take a scene without.")
             scene = scene.having(circuit=CAREFUL)
         texts[file] = to_toml(scene, base)
     if kind == "circuit":

@@ -72,12 +72,13 @@ def draw_own(scene: Scene, waves: dict[str, Array], units: Mapping[str, str]) ->
     """The figure of a run of a scene with its own FMUs: a panel for each waveform, up to
     MOST_PANELS, the whole run. Of more those that are kept or joined are drawn, and those that stay
     the same are not."""
-    chosen = {*(scene.circuit.save or ())}
-    for port in scene.port:
-        chosen |= {str(port.probe), str(port.source), str(port.origin), str(port.to)}
-    every = [name for name in waves if name != "time"]
-    names = sorted(every, key=lambda name: (np.ptp(waves[name]) == 0.0, name not in chosen))
-    names = [name for name in every if name in names[:MOST_PANELS]]
+    names = every = [name for name in waves if name != "time"]
+    if len(every) > MOST_PANELS:
+        chosen = {*(scene.circuit.save or ())}
+        for port in scene.port:
+            chosen |= {str(port.probe), str(port.source), str(port.origin), str(port.to)}
+        ranked = sorted(every, key=lambda name: (np.ptp(waves[name]) == 0.0, name not in chosen))
+        names = [name for name in every if name in ranked[:MOST_PANELS]]
     figure, axes = grid(len(names), 1 if len(names) < 4 else 2, 13.0, 1.9, 1.2)
     for axis, name in zip(axes, names, strict=True):
         axis.plot(*_outline(waves["time"], waves[name]), color=SURFACE, lw=0.8)

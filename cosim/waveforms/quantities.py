@@ -38,8 +38,8 @@ def with_unit(value: float, unit: str, digits: int = 6) -> str:
 
 
 def label(name: str, unit: str) -> str:
-    """``name [unit]`` for an axis."""
-    return name if unit in ("1", "?") else f"{name} [{unit}]"
+    """``name [unit]``, for an axis or a table."""
+    return name if unit in ("", "1", "?") else f"{name} [{unit}]"
 
 
 def bench_unit(quantity: str) -> tuple[str, float]:

@@ -52,7 +52,7 @@ def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str
     """The numbers of a scene with its own FMUs, a line for each waveform that is not 0."""
     every = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
     names = [name for name in every if summary[f"{name}.rms"] != 0.0]
-    shown = [label(name, units[name] or "1") for name in names]
+    shown = [label(name, units[name]) for name in names]
     width = max(20, *map(len, shown))
     whats = ["mean", "rms", "least", "greatest"]
     told = any(name.endswith(".mean_error") for name in summary)

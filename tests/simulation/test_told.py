@@ -47,10 +47,12 @@ def true_average(scene: Scene) -> tuple[float, float]:
         fine = [{"reltol": 3e-7, "max_step": 2.5e-5}, {"reltol": 1e-6, "max_step": 4e-5}]
         two = [simulate(scene.having(circuit=steps)).summary["v_average"] for steps in fine]
     else:
-        of = {"contact": scene.mechanics.contact, "circuit": model}
+        contact = scene.mechanics.contact
         times = reference_parameters(scene), run.duration, run.settle
         two = [
-            monolithic(*times, **of, tol=tolerance, method=method).v_average
+            monolithic(
+                *times, contact=contact, circuit=model, tol=tolerance, method=method
+            ).v_average
             for tolerance, method in ((1e-10, "Adams"), (1e-9, "BDF"))
         ]
     return two[0], abs(two[1] - two[0])

@@ -204,8 +204,8 @@ def test_a_rig_is_recovered_from_a_start_nearby(search: Search) -> None:
     rng = np.random.default_rng(3)
     beside = np.clip(point() + 0.03 * rng.choice([-1.0, 1.0], len(point())), 0.0, 1.0)
     start = search.screen(beside[None], rng, 96, 6, 4)[0]
-    found = search.nested(start, rng, 40, 0.03, quiet)
-    assert found.total < 0.7 * start.total
+    found = search.nested(start, rng, 60, 0.03, quiet)
+    assert found.total < 0.5 * start.total
     assert finish(search, found, 5).total <= found.total
 
 

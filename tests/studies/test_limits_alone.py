@@ -60,6 +60,7 @@ def test_rows_drawn_blind_are_what_another_solver_finds() -> None:
             tol=1e-8,
             times=exposures(run.duration, run.settle, run.shutter).tolist(),
         )
-        seen = savgol_filter(found.samples["z_surface"], 5, 2, deriv=2, delta=1.0 / FRAME_RATE)
+        heights = found.samples["z_surface"]
+        seen = np.array(savgol_filter(heights, 5, 2, deriv=2, delta=1.0 / FRAME_RATE))
         assert 1e-3 * float(row["v_average [mm/s]"]) == pytest.approx(found.v_average, rel=1e-3)
         assert -float(row["a_camera [m/s²]"]) == pytest.approx(seen[2:-2].min(), rel=1e-3)

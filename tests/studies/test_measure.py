@@ -125,6 +125,7 @@ def test_a_measurement_weighs_as_in_a_likelihood(tmp_path: Path) -> None:
     off = space.residuals(points)
     assert np.abs(off[:, :2]) == pytest.approx(np.array([[0.0, 2.0], [0.0, 0.0]]), abs=1e-6)
     entry = space.entries["coil.force_factor"]
+    assert entry.prior is not None and entry.sigma is not None
     priors = [np.log(value / entry.prior) / entry.sigma for value in (1.3, 1.5)]
     assert off[:, 2] == pytest.approx(priors)
     costs = np.full((2, 9), 0.1)

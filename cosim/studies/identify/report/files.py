@@ -12,6 +12,7 @@ from cosim.studies.identify.report.scenes import rounded, scene_file, trial_sett
 from cosim.studies.identify.report.solved import Solved
 from cosim.studies.report import Report
 from cosim.studies.tables import Row
+from cosim.waveforms.quantities import label
 
 COLUMNS = {
     "nrmse_v_surface": "velocity",
@@ -219,7 +220,7 @@ def _with_unit(name: str) -> str:
     (unit,) = (key.unit for key in keys() if key.full == name)
     for plain, raised in (("1.5", "^1.5"), ("2", "²"), ("3", "³")):
         unit = unit.replace(plain, raised)
-    return name if unit in ("", "1") else f"{name} [{unit}]"
+    return label(name, unit)
 
 
 def _told(row: Row) -> Row:

@@ -48,7 +48,7 @@ ENDS_AT = 1e-5
 @dataclass(frozen=True, eq=False)
 class Found:
     """A rig, a ``point`` of its ``space``, and the trials on it: their parameters ``own`` (trials ×
-    OWN), their ``costs`` and ``total``, which is the mean of these but for what is known beside."""
+    OWN), their ``costs``, and ``total``: their mean, with what is known beside the trials."""
 
     space: Space
     point: Array
