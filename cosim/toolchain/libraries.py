@@ -74,11 +74,7 @@ def _interface(name: str) -> dict[str, Any]:
 
 def ngspice_library() -> str:
     """The path or name of libngspice on this machine. Raises BadInput where it is missing."""
-    # Debian's runtime package has only the versioned name, which the loader's own search finds.
-    name = os.environ.get("NGSPICE_LIBRARY_PATH") or _found("ngspice")
-    if name is None and sys.platform == "darwin":
-        paths = (f"{folder}/libngspice.dylib" for folder in ("/opt/homebrew/lib", "/usr/local/lib"))
-        name = next(filter(os.path.exists, paths), None)
+    name = os.environ.get("NGSPICE_LIBRARY_PATH") or _found_library(sys.prefix)
     if name is None:
         raise BadInput(
             "libngspice was not found; install it (Debian and Ubuntu: libngspice0, macOS: brew "
@@ -87,8 +83,15 @@ def ngspice_library() -> str:
     return os.path.abspath(name) if os.sep in name else name  # a worker has another folder
 
 
-_found = cache(find_library)
-"""It starts programs, which takes some milliseconds."""
+@cache
+def _found_library(prefix: str) -> str | None:
+    """That of Python's own environment, where it has one as conda's do, of the system, or of
+    Homebrew. The system's loader is asked by programs, which takes some milliseconds."""
+    own = (f"{prefix}/lib/libngspice{SUFFIX}", f"{prefix}/Library/bin/ngspice.dll")
+    brewed = (f"{folder}/libngspice.dylib" for folder in ("/opt/homebrew/lib", "/usr/local/lib"))
+    # Debian's runtime package has only the versioned name, which the loader's own search finds.
+    found = next(filter(os.path.exists, own), None) or find_library("ngspice")
+    return found or next(filter(os.path.exists, brewed), None)
 
 
 def digest(name: str) -> str:

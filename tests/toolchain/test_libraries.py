@@ -127,3 +127,17 @@ def test_a_worker_loads_nothing_from_the_working_folder(tmp_path: Path) -> None:
     )  # fmt: skip
     assert not list(tmp_path.glob("* was run")), done.stderr
     assert "v_average" in done.stdout and done.returncode == 0, done.stderr
+
+
+@needs.ngspice_library
+def test_the_ngspice_of_pythons_own_environment_comes_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Conda's loader does not know the folder of an environment's libraries."""
+    monkeypatch.delenv("NGSPICE_LIBRARY_PATH", raising=False)
+    of_system = libraries.ngspice_library()
+    own = tmp_path / "lib" / f"libngspice{libraries.SUFFIX}"
+    own.parent.mkdir()
+    own.touch()
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    assert libraries.ngspice_library() == str(own) != of_system
