@@ -2,7 +2,8 @@
 
 Each is the identified one with every key moved. The FMU makes its trials with what the search does
 not know: rigid walls, or a normal force that changes with the period as the moving plate's does;
-and what the identified rig leaves of the real trials is added to their heights.
+and what the identified rig leaves of the real trials is added to their heights. The priors are the
+made rig's own, as far off it as they say: what a wrong prior does to a range is not tried.
 """
 
 import json
@@ -47,6 +48,19 @@ def _truth(space: Space, rng: np.random.Generator) -> tuple[dict[str, Any], Arra
     (law,) = [one for one in FOUND["laws"] if one["law"] == LAW]
     point = space.point(np.array([law["rig"][key] for key in space.names]))
     return law, point, np.clip(point + MOVED * rng.standard_normal(len(point)), 0.05, 0.95)
+
+
+def _known(space: Space, truth: Array, rng: np.random.Generator) -> Space:
+    """The space with priors of the made rig: what is known of it beforehand is off by as much as
+    the priors say, as what was known of the real one is."""
+    true = dict(zip(space.names, space.values(truth).tolist(), strict=True))
+    entries = dict(space.entries)
+    for key, entry in entries.items():
+        if entry.prior is not None and entry.sigma is not None:
+            assert entry.log
+            off = np.exp(entry.sigma * rng.standard_normal())
+            entries[key] = replace(entry, prior=true[key] * off)
+    return replace(space, entries=entries)
 
 
 def _made(real: Measured, own: Array, rigs: tuple[Array, Any], kind: str, folder: Path) -> None:
@@ -96,6 +110,7 @@ def told(
     for label in rng.choice([*owns], count, replace=False).tolist():
         _made(real[label], owns[label], rigs, kind, folder)
     made = read_trials(folder, space)
+    space = _known(space, truth, rng)
     coarse = Search(space, [one.target for one in made], 2)
     plan = Plan(
         coarse,
