@@ -23,7 +23,17 @@ from cosim.studies.limits.study import ensemble
 from cosim.studies.measure import measure as study
 from cosim.studies.measure import sample as sampling
 from cosim.studies.measure.measure import report, worths
-from cosim.studies.measure.sample import CANDIDATES, KEPT, SPREAD, TARGETS, Sample, drawn, whole
+from cosim.studies.measure.sample import (
+    CANDIDATES,
+    KEPT,
+    SPREAD,
+    TARGETS,
+    Sample,
+    drawn,
+    gauged_on,
+    held_currents,
+    whole,
+)
 from cosim.studies.measure.worth import FEWEST, chance, interval, likely, worth
 from tests.studies.test_figures import assert_legible
 from tests.studies.test_identify import OWN, folder, point
@@ -60,6 +70,21 @@ def test_click_current_is_that_at_which_the_ram_leaves_the_wall() -> None:
         waves = simulate(changed(SCENE, given | still | run, "test")).waveforms
         q = float((waves.z_ram - waves.z_surface)[-1])
         assert (q >= 1e-3) == at_wall
+
+
+def test_a_current_that_the_source_does_not_hold_is_seen_as_its_most() -> None:
+    """Its output is 2 V from the rails of 18 V, and 4 of 11 Ohm are the sense resistor's."""
+    limits = {f"circuit.swing_loss_{end}": 2.0 for end in ("high", "low")}
+    given = limits | {"coil.resistance": 7.0, "circuit.sense_resistance": 4.0}
+    stiff = {"mechanics.suspension_k3": 1e9, "mechanics.travel": 3e-3}
+    scene = changed(SCENE, given | stiff, "test")
+    assert held_currents(scene) == pytest.approx((-16.0 / 11.0, 16.0 / 11.0))
+    numbers = dict(zip(GAUGES, gauged_on(scene), strict=True))
+    assert numbers["click up"] == [pytest.approx(16.0 / 11.0)]
+    assert numbers["click down"] == [pytest.approx(-16.0 / 11.0)]
+    assert numbers["force factor"] == [scene.coil.force_factor]
+    weak = changed(scene, {"circuit.current_limit": 0.5, "coil.count": 2}, "test")
+    assert held_currents(weak) == pytest.approx((-0.25, 0.25))
 
 
 def test_ring_down() -> None:
@@ -284,4 +309,4 @@ def test_the_recommended_measurement_narrows_more_than_others() -> None:
         print(first.name, recommended, np.median([*widths.values()]), held[first.name])
         good += bool(recommended < np.median([*widths.values()]) and held[first.name])
     assert good >= 5 / 6 * MADE
-    assert first.name in repr(report(known, len(given), 0))
+    assert first.name in repr(report(known, len(given), 0, held_currents(SCENE)))

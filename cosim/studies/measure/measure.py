@@ -21,6 +21,7 @@ from cosim.studies.measure.sample import (
     Candidate,
     Sample,
     drawn,
+    held_currents,
     sample,
     whole,
 )
@@ -73,7 +74,8 @@ def measure(
     open_ = partial(Evaluator, kept=KEPT, workers=workers)
 
     def found(store: Store) -> Report:
-        return report(sample(base, [*given, *more], store, open_, seed, tick), len(given), seed)
+        rigs = sample(base, [*given, *more], store, open_, seed, tick)
+        return report(rigs, len(given), seed, held_currents(base))
 
     return reported(found, out, "measure.sqlite", base.as_dict(), others, seed, quick)
 
@@ -90,8 +92,10 @@ def worths(found: Sample, seed: int) -> tuple[list[Worth], list[tuple[Candidate,
     return now, sorted(each, key=lambda pair: pair[1][0].width)
 
 
-def report(found: Sample, given: int, seed: int) -> Report:
-    """What the sample tells; ``given`` of its rigs are those of the file."""
+def report(found: Sample, given: int, seed: int, currents: tuple[float, float]) -> Report:
+    """What the sample tells; ``given`` of its rigs are those of the file, and the device's source
+    holds ``currents`` (A) at least and at most."""
+    low, high = currents
     now, each = worths(found, seed)
     values = dict(zip(CANDIDATES, found.values, strict=True))
     luck = chance(found.targets, np.random.default_rng(seed))
@@ -128,7 +132,9 @@ def report(found: Sample, given: int, seed: int) -> Report:
         "Rigs count equally: their misfits differ by less than the searches that found them "
         "scatter. The velocity is the median over the knobs' turns by 2 %, at the best setting for "
         "that on each rig. Accuracies are assumed, but for the velocity in a film: that is what a "
-        "rig misses of a trial that it was not fitted to.",
+        "rig misses of a trial that it was not fitted to. A current is measured as far as the "
+        f"device's own source holds it, {low:.2f} to {high:.2f} A; of one beyond nothing but that "
+        "is seen.",
     ]
     return Report(
         "measure", "What to measure next", rows, notes, {"Each measurement": rows},

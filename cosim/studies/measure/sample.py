@@ -129,6 +129,22 @@ def whole(scene: Scene, rigs: Sequence[Settings]) -> list[Settings]:
     return [own, *({**own, **rig} for rig in rigs)]
 
 
+def gauged_on(scene: Scene) -> list[list[float]]:
+    """What each of GAUGES shows on the rig of a scene, SI; of a current beyond what the device's
+    own source holds in its coil nothing but that."""
+    rig, ends = numbers_of(scene), held_currents(scene)
+    shown = ((gauge, gauge.of(rig)) for gauge in GAUGES.values())
+    return [[float(np.clip(x, *ends)) if gauge.unit == "A" else x] for gauge, x in shown]
+
+
+def held_currents(scene: Scene) -> tuple[float, float]:
+    """The least and the most current that the device's source holds in each coil, A."""
+    coil, circuit = scene.coil, scene.circuit
+    around, limit = coil.resistance + coil.count * circuit.sense_resistance, circuit.current_limit
+    low, high = circuit.swing_loss_low - circuit.supply, circuit.supply - circuit.swing_loss_high
+    return max(low / around, -limit / coil.count), min(high / around, limit / coil.count)
+
+
 _Found = tuple[Candidates, float]
 
 
@@ -189,7 +205,7 @@ def sample(
 
         shown = store.once(f"films {number}", lambda base=base: _films(base, open_, own))
         speeds = store.once(f"rig {number}", speeds_of)
-        gauged = [[gauge.of(numbers_of(base))] for gauge in GAUGES.values()]
+        gauged = gauged_on(base)
         told(f"rig {number}")
         if np.isfinite([*speeds, *(one for some in shown for one in some)]).all():
             targets.append(speeds)
