@@ -186,8 +186,8 @@ class Store:
             raise BadInput(f"{name}: cannot be written ({error}).") from error
         except sqlite3.DatabaseError as error:
             raise BadInput(
-                f"{name}: this is no store of cosim's, or it is damaged ({error}); remove it, or "
-                "choose another --out."
+                f"{name}: this is no store of this version of cosim, or it is damaged ({error}); "
+                "remove it, or choose another --out."
             ) from error
 
     def _close(self) -> None:

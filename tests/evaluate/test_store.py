@@ -168,7 +168,7 @@ SPOILT: dict[str, bytes] = {
 def test_another_file_is_told_and_left(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "any.sqlite"
     path.write_bytes(content)
-    with pytest.raises(BadInput, match="no store of cosim's, or it is damaged"):
+    with pytest.raises(BadInput, match="no store of this version of cosim, or it is damaged"):
         Store(path)
     assert path.read_bytes() == content
 

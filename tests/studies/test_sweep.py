@@ -188,7 +188,7 @@ def test_folder_of_another_sweep(tmp_path: Path) -> None:
         sweep(scene, {"friction.mu_s": [0.8]}, out=tmp_path, workers=1)
     assert (tmp_path / "sweep.nc").read_bytes() == before
     (tmp_path / "sweep.sqlite").write_bytes(b'{"journal": "torn')
-    with pytest.raises(BadInput, match="no store of cosim's"):
+    with pytest.raises(BadInput, match="no store of this version"):
         sweep(scene, {"friction.mu_s": [0.7]}, out=tmp_path, workers=1)
 
 
