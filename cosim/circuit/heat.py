@@ -2,8 +2,10 @@
 
     C_w Ṫ_w = P − (T_w − T_b)/R_w        C_b Ṫ_b = (T_w − T_b)/R_w − T_b/R_b
 
-with P the heat of the winding, W, and rises over the air, K. That warm copper has 0.39 %/K more
-resistance is left out. **An estimate, no rating:** the data sheet of the Carlton (C-151L337V5R2)
+with P the heat of the winding, W, and rises over the air, K. The circuit drives a current, so warm
+copper makes more heat, P (1 + α T_w): the equations are solved for P = 1 W, and P is then that of
+the greatest rise. For ever that is exact, in a cycle no less than what comes of it. **An estimate,
+no rating:** the data sheet of the Carlton (C-151L337V5R2)
 gives a range of drives, 3.6 to 10 V peak-to-peak, and 125 mA rms, but no power and no temperature.
 Body: its 20.5 cm² lose 10 to 15 W/(m² K) to still air, and its 15 g hold 0.4 to 0.67 J/(g K).
 Winding, assumed: the 0.9 to 3.6 g of copper that make 7.1 Ohm of wire of 0.14 to 0.2 mm, in a gap
@@ -11,7 +13,7 @@ of a few tenths of a millimetre.
 """
 
 from functools import lru_cache
-from math import expm1, inf, sqrt
+from math import expm1, inf, isfinite, sqrt
 from typing import Any
 
 from cosim.errors import BadInput
@@ -22,6 +24,17 @@ DRIVE_RANGE_HEAT = 5.0**2 / 7.1
 """W: the most that any drive within the Carlton's range makes of its 7.1 Ohm: a square wave of
 10 V peak-to-peak without offset. It is no rating; the authors saw the housing melt (README of their
 repository)."""
+
+RATED_CURRENT = 0.125
+"""A rms: what the data sheet of the Carlton names."""
+
+COPPER = 3.93e-3
+"""1/K: α of copper's resistance at 20 °C (IEC 60028)."""
+
+MELTED = 1065.0
+"""K: the rise at which copper melts."""
+MELTED_COLD = MELTED / (1.0 + COPPER * MELTED)
+"""K: what that would be if warm copper made no more heat."""
 
 LIFT = 10.0
 """s: a lift, of which a summary tells the rise."""
@@ -49,9 +62,9 @@ def modes(
 
 
 def rise(coil: Coil, on_time: float = inf, duty: float = 1.0, side: int = 0) -> float:
-    """The winding's greatest rise over the air, K, for each watt while it is on: for ``on_time``
-    (s) of each of many cycles, their share ``duty``, where 0 is a single one. ``side`` 1 and -1
-    take the upper and lower end of the estimate.
+    """The winding's greatest rise over the air, K, for each watt that it makes while it is on: for
+    ``on_time`` (s) of each of many cycles, their share ``duty``, where 0 is a single one. ``side``
+    1 and -1 take the upper and lower end of the estimate.
     """
     return _rise(tuple(getattr(coil, name) for name in SPREAD), on_time, duty, side)
 
@@ -65,9 +78,17 @@ def _rise(estimate: tuple[float, ...], on_time: float, duty: float, side: int) -
     return sum(r * expm1(-on_time / tau) / expm1(-cycle / tau) for r, tau in modes(**given))
 
 
+def warmed(heat: float, cold: float) -> float:
+    """The rise, K, where a current makes ``heat`` (W) of cold copper, of which each watt warms by
+    ``cold`` (K/W, of :func:`rise`); infinite where it melts before it loses as much."""
+    rise_cold = heat * cold
+    return rise_cold / (1.0 - COPPER * rise_cold) if rise_cold < MELTED_COLD else inf
+
+
 def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float = LIFT) -> float:
-    """The heat of the winding while it is on, W, with which it rises by ``rise_limit`` (K) over the
-    air at most, in cycles of which it is on for ``on_time`` (s), their share ``duty``.
+    """The heat that a current makes of the cold winding while it is on, W, with which it rises by
+    ``rise_limit`` (K) over the air at most, in cycles of which it is on for ``on_time`` (s), their
+    share ``duty``.
 
     Raises BadInput for what is none of these.
     """
@@ -76,12 +97,14 @@ def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float 
             f"A limit of heat needs a rise above 0 K, a duty from 0 to 1 and a time above 0 s, not "
             f"{rise_limit:g} K, {duty:g} and {on_time:g} s."
         )
-    return rise_limit / rise(coil, on_time if duty < 1.0 else inf, duty)
+    cold = rise(coil, on_time if duty < 1.0 else inf, duty)
+    return rise_limit / (cold * (1.0 + COPPER * rise_limit))
 
 
 def heats(scene: Scene, energy_copper: float) -> dict[str, Any]:
     """What a summary tells of the heat: that of one coil (W), and its rises (K), from the lower to
-    the upper end of the estimate. ``energy_copper`` (J) is that of all coils and sense resistors.
+    the upper end of the estimate, None without end. ``energy_copper`` (J) is that of all coils and
+    sense resistors.
     """
     coil = scene.coil
     # A user's netlist has the sense resistor's share to itself.
@@ -89,8 +112,9 @@ def heats(scene: Scene, energy_copper: float) -> dict[str, Any]:
     share = coil.resistance / (coil.resistance + sense)
     coils = coil.count * (1 if scene.drive.phase_deg is None else 2)
     heat = energy_copper / coils / scene.run.duration * share
-    return {
-        "coil_heat": heat,
-        "coil_rise_lift": [heat * rise(coil, LIFT, 0.0, side) for side in (-1, 1)],
-        "coil_rise_continuous": [heat * rise(coil, side=side) for side in (-1, 1)],
+    found = {
+        "coil_rise_lift": [warmed(heat, rise(coil, LIFT, 0.0, side)) for side in (-1, 1)],
+        "coil_rise_continuous": [warmed(heat, rise(coil, side=side)) for side in (-1, 1)],
     }
+    ends = {name: [x if isfinite(x) else None for x in both] for name, both in found.items()}
+    return {"coil_heat": heat, **ends}

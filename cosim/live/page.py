@@ -8,7 +8,7 @@ from math import ceil, isfinite
 from pathlib import Path
 from typing import Any
 
-from cosim.circuit.heat import DRIVE_RANGE_HEAT
+from cosim.circuit.heat import COPPER, DRIVE_RANGE_HEAT
 from cosim.errors import BadInput
 from cosim.live import rigs
 from cosim.scene import load, to_link
@@ -47,7 +47,8 @@ def html(link: str, models: Iterable[str] = (), record: Path | None = None) -> s
     It may ask its own server for runs with the circuits ``models``. ``record``, measurements of a
     machine, can be laid over its curves. Raises BadInput.
     """
-    known = rigs.data() | {"start": link, "heat": DRIVE_RANGE_HEAT, "models": [*models]}
+    known = rigs.data() | {"start": link, "models": [*models]}
+    known |= {"heat": DRIVE_RANGE_HEAT, "copper": COPPER}
     known["record"] = None if record is None else _record(record)
     binary = base64.b64encode((_WEB / "machine.wasm").read_bytes()).decode()
     given = {"DATA": known, "BINARY": binary, "CORE": script(_CORE)}

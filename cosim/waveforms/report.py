@@ -1,6 +1,7 @@
 """A run's numbers for a reader: the table that is printed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import Any
 
 from cosim.scene import Scene
@@ -114,11 +115,15 @@ def _heat(summary: dict[str, Any]) -> str:
     """The heat of a coil, and how warm it would make it."""
     if "coil_heat" not in summary:
         return ""
-    lift, ever = (
-        " to ".join(f"{end:.3g}" for end in summary[f"coil_rise_{name}"])
-        for name in ("lift", "continuous")
-    )
-    return f"{summary['coil_heat']:.3g} W; warmer by {lift} K in 10 s, {ever} K for ever (estimate)"
+    lift, ever = (rises(summary[f"coil_rise_{name}"]) for name in ("lift", "continuous"))
+    return f"{summary['coil_heat']:.3g} W; warmer by {lift} in 10 s, {ever} for ever (estimate)"
+
+
+def rises(ends: Sequence[float | None]) -> str:
+    """How much warmer a coil becomes, from the least to the most, K; None or infinite is without
+    end."""
+    known = [f"{end:.3g} K" for end in ends if end is not None and isfinite(end)]
+    return " to ".join([*known, "more and more"][:2])
 
 
 def _own_error(summary: dict[str, Any]) -> str:

@@ -98,6 +98,18 @@ def test_a_sense_resistor_leaves_the_current() -> None:
         assert less.numbers[name] == pytest.approx(own.numbers[name], rel=1e-5)
 
 
+def test_a_coil_of_more_turns_has_the_same_force_of_the_same_heat() -> None:
+    """Bl²/R and the time constant stay as they are; the output has to give more volts."""
+    scene = load("paper")
+    coil = changed(scene, NAMED["coil of 1.4 times the turns"].machine(scene).settings, "it").coil
+    assert coil.force_factor == pytest.approx(1.4 * scene.coil.force_factor)
+    ratios = [one.force_factor**2 / one.resistance for one in (coil, scene.coil)]
+    assert ratios[0] == pytest.approx(ratios[1])
+    assert coil.inductance / coil.resistance == pytest.approx(
+        scene.coil.inductance / scene.coil.resistance
+    )
+
+
 def test_exchanged_wires_are_the_other_command() -> None:
     """A symmetric circuit cannot tell the coil's wires from the command's sign."""
     made = bench()
@@ -250,7 +262,7 @@ def test_gains_are_paired_on_each_rig() -> None:
     found = made_study(0.02, 0.04, (0.03, 0.033), 0.021)
     (gain,) = gains(found, BY_NAME["v_up"])
     assert gain.every == pytest.approx((1.0, 0.1))
-    assert gain.over_rigs == pytest.approx((55.0, 10.0, 100.0))
+    assert (gain.own, gain.middle) == pytest.approx((1.0, 0.55))
     assert noise(found, BY_NAME["v_up"]) == pytest.approx(0.05) and gain.counts
     assert not gains(made_study(0.02, 0.0206, (0.03, 0.03), 0.021), BY_NAME["v_up"])[0].counts
     assert np.isnan(gain_on(found.rigs[0], AS_IT_IS, BY_NAME["v_down"]))
@@ -287,7 +299,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     said = study_in(tmp_path)
     study_in(tmp_path / "at once")
     assert steps == [(k, len(steps) // 2) for k in range(1, len(steps) // 2 + 1)] * 2
-    assert "by an estimate it warms the winding" in repr(said)
+    assert "By an estimate it warms the winding" in repr(said)
     assert not (tmp_path / STORE).exists()
     text = (tmp_path / "limits.csv").read_text(encoding="utf-8")
     assert text == (tmp_path / "at once" / "limits.csv").read_text(encoding="utf-8")

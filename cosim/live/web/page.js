@@ -171,7 +171,7 @@ function tellAll() {
     tell("v", `${signed(1e3 * found.velocity, 2)} mm/s`, `over ${found.time.toFixed(2)} s; up is positive`);
     tell("stick", `${(100 * found.stick).toFixed(0)} %`, "of the time");
     tell("hits", found.hits.toFixed(1), `amplifier at a limit ${(100 * found.clamped).toFixed(0)} % of the time`);
-    const rise = found.heat * DATA.scenes[state.setting.scene].rise;
+    const cold = found.heat * DATA.scenes[state.setting.scene].rise, rise = cold / Math.max(1e-3, 1 - DATA.copper * cold);
     tell("heat", `${found.heat.toFixed(2)} W`, found.heat > DATA.heat ? `above the ${DATA.heat.toFixed(1)} W of its data sheet's drives`
       : `in the long run some ${rise.toFixed(0)} K warmer`);
     $("told-heat").style.color = found.heat > DATA.heat ? "var(--warn)" : "";

@@ -110,6 +110,15 @@ def _times(factor: float, *keys: str, **more: Any) -> Callable[[Scene], Machine]
     return machine
 
 
+def _rewound(factor: float, scene: Scene) -> Machine:
+    """A coil of so many times the turns in the same room: the same force of the same heat."""
+    found: Settings = {"coil.force_factor": factor * scene.coil.force_factor}
+    for name in ("resistance", "inductance", "eddy_resistance", "eddy_inductance"):
+        if (value := getattr(scene.coil, name)) is not None:
+            found[f"coil.{name}"] = factor**2 * value
+    return Machine(found)
+
+
 def _sense(value: float, scene: Scene) -> Machine:
     """The same range of currents over another resistor."""
     key = "circuit.sense_resistance"
@@ -148,8 +157,9 @@ CHANGES: Sequence[Change] = (
         for name in ("resistance", "inductance")
         for words, factor in (("half", 0.5), ("twice", 2.0))
     ),
-    Change("coil of 0.7 times the force factor", "circuit", _times(0.7, "coil.force_factor")),
-    Change("coil of 1.4 times the force factor", "circuit", _times(1.4, "coil.force_factor")),
+    Change("magnet of 0.7 times the field", "circuit", _times(0.7, "coil.force_factor")),
+    Change("magnet of 1.4 times the field", "circuit", _times(1.4, "coil.force_factor")),
+    Change("coil of 1.4 times the turns", "circuit", partial(_rewound, 1.4)),
     Change("sense resistor 2 Ω", "circuit", partial(_sense, 2.0)),
     Change("sense resistor 8 Ω", "circuit", partial(_sense, 8.0)),
     Change("current limit 0.8 A", "circuit", _set("circuit.current_limit", value=0.8)),

@@ -1,7 +1,6 @@
 """The figures of the limits, one message each."""
 
 from collections.abc import Callable
-from math import isfinite
 from pathlib import Path
 from textwrap import fill
 
@@ -36,43 +35,40 @@ def drawn(study: Study) -> dict[str, Callable[[Path], None]]:
 
 
 def changes(path: Path, study: Study, goal: Goal) -> None:
-    """A row for each change, the largest gain on top: what is achieved robustly with it."""
-    every = [gain for gain in gains(study, goal) if isfinite(gain.own)]
-    own = study.rigs[0].point(AS_IT_IS, goal, "robust")
-    base = own.median * goal.scale if own else 1.0
+    """A row for each change, the largest gain on top: what it brings robustly, in %."""
+    every = [gain for gain in gains(study, goal) if gain.every]
+    known = [point.median for rig in study.rigs if (point := rig.point(AS_IT_IS, goal, "robust"))]
+    base = brief(float(np.median(known)) * goal.scale) if known else "-"
     note = (
-        "Robust: the median over turns of the knobs by ±2 %, the knobs set anew for each change. "
-        "Dot: the identified rig, hollow where the gain is within the noise; thin bar: the same "
-        "change on the other rigs that may be meant, relative to each one's own; grey band: "
-        "what repeated searches differ by. Red changes the waveform, orange the heat, green the "
-        "grip, blue the circuit. All trials that were measured have a rising sawtooth."
+        "Robust: the median over turns of the knobs by ±2 %, the knobs set anew for each change on "
+        "each rig that may be meant. Dot: the median over the rigs, hollow where it is within the "
+        "noise; bar: their range; cross: the scene's rig; grey band: what repeated searches differ "
+        "by. Red changes the waveform, orange the heat, green the grip, blue the circuit. All "
+        "trials that were measured have a rising sawtooth."
     )
     title = goal.title
     if every:
-        gained = f"{brief(base * (1.0 + every[0].own))} for {brief(base)} {goal.unit}"
-        title = f"The {goal.title} gains most by: {every[0].change.name}, {gained}"
+        title = (
+            f"The {goal.title}, {base} {goal.unit} as it is, gains most by: {every[0].change.name}"
+        )
     figure, (axis,) = panels(title, fill(note, 125), (10.0, 0.27 * len(every) + 1.9))
-    apart = noise(study, goal)
-    axis.axvspan(base * (1.0 - apart), base * (1.0 + apart), color="0.88", zorder=0)
-    axis.axvline(base, color="0.15", lw=1.0)
+    apart = 100.0 * noise(study, goal)
+    axis.axvspan(-apart, apart, color="0.88", zorder=0)
+    axis.axvline(0.0, color="0.15", lw=1.0)
     upwards = every[::-1]
     for row, gain in enumerate(upwards):
         color = COLORS[gain.change.group]
-        ends = np.array([min(gain.every), max(gain.every)])
-        axis.plot(base * (1.0 + ends), [row, row], color=color, lw=1.6, alpha=0.55)
+        ends = 100.0 * np.array([min(gain.every), max(gain.every)])
+        axis.plot(ends, [row, row], color=color, lw=1.6, alpha=0.55)
         filled = color if gain.counts else "white"
-        axis.plot(base * (1.0 + gain.own), row, "o", color=color, mfc=filled, ms=6, zorder=3)
+        axis.plot(100.0 * gain.middle, row, "o", color=color, mfc=filled, ms=6, zorder=3)
+        axis.plot(100.0 * gain.own, row, "x", color="0.15", ms=5, zorder=4)
     axis.set_yticks(range(len(every)), [gain.change.name for gain in upwards], fontsize=9)
     for label, gain in zip(axis.get_yticklabels(), upwards, strict=True):
         label.set_color(COLORS[gain.change.group])
-    axis.set_ylim(-0.7, len(every) + 0.1)
-    axis.set_xlim(left=0.0)
+    axis.set_ylim(-0.7, len(every) - 0.3)
     keep_ticks_inside(axis.xaxis)
-    axis.set_xlabel(f"{goal.title}, robust [{goal.unit}]")
-    axis.annotate(
-        "as it is", (base, len(every) - 0.45), xytext=(3, 0), textcoords="offset points",
-        fontsize=8.5, color="0.15",
-    )  # fmt: skip
+    axis.set_xlabel(f"gain of the {goal.title}, robust [%]")
     figure.write(path)
 
 
@@ -95,7 +91,7 @@ def settings(path: Path, study: Study) -> None:
         axis.plot(velocity, reading, "o", color=color, ms=5, alpha=0.75, label=words)
     for way, style in (("up", "--"), ("down", ":")):
         label = f"slips, part going {way}"
-        axis.axhline(-study.slips[way][0], color=PURPLE, lw=1.2, ls=style, label=label)
+        axis.axhline(-study.slips[0][way][0], color=PURPLE, lw=1.2, ls=style, label=label)
     axis.axvline(0.0, color="0.6", lw=0.8)
     axis.set_xlabel("mean velocity of the part, upwards [mm/s]")
     axis.set_ylabel("largest fall, as a camera reads it [m/s²]")

@@ -73,7 +73,7 @@ def _row(goal: Goal, point: Point) -> Row:
 
 
 def _gains(found: Study, goal: Goal) -> Iterator[Row]:
-    """A row for the device as it is and for each change, the largest gain first."""
+    """A row for the device as it is and for each change, the largest median gain first."""
     every, apart = gains(found, goal), noise(found, goal)
     for change, gain in ((AS_IT_IS, None), *((gain.change, gain) for gain in every)):
         robust, best = (found.rigs[0].point(change, goal, kind) for kind in ("robust", "best"))
@@ -81,7 +81,8 @@ def _gains(found: Study, goal: Goal) -> Iterator[Row]:
         if gain and isfinite(gain.own):
             own = f"{100.0 * gain.own:+.1f}"
         if gain and len(gain.every) > 1:
-            rigs = "{:+.0f} ({:+.0f} to {:+.0f})".format(*gain.over_rigs)
+            ends = (100.0 * one for one in (gain.middle, min(gain.every), max(gain.every)))
+            rigs = "{:+.0f} ({:+.0f} to {:+.0f})".format(*ends)
         yield {
             "change": change.name,
             "robust (median)": robust.median * goal.scale if robust else nan,

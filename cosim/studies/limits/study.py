@@ -73,11 +73,16 @@ class Study:
     """Of REPEATED on the own rig, searched alone with other seeds."""
 
     @property
-    def slips(self) -> Mapping[str, tuple[float, float]]:
-        """Accelerations of the surface, m/s², beyond which a part slips on its way up or down."""
-        friction, mechanics = self.scene.friction, self.scene.mechanics
-        force = friction.normal_force * mechanics.n_surfaces / mechanics.part_mass
-        return slip_budget(friction.mu_s, force, mechanics.gravity, friction.mu_plate)
+    def slips(self) -> list[Mapping[str, tuple[float, float]]]:
+        """Accelerations of the surface, m/s², beyond which a part slips on its way up or down, on
+        each rig."""
+        return [_slips(Bench.base(self.scene, rig.settings, "a rig")) for rig in self.rigs]
+
+
+def _slips(scene: Scene) -> Mapping[str, tuple[float, float]]:
+    friction, mechanics = scene.friction, scene.mechanics
+    force = friction.normal_force * mechanics.n_surfaces / mechanics.part_mass
+    return slip_budget(friction.mu_s, force, mechanics.gravity, friction.mu_plate)
 
 
 def steps(efforts: Efforts, changes: Sequence[Change], rigs: int) -> int:

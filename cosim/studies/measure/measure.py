@@ -1,7 +1,7 @@
 """What to measure next, and measure.csv, measure.md and the figure that it leaves."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -122,6 +122,8 @@ def report(found: Sample, given: int, seed: int, currents: tuple[float, float]) 
         f"That velocity is {ends[0, 0]:.1f} to {ends[1, 0]:.1f} mm/s as the device is, and "
         f"{ends[0, 1]:.1f} to {ends[1, 1]:.1f} mm/s with a falling sawtooth; of the latter's width "
         f"{other.name} leaves the least, {100.0 * leaves[1].width / now[1].width:.0f} %.",
+        f"The knobs are to be set anew on the machine: at the best settings of the scene's rig the "
+        f"rigs give {_films(values)}.",
         f"The sample is {len(found.targets)} rigs: {given} that were found from the trials, and "
         "others drawn about them. Each in turn is taken as the truth and left out, and the others "
         "are weighted by how well they agree with what it would show, noise added. Widths are "
@@ -154,6 +156,14 @@ def _row(
             f"{target}: holds [%]": 100.0 * here.held,
         }
     return row | {"how": how}
+
+
+def _films(values: Mapping[Candidate, Array]) -> str:
+    """What the films of three shapes show, of nine rigs in ten."""
+    shapes = ("rising sawtooth", "falling sawtooth", "sine")
+    ends = {one.name: np.quantile(shown[:, 0], (0.05, 0.95)) * 1e3 for one, shown in values.items()}
+    told = ((shape, *ends[f"film, {shape}"].tolist()) for shape in shapes)
+    return ", ".join(f"{low:.0f} to {high:.0f} mm/s with a {shape}" for shape, low, high in told)
 
 
 def _accuracy(one: Candidate) -> str:

@@ -66,7 +66,8 @@ GAUGES = {
         _CURRENT.format("lower"), "A", 1.0, 0.02, 0.0, lambda rig: leaves(rig, "down")
     ),
     "force factor": Gauge(
-        "a current probe at a trial that is filmed, against the current that the fit gives it",
+        "the coil's impedance for small tones above the ram's resonance, housing held: what the "
+        "free ram adds is Bl² over its known mass",
         "N/A", 1.0, 0.0, 0.03, lambda rig: rig["force_factor"],
     ),
     "weight": Gauge(
@@ -80,7 +81,7 @@ GAUGES = {
     "ring-down": Gauge(_RING + "frequency", "Hz", 1.0, 0.0, 0.01, ring),
     "decay": Gauge(_RING + "decay", "1/s", 1.0, 0.0, 0.1, decay),
     "deflection": Gauge(
-        f"hang {LOAD * 1e3:.0f} g on the platform: how far it sinks, by a dial gauge",
+        f"hang {LOAD * 1e3:.0f} g on the platform: how far it sinks, by the camera",
         "mm", 1e3, 2e-5, 0.0, lambda rig: LOAD * rig["gravity"] / rig["flexure_stiffness"],
     ),
 }  # fmt: skip
