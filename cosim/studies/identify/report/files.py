@@ -86,16 +86,19 @@ def _draw(name: str, found: Solved, path: Path) -> None:
 
 def _priors(found: Solved) -> list[str]:
     """What took part in the cost beside the trials; a paragraph each."""
-    said, rig = [], found.best.numbers
+    said, rig, space = [], found.best.numbers, found.best.space
+    known = [entry for entry in space.free if entry.prior is not None and entry.sigma is not None]
+    off = space.residuals(found.best.point[None])[0][len(space.measured) :].tolist()
     weighed = [
-        f"{entry.key} {entry.prior:.4g} (σ {entry.sigma:.2g}{' of it' if entry.log else ''})"
-        for entry in found.best.space.free
-        if entry.prior is not None and entry.sigma is not None
+        f"{entry.key} {entry.prior:.4g} (σ {entry.sigma:.2g}{' of it' if entry.log else ''}; the "
+        f"rig is {sigmas:+.1f} σ off)"
+        for entry, sigmas in zip(known, off, strict=True)
     ]
     if weighed:
         said.append(
             f"Priors took part, normal ones in a likelihood: {'; '.join(weighed)}. They decide "
-            "where the trials do not tell."
+            "where the trials do not tell. Ranges hold the truth as often as they say only where "
+            "the priors do, too."
         )
     other = [
         f"{name} {value * gauge.scale:.4g} ± {sd * gauge.scale:.2g} {gauge.unit}, on the rig "
