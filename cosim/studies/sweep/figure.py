@@ -98,8 +98,14 @@ def _own(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
 
 
 def _row(rows: Any, number: int, count: int) -> list[Axes]:
-    """``count`` axes beside each other in one of the subfigures."""
-    return list(np.atleast_1d(rows[number].subplots(1, count)))
+    """``count`` axes beside each other in one of the subfigures, with one scale upwards."""
+    return list(np.atleast_1d(rows[number].subplots(1, count, sharey=True)))
+
+
+def _others(data: xr.Dataset) -> list[Quantity]:
+    """The quantities beside the velocity that there are: rigid walls have no peak, and the fast
+    solver knows none."""
+    return [one for one in OTHERS if np.isfinite(_values(data, one).values).any()]
 
 
 def _values(data: xr.Dataset, quantity: Quantity) -> xr.DataArray:
@@ -109,15 +115,23 @@ def _values(data: xr.Dataset, quantity: Quantity) -> xr.DataArray:
 
 
 def _curves(figure: Figure, data: xr.Dataset, name: str) -> None:
-    for axis, quantity in zip(figure.subplots(2, 2).flat, (V_AVERAGE, *OTHERS), strict=True):
+    for axis, quantity in _panels(figure, (V_AVERAGE, *_others(data))):
         values = _values(data, quantity).values
         axis.plot(data[name].values, values, color="#1f6fb2", marker=".", lw=1.3)
         _over_key(axis, data, name)
         if _are_decades(data[name].values):
             axis.set_xscale("log")
         axis.set(ylabel=f"[{quantity.unit}]")
-        _head(axis, quantity, values)
+        axis.set_title(quantity.title, loc="left", fontsize=10.5)
     figure.axes[0].axhline(0.0, color="0.3", lw=0.8)
+
+
+def _panels(figure: Figure, shown: Sequence[Quantity]) -> list[tuple[Axes, Quantity]]:
+    """Axes for each, two beside each other."""
+    every = [*figure.subplots(-(-len(shown) // 2), 2, squeeze=False).flat]
+    for axis in every[len(shown) :]:
+        axis.set_visible(False)
+    return [*zip(every, shown, strict=False)]
 
 
 def _are_decades(values: Array) -> bool:
@@ -131,7 +145,7 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
     known = _values(data, V_AVERAGE).fillna(-np.inf)
     best: Any = known.argmax(known.dims)
     *fixed, third, y, x = ["", *names] if len(names) == 2 else names
-    said = []
+    beside, said = _others(data), []
     for name in [str(dim) for dim in data.dims if dim not in (x, y, third)]:
         data = data.isel({name: int(best[name])})
         if name in fixed:
@@ -146,10 +160,10 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
         slices = [data.isel({third: moving[k]}) for k in places.tolist()]
         here = data.isel({third: int(best[third])})
         rows = figure.subfigures(2, 1)
-        top, others = _row(rows, 0, len(slices)), _row(rows, 1, len(OTHERS))
-        panels = list(zip(top, slices, strict=True))
+        panels = list(zip(_row(rows, 0, len(slices)), slices, strict=True))
+        others = list(zip(_row(rows, 1, len(beside)), beside, strict=True)) if beside else []
     else:
-        first, *others = figure.subplots(2, 2).flat
+        (first, _), *others = _panels(figure, (V_AVERAGE, *beside))
         panels = [(first, data)]
     norm = _two_sided(np.concatenate([_values(part, V_AVERAGE).values.ravel() for part in slices]))
     for k, (axis, part) in enumerate(panels):
@@ -161,13 +175,13 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
         if k == len(panels) - 1:
             label = f"{V_AVERAGE.title} [mm/s]" if third else "[mm/s]"
             axis.figure.colorbar(shown, ax=[p[0] for p in panels], label=label)
-    for axis, quantity in zip(others, OTHERS, strict=True):
-        values = _values(here, quantity).values
-        shown = _map(axis, here, quantity, x, y, "viridis", _one_sided(values, quantity.unit))
-        _head(axis, quantity, values, shown)
+    for axis, quantity in others:
+        norm = _one_sided(_values(here, quantity).values, quantity.unit)
+        _head(axis, quantity, _map(axis, here, quantity, x, y, "viridis", norm))
     said += [_setting(here, third)] if third else []
-    if said:
-        others[0].set_title(f"{OTHERS[0].title}\nat {', '.join(said)}", loc="left", fontsize=10.5)
+    if said and others:
+        axis, quantity = others[0]
+        axis.set_title(f"{quantity.title}\nat {', '.join(said)}", loc="left", fontsize=10.5)
 
 
 def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
@@ -185,7 +199,8 @@ def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
     if len(names) < 2:
         return
     x, y = data[names[0]].values, data[names[1]].values
-    for axis, quantity in zip(_row(rows, 1, 3), (V_AVERAGE, *OTHERS[1:]), strict=True):
+    shown_there = [V_AVERAGE, *(one for one in _others(data) if one is not OTHERS[0])]
+    for axis, quantity in zip(_row(rows, 1, len(shown_there)), shown_there, strict=True):
         values = _values(data, quantity).values
         colors, limits = "viridis", _one_sided(values, quantity.unit)
         if quantity is V_AVERAGE:
@@ -194,7 +209,7 @@ def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
         failed = data[FAILURE].values != ""
         axis.plot(x[failed], y[failed], **FAILED)
         _name_axes(axis, data, names[0], names[1])
-        _head(axis, quantity, values, shown)
+        _head(axis, quantity, shown)
 
 
 def _over_key(axis: Axes, data: xr.Dataset, name: str) -> None:
@@ -288,14 +303,10 @@ def _levels(norm: Normalize) -> list[float]:
     return [float(level) for level in ticks if low < level < high and level != 0.0]
 
 
-def _head(axis: Axes, quantity: Quantity, values: Array, shown: Any = None) -> None:
-    """Name what a panel has ``shown`` in colours, or that there is nothing to show, as of a peak
-    that rigid walls do not have."""
+def _head(axis: Axes, quantity: Quantity, shown: Any) -> None:
+    """Name what a panel has ``shown`` in colours."""
     axis.set_title(quantity.title, loc="left", fontsize=10.5)
-    if not np.isfinite(values).any():
-        axis.text(0.5, 0.5, "there is none here", transform=axis.transAxes, ha="center")
-    elif shown is not None:
-        axis.figure.colorbar(shown, ax=axis, label=f"[{quantity.unit}]")
+    axis.figure.colorbar(shown, ax=axis, label=f"[{quantity.unit}]")
 
 
 def _setting(data: xr.Dataset, name: str) -> str:
@@ -317,7 +328,10 @@ def _name_axes(axis: Axes, data: xr.Dataset, *names: str) -> None:
     axis.xaxis.set_major_locator(MaxNLocator(6))
     for name, line in zip(names, (axis.xaxis, axis.yaxis), strict=False):
         key, unit = data[name].key, data[name].units
-        line.set_label_text(label(key, unit))
+        place = axis.get_subplotspec()
+        inner = line is axis.yaxis and axis.get_shared_y_axes().get_siblings(axis) != [axis]
+        if not inner or (place is not None and place.is_first_col()):
+            line.set_label_text(label(key, unit))
         if _meant(key, 0.5):
             low, high = line.get_view_interval()
             shown = [tick for tick in np.linspace(0.0, 1.0, 6) if low <= tick <= high]
