@@ -23,6 +23,9 @@ GROUPS = {
 }
 """In words, by what of the device is changed; in the order of the sentences."""
 
+IDEAL, TWICE_HEAT = "ideal current", "heat 7 W"
+"""Changes that the first sentence names."""
+
 LEGEND = (
     "Each change with the median of its gain over all rigs, the knobs set anew on each, and, in "
     "brackets, its range, that on the scene's rig, and on how many of those on which anything was "
@@ -91,6 +94,7 @@ def sentences(study: Study) -> list[str]:
     up, camera = BY_NAME["v_up"], BY_NAME["a_camera"]
     by_up, by_camera = gains(study, up), gains(study, camera)
     said = [
+        *_in_short(by_up),
         *_as_it_is(study, up),
         LEGEND if len(study.rigs) > 1 else "",
         *(words for group in GROUPS for words in _group(by_up, group)),
@@ -101,6 +105,23 @@ def sentences(study: Study) -> list[str]:
         _search(study),
     ]
     return [one for one in said if one]
+
+
+def _in_short(every: Sequence[Gain]) -> Iterator[str]:
+    """What the amplifier, the shape of the command and the coil's heat each hold back."""
+    known = {gain.change.name: gain for gain in every if gain.every}
+    shapes = [gain for gain in every if gain.change.group == "waveform" and gain.every]
+    if not (shapes and {IDEAL, TWICE_HEAT} <= known.keys()):
+        return
+    shape, ideal, heat = (
+        f"{100.0 * gain.middle:+.0f} %" for gain in (shapes[0], known[IDEAL], known[TWICE_HEAT])
+    )
+    rigs = len(known[IDEAL].every)
+    over = f" in the median of {rigs} rigs" if rigs > 1 else ""
+    yield (
+        f"The {every[0].goal.title} would gain {ideal} with an ideal source of current, {shape} "
+        f"with the best other shape of the command, and {heat} with twice the heat{over}."
+    )
 
 
 def _as_it_is(study: Study, goal: Goal) -> Iterator[str]:
