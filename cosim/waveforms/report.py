@@ -122,8 +122,10 @@ def _heat(summary: dict[str, Any]) -> str:
 def rises(ends: Sequence[float | None]) -> str:
     """How much warmer a coil becomes, from the least to the most, K; None or infinite is without
     end."""
-    known = [f"{end:.3g} K" for end in ends if end is not None and isfinite(end)]
-    return " to ".join([*known, "more and more"][:2])
+    known = [f"{end:.3g}" for end in ends if end is not None and isfinite(end)]
+    if len(known) < len(ends):
+        return f"at least {known[0]} K" if known else "more and more"
+    return f"{' to '.join(known)} K"
 
 
 def _own_error(summary: dict[str, Any]) -> str:
