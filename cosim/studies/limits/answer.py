@@ -17,7 +17,8 @@ BY_NAME = {goal.name: goal for goal in GOALS}
 
 GROUPS = {
     "waveform": "waveform",
-    "circuit": "circuit or coil",
+    "circuit": "circuit",
+    "coil": "coil or magnet",
     "heat": "limit of heat",
     "grip": "grip force",
 }
@@ -27,9 +28,9 @@ IDEAL, TWICE_HEAT = "ideal current", "heat 7 W"
 """Changes that the first sentence names."""
 
 LEGEND = (
-    "Each change with the median of its gain over all rigs, the knobs set anew on each, and, in "
-    "brackets, its range, that on the scene's rig, and on how many of those on which anything was "
-    "found it is beyond the search's noise to the same side."
+    "Of each change below: the median gain over the rigs, the knobs set anew on each; in brackets "
+    "the range, the gain on the scene's rig, and on how many of the rigs on which anything was "
+    "found it has the median's sign and exceeds the search's noise."
 )
 
 NAMED, LEAST = 6, 2
@@ -98,8 +99,9 @@ def sentences(study: Study) -> list[str]:
         *_as_it_is(study, up),
         LEGEND if len(study.rigs) > 1 else "",
         *(words for group in GROUPS for words in _group(by_up, group)),
+        *_in_short(by_camera),
         *_as_it_is(study, camera),
-        *(words for group in ("waveform", "circuit") for words in _group(by_camera, group)),
+        *(words for group in ("waveform", "circuit", "coil") for words in _group(by_camera, group)),
         _slips(study),
         _warmth(study),
         _search(study),
@@ -109,19 +111,37 @@ def sentences(study: Study) -> list[str]:
 
 def _in_short(every: Sequence[Gain]) -> Iterator[str]:
     """What the amplifier, the shape of the command and the coil's heat each hold back."""
+    told = in_short(every)
+    if told:
+        rigs = max(len(gain.every) for gain in every)
+        over = f"Median gain over {rigs} rigs" if rigs > 1 else "Gain"
+        yield f"{over} in {every[0].goal.title}, robust: {told}."
+
+
+def in_short(every: Sequence[Gain], ranges: bool = True) -> str:
+    """The same as a list; empty where one of them is not known."""
     known = {gain.change.name: gain for gain in every if gain.every}
     shapes = [gain for gain in every if gain.change.group == "waveform" and gain.every]
     if not (shapes and {IDEAL, TWICE_HEAT} <= known.keys()):
-        return
-    shape, ideal, heat = (
-        f"{100.0 * gain.middle:+.0f} %" for gain in (shapes[0], known[IDEAL], known[TWICE_HEAT])
+        return ""
+    told = {
+        "an ideal current source": known[IDEAL],
+        f"the best other waveform ({shapes[0].change.name})": shapes[0],
+        "twice the heat": known[TWICE_HEAT],
+    }
+    return ", ".join(
+        f"{words} {_percent(gain.middle)} %"
+        + (f" ({_ends(gain)})" if ranges and len(gain.every) > 1 else "")
+        for words, gain in told.items()
     )
-    rigs = len(known[IDEAL].every)
-    over = f" in the median of {rigs} rigs" if rigs > 1 else ""
-    yield (
-        f"The {every[0].goal.title} would gain {ideal} with an ideal source of current, {shape} "
-        f"with the best other shape of the command, and {heat} with twice the heat{over}."
-    )
+
+
+def _ends(gain: Gain) -> str:
+    return f"{_percent(min(gain.every))} to {_percent(max(gain.every))}"
+
+
+def _percent(share: float) -> str:
+    return f"{round(100.0 * share):+d}"  # no minus before a zero
 
 
 def _as_it_is(study: Study, goal: Goal) -> Iterator[str]:
@@ -130,19 +150,23 @@ def _as_it_is(study: Study, goal: Goal) -> Iterator[str]:
     if robust is None or best is None:
         return
     known = [one.median * goal.scale for one in every if one]
-    own, unit = f"{brief(robust.median * goal.scale)} {goal.unit}", goal.unit
-    reached = f"{own} of {goal.title}, robustly"
+    unit = goal.unit
+    value, median, worst, single = (
+        f"{brief(x * goal.scale)} {unit}"
+        for x in (robust.median, best.median, robust.worst, best.value)
+    )
     if len(known) > 1:
-        middle = f"{brief(float(np.median(known)))} {unit} of {goal.title}, robustly"
-        over = f"in the median of {len(known)} rigs ({span(known)})"
-        reached = f"{middle}, {over}; on the scene's rig {own}"
+        middle = f"{brief(float(np.median(known)))} {unit}"
+        reached = f"a robust {middle} of {goal.title} (median of {len(known)} rigs, {span(known)})"
+        reached += f". On the scene's rig it is {value}"
+    else:
+        reached = f"a robust {value} of {goal.title}"
     if not goal.name.startswith("v_"):
         reached += f", where the part moves at {robust.v_average * 1e3:+.1f} mm/s"
     yield (
-        f"As it is, the device reaches {reached}, and {brief(robust.worst * goal.scale)} {unit} at "
-        f"the worst turn of the knobs by ±2 %. The best single setting there has "
-        f"{brief(best.value * goal.scale)} {unit}, of which the median over such turns leaves "
-        f"{brief(best.median * goal.scale)} {unit}."
+        f"Unchanged, the device reaches {reached}; the worst error of ±2 % in the knobs gives "
+        f"{worst}. The best single setting there gives {single}, and {median} in the median over "
+        "such errors."
     )
 
 
@@ -154,21 +178,20 @@ def _group(every: Sequence[Gain], group: str) -> Iterator[str]:
     named = [gain for gain in some if gain.counts]
     shown = named if len(named) <= NAMED else [*named[: NAMED - LEAST], *named[-LEAST:]]
     told = [f"{gain.change.name} {_share(gain)}" for gain in shown]
-    rest = [100.0 * gain.middle for gain in some if gain not in shown]
+    rest = [gain.middle for gain in some if gain not in shown]
     if len(rest) == 1:
-        told.append(f"one other {rest[0]:+.0f} %")
+        told.append(f"one other {_percent(rest[0])} %")
     elif rest:
-        told.append(f"{len(rest)} others {min(rest):+.0f} to {max(rest):+.0f} %")
+        told.append(f"{len(rest)} others {_percent(min(rest))} to {_percent(max(rest))} %")
     yield f"The {some[0].goal.title}, robustly, with another {GROUPS[group]}: {'; '.join(told)}."
 
 
 def _share(gain: Gain) -> str:
-    text = f"{100.0 * gain.middle:+.0f} %"
+    text = f"{_percent(gain.middle)} %"
     if len(gain.every) > 1:
-        low, high = (100.0 * end for end in (min(gain.every), max(gain.every)))
-        own = f"{100.0 * gain.own:+.0f}" if isfinite(gain.own) else "nothing"
+        own = _percent(gain.own) if isfinite(gain.own) else "nothing"
         alike = sum(np.sign(gain.middle) * one > gain.noise for one in gain.every)
-        text += f" ({low:+.0f} to {high:+.0f}; {own}; {alike} of {len(gain.every)})"
+        text += f" ({_ends(gain)}; {own}; {alike} of {len(gain.every)})"
     return text
 
 
@@ -178,15 +201,15 @@ def _slips(study: Study) -> str:
         for way in ("up", "down")
     )
     return (
-        f"A part that goes up slips where the surface falls with more than {up} m/s² or rises with "
-        f"more than {rising}; one that goes down, where the surface falls with more than {down}. A "
-        "camera's reading is a mean over 4 ms, below the instant that decides."
+        f"While the part moves up it slips where the surface accelerates downwards at more than "
+        f"{up} m/s² or upwards at more than {rising}; while it moves down, downwards at more than "
+        f"{down}. A camera averages over 4 ms, so it reads less than the peak that makes it slip."
     )
 
 
 def _over(values: Sequence[float]) -> str:
     """The own rig's value and, of several rigs, the range."""
-    return f"{values[0]:.0f}" + (f" ({span(values)} on all rigs)" if len(values) > 1 else "")
+    return f"{values[0]:.0f}" + (f" ({span(values)} over the rigs)" if len(values) > 1 else "")
 
 
 def _warmth(study: Study) -> str:
@@ -197,10 +220,10 @@ def _warmth(study: Study) -> str:
     )
     current = np.sqrt(DRIVE_RANGE_HEAT / coil.resistance)
     return (
-        f"The heat of {DRIVE_RANGE_HEAT:.1f} W that is allowed here is (5 V)²/7.1 Ω, no rating: it "
-        f"is {current:.2f} A rms, {current / RATED_CURRENT:.1f} times what the data sheet names. "
-        f"By an estimate it warms the winding by {lift} in a lift of {LIFT:.0f} s, and by {ever} "
-        "in continuous use."
+        f"The coil may make {DRIVE_RANGE_HEAT:.1f} W here, the most of the data sheet's range of "
+        f"drives, (5 V)²/7.1 Ω. That is no rating: its {current:.2f} A rms are "
+        f"{current / RATED_CURRENT:.1f} times the current that the sheet names. By an estimate the "
+        f"winding warms by {lift} in a lift of {LIFT:.0f} s, and by {ever} in continuous use."
     )
 
 

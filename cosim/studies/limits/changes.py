@@ -87,7 +87,8 @@ class Change:
 
     name: str
     group: str
-    """What of the device: ``waveform``, ``heat``, ``grip`` or ``circuit``, the coil among it."""
+    """What of the device: ``waveform``, ``heat``, ``grip``, ``circuit``, or ``coil`` with its
+    magnet."""
     machine: Callable[[Scene], Machine]
     searched: bool = True
     """Whether the knobs are set anew for it; else it is tried at the best settings of the device as
@@ -140,7 +141,7 @@ CHANGES: Sequence[Change] = (
     Change("coil's wires exchanged", "waveform", _set("coil.polarity", value=-1)),
     Change("sine", "waveform", _set("drive.waveform", value="sine")),
     Change("square wave", "waveform", _set("drive.waveform", value="square")),
-    Change("six levels, straight lines between", "waveform", _own_command("pieces", 6)),
+    Change("six levels, joined by lines", "waveform", _own_command("pieces", 6)),
     Change("six levels, held", "waveform", _own_command("steps", 6)),
     Change("heat 0.9 W", "heat", lambda _: Machine(heat=0.9)),
     Change("heat 1.8 W", "heat", lambda _: Machine(heat=1.8)),
@@ -153,20 +154,20 @@ CHANGES: Sequence[Change] = (
     ),
     Change("output swings to its rails", "circuit", _set(*_SWING, value=0.0)),
     *(
-        Change(f"coil of {words} the {name}", "circuit", _times(factor, f"coil.{name}"))
+        Change(f"coil of {words} the {name}", "coil", _times(factor, f"coil.{name}"))
         for name in ("resistance", "inductance")
         for words, factor in (("half", 0.5), ("twice", 2.0))
     ),
-    Change("magnet of 0.7 times the field", "circuit", _times(0.7, "coil.force_factor")),
-    Change("magnet of 1.4 times the field", "circuit", _times(1.4, "coil.force_factor")),
-    Change("coil of 1.4 times the turns", "circuit", partial(_rewound, 1.4)),
+    Change("magnet of 0.7 times the field", "coil", _times(0.7, "coil.force_factor")),
+    Change("magnet of 1.4 times the field", "coil", _times(1.4, "coil.force_factor")),
+    Change("coil of 1.4 times the turns", "coil", partial(_rewound, 1.4)),
     Change("sense resistor 2 Ω", "circuit", partial(_sense, 2.0)),
     Change("sense resistor 8 Ω", "circuit", partial(_sense, 8.0)),
     Change("current limit 0.8 A", "circuit", _set("circuit.current_limit", value=0.8)),
     Change("current limit 5 A", "circuit", _set("circuit.current_limit", value=5.0)),
-    Change("knobs to half their volts", "circuit", lambda _: Machine(reach=0.5)),
-    Change("knobs to twice their volts", "circuit", lambda _: Machine(reach=2.0)),
-    Change("knob to twice its hertz", "circuit", lambda _: Machine(pace=2.0)),
+    Change("knobs up to half their volts", "circuit", lambda _: Machine(reach=0.5)),
+    Change("knobs up to twice their volts", "circuit", lambda _: Machine(reach=2.0)),
+    Change("knob up to twice its hertz", "circuit", lambda _: Machine(pace=2.0)),
     Change(
         "op-amp of a tenth the gain-bandwidth", "circuit",
         _times(0.1, _LIMITS[0], rung="amplifier"), searched=False,
@@ -177,6 +178,6 @@ CHANGES: Sequence[Change] = (
     ),
     Change("DAC steps", "circuit", _set("drive.quantised", value=True), searched=False),
     Change("ideal current", "circuit", lambda _: Machine(rung="ideal")),
-    Change("ideal current, any heat", "circuit", lambda _: Machine(rung="ideal", heat=inf)),
+    Change("ideal current, any heat", "heat", lambda _: Machine(rung="ideal", heat=inf)),
 )  # fmt: skip
 """The device as it is comes first."""

@@ -6,7 +6,7 @@ from textwrap import fill
 
 import numpy as np
 
-from cosim.studies.limits.answer import BY_NAME, gains, noise
+from cosim.studies.limits.answer import BY_NAME, gains, in_short, noise
 from cosim.studies.limits.changes import AS_IT_IS
 from cosim.studies.limits.runs import Goal
 from cosim.studies.limits.study import Study
@@ -19,9 +19,11 @@ from cosim.studies.plots import (
     keep_ticks_inside,
     panels,
 )
-from cosim.studies.tables import brief
 
-COLORS = {"": "0.15", "waveform": VERMILION, "heat": ORANGE, "grip": GREEN, "circuit": BLUE}
+COLORS = {
+    **{"": "0.15", "waveform": VERMILION, "heat": ORANGE, "grip": GREEN},
+    **{"circuit": BLUE, "coil": PURPLE},
+}
 """By what of the device is changed."""
 
 
@@ -37,20 +39,15 @@ def drawn(study: Study) -> dict[str, Callable[[Path], None]]:
 def changes(path: Path, study: Study, goal: Goal) -> None:
     """A row for each change, the largest gain on top: what it brings robustly, in %."""
     every = [gain for gain in gains(study, goal) if gain.every]
-    known = [point.median for rig in study.rigs if (point := rig.point(AS_IT_IS, goal, "robust"))]
-    base = brief(float(np.median(known)) * goal.scale) if known else "-"
     note = (
-        "Robust: the median over turns of the knobs by ±2 %, the knobs set anew for each change on "
-        "each rig that may be meant. Dot: the median over the rigs, hollow where it is within the "
-        "noise; bar: their range; cross: the scene's rig; grey band: what repeated searches differ "
-        "by. Red changes the waveform, orange the heat, green the grip, blue the circuit. All "
-        "trials that were measured have a rising sawtooth."
+        "Robust: the median over errors of ±2 % in the knobs, set anew for each change on each rig "
+        "that fits the trials. Dot: the median over the rigs, hollow where it is within "
+        "the noise; bar: their range; cross: the scene's rig; grey band: what repeated searches "
+        "differ by. Red changes the waveform, orange the heat, green the grip, blue the circuit, "
+        "purple coil or magnet. All trials that were measured have a rising sawtooth."
     )
-    title = goal.title
-    if every:
-        title = (
-            f"The {goal.title}, {base} {goal.unit} as it is, gains most by: {every[0].change.name}"
-        )
+    said = in_short(every, ranges=False)
+    title = f"{goal.title.capitalize()}: {said}" if said else goal.title
     figure, (axis,) = panels(title, fill(note, 125), (10.0, 0.27 * len(every) + 1.9))
     apart = 100.0 * noise(study, goal)
     axis.axvspan(-apart, apart, color="0.88", zorder=0)

@@ -106,24 +106,23 @@ def report(found: Sample, given: int, seed: int, currents: tuple[float, float]) 
     ]
     rows = [_row(*one, now) for one in told]
     (first, best), (second, next_) = each[:2]
-    left = [100.0 * a.width / n.width for a, n in zip(best, now, strict=True)]
     usual = np.median([after[0].each for _, after in each[1:]], axis=0)
     often = 100.0 * np.mean(best[0].each < usual)
     other, leaves = min(each, key=lambda pair: pair[1][1].width)
     title = (
-        f"Measure next: {first.name}. It leaves {left[0]:.0f} % of the 90 % interval of the robust "
-        f"velocity upwards"
+        f"Measure next: {first.name}. It is expected to narrow the 90 % interval of the robust "
+        f"velocity upwards from {brief(now[0].width * 1e3)} to {brief(best[0].width * 1e3)} mm/s"
     )
     ends = np.quantile(found.targets, (0.05, 0.95), axis=0) * 1e3
     notes = [
-        f"{title}, {brief(best[0].width * 1e3)} of {brief(now[0].width * 1e3)} mm/s; next best is "
-        f"{second.name}, {brief(next_[0].width * 1e3)} mm/s. On {often:.0f} % of the rigs it "
-        f"leaves less than the median of the others. How: {first.how}.",
+        f"{title}; the next best, {second.name}, to {brief(next_[0].width * 1e3)} mm/s. On "
+        f"{often:.0f} % of the rigs it leaves less than the median of the others. How: "
+        f"{first.how}.",
         f"That velocity is {ends[0, 0]:.1f} to {ends[1, 0]:.1f} mm/s as the device is, and "
         f"{ends[0, 1]:.1f} to {ends[1, 1]:.1f} mm/s with a falling sawtooth; of the latter's width "
         f"{other.name} leaves the least, {100.0 * leaves[1].width / now[1].width:.0f} %.",
-        f"The knobs are to be set anew on the machine: at the best settings of the scene's rig the "
-        f"rigs give {_films(values)}.",
+        "The knobs have to be set on the machine: at the best settings of the scene's rig, 90 % of "
+        f"the rigs give {_films(values)}.",
         f"The sample is {len(found.targets)} rigs: {given} that were found from the trials, and "
         "others drawn about them. Each in turn is taken as the truth and left out, and the others "
         "are weighted by how well they agree with what it would show, noise added. Widths are "
