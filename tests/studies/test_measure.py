@@ -15,7 +15,7 @@ from cosim.files.picture import Picture
 from cosim.mechanics.stickslip import numbers_of
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
-from cosim.studies.identify.problem.gauges import GAUGES
+from cosim.studies.identify.problem.gauges import AT_WALL, GAUGES
 from cosim.studies.identify.problem.space import Space, read_space
 from cosim.studies.identify.problem.targets import read_trials
 from cosim.studies.identify.search.search import SAMPLES, Found, Search, finish
@@ -79,12 +79,26 @@ def test_a_current_that_the_source_does_not_hold_is_seen_as_its_most() -> None:
     stiff = {"mechanics.suspension_k3": 1e9, "mechanics.travel": 3e-3}
     scene = changed(SCENE, given | stiff, "test")
     assert held_currents(scene) == pytest.approx((-16.0 / 11.0, 16.0 / 11.0))
-    numbers = dict(zip(GAUGES, gauged_on(scene), strict=True))
+    numbers = dict(zip((one.name for one in CANDIDATES), gauged_on(scene), strict=False))
     assert numbers["click up"] == [pytest.approx(16.0 / 11.0)]
     assert numbers["click down"] == [pytest.approx(-16.0 / 11.0)]
-    assert numbers["force factor"] == [scene.coil.force_factor]
+    assert numbers["the coil's impedance"][0] == scene.coil.force_factor
     weak = changed(scene, {"circuit.current_limit": 0.5, "coil.count": 2}, "test")
     assert held_currents(weak) == pytest.approx((-0.25, 0.25))
+
+
+@pytest.mark.parametrize("current", [0.0, -1.0])
+def test_resonance_of_a_cubic(current: float) -> None:
+    """About the root of the cubic at which it rests, and where a wall holds it none."""
+    rig = {"suspension_k1": 240.0, "suspension_k2": -3e5, "suspension_k3": 7e7, "travel": 3e-3}
+    force = SCENE.coil.force_factor * current - SCENE.mechanics.ram_mass * 9.81
+    roots = np.roots([7e7, -3e5, 240.0, -force])
+    q = min(roots[np.isreal(roots)].real, key=abs)
+    stiffness = 240.0 - 6e5 * q + 21e7 * q**2
+    name = "resonance" if current == 0.0 else "resonance down"
+    hertz = sqrt(stiffness / SCENE.mechanics.ram_mass) / (2.0 * pi)
+    assert shown(name, **rig) == pytest.approx(hertz, rel=1e-5)
+    assert shown("resonance down", **rig | {"travel": 1e-3}) == AT_WALL
 
 
 def test_ring_down() -> None:

@@ -14,7 +14,7 @@ from cosim.evaluate.store import Store
 from cosim.mechanics.stickslip import numbers_of
 from cosim.scene import Scene
 from cosim.search.protocol import Evaluate, Feasible
-from cosim.studies.identify.problem.gauges import GAUGES, Gauge
+from cosim.studies.identify.problem.gauges import BIASES, GAUGES, Gauge
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Machine, Settings
 from cosim.studies.limits.judge import NUMBER
 from cosim.studies.limits.runs import NEEDED, SETTLE, SPAN, Bench
@@ -25,6 +25,8 @@ BY_NAME = {change.name: change for change in CHANGES}
 TARGETS = (AS_IT_IS.name, "falling sawtooth")
 """The machines of which the robust velocity upwards is wanted: that of all measured trials, and one
 of the shapes that are said to bring most."""
+
+WIDE = (-np.inf, np.inf)
 
 SPREAD = 0.4
 """How far rigs are drawn about given ones, of these' own spread. Of 14 drawn so by 0.35 (and 0.5)
@@ -73,8 +75,17 @@ def _filmed(name: str, drive: str) -> str:
     return f"film the best robust setting of '{drive}'{apart}: v_average and the surface's stroke"
 
 
+IMPEDANCE = ("force factor", *(f"resonance{end}" for end in BIASES))
+"""Gauges that one measurement of the coil's impedance gives."""
+
 CANDIDATES = (
-    *(Candidate(name, gauge.how, (gauge,)) for name, gauge in GAUGES.items()),
+    Candidate(
+        "the coil's impedance",
+        "the coil's impedance for small tones over frequency, housing held, at 0 and -1 A: its "
+        "peaks tell the suspension, and what the free ram adds above them Bl² over its known mass",
+        tuple(GAUGES[name] for name in IMPEDANCE),
+    ),
+    *(Candidate(name, one.how, (one,)) for name, one in GAUGES.items() if name not in IMPEDANCE),
     *(Candidate(name, _filmed(*of), FILM) for name, of in FILMS.items()),
 )
 
@@ -130,11 +141,14 @@ def whole(scene: Scene, rigs: Sequence[Settings]) -> list[Settings]:
 
 
 def gauged_on(scene: Scene) -> list[list[float]]:
-    """What each of GAUGES shows on the rig of a scene, SI; of a current beyond what the device's
-    own source holds in its coil nothing but that."""
+    """What each measurement by gauges shows on the rig of a scene, SI; of a current beyond what the
+    device's own source holds in its coil nothing but that."""
     rig, ends = numbers_of(scene), held_currents(scene)
-    shown = ((gauge, gauge.of(rig)) for gauge in GAUGES.values())
-    return [[float(np.clip(x, *ends)) if gauge.unit == "A" else x] for gauge, x in shown]
+    every = (one.gauges for one in CANDIDATES if one.name not in FILMS)
+    return [
+        [float(np.clip(gauge.of(rig), *(ends if gauge.unit == "A" else WIDE))) for gauge in some]
+        for some in every
+    ]
 
 
 def held_currents(scene: Scene) -> tuple[float, float]:

@@ -6,11 +6,12 @@ tables ``measured``. Accuracies are assumed, unless a source is told.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import pi, sqrt
 
 import numpy as np
 
-from cosim.mechanics.stickslip import suspension_force
+from cosim.mechanics.stickslip import rests_of, suspension_force
 
 Numbers = Mapping[str, float]
 
@@ -52,6 +53,27 @@ def ring(rig: Numbers) -> float:
     return sqrt(max(square - decay(rig) ** 2, 0.0)) / (2.0 * pi)
 
 
+BIASES = {"": 0.0, " down": -1.0}
+"""A, of the coil, at which the ram's resonance is sought, by what the gauge's name has after it."""
+
+AT_WALL = 500.0
+"""Hz: shown where the current holds the ram at a wall, so that there is no peak below."""
+
+_NUDGE = 1e-6
+"""m, for a slope."""
+
+
+def resonance(rig: Numbers, current: float) -> float:
+    """The frequency at which the ram swings about its rest nearest the centre under a current (A),
+    the housing held, Hz: √(k/m_r)/2π."""
+    lighter = rig["force_factor"] * current / rig["ram_mass"]
+    q = min(rests_of({**rig, "gravity": rig["gravity"] - lighter}), key=abs)
+    if not -rig["travel_down"] < q < rig["travel_up"]:
+        return AT_WALL
+    below, above = suspension_force(rig, q + np.array([-_NUDGE, _NUDGE])).tolist()
+    return sqrt(max(below - above, 0.0) / (2.0 * _NUDGE) / rig["ram_mass"]) / (2.0 * pi)
+
+
 _CURRENT = (
     "hold the ram at its {} wall by a current, let that go slowly, a small tone on it: the current "
     "at which a back-EMF sets in"
@@ -70,6 +92,13 @@ GAUGES = {
         "free ram adds is Bl² over its known mass",
         "N/A", 1.0, 0.0, 0.03, lambda rig: rig["force_factor"],
     ),
+    **{
+        f"resonance{end}": Gauge(
+            f"the peak of the coil's impedance for small tones, housing held, at {current:g} A",
+            "Hz", 1.0, 0.0, 0.03, partial(resonance, current=current),
+        )
+        for end, current in BIASES.items()
+    },
     "weight": Gauge(
         "weigh housing, platform and ram, and a third of the flexures; half of these is not known",
         "g", 1e3, 3e-4, 0.0, lambda rig: rig["surface_mass"] + rig["ram_mass"],
