@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
+import cosim
 from cosim.coupling.loop.agenda import exposures
 from cosim.mechanics.stickslip import numbers_of, rests_of
 from cosim.scene import Scene, load
 from cosim.simulation.checks import motion
+from cosim.simulation.simulate import summary
 from cosim.trials.camera import FRAME_RATE
 from tests.reference.monolithic import simulate as monolithic
 from tests.reference.parameters import reference_parameters
@@ -31,7 +33,8 @@ def scene_of(row: dict[str, str]) -> Scene:
 
 def drawn() -> Iterator[tuple[dict[str, str], Scene]]:
     """Rows in random order whose motion is regular and that the other solver knows: rising
-    sawtooth and sine without steps, no schematic, and a ram that does not hang in a wall."""
+    sawtooth and sine without steps, no schematic, a current that stays below its limit, and a ram
+    that does not hang in a wall."""
     with TABLE.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["command"]]
     for number in np.random.default_rng(SEED).permutation(len(rows)):
@@ -43,11 +46,14 @@ def drawn() -> Iterator[tuple[dict[str, str], Scene]]:
             continue
         if scene.circuit.model == "full" or motion(scene, lambda _: None)["motion"] != "regular":
             continue
+        if scene.circuit.model == "limited" and summary(scene)["current_limit_fraction"]:
+            continue
         yield rows[number], scene
 
 
 def test_rows_drawn_blind_are_what_another_solver_finds() -> None:
-    """The camera's reading, too: parabolas through five frames."""
+    """The camera's reading, too: parabolas through five frames. With ngspice the mean velocity is
+    as near as the run itself tells."""
     rows = drawn()
     for _ in range(ROWS):
         row, scene = next(rows)
@@ -62,5 +68,7 @@ def test_rows_drawn_blind_are_what_another_solver_finds() -> None:
         )
         heights = found.samples["z_surface"]
         seen = np.array(savgol_filter(heights, 5, 2, deriv=2, delta=1.0 / FRAME_RATE))
-        assert 1e-3 * float(row["v_average [mm/s]"]) == pytest.approx(found.v_average, rel=1e-3)
+        told = cosim.run(scene).summary["v_average_error"] if scene.rung.ngspice else 0.0
+        near = pytest.approx(found.v_average, rel=1e-3, abs=2.0 * told)
+        assert 1e-3 * float(row["v_average [mm/s]"]) == near
         assert -float(row["a_camera [m/s²]"]) == pytest.approx(seen[2:-2].min(), rel=1e-3)
