@@ -39,6 +39,9 @@ MELTED_COLD = MELTED / (1.0 + COPPER * MELTED)
 LIFT = 10.0
 """s: a lift, of which a summary tells the rise."""
 
+_CYCLES = ((LIFT, 0.0), (inf, 1.0))
+"""Time (s) and duty of that, and of a current for ever."""
+
 SPREAD = {
     **{"winding_to_body": 2.0, "winding_capacity": 1.9},
     **{"body_to_air": 1.22, "body_capacity": 1.25},
@@ -101,6 +104,13 @@ def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float 
     return rise_limit / (cold * (1.0 + COPPER * rise_limit))
 
 
+def rises(coil: Coil, heat: float) -> list[list[float | None]]:
+    """The rises, K, that a current which makes ``heat`` (W) of the cold winding brings in a LIFT
+    and for ever: the lower and the upper end of the estimate of each, None without end."""
+    ends = [[warmed(heat, rise(coil, *on, side)) for side in (-1, 1)] for on in _CYCLES]
+    return [[end if isfinite(end) else None for end in both] for both in ends]
+
+
 def heats(scene: Scene, energy_copper: float) -> dict[str, Any]:
     """What a summary tells of the heat: that of one coil (W), and its rises (K), from the lower to
     the upper end of the estimate, None without end. ``energy_copper`` (J) is that of all coils and
@@ -112,9 +122,5 @@ def heats(scene: Scene, energy_copper: float) -> dict[str, Any]:
     share = coil.resistance / (coil.resistance + sense)
     coils = coil.count * (1 if scene.drive.phase_deg is None else 2)
     heat = energy_copper / coils / scene.run.duration * share
-    found = {
-        "coil_rise_lift": [warmed(heat, rise(coil, LIFT, 0.0, side)) for side in (-1, 1)],
-        "coil_rise_continuous": [warmed(heat, rise(coil, side=side)) for side in (-1, 1)],
-    }
-    ends = {name: [x if isfinite(x) else None for x in both] for name, both in found.items()}
-    return {"coil_heat": heat, **ends}
+    lift, continuous = rises(coil, heat)
+    return {"coil_heat": heat, "coil_rise_lift": lift, "coil_rise_continuous": continuous}

@@ -1,7 +1,6 @@
 """A run's numbers for a reader: the table that is printed."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from typing import Any
 
 from cosim.scene import Scene
@@ -115,14 +114,13 @@ def _heat(summary: dict[str, Any]) -> str:
     """The heat of a coil, and how warm it would make it."""
     if "coil_heat" not in summary:
         return ""
-    lift, ever = (rises(summary[f"coil_rise_{name}"]) for name in ("lift", "continuous"))
+    lift, ever = (warmer(summary[f"coil_rise_{name}"]) for name in ("lift", "continuous"))
     return f"{summary['coil_heat']:.3g} W; warmer by {lift} in 10 s, {ever} for ever (estimate)"
 
 
-def rises(ends: Sequence[float | None]) -> str:
-    """How much warmer a coil becomes, from the least to the most, K; None or infinite is without
-    end."""
-    known = [f"{end:.3g}" for end in ends if end is not None and isfinite(end)]
+def warmer(ends: Sequence[float | None]) -> str:
+    """How much warmer a coil becomes, from the least to the most, K; None is without end."""
+    known = [f"{end:.3g}" for end in ends if end is not None]
     if len(known) < len(ends):
         return f"at least {known[0]} K" if known else "more and more"
     return f"{' to '.join(known)} K"

@@ -6,12 +6,12 @@ from math import isfinite, nan
 
 import numpy as np
 
-from cosim.circuit.heat import DRIVE_RANGE_HEAT, LIFT, RATED_CURRENT, rise, warmed
+from cosim.circuit.heat import DRIVE_RANGE_HEAT, LIFT, RATED_CURRENT, rises
 from cosim.studies.limits.changes import AS_IT_IS, Change
 from cosim.studies.limits.runs import GOALS, Goal
 from cosim.studies.limits.study import Rig, Study
 from cosim.studies.tables import brief, span
-from cosim.waveforms.report import rises
+from cosim.waveforms.report import warmer
 
 BY_NAME = {goal.name: goal for goal in GOALS}
 
@@ -130,18 +130,20 @@ def in_short(every: Sequence[Gain], ranges: bool = True) -> str:
         "twice the heat": known[TWICE_HEAT],
     }
     return ", ".join(
-        f"{words} {_percent(gain.middle)} %"
-        + (f" ({_ends(gain)})" if ranges and len(gain.every) > 1 else "")
+        f"{words} {percent(gain.middle)} %"
+        + (f" ({ends(gain)})" if ranges and len(gain.every) > 1 else "")
         for words, gain in told.items()
     )
 
 
-def _ends(gain: Gain) -> str:
-    return f"{_percent(min(gain.every))} to {_percent(max(gain.every))}"
+def ends(gain: Gain) -> str:
+    """The range over the rigs, %."""
+    return f"{percent(min(gain.every))} to {percent(max(gain.every))}"
 
 
-def _percent(share: float) -> str:
-    return f"{round(100.0 * share):+d}"  # no minus before a zero
+def percent(share: float) -> str:
+    """With its sign, but no minus before a zero."""
+    return f"{round(100.0 * share):+d}"
 
 
 def _as_it_is(study: Study, goal: Goal) -> Iterator[str]:
@@ -180,18 +182,18 @@ def _group(every: Sequence[Gain], group: str) -> Iterator[str]:
     told = [f"{gain.change.name} {_share(gain)}" for gain in shown]
     rest = [gain.middle for gain in some if gain not in shown]
     if len(rest) == 1:
-        told.append(f"one other {_percent(rest[0])} %")
+        told.append(f"one other {percent(rest[0])} %")
     elif rest:
-        told.append(f"{len(rest)} others {_percent(min(rest))} to {_percent(max(rest))} %")
+        told.append(f"{len(rest)} others {percent(min(rest))} to {percent(max(rest))} %")
     yield f"The {some[0].goal.title}, robustly, with another {GROUPS[group]}: {'; '.join(told)}."
 
 
 def _share(gain: Gain) -> str:
-    text = f"{_percent(gain.middle)} %"
+    text = f"{percent(gain.middle)} %"
     if len(gain.every) > 1:
-        own = _percent(gain.own) if isfinite(gain.own) else "nothing"
+        own = percent(gain.own) if isfinite(gain.own) else "nothing"
         alike = sum(np.sign(gain.middle) * one > gain.noise for one in gain.every)
-        text += f" ({_ends(gain)}; {own}; {alike} of {len(gain.every)})"
+        text += f" ({ends(gain)}; {own}; {alike} of {len(gain.every)})"
     return text
 
 
@@ -214,10 +216,7 @@ def _over(values: Sequence[float]) -> str:
 
 def _warmth(study: Study) -> str:
     coil = study.scene.coil
-    lift, ever = (
-        rises([warmed(DRIVE_RANGE_HEAT, rise(coil, *on, side=side)) for side in (-1, 1)])
-        for on in ((LIFT, 0.0), ())
-    )
+    lift, ever = map(warmer, rises(coil, DRIVE_RANGE_HEAT))
     current = np.sqrt(DRIVE_RANGE_HEAT / coil.resistance)
     return (
         f"The coil may make {DRIVE_RANGE_HEAT:.1f} W here, the most of the data sheet's range of "

@@ -11,7 +11,7 @@ from cosim.evaluate.store import Store, reported
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
 from cosim.studies.limits import figures
-from cosim.studies.limits.answer import BY_NAME, gains, noise, sentences
+from cosim.studies.limits.answer import BY_NAME, ends, gains, noise, percent, sentences
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Settings
 from cosim.studies.limits.judge import Key, Point
 from cosim.studies.limits.runs import GOALS, NEEDED, Goal, command
@@ -81,8 +81,7 @@ def _gains(found: Study, goal: Goal) -> Iterator[Row]:
         if gain and isfinite(gain.own):
             own = f"{100.0 * gain.own:+.1f}"
         if gain and len(gain.every) > 1:
-            ends = (100.0 * one for one in (gain.middle, min(gain.every), max(gain.every)))
-            rigs = "{:+.0f} ({:+.0f} to {:+.0f})".format(*ends)
+            rigs = f"{percent(gain.middle)} ({ends(gain)})"
         yield {
             "change": change.name,
             "robust (median)": robust.median * goal.scale if robust else nan,

@@ -14,8 +14,8 @@ from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.store import Store
 from cosim.files.reader import read
-from cosim.mechanics.part import slip_budget
 from cosim.scene import Scene
+from cosim.simulation.summary import budget
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Change, Settings
 from cosim.studies.limits.judge import TRIES, Key, Point, confirmed, judged, tried
 from cosim.studies.limits.runs import Bench, Goal
@@ -76,13 +76,7 @@ class Study:
     def slips(self) -> list[Mapping[str, tuple[float, float]]]:
         """Accelerations of the surface, m/s², beyond which a part slips on its way up or down, on
         each rig."""
-        return [_slips(Bench.base(self.scene, rig.settings, "a rig")) for rig in self.rigs]
-
-
-def _slips(scene: Scene) -> Mapping[str, tuple[float, float]]:
-    friction, mechanics = scene.friction, scene.mechanics
-    force = friction.normal_force * mechanics.n_surfaces / mechanics.part_mass
-    return slip_budget(friction.mu_s, force, mechanics.gravity, friction.mu_plate)
+        return [budget(Bench.base(self.scene, rig.settings, "a rig")) for rig in self.rigs]
 
 
 def steps(efforts: Efforts, changes: Sequence[Change], rigs: int) -> int:

@@ -26,8 +26,6 @@ TARGETS = (AS_IT_IS.name, "falling sawtooth")
 """The machines of which the robust velocity upwards is wanted: that of all measured trials, and one
 of the shapes that are said to bring most."""
 
-WIDE = (-np.inf, np.inf)
-
 SPREAD = 0.4
 """How far rigs are drawn about given ones, of these' own spread. Of 14 drawn so by 0.35 (and 0.5)
 the published trials, their own numbers fitted anew, have a median cost of 0.137 (0.132); of the 14
@@ -144,11 +142,12 @@ def gauged_on(scene: Scene) -> list[list[float]]:
     """What each measurement by gauges shows on the rig of a scene, SI; of a current beyond what the
     device's own source holds in its coil nothing but that."""
     rig, ends = numbers_of(scene), held_currents(scene)
-    every = (one.gauges for one in CANDIDATES if one.name not in FILMS)
-    return [
-        [float(np.clip(gauge.of(rig), *(ends if gauge.unit == "A" else WIDE))) for gauge in some]
-        for some in every
-    ]
+
+    def shown(gauge: Gauge) -> float:
+        value = gauge.of(rig)
+        return float(np.clip(value, *ends)) if gauge.unit == "A" else value
+
+    return [[*map(shown, one.gauges)] for one in CANDIDATES if one.name not in FILMS]
 
 
 def held_currents(scene: Scene) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -19,6 +19,8 @@ from cosim.studies.plots import headline
 from cosim.studies.sweep.dataset import FAILURE, POINT, swept
 from cosim.studies.sweep.report import at, fastest, setting
 from cosim.waveforms.quantities import label
+
+T = TypeVar("T")
 
 STAYS = 0.05e-3
 """m/s; a part that moves more slowly than this counts as not transported."""
@@ -89,8 +91,7 @@ def _own(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
     means = [str(name) for name in data if str(name).endswith(".mean")][:MOST_OWN]
     dims = data[FAILURE].dims
     first = xr.broadcast(data[names[0]], data[FAILURE])[0].transpose(*dims).values.ravel()
-    rows = -(-len(means) // 2)
-    for axis, name in zip(figure.subplots(rows, 2, squeeze=False).flat, means, strict=False):
+    for axis, name in _panels(figure, means):
         values = data[name].transpose(*dims).values.ravel()
         axis.plot(first, values, ".", color="#1f6fb2")
         axis.set_xlabel(data[names[0]].key)
@@ -126,7 +127,7 @@ def _curves(figure: Figure, data: xr.Dataset, name: str) -> None:
     figure.axes[0].axhline(0.0, color="0.3", lw=0.8)
 
 
-def _panels(figure: Figure, shown: Sequence[Quantity]) -> list[tuple[Axes, Quantity]]:
+def _panels(figure: Figure, shown: Sequence[T]) -> list[tuple[Axes, T]]:
     """Axes for each, two beside each other."""
     every = [*figure.subplots(-(-len(shown) // 2), 2, squeeze=False).flat]
     for axis in every[len(shown) :]:
