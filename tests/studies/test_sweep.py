@@ -281,6 +281,22 @@ def test_rugged_ground_is_told_from_a_slope() -> None:
     assert np.argwhere(figure._rugged(ground, norm)[1:-1, 1:-1]).tolist() == [[1, 2]]
 
 
+def test_a_figure_of_ones_own_circuit_says_which_mean_changes_most() -> None:
+    resistance = xr.DataArray(
+        [0.5, 1.0, 2.0], dims="R", attrs={"key": "circuit.param.R", "units": "?"}
+    )
+    means = {
+        "rotor.omega.mean": ("R", [100.0, 90.0, np.nan]),
+        "Vemf.mean": ("R", [5.0, 1.0, np.nan]),
+    }
+    failure = {"failure": ("R", ["", "", "no such circuit"])}
+    drawn = figure.draw(xr.Dataset(means | failure, {"R": resistance}), "motor")
+    assert drawn.get_suptitle() == "motor: Vemf.mean from 1 to 5 over circuit.param.R, 3 points"
+    first = drawn.axes[0]
+    assert first.get_xlabel() == "circuit.param.R"
+    assert [line.get_marker() for line in first.lines] == [".", "x"]  # one failed
+
+
 def test_a_kill_leaves_no_older_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Between the numbers and the figure of another sweep, whose journal is gone."""
     (tmp_path / "figure.png").write_bytes(b"old")

@@ -56,8 +56,7 @@ def draw(data: xr.Dataset, title: str) -> Picture:
     """The figure of the dataset of a sweep."""
     figure = Picture(13.0, 8.4, "constrained")
     if "v_average" not in data and any(str(name).endswith(".mean") for name in data):
-        _own(figure, data, swept(data))
-        headline(figure, title)
+        headline(figure, f"{title}: {_own(figure, data, swept(data))}")
         return figure
     if POINT in data.dims:
         _scatters(figure, data, swept(data))
@@ -86,16 +85,27 @@ def draw(data: xr.Dataset, title: str) -> Picture:
 MOST_OWN = 6
 
 
-def _own(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
-    """Of a scene with its own FMUs: means over the first key, a point for each setting."""
+def _own(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> str:
+    """Of a scene with its own FMUs: means over the first key, a point for each setting; in words
+    the mean that changes most for its size."""
     means = [str(name) for name in data if str(name).endswith(".mean")][:MOST_OWN]
     dims = data[FAILURE].dims
-    first = xr.broadcast(data[names[0]], data[FAILURE])[0].transpose(*dims).values.ravel()
+    over = xr.broadcast(data[names[0]], data[FAILURE])[0].transpose(*dims).values.ravel()
+    changes: list[tuple[float, str]] = []
     for axis, name in _panels(figure, means):
         values = data[name].transpose(*dims).values.ravel()
-        axis.plot(first, values, ".", color="#1f6fb2")
-        axis.set_xlabel(data[names[0]].key)
+        axis.plot(over, values, ".", color="#1f6fb2")
+        axis.ticklabel_format(useOffset=False)
+        _over_key(axis, data, names[0])
         axis.set_title(name.replace("$", "\\$"), loc="left", fontsize=10.5)
+        known = values[np.isfinite(values)]
+        if known.size:
+            low, high = known.min(), known.max()
+            share = (high - low) / (max(abs(low), abs(high)) or 1.0)
+            changes.append((share, f"{name} from {low:.4g} to {high:.4g}"))
+    ways = ", ".join(data[name].key for name in names)
+    most = max(changes, default=(0.0, "all failed"))[1].replace("$", "\\$")
+    return f"{most} over {ways}, {data[FAILURE].size} points"
 
 
 def _row(rows: Any, number: int, count: int) -> list[Axes]:
