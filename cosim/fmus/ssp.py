@@ -13,13 +13,14 @@ import numpy as np
 
 from cosim.circuit.netlist import prepare
 from cosim.drive.command import command
-from cosim.drive.pieces import SINE, Piece
+from cosim.drive.pieces import LEVEL, SINE, Piece
 from cosim.errors import BadInput
 from cosim.files.atomic import whole
 from cosim.fmus.netlist import write
 from cosim.mechanics.package import unpacked, zipped
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
+from cosim.scene.firmware import GAIN
 
 _FALL = 1e-9
 """s; of a jump of the drive, which ngspice's own sources want above 0."""
@@ -76,8 +77,8 @@ def _deck(scene: Scene) -> str:
 
 
 def _points(scene: Scene, column: str) -> list[tuple[float, float]]:
-    """Times and values of a source: before time 0 it is 0."""
-    found = [(0.0, 0.0)]
+    """Times and values of a source: before time 0 the command is 0, and both pins are at rest."""
+    found = [(0.0, 0.0 if column == "v1" else command(scene).v_offset)]
     for begin, until, values in _lines(scene, column):
         t = np.linspace(begin, until, len(values))
         same = abs(values[0] - found[-1][1]) <= 1e-12
@@ -99,18 +100,22 @@ def _lines(scene: Scene, column: str) -> Iterator[tuple[float, float, list[float
     while begin < end:
         for piece in found.pieces(begin, end, _AT_A_TIME):
             until = min(piece.until, end)
-            yield piece.begin, until, _values(piece, until, column)
+            yield piece.begin, until, _values(piece, until, column, found.v_offset)
             begin = until
 
 
-def _values(piece: Piece, until: float, column: str) -> list[float]:
-    if column != "v1":
-        return [getattr(piece, column)] * 2
+def _values(piece: Piece, until: float, column: str, v_offset: float) -> list[float]:
+    if column == "pin":
+        return [piece.pin] * 2
+    if column == "dac" and piece.kind == LEVEL:
+        return [piece.dac] * 2
     parts = 1
     if piece.kind == SINE:
         parts = max(1, round((until - piece.begin) * abs(piece.rate) * _PARTS))
     times = np.linspace(piece.begin, until, parts + 1)
-    return [*map(piece.value, times[:-1].tolist()), piece.before(until)]
+    values = [*map(piece.value, times[:-1].tolist()), piece.before(until)]
+    # A DAC that follows a smooth command is what makes that of the pin's mean (full.cir).
+    return values if column == "v1" else [v_offset - value / GAIN for value in values]
 
 
 def _structure(scene: Scene) -> str:

@@ -1,5 +1,6 @@
 """The machine as an .ssp in other masters, as far as they are installed, against our Jacobi."""
 
+import re
 import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
@@ -10,6 +11,7 @@ import pytest
 import cosim
 from benchmarks.peers import masters
 from cosim.cli.main import main
+from cosim.drive.command import command as command_of
 from cosim.toolchain.processes import in_place
 
 STEP, DURATION = 1e-4, 0.1
@@ -79,6 +81,28 @@ def test_the_structure_joins_variables_that_are_there(tmp_path: Path) -> None:
         assert kinds[joined.get("endElement"), joined.get("endConnector")] == "input"
     values = {each.get("name"): each[0].get("value") for each in root.iter(f"{ssv}Parameter")}
     assert values["part_mass"] == "0.012"
+
+
+@pytest.mark.parametrize("waveform", ["sawtooth", "sine", "square"])
+def test_the_pins_make_the_command(tmp_path: Path, waveform: str) -> None:
+    """By the schematic's own formula, V1 = (R4/R2) (V_offset - V_DAC), from rest on."""
+    file = tmp_path / "rig.ssp"
+    settings = {"circuit.model": "full", "drive.quantised": False, "drive.waveform": waveform}
+    given = [word for key, x in settings.items() for word in ("--set", f"{key}={str(x).lower()}")]
+    assert main(["fmu", "ssp", "reference", *given, "--out", str(file)]) == 0
+    with zipfile.ZipFile(file) as archive:
+        inner = zipfile.ZipFile(archive.open("resources/circuit.fmu"))
+        deck = inner.read("resources/deck.cir").decode()
+    times, volts = {}, {}
+    for name in ("vdac", "voffset"):
+        words = re.findall(rf"^{name} .*pwl\(([^)]*)\)", deck, re.MULTILINE | re.IGNORECASE)[0]
+        times[name], volts[name] = np.array(words.split(), float).reshape(-1, 2).T
+    command = cosim.load("reference", {**settings, "run.duration": 1.0})
+    at = np.sort(np.random.default_rng(0).uniform(0.0, 0.2, 997))  # on no jump
+    pins = [np.interp(at, times[name], volts[name]) for name in ("voffset", "vdac")]
+    wanted = command_of(command).values(at)
+    np.testing.assert_allclose(15.0 / 4.7 * (pins[0] - pins[1]), wanted, atol=2e-3)
+    assert volts["vdac"][0] == pytest.approx(volts["voffset"][0])  # no command yet
 
 
 @pytest.mark.parametrize(
