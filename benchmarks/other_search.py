@@ -1,6 +1,6 @@
-"""Whether another search finds more than ``results/limits.csv`` has on the scene's own rig.
+"""Whether another search finds more than ``results/limits.csv`` has on a rig, by its number there.
 
-    python -m benchmarks.other_search best|robust [--seed N]
+    python -m benchmarks.other_search best|robust [--seed N] [--rig N]
 
 It is SciPy's differential evolution (R. Storn, K. Price, J. Global Optimization 11, 1997, 341-359),
 which shares nothing with the study's search but the machine, its runs, and the judge of what is
@@ -21,8 +21,9 @@ from cosim.search.protocol import apart
 from cosim.studies.limits.changes import CHANGES, STEPS, Change
 from cosim.studies.limits.judge import judged
 from cosim.studies.limits.runs import GOALS, NEEDED, Bench
+from cosim.studies.limits.study import ensemble
 
-FOUND = Path("results/limits.csv")
+FOUND, RIGS = Path("results/limits.csv"), Path("results/identify.json")
 COLUMN = {"best": "value", "robust": "median over turns"}
 MORE = {"best": 1.05, "robust": 1.08}
 POPULATION = {"best": 60, "robust": 24}
@@ -66,13 +67,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, prog="python -m benchmarks.other_search")
     parser.add_argument("kind", choices=[*COLUMN])
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--rig", type=int, default=0, help="0 for the scene's own")
     asked = parser.parse_args()
     with FOUND.open(newline="") as file:
         rows = [
-            row for row in csv.DictReader(file) if (row["rig"], row["kind"]) == ("0", asked.kind)
+            row
+            for row in csv.DictReader(file)
+            if (row["rig"], row["kind"]) == (str(asked.rig), asked.kind)
         ]
     known = {(row["change"], row["goal"]): float(row[COLUMN[asked.kind]]) for row in rows}
-    base, ratios = Bench.base(load("paper"), {}, "the scene's rig"), []
+    scene = load("paper")
+    rig = [{}, *ensemble(RIGS, scene)][asked.rig]
+    base, ratios = Bench.base(scene, rig, f"rig {asked.rig}"), []
     with Evaluator(base, kept=NEEDED) as evaluator:
         bench = Bench(base, evaluator)
         for change in CHANGES:

@@ -3,15 +3,11 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from cosim.cli.command import Command
 from cosim.cli.work import print_page, progress_bar, writable
 from cosim.studies.study import OVERRIDES, SCENE, SHOW, Option
-
-if TYPE_CHECKING:
-    from cosim.scene import Scene
-    from cosim.studies.spread.run import Spread
 
 _BAR = "{desc} {percentage:3.0f}% |{bar}| {n:.2f} of {total:g} s, {remaining} left"
 
@@ -42,8 +38,8 @@ def _run(
         from cosim.simulation.elsewhere import on_disk_in
         from cosim.waveforms.report import table
 
-        def progress(time: float) -> None:
-            bar.update(time - bar.n)
+        def progress(reached: float) -> None:
+            bar.update(reached - bar.n)
 
         with (
             progress_bar(base.name, base.run.duration, "s", delay=1.0, bar_format=_BAR) as bar,
@@ -51,8 +47,10 @@ def _run(
         ):
             result = cosim.run(base, progress=progress, strict=strict)
         result.save(folder)
-        found = _spread(result.scene) if spread else None
-        if found is not None:
+        found = None
+        if spread:
+            with progress_bar("spread", None, "run") as bar:
+                found = cosim.spread(result.scene, progress=progress)
             path = folder / "summary.json"
             saved = json.loads(path.read_text(encoding="utf-8"))
             write_json(path, saved | {"spread": found.summary()})
@@ -64,16 +62,6 @@ def _run(
     print(f"Figure: {folder / 'figure.png'}")
     if show:
         print_page(folder)
-
-
-def _spread(scene: "Scene") -> "Spread":
-    import cosim
-
-    def progress(runs: int) -> None:
-        bar.update(runs - bar.n)
-
-    with progress_bar("spread", None, "run") as bar:
-        return cosim.spread(scene, progress=progress)
 
 
 def _scenes(scene: str | None = None) -> None:

@@ -6,13 +6,11 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from fmpy import platform
+from fmpy import platform, platform_tuple
 
 from cosim.errors import BadInput, plain
 from cosim.files.atomic import whole
 from cosim.mechanics.package import zipped
-
-_PLATFORMS_3 = {"64": "x86_64-{}", "32": "x86-{}"}
 
 
 def pack(
@@ -36,14 +34,8 @@ def pack(
         if not describe(version, *paths, why):
             raise BadInput(f"{plain(str(library))}: {plain(why.value.decode())}.")
         root = ElementTree.parse(about).getroot()
-        place = folder / "binaries" / (platform if version == 2 else _platform_3())
+        place = folder / "binaries" / (platform if version == 2 else platform_tuple)
         place.mkdir(parents=True)
         (place / f"{root.attrib['modelName']}{library.suffix}").write_bytes(library.read_bytes())
         with whole(target) as file:
             zipped(folder, file)
-
-
-def _platform_3() -> str:
-    """Of FMI 3.0; FMPy's name is that of FMI 2.0."""
-    system, bits = platform[:-2], platform[-2:]
-    return _PLATFORMS_3[bits].format({"win": "windows"}.get(system, system))

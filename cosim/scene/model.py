@@ -248,7 +248,7 @@ class Scene(BaseModel):
         """Only the FMU solves two surfaces that move independently, and without a plate."""
         if self.drive.phase_deg is None:
             return self
-        able = sorted(name for name, rung in RUNGS.items() if rung.two_surfaces)
+        able = sorted(name for name, rung in RUNGS.items() if rung.driven and not rung.ngspice)
         self._need(
             "drive.phase_deg lets two surfaces move by themselves",
             ("circuit.model", able, " or ".join(f'"{name}"' for name in able)),

@@ -51,11 +51,6 @@ class Rung:
         """Whether it models the device's amplifier, and other rungs do the same."""
         return self.driven and not self.own_netlist
 
-    @property
-    def two_surfaces(self) -> bool:
-        """Whether two surfaces can move independently, which needs the coils in the FMU alone."""
-        return self.driven and not self.ngspice
-
 
 _ALL = (
     Rung(

@@ -27,13 +27,10 @@ class Known:
         self.feasible: Feasible = np.empty(0, bool)
         self._tree: KDTree | None = None
 
-    def set_at(self, points: Array) -> Array:
-        """The nearest points (rows) that can be set, inside the cube."""
-        return np.round(np.clip(points, 0.0, 1.0) * self._steps) / self._steps
-
     def rows(self, points: Array) -> list[int]:
-        """The rows of points here, which are run where they are not known."""
-        points = self.set_at(points)
+        """The rows here of the nearest points that can be set, which are run where they are not
+        known."""
+        points = np.round(np.clip(points, 0.0, 1.0) * self._steps) / self._steps
         keys = [point.tobytes() for point in points]
         new = [n for n, key in enumerate(keys) if key not in self._rows]
         new = [n for n in new if keys.index(keys[n]) == n]
@@ -47,7 +44,7 @@ class Known:
             self._tree = None
         return [self._rows[key] for key in keys]
 
-    def search(self, searches: Mapping[int, Search], runs: float = inf) -> None:
+    def search(self, searches: Mapping[int, Search], runs: int) -> None:
         """Let searches, by the number of the quantity that each is for, ask for ``runs`` points
         each, side by side, so that many workers have something to do."""
         for quantity, search in searches.items():
@@ -56,7 +53,7 @@ class Known:
         while asked := {
             quantity: points
             for quantity, search in searches.items()
-            if left[quantity] > 0 and len(points := _first(search.ask(), left[quantity]))
+            if left[quantity] > 0 and len(points := search.ask()[: left[quantity]])
         }:
             rows = self.rows(np.vstack([*asked.values()]))
             for quantity, points in asked.items():
@@ -93,7 +90,3 @@ class Known:
         column = self.scores[:, quantity]
         order = np.argsort(-column, kind="stable")
         return order[np.isfinite(column[order])]
-
-
-def _first(points: Array, most: float) -> Array:
-    return points if len(points) <= most else points[: int(most)]

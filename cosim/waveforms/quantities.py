@@ -18,11 +18,6 @@ SUMMARY = {row.pop("name"): Quantity(**row) for row in DictReader(_ROWS)}
 """Every entry by its name. Absent participants have none of theirs."""
 
 
-def unit(name: str) -> str:
-    """The SI unit of an entry of the summary; ``"1"`` for shares, counts and ratios."""
-    return SUMMARY[name].unit
-
-
 def meaning(name: str) -> dict[str, str]:
     """The attributes ``units`` and ``long_name`` of an entry in a dataset."""
     if name not in SUMMARY:  # of a scene with its own FMUs

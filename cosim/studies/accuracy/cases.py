@@ -11,7 +11,6 @@ from cosim.coupling.participants.amplifier import Amplifier
 from cosim.coupling.participants.linear import LinearParticipant, regulated_coil
 from cosim.coupling.participants.stickslip import FmuMechanics
 from cosim.drive.command import command
-from cosim.errors import BadInput
 from cosim.scene import Scene
 
 
@@ -111,15 +110,8 @@ def reference(name: str) -> Reference:
 
 
 def participants(scene: Scene) -> tuple[LinearParticipant | Amplifier, FmuMechanics]:
-    """The circuit and the mechanics of a scene, both at rest and able to go back.
-
-    Raises BadInput for other rungs than ``amplifier``.
-    """
+    """The circuit ``amplifier`` and the mechanics of a scene, at rest and able to go back."""
     circuit, coil, drive = scene.circuit, scene.coil, scene.drive
-    if circuit.model != "amplifier":
-        raise BadInput(
-            f'circuit.model = "{circuit.model}" cannot go back; the studies take "amplifier".'
-        )
     mechanics = FmuMechanics(scene)
     if drive.waveform == "sine" and drive.offset == 0.0:
         # Without limits, and exact, where the command is no straight line.

@@ -231,9 +231,11 @@ def _search(study: Study) -> str:
     own = study.rigs[0].points.values()
     asked = [point for point in own if point.rung]
     held = sum(point.confirmed for point in asked)
+    shorter = "; the other rigs are searched more briefly, and may reach more than is told"
     return (
-        f"Searches repeated with {len(study.repeats)} other seeds found robust values apart by at "
-        f"most: {apart}. Of {len(asked)} points the circuit with more in it confirms {held} within "
-        "1 %. All measured trials have a rising sawtooth, of 51 Hz at most and but for one of 30: "
-        "what other shapes bring, and what is reached at more, is a prediction."
+        f"Searches of the scene's rig repeated with {len(study.repeats)} other seeds found robust "
+        f"values apart by at most: {apart}{shorter if len(study.rigs) > 1 else ''}. Of "
+        f"{len(asked)} points the circuit with more in it confirms {held} within 1 %. All measured "
+        "trials have a rising sawtooth, of 51 Hz at most and but for one of 30: what other shapes "
+        "bring, and what is reached at more, is a prediction."
     )

@@ -3,18 +3,7 @@
 The formulas themselves, with source and symbols, are in :mod:`cosim.drive.surface.formulas`.
 """
 
-import math
-from argparse import ArgumentTypeError
-
 from cosim.studies.study import Option, Study, chart, folder_of_trials
-
-
-def _number(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise ArgumentTypeError(f"{text} is not a finite number")
-    return value
-
 
 _GIVEN = (
     ("--mu-s", "static coefficient of friction", "MU"),
@@ -34,7 +23,7 @@ STUDIES = (
         "paper.theory.theory",
         "the paper's closed forms: theory.json, figure3.png, figure4.png",
         (
-            *(Option(n, f"{t} (default: the paper's)", unit, _number) for n, t, unit in _GIVEN),
+            *(Option(n, f"{t} (default: the paper's)", unit, float) for n, t, unit in _GIVEN),
             _ERRATA,
         ),
         command="theory",

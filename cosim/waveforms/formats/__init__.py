@@ -11,7 +11,7 @@ from pathlib import Path
 
 from cosim.errors import BadInput, plain
 from cosim.files.atomic import whole
-from cosim.files.declared import declared
+from cosim.files.declared import modules
 from cosim.waveforms.formats.source import Format, Run, read
 
 __all__ = ["export", "formats", "parse", "read"]
@@ -20,7 +20,8 @@ __all__ = ["export", "formats", "parse", "read"]
 @cache
 def formats() -> dict[str, Format]:
     """Every format by its name."""
-    return declared(__name__, "FORMAT")
+    found = [module.FORMAT for module in modules(__name__) if hasattr(module, "FORMAT")]
+    return {one.name: one for one in sorted(found, key=lambda one: one.name)}
 
 
 def parse(lists: list[str]) -> list[str]:
