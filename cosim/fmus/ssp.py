@@ -13,7 +13,7 @@ import numpy as np
 
 from cosim.circuit.netlist import prepare
 from cosim.drive.command import command
-from cosim.drive.pieces import LEVEL, SINE, Piece
+from cosim.drive.pieces import LEVEL, SINE, Command, Piece
 from cosim.errors import BadInput
 from cosim.files.atomic import whole
 from cosim.fmus.netlist import write
@@ -78,8 +78,9 @@ def _deck(scene: Scene) -> str:
 
 def _points(scene: Scene, column: str) -> list[tuple[float, float]]:
     """Times and values of a source: before time 0 the command is 0, and both pins are at rest."""
-    found = [(0.0, 0.0 if column == "v1" else command(scene).v_offset)]
-    for begin, until, values in _lines(scene, column):
+    drive = command(scene)
+    found = [(0.0, 0.0 if column == "v1" else drive.v_offset)]
+    for begin, until, values in _lines(drive, scene.run.duration, column):
         t = np.linspace(begin, until, len(values))
         same = abs(values[0] - found[-1][1]) <= 1e-12
         if not same:
@@ -93,18 +94,17 @@ def _points(scene: Scene, column: str) -> list[tuple[float, float]]:
     return found
 
 
-def _lines(scene: Scene, column: str) -> Iterator[tuple[float, float, list[float]]]:
+def _lines(drive: Command, end: float, column: str) -> Iterator[tuple[float, float, list[float]]]:
     """Begin, end, and values at equal distances, of each piece of the drive."""
-    found, end = command(scene), scene.run.duration
     begin = 0.0
     while begin < end:
-        for piece in found.pieces(begin, end, _AT_A_TIME):
+        for piece in drive.pieces(begin, end, _AT_A_TIME):
             until = min(piece.until, end)
-            yield piece.begin, until, _values(piece, until, column, found.v_offset)
+            yield piece.begin, until, _values(piece, until, column)
             begin = until
 
 
-def _values(piece: Piece, until: float, column: str, v_offset: float) -> list[float]:
+def _values(piece: Piece, until: float, column: str) -> list[float]:
     if column == "pin":
         return [piece.pin] * 2
     if column == "dac" and piece.kind == LEVEL:
@@ -114,8 +114,8 @@ def _values(piece: Piece, until: float, column: str, v_offset: float) -> list[fl
         parts = max(1, round((until - piece.begin) * abs(piece.rate) * _PARTS))
     times = np.linspace(piece.begin, until, parts + 1)
     values = [*map(piece.value, times[:-1].tolist()), piece.before(until)]
-    # A DAC that follows a smooth command is what makes that of the pin's mean (full.cir).
-    return values if column == "v1" else [v_offset - value / GAIN for value in values]
+    # Of a smooth command a piece does not have the DAC's voltage, which makes it of the pin's.
+    return values if column == "v1" else [piece.pin - value / GAIN for value in values]
 
 
 def _structure(scene: Scene) -> str:

@@ -291,7 +291,8 @@ def test_a_figure_of_ones_own_circuit_says_which_mean_changes_most() -> None:
     }
     failure = {"failure": ("R", ["", "", "no such circuit"])}
     drawn = figure.draw(xr.Dataset(means | failure, {"R": resistance}), "motor")
-    assert drawn.get_suptitle() == "motor: Vemf.mean from 1 to 5 over circuit.param.R, 3 points"
+    message = "motor: Vemf.mean from 1 to 5 over circuit.param.R, 3 points, 1 failed (×)"
+    assert drawn.get_suptitle() == message
     first = drawn.axes[0]
     assert first.get_xlabel() == "circuit.param.R"
     assert [line.get_marker() for line in first.lines] == [".", "x"]  # one failed

@@ -55,8 +55,10 @@ OTHERS = (
 def draw(data: xr.Dataset, title: str) -> Picture:
     """The figure of the dataset of a sweep."""
     figure = Picture(13.0, 8.4, "constrained")
+    failed = int(np.sum(data[FAILURE].values != ""))
+    words = f"{data[FAILURE].size} points" + (f", {failed} failed (×)" if failed else "")
     if "v_average" not in data and any(str(name).endswith(".mean") for name in data):
-        headline(figure, f"{title}: {_own(figure, data, swept(data))}")
+        headline(figure, f"{title}: {_own(figure, data, swept(data))}, {words}")
         return figure
     if POINT in data.dims:
         _scatters(figure, data, swept(data))
@@ -67,8 +69,6 @@ def draw(data: xr.Dataset, title: str) -> Picture:
             _curves(figure, data.squeeze([n for n in names if n != varied[0]]), varied[0])
         else:
             _maps(figure, data, varied)
-    failed = int(np.sum(data[FAILURE].values != ""))
-    words = f"{data[FAILURE].size} points" + (f", {failed} failed (×)" if failed else "")
     if len(data.squeeze().dims) > 1:
         words += f"; hatched: the part stays (below {STAYS * 1e3:g} mm/s)"
         if POINT not in data.dims:
@@ -105,7 +105,7 @@ def _own(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> str:
             changes.append((share, f"{name} from {low:.4g} to {high:.4g}"))
     ways = ", ".join(data[name].key for name in names)
     most = max(changes, default=(0.0, "all failed"))[1].replace("$", "\\$")
-    return f"{most} over {ways}, {data[FAILURE].size} points"
+    return f"{most} over {ways}"
 
 
 def _row(rows: Any, number: int, count: int) -> list[Axes]:
