@@ -30,11 +30,6 @@ class Pace:
         self._scene, self._mechanics = scene, mechanics
         self._spent = 0.0
 
-    @property
-    def enough(self) -> float:
-        """Internal steps, beyond one for each step asked for, from which on to judge."""
-        return math.inf if self._spent > BEGINNING else ENOUGH
-
     def judge(self, time: float, steps: int) -> None:
         """At ``time`` (s), after ``steps`` of the FMU.
 

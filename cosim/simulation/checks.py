@@ -36,7 +36,7 @@ from cosim.simulation.fidelity import LEAST, Fidelity, relative_error
 from cosim.simulation.here import few_rows, simulate_here
 from cosim.waveforms.result import Result
 
-COARSER = 3.0
+COARSER = 3.5
 """How much longer the steps are of the run that tells the error of another one."""
 
 LOOSER = 1e-6

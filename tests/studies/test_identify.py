@@ -277,6 +277,7 @@ def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(
     monkeypatch.setattr(plan, "SCREENED", 16)
     monkeypatch.setattr(plan, "AGAIN", (32, 6, 3))
     monkeypatch.setattr(plan, "CAREFUL", (64, 6, 3))
+    monkeypatch.setattr(plan, "DRIVES", (64, 6, 3))
     monkeypatch.setattr(plan, "LAST", 10)
     more: dict[str, Any] = {"bounds": bounds, "quick": True, "seed": 4}
     whole = identify(tmp_path, workers=2, out=tmp_path / "out", **more)
@@ -438,6 +439,7 @@ def test_ranges_hold_the_truth_or_are_not_told(
     whether ranges are right where the search is easy and the model true: then they should hold the
     truth. It says nothing of all 13 keys, nor of a model that is wrong."""
     monkeypatch.setattr(plan, "CAREFUL", (64, 6, 4))
+    monkeypatch.setattr(plan, "DRIVES", (64, 6, 4))
     few = ((3, 30, 0.12), (1, 60, 0.05))
     monkeypatch.setattr(run, "FULL", plan.Effort(1, 25, few, ((1, 20, 0.1),), 1, 2))
     free = {

@@ -23,10 +23,6 @@ nobody knows yet how long a step takes."""
 _CALLS = ("set_reals", "do_step", "get_reals", "get_integers")
 
 
-Block = tuple[Array, Array, Array]
-"""Intervals as :meth:`Recorder.follow` takes them: ``edges``, ``start``, ``end``."""
-
-
 class Recorder:
     """The waveforms of the mechanics, filled as ``follow`` or ``advance`` is called.
 

@@ -15,7 +15,7 @@ from cosim.evaluate.store import Store, reported
 from cosim.files.picture import Picture
 from cosim.scene import keys
 from cosim.studies.identify.problem.space import Space, read_space
-from cosim.studies.identify.problem.targets import TRANSPORT, WEIGHTS, Measured, read_trials
+from cosim.studies.identify.problem.targets import WEIGHTS, Measured, read_trials
 from cosim.studies.identify.report import figures, files, measures, solved
 from cosim.studies.identify.report.verdicts import judge, rigs_meant
 from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds, searched
@@ -164,7 +164,7 @@ def _asked(space: Space, trials: Sequence[Measured], effort: object) -> list[Any
     """All that decides what a stage finds, beside the seed and the programs."""
     entries = [repr(entry) for entry in (*space.entries.values(), *space.trial.values())]
     signals = [[trial.label, *map(_sum, trial.target.signals.values())] for trial in trials]
-    return [entries, space.laws, space.measured, signals, repr((effort, WEIGHTS, TRANSPORT))]
+    return [entries, space.laws, space.measured, signals, repr((effort, WEIGHTS))]
 
 
 def _sum(values: Array) -> float:
@@ -181,8 +181,7 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[Ro
         rigs.append(rig := plan.finished(name, rows, found))
         surface = replace(plan.fine, targets=[trials[k].surface for k in left])
         alone = plan.drives(f"{name}: surface", rig.point, surface)
-        transport = replace(plan.fine, targets=[trials[k].transport for k in left])
-        both = plan.drives(f"{name}: surface and part", rig.point, transport)
+        both = plan.drives(f"{name}: surface and part", rig.point, plan.fine.part(left))
         for k, *owns in zip(left, alone.own, both.own, strict=True):
             held_out[k] = {"trial": trials[k].label, "fold": number} | {
                 kind: measures.errors(trials[k], rig.rig, own) | measures.own_parameters(own)

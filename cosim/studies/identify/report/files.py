@@ -202,8 +202,7 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
     }
     if numbers["apart"]:
         tables["Trials that were not fitted"] = [*map(_told, numbers["apart"])]
-    both = "surface and part, whose heights count twice"
-    for kind, words in (("surface", "surface alone"), ("surface_and_part", both)):
+    for kind, words in (("surface", "surface alone"), ("surface_and_part", "surface and part")):
         if numbers["held_out"]:
             heading = f"Held out: rig from the other folds, own numbers from the trial's {words}"
             rows = [_told(one[kind]) for one in numbers["held_out"]]

@@ -23,7 +23,7 @@ PLACES = np.linspace(-2e-3, 2e-3, 9)
 
 KINDS = ("surface", "surface_and_part")
 """By what the own parameters of a trial that was held out are fitted: its surface alone; surface
-and part, whose heights count twice there."""
+and part."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

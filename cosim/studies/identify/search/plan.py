@@ -54,7 +54,9 @@ SCREENED, KEPT, SCREEN_ROUNDS = 128, 8, 4
 AGAIN = 256, 16, 4
 """The same before a solution is searched further."""
 CAREFUL = 512, 24, 5
-"""The same where a trial's own parameters must be the best there are."""
+"""The same of a rig that is to be finished."""
+DRIVES = 4096, 128, 5
+"""The same where only a trial's own parameters are sought: they must be the best there are."""
 LAST = 40
 """Generations at the finish's step."""
 
@@ -158,7 +160,7 @@ class Plan:
 
     def drives(self, name: str, point: Array, targets: Search) -> Found:
         """The best own parameters of trials on a rig, of many starts."""
-        return self._stage(name, lambda rng: targets.screen(point[None], rng, *CAREFUL))[0]
+        return self._stage(name, lambda rng: targets.screen(point[None], rng, *DRIVES))[0]
 
     def _telling(self, title: str) -> Progress:
         return lambda what, best: self.progress(f"{self.name}: {title}, {what}", best)
