@@ -22,7 +22,7 @@ from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
 from cosim.search.turns import TURN, turned
 from cosim.studies.limits import judge, report, runs, search, study
-from cosim.studies.limits.answer import BY_NAME, gain_on, gains, noise
+from cosim.studies.limits.answer import BY_NAME, differences, gain_on, gains, noise
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, FREE, STEPS, Machine
 from cosim.studies.limits.judge import Key, Point
 from cosim.studies.limits.report import STORE
@@ -246,7 +246,12 @@ def test_what_is_not_settled_does_not_stand() -> None:
                 assert abs(values[1] / values[0] - 1.0) <= 0.01 and point.value == values[0]
 
 
-def made_study(own: float, changed_: float, other: tuple[float, float], again: float) -> Study:
+def made_study(
+    own: float, changed_: float, other: tuple[float, float], again: dict[int, tuple[float, float]]
+) -> Study:
+    """What the device as it is and a sine reach on the scene's own rig and on another, and what
+    they reached ``again`` on a rig."""
+
     def points(as_it_is: float, sine: float) -> dict[Key, Point]:
         return {
             (name, "v_up", "robust"): Point(value, value, value, 1.0, value, 50.0, [], {})
@@ -255,16 +260,19 @@ def made_study(own: float, changed_: float, other: tuple[float, float], again: f
 
     rigs = [Rig({}, points(own, changed_)), Rig({}, points(*other))]
     changes = [AS_IT_IS, NAMED["sine"]]
-    return Study(load("paper"), changes, rigs, [points(again, changed_)])
+    return Study(load("paper"), changes, rigs, [(k, points(*one)) for k, one in again.items()])
 
 
 def test_gains_are_paired_on_each_rig() -> None:
-    found = made_study(0.02, 0.04, (0.03, 0.033), 0.021)
+    found = made_study(0.02, 0.04, (0.03, 0.033), {0: (0.021, 0.04)})
     (gain,) = gains(found, BY_NAME["v_up"])
     assert gain.every == pytest.approx((1.0, 0.1))
     assert (gain.own, gain.middle) == pytest.approx((1.0, 0.55))
     assert noise(found, BY_NAME["v_up"]) == pytest.approx(0.05) and gain.counts
-    assert not gains(made_study(0.02, 0.0206, (0.03, 0.03), 0.021), BY_NAME["v_up"])[0].counts
+    more = made_study(0.02, 0.0206, (0.03, 0.03), {0: (0.02, 0.0206), 1: (0.033, 0.03)})
+    assert differences(more, BY_NAME["v_up"]) == pytest.approx([0.0, 0.0, 0.1, 0.0])
+    assert not gains(more, BY_NAME["v_up"])[0].counts
+    assert noise(made_study(0.02, 0.04, (0.03, 0.033), {}), BY_NAME["v_up"]) == 0.0
     assert np.isnan(gain_on(found.rigs[0], AS_IT_IS, BY_NAME["v_down"]))
 
 

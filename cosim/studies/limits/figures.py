@@ -42,9 +42,10 @@ def changes(path: Path, study: Study, goal: Goal) -> None:
     note = (
         "Robust: the median over errors of ±2 % in the knobs, set anew for each change on each rig "
         "that fits the trials. Dot: the median over the rigs, hollow where it is within "
-        "the noise; bar: their range; cross: the scene's rig; grey band: what repeated searches "
-        "differ by. Red changes the waveform, orange the heat, green the grip, blue the circuit, "
-        "purple coil or magnet. All trials that were measured have a rising sawtooth."
+        "the noise; bar: their range; cross: the scene's rig; grey band: what nine in ten "
+        "repeated searches differ by at most. Red changes the waveform, orange the heat, green the "
+        "grip, blue the circuit, purple coil or magnet. All trials that were measured have a "
+        "rising sawtooth."
     )
     said = in_short(every, ranges=False)
     title = f"{goal.title.capitalize()}: {said}" if said else goal.title

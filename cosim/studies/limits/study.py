@@ -17,7 +17,7 @@ from cosim.files.reader import read
 from cosim.scene import Scene
 from cosim.simulation.summary import budget
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Change, Settings
-from cosim.studies.limits.judge import TRIES, Key, Point, confirmed, judged, tried
+from cosim.studies.limits.judge import TURNED, Key, Point, confirmed, judged, tried
 from cosim.studies.limits.runs import Bench, Goal
 from cosim.studies.limits.search import KINDS, Candidates, Effort, searched
 
@@ -30,7 +30,8 @@ class Efforts:
     others: tuple[Effort, Effort]
     """On the other rigs, whose searches begin with what was found on the scene's own."""
     again: int
-    """How often some machines are searched with other seeds, which tells the search's noise."""
+    """How often some machines are searched with other seeds on the scene's own rig, and once on
+    each other, which tells the search's noise."""
 
     def times(self, factor: float) -> "Efforts":
         """So many times as much."""
@@ -39,8 +40,8 @@ class Efforts:
 
 
 FULL = Efforts(
-    own=(Effort(512, 300, 120), Effort(0, 100, 50)),
-    others=(Effort(64, 40, 25), Effort(0, 20, 10)),
+    own=(Effort(512, 300, 120), Effort(0, 100, 80)),
+    others=(Effort(512, 80, 0), Effort(0, 40, 60)),
     again=3,
 )
 _FEW = Effort(32, 20, 10)
@@ -69,8 +70,8 @@ class Study:
     scene: Scene
     changes: Sequence[Change]
     rigs: list[Rig]
-    repeats: list[dict[Key, Point]]
-    """Of REPEATED on the own rig, searched alone with other seeds."""
+    repeats: Sequence[tuple[int, Mapping[Key, Point]]]
+    """Rigs, by their numbers, and what REPEATED reach there, searched with other seeds."""
 
     @property
     def slips(self) -> list[Mapping[str, tuple[float, float]]]:
@@ -83,7 +84,8 @@ def steps(efforts: Efforts, changes: Sequence[Change], rigs: int) -> int:
     """How many steps :func:`study` tells."""
     some = sum(change.searched for change in changes)
     repeated = sum(change.name in REPEATED for change in changes)
-    return (2 * some + 1) * (1 + rigs) + efforts.again * repeated + bool(efforts.again)
+    again = efforts.again + rigs * bool(efforts.again)
+    return (2 * some + 1) * (1 + rigs) + (2 * repeated + 1) * again
 
 
 def study(
@@ -102,29 +104,26 @@ def study(
     ``told`` hears of each step. The same for the same seed.
     """
     found: list[Rig] = []
-    repeats: list[dict[Key, Point]] = []
-    searched = [change for change in changes if change.searched]
-    own: dict[str, Candidates] = {}
+    repeats: list[tuple[int, dict[Key, Point]]] = []
+    first = [change for change in changes if change.searched]
+    again = [change for change in changes if change.name in REPEATED]
+    own: list[dict[str, Candidates]] = []
     for number, rig in enumerate([{}, *rigs]):
         base = Bench.base(scene, rig, f"rig {number}")
         with open_(base) as evaluator:
             work = _Work(Bench(base, evaluator), store, number, changes, told)
-            first, second = efforts.others if number else efforts.own
-            alone = work.candidates(searched, first, [seed, number, 0], own)
-            # Each with the best of all others, so that what helps one is tried on all, and a limit
-            # that is eased never lowers what is found.
-            words, seeds = ", with what helps others", [seed, number, 1]
-            both = work.candidates(searched, second, seeds, alone, alone, words)
-            found.append(Rig(rig, work.points(both, own=not number)))
-            if number:
-                continue
-            own = both
-            again = [change for change in changes if change.name in REPEATED]
-            for other in range(efforts.again):
-                apart = work.candidates(again, first, [seed, number, 2 + other])
-                repeats.append(work.points(apart, name=f"repeat {other}"))
-            if efforts.again:
-                told("searched again")
+            cost = efforts.others if number else efforts.own
+            # What a seed has found on the scene's own rig is where its searches of others begin.
+            for turn in range(1 + (min(1, efforts.again) if number else efforts.again)):
+                known, asked = own[turn] if number else _NOTHING, again if turn else first
+                both = work.searched(asked, cost, [seed, number, turn], known)
+                points = work.points(both, turn, own=not number and not turn)
+                if turn:
+                    repeats.append((number, points))
+                else:
+                    found.append(Rig(rig, points))
+                if not number:
+                    own.append(both)
     return Study(scene, changes, found, repeats)
 
 
@@ -141,12 +140,26 @@ class _Work:
     changes: Sequence[Change]
     told: Callable[[str], object]
 
-    def candidates(
+    def searched(
+        self,
+        changes: Sequence[Change],
+        efforts: tuple[Effort, Effort],
+        seed: list[int],
+        known: Mapping[str, Candidates],
+    ) -> dict[str, Candidates]:
+        """The candidates of each change by name, from those that are ``known``: first each by
+        itself, then with the best of all others, so that what helps one is tried on all, and a
+        limit that is eased never lowers what is found."""
+        alone = self._candidates(changes, efforts[0], [*seed, 0], known)
+        words = ", with what helps others"
+        return self._candidates(changes, efforts[1], [*seed, 1], alone, alone, words)
+
+    def _candidates(
         self,
         changes: Sequence[Change],
         effort: Effort,
         seed: list[int],
-        known: Mapping[str, Candidates] = _NOTHING,
+        known: Mapping[str, Candidates],
         others: Mapping[str, Candidates] = _NOTHING,
         words: str = "",
     ) -> dict[str, Candidates]:
@@ -172,22 +185,20 @@ class _Work:
         of = found[other.name]
         return {kind: [[[*one, *more] for one in some[:1]] for some in of[kind]] for kind in KINDS}
 
-    def points(
-        self, candidates: dict[str, Candidates], own: bool = False, name: str = ""
-    ) -> dict[Key, Point]:
-        """The judged points of machines; on the scene's ``own`` rig also by the amplifier, and with
-        those of the changes that are not searched."""
-        found = self.store.once(f"judged {self.rig} {name}", partial(self._judge, candidates, own))
-        if not name:
-            self.told(f"rig {self.rig}: judged")
+    def points(self, candidates: dict[str, Candidates], turn: int, own: bool) -> dict[Key, Point]:
+        """The judged points of machines, searched for the first time or again (``turn``); where
+        they are the scene's ``own`` rig's also by the amplifier, and with those of the changes that
+        are not searched."""
+        found = self.store.once(f"judged {self.rig} {turn}", partial(self._judge, candidates, own))
+        self.told(f"rig {self.rig}: judged")
         return {(change, goal, kind): Point(**of) for (change, goal, kind), of in found}
 
     def _judge(
         self, candidates: dict[str, Candidates], own: bool
     ) -> list[tuple[Key, dict[str, Any]]]:
         machines = {change.name: change.machine(self.bench.scene) for change in self.changes}
-        kinds, tries = (KINDS, TRIES) if own else (KINDS[1:], 1)
-        found = judged(self.bench, machines, candidates, kinds, tries)
+        kinds, most = (KINDS, TURNED) if own else (KINDS[1:], 1)
+        found = judged(self.bench, machines, candidates, kinds, most)
         if own:
             others = [change.name for change in self.changes if not change.searched]
             found = confirmed(self.bench, machines, found)
