@@ -1,5 +1,6 @@
 """The numbers of a run: ``summary.csv`` names and describes each entry of ``summary.json``."""
 
+from collections.abc import Mapping
 from csv import DictReader
 from pathlib import Path
 from typing import NamedTuple
@@ -18,11 +19,17 @@ SUMMARY = {row.pop("name"): Quantity(**row) for row in DictReader(_ROWS)}
 """Every entry by its name. Absent participants have none of theirs."""
 
 
-def meaning(name: str) -> dict[str, str]:
-    """The attributes ``units`` and ``long_name`` of an entry in a dataset."""
-    if name not in SUMMARY:  # of a scene with its own FMUs
+OF_SOURCES = {"power": "W", "energy": "J"}
+"""What a scene with ports has of a source, in its unit."""
+
+
+def meaning(name: str, units: Mapping[str, str] | None = None) -> dict[str, str]:
+    """The attributes ``units`` and ``long_name`` of an entry in a dataset; ``units`` are those of
+    the signals of a scene with ports."""
+    if name not in SUMMARY:  # of a scene with ports
         signal, _, what = name.rpartition(".")
-        return {"units": "?", "long_name": f"{what} of {signal}"}
+        unit = OF_SOURCES.get(what) or (units or {}).get(signal, "?")
+        return {"units": unit, "long_name": f"{what} of {signal}"}
     found = SUMMARY[name]
     return {"units": found.unit, "long_name": found.text}
 

@@ -388,6 +388,9 @@ def test_a_sweep_goes_over_parameters_of_fmus_and_circuit(tmp_path: Path) -> Non
     speed = data["rotor.omega.greatest"].values
     assert speed.shape == (2, 2) and (np.abs(speed[0]) > np.abs(speed[1])).all()
     assert (data["failure"].values == "").all()
+    units = {name: of.attrs.get("units") for name, of in data.data_vars.items()}
+    assert units["rotor.omega.greatest"] == "rad/s" and units["v(gp).mean"] == "V"
+    assert (units["Vemf.mean"], units["Vemf.power"], units["v(a)*i(Vemf).rms"]) == ("V", "W", "W")
 
 
 def test_an_fmu_that_ends_its_process_or_fails_is_told(tmp_path: Path) -> None:

@@ -2,16 +2,21 @@
 
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from fmpy import read_model_description
 
 from cosim.arrays import Array
+from cosim.circuit.joined import unit
 from cosim.evaluate.point import Outcome
 from cosim.files.atomic import together
+from cosim.mechanics.package import unpacked
 from cosim.scene import Scene, firmware, keys, to_toml
+from cosim.scene.tables import MACHINE
 from cosim.studies.sweep.design import Design
 from cosim.waveforms.columns import netcdf_name
 from cosim.waveforms.quantities import meaning
@@ -68,7 +73,7 @@ def dataset(scene: Scene, design: Design, found: Numbers, versions: dict[str, st
     ``table.key``. Beside a knob stands what it stands for. NaN stands for a point that failed, is
     still to be run, or has no such number. SI units.
     """
-    numbers = found.by_name()
+    numbers, units = found.by_name(), units_of(scene)
     axes = _names(design, {*numbers, FAILURE, POINT})
     dims = tuple(axes) if design.sample is None else (POINT,)
     columns = [list(axis.values) for axis in design.axes]
@@ -85,7 +90,7 @@ def dataset(scene: Scene, design: Design, found: Numbers, versions: dict[str, st
     variables = {
         netcdf_name(name): (
             *(dims, values.reshape(design.shape)),
-            _JUDGED if name == JUDGED else meaning(name),
+            _JUDGED if name == JUDGED else meaning(name, units),
         )
         for name, values in numbers.items()
     }
@@ -98,6 +103,24 @@ def dataset(scene: Scene, design: Design, found: Numbers, versions: dict[str, st
     }
     data = xr.Dataset(variables, coordinates, attributes)
     return data.assign_coords(_meant(scene, data))
+
+
+def units_of(scene: Scene) -> dict[str, str]:
+    """Of the signals of a scene with ports, by name; none where a file does not tell."""
+    files = {each.name: each.file for each in scene.fmu}
+    ends = [str(end) for port in scene.port for end in (port.origin, port.to)]
+    if any(end.startswith(f"{MACHINE}.") for end in ends):
+        files[MACHINE] = str(unpacked(2))
+    sources = [port.source for port in scene.port if port.source is not None]
+    found = {name: {"v": "V", "i": "A"}.get(name[:1].lower(), "?") for name in sources}
+    for name, file in files.items():
+        with suppress(Exception):  # whatever is wrong with it, its runs tell
+            for each in read_model_description(file, validate=False).modelVariables:
+                of = each.unit or (each.declaredType and each.declaredType.unit) or "1"
+                found[f"{name}.{each.name}"] = of
+    words = [port.probe for port in scene.port if port.probe is not None]
+    found |= {each: unit(each) for each in (*words, *(scene.circuit.save or ()))}
+    return found
 
 
 def _names(design: Design, taken: set[str]) -> list[str]:
