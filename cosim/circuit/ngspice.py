@@ -224,6 +224,9 @@ class Engine(Shared.NgSpiceShared):
 
 
 def _vector(name: str) -> str:
-    """What ngspice calls a saved vector: ``i(vemf)`` is ``vemf#branch``, ``v(out)`` is ``out``."""
+    """What ngspice calls a saved vector: ``i(vemf)`` is ``vemf#branch``, ``v(out)`` is ``out``, but
+    ``v(2)`` is itself."""
     kind, _, inner = name.lower().rstrip(")").partition("(")
-    return f"{inner}#branch" if kind == "i" else inner
+    if kind == "i":
+        return f"{inner}#branch"
+    return f"v({inner})" if inner[:1].isdigit() else inner

@@ -4,19 +4,19 @@ ngspice where the importer has it (``fmu/netlist``).
 
 import hashlib
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from math import inf
 from pathlib import Path
 
 from cosim.circuit.joined import deck, unit
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.fmus.pack import pack
 from cosim.toolchain.libraries import SUFFIX, compiled
 
-_PARAM = re.compile(
-    r"\.param (\w+)=([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(meg|mil|[tgkmunpfa])?$"
-)
+_PARAM = re.compile(r"\.param (\w+)=([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(meg|mil|[tgkmunpf])?$")
 _SCALES = {"t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6}
-_SCALES |= {"n": 1e-9, "p": 1e-12, "f": 1e-15, "a": 1e-18}
+_SCALES |= {"n": 1e-9, "p": 1e-12, "f": 1e-15}
 _UNITS = {"v": "V", "i": "A", "?": "1"}
 
 
@@ -31,8 +31,10 @@ def netlist(
 ) -> None:
     """Write an .fmu of a netlist whose sources ``inputs`` the importer sets, and of which it reads
     the ``outputs``, vectors or expressions. Raises BadInput."""
-    if not max_step > 0.0 or not 0.0 < reltol < 1.0:
-        raise BadInput("--max-step must be above 0 s, and --reltol between 0 and 1.")
+    if not 0.0 < max_step < inf or not 0.0 < reltol < 1.0:
+        raise BadInput("--max-step must be above 0 s and finite, and --reltol between 0 and 1.")
+    if len({name.lower() for name in inputs}) < len(inputs):
+        raise BadInput(f"--input {plain(', '.join(inputs))}: names a source twice.")
     made = deck(path, inputs, outputs, {}, 1.0, reltol, max_step, False, {}, called="--input")
     kinds = {name: made.kinds[name.lower()] for name in inputs}
     vectors = dict(zip(outputs, made.vectors, strict=False))  # those of .meas follow
@@ -50,7 +52,11 @@ def write(
 ) -> None:
     """Write the .fmu of a deck: of its external sources with their kinds, ``v`` or ``i``, and of
     words with the vectors that have their values."""
-    rows = [("parameter", name, "1", repr(x), "Of the netlist", name) for name, x in _given(text)]
+    # What an .fmu has another variable for, or the netlist two values, is no parameter of it.
+    given = [*_given(text)]
+    taken = {"time", *inputs, *(f"{name}_slope" for name in inputs), *outputs}
+    taken |= {name for name, count in Counter(name for name, _ in given).items() if count > 1}
+    rows = [("parameter", k, "1", repr(x), "Of the netlist", k) for k, x in given if k not in taken]
     for name, kind in inputs.items():
         rows.append(("input", name, _UNITS[kind], "0", "Value of the source", name.lower()))
     for words, vector in outputs.items():
@@ -58,7 +64,7 @@ def write(
         rows.append(("output", words, of, "0", "At the last accepted step", _sent(vector)))
     rows += [("pulse", name) for name in pulses]
     name = re.sub(r"\W", "_", target.stem, flags=re.ASCII)
-    rows = [("about", f"{target.stem}, computed by ngspice"), ("step", repr(step)), *rows]
+    rows = [("about", f"{plain(target.stem)}, computed by ngspice"), ("step", repr(step)), *rows]
     ports = "".join("\t".join(row) + "\n" for row in rows)
     library = compiled(f"netlist{SUFFIX}")
     token = hashlib.sha256(f"{ports}{text}".encode() + library.read_bytes()).hexdigest()[:32]
@@ -77,6 +83,8 @@ def _given(text: str) -> Iterator[tuple[str, float]]:
 
 
 def _sent(vector: str) -> str:
-    """ngspice's name of ``v(out)`` or ``i(v1)``."""
+    """ngspice's name of ``v(out)``, ``v(2)`` or ``i(v1)``."""
     inner = vector[2:-1]
-    return inner if vector.startswith("v") else f"{inner}#branch"
+    if vector.startswith("i"):
+        return f"{inner}#branch"
+    return f"V({inner})" if inner[:1].isdigit() else inner

@@ -46,6 +46,11 @@ def ssp(scene: Scene, target: Path, fmi: int = 2) -> None:
             f"scene {scene.name}: an .ssp is of the built-in machine with a circuit in ngspice: "
             'circuit.model must be "amplifier", "full" or "file".'
         )
+    if scene.renamed or scene.coupling.method == "companion":
+        raise BadInput(
+            f"scene {scene.name}: an .ssp has a netlist with sources Vcommand and Vemf, without "
+            '[[port]], and another coupling.method than "companion".'
+        )
     if scene.friction.normal_force_file or scene.drive.phase_deg is not None:
         raise BadInput(f"scene {scene.name}: an .ssp has one surface and a constant normal_force.")
     with tempfile.TemporaryDirectory(prefix="ssp-") as name:

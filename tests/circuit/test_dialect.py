@@ -144,6 +144,8 @@ TOLD = {
     "B9 x 0 V=idt(V(in))": "the function idt is not defined",
     "K9 L1 L2 L3 1": "must name two inductors and their coupling",
     "C9 x 0 1u Rser=1 m=2": "write a resistor in series",
+    "R9 x 0 4,7k": "has two values; a number has a decimal point",
+    "X9 in x part rr=4k\n.subckt part a b params: r=1\nR1 a b {r}\n.ends": "no parameter rr",
     ".options maxstep=1u": "the option maxstep is not allowed in a netlist; leave it out",
     ".meas tran a DERIV V(in) AT=1m": ".meas a is nothing known here; it may be AVG",
     ".meas tran a WHEN V(in)": ".meas a is nothing known here; it may be AVG",
@@ -157,6 +159,38 @@ def test_what_would_mean_something_else_is_told(line: str, tmp_path: Path) -> No
     path.write_text(f"{HEAD}R8 x 0 1k\n{line}\n.end\n")
     with pytest.raises(BadInput, match=rf"^own\.cir:\d+: .*{re.escape(TOLD[line])}"):
         deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False, {})
+
+
+def test_numbers_are_those_that_people_write(tmp_path: Path) -> None:
+    """4k7 and 4R7 for 4.7 k and 4.7, also behind a name; an A for amperes is no atto."""
+    lines = ["R8 in x R=4k7", "R9 x 0 4R7", "X9 in 0 part r=1n5", "I9 in 0 0.5A", ".param i0=1A"]
+    library = ".subckt part a b params: r=1\nR1 a b {r}\n.ends"
+    found = anew(tmp_path, *lines, library)
+    for wanted in ("r8 in x r=4.7k", "r9 x 0 4.7", "x9 in 0 part r=1.5n", "i9 in 0 0.5"):
+        assert wanted in found
+    assert ".param i0=1" in found
+
+
+def test_names_of_nodes_may_begin_with_digits(tmp_path: Path) -> None:
+    """Dividers of them, in closed form; a node 5V is no number, and 2 is none of a source's."""
+    text = """title
+V1 in 0 SIN(0 1 1k)
+V2 5V 0 5
+R1 5V 2 1k
+R2 2 0 3k
+E1 2out 0 2 0 2
+I1 0 3v3 1m
+R3 3v3 0 2k
+B1 4 0 V=v(2)*2+v(5V)
+.meas tran half WHEN v(in)=0.5A
+.end
+"""
+    true = {"v(2)": 3.75, "v(2out)": 7.5, "v(3v3)": 2.0, "v(5v)+v(2)": 8.75, "v(4)": 12.5}
+    with in_place():
+        result = found(tmp_path, "", text, *true)
+    for word, value in true.items():
+        assert result.columns[word][-1] == pytest.approx(value, rel=1e-6), word
+    assert result.summary["meas.half"] == pytest.approx(1e-3 / 12, rel=1e-3)
 
 
 def test_what_is_not_used_is_not_refused(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
@@ -207,6 +208,28 @@ def test_what_the_netlist_lacks_is_told(
     assert main(["fmu", "netlist", str(tmp_path / "filter.cir"), *given, "--out", str(out)]) == 2
     assert said in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_its_variables_are_each_ones_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Parameters that the netlist gives twice, or that are called as a source, are none."""
+    (tmp_path / "own.cir").write_text(
+        "t\n.param vin=12\n.param r=1k\n.param r=2k\n.param c=1u\n"
+        "Vin 2 0 1\nR1 2 3v3 {r}\nR2 3v3 0 {r}\nC1 3v3 0 {c}\n.end\n"
+    )
+    given = [str(tmp_path / "own.cir"), "--output", "v(3v3)", "--out", str(tmp_path)]
+    assert main(["fmu", "netlist", *given, "--input", "vin"]) == 0
+    described = fmpy.read_model_description(str(tmp_path / "own.fmu"))  # refuses what is double
+    assert {each.name for each in described.modelVariables if each.causality == "parameter"} == {
+        "c"
+    }
+    for wrong, said in (
+        (["--input", "vin", "--input", "VIN"], "names a source twice"),
+        (["--max-step", "inf"], "--max-step must be above 0 s and finite"),
+    ):
+        assert main(["fmu", "netlist", *given, *wrong]) == 2
+        assert said in capsys.readouterr().err
 
 
 def test_it_holds_nothing_that_a_stranger_could_run(tmp_path: Path) -> None:

@@ -108,11 +108,12 @@ def test_the_pins_make_the_command(tmp_path: Path, waveform: str) -> None:
 @pytest.mark.parametrize(
     ("scene", "said"),
     [("paper-limited", "circuit in ngspice"), ("dc-motor", "built-in machine"),
-     ("closed-loop-grasp", "constant normal_force")],
+     ("closed-loop-grasp", "constant normal_force"),
+     ("reference --set coupling.method=companion", "Vcommand and Vemf")],
 )  # fmt: skip
 def test_what_cannot_be_one_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], scene: str, said: str
 ) -> None:
-    assert main(["fmu", "ssp", scene, "--out", str(tmp_path / "a" / "x.ssp")]) == 2
+    assert main(["fmu", "ssp", *scene.split(), "--out", str(tmp_path / "a" / "x.ssp")]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "a").exists()

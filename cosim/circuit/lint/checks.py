@@ -10,7 +10,8 @@ from cosim.circuit.lint.deck import Line, refuse, shown
 from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed
 from cosim.circuit.lint.topology import check_topology
-from cosim.circuit.lint.words import word_set
+from cosim.circuit.lint.words import number, word_set
+from cosim.scene.messages import suggestion
 
 REQUIRED = (("vemf", "vcommand"), ("vemf", "vdac", "voffset"))
 """Alternatives, each a set of top-level voltage sources that a co-simulation can replace."""
@@ -132,6 +133,8 @@ def _check_passive(element: Element, scope: Scope, names: Names) -> None:
     first = next((word for word in element.words if "=" not in word), None)
     if first is None:
         element.refuse(" has no value")
+    if len(element.words) > 1 and None not in map(number, element.words[:2]):
+        element.refuse(" has two values; a number has a decimal point, not a comma")
     if _NUMBER.match(first) or first[0] in "{'+-":
         return
     types = scope.model_types(first)
@@ -200,3 +203,8 @@ def _check_call(element: Element, scope: Scope) -> None:
         element.refuse(
             f" has {len(element.nodes)} nodes, but the subcircuit {shown(name)} has {max(counts)}"
         )
+    known = {"m"}.union(*(subcircuit.parameters for subcircuit in subcircuits))
+    for key in (word.partition("=")[0] for word in element.words if "=" in word):
+        if key not in known:
+            hint = suggestion(key, known)
+            element.refuse(f": the subcircuit {shown(name)} has no parameter {shown(key)}{hint}")

@@ -50,6 +50,9 @@ _PAIR = re.compile(
     r"""(?<!\S)([a-z]\w*)\s*=\s*("[^"]*"|\{[^{}]*\}|'[^']*'|[^\s,()"{}']+)""", re.IGNORECASE
 )
 _SPLIT_NUMBER = re.compile(r"^(\d+)(meg|[tgkmunpf])(\d+)(?!\S)", re.IGNORECASE)
+_GLUED = re.compile(r"(?<==)\s*(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE)
+"""4k7 for 4.7k, as a value and behind a name."""
+_POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)
 _MODEL = re.compile(r"\.model\s+\S+\s+(\w+)", re.IGNORECASE)
 
 
@@ -57,6 +60,7 @@ def in_ngspice(line: Line) -> list[Line]:
     """The line as ngspice knows it, in one line or more."""
     text = _without_tables(line.text.translate(_LETTERS))
     kind = text[:1].lower()
+    text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
     if kind in "rclv":
         found = [*_passive(text, kind)]
     elif kind in "efgh":
@@ -136,6 +140,7 @@ def _passive(text: str, kind: str) -> Iterator[str]:
         rest = re.sub(r"(?i)\bsine\b", "sin", rest)
     else:
         rest = _SPLIT_NUMBER.sub(r"\1.\3\2", rest)
+        rest = _POINT.sub(r"\1.\2", rest) if kind == "r" else rest
     at = plus
     for key in ("rser", "lser"):
         if key in given:

@@ -7,10 +7,11 @@ _DEFINITION = re.compile(r"([a-z_]\w*)\s*(\([^()]*\))?\s*=(?!=)\s*", re.IGNORECA
 
 
 NUMBER = re.compile(
-    r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(meg|mil|[tgkmunpfa])?[a-z]*(?![\w.])", re.IGNORECASE
+    r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(meg|mil|[tgkmunpf])?[a-z]*(?![\w.])", re.IGNORECASE
 )
 _FACTORS = {"t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6,
-            "n": 1e-9, "p": 1e-12, "f": 1e-15, "a": 1e-18}  # fmt: skip
+            "n": 1e-9, "p": 1e-12, "f": 1e-15}  # fmt: skip
+"""1A is an ampere: only later versions of ngspice would have a for atto."""
 
 
 def word_set(text: str) -> frozenset[str]:

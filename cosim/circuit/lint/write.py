@@ -90,13 +90,15 @@ def _element(element: Element) -> str:
         for word in element.words:
             if cure := _FORMS.get(word.partition("=")[0]):
                 element.refuse(f": {cure}")
-    if element.kind in "beghfvi":
-        return _expression(line, line.text)
     head = [element.name, *element.nodes, *element.controls]
     head += [element.model] if element.model else []
     for part in head:
         if not _HEAD.fullmatch(part):
             element.refuse(f": {shown(part)} is no name")
+    if element.kind in "beghfvi":  # an expression, behind names that are none: a node 5V is no 5
+        names = re.match(rf"(?:[\s(),]*[^\s(),]+){{{len(head)}}}[\s),]*", line.text)
+        rest = line.text[names.end() :] if names else ""
+        return " ".join([*head, _expression(line, rest)])
     return " ".join([*head, *(_word(line, word) for word in element.words)])
 
 
