@@ -7,6 +7,8 @@ from cosim.studies.study import Option
 
 _KINDS = ("machine", "circuit", "fmu")
 _SCHEMA = "scene.schema.json"
+_TITLE = b'"Scene of cosim"'
+"""What tells it from another file of that name."""
 
 
 def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
@@ -49,13 +51,15 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
         text = (circuits() / "new" / f"{kind}.cir").read_text(encoding="utf-8")
         texts[file.with_suffix(".cir")] = text
     fmus = [file.with_suffix(".fmu")] if kind == "fmu" else []
-    for path in (*texts, *fmus):
+    schema_there = file.with_name(_SCHEMA)
+    theirs = schema_there.is_file() and _TITLE not in schema_there.read_bytes()
+    for path in (*texts, *fmus, *[schema_there] * theirs):
         if path.exists():
             raise BadInput(f"{plain(str(path))}: is there already; choose another name.")
     if not file.parent.is_dir():
         raise BadInput(f"{plain(str(file.parent))}: there is no such folder.")
     texts = {path: text.replace("NAME.", f"{file.stem}.") for path, text in texts.items()}
-    texts[file.with_name(_SCHEMA)] = as_json(schema())
+    texts[schema_there] = as_json(schema())
     paths = [*texts, *fmus]
     with together(paths) as temporary:
         for target, text in zip(temporary, texts.values(), strict=False):

@@ -8,15 +8,20 @@ from math import ceil, isfinite
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cosim.circuit.heat import COPPER, DRIVE_RANGE_HEAT
 from cosim.errors import BadInput
 from cosim.live import rigs
 from cosim.scene import load, to_link
-from cosim.trials.recording import read_recording
+from cosim.trials.recording import GAP, read_recording
 
 _WEB = Path(__file__).with_name("web")
 _CORE = ("machine.js", "hosts.js")
 _SCRIPTS = ("machine.js", "settings.js", "plot.js", "picture.js", "curves.js", "page.js")
+
+MOST_ROWS = 1_000_000
+"""Of a record, at its usual rate."""
 
 CIRCUITS: dict[str, dict[str, Any]] = {
     model: {"circuit.model": model} for model in ("amplifier", "full")
@@ -87,11 +92,15 @@ def script(names: tuple[str, ...]) -> str:
 def _record(path: Path) -> dict[str, Any]:
     """Measurements as the page takes them: in even steps, s; None where nothing is known."""
     found = read_recording(path)
-    step = float(found.time[-1]) / (len(found.time) - 1)
-    signals = {
-        name: [x if isfinite(x) else None for x in values.tolist()]
-        for name, values in found.signals.items()
-    }
+    step = float(np.median(np.diff(found.time)))
+    even = np.arange(min(round(found.time[-1] / step) + 1, MOST_ROWS)) * step
+    after = np.searchsorted(found.time, even).clip(1, len(found.time) - 1)
+    nearest = after - (even - found.time[after - 1] < found.time[after] - even)
+    known = np.abs(found.time[nearest] - even) <= GAP / 2.0 * step
+    signals = {}
+    for name, values in found.signals.items():
+        there = np.where(known, values[nearest], np.nan).tolist()
+        signals[name] = [x if isfinite(x) else None for x in there]
     return {"name": found.name, "step": step, "waveforms": signals}
 
 

@@ -59,7 +59,11 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
     if (results / "waveforms.nc").exists():
         found, scene = formats.read(results), load(results / "scene.toml")
         runs = [[*found.waveforms.values()]]
-        words = table(scene, _json(results / "summary.json"), found.units)
+        summary = results / "summary.json"
+        try:
+            words = table(scene, _json(summary), found.units)
+        except (KeyError, TypeError):
+            raise BadInput(f"{plain(str(summary))}: this is no run's whole summary.") from None
         told = {"title": scene.name, "about": scene.description, "words": words}
         return told | {"signals": _signals(found.units, runs)}, runs
     if (results / "sweep.nc").exists():
@@ -93,13 +97,15 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
     axes = swept if grid.ndim > 1 else []
     cloud = {"columns": columns, "keys": axes[2:], "ways": ways, "grid": axes}
     shown = {"title": data.attrs["title"], "cloud": cloud | {"count": grid.size, "family": None}}
-    points = sorted(int(kept.stem) for kept in (folder / "points").glob("*.nc"))
+    points = sorted(int(p.stem) for p in (folder / "points").glob("*.nc") if p.stem.isdecimal())
     if not points:
         return shown, []
     kept = [read_netcdf(folder / "points" / f"{number}.nc") for number in points]
     runs = [[*columns.values()] for columns, _, _ in kept]
     shown["signals"] = _signals(kept[0][1], runs)
     for run, (_, _, about) in zip(shown["signals"]["runs"], kept, strict=True):
+        if "frequency" not in about:
+            raise BadInput(f"{plain(str(folder / 'points'))}: these are not the sweep's own runs.")
         run["frequency"] = float(about["frequency"])
     shown["cloud"]["family"] = points
     return shown, runs
@@ -108,10 +114,19 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
 def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
     """Curves of a table that begins with the time; a cloud of any other, and a chart's pictures."""
     cells = read_cells(path)
-    matches = {cell: _HEAD.fullmatch(cell) for cell in cells.rows[0][1]}
-    heads = dict((m[1], m[2]) if m else (cell, "") for cell, m in matches.items())
+    cells.even(1)
+    header, heads = cells.rows[0][1], {}
+    for cell in header:
+        if header.count(cell) > 1:
+            raise BadInput(f"{cells.name}: two columns are called {plain(cell, 40)}.")
+        match = _HEAD.fullmatch(cell)
+        name, unit = (match[1], match[2]) if match else (cell, "")
+        heads[cell if name in heads else name] = unit
     if next(iter(heads)) == "time":
-        runs = [[cells.numbers(1, k, name, {"nan", ""}) for k, name in enumerate(heads)]]
+        if len(cells.rows) < 3:
+            raise BadInput(f"{cells.name}: curves need two rows at least.")
+        missing = [set(), *[{"nan", ""}] * (len(heads) - 1)]
+        runs = [[cells.numbers(1, k, *of) for k, of in enumerate(zip(heads, missing, strict=True))]]
         return {"title": path.stem, "signals": _signals(heads, runs)}, runs
     columns = []
     for k, (name, unit) in enumerate(heads.items()):

@@ -352,8 +352,11 @@ def _with_parameters(
     fmus: list[dict[str, Any]], given: dict[str, Any], origin: str
 ) -> list[dict[str, Any]]:
     """The FMUs with other values for parameters: ``{"name.parameter": value}``."""
+    for fmu in fmus:
+        if not isinstance(fmu.get("name"), str) or not isinstance(fmu.get("parameters", {}), dict):
+            return fmus  # the scene's check tells what is wrong
     found = [fmu | {"parameters": {**fmu.get("parameters", {})}} for fmu in fmus]
-    by_name = {fmu.get("name"): fmu for fmu in found}
+    by_name = {fmu["name"]: fmu for fmu in found}
     for key, value in given.items():
         name, _, parameter = key.partition(".")
         if name not in by_name:

@@ -23,7 +23,7 @@ def measured(scene: Scene) -> tuple[int, dict[str, float]] | None:
     """
     found = re.fullmatch(r"trial-(\d\d)", scene.name)
     number = OF_PAPER if scene.name == "paper" else int(found[1]) if found else None
-    if number is None or _moved(scene) != _moved(load(scene.name)):
+    if number not in _table() or _moved(scene) != _moved(load(scene.name)):
         return None
     numbers = dict(_table()[number])
     if scene.name == "paper":

@@ -88,7 +88,9 @@ def read_recording(path: Path, asked: str = "") -> Recording:
         if f"z_{body}" in signals:
             central = velocities(time, signals[f"z_{body}"])
             there = signals.get(f"v_{body}", central)
-            signals[f"v_{body}"] = np.where(np.isnan(there), central, there)
+            there = np.where(np.isnan(there), central, there)
+            if f"v_{body}" in signals or np.isfinite(there).any():
+                signals[f"v_{body}"] = there
     for name, values in signals.items():
         if np.isfinite(values).sum() < 2:
             raise BadInput(f"{path}: column {table.headers[name]}: it has fewer than two values.")
@@ -105,7 +107,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
         "gaps": _gaps(time),
         "columns": columns,
     }
-    return Recording(path.stem, time, signals, across, notes, understood)
+    return Recording(plain(path.stem), time, signals, across, notes, understood)
 
 
 def _gaps(time: Array) -> list[str]:

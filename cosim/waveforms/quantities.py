@@ -19,6 +19,9 @@ SUMMARY = {row.pop("name"): Quantity(**row) for row in DictReader(_ROWS)}
 """Every entry by its name. Absent participants have none of theirs."""
 
 
+UNITLESS = ("", "1", "?")
+"""What stands for the unit of words, of plain numbers, and of what is not known."""
+
 OF_SOURCES = {"power": "W", "energy": "J"}
 """What a scene with ports has of a source, in its unit."""
 
@@ -41,7 +44,7 @@ def with_unit(value: float, unit: str, digits: int = 6) -> str:
 
 def label(name: str, unit: str) -> str:
     """``name [unit]``, for an axis or a table."""
-    return name if unit in ("", "1", "?") else f"{name} [{unit}]"
+    return name if unit in UNITLESS else f"{name} [{unit}]"
 
 
 def bench_unit(quantity: str) -> tuple[str, float]:

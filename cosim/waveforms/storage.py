@@ -33,7 +33,7 @@ def write_csv(path: Path, waveforms: dict[str, Array], units: Mapping[str, str])
 
 def csv(file: IO[bytes], waveforms: dict[str, Array], units: Mapping[str, str]) -> None:
     """What :func:`write_csv` writes, into an open file."""
-    header = ",".join(f"{name} [{units[name]}]" for name in waveforms)
+    header = ",".join(_cell(f"{name} [{units[name]}]") for name in waveforms)
     file.write(f"{header}\n".encode())
     columns = list(waveforms.values())
     row = ",".join(["%.10g"] * len(columns)) + "\n"
@@ -43,6 +43,11 @@ def csv(file: IO[bytes], waveforms: dict[str, Array], units: Mapping[str, str]) 
             table = np.column_stack([values[few] for values in columns])
             # Many rows in one go: several times as fast as numpy's savetxt.
             file.write((row * len(table) % tuple(table.ravel().tolist())).encode())
+
+
+def _cell(text: str) -> str:
+    """Between quotation marks where a comma would part it."""
+    return '"' + text.replace('"', '""') + '"' if set(text) & {",", '"'} else text
 
 
 _DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12

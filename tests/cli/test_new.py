@@ -69,6 +69,17 @@ def test_what_cannot_be_made_is_told(
     assert [path.name for path in tmp_path.iterdir()] == ["there.toml"]
 
 
+def test_anothers_schema_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    theirs = tmp_path / "scene.schema.json"
+    theirs.write_text('{"title": "mine"}')
+    assert main(["new", str(tmp_path / "a.toml")]) == 2
+    assert "scene.schema.json: is there already" in capsys.readouterr().err
+    assert theirs.read_text() == '{"title": "mine"}' and [*tmp_path.iterdir()] == [theirs]
+    theirs.unlink()
+    for name in ("a.toml", "b.toml"):
+        assert main(["new", str(tmp_path / name)]) == 0
+
+
 def test_nothing_is_half_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def spoilt(path: Path, version: int) -> None:
         path.write_text("half")

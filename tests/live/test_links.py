@@ -8,7 +8,7 @@ import pytest
 from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.live import rigs
-from cosim.live.page import opened
+from cosim.live.page import _record, opened
 from cosim.scene import load, to_link
 from tests.live.page_in_node import needs_node, run
 
@@ -108,6 +108,20 @@ def test_bad_links(link: str, said: str, capsys: pytest.CaptureFixture[str]) -> 
 
 
 @needs_node
+def test_a_record_with_a_gap_keeps_its_times(tmp_path: Path) -> None:
+    """1000 rows a second without 40 to 139: nothing there, and what comes after stays where it is."""
+    rows = [k for k in range(300) if not 40 <= k < 140]
+    text = "time [s],z_surface [m]\n" + "".join(f"{k / 1000},{k * k}e-9\n" for k in rows)
+    (tmp_path / "gap.csv").write_text(text, encoding="utf-8")
+    shown = _record(tmp_path / "gap.csv")
+    heights = shown["waveforms"]["z_surface"]
+    assert shown["step"] == pytest.approx(1e-3) and len(heights) == 300
+    assert heights[41:139] == [None] * 98
+    assert heights[140] == pytest.approx(140**2 * 1e-9) and heights[39] == pytest.approx(
+        39**2 * 1e-9
+    )
+
+
 def test_page_refuses_them_too() -> None:
     code = """
     return given.map((link) => {

@@ -10,7 +10,7 @@ import pytest
 
 import cosim
 from cosim.cli.main import main
-from cosim.live.show import BLOCK, show
+from cosim.live.show import BLOCK, _table, show
 from cosim.waveforms import formats
 from cosim.waveforms.storage import netcdf
 
@@ -152,6 +152,14 @@ def test_a_comparison_and_a_chart(tab: Any, tmp_path: Path) -> None:
     assert MARKUP in tab.inner_text("#cloud dl") and tab.locator("img").count() == 0
 
 
+def test_columns_of_one_name_in_two_units_are_two(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time [s],z [mm],z [m],v [m/s]\n0,1,0.001,7\n1,2,0.002,8\n", encoding="utf-8")
+    shown, ((_, *columns),) = _table(path)
+    assert [each["name"] for each in shown["signals"]["columns"]] == ["time", "z", "z [m]", "v"]
+    assert [column.tolist() for column in columns] == [[1, 2], [0.001, 0.002], [7, 8]]
+
+
 @pytest.mark.reliability
 def test_what_cannot_be_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "empty").mkdir()
@@ -161,6 +169,10 @@ def test_what_cannot_be_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     (tmp_path / "words.csv").write_text("x\nword\n", encoding="utf-8")
     (tmp_path / "torn").mkdir()
     (tmp_path / "torn" / "sweep.nc").write_bytes(b"CDF\x02\x00\x00")
+    (tmp_path / "short.csv").write_text("time [s],v [m/s]\n0,1\n1\n", encoding="utf-8")
+    (tmp_path / "head.csv").write_text("time [s],v [m/s]\n", encoding="utf-8")
+    (tmp_path / "gone.csv").write_text("time [s],v [m/s]\n0,1\n,2\n2,3\n", encoding="utf-8")
+    (tmp_path / "twice.csv").write_text("time [s],z [m],z [m]\n0,1,2\n1,2,3\n", encoding="utf-8")
     (tmp_path / "half").mkdir()
     (tmp_path / "half" / "waveforms.nc").write_bytes(b"CDF\x01")
     for name, said in (
@@ -168,6 +180,10 @@ def test_what_cannot_be_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         ("two", "name one of: a.csv, b.csv"),
         ("words.csv", "no column of numbers"),
         ("torn", "not a whole"),
+        ("short.csv", "row 3: it has 1 cells, the header 2"),
+        ("head.csv", "curves need two rows"),
+        ("gone.csv", "row 3, column time"),
+        ("twice.csv", "two columns are called z [m]"),
         ("half", "not a whole"),
         ("nothing", "nothing"),
     ):

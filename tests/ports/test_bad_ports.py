@@ -70,6 +70,15 @@ def test_a_wrong_port_is_told_in_one_sentence(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("wrong", ["parameters = 5\nname = \"a\"", "name = [1]"])
+def test_what_is_no_fmu_is_told_whatever_is_set(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], wrong: str
+) -> None:
+    (tmp_path / "own.toml").write_text(f'[[fmu]]\n{wrong}\nfile = "a.fmu"\n', encoding="utf-8")
+    assert main(["run", str(tmp_path / "own.toml"), "--set", "fmu.a.J=1"]) == 2
+    assert wrong.partition(" ")[0] in capsys.readouterr().err
+
+
 def test_an_fmu_that_unpacks_outside_itself_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

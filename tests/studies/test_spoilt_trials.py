@@ -149,6 +149,53 @@ def test_what_may_be_wrong_is_told(spoilt: str, run: cosim.Result, tmp_path: Pat
         assert numbers["drift_simulated"] == pytest.approx(numbers["drift_measured"], rel=0.02)
 
 
+def every(n: int, first: int = 0) -> Spoil:
+    """Nothing of the part but every ``n``-th row; nothing of the surface in these, if ``first``."""
+
+    def spoil(columns: list[Array]) -> list[Array]:
+        time, surface, part = (column.copy() for column in columns)
+        rows = np.arange(len(time)) % n == 0
+        part[~rows] = np.nan
+        if first:
+            surface[rows] = np.nan
+        return [time, surface, part]
+
+    return spoil
+
+
+SPARSE = {
+    "the part in each third row": every(3),
+    "two instruments, in turn": every(2, 1),
+    "the part in two rows": every(200),
+}
+
+
+@pytest.mark.parametrize("sparse", SPARSE)
+def test_cells_may_be_missing_where_both_are_never_known(
+    sparse: str, run: cosim.Result, tmp_path: Path
+) -> None:
+    """Without velocities there is no guide in some; each number is told or is null."""
+    file = write(tmp_path / "a.csv", HEADER, SPARSE[sparse](table(run)))
+    compared = cosim.compare(run, file)
+    compared.save(tmp_path)
+    told = json.loads((tmp_path / "compare.json").read_text())
+    if sparse.startswith("two"):
+        assert told["slip_fraction_measured"] is None
+    else:
+        assert told["mean_error_mm"] >= 0.0 and "part_velocity_r2" not in told
+    if not sparse.endswith("two rows"):
+        assert told["mean_error_mm"] == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_hint_names_the_column_that_is_wrong(run: cosim.Result, tmp_path: Path) -> None:
+    """A velocity in mm/s that is said to be in m/s, beside heights that are right."""
+    time, surface, _ = table(run)
+    v = np.interp(0.3125 + time, run.columns["time"], run.columns["v_surface"])
+    head = "time [s],surface height [mm],surface velocity [m/s]"
+    said = repr(cosim.compare(run, write(tmp_path / "a.csv", head, [time, surface, 1e3 * v])))
+    assert "with column surface velocity [m/s] times 0.001" in said
+
+
 @pytest.mark.parametrize("rate", [120, 240, 480, 960, 4000])
 def test_a_clean_trial_is_told_nothing_and_keeps_its_frequency(
     rate: int, run: cosim.Result, tmp_path: Path

@@ -36,3 +36,10 @@ def test_another_motion_has_no_measured_one() -> None:
     assert measured(changed(paper, {"circuit.model": "limited"}, "here")) == measured(paper)
     assert measured(changed(paper, {"drive.amplitude": 5.0}, "here")) is None
     assert measured(load("reference")) is None
+
+
+def test_a_scene_of_ones_own_may_be_called_as_a_trial(tmp_path: Path) -> None:
+    """As ``identify`` calls those of more trials than were published."""
+    own = tmp_path / "trial-12.toml"
+    own.write_text('base = "paper-limited"\n', encoding="utf-8")
+    assert measured(load(own)) is None

@@ -119,6 +119,28 @@ def test_matlab(run: Path, tmp_path: Path) -> None:
     assert max(map(len, made)) <= 31
 
 
+def test_names_of_expressions_stay_apart(tmp_path: Path) -> None:
+    """Vectors with commas, signs and blanks, of a circuit of one's own."""
+    scene = tmp_path / "own.toml"
+    assert main(["new", str(scene), "--kind", "circuit"]) == 0
+    words = ["v(out,c1)", "v(out)-v(c1)", "v(out)+v(c1)", "2*v(out)", "v(out) * i(Vemf)"]
+    words.append("(v(out)-v(c1))*(v(out)-v(c1))/7.1")
+    run = make_run(tmp_path, str(scene), f"circuit.save={json.dumps(words)}")
+    data = xarray.load_dataset(run / "waveforms.nc")
+    with (run / "waveforms.csv").open(newline="") as file:
+        head, *rows = csv.reader(file)
+    assert {len(row) for row in rows} == {len(head)}
+    (place,) = (k for k, cell in enumerate(head) if cell.startswith("v(out,c1) ["))
+    np.testing.assert_allclose([float(row[place]) for row in rows], data["v(out,c1)"], rtol=1e-9)
+    export(run, "mat,raw", tmp_path)
+    made = loadmat(tmp_path / "waveforms.mat")
+    names = [name for name, of in made.items() if np.shape(of) == (len(rows), 1)]
+    assert len(names) == len(head) and all(re.fullmatch(r"[A-Za-z]\w{0,62}", x) for x in names)
+    np.testing.assert_array_equal(made["v_out__v_c1__2"][:, 0], data["v(out)+v(c1)"])
+    head = (tmp_path / "waveforms.raw").read_bytes().partition(b"Binary:")[0].decode()
+    assert "\tv(out)*i(Vemf)\t" in head
+
+
 def test_hdf5_and_its_readers(run: Path, tmp_path: Path) -> None:
     export(run, "hdf5", tmp_path)
     path, scene = tmp_path / "waveforms.h5", (run / "scene.toml").read_text(encoding="utf-8")

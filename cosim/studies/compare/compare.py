@@ -41,6 +41,9 @@ PHASES = 101
 DIGITS = 6e-7, 6e-12
 """Relative, and m: of the heights of an exported trial."""
 
+LEAST_ROWS = 8
+"""Of a recording that a run must cover."""
+
 APART = 0.05
 """Of a period by which run and recording may drift apart before their frequencies differ."""
 
@@ -88,8 +91,10 @@ class Seen:
         return all(np.allclose(*_known(run, seen), *DIGITS) for run, seen in pairs)
 
     def best_start(self, earliest: float, latest: float) -> float:
-        """The start at which the run explains most of the guiding signal."""
-        name = next(name for name in GUIDES if name in self.recording.signals)
+        """The start at which the run explains most of the guiding signal, if there is one."""
+        name = next((name for name in GUIDES if name in self.recording.signals), "")
+        if not name:
+            return earliest
         wanted = self.recording.signals[name]
 
         def missed(start: float) -> float:
@@ -149,6 +154,11 @@ def measure(
     end = float(waveforms["time"][-1])
     if period is None and not own:
         recording = _covered(recording, end - earliest)
+        if len(recording.time) < LEAST_ROWS:
+            raise BadInput(
+                f"The run ends at {end:.4g} s, and covers {len(recording.time)} rows of "
+                f"{plain(recording.name)}: there must be {LEAST_ROWS}."
+            )
         seen = replace(seen, recording=recording)
     rows, span = len(recording.time), float(recording.time[-1])
     if earliest + span > end + 1e-9:

@@ -86,7 +86,7 @@ def _agree(what: str, after: float, before: float) -> str:
 
 def _scaled(recording: Recording, name: str, factor: float) -> str:
     columns = recording.understood.get("columns", {})
-    column = columns.get(name.replace("v_", "z_", 1)) or columns.get(name)
+    column = columns.get(name) or columns.get(name.replace("v_", "z_", 1))
     header, unit = (column["header"], column["unit"]) if column else (name, "SI")
     asks = [f"is it in {unit}"] if abs(factor) != 1.0 else []
     asks += ["is its positive direction the run's"] if factor < 0.0 else []

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import isfinite, nan
 
 import numpy as np
 
@@ -47,21 +48,25 @@ class Score:
 
 
 def explained(found: Array, wanted: Array) -> float:
-    """R²: the share of the variance of ``wanted`` that ``found`` explains."""
+    """R²: the share of the variance of ``wanted`` that ``found`` explains; NaN where there is none
+    to be explained."""
     known = np.isfinite(found) & np.isfinite(wanted)
     wanted, found = wanted[known], found[known]
+    if not len(wanted) or np.ptp(wanted) == 0.0:
+        return nan
     return 1.0 - float(np.sum((wanted - found) ** 2) / np.sum((wanted - wanted.mean()) ** 2))
 
 
 def mean_distance(found: Array, wanted: Array) -> float:
-    """Mean of the distances, where both are known."""
-    return float(np.nanmean(np.abs(found - wanted)))
+    """Mean of the distances, where both are known; NaN where they never are."""
+    apart = (found - wanted)[np.isfinite(found - wanted)]
+    return float(np.abs(apart).mean()) if len(apart) else nan
 
 
 def centred_distance(found: Array, wanted: Array) -> float:
-    """Mean of the distances from the mean difference, where both are known."""
-    apart = found - wanted
-    return float(np.nanmean(np.abs(apart - np.nanmean(apart))))
+    """The same of the distances from the mean difference."""
+    apart = (found - wanted)[np.isfinite(found - wanted)]
+    return float(np.abs(apart - apart.mean()).mean()) if len(apart) else nan
 
 
 SHARE = "share of the variance of the measured {} that the run explains"
@@ -110,11 +115,16 @@ def _lines(
     line = np.polynomial.Polynomial.fit(time[known], measured[known], 1)
     later = one_period_later(time, measured, period, gained) if period else None
     return (
-        score(run, measured),
-        None if later is None else score(later, measured),
-        score(np.zeros(len(time)), measured),
-        score(line(time), measured),
+        _told(score(run, measured)),
+        None if later is None else _told(score(later, measured)),
+        _told(score(np.zeros(len(time)), measured)),
+        _told(score(line(time), measured)),
     )
+
+
+def _told(value: float) -> float | None:
+    """None where nothing was known to make it of."""
+    return value if isfinite(value) else None
 
 
 def both_sides(
@@ -150,23 +160,25 @@ def both_sides(
         apart = max(1, round(1.0 / FRAME_RATE / float(np.median(np.diff(time)))))
         apart = min(apart, len(time) // 2)
         velocities = [signals["v_surface"] for _, signals in sides]
-        kicks = [float(np.nanmax(np.abs(v[apart:] - v[:-apart]))) for v in velocities]
+        changes = [np.abs(v[apart:] - v[:-apart]) for v in velocities]
+        kicks = [_told(float(np.fmax.reduce(each, initial=-np.inf))) for each in changes]
         words = f"largest change of the surface's velocity in {time[apart] * 1e3:.3g} ms"
         pair("kick", "m/s", f"{words}: what impacts show", [*kicks])
     return found
 
 
-def _slipping(signals: Signals) -> float:
+def _slipping(signals: Signals) -> float | None:
     apart = np.abs(signals["v_part"] - signals["v_surface"])
-    return float(np.mean(apart[np.isfinite(apart)] > STICKS))
+    known = apart[np.isfinite(apart)]
+    return float(np.mean(known > STICKS)) if len(known) else None
 
 
 def horizontal_share(recording: Recording) -> Number | None:
     """The share of the surface's measured motion that is horizontal; the simulation has none."""
     across, along = recording.v_across, recording.signals.get("v_surface", np.array(np.nan))
     known = np.isfinite(across) & np.isfinite(along)
-    if not known.any():
+    squares = [float((each[known] ** 2).sum()) for each in (across, along) if known.any()]
+    if not sum(squares):
         return None
-    squares = float(np.mean(across[known] ** 2)), float(np.mean(along[known] ** 2))
     words = "share of the surface's measured mean square velocity that is horizontal"
     return Number("horizontal_share", squares[0] / sum(squares), "1", words)

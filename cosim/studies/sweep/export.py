@@ -5,6 +5,8 @@ from pathlib import Path
 
 from cosim.errors import BadInput, plain
 from cosim.files.atomic import whole
+from cosim.waveforms.formats.matlab import legal
+from cosim.waveforms.quantities import UNITLESS
 from cosim.waveforms.storage import read_sweep
 
 FORMS = ("csv", "parquet", "mat")
@@ -28,17 +30,19 @@ def export(folder: Path, lists: list[str], out: Path) -> dict[str, str]:
     for name, file in files.items():
         if name == "csv":
             heads = {
-                each: f"{each} [{units[each]}]" if units.get(each, "1") != "1" else each
+                each: f"{each} [{units[each]}]" if units.get(each, "") not in UNITLESS else each
                 for each in frame
             }
             frame.rename(columns=heads).to_csv(file, index=False)
         elif name == "mat":
             from scipy.io import savemat
 
-            columns = {each: frame[each].to_numpy() for each in frame}
-            savemat(
-                file, {"sweep": columns, "units": units}, long_field_names=True, oned_as="column"
-            )
+            words = legal(map(str, frame))
+            content = {
+                "sweep": {words[each]: frame[each].to_numpy() for each in frame},
+                "units": {words[each]: units.get(each, "") for each in frame},
+            }
+            savemat(file, content, long_field_names=True, oned_as="column")
         else:
             try:
                 frame.to_parquet(file, index=False)

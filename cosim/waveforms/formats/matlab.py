@@ -1,9 +1,13 @@
 """MATLAB's MAT-file of version 5, which Octave, Scilab and SciPy read too."""
 
 import re
+from collections.abc import Iterable
 from io import BytesIO
 
 from cosim.waveforms.formats.source import Format, Run
+
+LONGEST = 63
+"""Letters of a name in MATLAB."""
 
 ABOUT = 116  # bytes of free text at the file's beginning
 
@@ -15,14 +19,28 @@ def write(run: Run, file: BytesIO) -> str:
     """
     from scipy.io import savemat
 
-    names = {name: re.sub(r"\W", "_", name, flags=re.ASCII).lstrip("_") for name in run.waveforms}
+    names = legal(run.waveforms, {"units", *run.attributes})
     variables: dict[str, object] = {names[name]: of for name, of in run.waveforms.items()}
     units = {names[name]: unit for name, unit in run.units.items()}
-    savemat(file, variables | {"units": units} | run.attributes, format="5", oned_as="column")
+    found = variables | {"units": units} | run.attributes
+    savemat(file, found, format="5", oned_as="column", long_field_names=True)
     about = b"MATLAB 5.0 MAT-file, written by cosim"  # SciPy's would name the moment of writing
     file.seek(0)
     file.write(about.ljust(ABOUT))
     return f"MATLAB 5, {len(run.waveforms)} column vectors and a struct units"
+
+
+def legal(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
+    """For each name one of MATLAB's, none of them twice or ``taken``."""
+    found: dict[str, str] = {}
+    for name in names:
+        word = re.sub(r"\W", "_", name, flags=re.ASCII).lstrip("_")
+        word = word if word[:1].isalpha() else f"x{word}"
+        one, others, k = word[:LONGEST], {*found.values(), *taken}, 2
+        while one in others:
+            one, k = f"{word[: LONGEST - 4]}_{k}", k + 1
+        found[name] = one
+    return found
 
 
 FORMAT = Format("mat", "waveforms.mat", "MATLAB 5", write)

@@ -24,7 +24,7 @@ def write(run: Run, file: BytesIO) -> str:
             if abs(first - points[-1][1]) > 1e-9:
                 points.append((edges[k] + EDGE, first))
             points.append((edges[k + 1], last))
-    lines = [f"+ {time:.12g} {volts:.9g}" for time, volts in points]
+    lines = [f"+ {time:.15g} {volts:.9g}" for time, volts in points]
     head = f"* {scene.name}: {scene.drive.waveform}, V1 in V over s"
     file.write("\n".join([head, "Vcommand v1 0 PWL(", *lines, "+ )\n"]).encode())
     return f"{len(points)} points over {scene.run.duration:g} s"

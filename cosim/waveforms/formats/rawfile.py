@@ -32,7 +32,7 @@ def write(run: Run, file: BytesIO) -> str:
     for number, name in enumerate(names):
         kind, form = TYPES.get(run.units[name], ("notype", "{}"))
         named = name if name.startswith(("v(", "i(")) else form.format(name)
-        lines.append(f"\t{number}\t{named}\t{kind}")
+        lines.append(f"\t{number}\t{''.join(named.split())}\t{kind}")
     header = "\n".join([*lines, "Binary:\n"]).encode()
     rows = np.column_stack(list(run.waveforms.values())).astype("<f8")
     file.write(header + rows.tobytes())
