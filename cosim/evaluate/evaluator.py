@@ -13,7 +13,16 @@ from typing import Any, Self
 
 from cosim.errors import BadInput
 from cosim.evaluate.many import Pool, cluster, each, threads
-from cosim.evaluate.point import Number, Outcome, evaluate_all, failed, is_fast, outcome_of, point
+from cosim.evaluate.point import (
+    Number,
+    Outcome,
+    evaluate_all,
+    failed,
+    inputs,
+    is_fast,
+    outcome_of,
+    point,
+)
 from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene
 from cosim.toolchain.processes import processors
@@ -53,7 +62,7 @@ class Evaluator:
         self._workers, self._dask = workers_asked(workers), dask
         self._far: Pool | None = None
         self._stack = ExitStack()
-        self._store = Store(path, scene.as_dict(), whole_periods, *asked)
+        self._store = Store(path, inputs(scene) if path else None, whole_periods, *asked)
         self.resumed = self._store.resumed
         """Outcomes that stood in the file."""
 

@@ -1,12 +1,17 @@
 """One point of a study: the scene with some keys changed, run for the numbers of its summary."""
 
+import hashlib
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import ceil, isfinite, isinf, nan
+from pathlib import Path
 from typing import Any
 
+from cosim.circuit.lint.deck import named as netlist_files
 from cosim.errors import CosimError
 from cosim.scene import Scene, changed
+from cosim.scene.tables import PATHS
 from cosim.toolchain.processes import TRIES, ProcessLost
 
 Number = float | int
@@ -90,6 +95,22 @@ def point(base: Scene, values: Mapping[str, Number | str], whole_periods: bool) 
         values = {"run.output_step": few_rows, **values}
     scene = changed(base, values, "--over")
     return in_whole_periods(scene) if whole_periods else scene
+
+
+def inputs(scene: Scene) -> dict[str, Any]:
+    """All that decides a run of a scene: its keys, and the hashes of the files that they name, with
+    those that a netlist names in turn."""
+    named = [scene.table(table).get(key) for table, key in PATHS]
+    files = [Path(file) for file in (*named, *(each.file for each in scene.fmu)) if file]
+    if netlist := scene.circuit.netlist:
+        files += netlist_files(Path(netlist))
+    every = [one for file in files for one in ([file], sorted(file.rglob("*")))[file.is_dir()]]
+    hashes = {}
+    for file in every:
+        with suppress(OSError):  # its runs tell
+            if file.is_file():
+                hashes[str(file)] = hashlib.sha256(file.read_bytes()).hexdigest()
+    return scene.as_dict() | {"files": hashes}
 
 
 def outcome(summary: Mapping[str, Any]) -> Outcome:

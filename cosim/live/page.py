@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cosim.circuit.heat import COPPER, DRIVE_RANGE_HEAT
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.live import rigs
 from cosim.scene import load, to_link
 from cosim.trials.recording import GAP, read_recording
@@ -37,13 +37,18 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
         kept = found.table("circuit")
         own = {key: kept.pop(key, None) for key in ("netlist", "reltol", "max_step")}
         own["netlist"] = str(Path(own["netlist"]).absolute())
+        own |= {f"param.{key}": x for key, x in (kept.pop("param", None) or {}).items()}
         circuits["own"] = {"circuit.model": "file"} | {f"circuit.{k}": x for k, x in own.items()}
         simple = type(found.circuit).model_validate(kept | {"model": "amplifier"})
         found = found.model_copy(update={"circuit": simple})
     if not rigs.fits(found):
         known = ", ".join(rigs.scenes())
         raise BadInput(f"scene {found.name}: the page runs {known}, and such as these.")
-    return to_link(found), circuits
+    link, known = to_link(found), rigs.turned()
+    for key in (pair.partition("=")[0] for pair in link.split("&")[1:]):
+        if key not in known and not key.startswith(("run.", "coupling.")):
+            raise BadInput(f"scene {found.name}: the page cannot turn {plain(key)}.")
+    return link, circuits
 
 
 def html(link: str, models: Iterable[str] = (), record: Path | None = None) -> str:

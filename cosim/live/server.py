@@ -1,6 +1,7 @@
 """Serves the page on this machine alone, and runs what it asks for with ngspice."""
 
 import json
+import sys
 import warnings
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -32,7 +33,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Only the page itself may ask: another site's has another origin."""
         length = self.headers.get("Content-Length", "")
         circuit = self.server.circuits.get(self.path.removeprefix("/run/"))
-        sound = length.isdecimal() and int(length) <= LONGEST
+        sound = length.isdecimal() and len(length) < 10 and int(length) <= LONGEST
         if circuit is None or not (sound and self._from_here(needs_origin=True)):
             self._tell(404, {"error": "There is only run, which takes a link of the page."})
             return
@@ -68,6 +69,11 @@ class Server(ThreadingHTTPServer):
     """The page at ``address``, on a free port."""
 
     daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A page that is closed meanwhile needs no word."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
     def __init__(
         self, link: str, circuits: dict[str, dict[str, str]], record: Path | None = None

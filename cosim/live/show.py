@@ -92,7 +92,10 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
         values = data[name].broadcast_like(grid).transpose(*grid.dims).values.ravel()
         unit, text = (data[name].attrs.get(key, "") for key in ("units", "long_name"))
         columns.append(_column(str(name), unit, values.tolist(), text))
-    best = "v_average" if "v_average" in data else columns[len(swept)]["name"]
+    numbers = [each["name"] for each in columns[len(swept) :] if each["most"] is not None]
+    if not numbers:
+        raise BadInput(f"{plain(str(path))}: no point of this sweep has a number.")
+    best = "v_average" if "v_average" in numbers else numbers[0]
     ways = [swept[0], swept[1] if len(swept) > 1 else best, best]
     axes = swept if grid.ndim > 1 else []
     cloud = {"columns": columns, "keys": axes[2:], "ways": ways, "grid": axes}

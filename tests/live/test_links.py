@@ -7,6 +7,7 @@ import pytest
 
 from cosim.cli.main import main
 from cosim.errors import BadInput
+from cosim.files.resources import circuits
 from cosim.live import rigs
 from cosim.live.page import _record, opened
 from cosim.scene import load, to_link
@@ -108,8 +109,25 @@ def test_bad_links(link: str, said: str, capsys: pytest.CaptureFixture[str]) -> 
 
 
 @needs_node
+@pytest.mark.parametrize("key", ["circuit.gain_bandwidth=2e6", "circuit.slew_rate=1e6"])
+def test_what_the_page_cannot_turn_is_told(key: str) -> None:
+    with pytest.raises(BadInput, match=f"the page cannot turn {key.partition('=')[0]}"):
+        opened("paper", [key])
+
+
+def test_parameters_of_an_own_netlist_go_with_it() -> None:
+    netlist = circuits() / "examples" / "h_bridge.cir"
+    given = [
+        "circuit.model=file",
+        f"circuit.netlist={netlist}",
+        "circuit.param.switch_resistance=2",
+    ]
+    link, known = opened("paper", given)
+    assert known["own"]["circuit.param.switch_resistance"] == 2 and "param" not in link
+
+
 def test_a_record_with_a_gap_keeps_its_times(tmp_path: Path) -> None:
-    """1000 rows a second without 40 to 139: nothing there, and what comes after stays where it is."""
+    """1000 rows a second without 40 to 139: nothing there, and the rest stays where it is."""
     rows = [k for k in range(300) if not 40 <= k < 140]
     text = "time [s],z_surface [m]\n" + "".join(f"{k / 1000},{k * k}e-9\n" for k in rows)
     (tmp_path / "gap.csv").write_text(text, encoding="utf-8")

@@ -70,7 +70,7 @@ def test_a_wrong_port_is_told_in_one_sentence(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("wrong", ["parameters = 5\nname = \"a\"", "name = [1]"])
+@pytest.mark.parametrize("wrong", ['parameters = 5\nname = "a"', "name = [1]"])
 def test_what_is_no_fmu_is_told_whatever_is_set(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], wrong: str
 ) -> None:

@@ -25,6 +25,7 @@ from cosim.studies.sweep import figure
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.studies.sweep.run import sweep
 from cosim.toolchain import processes
+from cosim.toolchain.processes import in_place
 
 SHORT = ["run.duration=0.1", "run.settle=0.05"]
 
@@ -192,6 +193,38 @@ def test_folder_of_another_sweep(tmp_path: Path) -> None:
         sweep(scene, {"friction.mu_s": [0.7]}, out=tmp_path, workers=1)
 
 
+def test_a_file_with_other_content_is_other_work(tmp_path: Path) -> None:
+    """What a sweep has kept does not answer for a force, or a netlist, that was edited since; the
+    waveforms that another one left go."""
+    force = tmp_path / "force.csv"
+    force.write_text("time [s],normal_force [N]\n0,0.5\n1,0.5\n")
+    given = {"friction.normal_force_file": str(force), "run.duration": 0.02, "run.settle": 0.0}
+    out, old = tmp_path / "out", tmp_path / "out" / "points" / "7.nc"
+    old.parent.mkdir(parents=True)
+    old.write_bytes(b"of another sweep")
+
+    def swept() -> float:
+        over = {"drive.amplitude": [6.0]}
+        data = sweep(load("paper-limited", given), over, out=out, workers=1)
+        return float(data["v_average"].values[0])
+
+    with in_place():
+        first = swept()
+        assert swept() == first and not old.exists()
+        force.write_text("time [s],normal_force [N]\n0,0.1\n1,0.1\n")
+        with pytest.raises(BadInput, match="other work"):
+            swept()
+        (out / "sweep.sqlite").unlink()
+        assert swept() != first
+
+
+def test_keys_with_choices_are_drawn_from_them() -> None:
+    over = {"coil.polarity": [-1, 1], "drive.amplitude": [5.0, 8.0]}
+    design = sample(over, 12, 0, False)
+    found = [design.point(k)["coil.polarity"] for k in range(12)]
+    assert (found.count(-1), found.count(1)) == (6, 6)
+
+
 def test_latin_hypercube() -> None:
     """Each of N equal parts of each range holds one point; whole numbers stay whole."""
     over = {"drive.frequency": [10.0, 60.0], "mechanics.n_surfaces": [1, 4]}
@@ -223,6 +256,7 @@ BAD = [
     (["--over", "drive.offset=1,200"], "a number from -100 to 100 V"),
     (["--over", "mechanics.n_surfaces=1.5,2"], "a whole number from 1 to 16"),
     (["--over", "drive.offset=1,2", "--over", "drive.offset=3,4"], "given twice"),
+    (["--over", "coil.polarity=0,1"], "0 must be one of -1, 1"),
     (["--over", "drive.offset=1,2", "--samples", "0"], "--samples 0"),
     (["--over", "drive.offset=1", "--samples", "5"], "needs a range"),
     (["--over", "drive.offset=1,2", "--random"], "--random needs --samples"),

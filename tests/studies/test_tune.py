@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from cosim.cli.main import main
-from cosim.errors import BadInput, SimulationFailed
+from cosim.errors import BadInput, Note, SimulationFailed
 from cosim.evaluate.evaluator import Evaluator
-from cosim.evaluate.point import in_whole_periods
+from cosim.evaluate.point import Outcome, in_whole_periods
 from cosim.scene import changed, load
 from cosim.simulation.simulate import simulate
+from cosim.studies.tune.found import Run, write_runs
 from cosim.studies.tune.run import tune
 
 
@@ -227,6 +228,44 @@ def test_waveforms_are_searched_each_by_itself(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("*.sqlite*"))
 
 
+def test_a_waveform_without_a_setting_costs_only_itself(tmp_path: Path) -> None:
+    """Square waves of these volts make more heat than may be."""
+    few = {**FAST, "run.settle": 0.05, "run.duration": 0.1}
+    given: dict[str, Any] = {"heat": 3.0, "budget": 24, "workers": 1, "out": tmp_path}
+    over = {"drive.offset": (-1.0, 1.0)}
+    with pytest.warns(Note, match="square: No setting could be run"):
+        found = tune(
+            *("paper-limited", few), maximise="v_average", over=over,
+            waveform=["square", "sine"], **given,
+        )  # fmt: skip
+    assert found.waveform == "sine" and not found.others
+
+
+def test_runs_of_all_waveforms_are_written(tmp_path: Path) -> None:
+    runs = [
+        Run({"drive.offset": 1.0, "drive.duty": 0.3}, Outcome({}), 1.0),
+        Run({"drive.offset": 2.0, "drive.table.1": 0.1}, Outcome({}, "hot"), None),
+    ]
+    write_runs(tmp_path / "tune.csv", runs, "v_average")
+    with (tmp_path / "tune.csv").open(newline="") as file:
+        first, second = csv.DictReader(file)
+    assert (first["drive.duty [1]"], first["drive.table.1 [1]"]) == ("0.3", "")
+    assert (second["drive.duty [1]"], second["drive.table.1 [1]"]) == ("", "0.1")
+
+
+def test_the_least_robustly_is_a_median_too() -> None:
+    few = {**FAST, "run.settle": 0.1, "run.duration": 0.2}
+    over = {"drive.offset": (-1.0, 1.0)}
+    found = tune(
+        *("paper-limited", few), minimise="coil_heat", over=over, robust=True, budget=24, workers=1
+    )
+    place, heats = found.best.values["drive.offset"], []
+    for turn in (0.0, 0.04, -0.04):
+        there = changed(found.scene, {"drive.offset": min(max(place + turn, -1.0), 1.0)}, "it")
+        heats.append(simulate(there).summary["coil_heat"])
+    assert found.value == pytest.approx(np.median(heats), rel=1e-3) and found.value < max(heats)
+
+
 def test_robust_is_the_median_of_all_turns() -> None:
     """Of the three knobs by 2 %, one by one and together: here turned once more, by hand."""
     few = {**FAST, "run.settle": 0.1, "run.duration": 0.2}
@@ -248,6 +287,8 @@ def test_robust_is_the_median_of_all_turns() -> None:
         (["--waveform", "triangle"], "must be one of sawtooth, falling-sawtooth, sine, square"),
         (["--waveform", "steps:65"], "N from 2 to 64"),
         (["--waveform", "pieces"], "pieces:N with N from 2"),
+        (["--waveform", "steps:" + "9" * 5000], "N from 2 to 64"),
+        (["--waveform", "sine,"], "--waveform : must be one of"),
         (["--heat", "0"], "must be a number above 0 W"),
         (["--heat", "60:2"], "a duty from 0 to 1"),
         (["--heat", "60:0.3:1:1"], "RISE:DUTY:SECONDS"),

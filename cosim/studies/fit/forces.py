@@ -91,7 +91,7 @@ def _force(where: str, row: dict[str, Any]) -> Force:
             raise BadInput(f"{where}: “{plain(key)}” is none of {', '.join(KEYS)}.")
         try:
             numbers[key] = float(value)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             numbers[key] = float("nan")
         if not 0 < numbers[key] <= LARGEST:
             said = plain(str(value))

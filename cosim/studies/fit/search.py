@@ -105,6 +105,12 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
         middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
         if not {0, FINE - 1} & set(best):  # none is at the edge of its grid
             break
+    # What is likely may reach far beyond the fine grids.
+    grids = [np.unique([*coarse.clip(*x), *grid]) for x, grid in zip(limits, grids, strict=True)]
+    if plate:
+        ratios = np.unique([*RATIOS, *ratios])
+    tables = [_losses(each, grid, ratios) for each, grid in zip(slides, grids, strict=True)]
+    row, best = _best(_summed(tables))
     rows, drawn = _drawn(tables)
     sums = _summed(tables)
     whole = np.sum([one.min(axis=0) for one in sums], axis=0)
@@ -119,9 +125,9 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
             value = value if count[k] else float(np.sqrt(limit[0] * limit[1]))
             found.append(Found(value, *limit))
             continue
-        likely = grid[profile <= LOSS]
+        likely = _likely(grid, profile)
         found.append(_interval(value, likely, grid[drawn[:, k]], count[k], limit))
-    likely = ratios[whole - whole.min() <= LOSS]
+    likely = _likely(ratios, whole - whole.min())
     ratio = _interval(float(ratios[row]), likely, ratios[rows], sum(count), (0.0, 9.0))
     return Fit(ratio, found, slides, profiles)
 
@@ -149,15 +155,26 @@ def _drawn(tables: Sequence[Array]) -> tuple[Rows, Rows]:
     return rows, np.stack([one[np.arange(DRAWS), :, rows].argmin(axis=1) for one in sums], 1)
 
 
-def _interval(value: float, likely: Array, drawn: Array, count: int, limit: Interval) -> Found:
+def _likely(grid: Array, loss: Array) -> Interval:
+    """The ends of what loses at most LOSS, between the points of the grid by straight lines."""
+    inside = np.flatnonzero(loss <= LOSS)
+    ends = []
+    for at, beyond in ((inside[0], inside[0] - 1), (inside[-1], inside[-1] + 1)):
+        known = 0 <= beyond < len(grid)
+        share = (LOSS - loss[at]) / (loss[beyond] - loss[at]) if known else 0.0
+        ends.append(float(grid[at] + share * (grid[beyond if known else at] - grid[at])))
+    return ends[0], ends[1]
+
+
+def _interval(value: float, likely: Interval, drawn: Array, count: int, limit: Interval) -> Found:
     """From what is likely and what was drawn; few slides scatter less than many would."""
     few = float(student.ppf((1 + LEVEL) / 2, max(1, count - 1)) / student.ppf((1 + LEVEL) / 2, 1e9))
     ends = []
     for end, share, side in (
-        (likely.min(), (1 - LEVEL) / 2, -1),
-        (likely.max(), (1 + LEVEL) / 2, 1),
+        (likely[0], (1 - LEVEL) / 2, -1),
+        (likely[1], (1 + LEVEL) / 2, 1),
     ):
         scatter = few * (float(np.quantile(drawn, share)) - value)
-        far = max(side * scatter, side * (float(end) - value), 0.0)
+        far = max(side * scatter, side * (end - value), 0.0)
         ends.append(value + side * float(np.hypot(far, SYSTEMATIC * value)))
     return Found(value, max(ends[0], limit[0]), min(ends[1], limit[1]))

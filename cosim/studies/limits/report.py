@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.point import inputs
 from cosim.evaluate.store import Store, reported
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
@@ -142,5 +143,5 @@ def limits(
             *(seed, efforts, CHANGES, told),
         )
 
-    asked = base.as_dict(), others, seed, quick, effort
+    asked = inputs(base), others, seed, quick, effort
     return reported(lambda store: report(found(store), " ".join(words)), out, STORE, *asked)

@@ -10,6 +10,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.point import inputs
 from cosim.evaluate.store import Store, reported
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
@@ -77,7 +78,7 @@ def measure(
         rigs = sample(base, [*given, *more], store, open_, seed, tick)
         return report(rigs, len(given), seed, held_currents(base))
 
-    return reported(found, out, "measure.sqlite", base.as_dict(), others, seed, quick)
+    return reported(found, out, "measure.sqlite", inputs(base), others, seed, quick)
 
 
 def worths(found: Sample, seed: int) -> tuple[list[Worth], list[tuple[Candidate, list[Worth]]]]:

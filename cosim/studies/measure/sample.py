@@ -189,8 +189,8 @@ def sample(
     told: Callable[[str], object],
 ) -> Sample:
     """What the scene's rig, the first of ``rigs``, and the others show; ``store`` keeps it rig by
-    rig, ``open_`` makes the evaluator of one. Those on which nothing goes up are left out. Raises
-    BadInput where the first is one of these."""
+    rig, ``open_`` makes the evaluator of one. Those on which nothing goes up, or a gauge shows 0,
+    are left out. Raises BadInput where the first is one of these."""
 
     def ask(number: int, names: Iterable[str], effort: Effort) -> dict[str, _Found]:
         base = Bench.base(scene, rigs[number], f"rig {number}")
@@ -220,9 +220,13 @@ def sample(
         speeds = store.once(f"rig {number}", speeds_of)
         gauged = gauged_on(base)
         told(f"rig {number}")
-        if np.isfinite([*speeds, *(one for some in shown for one in some)]).all():
+        every = [*gauged, *shown]
+        # Where a number is 0 whose accuracy is a share of it, every measurement would be exact.
+        both = zip(CANDIDATES, every, strict=True)
+        sound = all((one.accuracy(np.array(some)) > 0.0).all() for one, some in both)
+        if sound and np.isfinite([*speeds, *(one for some in shown for one in some)]).all():
             targets.append(speeds)
-            values.append([*gauged, *shown])
+            values.append(every)
     columns = [np.array(column) for column in zip(*values, strict=True)]
     return Sample(columns, np.array(targets))
 

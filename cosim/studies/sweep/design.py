@@ -108,7 +108,10 @@ def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: 
     columns = []
     for axis, column in zip(axes, unit.T, strict=True):
         low, high = min(axis.values), max(axis.values)
-        if axis.key.kind is int:
+        if axis.key.choices:
+            chosen = sorted(one for one in map(int, axis.key.choices) if low <= one <= high)
+            columns.append([chosen[int(u * len(chosen))] for u in column])
+        elif axis.key.kind is int:
             columns.append([low + int(u * (high - low + 1)) for u in column])
         else:
             columns.append([float(low + u * (high - low)) for u in column])
@@ -141,6 +144,9 @@ def _axis(name: str, values: Sequence[Number]) -> Axis:
             raise BadInput(f"--over {name}: {shown(value)} must be {key.allowed}.") from None
         if not inside:
             raise BadInput(f"--over {name}: {value:g} must be {key.allowed}.")
+        if key.choices and value not in (choices := [*map(int, key.choices)]):
+            known = ", ".join(map(str, choices))
+            raise BadInput(f"--over {name}: {value:g} must be one of {known}.")
     found = tuple(map(kind, values))
     if len(set(found)) < len(found):
         raise BadInput(f"--over {name}: a value stands there twice.")

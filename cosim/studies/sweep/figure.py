@@ -126,6 +126,7 @@ def _values(data: xr.Dataset, quantity: Quantity) -> xr.DataArray:
 
 
 def _curves(figure: Figure, data: xr.Dataset, name: str) -> None:
+    data = data.sortby(name)
     for axis, quantity in _panels(figure, (V_AVERAGE, *_others(data))):
         values = _values(data, quantity).values
         axis.plot(data[name].values, values, color="#1f6fb2", marker=".", lw=1.3)

@@ -107,6 +107,10 @@ def _sweep(
     with Evaluator(
         scene, folder / STORE, *asked, whole_periods=whole_periods, workers=workers, dask=dask
     ) as bench:
+        if not bench.resumed:  # what was kept there is another sweep's
+            for old in (folder / "points").glob("*.nc"):
+                if old.stem.isdecimal():
+                    old.unlink()
         before: set[int] = set()
         for number in range(total) if bench.resumed else ():
             if (outcome := bench.known(design.point(number))) is not None:

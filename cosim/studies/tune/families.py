@@ -19,7 +19,8 @@ def family(name: str) -> tuple[dict[str, Any], Ranges]:
     """
     shape, _, count = name.partition(":")
     sharp = {"drive.waveform": shape, "drive.reset_time": 0.0, "drive.duty": 0.5}
-    if shape in TABLES and count.isdecimal() and 2 <= int(count) <= MOST_CORNERS:
+    few = count.isdecimal() and len(count) < 4
+    if shape in TABLES and few and 2 <= int(count) <= MOST_CORNERS:
         phases = [k / int(count) for k in range(int(count))]
         levels = {f"drive.table.{k + 1}": (-0.5, 0.5) for k in range(len(phases))}
         return sharp | {"drive.table": [[phase, 0.5 - phase] for phase in phases]}, levels

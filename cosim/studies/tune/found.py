@@ -60,7 +60,7 @@ class Tuning:
     waveform: str = ""
     """The family that was searched; empty for the scene's own waveform."""
     robust: bool = False
-    """Whether values are medians over the turns of the keys."""
+    """Whether values are medians over the turns of the keys, or the worst where signs differ."""
     heat: float = inf
     """W: the most in a coil."""
     motion: Mapping[str, Any] = field(default_factory=dict[str, Any])
@@ -230,7 +230,10 @@ class Tuning:
         if words := motion_in_words(self.motion):
             lines.append(f"  motion: {words}")
         if self.robust:
-            lines.append(f"  values are medians over the keys' turns by {TURN:.0%}")
+            lines.append(
+                f"  values are medians over the keys' turns by {TURN:.0%}, or the worst of them "
+                "where their signs differ"
+            )
         for one in (self, *self.others) if self.others else ():
             lines.append(f"  {one.waveform}: {with_unit(one.value * scale, unit, 4)}")
         return "\n".join(lines)
@@ -239,9 +242,10 @@ class Tuning:
 def write_runs(path: Path, runs: Sequence[Run], quantity: str) -> None:
     """The runs in order: their settings (SI), the value asked for, and why one failed."""
     if runs:
-        heads = {name: f"{name} [{numeric_key(name).unit}]" for name in runs[0].values}
+        names = dict.fromkeys(name for run in runs for name in run.values)
+        heads = {name: f"{name} [{numeric_key(name).unit}]" for name in names}
         rows = [
-            {heads[name]: setting for name, setting in run.values.items()}
+            {head: run.values.get(name) for name, head in heads.items()}
             | {quantity: run.value, "failure": run.outcome.failure}
             for run in runs
         ]

@@ -1,6 +1,7 @@
 """Tunes a scene: searches its settings, then turns each key a little about the best."""
 
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import dataclass, replace
@@ -10,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput, SimulationFailed
+from cosim.errors import BadInput, Note, SimulationFailed
 from cosim.evaluate.evaluator import Evaluator, Settings
 from cosim.evaluate.keys import FREQUENCIES, numeric_key
 from cosim.evaluate.point import Number, Outcome, in_whole_periods
@@ -86,7 +87,7 @@ def tune(
     Each ``waveform``, as :func:`family` names them, is searched by itself with the numbers of its
     shape beside the keys, and with both polarities of the coil where ``polarity`` is asked for; the
     best one is given, with the ``others``. A ``robust`` search makes of each setting the median
-    over all turns of the keys of ``over``, or the worst of them where that is not above zero. No
+    over all turns of the keys of ``over``, or the worst of them where their signs differ. No
     setting counts that makes more ``heat`` in a coil than :func:`most_heat` has.
 
     In the folder ``out`` it leaves what ``Tuning.save`` writes, and takes up what an interrupted
@@ -110,8 +111,9 @@ def tune(
     most = most_heat(scene, heat)
     both = {"coil.polarity": (-1.0, 1.0)} if polarity else {}
     families: dict[str, tuple[Scene, dict[str, tuple[float, float]]]] = {}
-    for name in ([waveform] if isinstance(waveform, str) else waveform) or [""]:
-        changes, shape = family(name) if name else ({}, {})
+    asked = [*filter(None, [waveform])] if isinstance(waveform, str) else waveform
+    for name in asked or [""]:
+        changes, shape = family(name) if asked else ({}, {})
         ranges = {**keys, **both, **shape}
         least = FEWEST_RUNS + 2 * len(ranges)
         if not least <= budget <= MOST_RUNS:
@@ -132,6 +134,11 @@ def tune(
             aim = _Aim(bench, base, quantity, largest, ranges, count, most, made)
             try:
                 best, neighbours, runs, ahead = _searched(aim, budget, seed, progress, scouting)
+            except SimulationFailed as error:
+                if name == [*families][-1] and not tunings:
+                    raise
+                warnings.warn(f"{name}: {error}", Note, stacklevel=2)
+                continue
             except KeyboardInterrupt:
                 if out is not None:
                     write_runs(Path(out) / "tune.csv", aim.made, quantity)
@@ -289,10 +296,12 @@ class _Trial:
         if (heat := own.numbers.get("coil_heat", 0.0)) > most:
             own = replace(own, failure=f"the heat of {heat:.3g} W in a coil is above {most:.3g} W")
             return Run(settings, own, None)
-        scores = [self._score(self._value(outcome)) for outcome in outcomes]
-        score = float(np.median(scores)) if min(scores) > 0.0 else min(scores)
-        value = score if self._aim.largest else -score
-        return Run(settings, own, value if isfinite(value) else None)
+        values = [value for one in outcomes if (value := self._value(one)) is not None]
+        if len(values) < len(outcomes):
+            return Run(settings, own, None)
+        alike = min(values) > 0.0 or max(values) < 0.0
+        value = float(np.median(values)) if alike else min(values, key=self._score)
+        return Run(settings, own, value)
 
     def _settings(self, point: Sequence[float]) -> dict[str, Number]:
         """The keys' values at a point of the unit cube."""
