@@ -11,7 +11,6 @@ from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed
 from cosim.circuit.lint.topology import check_topology
 from cosim.circuit.lint.words import number, word_set
-from cosim.scene.messages import suggestion
 
 REQUIRED = (("vemf", "vcommand"), ("vemf", "vdac", "voffset"))
 """Alternatives, each a set of top-level voltage sources that a co-simulation can replace."""
@@ -206,5 +205,5 @@ def _check_call(element: Element, scope: Scope) -> None:
     known = {"m"}.union(*(subcircuit.parameters for subcircuit in subcircuits))
     for key in (word.partition("=")[0] for word in element.words if "=" in word):
         if key not in known:
-            hint = suggestion(key, known)
-            element.refuse(f": the subcircuit {shown(name)} has no parameter {shown(key)}{hint}")
+            has = ", ".join(sorted(known - {"m"})) or "none"
+            element.refuse(f": {shown(name)} has no parameter {shown(key)} (it has {has})")
