@@ -125,6 +125,9 @@ def rigs(found: Solved) -> Picture:
     first.set_xlabel("q [mm]", fontsize=8)
     first.set_ylim(-1.0, 2.5)
     for axis, name in zip(others, names, strict=True):
+        low, high = verdicts[name].low, verdicts[name].high
+        if low is not None and high is not None:
+            axis.axvspan(low, high, color="0.92", zorder=0)
         if space.log[space.names.index(name)]:
             axis.set_xscale("log")
             low, high = axis.get_xlim()
@@ -138,9 +141,6 @@ def rigs(found: Solved) -> Picture:
             axis.xaxis.set_minor_formatter(NullFormatter())
         else:
             axis.locator_params(axis="x", nbins=4)
-        low, high = verdicts[name].low, verdicts[name].high
-        if low is not None and high is not None:
-            axis.axvspan(low, high, color="0.92", zorder=0)
         unit = "" if units[name] in ("1", "") else f" [{units[name]}]"
         axis.set_title(f"{name.partition('.')[2]}{unit}: cost", loc="left", fontsize=9)
     for axis in (first, *others):
