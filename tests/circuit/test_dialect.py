@@ -150,6 +150,9 @@ TOLD = {
     ".meas tran a DERIV V(in) AT=1m": ".meas a is nothing known here; it may be AVG",
     ".meas tran a WHEN V(in)": ".meas a is nothing known here; it may be AVG",
     ".meas a": "is no complete .meas",
+    "F9 x 0": "names no source whose current controls it",
+    ".param k=": ".param gives no name a value",
+    ".if ()\nR9 x 0 1k\n.endif": ".if has no condition",
 }
 
 

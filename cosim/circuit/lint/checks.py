@@ -170,7 +170,9 @@ def _check_source(element: Element, scope: Scope, names: Names) -> None:
 
 def _check_current_controlled(element: Element, scope: Scope) -> None:
     found = element.words
-    if element.kind != "w" and (not found or "=" in found[0] or found[0][0] in "{'"):
+    if not found:
+        element.refuse(" names no source whose current controls it")
+    if element.kind != "w" and ("=" in found[0] or found[0][0] in "{'"):
         return
     if found[:1] == ["poly"]:
         return

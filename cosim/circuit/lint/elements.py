@@ -181,6 +181,8 @@ class _Parser:
     def _conditional(self, line: Line, found: list[str]) -> None:
         word = found[0].partition("{")[0].partition("'")[0]
         if word == ".if":
+            if len(line.text.split("if", 1)[-1].strip(" ()")) == 0:
+                refuse(line, ".if has no condition")
             self.ifs.append(line)
         elif len(self.ifs) <= (self.outer_ifs[-1] if self.outer_ifs else 0):
             refuse(line, f"{shown(word)} has no .if")
@@ -188,10 +190,10 @@ class _Parser:
             self.ifs.pop()
 
     def _param(self, line: Line, found: list[str]) -> None:
-        names = [definition[0] for definition in definitions(line.text)]
-        if not names:
+        given = definitions(line.text)
+        if not given or not all(expression for _, expression in given):
             refuse(line, ".param gives no name a value")
-        for name, formal in names:
+        for (name, formal), _ in given:
             (self.scope.parameters if formal is None else self.scope.functions).add(name)
 
     def _func(self, line: Line, found: list[str]) -> None:
