@@ -22,6 +22,7 @@ from cosim.scene.messages import ended, suggestion
 
 # Ground is no vector of ngspice's, but may stand in an expression.
 _VECTOR = re.compile(r"(v(?!\s*\(\s*(?:0|gnd)\s*\))|i)\s*\(\s*([^\s(),]+)\s*\)", re.IGNORECASE)
+_SUM = re.compile(r"[-+](?![^()]*\))")
 _FACTOR = re.compile(r"[vi]\s*\([^()]*\)", re.IGNORECASE)
 _UNITS = {"v": "V", "i": "A", "iv": "W", "vv": "V2", "ii": "A2"}
 _CURRENTS = "vleh"  # elements whose current ngspice computes as an unknown
@@ -50,7 +51,11 @@ class Deck:
 
 
 def unit(words: str) -> str:
-    """Of a vector or of a product of vectors; "?" where it is not known."""
+    """Of a vector, a product of vectors, or a sum of such; "?" where it is not known."""
+    terms = _SUM.split(words)
+    if len(terms) > 1 and all(map(str.strip, terms)):
+        first, *others = map(unit, terms)
+        return first if {first} == {first, *others} else "?"
     factors = _FACTOR.findall(words)
     if "".join(words.split()) != "*".join("".join(each.split()) for each in factors):
         return "?"

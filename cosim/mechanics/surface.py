@@ -52,7 +52,10 @@ class Surface:
         begins = (shifts[:, None] + self.times[:-1]).ravel()
         local, lengths = (np.tile(t, len(shifts)) for t in (self.times[:-1], np.diff(self.times)))
         v0, v1 = (np.tile(v, len(shifts)) for v in (self.velocities[:-1], self.velocities[1:]))
-        here = (begins <= end) & (begins + lengths >= start)
+        # What only touches an end does not count; of a jump at both, of a period, one does.
+        closed = (lengths == 0.0) & (self.periods > 1)
+        before = np.where(closed, begins <= end * (1.0 + 1e-12), begins < end)
+        here = before & (begins + lengths > start)
         begins, local, lengths, v0, v1 = (x[here] for x in (begins, local, lengths, v0, v1))
         # The part of each piece that counts.
         low = np.clip(start - begins, 0.0, lengths)

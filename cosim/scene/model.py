@@ -102,7 +102,9 @@ class Scene(BaseModel):
         """The mean over a broken period is off by per cents, so whole ones are the default."""
         given, duration = self.run.model_fields_set, self.run.duration
         fitted = {"output_step": min(self.run.output_step, duration / 2)}
-        if "settle" not in given:
+        if "settle" not in given and self.drive.waveform == "file":
+            fitted["settle"] = 0.0  # a record has no period
+        elif "settle" not in given:
             length = self.period
             count = max(int(duration / 2 / length * (1 + 1e-9)), int(duration >= length))
             fitted["settle"] = max(0.0, duration - count * length) if count else duration / 2

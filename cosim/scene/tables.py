@@ -77,6 +77,15 @@ class Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
+FRAME_RATE = 960.0
+"""1/s: of the published trials' camera."""
+
+SHORTEST = 1e-9
+"""s: of what is left after settling, and of a row."""
+
+LONGEST_NAME = 63
+"""Characters of a source that is fed."""
+
 PATHS = (("circuit", "netlist"), ("drive", "file"), ("friction", "normal_force_file"))
 """The keys that name files."""
 
@@ -543,10 +552,21 @@ class Run(Table):
     @model_validator(mode="after")
     def _check(self) -> "Run":
         for key in self.model_fields_set & {"settle", "output_step"}:
-            if (value := getattr(self, key)) >= self.duration:
+            if (value := getattr(self, key)) > self.duration - SHORTEST:
                 raise fault(
                     f"run.{key} = {value:g} s must be below run.duration = {self.duration:g} s"
                 )
+        frame = 1.0 / FRAME_RATE
+        if self.average == "slope" and self.duration - self.settle < 2.0 * frame - 1e-5:
+            raise fault(
+                f"run.settle = {self.settle:g} s leaves less than three frames, 1/{FRAME_RATE:g} s "
+                f'apart, of run.duration = {self.duration:g} s: run.average = "slope" needs them'
+            )
+        if self.average == "slope" and self.output_step > frame:
+            raise fault(
+                f"run.output_step = {self.output_step:g} s must be at most 1/{FRAME_RATE:g} s for "
+                'run.average = "slope"'
+            )
         if self.duration / self.output_step > MAX_ROWS:
             raise fault(
                 f"run.output_step = {self.output_step:g} s makes more than {MAX_ROWS} rows in "
@@ -620,6 +640,10 @@ class Port(Table):
 
     @model_validator(mode="after")
     def _check(self) -> "Port":
+        if self.probe is not None and not self.probe.strip():
+            raise fault("probe must be a vector or an expression of the netlist")
+        if len(self.source or "") > LONGEST_NAME:
+            raise fault(f"source must have at most {LONGEST_NAME} characters")
         if (self.probe is None) == (self.origin is None):
             raise fault(f"the port {self.words} must have either probe or from")
         if (self.source is None) == (self.to is None) or (self.probe and self.source):

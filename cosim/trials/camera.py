@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.arrays import Array
-
-FRAME_RATE = 960.0  # 1/s
+from cosim.scene.tables import FRAME_RATE
 
 INSTANTS = 16
 """Of an exposure, whose mean a frame shows. A velocity that jumps by 0.3 m/s within the longest

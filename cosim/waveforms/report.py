@@ -1,6 +1,6 @@
 """A run's numbers for a reader: the table that is printed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from cosim.scene import Scene
@@ -43,6 +43,7 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
         ("error of the path", _error(summary)),
         ("run time", f"{summary['wall_time']:.2f} s for {scene.run.duration:g} s"),
     ]
+    rows += _measures(summary)
     beside = _measured(scene)
     rows = [(name, value + beside.get(name.strip(), "")) for name, value in rows if value]
     return "\n".join(f"  {name:<24}{value}" for name, value in rows)
@@ -53,7 +54,7 @@ def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str
     every = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
     names = [name for name in every if summary[f"{name}.rms"] != 0.0]
     shown = [label(name, units[name]) for name in names]
-    width = max(20, *map(len, shown))
+    width = max([20, *map(len, shown)])
     whats = ["mean", "rms", "least", "greatest"]
     told = any(name.endswith(".mean_error") for name in summary)
     whats += ["mean_error"] if told else []
@@ -73,12 +74,20 @@ def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str
     powers = [name.removesuffix(".power") for name in summary if name.endswith(".power")]
     for what, words in (
         *(("power at " + name, f"{summary[f'{name}.power']:.6g} W") for name in powers),
+        *_measures(summary),
         *coupling,
         ("steps", steps + repeated),
         ("run time", time),
     ):
         lines.append(f"  {what:<{width}} {words}")
     return "\n".join(lines)
+
+
+def _measures(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """What the netlist's ``.meas`` lines found."""
+    for name, value in summary.items():
+        if name.startswith("meas."):
+            yield name.removeprefix("meas."), "none" if value is None else f"{value:.6g}"
 
 
 def _measured(scene: Scene) -> dict[str, str]:
@@ -120,7 +129,7 @@ def _heat(summary: dict[str, Any]) -> str:
 
 def warmer(ends: Sequence[float | None]) -> str:
     """How much warmer a coil becomes, from the least to the most, K; None is without end."""
-    known = [f"{end:.3g}" for end in ends if end is not None]
+    known = [f"{end:.3g}" if end < 999.5 else f"{end:.0f}" for end in ends if end is not None]
     if len(known) < len(ends):
         return f"at least {known[0]} K" if known else "more and more"
     return f"{' to '.join(known)} K"

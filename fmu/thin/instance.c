@@ -123,7 +123,7 @@ int thin_start(Instance *inst)
     if (inst->started)
         return thin_refuse(inst, "it has been started already");
     inst->started = 1;
-    inst->stale = 0;
+    inst->stale = 1; /* outputs may depend on the inputs' values at the start */
     return !inst->model->start || inst->model->start(&inst->run) ||
            thin_refuse(inst, "%s", inst->run.why);
 }

@@ -6,6 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 
+from cosim.circuit.joined import unit
 from cosim.circuit.netlist import parameters
 from cosim.scene import load
 from tests.helpers import needs
@@ -152,3 +153,11 @@ def test_audio_amplifier_stage(tmp_path):
         flagged = sign * hard["swing"][late] >= 0.5
         assert flagged.any()
         assert np.min(sign * hard["amp"][late][flagged]) > 0.9 * top
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [("v(in) - v(out)", "V"), ("v(a)*i(b)+v(c)*i(d)", "W"), ("v(a)+i(b)", "?"), ("v(in-)", "V")],
+)
+def test_units_of_sums(words: str, wanted: str) -> None:
+    assert unit(words) == wanted

@@ -54,3 +54,17 @@ def test_a_run_tells_what_it_reached() -> None:
         assert told["slip_up"] == pytest.approx(budget["up"])
     grip = summary(load("held", {**rig, "mechanics.n_surfaces": 2, "run.duration": 0.5}))
     assert grip["slip_down"] == pytest.approx(slip_budget(0.7, 1.0 / 0.009, G, 0.2)["down"])
+
+
+def test_what_only_touches_the_ends_does_not_count() -> None:
+    """0 to 1 m/s in 0.1 s, constant until 0.3 s, then down at 100 m/s²; and of a period that jumps
+    at its end, the one jump."""
+    surface = Surface(
+        np.array([0.0, 0.1, 0.3, 0.31]), np.array([0.0, 1.0, 1.0, 0.0]), 1.0, 0.0, 0.0
+    )
+    found = surface.extremes(0.1, 0.3)
+    assert (found["a_surface_max"], found["a_surface_min"]) == (0.0, 0.0)
+    saw = Surface(np.array([0.0, 0.1, 0.1]), np.array([-1.0, 1.0, -1.0]), 5)
+    for start in (0.1, 0.15, 0.2):
+        found = saw.extremes(start, start + 0.2)
+        assert found["a_surface_max"] == pytest.approx(20.0) and found["a_surface_min"] == -np.inf

@@ -498,3 +498,30 @@ def test_nothing_heavy_is_imported() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"run.average": "slope", "run.settle": 0.199}, "less than three frames"),
+        (
+            {"run.average": "slope", "run.settle": 0.1, "run.output_step": 0.05},
+            "run.output_step = 0.05 s must be at most 1/960 s",
+        ),
+        ({"run.settle": 0.2 - 1e-12}, "must be below run.duration"),
+    ],
+)
+def test_averages_need_something_to_average(settings: dict[str, Any], said: str) -> None:
+    with pytest.raises(BadInput, match=said):
+        load("paper-limited", {"run.duration": 0.2, **settings})
+
+
+def test_a_motion_from_a_file_is_averaged_over_all_of_it(tmp_path: Path) -> None:
+    """It has no period that a whole number of could be taken of."""
+    rows = "time [s],v_surface [m/s]\n0,0\n0.02,0.1\n0.05,0\n"
+    (tmp_path / "motion.csv").write_text(rows)
+    (tmp_path / "given.toml").write_text(
+        'base = "reference"\n[drive]\nwaveform = "file"\nfile = "motion.csv"\n'
+        '[circuit]\nmodel = "none"\n[run]\nduration = 0.05\n'
+    )
+    assert load(tmp_path / "given.toml").run.settle == 0.0

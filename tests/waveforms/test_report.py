@@ -91,3 +91,13 @@ def test_rigid_walls_have_no_peak_and_rest_no_sign() -> None:
     held = load("held", SHORT)
     lines = table(held, simulate(held).summary, UNITS).splitlines()
     assert any(line.split() == ["surface", "velocity", "0", "…", "0", "mm/s"] for line in lines)
+
+
+def test_ports_of_which_all_numbers_are_zero() -> None:
+    scene = load("dc-motor")
+    whats = ("mean", "rms", "least", "greatest")
+    counts = {"circuit_steps": 9, "fmu_steps": 9, "steps_repeated": 0, "wall_time": 1.0}
+    counts |= {"method": "redo", "meas.loudest": 0.25}
+    zeros = {f"rotor.omega.{what}": 0.0 for what in whats}
+    told = table(scene, zeros | counts, {"rotor.omega": "rad/s"})
+    assert "1 other is 0 after settling" in told and re.search(r"loudest +0\.25", told)

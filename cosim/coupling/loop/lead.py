@@ -35,6 +35,9 @@ _AFTER_JUMP, _SHARE_AFTER_JUMP = 1e-7, 1e-2
 remembers of the slopes before it misleads its choice of the step. The start is one too: V1 leaves 0
 at once. This step is of first order and nothing judges it, so finer runs must shorten it too."""
 
+ROUNDING = 1e-13
+"""s, by which ngspice may end before the time that it was asked for."""
+
 _COARSEST = 1e-4
 """``circuit.reltol`` at which the lengths of steps in ``lead.c`` are used as they stand. Another
 divides them by the cube root of the ratio, with which the steps that ngspice chooses by their
@@ -138,7 +141,7 @@ class Lead:
         if state.status == UNKNOWN_SOURCE:
             name = state.source.decode().lower()
             raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
-        if self._time < self._duration * (1 - 1e-9):
+        if self._time < self._duration - max(1e-9 * self._duration, ROUNDING):
             raise SimulationFailed(
                 f"ngspice stopped at t = {self._time:.6g} s of {self._duration:g} s: "
                 f"{engine().said()}. If the circuit is right, a smaller circuit.max_step or "

@@ -303,7 +303,9 @@ typedef struct Ports {
     int64_t n_throughs;
     int64_t learn;             /* whether their gains are to be looked at */
     double macro_step;         /* s; 0: each accepted step ends on a communication point */
+    int64_t fixed;             /* whether an FMU takes no other step than that one */
     double duration, after_jump;
+    double drive_charge;       /* V s; the drive's integral since the communication point */
     double jumped;             /* s; the last jump, of the drive or of an FMU */
     double time, origin, end;  /* s; last accepted point; last and next communication point */
     double told, sent;         /* as in Lead */

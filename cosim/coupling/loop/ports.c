@@ -182,6 +182,12 @@ static int fmu_failed(Ports *c, const Stranger *s)
     return 0;
 }
 
+/* V s; of the drive since the last accepted point. */
+static double drive_integral(Ports *c, double time)
+{
+    return 0.5 * (time - c->time) * (drive_after(c, c->time) + drive_before(c, time));
+}
+
 /* An input from the communication point to `time`, which lies `h` (s) later. */
 static void feed(Ports *c, const Feed *f, double time, double h)
 {
@@ -198,7 +204,7 @@ static void feed(Ports *c, const Feed *f, double time, double h)
     } else {
         start = drive_after(c, c->origin);
         end = drive_before(c, time);
-        mean = 0.5 * (start + end);
+        mean = (c->drive_charge + drive_integral(c, time)) / h;
     }
     const double value = f->feed == MEAN ? mean : f->feed == END ? end : start;
     *f->input = f->origin.scale * value + f->origin.offset;
@@ -225,7 +231,7 @@ static int set_inputs(Stranger *s)
 }
 
 /* What an FMU puts out for the values that its inputs have at the end of a step. */
-static int refresh(Ports *c, Stranger *s)
+static int refresh(Ports *c, Stranger *s, double time)
 {
     for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++) {
         const int64_t k = f->origin.place;
@@ -233,6 +239,8 @@ static int refresh(Ports *c, Stranger *s)
             *f->input = f->origin.scale * c->now[k] + f->origin.offset;
         if (f->origin.kind == FROM_OUTPUT)
             *f->input = f->origin.scale * c->outputs[k] + f->origin.offset;
+        if (f->origin.kind == FROM_DRIVE)
+            *f->input = f->origin.scale * drive_before(c, time) + f->origin.offset;
     }
     return set_inputs(s) && get_outputs(s);
 }
@@ -252,7 +260,7 @@ static int step_all(Ports *c, double time)
             feed(c, f, time, h);
         s->fmu->time = c->origin;
         if (!set_inputs(s) || !s->fmu->step(s->fmu, h) || !get_outputs(s) ||
-            (c->repeats && !refresh(c, s)))
+            (c->repeats && !refresh(c, s, time)))
             return fmu_failed(c, s);
         s->fmu->time = time;
         s->fmu->steps++;
@@ -321,12 +329,16 @@ static void begin_exchange(Ports *c)
     set_lines(c);
     memcpy(c->start, c->now, (size_t)c->n_saved * sizeof *c->start);
     memset(c->charges, 0, (size_t)c->n_saved * sizeof *c->charges);
+    c->drive_charge = 0.0;
     c->origin = time;
     c->met_before = c->met;
     c->met = 0;
-    c->end = c->macro_step > 0.0 ? fmin(time + c->macro_step, c->jump) : -INFINITY;
-    if (c->macro_step > 0.0 && time < c->duration - ON_TIME)
-        c->end = fmin(c->end, c->duration);
+    c->end = c->macro_step > 0.0 ? time + c->macro_step : -INFINITY;
+    if (c->macro_step > 0.0 && !c->fixed) {
+        c->end = fmin(c->end, c->jump);
+        if (time < c->duration - ON_TIME)
+            c->end = fmin(c->end, c->duration);
+    }
     c->exchanged++;
     write_point(c, time);
     if (save_all(c) && c->learn)
@@ -401,6 +413,8 @@ static double accepted(Ports *c, double time, double next_step)
         c->stepped = 0;
         for (int64_t k = 0; k < c->n_saved; k++)
             c->charges[k] += 0.5 * (time - c->time) * (c->last[k] + c->now[k]);
+        if (c->driven)
+            c->drive_charge += drive_integral(c, time);
         memcpy(c->last, c->now, (size_t)c->n_saved * sizeof *c->last);
         c->time = time;
         if (meets)
@@ -666,7 +680,7 @@ void ports_finish(Ports *c)
     if (going(c) && c->sent > c->told) {
         if (c->n_log == c->log_rows)
             c->attend();
-        c->end = c->macro_step > 0.0 ? fmin(c->end, c->sent) : c->end;
+        c->end = c->macro_step > 0.0 && !c->fixed ? fmin(c->end, c->sent) : c->end;
         accepted(c, c->sent, 0.0);
     }
     run = NULL;

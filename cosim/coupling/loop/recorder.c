@@ -174,8 +174,9 @@ static int64_t follow(Recorder *r, int64_t n, const double *edges, const double 
         if (!step_within(r, edges[k], edges[k], start, end))
             return -1;
         r->inside = 0;
-        if (r->times[r->next] <= edges[k] + SAME_TIME && !visit(r))
-            return -1;
+        while (r->times[r->next] <= edges[k] + SAME_TIME)
+            if (!visit(r))
+                return -1;
         if (f->steps >= stop || is_late(f, late))
             return k + 1;
     }

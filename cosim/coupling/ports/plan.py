@@ -179,11 +179,7 @@ def _method(scene: Scene, sides: list[Side]) -> str:
                     'canGetAndSetFMUstate = true; take "step-locked" with small circuit.max_step'
                 )
         return "redo"
-    fixed = any(
-        not side.of.abilities.canHandleVariableCommunicationStepSize
-        or side.of.abilities.fixedInternalStepSize
-        for side in sides
-    )
+    fixed = any(not side.varies or side.of.abilities.fixedInternalStepSize for side in sides)
     return ("macro-steps" if fixed else "step-locked") if asked == "auto" else asked
 
 

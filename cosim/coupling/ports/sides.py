@@ -48,6 +48,11 @@ class Side:
         self._parameters = about.parameters
 
     @property
+    def varies(self) -> bool:
+        """Whether its steps may have other lengths."""
+        return bool(self.of.abilities.canHandleVariableCommunicationStepSize)
+
+    @property
     def width(self) -> int:
         return len(self.columns) + len(self.slopes)
 
@@ -79,7 +84,12 @@ class Side:
         self.fmu = Fmu(instance=self.instance.raw.component, goes_back=int(repeats), **calls)
         loop().fmu_bind(ctypes.byref(self.fmu), self.of.version)
         inputs = _grouped(self.inputs)
-        starts = [value for each in inputs for value in each.start]
+        given = self._parameters
+        starts = [
+            float(given.get(each.name if each.size == 1 else f"{each.name}[{k}]", value))
+            for each in inputs
+            for k, value in enumerate(each.start)
+        ]
         self._values = (c_double * max(len(starts), 1))(*starts)
         at, base = {}, 0
         for each in inputs:

@@ -203,6 +203,9 @@ class Stranger:
             raise self.bad(f"its library lacks the function {function}") from None
 
 
+_WHOLE = {f"{'' if s else 'U'}Int{n}": (n, s) for n in (8, 16, 32, 64) for s in (True, False)}
+"""Bits of a type, and whether it has a sign; FMI 2.0's has 32."""
+
 _AS_2 = {"Enumeration": "Integer"}
 
 
@@ -215,6 +218,10 @@ def _allowed(found: Variable, value: Any, where: str, of: Stranger) -> Any:
     elif not found.real:
         if value != int(value):
             raise of.bad(f"{where} must be a whole number")
+        bits, signed = _WHOLE.get(found.type, (32, True))
+        low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
+        if not low <= value <= high:
+            raise of.bad(f"{where} must be from {low} to {high}")
         return int(value)
     return value
 

@@ -72,11 +72,15 @@ def _whole_path(row: dict[str, Any]) -> str:
 def profiles(result: dict[str, Any]) -> Picture:
     """How much less likely than the best each µ_k F_n of a trial is, all else fitted anew."""
     figure, (axis,) = grid(1, 1, 9.0, 5.2, 0.0)
+    near = [0.0]
     style: dict[str, Any] = {"lw": 1.4, "marker": ".", "ms": 4}
     for (name, profile), row in zip(result["profiles"].items(), result["trials"], strict=True):
         if row["normal_force_weights"] is not None:
             axis.plot(profile["kinetic_friction_weights"], profile["loss"], label=name, **style)
+            both = zip(profile["kinetic_friction_weights"], profile["loss"], strict=True)
+            near += [friction for friction, loss in both if loss <= LARGEST_LOSS]
     axis.axhline(LOSS, color="0.3", lw=1.0, ls="--", label="90 %, of slides that do not scatter")
+    axis.set_xlim(0.0, 1.1 * max(near) or 1.0)
     axis.set(xlabel="µ_k F_n [m·g]", ylabel="loss of log-likelihood", ylim=(0, LARGEST_LOSS))
     axis.legend(fontsize=8, frameon=False, ncols=2)
     axis.set_title(

@@ -47,8 +47,8 @@ class Quantity:
 V_AVERAGE = Quantity("v_average", "Mean velocity of the part", "mm/s", 1e3)
 OTHERS = (
     Quantity("stick_fraction", "Sticking, share of the time", "%", 100.0),
-    Quantity("a_camera_max", "Peak acceleration, read by a camera", "m/s²", 1.0),
-    Quantity("a_surface_max", "Peak acceleration, true", "m/s²", 1.0),
+    Quantity("a_camera_max", "Peak acceleration upwards, read by a camera", "m/s²", 1.0),
+    Quantity("a_surface_max", "Peak acceleration upwards, true", "m/s²", 1.0),
 )
 
 
