@@ -200,8 +200,8 @@ def exports() -> str:
     parts = [
         "# Exports",
         "`cosim export RUN --as mat,wav` writes a finished run in the forms of other programs, "
-        "from `waveforms.nc`, with all digits. A sweep's points it writes as `csv`, `mat` or, with the "
-        "package pyarrow, `parquet`: a row for each.",
+        "from `waveforms.nc`, with all digits. A sweep's points it writes as `csv`, `mat` or, with "
+        "the package pyarrow, `parquet`: a row for each.",
         table(["form", "file", "what it is"], rows),
     ]
     for name, one in formats().items():
