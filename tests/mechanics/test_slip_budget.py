@@ -59,9 +59,7 @@ def test_a_run_tells_what_it_reached() -> None:
 def test_what_only_touches_the_ends_does_not_count() -> None:
     """0 to 1 m/s in 0.1 s, constant until 0.3 s, then down at 100 m/s²; and of a period that jumps
     at its end, the one jump."""
-    surface = Surface(
-        np.array([0.0, 0.1, 0.3, 0.31]), np.array([0.0, 1.0, 1.0, 0.0]), 1.0, 0.0, 0.0
-    )
+    surface = Surface(np.array([0.0, 0.1, 0.3, 0.31]), np.array([0.0, 1.0, 1.0, 0.0]))
     found = surface.extremes(0.1, 0.3)
     assert (found["a_surface_max"], found["a_surface_min"]) == (0.0, 0.0)
     saw = Surface(np.array([0.0, 0.1, 0.1]), np.array([-1.0, 1.0, -1.0]), 5)
