@@ -17,6 +17,7 @@ from cosim.cli.main import main
 from cosim.drive.command import command
 from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.point import inputs
 from cosim.evaluate.store import Store
 from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
@@ -301,7 +302,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         study_in(tmp_path, 3)
-    with Store(tmp_path / STORE, scene.as_dict(), *ASKED) as store:
+    with Store(tmp_path / STORE, inputs(scene), *ASKED) as store:
         assert store.resumed == 4
     steps.clear()
     said = study_in(tmp_path)
