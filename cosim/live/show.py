@@ -118,7 +118,9 @@ def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
     """Curves of a table that begins with the time; a cloud of any other, and a chart's pictures."""
     cells = read_cells(path)
     cells.even(1)
-    header, heads = cells.rows[0][1], {}
+    header, heads = [*cells.rows[0][1]], {}
+    while not header[-1]:  # a separator too many
+        header.pop()
     for cell in header:
         if header.count(cell) > 1:
             raise BadInput(f"{cells.name}: two columns are called {plain(cell, 40)}.")

@@ -154,7 +154,8 @@ def test_a_comparison_and_a_chart(tab: Any, tmp_path: Path) -> None:
 
 def test_columns_of_one_name_in_two_units_are_two(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
-    path.write_text("time [s],z [mm],z [m],v [m/s]\n0,1,0.001,7\n1,2,0.002,8\n", encoding="utf-8")
+    rows = "time [s],z [mm],z [m],v [m/s],,\n0,1,0.001,7,,\n1,2,0.002,8,,\n"
+    path.write_text(rows, encoding="utf-8")
     shown, ((_, *columns),) = _table(path)
     assert [each["name"] for each in shown["signals"]["columns"]] == ["time", "z", "z [m]", "v"]
     assert [column.tolist() for column in columns] == [[1, 2], [0.001, 0.002], [7, 8]]
