@@ -18,6 +18,7 @@ from typing import Any, Protocol
 
 from PySpice.Spice.NgSpice import Shared
 
+from cosim.circuit.lint.words import sent
 from cosim.errors import BadInput, SimulationFailed, plain
 from cosim.toolchain.libraries import ngspice_library
 from cosim.toolchain.processes import retire
@@ -214,19 +215,10 @@ class Engine(Shared.NgSpiceShared):
             self.sent = tuple(name.lower() for name in names)
             if self._leader is not None:
                 for name in self._save:
-                    if _vector(name) not in self.sent:
+                    if sent(name.lower()).lower() not in self.sent:
                         raise ValueError(plain(name))
-                wanted = [*(_vector(name) for name in self._save), "time"]
+                wanted = [*(sent(name.lower()).lower() for name in self._save), "time"]
                 self._leader.places[:] = [self.sent.index(name) for name in wanted]
         except ValueError as error:
             self.fail(SimulationFailed(f"The netlist has no such vector: {error}."))
         return 0
-
-
-def _vector(name: str) -> str:
-    """What ngspice calls a saved vector: ``i(vemf)`` is ``vemf#branch``, ``v(out)`` is ``out``, but
-    ``v(2)`` is itself."""
-    kind, _, inner = name.lower().rstrip(")").partition("(")
-    if kind == "i":
-        return f"{inner}#branch"
-    return f"v({inner})" if inner[:1].isdigit() else inner

@@ -11,7 +11,6 @@ from typing import Any
 from cosim.circuit.lint.deck import named as netlist_files
 from cosim.errors import CosimError
 from cosim.scene import Scene, changed
-from cosim.scene.tables import PATHS
 from cosim.toolchain.processes import TRIES, ProcessLost
 
 Number = float | int
@@ -100,16 +99,16 @@ def point(base: Scene, values: Mapping[str, Number | str], whole_periods: bool) 
 def inputs(scene: Scene) -> dict[str, Any]:
     """All that decides a run of a scene: its keys, and the hashes of the files that they name, with
     those that a netlist names in turn."""
-    named = [scene.table(table).get(key) for table, key in PATHS]
-    files = [Path(file) for file in (*named, *(each.file for each in scene.fmu)) if file]
+    files = [Path(file) for file in scene.files.values()]
     if netlist := scene.circuit.netlist:
-        files += netlist_files(Path(netlist))
-    every = [one for file in files for one in ([file], sorted(file.rglob("*")))[file.is_dir()]]
+        files += netlist_files(Path(netlist))[1:]
+    every = [one for file in files for one in (file.rglob("*") if file.is_dir() else [file])]
     hashes = {}
-    for file in every:
+    for path in every:
         with suppress(OSError):  # its runs tell
-            if file.is_file():
-                hashes[str(file)] = hashlib.sha256(file.read_bytes()).hexdigest()
+            if path.is_file():
+                with path.open("rb") as file:
+                    hashes[str(path)] = hashlib.file_digest(file, "sha256").hexdigest()
     return scene.as_dict() | {"files": hashes}
 
 

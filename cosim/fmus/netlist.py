@@ -10,13 +10,12 @@ from math import inf
 from pathlib import Path
 
 from cosim.circuit.joined import deck, unit
+from cosim.circuit.lint.words import number, sent
 from cosim.errors import BadInput, plain
 from cosim.fmus.pack import pack
 from cosim.toolchain.libraries import SUFFIX, compiled
 
-_PARAM = re.compile(r"\.param (\w+)=([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(meg|mil|[tgkmunpf])?$")
-_SCALES = {"t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6}
-_SCALES |= {"n": 1e-9, "p": 1e-12, "f": 1e-15}
+_PARAM = re.compile(r"\.param (\w+)=(\S+)$")
 _UNITS = {"v": "V", "i": "A", "?": "1"}
 
 
@@ -61,7 +60,7 @@ def write(
         rows.append(("input", name, _UNITS[kind], "0", "Value of the source", name.lower()))
     for words, vector in outputs.items():
         of = _UNITS.get(unit(words), unit(words))
-        rows.append(("output", words, of, "0", "At the last accepted step", _sent(vector)))
+        rows.append(("output", words, of, "0", "At the last accepted step", sent(vector)))
     rows += [("pulse", name) for name in pulses]
     name = re.sub(r"\W", "_", target.stem, flags=re.ASCII)
     rows = [("about", f"{plain(target.stem)}, computed by ngspice"), ("step", repr(step)), *rows]
@@ -78,13 +77,6 @@ def _given(text: str) -> Iterator[tuple[str, float]]:
     for line in text.split("\n"):
         depth += line.startswith(".subckt") - line.startswith(".ends")
         found = _PARAM.match(line)
-        if found and depth == 0:
-            yield found[1], float(found[2]) * _SCALES.get(found[3] or "", 1.0)
-
-
-def _sent(vector: str) -> str:
-    """ngspice's name of ``v(out)``, ``v(2)`` or ``i(v1)``."""
-    inner = vector[2:-1]
-    if vector.startswith("i"):
-        return f"{inner}#branch"
-    return f"V({inner})" if inner[:1].isdigit() else inner
+        value = number(found[2]) if found and depth == 0 else None
+        if found and value is not None:
+            yield found[1], value

@@ -181,7 +181,7 @@ class _Parser:
     def _conditional(self, line: Line, found: list[str]) -> None:
         word = found[0].partition("{")[0].partition("'")[0]
         if word == ".if":
-            if len(line.text.split("if", 1)[-1].strip(" ()")) == 0:
+            if not line.text.split("if", 1)[-1].strip(" ()"):
                 refuse(line, ".if has no condition")
             self.ifs.append(line)
         elif len(self.ifs) <= (self.outer_ifs[-1] if self.outer_ifs else 0):

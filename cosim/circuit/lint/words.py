@@ -27,6 +27,15 @@ def number(text: str) -> float | None:
     return sign * float(match[1]) * _FACTORS.get((match[2] or "").lower(), 1.0)
 
 
+def sent(vector: str) -> str:
+    """What ngspice calls a vector that it sends: ``i(vemf)`` is ``vemf#branch``, ``v(out)`` is
+    ``out``, but ``v(2)`` is ``V(2)``."""
+    inner = vector[2:-1]
+    if vector[0] == "i":
+        return f"{inner}#branch"
+    return f"V({inner})" if inner[:1].isdigit() else inner
+
+
 def words(text: str) -> list[str]:
     """The words of a line, lower case: ``{…}`` and ``'…'`` whole, ``key=value`` in one."""
     found: list[str] = []

@@ -114,12 +114,8 @@ def _lines(
     known = np.isfinite(measured)
     line = np.polynomial.Polynomial.fit(time[known], measured[known], 1)
     later = one_period_later(time, measured, period, gained) if period else None
-    return (
-        _told(score(run, measured)),
-        None if later is None else _told(score(later, measured)),
-        _told(score(np.zeros(len(time)), measured)),
-        _told(score(line(time), measured)),
-    )
+    every = run, later, np.zeros(len(time)), line(time)
+    return tuple(None if one is None else _told(score(one, measured)) for one in every)
 
 
 def _told(value: float) -> float | None:

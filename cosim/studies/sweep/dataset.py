@@ -1,7 +1,7 @@
 """The result of a sweep as a labelled dataset, and as netCDF."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -66,14 +66,20 @@ class Numbers:
         return found | {name: self._values[name] for name in (JUDGED,) if name in self._values}
 
 
-def dataset(scene: Scene, design: Design, found: Numbers, versions: dict[str, str]) -> xr.Dataset:
+def dataset(
+    scene: Scene,
+    design: Design,
+    found: Numbers,
+    versions: dict[str, str],
+    units: Mapping[str, str],
+) -> xr.Dataset:
     """The numbers of each point's summary over the keys of the sweep, with their units.
 
     A key's coordinate (:func:`_names`) has its unit, its meaning and, as ``key``, its
     ``table.key``. Beside a knob stands what it stands for. NaN stands for a point that failed, is
-    still to be run, or has no such number. SI units.
+    still to be run, or has no such number. SI units; ``units`` are :func:`units_of` the scene.
     """
-    numbers, units = found.by_name(), units_of(scene)
+    numbers = found.by_name()
     axes = _names(design, {*numbers, FAILURE, POINT})
     dims = tuple(axes) if design.sample is None else (POINT,)
     columns = [list(axis.values) for axis in design.axes]

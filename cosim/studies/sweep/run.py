@@ -94,13 +94,13 @@ def _sweep(
     dask: str | None,
     progress: Callable[[int, int, int], None],
 ) -> xr.Dataset:
-    made_by = {**versions(), "fmu": fmu.token()}
+    made_by, units = {**versions(), "fmu": fmu.token()}, dataset.units_of(scene)
     total, numbers = len(design), dataset.Numbers(len(design))
     asked = [(axis.key.full, axis.values) for axis in design.axes], design.sample
     whole_periods = design.changes_frequency
 
     def refreshed() -> xr.Dataset:
-        data = dataset.dataset(scene, design, numbers, made_by)
+        data = dataset.dataset(scene, design, numbers, made_by, units)
         dataset.write(folder / RESULT, data, folder / FIGURE)
         return data
 
