@@ -4,12 +4,16 @@ Both go through fmpy's own functions, which check every return code.
 """
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Iterable
+from contextlib import suppress
 from copy import copy
-from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_uint, c_void_p, cast
+from ctypes import byref, c_double, c_uint, c_void_p, cast
 from functools import cache, cached_property, partial
+from itertools import count
 from threading import Lock
 from typing import Any, ClassVar
+from weakref import WeakValueDictionary
 
 import fmpy
 from fmpy import fmi2, fmi3
@@ -47,6 +51,11 @@ def _places(version: int, names: tuple[str, ...]) -> Any:
     return (c_uint * len(names))(*(known[name] for name in names))
 
 
+def unit(variable: Any) -> str:
+    """What fmpy says of a variable's unit: its own, or that of its type, or 1."""
+    return variable.unit or (variable.declaredType and variable.declaredType.unit) or "1"
+
+
 class Interface(ABC):
     """One instance of the FMU. Places and values are ctypes arrays of equal length."""
 
@@ -57,7 +66,7 @@ class Interface(ABC):
 
     def __init__(self, loaded: Any = None) -> None:
         """Of an FMU that fmpy has ``loaded``; by default the project's own."""
-        self.messages: list[str] = []
+        self.messages: deque[str] = deque(maxlen=100)
         """What the FMU has said, the newest last."""
         self._running = False
         self._fmu = copy(load(self.version) if loaded is None else loaded)
@@ -152,9 +161,14 @@ class Fmi2(Interface):
 
     def _begin(self, new: bool) -> None:
         if new:
-            self._logger = _LOGGER_2(lambda *a: self.messages.append(_text(a[4])))
             callbacks = fmi2.fmi2CallbackFunctions()
-            callbacks.logger = self._logger
+            callbacks.logger = _logger_2
+            callbacks.componentEnvironment = next(_number)
+            _said[callbacks.componentEnvironment] = self.messages
+            with suppress(OSError):  # fmpy has none for every machine
+                from fmpy.logging import addLoggerProxy
+
+                addLoggerProxy(byref(callbacks))
             callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
             callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
             self._fmu.instantiate(callbacks=callbacks)
@@ -190,12 +204,22 @@ class Fmi3(Interface):
 
 
 _ONE = (c_double * 1)(1.0)
-_LOGGER_2 = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
-"""FMI 2.0's logger without its variable arguments: this FMU's messages use none."""
+_number = count(1)
+_said: WeakValueDictionary[int, deque[str]] = WeakValueDictionary()
+"""The messages of each instance of FMI 2.0, by what it was given as its environment."""
 
 
 def _text(message: bytes | None) -> str:
     return (message or b"").decode(errors="replace")
+
+
+@fmi2.fmi2CallbackLoggerTYPE
+def _logger_2(environment: int | None, *said: Any) -> None:
+    """FMI 2.0's logger without its variable arguments, which fmpy's C function before it puts into
+    the message. That function has one logger behind it in a process, and so has this module."""
+    newest = max(_said, default=0)  # some FMUs lose their environment
+    with suppress(KeyError):
+        _said[environment or newest].append(_text(said[-1]))
 
 
 INTERFACES: dict[int, type[Interface]] = {2: Fmi2, 3: Fmi3}

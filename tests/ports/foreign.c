@@ -45,7 +45,7 @@ static int step(Model *m, double time, double h)
         abort();
     if (time + h >= m->r[FAIL_AT]) {
         if (m->log2)
-            m->log2(NULL, "foreign", 3, "error", "the bearing is worn out");
+            m->log2(NULL, "foreign", 3, "error", "the %s is worn %s", "bearing", "out");
         if (m->log3)
             m->log3(NULL, 3, "error", "the bearing is worn out");
         return 3;

@@ -159,9 +159,9 @@ class Run:
 
     def _fmu_failure(self) -> SimulationFailed:
         side = self.plan.sides[self.state.failed]
-        said = side.instance.messages[-1:] or [f"status {side.fmu.status}"]
+        said = side.instance.messages or [f"status {side.fmu.status}"]
         return SimulationFailed(
-            f"The FMU {side.name} failed at t = {self.state.told:.6g} s: {plain(said[0], 400)}"
+            f"The FMU {side.name} failed at t = {self.state.told:.6g} s: {plain(said[-1], 400)}"
         )
 
     # What ngspice's engine asks for (see cosim.circuit.ngspice.Leader).

@@ -17,7 +17,7 @@ import fmpy
 from fmpy import fmi2, fmi3
 
 from cosim.errors import BadInput, plain
-from cosim.mechanics.fmi import INTERFACES, Interface
+from cosim.mechanics.fmi import INTERFACES, Interface, unit
 from cosim.scene.messages import ended, shown, suggestion
 
 MOST_FILES, LARGEST = 10_000, 1 << 30
@@ -113,7 +113,7 @@ class Stranger:
             start = start * size if len(start) == 1 else start
             known[each.name] = Variable(
                 *(each.name, each.valueReference, each.type, kinds[each.type], size),
-                each.unit or (each.declaredType and each.declaredType.unit) or "1",
+                unit(each),
                 *(each.causality or "local", each.variability or "continuous"),
                 start if len(start) == size else (0.0,) * size,
                 derivatives.get(each.name, ""),

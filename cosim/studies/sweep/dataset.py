@@ -14,6 +14,7 @@ from cosim.arrays import Array
 from cosim.circuit.joined import unit
 from cosim.evaluate.point import Outcome
 from cosim.files.atomic import together
+from cosim.mechanics import fmi
 from cosim.mechanics.package import unpacked
 from cosim.scene import Scene, firmware, keys, to_toml
 from cosim.scene.tables import MACHINE
@@ -122,8 +123,7 @@ def units_of(scene: Scene) -> dict[str, str]:
     for name, file in files.items():
         with suppress(Exception):  # whatever is wrong with it, its runs tell
             for each in read_model_description(file, validate=False).modelVariables:
-                of = each.unit or (each.declaredType and each.declaredType.unit) or "1"
-                found[f"{name}.{each.name}"] = of
+                found[f"{name}.{each.name}"] = fmi.unit(each)
     words = [port.probe for port in scene.port if port.probe is not None]
     found |= {each: unit(each) for each in (*words, *(scene.circuit.save or ()))}
     return found
