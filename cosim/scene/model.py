@@ -89,13 +89,18 @@ class Scene(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _fill(cls, data: Any) -> Any:
-        """A netlist of one's own is solved with smaller steps and tolerance by default."""
+        """A netlist of one's own is solved with smaller steps and tolerance by default, and coupled
+        with FMUs by what they can do and need."""
         if not isinstance(data, dict):
             return data
-        circuit = data.get("circuit", {})
+        circuit, coupling = data.get("circuit", {}), data.get("coupling", {})
         model = circuit.get("model") if isinstance(circuit, dict) else None
         rung = RUNGS.get(model) if isinstance(model, str) else None
-        return data | {"circuit": CAREFUL | circuit} if rung and rung.own_netlist else data
+        if rung and rung.own_netlist:
+            data = data | {"circuit": CAREFUL | circuit}
+        if data.get("fmu") and isinstance(coupling, dict):
+            data = data | {"coupling": {"method": "auto"} | coupling}
+        return data
 
     @model_validator(mode="after")
     def _fit_times(self) -> "Scene":

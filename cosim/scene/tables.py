@@ -478,7 +478,7 @@ class Friction(Table):
 
 
 class Coupling(Table):
-    """How circuit and mechanics are joined; ngspice leads."""
+    """How circuit and mechanics are joined; ngspice leads. With [[fmu]] the default is "auto"."""
 
     method: str = _declared("step-locked", "Coupling", METHODS)
     macro_step: float = _number(1e-4, "s", 1e-7, 1e-2, "Macro step; ends at jumps of the command")

@@ -182,8 +182,6 @@ from = "load.y"
 [[port]]
 probe = "i(Vf)"
 to = "load.u"
-[coupling]
-method = "auto"
 [run]
 duration = 2e-4
 output_step = 2e-7
