@@ -1,6 +1,6 @@
 """The points of a search that were run, for several quantities at once."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import inf
 
 import numpy as np
@@ -66,10 +66,13 @@ class Known:
         top: Array = self.scores.max(axis=0, initial=-inf)
         return top
 
-    def ranked(self, quantity: int, distance: float, count: int) -> Array:
-        """Feasible points with a score, the best first, each ``distance`` from those before it."""
+    def ranked(
+        self, quantity: int, distance: float, count: int, among: Sequence[int] | None = None
+    ) -> Array:
+        """Feasible points with a score, the best first, each ``distance`` from those before it; of
+        all, or of the rows ``among`` them."""
         order = self._order(quantity)
-        best = self.points[order]
+        best = self.points[order if among is None else order[np.isin(order, among)]]
         return best[apart(best, distance, count)]
 
     def steady(self, quantity: int, distance: float, count: int) -> Array:

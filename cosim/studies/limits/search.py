@@ -54,20 +54,22 @@ def searched(
     warm: Sequence[Candidates] = (),
 ) -> Candidates:
     """The candidates of a machine, from its ``own``, as far as they are known, and from ``warm``
-    starts, those of others whose cubes have the same dimensions: of these, too, the turns are run
-    where a single run shows that they do well here."""
+    starts, those of others whose cubes have the same dimensions. What is robust there need not show
+    it here by single runs: the turns of the best of it are run in any case."""
     keys = machine.keys
     once = Known(keys, len(GOALS), STEPS, bench.once(machine))
     over_turns = Known(keys, len(GOALS), STEPS, bench.over_turns(machine))
     for one in [own, *warm] if own else warm:
         for kind in KINDS:
             once.rows(_points(one[kind], keys))
+    others = [row for one in warm for row in once.rows(_points(one["robust"], keys))]
     if effort.design:
         once.search({0: Design(keys, effort.design, [*seed, 0], ends=True)}, effort.design)
     once.search({n: Climb(keys, [*seed, 1, n]) for n in _within_reach(once)}, effort.climb)
     starts = [_points(own["robust"], keys)] if own else []
     for n in range(len(GOALS)):
         starts += [once.ranked(n, APART, KEPT), once.steady(n, CLOSE, 2 * KEPT)]
+        starts += [once.ranked(n, CLOSE, 2 * KEPT, others)]
     over_turns.rows(np.vstack(starts))
     climbs = {n: Climb(keys, [*seed, 2, n], step=0.03) for n in _within_reach(over_turns)}
     over_turns.search(climbs, effort.turned)

@@ -24,10 +24,11 @@ from cosim.studies.limits.search import KINDS, Candidates, Effort, searched
 
 @dataclass(frozen=True)
 class Efforts:
-    """What the searches may cost: of each machine by itself, and once all others are known."""
+    """What the searches may cost: of each machine by itself, then, as often as there is more, once
+    all others are known as far as they were searched before."""
 
-    own: tuple[Effort, Effort]
-    others: tuple[Effort, Effort]
+    own: tuple[Effort, ...]
+    others: tuple[Effort, ...]
     """On the other rigs, whose searches begin with what was found on the scene's own."""
     again: int
     """How often some machines are searched with other seeds on the scene's own rig, and once on
@@ -35,13 +36,17 @@ class Efforts:
 
     def times(self, factor: float) -> "Efforts":
         """So many times as much."""
-        own, others = ((a.times(factor), b.times(factor)) for a, b in (self.own, self.others))
+        own, others = (
+            tuple(one.times(factor) for one in every) for every in (self.own, self.others)
+        )
         return Efforts(own, others, self.again)
 
 
+_NONE = Effort(0, 0, 0)
+"""What is found late is tried on all others, no more."""
 FULL = Efforts(
-    own=(Effort(512, 300, 120), Effort(0, 100, 80)),
-    others=(Effort(512, 80, 0), Effort(0, 40, 60)),
+    own=(Effort(512, 300, 120), Effort(0, 100, 80), _NONE),
+    others=(Effort(512, 80, 0), Effort(0, 40, 60), _NONE),
     again=3,
 )
 _FEW = Effort(32, 20, 10)
@@ -84,8 +89,13 @@ def steps(efforts: Efforts, changes: Sequence[Change], rigs: int) -> int:
     """How many steps :func:`study` tells."""
     some = sum(change.searched for change in changes)
     repeated = sum(change.name in REPEATED for change in changes)
-    again = efforts.again + rigs * bool(efforts.again)
-    return (2 * some + 1) * (1 + rigs) + (2 * repeated + 1) * again
+    again = bool(efforts.again)
+    return sum(
+        many * (len(cost) * some + 1) + repeats * (len(cost) * repeated + 1)
+        for many, repeats, cost in (
+            (1, efforts.again, efforts.own), (rigs, rigs * again, efforts.others)
+        )
+    )  # fmt: skip
 
 
 def study(
@@ -143,16 +153,18 @@ class _Work:
     def searched(
         self,
         changes: Sequence[Change],
-        efforts: tuple[Effort, Effort],
+        efforts: tuple[Effort, ...],
         seed: list[int],
         known: Mapping[str, Candidates],
     ) -> dict[str, Candidates]:
         """The candidates of each change by name, from those that are ``known``: first each by
         itself, then with the best of all others, so that what helps one is tried on all, and a
         limit that is eased never lowers what is found."""
-        alone = self._candidates(changes, efforts[0], [*seed, 0], known)
-        words = ", with what helps others"
-        return self._candidates(changes, efforts[1], [*seed, 1], alone, alone, words)
+        found = self._candidates(changes, efforts[0], [*seed, 0], known)
+        for turn, effort in enumerate(efforts[1:], 1):
+            words = ", with what helps others"
+            found = self._candidates(changes, effort, [*seed, turn], found, found, words)
+        return found
 
     def _candidates(
         self,
