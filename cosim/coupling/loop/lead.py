@@ -141,12 +141,7 @@ class Lead:
         if state.status == UNKNOWN_SOURCE:
             name = state.source.decode().lower()
             raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
-        if self._time < self._duration - max(1e-9 * self._duration, ROUNDING):
-            raise SimulationFailed(
-                f"ngspice stopped at t = {self._time:.6g} s of {self._duration:g} s: "
-                f"{engine().said()}. If the circuit is right, a smaller circuit.max_step or "
-                "another circuit.reltol may help."
-            )
+        finished(self._time, self._duration)
 
     @property
     def steps(self) -> int:
@@ -217,3 +212,12 @@ def engine() -> ngspice.Engine:
     """This process's ngspice, which calls the loop. Raises BadInput."""
     names = ("lead_data", "lead_source", "lead_step")
     return ngspice.engine(ngspice.Callbacks(*map(address, names)))
+
+
+def finished(reached: float, duration: float) -> None:
+    """Raise SimulationFailed where ngspice has only ``reached`` that time (s)."""
+    if reached < duration - max(1e-9 * duration, ROUNDING):
+        raise SimulationFailed(
+            f"ngspice stopped at t = {reached:.6g} s of {duration:g} s: {engine().said()}. If the "
+            "circuit is right, a smaller circuit.max_step or another circuit.reltol may help."
+        )

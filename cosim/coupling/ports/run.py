@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cosim.circuit import ngspice
-from cosim.coupling.loop.lead import ROUNDING, after_jump, engine
+from cosim.coupling.loop.lead import after_jump, engine, finished
 from cosim.coupling.loop.structures import (
     FMU_FAILED,
     NO_AGREEMENT,
@@ -128,12 +128,7 @@ class Run:
                 "is repeated; a smaller circuit.max_step may help."
             )
         reached = float(self.log.column()[-1]) if len(self.log) else 0.0
-        if reached < duration - max(1e-9 * duration, ROUNDING):
-            raise SimulationFailed(
-                f"ngspice stopped at t = {reached:.6g} s of {duration:g} s: "
-                f"{engine().said()}. If the circuit is right, a smaller circuit.max_step or "
-                "another circuit.reltol may help."
-            )
+        finished(reached, duration)
 
     @property
     def steps(self) -> int:
