@@ -57,7 +57,7 @@ def searched(bench: Bench, change: Change, number: int, kind: str, seed: int) ->
         return 0.0
     some = points[apart(points, APART, JUDGED)].tolist()
     candidates = {kind: [some if k == number else [] for k in range(len(GOALS))]}
-    found = judged(bench, {change.name: machine}, {change.name: candidates}, (kind,), JUDGED)
+    found = judged(bench, {change.name: machine}, {change.name: candidates}, (kind,))
     point = found.get((change.name, goal.name, kind))
     return point.rank(kind) * goal.scale if point else 0.0
 

@@ -162,7 +162,7 @@ def test_search_finds_what_an_exhaustive_grid_finds() -> None:
             for n, goal in enumerate(GOALS):
                 mine, allowed = scores(np.array(found[kind][n][:1]))
                 assert allowed.all() and mine[0, n] >= 0.95 * best[n], (kind, goal.name)
-        points = judge.judged(made, {"": machine}, {"": found}, ("robust",), 3)
+        points = judge.judged(made, {"": machine}, {"": found}, ("robust",))
     up = points["", "v_up", "robust"]
     assert 0.0 < up.median <= up.value + 1e-4 and up.heat <= machine.heat
     monolithic = pytest.importorskip("tests.reference.monolithic")
@@ -239,7 +239,7 @@ def test_what_is_not_settled_does_not_stand() -> None:
     candidates = {"": {kind: [place] * len(GOALS) for kind in ("best", "robust")}}
     with made.evaluator, slow.evaluator:
         for one in (made, slow):
-            points = judge.judged(one, {"": Machine()}, candidates, ("robust",), 1)
+            points = judge.judged(one, {"": Machine()}, candidates, ("robust",))
             whole, late = one.evaluator.outcomes(
                 [Machine().at(np.array(place[0]), *times) for times in ((1.5, 1.5), (2.25, 0.75))]
             )
@@ -286,6 +286,7 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Picture, "write", lambda figure, *where: drawn.append(figure))
     names = ("as it is", "sine", "heat 7 W")
     monkeypatch.setattr(search, "KEPT", 1)
+    monkeypatch.setattr(search, "BEST", 1)
     monkeypatch.setattr(report, "CHANGES", [NAMED[name] for name in names])
     monkeypatch.setattr(
         report, "FULL", Efforts((FEW, Effort(0, 3, 2), Effort(0, 0, 0)), (FEW, FEW), 1)

@@ -21,9 +21,6 @@ from cosim.studies.limits.search import Candidates
 SETTLE, SPAN = 1.5, 1.5
 """s, left out of averages and averaged over, at least."""
 
-TURNED = 3
-"""Candidates of a machine whose turns are run for each goal."""
-
 SHORT = 0.6
 """s, left out of averages where ngspice runs all turns of a setting."""
 
@@ -74,10 +71,9 @@ def judged(
     machines: Mapping[str, Machine],
     candidates: Mapping[str, Candidates],
     kinds: Sequence[str],
-    most: int,
 ) -> dict[Key, Point]:
-    """For each machine, goal and one of ``kinds`` the best of the first ``most`` candidates that
-    are settled and feasible; none where there is none, or where none achieves anything."""
+    """For each machine, goal and one of ``kinds`` the best of the candidates that are settled and
+    feasible; none where there is none, or where none achieves anything."""
     asked = [
         ((name, goal.name, kind), np.array(point))
         for name, of in candidates.items()
@@ -85,7 +81,7 @@ def judged(
         for goal, some in zip(GOALS, of[kind], strict=True)
         for point in some
     ]
-    good = _settled(bench, machines, asked, most)
+    good = _settled(bench, machines, asked)
     runs = [[machines[key[0]].at(one, SETTLE, SPAN) for one in around(p)] for key, p in good]
     found: dict[Key, Point] = {}
     for (key, middle), each, turns in zip(good, runs, bench.outcomes(runs), strict=True):
@@ -99,9 +95,9 @@ def judged(
 _Asked = list[tuple[Key, Array]]
 
 
-def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked, most: int) -> _Asked:
-    """Those that are settled and feasible, the first ``most`` of a machine and goal; of its best
-    settings only the very best one."""
+def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked) -> _Asked:
+    """Those that are settled and feasible; of a machine's best settings for a goal only the very
+    best one."""
     times = (SETTLE, SPAN), (SETTLE + SPAN / 2.0, SPAN / 2.0)
     runs = [[machines[key[0]].at(point, *each) for each in times] for key, point in asked]
     found: _Asked = []
@@ -111,7 +107,7 @@ def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked, most:
         if not bench.feasible(machines[key[0]], both[0]) or relative_error(*values) > SETTLED:
             continue
         if key[2] != "best":
-            found += [(key, point)] if sum(one[0] == key for one in found) < most else []
+            found.append((key, point))
         elif values[0] > top.get(key, 0.0):
             top[key] = values[0]
             found = [one for one in found if one[0] != key] + [(key, point)]

@@ -22,8 +22,9 @@ KINDS = ("best", "robust")
 Candidates = Mapping[str, Sequence[Sequence[Sequence[float]]]]
 """For each of KINDS and of GOALS the points that did best, the first one first."""
 
-APART, KEPT = 0.03, 4
-"""How far apart the points are that a search tells, and how many for each goal."""
+APART, KEPT, BEST = 0.03, 4, 12
+"""How far apart the points are that a search tells, and how many for each goal: of the robust ones,
+and of the best, of which many are nothing by longer runs where motion is chaotic."""
 
 CLOSE = 0.015
 """The same of those whose turns are run since single runs show good surroundings."""
@@ -73,7 +74,7 @@ def searched(
     over_turns.rows(np.vstack(starts))
     climbs = {n: Climb(keys, [*seed, 2, n], step=0.03) for n in _within_reach(over_turns)}
     over_turns.search(climbs, effort.turned)
-    return {"best": _told(once), "robust": _told(over_turns)}
+    return {"best": _told(once, BEST), "robust": _told(over_turns, KEPT)}
 
 
 def _within_reach(known: Known) -> list[int]:
@@ -87,6 +88,6 @@ def _points(every: Sequence[Sequence[Sequence[float]]], keys: int) -> Array:
     return np.array(found).reshape(-1, keys)
 
 
-def _told(known: Known) -> list[list[list[float]]]:
-    found: list[Array] = [known.ranked(n, APART, KEPT) for n in range(len(GOALS))]
+def _told(known: Known, count: int) -> list[list[list[float]]]:
+    found: list[Array] = [known.ranked(n, APART, count) for n in range(len(GOALS))]
     return [points.tolist() for points in found]

@@ -17,7 +17,7 @@ from cosim.files.reader import read
 from cosim.scene import Scene
 from cosim.simulation.summary import budget
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Change, Settings
-from cosim.studies.limits.judge import TURNED, Key, Point, confirmed, judged, tried
+from cosim.studies.limits.judge import Key, Point, confirmed, judged, tried
 from cosim.studies.limits.runs import Bench, Goal
 from cosim.studies.limits.search import KINDS, Candidates, Effort, searched
 
@@ -209,8 +209,7 @@ class _Work:
         self, candidates: dict[str, Candidates], own: bool
     ) -> list[tuple[Key, dict[str, Any]]]:
         machines = {change.name: change.machine(self.bench.scene) for change in self.changes}
-        kinds, most = (KINDS, TURNED) if own else (KINDS[1:], 1)
-        found = judged(self.bench, machines, candidates, kinds, most)
+        found = judged(self.bench, machines, candidates, KINDS if own else KINDS[1:])
         if own:
             others = [change.name for change in self.changes if not change.searched]
             found = confirmed(self.bench, machines, found)
