@@ -148,7 +148,8 @@ def copy(tmp_path: Path) -> Path:
         pytest.skip("cosim does not run from a checkout")
     folder = tmp_path / "copy"
     for name in ("cosim", "fmu", "circuits"):
-        leave_out = shutil.ignore_patterns("__pycache__")
+        # What Python has compiled goes along, but for what another process is just writing.
+        leave_out = shutil.ignore_patterns("*.pyc.*")
         shutil.copytree(root / name, folder / name, ignore=leave_out)
     return folder
 
