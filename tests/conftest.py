@@ -1,5 +1,6 @@
 """Settings and fixtures of all tests."""
 
+import gc
 import json
 import os
 from collections.abc import Iterator
@@ -32,6 +33,31 @@ def pytest_configure() -> None:
 def pytest_xdist_auto_num_workers() -> int:
     """One more than there are processors: the tests of processes wait for them."""
     return processes.processors() + 1
+
+
+LONG = (
+    "toolchain/test_build_c.py",
+    "mechanics/test_sanitizers.py",
+    "mechanics/test_built_elsewhere.py",
+    "studies/test_limits.py",
+    "studies/test_spread.py",
+    "studies/test_identify.py",
+    "studies/test_fit.py",
+    "simulation/test_memory.py",
+)
+"""What takes seconds in one test begins first: at the end a worker would wait for it."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The tests of a file stay together, with what its fixtures have made."""
+    tests = Path(__file__).parent
+    ranks = {tests / name: rank for rank, name in enumerate(LONG)}
+    items.sort(key=lambda item: ranks.get(item.path, len(LONG)))
+
+
+def pytest_collection_finish() -> None:
+    """What is imported stays until the end: the collector of garbage need not look at it again."""
+    gc.freeze()
 
 
 def pytest_sessionstart() -> None:

@@ -28,6 +28,7 @@ from cosim.drive.straights import straights
 from cosim.errors import BadInput
 from cosim.scene import changed, load
 from cosim.scene.firmware import passes, staircase
+from tests.helpers.examples import examples
 from tests.helpers.pins import pin, pin_before, v_dac, v_dac_before, value_before
 
 GAIN = 15 / 4.7
@@ -190,6 +191,7 @@ def test_pieces_in_closed_form() -> None:
     assert [drive.piece(t).until for t in (0.0, *corners[:3])] == pytest.approx(corners)
 
 
+@examples(50)
 @given(levels=st.lists(st.floats(-0.5, 0.5), min_size=2, max_size=9), f=st.floats(1.0, 500.0))
 def test_a_table_of_steps_in_codes(levels: list[float], f: float) -> None:
     """The nearest codes of the levels, held for whole steps of 50 us; the mean at the pin's."""

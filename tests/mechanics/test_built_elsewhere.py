@@ -70,7 +70,8 @@ def exported(library: Path) -> set[str]:
     return {line.split()[-1] for line in listing.stdout.splitlines()}
 
 
-@pytest.mark.parametrize("version", [pytest.param(2, marks=pytest.mark.slow), 3])
+@pytest.mark.slow
+@pytest.mark.parametrize("version", [2, 3])
 def test_fmpy_compile_gives_the_same_bits(
     packed: dict[int, Path], shipped: bytes, version: int, tmp_path: Path
 ) -> None:
@@ -106,16 +107,31 @@ def test_what_is_internal_stays_inside_without_flags(
     assert {name for name in names if not name.startswith("stickslip_fmi3")} == set()
 
 
-def test_internal_names_have_one_prefix(packed: dict[int, Path], tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def objects(
+    packed: dict[int, Path], tmp_path_factory: pytest.TempPathFactory
+) -> dict[int, list[Path]]:
+    """Of each file's sources, compiled with the Modelica Association's headers."""
+    made = {}
+    for version, path in packed.items():
+        folder = tmp_path_factory.mktemp(f"fmi{version}")
+        fmpy.extract(str(path), str(folder))
+        for header in folder.glob("sources/fmi/fmi*.h"):
+            header.unlink()  # an importer uses its own
+        sources = sorted(map(str, folder.glob("sources/*/*.c")))
+        headers = f"-I{FMU / 'include'}"
+        subprocess.run([*compiler(), headers, "-c", *sources], cwd=folder, check=True)
+        made[version] = sorted(folder.glob("*.o"))
+    return made
+
+
+def test_internal_names_have_one_prefix(objects: dict[int, list[Path]]) -> None:
     """So that they meet no other's where an FMU is linked statically."""
     nm = shutil.which("nm")
     if not nm:
         pytest.skip("needs nm")
-    sources = Path(fmpy.extract(str(packed[2]), str(tmp_path / "fmu"))) / "sources"
-    files = sorted(map(str, sources.glob("*/*.c")))
-    subprocess.run([*compiler(), "-c", *files], cwd=tmp_path, check=True)
     listing = subprocess.run(
-        [nm, "-g", "--defined-only", *map(str, sorted(tmp_path.glob("*.o")))],
+        [nm, "-g", "--defined-only", *map(str, objects[2])],
         capture_output=True,
         text=True,
         check=True,
@@ -127,22 +143,19 @@ def test_internal_names_have_one_prefix(packed: dict[int, Path], tmp_path: Path)
 
 
 @pytest.mark.skipif(fmpy.system != "linux", reason="libraries are linked otherwise there")
-def test_both_link_statically_beside_others(packed: dict[int, Path], tmp_path: Path) -> None:
-    """As libraries of the standard's name, made with the Modelica Association's headers."""
+def test_both_link_statically_beside_others(
+    packed: dict[int, Path], objects: dict[int, list[Path]], tmp_path: Path
+) -> None:
+    """As libraries of the standard's name."""
     description = fmpy.read_model_description(str(packed[2]))
     references = {v.name: str(v.valueReference) for v in description.modelVariables}
     arguments = [references[name] for name in ("current", "contact", "z_part", "z_ram")]
     headers = f"-I{FMU / 'include'}"
     libraries = []
-    for version, path in packed.items():
-        folder = Path(fmpy.extract(str(path), str(tmp_path / f"fmi{version}")))
-        for header in folder.glob("sources/fmi/fmi*.h"):
-            header.unlink()  # an importer uses its own
-        sources = sorted(map(str, folder.glob("sources/*/*.c")))
-        subprocess.run([*compiler(), headers, "-c", *sources], cwd=folder, check=True)
-        libraries.append(folder / "libstickslip.a")
-        objects = sorted(map(str, folder.glob("*.o")))
-        subprocess.run(["ar", "rc", str(libraries[-1]), *objects], check=True)
+    for version, compiled in objects.items():
+        libraries.append(tmp_path / f"fmi{version}" / "libstickslip.a")
+        libraries[-1].parent.mkdir()
+        subprocess.run(["ar", "rc", str(libraries[-1]), *map(str, compiled)], check=True)
 
     def printed(name: str, *inputs: str) -> str:
         program = tmp_path / name

@@ -2,7 +2,9 @@
 
 import subprocess
 import zipfile
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from fmpy import platform, sharedLibraryExtension
 
@@ -36,10 +38,7 @@ def build(
     slopes."""
     library = folder / f"foreign{sharedLibraryExtension}"
     if not library.exists():
-        source = Path(__file__).with_name("foreign.c")
-        subprocess.run(
-            ["cc", "-shared", "-fPIC", "-O2", "-w", "-o", library, source, "-lm"], check=True
-        )
+        library.write_bytes(_library())
     describe = _two if version == 2 else _three
     place = platform if version == 2 else {"linux64": "x86_64-linux"}.get(platform, platform)
     path = folder / f"{name}.fmu"
@@ -50,6 +49,18 @@ def build(
         archive.writestr("modelDescription.xml", text)
         archive.write(library, f"binaries/{place}/foreign{sharedLibraryExtension}")
     return path
+
+
+@cache
+def _library() -> bytes:
+    """Compiled once for all tests of a process."""
+    source = Path(__file__).with_name("foreign.c")
+    with TemporaryDirectory() as folder:
+        library = Path(folder, f"foreign{sharedLibraryExtension}")
+        subprocess.run(
+            ["cc", "-shared", "-fPIC", "-O2", "-w", "-o", library, source, "-lm"], check=True
+        )
+        return library.read_bytes()
 
 
 def _abilities(saves: bool, fixed: bool, word: str) -> str:

@@ -102,7 +102,7 @@ def test_shorter_steps_err_less() -> None:
 def test_errors_are_of_second_order() -> None:
     """Over settings of the knobs, with impacts and friction on both sides of the part: half the
     step makes a third of the median error, where first order makes half of it."""
-    knobs = np.random.default_rng(3).uniform((0.4, 0.1, 0.0), (1.0, 0.95, 0.7), (160, 3))
+    knobs = np.random.default_rng(3).uniform((0.4, 0.1, 0.0), (1.0, 0.95, 0.7), (80, 3))
     names = ("drive.pot_max", "drive.pot_frequency", "drive.pot_offset")
     scenes = [
         load("paper-limited", FAST | dict(zip(names, map(float, places), strict=True)))

@@ -285,6 +285,8 @@ def test_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Figure] = []
     monkeypatch.setattr(Picture, "write", lambda figure, *where: drawn.append(figure))
     names = ("as it is", "sine", "heat 7 W")
+    for name, short in (("SETTLE", 0.05), ("SPAN", 0.1)):
+        monkeypatch.setattr(judge, name, short)
     monkeypatch.setattr(search, "KEPT", 1)
     monkeypatch.setattr(search, "BEST", 1)
     monkeypatch.setattr(report, "CHANGES", [NAMED[name] for name in names])

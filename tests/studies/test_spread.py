@@ -12,12 +12,12 @@ from cosim.errors import BadInput
 from cosim.scene import firmware, load
 from cosim.studies.spread.run import turns
 
-SHORT = {"run.duration": 0.5, "run.settle": 0.25}
+SHORT = {"run.duration": 0.3, "run.settle": 0.15}
 
 
 def alone(name: str, keys: dict[str, float]) -> float:
-    """v_average by a run of its own, which settles and lasts for whole periods, 0.25 s at least."""
-    count = ceil(0.25 * keys["drive.frequency"])
+    """v_average by a run of its own, which settles and lasts for whole periods, 0.15 s at least."""
+    count = ceil(0.15 * keys["drive.frequency"])
     times = {"run.settle": count, "run.duration": 2 * count}
     lasting = {key: n / keys["drive.frequency"] for key, n in times.items()}
     return cosim.run(name, {**keys, **lasting, "run.output_step": 1e-3}).summary["v_average"]
