@@ -24,11 +24,11 @@ KEYS = ("drive.amplitude", "drive.frequency", "drive.offset", "friction.normal_f
 
 
 def settings() -> list[dict[str, object]]:
-    """Twelve, of the page's own making: scene, and changes as its knobs leave them."""
+    """Twenty, of the page's own making: scene, and changes as its knobs leave them."""
     chance = random.Random(5)
     scenes = list(rigs.scenes())
     found: list[dict[str, object]] = []
-    for k in range(12):
+    for k in range(20):
         changes: dict[str, object] = {"drive.amplitude": chance.uniform(4, 8)}
         changes["friction.normal_force"] = round(chance.uniform(0.2, 1.5), 3)
         changes["coil.polarity"] = chance.choice([-1, 1])
