@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -362,6 +363,9 @@ def _with_parameters(
         if name not in by_name:
             known = ", ".join(map(str, by_name)) or "none"
             raise BadInput(f"{origin}: fmu.{plain(key)}: there is no such FMU (known: {known}).")
+        if not isinstance(value, str | int) and not (isinstance(value, float) and isfinite(value)):
+            what = f"fmu.{plain(key)} = {messages.shown(value)}"
+            raise BadInput(f"{origin}: {what} must be {messages.ALLOWED_START}.")
         by_name[name]["parameters"][parameter] = value
     return found
 
@@ -371,7 +375,7 @@ def _origins(layers: list[_Layer]) -> dict[str, tuple[int, str]]:
     origins: dict[str, tuple[int, str]] = {}
     for rank, layer in enumerate(layers):
         for table, content in layer.tables.items():
-            names = [f"{table}.{key}" for key in content] if table in TABLES else [table]
+            names = [f"{table}.{x}" for x in content] if isinstance(content, dict) else [table]
             origins |= dict.fromkeys(names, (rank, layer.origin))
     return origins
 
