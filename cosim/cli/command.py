@@ -42,7 +42,8 @@ def add_commands(
     """
     own = parser.add_subparsers(required=True, metavar=metavar)
     for command in commands:
-        one = own.add_parser(command.name, help=command.help, allow_abbrev=False)
+        about = {"help": command.help, "description": command.help}
+        one = own.add_parser(command.name, **about, allow_abbrev=False)
         one.set_defaults(call=command.call)
         if asked is None or command.name in asked:
             add_options(one, command)
