@@ -144,8 +144,7 @@ class Tuning:
         turn_axis.axhline(self.value * scale, color="0.7", lw=0.9)
         turned = "turned by [% of the key's range]"
         turn_axis.set(xlabel=turned, ylabel=ylabel, xlim=1.1 * turns[[0, -1]])
-        words = self.robustness or "its keys have no room to be turned"
-        turn_axis.set_title(f"The best: {words}", loc="left", fontsize=10.5)
+        turn_axis.set_title(self.robustness.capitalize(), loc="left", fontsize=10.5)
         if self.neighbours:
             turn_axis.legend(fontsize=8.5)
 
