@@ -356,6 +356,7 @@ def test_command_prints_and_writes_units_and_meanings(
             printed = printed.removesuffix(line)
         assert f"{printed} [{row['unit']}]" in said
         assert row["meaning"].partition("; of")[0] in said
+        assert not row["meaning"].startswith("the same")  # as which other row?
 
 
 @pytest.mark.parametrize(
