@@ -14,7 +14,7 @@ from cosim.arrays import Array
 from cosim.files.picture import Picture, grid
 from cosim.files.spill import release
 from cosim.scene import Scene
-from cosim.trials.camera import FRAME_RATE, accelerations, film
+from cosim.trials.camera import FRAME_RATE, accelerations, heights
 from cosim.trials.measured import measured
 from cosim.waveforms.report import MOST_SHOWN, asked_for
 
@@ -287,7 +287,7 @@ def _acceleration(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) 
     first, last = cut["time"][[0, -1]] + np.array([exposure, -exposure]) / 2
     frames = np.arange(np.ceil(first * FRAME_RATE), last * FRAME_RATE) / FRAME_RATE
     if len(frames) > 4:
-        read = accelerations(film(cut, frames, exposure).z_surface)
+        read = accelerations(heights(cut, "surface", frames, exposure))
         label = f"read from {FRAME_RATE:.0f} frames/s"
         axis.plot(frames * 1e3, read, color="0.2", lw=0.9, marker=".", ms=4, label=label)
     beyond = ""
