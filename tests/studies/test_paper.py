@@ -5,7 +5,6 @@ the form of the friction law alone. Published and derived numbers have µ_s = 0.
 """
 
 import csv
-import inspect
 import json
 import math
 import subprocess
@@ -35,7 +34,7 @@ from cosim.drive.surface.waveforms import (
     quaid_velocity,
 )
 from cosim.errors import BadInput
-from cosim.studies.paper import STUDIES, exact, figure7, figures, knife_edge
+from cosim.studies.paper import exact, figure7, figures, knife_edge
 from cosim.studies.paper.errata import errata, errata_text
 from cosim.studies.paper.theory import theory
 from tests.helpers import needs
@@ -413,13 +412,10 @@ def test_the_command_says_what_it_takes_and_writes(
     for more in (["--period", "0.1"], ["--out", str(tmp_path / "out")]):
         assert main(["theory", "--errata", *more]) == 2
         assert "no other option" in capsys.readouterr().err
-    own = inspect.signature(theory).parameters
-    (study,) = (study for study in STUDIES if study.command == "theory")
-    told = {option.argument: option.default for option in study.options if option.metavar}
-    assert told == pytest.approx({name: own[name].default for name in own})
     with pytest.raises(SystemExit):
         main(["theory", "--help"])
-    assert "knife_edge.csv" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "knife_edge.csv" in told and "(default: 98.1)" in told
 
 
 @examples(50)
