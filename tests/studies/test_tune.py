@@ -84,7 +84,11 @@ def test_all_runs_fail() -> None:
 
 BAD = [
     (["--maximise", "speed"], "speed is not a number of this scene's summary"),
+    (["--maximise", "v_averge"], "v_averge is not a number of this scene's summary; did you mean"),
     (["--maximise", "v_average", "--budget", "20"], "--budget 20"),
+    (["--maximise", "v_average", "--budget", "3.5"], "must be a whole number, not '3.5'"),
+    (["--maxmise", "v_average"], "--maximise --minimise is required (see cosim tune --help)"),
+    (["--maximise", "v_average", "--robst"], "--robst; did you mean --robust? (see cosim tune"),
     (["--maximise", "v_average", "--over", "drive.offset"], "table.key=low:high"),
     (["--maximise", "v_average", "--over", "drive.offset=1:0"], "must be a range"),
     (["--maximise", "v_average", "--over", "drive.offset=0:1e9"], "from -100 to 100 V"),
