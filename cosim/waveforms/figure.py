@@ -16,7 +16,7 @@ from cosim.files.spill import release
 from cosim.scene import Scene
 from cosim.trials.camera import FRAME_RATE, accelerations, heights
 from cosim.trials.measured import measured
-from cosim.waveforms.report import MOST_SHOWN, asked_for
+from cosim.waveforms.report import asked_for
 
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
 GRIP, SECOND = "#7a5195", "#6fb7e9"
@@ -66,12 +66,15 @@ def draw(scene: Scene, waves: dict[str, Array], numbers: dict[str, Any]) -> Pict
     return figure
 
 
+MOST_PANELS = 12
+
+
 def draw_own(scene: Scene, waves: dict[str, Array], units: Mapping[str, str]) -> Picture:
     """The figure of a run of a scene with its own FMUs: a panel for each waveform, up to
-    MOST_SHOWN, the whole run: first those that are asked for, last those that stay the same."""
+    MOST_PANELS, the whole run: first those that are asked for, last those that stay the same."""
     asked, every = asked_for(scene), [name for name in waves if name != "time"]
     ranked = sorted(every, key=lambda name: (np.ptp(waves[name]) == 0.0, name not in asked))
-    names = ranked[:MOST_SHOWN]
+    names = ranked[:MOST_PANELS]
     figure, axes = grid(len(names), 1 if len(names) < 4 else 2, 13.0, 1.9, 1.2)
     for axis, name in zip(axes, names, strict=True):
         axis.plot(*_outline(waves["time"], waves[name]), color=SURFACE, lw=0.8)

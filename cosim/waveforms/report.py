@@ -49,9 +49,8 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
     return "\n".join(f"  {name:<24}{value}" for name, value in rows)
 
 
-MOST_SHOWN = 12
-"""Waveforms of a scene with its own FMUs that a figure shows; a table shows all that are asked for,
-and others up to so many."""
+MOST_ROWS = 20
+"""Of a scene with its own FMUs, beyond what is asked for."""
 
 
 def asked_for(scene: Scene) -> set[str]:
@@ -66,7 +65,7 @@ def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str
     every = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
     asked, moving = asked_for(scene), [name for name in every if summary[f"{name}.rms"] != 0.0]
     ranked = sorted(moving, key=lambda name: name not in asked)
-    names = ranked[: max(MOST_SHOWN, len(asked.intersection(moving)))]
+    names = ranked[: max(MOST_ROWS, len(asked.intersection(moving)))]
     shown = [label(name, units[name]) for name in names]
     width = max([20, *map(len, shown)])
     whats = ["mean", "rms", "least", "greatest"]
