@@ -23,17 +23,9 @@ VELOCITY = "nrmse_v_surface"
 """By which a figure's message tells how near the rig is."""
 
 COMPARED = (
-    (
-        VELOCITY,
-        "floor_late",
-        "Velocity of the surface, NRMSE (black: between its own cycles)",
-    ),
+    (VELOCITY, "floor_late", "Velocity of the surface, NRMSE (black: between its own cycles)"),
     ("nrmse_z_surface", "", "Height of the surface, NRMSE"),
-    (
-        "part_error_mm",
-        "straight_line_error_mm",
-        "Part, mean error [mm] (black: straight line)",
-    ),
+    ("part_error_mm", "straight_line_error_mm", "Part, mean error [mm] (black: straight line)"),
     (
         *("v_average_mm_per_s", "v_average_measured_mm_per_s"),
         "Mean velocity of the part [mm/s] (black: measured)",
