@@ -13,7 +13,7 @@ from cosim.simulation.simulate import simulate
 from cosim.studies.speed.bench import ratios, take_turns
 from cosim.toolchain.libraries import library
 from cosim.trials import published
-from cosim.trials.camera import film, frame_times
+from cosim.trials.camera import frame_times, heights, velocities
 from cosim.trials.tracked import Track, Trial, read_folder
 
 FRAMES = 312
@@ -73,7 +73,7 @@ def _call(trial: Trial, exact: bool) -> Callable[[], int]:
 
 def _made_up(number: int) -> Trial:
     scene = load("reference", ["circuit.model=ideal", "run.duration=0.8", "run.settle=0.4"])
-    frames = film(simulate(scene).columns, frame_times(0.4 + 0.003 * number, FRAMES), 0.0)
-    surface = Track(frames.z_surface, frames.v_surface)
-    moved = Track(frames.z_part, frames.v_part)
-    return Trial(f"made up {number}", None, frames.time, surface, moved, None)
+    waves, time = simulate(scene).columns, frame_times(0.4 + 0.003 * number, FRAMES)
+    seen = (heights(waves, body, time, 0.0) for body in ("surface", "part"))
+    surface, moved = (Track(z, velocities(time, z)) for z in seen)
+    return Trial(f"made up {number}", None, time - time[0], surface, moved, None)

@@ -4,9 +4,9 @@
 
 with P the heat of the winding, W, and rises over the air, K. The circuit drives a current, so warm
 copper makes more heat, P (1 + α T_w): the equations are solved for P = 1 W, and P is then that of
-the greatest rise. For ever that is exact, in a cycle no less than what comes of it. **An estimate,
-no rating:** the data sheet of the Carlton (C-151L337V5R2)
-gives a range of drives, 3.6 to 10 V peak-to-peak, and 125 mA rms, but no power and no temperature.
+the greatest rise. In continuous use that is exact, in a cycle no less than what comes of it.
+**An estimate, no rating:** the data sheet of the Carlton (C-151L337V5R2) gives a range of drives,
+3.6 to 10 V peak-to-peak, and 125 mA rms, but no power and no temperature.
 Body: its 20.5 cm² lose 10 to 15 W/(m² K) to still air, and its 15 g hold 0.4 to 0.67 J/(g K).
 Winding, assumed: the 0.9 to 3.6 g of copper that make 7.1 Ohm of wire of 0.14 to 0.2 mm, in a gap
 of a few tenths of a millimetre.
@@ -40,7 +40,7 @@ LIFT = 10.0
 """s: a lift, of which a summary tells the rise."""
 
 _CYCLES = ((LIFT, 0.0), (inf, 1.0))
-"""Time (s) and duty of that, and of a current for ever."""
+"""Time (s) and duty of that, and of continuous use."""
 
 SPREAD = {
     **{"winding_to_body": 2.0, "winding_capacity": 1.9},
@@ -106,7 +106,7 @@ def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float 
 
 def rises(coil: Coil, heat: float) -> list[list[float | None]]:
     """The rises, K, that a current which makes ``heat`` (W) of the cold winding brings in a LIFT
-    and for ever: the lower and the upper end of the estimate of each, None without end."""
+    and in continuous use: the lower and the upper end of the estimate of each, None without end."""
     ends = [[warmed(heat, rise(coil, *on, side)) for side in (-1, 1)] for on in _CYCLES]
     return [[end if isfinite(end) else None for end in both] for both in ends]
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from cosim.circuit.lint.checks import check
-from cosim.circuit.lint.deck import Line, passed, read_all
-from cosim.circuit.lint.elements import Element, Scope, parse
+from cosim.circuit.lint.deck import Line, passed, read_all, refuse
+from cosim.circuit.lint.elements import Element, Scope, node, parse
 from cosim.circuit.lint.expressions import sensed
 from cosim.circuit.lint.outputs import Measure, measures, without_effect
 from cosim.circuit.lint.words import definitions
@@ -72,14 +72,14 @@ def deck(
     max_step: float,
     asked: bool,
     known: Mapping[str, float],
-    called: str = "[[port]] source",
+    called: tuple[str, str] = ("[[port]] source", "probe or circuit.save"),
     through: Sequence[tuple[str, str]] = (),
 ) -> Deck:
     """The deck of a netlist in which the ``sources`` are external and the ``words`` are saved;
     where they are ``asked`` for within a step, each as a device's parameter. ``known`` are values
     for such ``.param`` lines as it may have, ``parameters`` for those that it must have. For each
     source and word of ``through`` the circuit adds the word, times the external source
-    ``Vcosim_gain`` with the pair's number, to the source.
+    ``Vcosim_gain`` with the pair's number, to the source. Sources and words are ``called`` so.
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
@@ -91,10 +91,10 @@ def deck(
         if source.lower() not in found or source[0].lower() not in "vi":
             able = sorted(each for each in found if each[0] in "vi")
             hint = suggestion(source.lower(), able) or f" (it has {', '.join(able) or 'none'})"
-            shown = f'{called} = "{plain(source)}"'
+            shown = f'{called[0]} = "{plain(source)}"'
             raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
     top, every = check_reading(
-        path, lines, words, asks, [[source.lower() for source in sources]], asked
+        path, lines, words, asks, [[source.lower() for source in sources]], asked, called[1]
     )
     values = {**known, **own_parameters(top, name, parameters)}
     fed = {source.lower() for source in sources}
@@ -147,16 +147,18 @@ def check_reading(
     asks: Sequence[Measure],
     required: Sequence[Sequence[str]],
     asked: bool = False,
+    called: str = "probe or circuit.save",
 ) -> tuple[Scope, list[str]]:
     """The top level of a netlist with what reads the ``words`` and what the measurements need, as
     :func:`check` gives it; and all these words, each once."""
-    every = {each: Line(each, f'"{plain(each)}"', k) for k, each in enumerate(words, 1)}
+    name = plain(str(path))
+    every = {each: Line(each, f'{name}: {called} = "{plain(each)}"', 0) for each in words}
     for ask in asks:
         every |= {each: replace(ask.line, text=each) for each in ask.words if each not in every}
     direct = _direct([*every], len(words) if asked else 0)
     extra = [_source_of(k, line) for k, line in enumerate(every.values()) if direct[k] is None]
     top = check([*lines, *extra], required)
-    _check_vectors(top, plain(str(path)), words, every.values())
+    _check_vectors(top, every.values())
     return top, [*every]
 
 
@@ -189,26 +191,24 @@ def _read_as(place: int, match: re.Match[str] | None) -> tuple[str, str]:
     return f"{kind}({inner})", f"@{inner}[i]" if kind == "i" else ""
 
 
-def _check_vectors(top: Scope, name: str, words: Sequence[str], wanted: Iterable[Line]) -> None:
-    """What is wanted must be there, as far as that can be known without subcircuits: the scene's
-    words, and those of the netlist's lines."""
+def _check_vectors(top: Scope, wanted: Iterable[Line]) -> None:
+    """What is wanted must be there, as far as that can be known without subcircuits."""
     known: dict[str, set[str]] = {
         "v": {node for element in top.elements for node in element.nodes} | {"0"},
         "i": {each.name for each in top.elements if each.kind in _CURRENTS},
     }
     for each in wanted:
-        where = name if each.text in words else f"{each.file}:{each.number}"
-        asked = f'{where}: "{plain(each.text)}" is asked for, but'
         if "@" in each.text:
-            raise BadInput(
-                f"{asked} what is within a device is not read; for its current put a source of 0 V "
-                "in series, and ask for i of that."
+            refuse(
+                each,
+                "what is within a device is not read; for its current put a source of 0 V in "
+                "series, and ask for i of that",
             )
         for kind, what in (("v", "node"), ("i", "V, L, E or H element")):
             for inner in sensed(f"b 1 0 v={each.text}", kind):
-                if not re.search(r"[.:]", inner) and inner not in known[kind]:
+                if not re.search(r"[.:]", inner) and node(inner) not in known[kind]:
                     hint = suggestion(inner, known[kind])
-                    raise BadInput(ended(f"{asked} there is no {what} {plain(inner)}{hint}"))
+                    raise BadInput(ended(f"{each.place}: there is no {what} {plain(inner)}{hint}"))
 
 
 def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[str, float]:

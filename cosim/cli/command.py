@@ -43,6 +43,7 @@ def add_commands(
     own = parser.add_subparsers(required=True, metavar=metavar)
     for command in commands:
         one = own.add_parser(command.name, help=command.help, allow_abbrev=False)
+        one.description = command.help
         one.set_defaults(call=command.call)
         if asked is None or command.name in asked:
             add_options(one, command)

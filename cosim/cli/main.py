@@ -11,6 +11,7 @@ import re
 import sys
 import time
 import warnings
+from difflib import get_close_matches
 from io import TextIOWrapper
 from typing import Any, NoReturn
 
@@ -37,7 +38,18 @@ class _Parser(argparse.ArgumentParser):
     """Tells a wrong command line in one sentence, like any other bad input."""
 
     def error(self, message: str) -> NoReturn:
+        for kind, words in (("int", "a whole number"), ("float", "a number")):
+            message = message.replace(f"invalid {kind} value:", f"must be {words}, not")
         raise BadInput(f"{message} (see {self.prog} --help).")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:  # pyright: ignore
+        """As it is, but what is not known is told by the command that does not know it."""
+        found, others = super().parse_known_args(args, namespace)
+        if others:
+            near = get_close_matches(others[0], self._option_string_actions, 1, 0.8)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            self.error(f"unrecognized arguments: {' '.join(others)}{hint}")
+        return found, others
 
 
 def _parser(arguments: list[str] | None) -> argparse.ArgumentParser:

@@ -9,6 +9,7 @@ from typing import Any
 
 from cosim.cli.command import Command
 from cosim.cli.work import print_page, progress_bar, writable
+from cosim.errors import BadInput
 from cosim.studies.study import Study, Told, loaded, studies
 
 CHART = "chart"
@@ -32,6 +33,8 @@ def _run(study: Study, out: Path | None = None, **asked: Any) -> None:
     """Run a study with what was asked, save and tell what it finds."""
     for option in study.options:
         if option.prints and asked.pop(option.argument, False):
+            if asked or out:
+                raise BadInput(f"{option.name}: no other option goes with it.")
             print(loaded(option.prints)())
             return
     shown = asked.pop("show", False)

@@ -34,7 +34,8 @@ def netlist(
         raise BadInput("--max-step must be above 0 s and finite, and --reltol between 0 and 1.")
     if len({name.lower() for name in inputs}) < len(inputs):
         raise BadInput(f"--input {plain(', '.join(inputs))}: names a source twice.")
-    made = deck(path, inputs, outputs, {}, 1.0, reltol, max_step, False, {}, called="--input")
+    called = "--input", "--output"
+    made = deck(path, inputs, outputs, {}, 1.0, reltol, max_step, False, {}, called)
     kinds = {name: made.kinds[name.lower()] for name in inputs}
     vectors = dict(zip(outputs, made.vectors, strict=False))  # those of .meas follow
     write(made.text, kinds, vectors, target, max_step, version, made.pulses)

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -190,8 +191,8 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
         hint = messages.suggestion(Path(source).stem, builtin, "the built-in scene ")
         if source.endswith(".toml") or os.sep in source:
             raise messages.bad(f"{origin}: there is no such file{hint}") from None
-        if os.path.isfile(f"{source}.toml"):
-            hint = f"; did you mean {origin}.toml?"
+        if os.path.isfile(near := f"{os.path.splitext(source)[0]}.toml"):
+            hint = f"; did you mean {plain(near)}?"
         hint = hint or f" (built-in: {', '.join(builtin)})"
         raise messages.bad(f'there is no built-in scene and no file "{origin}"{hint}') from None
     try:
@@ -362,6 +363,9 @@ def _with_parameters(
         if name not in by_name:
             known = ", ".join(map(str, by_name)) or "none"
             raise BadInput(f"{origin}: fmu.{plain(key)}: there is no such FMU (known: {known}).")
+        if not isinstance(value, str | int) and not (isinstance(value, float) and isfinite(value)):
+            what = f"fmu.{plain(key)} = {messages.shown(value)}"
+            raise BadInput(f"{origin}: {what} must be {messages.ALLOWED_START}.")
         by_name[name]["parameters"][parameter] = value
     return found
 
@@ -371,7 +375,8 @@ def _origins(layers: list[_Layer]) -> dict[str, tuple[int, str]]:
     origins: dict[str, tuple[int, str]] = {}
     for rank, layer in enumerate(layers):
         for table, content in layer.tables.items():
-            names = [f"{table}.{key}" for key in content] if table in TABLES else [table]
+            keyed = table in (*TABLES, "fmu") and isinstance(content, dict)
+            names = [f"{table}.{key}" for key in content] if keyed else [table]
             origins |= dict.fromkeys(names, (rank, layer.origin))
     return origins
 

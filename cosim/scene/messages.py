@@ -17,6 +17,7 @@ ALLOWED_TOP = {
     "name": "at most 64 letters, digits, blanks and ._+- that begin with a letter or digit",
     "description": "one line of at most 200 characters",
 }
+ALLOWED_START = "a number, true, false or a text"
 
 
 def shown(value: object, limit: int = 60) -> str:
@@ -129,6 +130,8 @@ def _of_list(fault: Any, origin: str) -> str:
     limits = {k: getattr(m, k) for m in field.metadata for k in ("ge", "le") if hasattr(m, k)}
     allowed = extra.get("words") or "a number from {ge:g} to {le:g}".format(**limits)
     what = f"{origin}: [[{table}]] {place[0] + 1}: {place[1]}"
+    if len(place) > 2:
+        what, allowed = f"{what}.{place[2]}", ALLOWED_START
     if fault["type"] == "missing":
         return f"{what} is missing; it must be {allowed}."
     return ended(f"{what} = {shown(fault['input'])} must be {allowed}")

@@ -9,7 +9,6 @@ parabola through five points by least squares. The columns of the trials hold th
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,17 +20,6 @@ INSTANTS = 16
 exposure makes this mean wrong by 0.2 µm at most."""
 
 SHORTEST = 1e-6  # s; a shorter exposure is an instant
-
-
-@dataclass(frozen=True)
-class Frames:
-    """Heights, m, and velocities by :func:`velocities`, m/s, at times in s; time 0 is the first."""
-
-    time: Array
-    z_surface: Array
-    v_surface: Array
-    z_part: Array
-    v_part: Array
 
 
 def frame_count(waveforms: Mapping[str, Array], start: float) -> int:
@@ -69,15 +57,6 @@ def heights(waveforms: Mapping[str, Array], body: str, frames: Array, exposure: 
     time = waveforms["time"]
     at = np.clip(instants(frames, exposure), time[0], time[-1])
     return shown(hermite(at, time, waveforms[f"z_{body}"], waveforms[f"v_{body}"]), exposure)
-
-
-def film(waveforms: Mapping[str, Array], frames: Array, exposure: float) -> Frames:
-    """:func:`heights` of surface and part, and their velocities."""
-    z_surface, z_part = (heights(waveforms, body, frames, exposure) for body in ("surface", "part"))
-    return Frames(
-        *(frames - frames[0], z_surface, velocities(frames, z_surface)),
-        *(z_part, velocities(frames, z_part)),
-    )
 
 
 def velocities(time: Array, z: Array) -> Array:

@@ -14,8 +14,9 @@ from cosim.arrays import Array
 from cosim.files.picture import Picture, grid
 from cosim.files.spill import release
 from cosim.scene import Scene
-from cosim.trials.camera import FRAME_RATE, accelerations, film
+from cosim.trials.camera import FRAME_RATE, accelerations, heights
 from cosim.trials.measured import measured
+from cosim.waveforms.report import asked_for
 
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
 GRIP, SECOND = "#7a5195", "#6fb7e9"
@@ -70,15 +71,10 @@ MOST_PANELS = 12
 
 def draw_own(scene: Scene, waves: dict[str, Array], units: Mapping[str, str]) -> Picture:
     """The figure of a run of a scene with its own FMUs: a panel for each waveform, up to
-    MOST_PANELS, the whole run. Of more those that are kept or joined are drawn, and those that stay
-    the same are not."""
-    names = every = [name for name in waves if name != "time"]
-    if len(every) > MOST_PANELS:
-        chosen = {*(scene.circuit.save or ())}
-        for port in scene.port:
-            chosen |= {str(port.probe), str(port.source), str(port.origin), str(port.to)}
-        ranked = sorted(every, key=lambda name: (np.ptp(waves[name]) == 0.0, name not in chosen))
-        names = [name for name in every if name in ranked[:MOST_PANELS]]
+    MOST_PANELS, the whole run: first those that are asked for, last those that stay the same."""
+    asked, every = asked_for(scene), [name for name in waves if name != "time"]
+    ranked = sorted(every, key=lambda name: (np.ptp(waves[name]) == 0.0, name not in asked))
+    names = ranked[:MOST_PANELS]
     figure, axes = grid(len(names), 1 if len(names) < 4 else 2, 13.0, 1.9, 1.2)
     for axis, name in zip(axes, names, strict=True):
         axis.plot(*_outline(waves["time"], waves[name]), color=SURFACE, lw=0.8)
@@ -294,7 +290,7 @@ def _acceleration(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) 
     first, last = cut["time"][[0, -1]] + np.array([exposure, -exposure]) / 2
     frames = np.arange(np.ceil(first * FRAME_RATE), last * FRAME_RATE) / FRAME_RATE
     if len(frames) > 4:
-        read = accelerations(film(cut, frames, exposure).z_surface)
+        read = accelerations(heights(cut, "surface", frames, exposure))
         label = f"read from {FRAME_RATE:.0f} frames/s"
         axis.plot(frames * 1e3, read, color="0.2", lw=0.9, marker=".", ms=4, label=label)
     beyond = ""

@@ -49,10 +49,23 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
     return "\n".join(f"  {name:<24}{value}" for name, value in rows)
 
 
+MOST_ROWS = 20
+"""Of a scene with its own FMUs, beyond what is asked for."""
+
+
+def asked_for(scene: Scene) -> set[str]:
+    """The waveforms that a port joins or ``circuit.save`` keeps."""
+    ends = {end for p in scene.port for end in (p.probe, p.source, p.origin, p.to) if end}
+    return ends | {*(scene.circuit.save or ())}
+
+
 def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str:
-    """The numbers of a scene with its own FMUs, a line for each waveform that is not 0."""
+    """The numbers of a scene with its own FMUs, a line for each waveform that is not 0, those that
+    are asked for first."""
     every = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
-    names = [name for name in every if summary[f"{name}.rms"] != 0.0]
+    asked, moving = asked_for(scene), [name for name in every if summary[f"{name}.rms"] != 0.0]
+    ranked = sorted(moving, key=lambda name: name not in asked)
+    names = ranked[: max(MOST_ROWS, len(asked.intersection(moving)))]
     shown = [label(name, units[name]) for name in names]
     width = max([20, *map(len, shown)])
     whats = ["mean", "rms", "least", "greatest"]
@@ -62,9 +75,10 @@ def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str
     for name, words in zip(names, shown, strict=True):
         values = "".join(f"{summary[f'{name}.{what}']:>13.6g}" for what in whats)
         lines.append(f"  {words:<{width}}{values}")
-    if len(names) < len(every):
-        others = len(every) - len(names)
-        lines.append(f"  {others} other{'s are' if others > 1 else ' is'} 0 after settling")
+    more, still = len(moving) - len(names), len(every) - len(moving)
+    others = [f"{more} more in summary.json"] * (more > 0)
+    others += [f"{still} other{'s are' if still > 1 else ' is'} 0 after settling"] * (still > 0)
+    lines += [f"  {'; '.join(others)}"] * bool(others)
     steps, coupling = f"{summary['circuit_steps']} of ngspice", []
     if summary["fmu_steps"]:
         steps += f", {summary['fmu_steps']} of FMUs"
@@ -124,7 +138,8 @@ def _heat(summary: dict[str, Any]) -> str:
     if "coil_heat" not in summary:
         return ""
     lift, ever = (warmer(summary[f"coil_rise_{name}"]) for name in ("lift", "continuous"))
-    return f"{summary['coil_heat']:.3g} W; warmer by {lift} in 10 s, {ever} for ever (estimate)"
+    warm = f"warmer by {lift} in 10 s, by {ever} in continuous use (estimate)"
+    return f"{summary['coil_heat']:.3g} W; {warm}"
 
 
 def warmer(ends: Sequence[float | None]) -> str:

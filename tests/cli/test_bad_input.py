@@ -334,3 +334,10 @@ def test_endless_numbers(
     told = capsys.readouterr().err
     assert told.startswith("cosim: ") and told.count("\n") == 1 and len(told) < 2500
     assert not list(tmp_path.iterdir())
+
+
+def test_a_file_of_another_ending_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "heavy.toml").touch()
+    for name in ("heavy", "heavy.tml"):
+        assert complaint(name).endswith("did you mean heavy.toml?")

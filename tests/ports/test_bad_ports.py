@@ -26,8 +26,14 @@ WRONG = {
     "no such FMU": ("rotor.omega", "motor.omega", r"from = \"motor\.omega\" must be a variable"),
     "no such source": ('"Vemf"\n', '"Vemg"\n', r"bridge\.cir: .*\"Vemg\".*did you mean vemf"),
     "no source at all": ('"Vemf"\n', '"Rm"\n', r"bridge\.cir: .*\"Rm\" must be a V or I source"),
-    "no such node": ('"v(gp)"', '"v(gpp)"', r"bridge\.cir: \"v\(gpp\)\".*no node gpp"),
-    "within a device": ('"v(gp)"', '"@d1[id]"', r"\"@d1\[id\]\" .*source of 0 V in series"),
+    "no such node": ('"v(gp)"', '"v(gpp)"', r"bridge\.cir: .* = \"v\(gpp\)\": .*no node gpp"),
+    "a broken expression": (
+        '"v(gp)"',
+        '"v(gp)*"',
+        r"bridge\.cir: probe or circuit\.save = \"v\(gp\)\*\": v\(gp\)\* is no expression",
+    ),
+    "two in one": ('"v(gp)"', '"v(gp), v(a)"', r"bridge\.cir: .* is no expression"),
+    "within a device": ('"v(gp)"', '"@d1[id]"', r"\"@d1\[id\]\": .*source of 0 V in series"),
     "no such current": ('"i(Vemf)"', '"i(Rm)"', r"bridge\.cir: .*no V, L, E or H element rm"),
     "a command as probe": ('"v(gp)"', '"v(gp)\\n.control"', r"cannot stand in a netlist"),
     "a parameter": ("J = 2e-4", "K = 2e-4", r"Rotor\.fmu: .*parameters K = 0\.0002"),
@@ -68,6 +74,22 @@ def test_a_wrong_port_is_told_in_one_sentence(
     assert told.count("\n") == 0 and told.startswith("cosim: ")
     assert re.search(said, told), told
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "given", "said"),
+    [
+        ("J = 2e-4", "J = [1]", "B=1e-5", r"motor\.toml: \[\[fmu\]\] 1: parameters\.J = \[1\] "),
+        ("J = 2e-4", "J = [1]", "B=nan", r"--set: fmu\.rotor\.B = nan must be a number"),
+    ],
+)
+def test_the_origin_of_a_wrong_value_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, given: str, said: str
+) -> None:
+    scene = motor(tmp_path)
+    scene.write_text(scene.read_text().replace(old, new))
+    assert main(["run", str(scene), "--set", f"fmu.rotor.{given}"]) == 2
+    assert re.search(said, capsys.readouterr().err)
 
 
 @pytest.mark.parametrize("wrong", ['parameters = 5\nname = "a"', "name = [1]"])

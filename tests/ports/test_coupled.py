@@ -405,8 +405,9 @@ def test_an_fmu_that_ends_its_process_or_fails_is_told(tmp_path: Path) -> None:
 
 def test_ground_may_be_kept(tmp_path: Path) -> None:
     scene = motor(tmp_path)
-    given = {"run.duration": 1e-3, "circuit.save": ["v(0)", "v(a, 0)"]}
-    assert not here(scene, given).columns["v(0)"].any()
+    given = {"run.duration": 1e-3, "circuit.save": ["v(0)", "v(a, 0)", "v(GND)"]}
+    columns = here(scene, given).columns
+    assert not columns["v(0)"].any() and not columns["v(GND)"].any()
 
 
 def test_structures_have_the_sizes_that_the_compiled_ones_have() -> None:

@@ -25,6 +25,7 @@ from cosim.studies.identify.problem.targets import (
     Measured,
     read_trials,
 )
+from cosim.studies.identify.report.figures import FIGURES
 from cosim.studies.identify.report.measures import bands, errors, nrmse, samples, shown
 from cosim.studies.identify.report.scenes import Settings, scene, trial_settings
 from cosim.studies.identify.report.verdicts import judge, rigs_meant
@@ -307,6 +308,9 @@ def test_the_same_seed_gives_the_same_and_an_interrupted_run_goes_on(
     assert "one search tells no range" in page and "The spring-loaded plate stands still" in page
     assert [len(one["rests_mm"]) for one in whole.numbers["laws"]] == [2]
     assert "rests at more than one place: cubic at q =" in page
+    titles = " ".join(axis.get_title("left") for axis in FIGURES["trials"](whole).axes)
+    for words in ("velocity of the surface [m/s], NRMSE", "height of the part [mm], mean error"):
+        assert f": {words}" in titles
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"identify.json", "identify.csv", "identify.md", "rig.toml", "trial-04.toml"} <= names
     loaded = cosim.load(tmp_path / "out" / "trial-04.toml")

@@ -23,6 +23,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import minimize_scalar
 
 import cosim
+from cosim.cli.main import main
 from cosim.drive.surface import formulas
 from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import (
@@ -403,6 +404,18 @@ def test_the_misprints_as_text():
     assert text.count("confirmed.") == 7
     assert "NOT CONFIRMED" not in text
     assert max(len(line) for line in text.splitlines()) <= 92
+
+
+def test_the_command_says_what_it_takes_and_writes(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+):
+    for more in (["--period", "0.1"], ["--out", str(tmp_path / "out")]):
+        assert main(["theory", "--errata", *more]) == 2
+        assert "no other option" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["theory", "--help"])
+    told = capsys.readouterr().out
+    assert "knife_edge.csv" in told and "(default: 98.1)" in told
 
 
 @examples(50)

@@ -101,6 +101,11 @@ def test_what_is_not_clear_is_refused(spoilt: str, run: cosim.Result, tmp_path: 
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
+def beside_velocities(columns: list[Array]) -> list[Array]:
+    time, *heights = columns
+    return [time, *(1e3 * z for z in heights), *(np.gradient(z, time) for z in heights)]
+
+
 EXCHANGED = "the columns of surface and part exchanged"
 TOLD = {
     "mm as m": (HEADER.replace("mm", "m"), same, ["surface [m] times 0.001", "part [m] times"]),
@@ -110,6 +115,10 @@ TOLD = {
     "the part alone in m": (HEADER, scaled(part=1e-3), ["part [mm] times 1000: is it in mm"]),
     "the part alone in cm": (HEADER, scaled(part=0.1), ["column part [mm] times 10: is it in mm"]),
     "up is negative": (HEADER, scaled(1, -1, -1), ["surface [mm] times -1: is its"]),
+    "µm as mm beside velocities": (
+        *(HEADER + ",v_surface [mm/s],v_part [mm/s]", beside_velocities),
+        ["column surface [mm] times 0.001: is it in mm", "column part [mm] times 0.001: is it in"],
+    ),
     "the part downwards": (HEADER, scaled(part=-1), ["part [mm] times -1: is its"]),
     "µm downwards": (HEADER, scaled(1, -1e3, -1e3), ["surface [mm] times -0.001: is it in mm and"]),
     "exchanged": (HEADER, lambda c: [c[0], c[2], c[1]], [EXCHANGED]),

@@ -88,4 +88,4 @@ def test_a_declaration_is_a_command(
     assert main(["look", "c", "--far", "--times=4", "--no-near", f"--out={out}"]) == 0
     assert heard == [(["a", "b"], 3, False, True), (["c"], 4, True, False)]
     assert main(["look", "c", "--times=x"]) == 2
-    assert "argument --times: invalid int value: 'x'" in capsys.readouterr().err
+    assert "argument --times: must be a whole number, not 'x'" in capsys.readouterr().err

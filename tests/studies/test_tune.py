@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -83,7 +84,11 @@ def test_all_runs_fail() -> None:
 
 BAD = [
     (["--maximise", "speed"], "speed is not a number of this scene's summary"),
+    (["--maximise", "v_averge"], "v_averge is not a number of this scene's summary; did you mean"),
     (["--maximise", "v_average", "--budget", "20"], "--budget 20"),
+    (["--maximise", "v_average", "--budget", "3.5"], "must be a whole number, not '3.5'"),
+    (["--maxmise", "v_average"], "--maximise --minimise is required (see cosim tune --help)"),
+    (["--maximise", "v_average", "--robst"], "--robst; did you mean --robust? (see cosim tune"),
     (["--maximise", "v_average", "--over", "drive.offset"], "table.key=low:high"),
     (["--maximise", "v_average", "--over", "drive.offset=1:0"], "must be a range"),
     (["--maximise", "v_average", "--over", "drive.offset=0:1e9"], "from -100 to 100 V"),
@@ -232,6 +237,8 @@ def test_a_waveform_without_a_setting_costs_only_itself(tmp_path: Path) -> None:
     """Square waves of these volts make more heat than may be."""
     few = {**FAST, "run.settle": 0.05, "run.duration": 0.1}
     given: dict[str, Any] = {"heat": 3.0, "budget": 24, "workers": 1, "out": tmp_path}
+    for name in ("best-square.toml", "best-mine.toml"):  # of an earlier search, and the user's
+        (tmp_path / name).touch()
     over = {"drive.offset": (-1.0, 1.0)}
     with pytest.warns(Note, match="square: No setting could be run"):
         found = tune(
@@ -239,6 +246,9 @@ def test_a_waveform_without_a_setting_costs_only_itself(tmp_path: Path) -> None:
             waveform=["square", "sine"], **given,
         )  # fmt: skip
     assert found.waveform == "sine" and not found.others
+    assert {path.name for path in tmp_path.glob("best*")} == {"best.toml", "best-mine.toml"}
+    unturned: Any = replace(found, neighbours={}).plot().axes[1]
+    assert "budget ended" in unturned.get_title("left") and unturned.get_xlim()[0] < 0.0
 
 
 def test_runs_of_all_waveforms_are_written(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.waveforms.columns import UNITS
+from cosim.waveforms.figure import draw_own
 from cosim.waveforms.formats.tracker import laid_over
 from cosim.waveforms.report import LIMITS, table
 
@@ -101,3 +102,27 @@ def test_ports_of_which_all_numbers_are_zero() -> None:
     zeros = {f"rotor.omega.{what}": 0.0 for what in whats}
     told = table(scene, zeros | counts, {"rotor.omega": "rad/s"})
     assert "1 other is 0 after settling" in told and re.search(r"loudest +0\.25", told)
+
+
+def test_of_many_waveforms_those_come_first_that_are_asked_for() -> None:
+    """Those that ports join, which stand last in the file; the others up to a dozen
+    panels and a score of rows."""
+    scene = load("closed-grip")
+    asked = ["jaw.normal_force", "rig.z_part", "control.out", "Vcommand", "i(Vemf)"]
+    names = [*(f"rig.y{k}" for k in range(40)), *asked]
+    whats = ("mean", "rms", "least", "greatest")
+    summary: dict[str, float | str] = {f"{name}.{what}": 1.0 for name in names for what in whats}
+    summary["rig.y39.rms"] = 0.0
+    summary |= dict.fromkeys(("circuit_steps", "fmu_steps", "steps_repeated", "wall_time"), 0)
+    first, *rows = table(scene, summary, dict.fromkeys(names, "1")).splitlines()
+    shown = [*asked, *(f"rig.y{k}" for k in range(15))]
+    assert "mean" in first and [row.split()[0] for row in rows[:20]] == shown
+    assert rows[20].strip() == "24 more in summary.json; 1 other is 0 after settling"
+    waves = {name: np.array([0.0, 1.0]) for name in ("time", *names)}
+    figure = draw_own(scene, waves, dict.fromkeys(names, "1"))
+    assert [axis.get_title("left") for axis in figure.axes] == shown[:12]
+
+
+def test_heat_that_goes_on_is_told_in_plain_words() -> None:
+    scene = load("reference", ["circuit.model=ideal", *SHORT])
+    assert "K in continuous use (estimate)" in table(scene, simulate(scene).summary, UNITS)

@@ -48,6 +48,15 @@ _ASSIGNMENT = re.compile(r"([a-z_]\w*)=([a-z_]\w*)\b(?!\s*\()", re.IGNORECASE)
 _DROPPABLE = re.compile(r"\.model ([^\s(]+)|\.func (\w+)")
 _CALLED = re.compile(r"(\w+)\s*\(")
 _FUNC = re.compile(r"\.func\s+([a-z_]\w*)\s*\(([^()]*)\)\s*=?(.*)", re.S)
+_PIECE = re.compile(
+    r"""(?P<operand>[vi]\s*\(\s*[^\s()][^()]*\)|@[\w.#]+\[\w+\]
+    |(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?[a-z]*|[a-z_][\w.$#]*+(?!\s*\())
+    |(?P<begin>[a-z_][\w.$#]*\s*\(|[({])|(?P<end>[)}])
+    |(?P<join>\*\*|&&|\|\||<>|[=<>!]=|[*/^%&|=<>?:,])|(?P<prefix>[-+!~])""",
+    re.IGNORECASE | re.VERBOSE,
+)
+_BROKEN = re.compile(r"(?:^|[bjp])(?:[ej]|$)|[oe][ob]")
+"""Of the first letters of the pieces: an operand lacks, or an operator."""
 _KEY = re.compile(r"\s*=(?!=)")
 _CALL = re.compile(r"\s*\(")
 _BODY = re.compile(r"\b[vi]\s*=(?!=)", re.IGNORECASE)
@@ -148,6 +157,9 @@ def check_names(scope: Scope, names: Names) -> None:
                     _check_own(line, name, arguments, names, behavioural)
                 else:
                     _check_call(line, name, arguments, behavioural)
+            pieces = "".join(str(piece.lastgroup)[0] for piece in _PIECE.finditer(expression))
+            if pieces and (_BROKEN.search(pieces) or len(split_arguments(expression)) > 1):
+                refuse(line, f"{shown(expression.strip())} is no expression that ngspice can read")
         if element is not None and element.kind == "b":
             _check_blanks(line, own)
 

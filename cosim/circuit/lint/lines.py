@@ -15,11 +15,16 @@ class Line:
     text: str
     file: str
     number: int
+    """0 of what is no line of the file."""
+
+    @property
+    def place(self) -> str:
+        return f"{self.file}:{self.number}" if self.number else self.file
 
 
 def refuse(line: Line, reason: str) -> NoReturn:
     """Raise the one sentence that tells what is wrong with ``line``."""
-    raise BadInput(f"{line.file}:{line.number}: {reason}.")
+    raise BadInput(f"{line.place}: {reason}.")
 
 
 def shown(text: str) -> str:

@@ -63,11 +63,11 @@ def without_effect(dropped: Sequence[Line]) -> Iterator[str]:
         word, match = text.split()[0], _MEAS.match(text)
         without = re.search(r"\b(uic|startup)\b", text) if word == ".tran" else None
         if word in _SAVING:
-            yield f"{line.file}:{line.number}: {word} has no effect; circuit.save keeps vectors."
+            yield f"{line.place}: {word} has no effect; circuit.save keeps vectors."
         elif word in _ANALYSES or without or (match and match[1] not in (None, "tran")):
             what = f"{word} {without[0]}" if without else word
             yield (
-                f"{line.file}:{line.number}: {what} has no effect: a run is a transient analysis "
+                f"{line.place}: {what} has no effect: a run is a transient analysis "
                 "that begins at the operating point."
             )
 
@@ -151,8 +151,8 @@ def measured(
         if value is not None:
             values[f"meas.{each.name}"] = value
         else:
-            where = f"{each.line.file}:{each.line.number}"
-            notes.append(f"{where}: .meas {each.name} has no value: its event does not come.")
+            what = f".meas {each.name} has no value: its event does not come."
+            notes.append(f"{each.line.place}: {what}")
     return values, notes
 
 

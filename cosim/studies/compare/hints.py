@@ -12,6 +12,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import plain
 from cosim.studies.compare.scores import R2, explained
+from cosim.trials.camera import velocities
 from cosim.trials.recording import Recording
 from cosim.waveforms.columns import COLUMNS
 
@@ -45,11 +46,14 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
             yield f"{agree} with the columns of surface and part exchanged: which is which?"
             return
     start, fine = starts[0], True
-    for name in [guide, *(R2.keys() & signals.keys() - {guide})]:
-        runs = laid if name == guide else [observe(recording, name, start)]
-        shares = {
-            factor: [explained(run, factor * signals[name]) for run in runs] for factor in FACTORS
-        }
+    measured = {name: signals[name] for name in (guide, *R2) if name in signals}
+    for z in ("z_surface", "z_part"):  # where a velocity is of another column, so is its unit
+        if {z, f"v{z[1:]}"} <= recording.understood.get("columns", {}).keys() & signals.keys():
+            measured[z] = velocities(recording.time, signals[z])
+    for name, values in measured.items():
+        moves = name.replace("z_", "v_", 1)
+        runs = laid if moves == guide else [observe(recording, moves, start)]
+        shares = {factor: [explained(run, factor * values) for run in runs] for factor in FACTORS}
         factor = max(shares, key=lambda factor: max(shares[factor]))
         before, after = max(shares[1.0]), max(shares[factor])
         if factor != 1.0 and _better(after, before):

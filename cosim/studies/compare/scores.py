@@ -89,8 +89,8 @@ def scores(recording: Recording, simulated: Signals, period: float | None) -> li
         gained = drift(time, measured, period) * period if period else 0.0
         largest = float(np.nanmax(np.abs(measured)))
         apart = "mean distance of the part's heights, both from their first: the paper's error"
-        of_height = "the same, of the part's greatest height"
-        centred = "the same, both from their means: what the first frame is does not count"
+        of_height = "the paper's error over the part's greatest measured height"
+        centred = "mean distance of the part's heights, both from their means"
         for name, unit, scale, distance, words in (
             ("mean_error_mm", "mm", 1e3, mean_distance, apart),
             ("mean_error_percent", "%", 100.0 / largest, mean_distance, of_height),

@@ -93,17 +93,15 @@ def forces(known: Sequence[Force], result: dict[str, Any]) -> Picture:
     """Normal forces, trial by trial, with their intervals, measured ones and bounds."""
     rows = result["trials"]
     figure, (axis,) = grid(1, 1, 8.0, 4.6, 0.0)
-    bounds: dict[str, Any] = {"color": SURFACE, "lw": 7.0, "alpha": 0.5}
+    bounds: Any = {"color": SURFACE, "lw": 7.0, "alpha": 0.5, "label": "bounds of the fit"}
     measured: dict[str, Any] = {"marker": "D", "ls": "", "mfc": "none", "color": MEASURED}
-    dots: dict[str, Any] = {"color": SIMULATED, "ms": 6}
-    drawn = set()
+    interval = " and 90 %" if "profiles" in result else ""
+    dots: dict[str, Any] = {"color": SIMULATED, "ms": 6, "label": result["parameters"] + interval}
     for x, (force, row) in enumerate(zip(known, rows, strict=True)):
         if force.lower is not None and force.upper is not None:
             axis.plot([x, x], [force.lower, force.upper], solid_capstyle="butt", **bounds)
-            drawn.add("bounds")
         if force.measured is not None:
-            axis.plot(x, force.measured, **measured)
-            drawn.add("measured")
+            axis.plot(x, force.measured, label="measured", **measured)
         found = row["normal_force_weights"]
         if found is None:
             axis.text(x, 0.0, " not determined", rotation=90, ha="center", va="bottom", fontsize=8)
@@ -111,18 +109,13 @@ def forces(known: Sequence[Force], result: dict[str, Any]) -> Picture:
         low, high = row.get("normal_force_90_percent", (found, found))
         reach = [[max(0.0, found - low)], [max(0.0, high - found)]]
         axis.errorbar(x, found, reach, fmt="o", capsize=4, **dots)
-    if "measured" in drawn:
-        axis.plot([], [], label="measured", **measured)
-    interval = " and 90 %" if "profiles" in result else ""
-    axis.plot([], [], "o", label=result["parameters"] + interval, **dots)
-    if "bounds" in drawn:
-        axis.plot([], [], label="bounds of the fit", **bounds)
     axis.set_xticks(range(len(rows)), [str(row["trial"]) for row in rows], fontsize=8)
     axis.margins(y=0.2)  # room for the legend
     axis.set_xlim(-0.5, len(rows) - 0.5)
     axis.set_ylim(0, None)
     axis.set(xlabel="trial", ylabel="normal force [m·g]")
-    axis.legend(fontsize=9, frameon=False, loc="upper center", ncols=3)
+    each = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))  # by its label
+    axis.legend(each.values(), each, fontsize=9, frameon=False, loc="upper center", ncols=3)
     change = result["normal_force_change_mean_percent"]
     off = "" if change is None else f"; {change:.1f} % off the measured on average"
     axis.set_title(f"Normal forces, {_words(result)}{off}", fontsize=10)

@@ -70,6 +70,8 @@ class Bench:
 
     scene: Scene
     evaluator: Evaluator
+    only: int | None = None
+    """Of GOALS, the one that is scored, so that nothing else is searched; all unless told."""
 
     @staticmethod
     def base(scene: Scene, rig: Settings, told: str) -> Scene:
@@ -106,7 +108,10 @@ class Bench:
         def evaluate(points: Array) -> tuple[Array, Feasible]:
             groups = self.outcomes([[scouted(one) for one in every(point)] for point in points])
             allowed = np.array([self.feasible(machine, group[0]) for group in groups], bool)
-            return np.median([[*map(scored, group)] for group in groups], axis=1), allowed
+            scores = np.median([[*map(scored, group)] for group in groups], axis=1)
+            if self.only is not None:
+                scores[:, np.arange(len(GOALS)) != self.only] = -np.inf
+            return scores, allowed
 
         return evaluate
 

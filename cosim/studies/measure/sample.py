@@ -13,9 +13,8 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.store import Store
 from cosim.mechanics.stickslip import numbers_of
 from cosim.scene import Scene
-from cosim.search.protocol import Evaluate, Feasible
 from cosim.studies.identify.problem.gauges import BIASES, GAUGES, Gauge
-from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Machine, Settings
+from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Settings
 from cosim.studies.limits.judge import NUMBER
 from cosim.studies.limits.runs import NEEDED, SETTLE, SPAN, Bench
 from cosim.studies.limits.search import Candidates, Effort, searched
@@ -161,25 +160,6 @@ def held_currents(scene: Scene) -> tuple[float, float]:
 _Found = tuple[Candidates, float]
 
 
-class _Upwards(Bench):
-    """Scores nothing but the velocity upwards, so that nothing else is searched."""
-
-    def once(self, machine: Machine) -> Evaluate:
-        return _alone(super().once(machine))
-
-    def over_turns(self, machine: Machine) -> Evaluate:
-        return _alone(super().over_turns(machine))
-
-
-def _alone(evaluate: Evaluate) -> Evaluate:
-    def alone(points: Array) -> tuple[Array, Feasible]:
-        scores, feasible = evaluate(points)
-        others = np.arange(scores.shape[1]) != UP
-        return np.where(others, -np.inf, scores), feasible
-
-    return alone
-
-
 def sample(
     scene: Scene,
     rigs: Sequence[Settings],
@@ -195,7 +175,7 @@ def sample(
     def ask(number: int, names: Iterable[str], effort: Effort) -> dict[str, _Found]:
         base = Bench.base(scene, rigs[number], f"rig {number}")
         with open_(base) as evaluator:
-            bench = _Upwards(base, evaluator)
+            bench = Bench(base, evaluator, UP)
             return {
                 name: _robust(bench, name, effort, [seed, number], own.get(name)) for name in names
             }

@@ -6,14 +6,14 @@ The formulas themselves, with source and symbols, are in :mod:`cosim.drive.surfa
 from cosim.studies.study import Option, Study, chart, folder_of_trials
 
 _GIVEN = (
-    ("--mu-s", "static coefficient of friction", "MU"),
-    ("--mu-k", "kinetic coefficient of friction", "MU"),
-    ("--a-max", "greatest acceleration of the surface, m/s²", "M/S2"),
-    ("--f-n", "normal force over the part's weight", "RATIO"),
-    ("--period", "period, s", "S"),
+    ("--mu-s", "static coefficient of friction", "MU", 0.7),
+    ("--mu-k", "kinetic coefficient of friction", "MU", 0.6),
+    ("--a-max", "greatest acceleration of the surface, m/s²", "M/S2", 98.1),
+    ("--f-n", "normal force over the part's weight", "RATIO", 5.0),
+    ("--period", "period, s", "S", 0.05),
 )
 _ERRATA = Option(
-    *("--errata", "the paper's misprints, each proven"),
+    *("--errata", "only print the paper's misprints, each proven"),
     kind=bool,
     prints="paper.errata.errata_text",
 )
@@ -21,9 +21,9 @@ _ERRATA = Option(
 STUDIES = (
     Study(
         "paper.theory.theory",
-        "the paper's closed forms: theory.json, figure3.png, figure4.png",
+        "the paper's closed forms: theory.json, knife_edge.csv, the figures 3, 4 and knife_edge",
         (
-            *(Option(n, f"{t} (default: the paper's)", unit, float) for n, t, unit in _GIVEN),
+            *(Option(name, help, unit, float, default) for name, help, unit, default in _GIVEN),
             _ERRATA,
         ),
         command="theory",

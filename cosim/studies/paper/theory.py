@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.drive.surface import formulas
-from cosim.drive.surface.formulas import GRAVITY, Direction, Transport
+from cosim.drive.surface.formulas import Direction, Transport
 from cosim.drive.surface.waveforms import (
     Cycle,
     optimal_cycle,
@@ -20,8 +20,8 @@ from cosim.files.atomic import write_json
 if TYPE_CHECKING:
     from cosim.files.picture import Picture
 
-FIGURE_3 = Transport(mu_s=0.7, mu_k=0.6, a_max=10.0 * GRAVITY, f_n=5.0, period=0.05)
-"""The case of the paper's figure 3, which tells no period: this one is ours."""
+FIGURE_3 = Transport(mu_s=0.7, mu_k=0.6, a_max=98.1, f_n=5.0, period=0.05)
+"""The case of the paper's figure 3, which has 10 g, and tells no period: this one is ours."""
 
 SHARES = (0.5, 1.0, 1.5, 2.0)
 """The largest accelerations of figure 4's curves, in units of the one given."""

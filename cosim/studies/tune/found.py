@@ -15,7 +15,7 @@ from cosim.evaluate.point import Number, Outcome
 from cosim.files.atomic import write_json, write_text
 from cosim.files.picture import Picture
 from cosim.scene import Scene, to_toml
-from cosim.scene.tables import KNOBS
+from cosim.scene.tables import COMMANDS, KNOBS
 from cosim.search.turns import TURN
 from cosim.studies.tables import write_csv
 from cosim.waveforms.quantities import bench_unit, label, with_unit
@@ -141,8 +141,10 @@ class Tuning:
             low, high = (np.nan if value is None else value * scale for value in row)
             heights = [low, self.value * scale, high]
             turn_axis.plot(turns, heights, color=color, ls=style, marker="o", ms=4, label=key)
-        turn_axis.set(xlabel="turned by [% of the key's range]", ylabel=ylabel)
-        turn_axis.set_title("The neighbourhood of the best", loc="left", fontsize=10.5)
+        turn_axis.axhline(self.value * scale, color="0.7", lw=0.9)
+        turned = "turned by [% of the key's range]"
+        turn_axis.set(xlabel=turned, ylabel=ylabel, xlim=1.1 * turns[[0, -1]])
+        turn_axis.set_title(self.robustness.capitalize(), loc="left", fontsize=10.5)
         if self.neighbours:
             turn_axis.legend(fontsize=8.5)
 
@@ -202,6 +204,9 @@ class Tuning:
         aim = f"{'largest' if self.largest else 'least'} {self.quantity}"
         found = {"name": f"{self.scene.name}-tuned"[:64], "description": f"Tuned for the {aim}"}
         write_json(out / "tune.json", numbers)
+        for path in out.glob("best-*.toml"):
+            if path.stem.split("-")[1] in COMMANDS:  # of an earlier search
+                path.unlink()
         for one in (self, *self.others):
             name = "best" if one is self else f"best-{one.waveform.replace(':', '-')}"
             write_text(out / f"{name}.toml", to_toml(one.scene.model_copy(update=found)))

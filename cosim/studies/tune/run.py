@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput, Note, SimulationFailed
+from cosim.errors import BadInput, Note, SimulationFailed, plain
 from cosim.evaluate.evaluator import Evaluator, Settings
 from cosim.evaluate.keys import FREQUENCIES, numeric_key
 from cosim.evaluate.point import Number, Outcome, in_whole_periods
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
+from cosim.scene.messages import bad, suggestion
 from cosim.scene.tables import COMMANDS
 from cosim.search.climb import POPULATION, Climb
 from cosim.search.design import Design
@@ -318,10 +319,9 @@ class _Trial:
         if outcome.failure:
             return None
         if self._aim.quantity not in outcome.numbers:
-            names = ", ".join(outcome.numbers)
-            raise BadInput(
-                f"{self._aim.quantity} is not a number of this scene's summary ({names})."
-            )
+            asked, names = self._aim.quantity, ", ".join(outcome.numbers)
+            hint = suggestion(asked, outcome.numbers) or f" ({names})"
+            raise bad(f"{plain(asked)} is not a number of this scene's summary{hint}")
         value = outcome.numbers[self._aim.quantity]
         return value if isfinite(value) else None
 

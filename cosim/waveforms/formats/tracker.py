@@ -16,9 +16,9 @@ from cosim.scene import Scene
 from cosim.trials.camera import (
     FRAME_RATE,
     accelerations,
-    film,
     frame_count,
     frame_times,
+    heights,
     velocities,
 )
 from cosim.trials.table import FEWEST_ROWS
@@ -44,14 +44,14 @@ def write(run: Run, file: BytesIO) -> str:
             f"{longest:.4g} s more than {start:g} s."
         )
     exposure = scene.run.shutter / FRAME_RATE
-    frames = film(run.waveforms, frame_times(start, n), exposure)
-    columns = {"t": frames.time}
-    rest = np.zeros(n)
-    for body, z in (("p", frames.z_surface), ("o", frames.z_part), ("s", rest)):
+    at, rest = frame_times(start, n), np.zeros(n)
+    columns = {"t": (time := at - at[0])}
+    for body, name in (("p", "surface"), ("o", "part"), ("s", "")):
+        z = heights(run.waveforms, name, at, exposure) if name else rest
         across, along = rest, 1e3 * z
         for kind, of in (
             ("", np.copy),
-            ("v", partial(velocities, frames.time)),
+            ("v", partial(velocities, time)),
             ("a", accelerations),
         ):
             columns[f"{kind}x{body}"] = of(across)

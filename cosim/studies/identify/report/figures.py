@@ -15,6 +15,7 @@ from cosim.studies.identify.report.solved import KINDS, Solved
 from cosim.studies.identify.report.verdicts import TRUSTED, forces
 from cosim.studies.plots import headline
 from cosim.studies.tables import Row
+from cosim.waveforms.columns import COLUMNS
 
 MEASURED, SIMULATED, OTHER, FLOOR = "0.15", "#d1495b", "#1f6fb2", "#2a9d8f"
 
@@ -22,7 +23,7 @@ VELOCITY = "nrmse_v_surface"
 """By which a figure's message tells how near the rig is."""
 
 COMPARED = (
-    (VELOCITY, "floor_late", "Velocity, NRMSE (black: its own cycles among themselves)"),
+    (VELOCITY, "floor_late", "Velocity of the surface, NRMSE (black: between its own cycles)"),
     ("nrmse_z_surface", "", "Height of the surface, NRMSE"),
     ("part_error_mm", "straight_line_error_mm", "Part, mean error [mm] (black: straight line)"),
     (
@@ -42,10 +43,10 @@ def overlays(found: Solved) -> Picture:
     for k, (trial, own) in enumerate(zip(trials, owns, strict=True)):
         simulated, row, time = shown(trial, rig, own), rows[trial.label], trial.fine.time * 1e3
         whose = f"Trial {trial.label}{' (not fitted)' if trial in found.apart else ''}"
-        for axis, name, body, unit, scale, error, of in (
-            (axes[3 * k], "v_surface", "surface", "m/s", 1.0, "nrmse_v_surface", "NRMSE {:.2f}"),
-            (axes[3 * k + 1], "z_surface", "surface", "mm", 1e3, "nrmse_z_surface", "NRMSE {:.2f}"),
-            (axes[3 * k + 2], "z_part", "part", "mm", 1e3, "part_error_mm", "error {:.3f} mm"),
+        for axis, name, unit, scale, error, of in (
+            (axes[3 * k], "v_surface", "m/s", 1.0, "nrmse_v_surface", "NRMSE {:.2f}"),
+            (axes[3 * k + 1], "z_surface", "mm", 1e3, "nrmse_z_surface", "NRMSE {:.2f}"),
+            (axes[3 * k + 2], "z_part", "mm", 1e3, "part_error_mm", "mean error {:.3f} mm"),
         ):
             if name not in simulated:
                 axis.set_visible(False)
@@ -55,8 +56,8 @@ def overlays(found: Solved) -> Picture:
                 (simulated[name], {"color": SIMULATED, "lw": 0.9, "label": "identified rig"}),
             ):
                 axis.plot(time, values * scale, **style)
-            axis.set_title(f"{whose}: {body}, {of.format(row[error])}", loc="left", fontsize=9)
-            axis.set_ylabel(unit)
+            what = f"{whose}: {COLUMNS[name].long_name} [{unit}], {of.format(row[error])}"
+            axis.set_title(what, loc="left", fontsize=9)
     for axis in axes[-3:]:
         axis.set_xlabel("time [ms]")
     _legend(figure, axes[0], "outside upper right", 2)
