@@ -48,8 +48,8 @@ UNDERSTOOD = "; ".join(" or ".join(words) for words in WORDS.values()) + (
 MAP = "surface=NAME[:unit],part=NAME[:unit],time=NAME[:unit]"
 """Which column of a table is what; the unit may stand in the header instead."""
 HOW = (
-    "write what it is and its unit, such as time [s], surface [mm], part [mm], or name the "
-    "columns, such as --columns time=t:s,surface=top:mm,part=cube:mm"
+    "write what it is and its unit, such as time [s], surface [mm], part [mm], or, to compare, "
+    "name the columns, such as --columns time=t:s,surface=top:mm,part=cube:mm"
 )
 BODIES = {"p": "surface", "o": "part", "s": "plate"}
 TRIALS = {"t": "time"} | {

@@ -2,6 +2,7 @@
 
 import json
 import math
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from cosim.cli.main import main
 from cosim.drive.surface.formulas import Transport, average_velocity
 from cosim.drive.surface.waveforms import quaid_cycle, quaid_velocity
-from cosim.errors import BadInput
+from cosim.errors import BadInput, Note
 from cosim.mechanics import part
 from cosim.scene import Scene, load
 from cosim.simulation.rungs import given_surface as prescribed
@@ -218,6 +219,23 @@ def test_bad_surface_files(text: str, told: str, tmp_path: Path) -> None:
     path.write_text(text)
     with pytest.raises(BadInput, match=told):
         simulate(load("trial", [f"drive.file={path}"]))
+
+
+def test_a_gap_in_the_surface_is_told(tmp_path: Path) -> None:
+    rows = [f"{k},{100 * (k % 2)}" for k in range(200)]
+    path = tmp_path / "own.csv"
+    given = [f"drive.file={path}", "run.duration=0.15", "run.settle=0"]
+    for row in (None, 0, 60):  # none, before the first one, between two
+        table = [f"{k}," if k == row else text for k, text in enumerate(rows)]
+        path.write_text("\n".join(["time [ms],v_surface [mm/s]", *table, ""]))
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", Note)
+            simulate(load("trial", given))
+        said = [
+            str(one.message) for one in told if "no velocity of the surface" in str(one.message)
+        ]
+        assert len(said) == (row == 60), said
+    assert "own.csv: no velocity of the surface from 0.059 to 0.061 s; a straight line" in said[0]
 
 
 def test_trial_needs_a_file() -> None:

@@ -5,13 +5,14 @@ between the knots and its own events (:mod:`cosim.mechanics.part`): there is no 
 """
 
 import math
+import warnings
 from pathlib import Path
 
 import numpy as np
 
 from cosim.arrays import Array
 from cosim.coupling.loop.agenda import exposures, grid
-from cosim.errors import BadInput, plain
+from cosim.errors import BadInput, Note, plain
 from cosim.files.cells import read_timetable
 from cosim.mechanics import part
 from cosim.mechanics.surface import Surface
@@ -19,6 +20,9 @@ from cosim.scene import Scene
 from cosim.simulation.rungs.rung import Motion, average_slope
 
 NO_GRAVITY = 1e-9  # m/s²; the theory divides by it
+
+LONGEST_STEP = 1.7
+"""Of a tracked surface, in units of the usual one: what is longer lacks a frame."""
 
 
 def surface(scene: Scene) -> Surface:
@@ -89,6 +93,12 @@ def _trial(path: Path) -> tuple[Array, Array]:
     times, platform = read_platform(path)
     known = np.isfinite(platform.v)
     times, velocities = times[known], platform.v[known]
+    steps = np.diff(times)
+    longest = int(steps.argmax())
+    if steps[longest] > LONGEST_STEP * np.median(steps):
+        first, last = times[[longest, longest + 1]]
+        told = f"{plain(str(path))}: no velocity of the surface from {first:.6g} to {last:.6g} s"
+        warnings.warn(f"{told}; a straight line is taken there.", Note, stacklevel=2)
     return times - times[0], velocities
 
 
