@@ -163,7 +163,9 @@ def _steady(trial: Measured) -> bool:
 def _asked(space: Space, trials: Sequence[Measured], effort: object) -> list[Any]:
     """All that decides what a stage finds, beside the seed and the programs."""
     entries = [repr(entry) for entry in (*space.entries.values(), *space.trial.values())]
-    signals = [[one.label, *(crc32(x.tobytes()) for x in one.target.signals.values())] for one in trials]
+    signals = [
+        [one.label, *(crc32(x.tobytes()) for x in one.target.signals.values())] for one in trials
+    ]
     return [entries, space.laws, space.measured, signals, repr((effort, WEIGHTS))]
 
 
