@@ -214,11 +214,11 @@ class Engine(Shared.NgSpiceShared):
             names = [_ffi.string(data.vecs[i].vecname).decode() for i in range(data.veccount)]
             self.sent = tuple(name.lower() for name in names)
             if self._leader is not None:
-                for name in self._save:
-                    if sent(name.lower()).lower() not in self.sent:
+                wanted = [sent(name.lower()).lower() for name in self._save]
+                for name, vector in zip(self._save, wanted, strict=True):
+                    if vector not in self.sent:
                         raise ValueError(plain(name))
-                wanted = [*(sent(name.lower()).lower() for name in self._save), "time"]
-                self._leader.places[:] = [self.sent.index(name) for name in wanted]
+                self._leader.places[:] = [self.sent.index(name) for name in (*wanted, "time")]
         except ValueError as error:
             self.fail(SimulationFailed(f"The netlist has no such vector: {error}."))
         return 0

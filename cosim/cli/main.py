@@ -11,7 +11,6 @@ import re
 import sys
 import time
 import warnings
-from difflib import get_close_matches
 from io import TextIOWrapper
 from typing import Any, NoReturn
 
@@ -46,6 +45,9 @@ class _Parser(argparse.ArgumentParser):
         """As it is, but what is not known is told by the command that does not know it."""
         found, others = super().parse_known_args(args, namespace)
         if others:
+            # All options begin alike, so these must be nearer than names for a suggestion are.
+            from difflib import get_close_matches
+
             near = get_close_matches(others[0], self._option_string_actions, 1, 0.8)
             hint = f"; did you mean {near[0]}?" if near else ""
             self.error(f"unrecognized arguments: {' '.join(others)}{hint}")

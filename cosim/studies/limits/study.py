@@ -89,13 +89,11 @@ def steps(efforts: Efforts, changes: Sequence[Change], rigs: int) -> int:
     """How many steps :func:`study` tells."""
     some = sum(change.searched for change in changes)
     repeated = sum(change.name in REPEATED for change in changes)
-    again = bool(efforts.again)
-    return sum(
-        many * (len(cost) * some + 1) + repeats * (len(cost) * repeated + 1)
-        for many, repeats, cost in (
-            (1, efforts.again, efforts.own), (rigs, rigs * again, efforts.others)
-        )
-    )  # fmt: skip
+
+    def of(cost: tuple[Effort, ...], again: int) -> int:
+        return len(cost) * some + 1 + again * (len(cost) * repeated + 1)
+
+    return of(efforts.own, efforts.again) + rigs * of(efforts.others, min(1, efforts.again))
 
 
 def study(
@@ -161,8 +159,8 @@ class _Work:
         itself, then with the best of all others, so that what helps one is tried on all, and a
         limit that is eased never lowers what is found."""
         found = self._candidates(changes, efforts[0], [*seed, 0], known)
+        words = ", with what helps others"
         for turn, effort in enumerate(efforts[1:], 1):
-            words = ", with what helps others"
             found = self._candidates(changes, effort, [*seed, turn], found, found, words)
         return found
 
