@@ -14,6 +14,7 @@ from cosim.circuit.heat import COPPER, DRIVE_RANGE_HEAT
 from cosim.errors import BadInput, plain
 from cosim.live import rigs
 from cosim.scene import load, to_link
+from cosim.scene.tables import FRAME_RATE
 from cosim.trials.recording import GAP, read_recording
 
 _WEB = Path(__file__).with_name("web")
@@ -43,7 +44,10 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
         found = found.model_copy(update={"circuit": simple})
     if not rigs.fits(found):
         known = ", ".join(rigs.scenes())
-        raise BadInput(f"scene {found.name}: the page runs {known}, and such as these.")
+        raise BadInput(
+            f"scene {found.name}: the page runs {known}, and such as these: a free ram, its drive from "
+            "time 0 on, and no [[port]], own file, DAC steps, PWM ripple or drive.phase_deg."
+        )
     link, known = to_link(found), rigs.turned()
     for key in (pair.partition("=")[0] for pair in link.split("&")[1:]):
         if key not in known and not key.startswith(("run.", "coupling.")):
@@ -58,7 +62,7 @@ def html(link: str, models: Iterable[str] = (), record: Path | None = None) -> s
     machine, can be laid over its curves. Raises BadInput.
     """
     known = rigs.data() | {"start": link, "models": [*models]}
-    known |= {"heat": DRIVE_RANGE_HEAT, "copper": COPPER}
+    known |= {"heat": DRIVE_RANGE_HEAT, "copper": COPPER, "frame_rate": FRAME_RATE}
     known["record"] = None if record is None else _record(record)
     binary = base64.b64encode((_WEB / "machine.wasm").read_bytes()).decode()
     given = {"DATA": known, "BINARY": binary, "CORE": script(_CORE)}
@@ -111,7 +115,8 @@ def _record(path: Path) -> dict[str, Any]:
 
 def answer(link: str, circuit: dict[str, str]) -> dict[str, Any]:
     """What ngspice has for a link of the page: mean velocity (m/s) of a second, and the waveforms
-    of its last 0.3 s or two periods. Raises CosimError."""
+    of its last 0.3 s or two periods, from ``begin`` on, s after the drive's phase was 0. Raises
+    CosimError."""
     import cosim
 
     scene = load(link, circuit)
@@ -125,7 +130,7 @@ def answer(link: str, circuit: dict[str, str]) -> dict[str, Any]:
     return {
         "v_average": result.summary["v_average"],
         "frequency": frequency,
-        "begin": float(rows.time[0]),
+        "begin": float(rows.time[0]) - scene.drive.start_time + scene.drive.start_phase / frequency,
         "step": times["run.output_step"],
         "waveforms": {str(name): rows[name].values.tolist() for name in rows.data_vars},
     }

@@ -103,8 +103,10 @@ def test_server_answers_its_own_page_alone(server: Server) -> None:
     assert asked("/run/full", Origin=server.address) == 400
 
 
-def test_comparison_with_ngspice(tab: Any, server: Server) -> None:
-    tab.goto(f"{server.address}/#scene=paper-limited&drive.amplitude=6")
+@pytest.mark.parametrize("phase", [0.0, 0.25])
+def test_comparison_with_ngspice(tab: Any, server: Server, phase: float) -> None:
+    setting = f"scene=paper-limited&drive.amplitude=6&drive.start_phase={phase}"
+    tab.goto(f"{server.address}/#{setting}")
     tab.wait_for_function(RUNS)
     tab.click("#compare")
     tab.wait_for_function("() => state.others.length", timeout=120_000)
@@ -113,6 +115,12 @@ def test_comparison_with_ngspice(tab: Any, server: Server) -> None:
     )
     assert there == pytest.approx(here, abs=0.3)
     assert "difference" in tab.inner_text("#compared") and not tab.faults
+    off, size = tab.evaluate("() => state.others[0].off('coil_current', history_)")
+    assert off < 0.02 * size, "laid over at another phase"
+    camera = tab.inner_text("#told-peak span").replace("−", "-").split()
+    told = cosim.run(f"#{setting}").summary
+    expected = [told["a_camera_min"], told["a_camera_max"]]
+    assert [float(camera[0]), float(camera[2])] == pytest.approx(expected, abs=2.0)
     assert {url.partition("#")[0] for url in tab.asked if url.startswith("http")} == {
         f"{server.address}/",
         f"{server.address}/run/amplifier",

@@ -106,11 +106,12 @@ const PANELS = [
   { name: "current, A", unit: "A", lines: [["coil", "coil_current", "a", 1]], least: 0.1 },
   { name: "heights, mm", unit: "mm", lines: [["surface", "z_surface", "a", 1e3], ["ram", "z_ram", "d", 1e3], ["part", "z_part", "b", 1e3]], least: 0.2 },
   { name: "velocities, mm/s", unit: "mm/s", lines: [["surface", "v_surface", "a", 1e3], ["ram", "v_ram", "d", 1e3], ["part", "v_part", "b", 1e3]], least: 20 },
-  { name: "acceleration, m/s²", unit: "m/s²", lines: [["instant", "a_surface", "d", 1], ["mean of 4 ms", "mean", "a", 1]], least: 20, bend: 40 },
+  { name: "acceleration, m/s²", unit: "m/s²", lines: [["instant", "a_surface", "d", 1], ["camera", "camera", "a", 1]], least: 20, bend: 40 },
 ];
-const SLIPS = { up: ["slips going up", "c", [5, 2]], down: ["slips going down", "b", [2, 3]] };
-const HALF = Math.round(0.002 * RATE); // rows of half of the 4 ms that a camera's reading spans
-const V_SURFACE = COLUMNS.indexOf("v_surface");
+const SLIPS = { up: ["slips going up", "c"], down: ["slips going down", "b"] };
+const FRAME = RATE / DATA.frame_rate; // rows
+const CAMERA = [2, -1, -2, -1, 2]; // times heights frame by frame over 7 frames squared, as cosim/trials/camera.py
+const Z_SURFACE = COLUMNS.indexOf("z_surface");
 
 class Curves {
   constructor(place, tell) {
@@ -146,9 +147,9 @@ class Curves {
 
   value(name, factor) {
     const { history } = this.window;
-    if (name === "mean") {
-      return (row) => (row - HALF < history.first || row + HALF > history.last ? NaN
-        : (history.value(row + HALF, V_SURFACE) - history.value(row - HALF, V_SURFACE)) / (2 * HALF) * RATE);
+    if (name === "camera") {
+      return (row) => (row - 2 * FRAME < history.first || row + 2 * FRAME > history.last ? NaN
+        : CAMERA.reduce((all, times, k) => all + times * history.value(row + (k - 2) * FRAME, Z_SURFACE), 0) / 7 * DATA.frame_rate ** 2);
     }
     const column = COLUMNS.indexOf(name), surface = COLUMNS.indexOf("z_surface");
     // The part travels: its way since the window's begin is drawn, from where the surface is.
@@ -183,7 +184,7 @@ class Curves {
     const legend = [...lines.map(([words, , of]) => [words, of]), ...(panel.bend ? Object.values(SLIPS) : [])];
     plot.begin([0, 1], [least, most], { legend, bend: panel.bend, upright });
     for (let n = 1; n < periods; n++) plot.line([[n / periods, least], [n / periods, most]], "steel", { width: 1 });
-    if (panel.bend) for (const [way, [, of, dash]] of Object.entries(SLIPS)) for (const end of budget[way]) plot.line([[0, end], [1, end]], of, { dash, width: 1 });
+    if (panel.bend) for (const [way, [, of]] of Object.entries(SLIPS)) for (const end of budget[way]) plot.line([[0, end], [1, end]], of, { dash: [9, 3, 2, 3], width: 1 });
     const now = this.share(history.last), gap = slow ? now * columns : -1;
     shapes.forEach((shape, n) => plot.envelope(shape, lines[n][2], { near: 3 + columns / Math.max(1, span) * 2, gap }));
     for (const { points, of, dash } of laid) plot.line(points, of, { dash });
@@ -204,7 +205,7 @@ class Curves {
     const words = [`B−A ${(time * 1e3).toFixed(2)} ms (${time ? (1 / Math.abs(time)).toFixed(1) : "∞"} Hz)`];
     if (a !== null && b !== null) {
       for (const panel of this.panels) for (const [label, name, , factor] of panel.lines) {
-        if (name === "mean") continue;
+        if (name === "camera") continue;
         const value = this.value(name, factor), digits = panel.unit === "mm" || panel.unit === "A" ? 3 : 1;
         const what = panel.lines.length > 1 || panel.unit.length < 3 ? `${label} ` : "";
         words.push(`${what}${value(a).toFixed(digits)} → ${value(b).toFixed(digits)} ${panel.unit}`);

@@ -72,7 +72,7 @@ function take(setting, again) {
   const was = setupOf(state.values, before.scene);
   Object.assign(state, { setting, values });
   state.others = state.others.filter((other) => other === record);
-  $("compared").textContent = "";
+  $("compared").textContent = state.others.length ? `${record.name} (dotted)` : "";
   fault("");
   const same = (name) => JSON.stringify(was[name]) === JSON.stringify(setup[name]);
   if (again || !same("reals") || !same("integers")) begin(false);
@@ -176,8 +176,8 @@ function tellAll() {
       : `in the long run some ${rise.toFixed(0)} K warmer`);
     $("told-heat").style.color = found.heat > DATA.heat ? "var(--warn)" : "";
   } else for (const id of ["v", "stick", "hits", "heat"]) tell(id, "…", "from whole periods");
-  const mean = curves.value("mean", 1), reached = new Envelope(1);
-  for (let row = Math.max(history_.first, history_.last - RATE, history_.turned + 1); row <= history_.last; row += 8) reached.put(0, mean(row));
+  const camera = curves.value("camera", 1), reached = new Envelope(1);
+  for (let row = Math.max(history_.first, history_.last - RATE, history_.turned + 1); row <= history_.last; row += 8) reached.put(0, camera(row));
   const [[least], [most]] = [reached.low, reached.high];
   tell("slip", `${signed(budget.up[0], 0)} / ${signed(budget.down[0], 0)} m/s²`, `going up / down; where the surface rises ${signed(budget.up[1], 0)} / ${signed(budget.down[1], 0)}`);
   const ways = Object.keys(budget).filter((way) => least < budget[way][0] || most > budget[way][1]).join(" or ");
@@ -187,12 +187,12 @@ function tellAll() {
 // --- laid over: a run of the server, a trial's record --------------------------------------------------
 const NAMED = { coil_current: "current" }, DASHED = [5, 4], DOTTED = [2, 3];
 const record = DATA.record && new Overlay({ ...DATA.record, begin: 0 }, DOTTED,
-  { ...NAMED, mean: "a_surface", a_surface: "" });
+  { ...NAMED, camera: "a_surface", a_surface: "" });
 
 /* How far the page's newest period is from what is laid over it, in words. */
 function apart(name, other, theirs) {
   const own = state.found, there = 1e3 * theirs, here = own ? 1e3 * own.velocity : NaN, words = [];
-  if (theirs !== null) words.push(`${signed(there, 2)} mm/s, here ${signed(here, 2)}, difference ${signed(here - there, 2)}`);
+  if (theirs !== null) words.push(`${signed(there, 2)} mm/s, here ${signed(here, 2)}, difference ${signed(here - there, 3)}`);
   for (const [which, factor, digits, unit] of [["coil_current", 1, 3, "A"], ["v_surface", 1e3, 1, "mm/s"]]) {
     const off = other.off(which, history_)?.map((v) => (factor * v).toFixed(digits));
     if (off) words.push(`${which === "coil_current" ? "current" : "surface"} off by ${off[0]} of ${off[1]} ${unit} rms`);
