@@ -38,6 +38,10 @@ def straights(
         begin = edges[-1]
         stop = min(duration, *(piece.until for piece in pieces))
         if pieces[0].kind == SINE:
+            if rows:  # what stood before the sine begins
+                start, end = np.array(rows).swapaxes(0, 1)
+                yield np.array(edges), start, end
+                rows = []
             times = _times(chords * pieces[0].rate, begin, stop)
             values = np.stack([_on_straights(piece, times, chords) for piece in pieces], axis=1)
             yield times, values[:-1], values[1:]

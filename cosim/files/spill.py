@@ -6,10 +6,11 @@ The file has no name, so it vanishes however the process ends.
 import mmap
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+from stat import S_ISREG
 from typing import IO
 from weakref import ref
 
@@ -48,24 +49,32 @@ def place() -> Path | None:
 
 
 class Packed:
-    """Columns of equal length, on their way to another process in a file of the system's folder of
-    temporary ones: what arrives there is the columns, mapped, and the file is gone. Raises BadInput
-    where the disk is full."""
+    """Columns of equal length, on their way to another process in a file of this one's working
+    folder. Raises BadInput where the disk is full."""
 
     def __init__(self, columns: Mapping[str, Array]) -> None:
-        self._names, self._rows = tuple(columns), len(next(iter(columns.values())))
-        handle, self._path = tempfile.mkstemp()
+        rows = len(next(iter(columns.values())))
+        handle, path = tempfile.mkstemp(dir=os.getcwd())
+        self.told = os.path.basename(path), tuple(columns), rows
+        """What :func:`unpacked` is to be given."""
         with open(handle, "wb", buffering=0) as file:
             for values in columns.values():
-                for part in blocks(self._rows):
+                for part in blocks(rows):
                     _write(file, values[part])
 
-    def __reduce__(self) -> tuple[Callable[..., dict[str, Array]], tuple[object, ...]]:
-        return _unpacked, (self._path, self._names, self._rows)
 
-
-def _unpacked(path: str, names: tuple[str, ...], rows: int) -> dict[str, Array]:
-    with open(path, "r+b") as file:
+def unpacked(folder: str, name: str, names: Sequence[str], rows: int) -> dict[str, Array]:
+    """The columns of these ``names`` that lie in a file of ``folder``, mapped; the file is gone.
+    Who tells of it may be a stranger's code: raises ValueError, TypeError and OSError where
+    anything else stands there than that."""
+    if os.path.basename(name) != name or not all(isinstance(each, str) for each in names):
+        raise ValueError(name)
+    path = os.path.join(folder, name)
+    alone = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    with open(path, "r+b", opener=lambda at, flags: os.open(at, flags | alone)) as file:
+        about = os.fstat(file.fileno())
+        if not S_ISREG(about.st_mode) or about.st_size != 8 * len(names) * rows:
+            raise ValueError(path)
         mapped = mmap.mmap(file.fileno(), 0)
     os.unlink(path)
     _mapped[id(mapped)] = ref(mapped)

@@ -37,7 +37,7 @@ def one_run(scene: Scene, progress: Progress, fmi_version: int = 3, alone: bool 
             f"{str(lost).rstrip('.')}; of its FMUs ({names}) one may be why."
         ) from None
     progress(scene.run.duration)
-    return Result(*ran)
+    return Result(scene, *ran)
 
 
 @contextmanager
@@ -57,8 +57,13 @@ def bounds(scene: Scene) -> Bounds:
     files = scene.files
     netlist = files.pop("netlist", None)
     circuit = named(Path(netlist)) if netlist else [circuits()]
-    reads = *map(str, circuit), *files.values()
+    reads = *map(str, circuit), *filter(_is_meant, files.values())
     return Bounds(reads, place(), ngspice_library(), (_load, None))
+
+
+def _is_meant(path: str) -> bool:
+    """A file, or the folder of an FMU: what lies below another is nobody's business."""
+    return Path(path).is_file() or Path(path, "modelDescription.xml").is_file()
 
 
 def _load(_: None) -> None:
@@ -72,8 +77,8 @@ def _load(_: None) -> None:
 
 def _worked(
     given: tuple[Scene, int, bool], progress: Progress
-) -> tuple[Scene, Packed | dict[str, Array], dict[str, Any], Mapping[str, str]]:
-    """A run in a worker."""
+) -> tuple[Packed | dict[str, Array], dict[str, Any], Mapping[str, str]]:
+    """A run in a worker: waveforms, summary, units."""
     from cosim.simulation.here import simulate_here
 
     scene, fmi_version, alone = given
@@ -84,4 +89,4 @@ def _worked(
             "checks stands between the netlist, or an FMU's code, and your files."
         )
     columns = {} if alone else Packed(result.columns)
-    return result.scene, columns, result.summary, result.units
+    return columns, result.summary, dict(result.units)

@@ -32,19 +32,23 @@ _SITES = ("site-packages", "dist-packages")
 _DENIED = {
     "x86_64": (0xC000003E, """
         41 42 43 49 50 53 288  57 58 59 322  62 129 200 297 424  101 310 311
-        90 91 92 93 94 260 268 452 132 235 261 280 188 189 190 197 198 199
-        155 161 163 164 165 166 167 169 170 172 173 175 179 227 246 248 249 250 272 298 304 308 313
-        321 323 425""", 56, 234),
+        141 142 144 251 314  29 30 31 64 65 66 68 69 70 71 220 240 241 242 243 244 245
+        253 254 255 294  76 90 91 92 93 94 260 268 452 132 235 261 280 188 189 190 197 198 199
+        153 155 159 161 163 164 165 166 167 168 169 170 171 172 173 175 176 179 227 246 248 249 250
+        272 298 304 305 308 313 320 321 323 425""", 56, (234, 302, 203)),
     "aarch64": (0xC00000B7, """
         198 199 200 201 202 203 242  221 281  129 130 138 240 424  117 270 271
-        52 53 54 55 452 88 5 6 7 14 15 16
-        39 40 41 51 60 89 97 104 105 112 142 161 170 217 218 219 224 241 265 268 273 280 282 425""",
-        220, 131),
+        140 118 119 30 274  194 195 196 190 191 192 193 186 187 188 189 180 181 182 183 184 185
+        26 27 28  45 52 53 54 55 452 88 5 6 7 14 15 16
+        39 40 41 51 58 60 89 97 104 105 106 112 142 161 162 170 171 217 218 219 224 225 241 265 266
+        268 273 280 282 294 425""", 220, (131, 261, 122)),
 }  # fmt: skip
 """By machine: its name in seccomp_data; the calls that fail (sockets; new programs; signals to
-others; others' memory; owners, modes, times and attributes of files; what only root can do, and
-io_uring, which would pass the filter by); clone, which may make threads only; tgkill, which may
-reach this process only."""
+others; others' memory; others' priorities; memory, semaphores and messages that processes share;
+watching files; truncating files, which Landlock forbids from version 3 on, and their owners, modes,
+times and attributes; what only root can do, and io_uring, which would pass the filter by); clone,
+which may make threads only; tgkill, which may reach this process only, and prlimit and
+sched_setaffinity, which may name none but the caller."""
 _CLONE3, _CLONE_THREAD = 435, 0x10000
 _DENY, _UNKNOWN, _ALLOW, _KILL = 0x50001, 0x50026, 0x7FFF0000, 0x80000000
 
@@ -123,7 +127,7 @@ def _filter(system: ctypes.CDLL) -> bool:
     machine = platform.machine()
     if machine not in _DENIED or sys.maxsize < 1 << 32:
         return False
-    name, denied, clone, tgkill = _DENIED[machine]
+    name, denied, clone, (tgkill, *own) = _DENIED[machine]
     load, equal, above, has, end = 0x20, 0x15, 0x35, 0x45, 0x06
 
     def only(call: int, test: int, value: int) -> list[tuple[int, int, int, int]]:
@@ -139,6 +143,8 @@ def _filter(system: ctypes.CDLL) -> bool:
         program += [(equal, 0, 1, call), (end, 0, 0, _DENY)]
     program += [(equal, 0, 1, _CLONE3), (end, 0, 0, _UNKNOWN)]  # then clone is tried
     program += only(clone, has, _CLONE_THREAD) + only(tgkill, equal, os.getpid())
+    for call in own:
+        program += only(call, equal, 0)
     program += [(end, 0, 0, _ALLOW)]
     code = b"".join(struct.pack("=HBBI", *step) for step in program)
     kept = ctypes.create_string_buffer(code, len(code))

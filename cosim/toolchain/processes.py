@@ -8,9 +8,13 @@ knows its function by its module, and work without progress ends it. No wall clo
 machine that slept, or a process that was stopped, has lost nothing.
 
 A process has a folder of its own to work in, and of the environment only what its libraries need;
-:class:`Bounds` close a fence around it. Those that are bounded alike are kept for further calls.
+:class:`Bounds` close a fence around it. Those that are bounded alike are kept for further calls. In
+such a process a stranger's code may run and speak for it: what it says is JSON, never a pickle,
+which could call anything here.
 """
 
+import builtins
+import json
 import os
 import signal
 import subprocess
@@ -31,6 +35,7 @@ from weakref import finalize, ref
 
 from cosim.errors import BadInput, SimulationFailed, plain
 from cosim.files.atomic import folder_of_ones_own
+from cosim.files.spill import Packed, unpacked
 from cosim.toolchain import fence
 from cosim.toolchain.interrupts import caught_signals
 
@@ -49,6 +54,12 @@ TRIES = 3
 
 CALLS = 250
 """After which a process is replaced: what ngspice leaks stays below some MB."""
+
+MOST_SAID = 64 << 20
+"""Bytes that a bounded process may say at once: summaries are small, waveforms are in a file."""
+
+_PACKED = "__columns__"
+"""The one key of what stands for columns."""
 
 _REPORT_EVERY = 0.1  # s of wall time
 _BEAT = 1.0  # s between two reports of the CPU time used
@@ -144,7 +155,7 @@ class Worker:
             if not self.pipe.poll(_REPORT_EVERY):
                 continue
             try:
-                kind, value = self.pipe.recv()
+                kind, value = self._heard()
             except OSError as error:
                 raise EOFError from error
             self.began = True
@@ -167,6 +178,21 @@ class Worker:
             f"{f'{PATIENCE:g} s of CPU time' if hangs else f'{STALLED:g} s'}. A netlist without a "
             "solution can do this to ngspice."
         )
+
+    def _heard(self) -> tuple[str, Any]:
+        """What the process says: a kind, and what belongs to it. Raises EOFError, OSError."""
+        if self.kind[1] is None:
+            return self.pipe.recv()
+        try:
+            kind, value = json.loads(self.pipe.recv_bytes(MOST_SAID), object_hook=self._columns)
+            if kind in ("progress", "spent"):
+                return kind, float(value)
+            return kind, _error(*value) if kind == "failure" else _printable(value)
+        except (ValueError, TypeError, RecursionError) as error:
+            raise EOFError from error
+
+    def _columns(self, found: dict[str, Any]) -> Any:
+        return unpacked(self.folder, *found[_PACKED]) if set(found) == {_PACKED} else found
 
     def _rest(self) -> None:
         self.reached = 0.0
@@ -248,6 +274,27 @@ def in_a_worker() -> bool:
     return getattr(_here, "ours", False)
 
 
+def _error(name: str, text: str) -> Exception:
+    """An error of a bounded process: one of ours or of Python's, by its name."""
+    known = vars(builtins) | {one.__name__: one for one in (BadInput, SimulationFailed)}
+    kind: Any = known.get(name)
+    with suppress(TypeError):  # one that takes more than a text
+        if issubclass(kind, Exception):
+            return kind(_printable(text))
+    return RuntimeError(_printable(f"{name}: {text}"))
+
+
+def _printable(value: Any) -> Any:
+    """The same without what a terminal would obey."""
+    if isinstance(value, str):
+        return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in value)
+    if isinstance(value, list):
+        return [_printable(each) for each in value]
+    if isinstance(value, dict):
+        return {name: _printable(each) for name, each in value.items()}
+    return value
+
+
 def isolated(
     function: Callable[[Any, Progress], Any],
     argument: Any,
@@ -255,7 +302,8 @@ def isolated(
     bounds: Bounds | None = None,
 ) -> Any:
     """What ``function(argument, progress)`` gives, from another process: a fresh one, or, with
-    ``bounds``, one that is kept; no more than there are processors at once.
+    ``bounds``, one that is kept, and then what JSON can hold, and :class:`Packed` columns; no more
+    than there are processors at once.
 
     Any thread may call it. Raises what the function raises, or SimulationFailed where the process
     hangs or dies.
@@ -352,7 +400,8 @@ _SAID = "said"
 def _start(pipe: Connection, folder: str, lock: int, library: str) -> "subprocess.Popen[Any]":
     """A process that serves the other end of ``pipe``, and whose input ends with this process."""
     handle = pipe.fileno()
-    options: dict[str, Any] = {"pass_fds": (handle, lock)}
+    # In the session of a terminal it could type into the shell there.
+    options: dict[str, Any] = {"pass_fds": (handle, lock), "start_new_session": True}
     if sys.platform == "win32":
         os.set_handle_inheritable(handle, True)
         about = subprocess.STARTUPINFO(lpAttributeList={"handle_list": [handle]})
@@ -363,7 +412,13 @@ def _start(pipe: Connection, folder: str, lock: int, library: str) -> "subproces
     command = [sys.executable, "-P", "-c", _PROGRAM, type(pipe).__name__, str(handle)]
     with open(os.path.join(folder, _SAID), "wb") as said:
         return subprocess.Popen(
-            command, stdin=subprocess.PIPE, stderr=said, cwd=folder, env=kept, **options
+            command,
+            stdin=subprocess.PIPE,
+            stdout=said,
+            stderr=said,
+            cwd=folder,
+            env=kept,
+            **options,
         )
 
 
@@ -380,7 +435,7 @@ def serve(pipe: Connection) -> None:
         except Exception as failure:
             unfit = failure
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    reports = _Reports(pipe)
+    reports = _Reports(pipe, bounds is not None)
     while True:
         try:
             argument = pipe.recv()
@@ -394,7 +449,8 @@ def serve(pipe: Connection) -> None:
             with in_place():
                 answer = ("result", function(argument, reports.progress))
         except Exception as failure:
-            answer = ("failure", failure)
+            told = (type(failure).__name__, str(failure))
+            answer = ("failure", failure if bounds is None else told)
         reports.at_work.clear()
         if _retires:
             reports.send("retires", None)
@@ -413,8 +469,8 @@ def retire() -> None:
 class _Reports:
     """Tells the parent of progress, and of the CPU time that was used without any."""
 
-    def __init__(self, pipe: Connection) -> None:
-        self._pipe = pipe
+    def __init__(self, pipe: Connection, plain: bool) -> None:
+        self._pipe, self._plain = pipe, plain
         self._alone = threading.Lock()
         self._told = time.monotonic()
         self._steps = 0
@@ -422,8 +478,12 @@ class _Reports:
         threading.Thread(target=self._beat, daemon=True).start()
 
     def send(self, kind: str, value: Any) -> None:
+        said = json.dumps((kind, value), default=_packed).encode() if self._plain else None
         with self._alone:
-            self._pipe.send((kind, value))
+            if said is None:
+                self._pipe.send((kind, value))
+            else:
+                self._pipe.send_bytes(said)
 
     def progress(self, reached: float) -> None:
         self._steps += 1
@@ -445,6 +505,12 @@ class _Reports:
                         steps, spent = self._steps, 0.0
                     elif self.at_work.is_set():
                         self.send("spent", spent)
+
+
+def _packed(value: Any) -> dict[str, Any]:
+    if isinstance(value, Packed):
+        return {_PACKED: value.told}
+    raise TypeError(f"a bounded process cannot give a {type(value).__name__}")
 
 
 def _end_with_parent() -> None:

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+import cosim
 from cosim.drive.command import (
     Command,
     Constant,
@@ -653,3 +654,13 @@ def test_a_drive_that_is_switched_on(start: float, phase: float, t: float) -> No
     if abs(cycles - round(cycles)) > 1e-9:
         assert drive.next_jump(t) == pytest.approx(following, abs=1e-12)
     assert v_dac(drive, t) == pytest.approx(drive.v_offset - drive.value(t) / GAIN, abs=1e-9)
+
+
+@pytest.mark.parametrize("model", ["ideal", "limited"])
+def test_a_sine_that_starts_late_is_zero_before(model: str) -> None:
+    """Nothing drives the coil before, and at rest the mechanics do not either."""
+    late = {"drive.waveform": "sine", "drive.start_time": 0.05, "circuit.model": model}
+    rows = cosim.run("reference", late | {"run.duration": 0.15, "run.settle": 0.05}).waveforms
+    before = rows.sel(time=slice(0.0, 0.0499))
+    assert abs(before.command).max() == abs(before.current).max() == 0.0
+    assert abs(rows.current).max() > 0.1

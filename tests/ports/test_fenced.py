@@ -24,28 +24,58 @@ ACTS = r"""
 #include <sys/socket.h>
 #include <unistd.h>
 
+static int worked;
+
+static void has_worked(const char *what)
+{
+    fprintf(stderr, "WORKED: %s\n", what);
+    worked = 1;
+}
+
 /* Runs as the library is loaded, before anybody asks the FMU for anything. What has worked is a
-   line on stderr, which is inherited; a program or a child of it would leave a file, too. */
+   line on stderr, and the end of the process. */
 __attribute__((constructor)) static void act(void)
 {
     const char *user = "@FOLDER@";
     char name[4096];
     snprintf(name, sizeof name, "%s/left-behind", user);
     if (open(name, O_CREAT | O_WRONLY, 0644) >= 0)
-        fputs("WORKED: write\n", stderr);
+        has_worked("write");
     snprintf(name, sizeof name, "%s/secret", user);
     if (open(name, O_RDONLY) >= 0)
-        fputs("WORKED: read\n", stderr);
+        has_worked("read");
     if (unlink(name) == 0)
-        fputs("WORKED: remove\n", stderr);
+        has_worked("remove");
     snprintf(name, sizeof name, "touch %s/left-behind", user);
     if (system(name) == 0)
-        fputs("WORKED: program\n", stderr);
+        has_worked("program");
     if (socket(AF_INET, SOCK_STREAM, 0) >= 0)
-        fputs("WORKED: socket\n", stderr);
+        has_worked("socket");
+    if (worked)
+        abort();
 }
 """
 
+
+SPEAKS = r"""
+#include <arpa/inet.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* Speaks in the place of its process to whoever listens. */
+__attribute__((constructor)) static void act(void)
+{
+    const char said[] = "@WORDS@";
+    unsigned length = htonl(sizeof said - 1);
+    struct stat about;
+    for (int handle = 3; handle < 256; handle++)
+        if (!fstat(handle, &about) && S_ISSOCK(about.st_mode)) {
+            write(handle, &length, sizeof length);
+            write(handle, said, sizeof said - 1);
+        }
+}
+"""
 
 CRASH = "#include <stdlib.h>\n__attribute__((constructor)) static void act(void) { abort(); }\n"
 
@@ -77,12 +107,9 @@ def evil(tmp_path: Path, user: Path) -> Path:
     return scene_with(folder, ACTS.replace("@FOLDER@", str(user)))
 
 
-def test_it_writes_reads_starts_and_connects_nothing(
-    evil: Path, user: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_it_writes_reads_starts_and_connects_nothing(evil: Path, user: Path) -> None:
     result = cosim.run(evil, {"run.duration": 1e-3})
     assert result.columns["rotor.omega"].size > 1  # it was loaded and has run
-    assert "WORKED" not in capfd.readouterr().err
     assert [path.name for path in user.iterdir()] == ["secret"]
     assert (user / "secret").read_text() == "mine"
 
@@ -97,6 +124,29 @@ def test_without_the_fence_the_same_acts_work(evil: Path, tmp_path: Path) -> Non
     assert sorted(said.split("WORKED: ")[1:]) == [
         *("program\n", "read\n", "remove\n", "socket\n", "write\n")
     ]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "cposix\\nsystem\\n(S'touch @FOLDER@/left-behind'\\ntR.",
+        '[\\"result\\",[{\\"__columns__\\":[\\"@FOLDER@/secret\\",[],0]},{},{}]]',
+        '[\\"result\\",[{\\"__columns__\\":[\\"..\\",[],0]},{},{}]]',
+        "[" * 5000,
+    ],
+    ids=["a pickle", "columns elsewhere", "a folder of columns", "depth"],
+)
+def test_what_it_says_in_place_of_its_process_does_nothing(
+    tmp_path: Path, user: Path, words: str
+) -> None:
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    said = words.replace("@FOLDER@", str(user))
+    scene = scene_with(folder, SPEAKS.replace("@WORDS@", said))
+    with pytest.raises(CosimError, match="process"):
+        cosim.run(scene, {"run.duration": 1e-3})
+    assert [path.name for path in user.iterdir()] == ["secret"]
+    assert (user / "secret").read_text() == "mine"
 
 
 def test_a_crash_while_it_is_loaded_is_told(tmp_path: Path) -> None:

@@ -154,7 +154,7 @@ def test_spoilt_library_is_left_behind(before: np.ndarray) -> None:
 
 def _spoil_or_run(spoil: int, progress: object) -> object:
     if not spoil:
-        return os.getpid(), good_run()
+        return os.getpid(), good_run().tolist()
     deck = "spoilt\nV1 a 0 1\nR1 a 0 {nothing}\n.tran 1u 1m\n.end"
     lead.engine().transient(deck, ("v(a)",), _Nobody())
     assert ngspice.Engine.poisoned

@@ -46,7 +46,7 @@ _NONE = Effort(0, 0, 0)
 """What is found late is tried on all others, no more."""
 FULL = Efforts(
     own=(Effort(512, 300, 120), Effort(0, 100, 80), _NONE),
-    others=(Effort(512, 80, 0), Effort(0, 40, 60), _NONE),
+    others=(Effort(512, 80, 0), Effort(0, 40, 120), Effort(0, 0, 80)),
     again=3,
 )
 _FEW = Effort(32, 20, 10)

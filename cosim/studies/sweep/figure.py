@@ -226,7 +226,8 @@ def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
 
 def _over_key(axis: Axes, data: xr.Dataset, name: str) -> None:
     """Name the key below the axis, and mark the points that failed there."""
-    failed = data[name].values[data[FAILURE].values != ""]
+    every, failure = xr.broadcast(data[name], data[FAILURE])
+    failed = every.values[failure.values != ""]
     if failed.size:
         bottom = np.full(failed.size, 0.02)
         axis.plot(failed, bottom, transform=axis.get_xaxis_transform(), **FAILED)
