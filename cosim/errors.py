@@ -33,8 +33,12 @@ class SimulationFailed(CosimError):
     exit_code = 3
 
 
+def printable(text: str) -> str:
+    """A text, of any number of lines, without what a terminal would obey."""
+    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)
+
+
 def plain(text: str, limit: int = 200) -> str:
     """A name or path as a sentence holds it: on one line, printable, not too long."""
-    text = json.dumps(text, ensure_ascii=False)[1:-1]
-    text = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+    text = printable(json.dumps(text, ensure_ascii=False)[1:-1])
     return text if len(text) <= limit else text[:limit] + "…"

@@ -38,10 +38,6 @@ def straights(
         begin = edges[-1]
         stop = min(duration, *(piece.until for piece in pieces))
         if pieces[0].kind == SINE:
-            if rows:  # what stood before the sine begins
-                start, end = np.array(rows).swapaxes(0, 1)
-                yield np.array(edges), start, end
-                rows = []
             times = _times(chords * pieces[0].rate, begin, stop)
             values = np.stack([_on_straights(piece, times, chords) for piece in pieces], axis=1)
             yield times, values[:-1], values[1:]
@@ -53,7 +49,7 @@ def straights(
             piece if stop < piece.until else command.piece(stop)
             for piece, command in zip(pieces, commands, strict=True)
         ]
-        if len(rows) == _TOGETHER or (rows and stop >= duration):
+        if rows and (len(rows) == _TOGETHER or stop >= duration or pieces[0].kind == SINE):
             start, end = np.array(rows).swapaxes(0, 1)
             yield np.array(edges), start, end
             edges, rows = edges[-1:], []

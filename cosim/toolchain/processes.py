@@ -26,6 +26,7 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -33,7 +34,7 @@ from shutil import rmtree
 from typing import Any
 from weakref import finalize, ref
 
-from cosim.errors import BadInput, SimulationFailed, plain
+from cosim.errors import BadInput, SimulationFailed, plain, printable
 from cosim.files.atomic import folder_of_ones_own
 from cosim.files.spill import Packed, unpacked
 from cosim.toolchain import fence
@@ -188,7 +189,7 @@ class Worker:
             if kind in ("progress", "spent"):
                 return kind, float(value)
             return kind, _error(*value) if kind == "failure" else _printable(value)
-        except (ValueError, TypeError, RecursionError) as error:
+        except (ValueError, TypeError, OverflowError, RecursionError) as error:
             raise EOFError from error
 
     def _columns(self, found: dict[str, Any]) -> Any:
@@ -285,9 +286,9 @@ def _error(name: str, text: str) -> Exception:
 
 
 def _printable(value: Any) -> Any:
-    """The same without what a terminal would obey."""
+    """The same, all its texts printable."""
     if isinstance(value, str):
-        return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in value)
+        return printable(value)
     if isinstance(value, list):
         return [_printable(each) for each in value]
     if isinstance(value, dict):
@@ -435,7 +436,7 @@ def serve(pipe: Connection) -> None:
         except Exception as failure:
             unfit = failure
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    reports = _Reports(pipe, bounds is not None)
+    reports = _Reports(pipe.send if bounds is None else partial(_send_json, pipe))
     while True:
         try:
             argument = pipe.recv()
@@ -469,8 +470,8 @@ def retire() -> None:
 class _Reports:
     """Tells the parent of progress, and of the CPU time that was used without any."""
 
-    def __init__(self, pipe: Connection, plain: bool) -> None:
-        self._pipe, self._plain = pipe, plain
+    def __init__(self, tell: Callable[[tuple[str, Any]], None]) -> None:
+        self._tell = tell
         self._alone = threading.Lock()
         self._told = time.monotonic()
         self._steps = 0
@@ -478,12 +479,8 @@ class _Reports:
         threading.Thread(target=self._beat, daemon=True).start()
 
     def send(self, kind: str, value: Any) -> None:
-        said = json.dumps((kind, value), default=_packed).encode() if self._plain else None
         with self._alone:
-            if said is None:
-                self._pipe.send((kind, value))
-            else:
-                self._pipe.send_bytes(said)
+            self._tell((kind, value))
 
     def progress(self, reached: float) -> None:
         self._steps += 1
@@ -505,6 +502,10 @@ class _Reports:
                         steps, spent = self._steps, 0.0
                     elif self.at_work.is_set():
                         self.send("spent", spent)
+
+
+def _send_json(pipe: Connection, said: tuple[str, Any]) -> None:
+    pipe.send_bytes(json.dumps(said, default=_packed).encode())
 
 
 def _packed(value: Any) -> dict[str, Any]:

@@ -151,10 +151,10 @@ class Curves {
       return (row) => (row - 2 * FRAME < history.first || row + 2 * FRAME > history.last ? NaN
         : CAMERA.reduce((all, times, k) => all + times * history.value(row + (k - 2) * FRAME, Z_SURFACE), 0) / 7 * DATA.frame_rate ** 2);
     }
-    const column = COLUMNS.indexOf(name), surface = COLUMNS.indexOf("z_surface");
+    const column = COLUMNS.indexOf(name);
     // The part travels: its way since the window's begin is drawn, from where the surface is.
     const base = name === "z_part" ? this.base.z_part - this.base.z_surface : 0;
-    const on = name === "z_part" && this.onSurface ? (row) => history.value(row, surface) : () => 0;
+    const on = name === "z_part" && this.onSurface ? (row) => history.value(row, Z_SURFACE) : () => 0;
     return (row) => factor * (history.value(row, column) - base - on(row));
   }
 
