@@ -547,7 +547,7 @@ class Run(Table):
     solver: Literal["fmu", "fast"] = _choice(
         "fmu", "fmu: finds each event; fast: fixed steps, many scenes side by side, in sweeps"
     )
-    step: float = _number(4.4e-5, "s", 1e-7, 1e-3, "Step of the solver fast")
+    step: float = _number(4.3e-5, "s", 1e-7, 1e-3, "Step of the solver fast")
 
     @model_validator(mode="after")
     def _check(self) -> "Run":

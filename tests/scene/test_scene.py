@@ -113,7 +113,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "coupling": {"method": "step-locked", "macro_step": 1e-4, "order": 1, "tolerance": 1e-3},
     "run": {
         **{"duration": 2.0, "settle": 1.0, "output_step": 5e-5, "shutter": 0.0, "tolerance": 1e-2},
-        **{"average": "ends", "solver": "fmu", "step": 4.4e-5},
+        **{"average": "ends", "solver": "fmu", "step": 4.3e-5},
     },
 }
 

@@ -180,7 +180,7 @@ def test_what_tune_reports_is_the_fmu_s() -> None:
         ({"coil.b1": 3.0}, "coil.b1 = 3 must be 0"),
         ({"coil.eddy_inductance": 1e-3, "coil.eddy_resistance": 2.0}, "must be absent"),
         ({"mechanics.contact": "rigid"}, 'must be "compliant"'),
-        ({"drive.frequency": 3000.0}, "must be at most 2272.73 Hz with run.step = 4.4e-05 s"),
+        ({"drive.frequency": 3000.0}, "must be at most 2325.58 Hz with run.step = 4.3e-05 s"),
         ({"mechanics.initial_lift": 1e-5, "friction.mu_plate": 0.0}, "0 without friction.mu_plate"),
     ],
 )

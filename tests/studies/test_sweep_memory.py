@@ -17,7 +17,7 @@ pytestmark = pytest.mark.reliability
 @pytest.mark.parametrize("name", ["paper", "optimal"])  # in processes, in threads
 def test_parent_stays_flat(name: str, tmp_path: Path) -> None:
     scene = load(name, ["run.duration=0.002", "run.settle=0.001"])
-    design = grid({"friction.mu_s": [0.6 + 1e-5 * k for k in range(6000)]})
+    design = grid({"friction.mu_s": [0.7 + 1e-5 * k for k in range(6000)]})
     process = psutil.Process()
     sizes = []
     with Evaluator(scene, tmp_path / "store", workers=2) as bench:

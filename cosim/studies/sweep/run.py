@@ -118,7 +118,8 @@ def _sweep(
                 before.add(number)
         progress(len(before), numbers.failed, total)
         due = time.monotonic() + _REFRESH
-        points = ((n, design.point(n)) for n in range(total) if n not in before)
+        left = design.alike(n for n in range(total) if n not in before)
+        points = ((n, design.point(n)) for n in left)
         for done, (number, outcome) in enumerate(bench.run(points), len(before) + 1):
             numbers.add(number, outcome)
             progress(done, numbers.failed, total)
