@@ -325,7 +325,8 @@ def isolated(
             except EOFError:
                 how = worker.end(ENDING)
                 if worker.began or tried == TRIES - 1:
-                    what = f"died at t = {worker.reached:.6g} s" if worker.began else "cannot start"
+                    when = f"died after t = {worker.reached:g} s"
+                    what = when if worker.began else "cannot start"
                     words = f"The simulation's process {what} ({how})."
                     raise ProcessLost(words) from None
             finally:

@@ -116,4 +116,4 @@ def test_a_crash_is_exit_code_three(tmp_path: Path, capsys: pytest.CaptureFixtur
     given = ["--set", "fmu.rotor.crash_at=1e-3", "--set", "run.duration=2e-3"]
     assert main(["run", str(scene), *given, "--out", str(tmp_path / "out")]) == 3
     told = capsys.readouterr().err.strip()
-    assert told.count("\n") == 0 and "died at t = " in told
+    assert told.count("\n") == 0 and "died after t = " in told

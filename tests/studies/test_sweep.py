@@ -152,7 +152,7 @@ def test_worker_that_keeps_dying() -> None:
         for number, outcome in bench.run(points):
             outcomes[number] = outcome
     killer.join()
-    assert re.match(r"The simulation's process died at t = .* s \(SIGKILL\)", outcomes[0].failure)
+    assert re.match(r"The simulation's process died after t = \S+ s \(SIG", outcomes[0].failure)
     assert outcomes[0].machine
     for number, values in points[1:]:
         assert outcomes[number] == evaluate(scene, values, False)
