@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: BSD-2-Clause */
 /* Writes a model's modelDescription.xml. Whoever packs an FMU loads its library and calls this. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -73,11 +74,53 @@ static void variable(FILE *to, const Model *m, int k, int version, const int *de
     fputs(version == 2 ? "/></ScalarVariable>\n" : "/>\n", to);
 }
 
-/* What depends on inputs at once is not known of a model that has `outputs`, so nothing is said:
- * that it may depend on all. */
-static void structure(FILE *to, const Model *m, int version)
+/* Whether outputs answer at once as all inputs leave their start values, each by another step. */
+static char *answers(const Model *m, const char *resources)
 {
-    const char *depends = m->outputs ? "" : " dependencies=\"\"";
+    char *found = calloc((size_t)m->count + 1, 1);
+    if (!m->outputs || m->alone) /* which may start a whole simulator */
+        return found;
+    Run run = {.stop = INFINITY, .resources = resources, .state = calloc(1, m->state + 1)};
+    double *before = calloc((size_t)m->count + 1, sizeof *before);
+    run.v = calloc((size_t)m->count + 1, sizeof *run.v);
+    for (int k = 0; k < m->count; k++)
+        run.v[k + 1] = m->variables[k].start;
+    if (!m->start || m->start(&run)) {
+        for (int pass = 0; pass < 3; pass++) {
+            for (int k = 0; k < m->count; k++)
+                if (m->variables[k].kind == INPUT)
+                    run.v[k + 1] = m->variables[k].start + (1.0 + k / 7.0) * (pass % 2 ? 1 : -pass);
+            m->outputs(&run);
+            for (int k = 0; k < m->count; k++) {
+                if (pass && m->variables[k].kind == OUTPUT)
+                    found[k] |= memcmp(&before[k], &run.v[k + 1], sizeof *before) != 0;
+                before[k] = run.v[k + 1];
+            }
+        }
+    }
+    if (m->end)
+        m->end(&run);
+    free(run.v);
+    free(run.state);
+    free(before);
+    return found;
+}
+
+/* Outputs that have answered may depend on all inputs at once, and those of a model without `outputs`
+ * do on none. What is not known is not said: FMI takes it for all. */
+static void depends(FILE *to, const Model *m, int version, int answered)
+{
+    if (m->outputs && !answered)
+        return;
+    fputs(" dependencies=\"", to);
+    for (int k = 0, n = 0; k < m->count; k++)
+        if (answered && m->variables[k].kind == INPUT)
+            fprintf(to, "%s%d", n++ ? " " : "", k + (version == 2 ? 2 : 1));
+    putc('"', to);
+}
+
+static void structure(FILE *to, const Model *m, int version, const char *answered)
+{
     const char *const outer[] = {"    <Outputs>\n", "    </Outputs>\n    <InitialUnknowns>\n",
                                  "    </InitialUnknowns>\n"};
     for (int pass = 0; pass < 2; pass++) {
@@ -86,10 +129,13 @@ static void structure(FILE *to, const Model *m, int version)
             if (m->variables[k].kind != OUTPUT)
                 continue;
             if (version == 2)
-                fprintf(to, "      <Unknown index=\"%d\"%s/>\n", k + 2, pass ? "" : depends);
+                fprintf(to, "      <Unknown index=\"%d\"", k + 2);
             else
-                fprintf(to, "    <%s valueReference=\"%d\"%s/>\n", pass ? "InitialUnknown" : "Output",
-                        k + 1, pass ? "" : depends);
+                fprintf(to, "    <%s valueReference=\"%d\"", pass ? "InitialUnknown" : "Output",
+                        k + 1);
+            if (pass == 0)
+                depends(to, m, version, answered[k]);
+            fputs("/>\n", to);
         }
     }
     fputs(version == 2 ? outer[2] : "", to);
@@ -107,6 +153,7 @@ FMI2_Export int model_describe(int version, const char *resources, const char *p
     }
     if (!to)
         return 0;
+    char *answered = answers(m, resources);
     int *derivative_of = calloc((size_t)m->count, sizeof *derivative_of), slopes = 0;
     for (int k = 0; k < m->count; k++) {
         const Variable *v = &m->variables[k];
@@ -141,9 +188,10 @@ FMI2_Export int model_describe(int version, const char *resources, const char *p
     for (int k = 0; k < m->count; k++)
         variable(to, m, k, version, derivative_of);
     fputs("  </ModelVariables>\n  <ModelStructure>\n", to);
-    structure(to, m, version);
+    structure(to, m, version, answered);
     fputs("  </ModelStructure>\n</fmiModelDescription>\n", to);
     free(derivative_of);
+    free(answered);
     if (m->close)
         m->close();
     return fclose(to) == 0;

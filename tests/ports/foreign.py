@@ -32,10 +32,11 @@ def build(
     derivative: bool = False,
     fixed: bool = False,
     slopes: bool = False,
+    discrete: str = "",
 ) -> Path:
     """An FMU of FMI 2.0 or 3.0; what it says of itself: whether it saves its state, that y depends
-    on u at once, that alpha is the derivative of omega, that its steps are fixed, and that it tells
-    slopes."""
+    on u at once, that alpha is the derivative of omega, that its steps are fixed, that it tells
+    slopes, and the name of an output that changes at events alone."""
     library = folder / f"foreign{sharedLibraryExtension}"
     if not library.exists():
         library.write_bytes(_library())
@@ -46,6 +47,8 @@ def build(
         text = describe(saves, through, derivative, fixed)
         if slopes:
             text = text.replace("<CoSimulation ", '<CoSimulation maxOutputDerivativeOrder="1" ')
+        if discrete:
+            text = text.replace(f'name="{discrete}"', f'name="{discrete}" variability="discrete"')
         archive.writestr("modelDescription.xml", text)
         archive.write(library, f"binaries/{place}/foreign{sharedLibraryExtension}")
     return path

@@ -139,6 +139,57 @@ def test_a_motor_on_a_bridge_is_that_of_one_netlist(tmp_path: Path, version: int
         )
 
 
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_discrete_output_is_held(tmp_path: Path, version: int) -> None:
+    """A source that follows it has no other value than those that the FMU had at its steps."""
+    scene = motor(tmp_path, version=version, discrete="omega")
+    macro = {"coupling.method": "macro-steps", "coupling.macro_step": 1e-3}
+    with in_place():
+        run = Run(load(scene, macro), lambda _: None)
+        run.run()
+    times, given = run.points.array()[:, 0], 0.05 * run.points.array()[:, 1]
+    at, source = run.log.array()[:, 0], run.log.array()[:, 1]
+    assert len(times) == 21 and np.unique(given).size > 15
+    assert source == pytest.approx(given[np.searchsorted(times, at - 1e-12) - (at > 0)])
+    waves = here(scene, macro).columns["rotor.omega"]
+    assert {*waves} <= {*run.points.array()[:, 1]}
+
+
+CIRCLE = """
+[circuit]
+model = "file"
+netlist = "rc.cir"
+[[fmu]]
+name = "a"
+file = "Load.fmu"
+[[fmu]]
+name = "b"
+file = "Load.fmu"
+parameters = { D = -4.0 }
+[[port]]
+from = "a.y"
+to = "b.u"
+[[port]]
+from = "b.y"
+to = "a.u"
+offset = 0.1
+[run]
+duration = 1e-3
+"""
+
+
+def test_a_run_that_diverges_fails(tmp_path: Path) -> None:
+    """a = b + 0.1 and b = -4 a, each from the other's last value, grow with each step."""
+    build(tmp_path, "Load", through=True)
+    (tmp_path / "rc.cir").write_text("* rc\nV1 in 0 1\nR1 in out 1k\nC1 out 0 1u\n.end\n")
+    (tmp_path / "circle.toml").write_text(CIRCLE)
+    with pytest.raises(SimulationFailed, match=r"diverges: [ab]\.y has .* t = \S+ s"):
+        here(tmp_path / "circle.toml", {"coupling.method": "step-locked"})
+    quiet = {"fmu.b.D": -0.5, "coupling.method": "step-locked"}
+    (note,) = here(tmp_path / "circle.toml", quiet).summary["notes"]
+    assert all(name in note for name in ("a.y", "b.u", "b.y", "a.u", "not iterated"))
+
+
 def test_a_run_without_end_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An hour of an undamped tank circuit of 500 MHz; of an ordinary one any length may be run."""
     scene = motor(tmp_path)
@@ -224,7 +275,32 @@ def test_feedthrough_needs_an_fmu_that_saves_its_state(tmp_path: Path) -> None:
     for overrides in ({}, {"coupling.method": "redo"}):
         with pytest.raises(BadInput, match=r"Load\.fmu: .*canGetAndSetFMUstate = true"):
             here(tmp_path / "load.toml", overrides)
-    assert here(tmp_path / "load.toml", {"coupling.method": "step-locked"})
+    (note,) = here(tmp_path / "load.toml", {"coupling.method": "step-locked"}).summary["notes"]
+    assert "load.u to load.y" in note and "redo" not in note
+    build(tmp_path, "Load", through=True)
+    (note,) = here(tmp_path / "load.toml", {"coupling.method": "step-locked"}).summary["notes"]
+    assert 'coupling.method = "redo" is' in note
+
+
+def test_an_fmu_of_fixed_steps_that_feeds_through_is_not_repeated(tmp_path: Path) -> None:
+    build(tmp_path, "Load", fixed=True, through=True)
+    (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD)
+    result = here(tmp_path / "load.toml", {"run.duration": 1e-3, "fmu.load.D": 0.5})
+    assert result.summary["method"] == "macro-steps"
+
+
+def test_outputs_that_settle_do_not_move_in_steps_of_their_own(tmp_path: Path) -> None:
+    """The ball lies on the floor after the seventh part of the run, and nothing else moves."""
+    build(tmp_path, "Load")
+    (tmp_path / "rl.cir").write_text("* r\nVf y 0 0\nR1 y 0 1\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD.replace("load.y", "load.v"))
+    given = {"run.duration": 2e-3, "fmu.load.drop": 1e-8, "coupling.method": "step-locked"}
+    given |= {"circuit.max_step": 1e-5}
+    result = here(tmp_path / "load.toml", given)
+    still = np.diff(result.columns["load.v"]) == 0.0
+    assert 0.5 < still.mean() < 0.99 and still[-100:].all()
+    assert result.summary["notes"] == []
 
 
 def test_an_event_of_an_fmu_is_found(tmp_path: Path) -> None:
@@ -393,7 +469,7 @@ def test_a_sweep_goes_over_parameters_of_fmus_and_circuit(tmp_path: Path) -> Non
 
 def test_an_fmu_that_ends_its_process_or_fails_is_told(tmp_path: Path) -> None:
     scene = motor(tmp_path)
-    with pytest.raises(SimulationFailed, match=r"died at t = .*SIGABRT"):
+    with pytest.raises(SimulationFailed, match=r"died after t = .*SIGABRT"):
         cosim.run(scene, {"run.duration": 2e-3, "fmu.rotor.crash_at": 1e-3})
     with pytest.raises(SimulationFailed, match=r"rotor failed at t = .*the bearing is worn out"):
         cosim.run(scene, {"run.duration": 2e-3, "fmu.rotor.fail_at": 1e-3})

@@ -19,13 +19,15 @@ MODEL = """
 #include <math.h>
 #include <stdio.h>
 #include "model.h"
-enum { TIME, U, W, Y, Q, FIXED };
+enum { TIME, U, W, Y, Q, FIXED, EVERY, S };
 static const Variable variables[] = {
     {INPUT, "u", "V", 0.0, "Input", 0},
     {INPUT, "w", "V", 0.0, "Input", 0},
     {OUTPUT, "y", "V", 0.0, "u + w, at once", 0},
     {OUTPUT, "q", "V.s", 0.0, "The integral of u", 0},
     {PARAMETER, "fixed", "s", 0.0, "The only step, or 0", 0},
+    {PARAMETER, "every", "s", 0.0, "Time between samples, or 0", 0},
+    {OUTPUT, "s", "V", 0.0, "How many samples", 0},
 };
 static void outputs(Run *run) { run->v[Y] = run->v[U] + run->v[W]; }
 static int step_by(Run *run, double h)
@@ -36,10 +38,12 @@ static int step_by(Run *run, double h)
         return 0;
     }
     run->v[Q] += h * run->v[U];
+    if (run->v[EVERY] > 0.0)
+        run->v[S] = floor((run->time + h) / run->v[EVERY] + 1e-6);
     return 1;
 }
 static const Model sum = {
-    .name = "sum", .about = "u + w", .token = "sum-1", .variables = variables, .count = 5,
+    .name = "sum", .about = "u + w", .token = "sum-1", .variables = variables, .count = 7,
     .step = 1e-4, .step_by = step_by, .outputs = outputs,
 };
 const Model *model(const char *resources, char why[512])
@@ -165,3 +169,24 @@ def test_an_fmu_of_fixed_steps_is_given_no_others(
     given |= {"drive.waveform": "sawtooth", "drive.frequency": 30.0, "run.duration": duration}
     result = run(tmp_path, library, BY_CIRCUIT, given, "fixed = 1e-3")
     assert result.summary["method"] == "macro-steps" and result.summary["fmu_steps"] == 40
+
+
+def test_steps_of_its_own_are_told(tmp_path: Path, library: Path) -> None:
+    given = {"coupling.method": "step-locked"}
+    (note,) = run(tmp_path, library, "", given, "every = 1e-3").summary["notes"]
+    assert "outputs of g changed in only 40 of " in note and "mostly of 0.001 s" in note
+
+
+def test_what_it_feeds_through_is_said(tmp_path: Path, library: Path) -> None:
+    """In both versions; so `auto` repeats steps by itself, as exact as one netlist."""
+    for version, first in ((2, 2), (3, 1)):
+        pack(library, tmp_path / "sum.fmu", version)
+        about = ZipFile(tmp_path / "sum.fmu").read("modelDescription.xml").decode()
+        outputs = about.partition("<ModelStructure>")[2].partition("<InitialUnknown")[0]
+        assert outputs.count("dependencies") == 1
+        assert f'dependencies="{first} {first + 1}"' in outputs
+    rc = "V1 in 0 1\nR1 in a 1k\nVx a b 0\nC1 b 0 1n\nR2 b 0 1k\n"
+    ports = '[[port]]\nprobe = "i(Vx)"\nto = "g.u"\nscale = 1000.0'
+    result = run(tmp_path, library, ports, {}, "", rc)
+    assert result.summary["method"] == "redo"
+    assert result.summary["i(Vx).mean"] == pytest.approx(1.0 / 3e3, rel=1e-4)

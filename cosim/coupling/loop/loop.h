@@ -261,7 +261,6 @@ typedef struct {
     void *state;               /* at the communication point, where steps are repeated */
     double *row;               /* its part of the outputs */
     int64_t width;
-    int64_t moved;             /* steps in which an output changed */
 } Stranger;
 
 /* Where an FMU feeds a probe through to a source, the circuit itself carries that share: it adds the

@@ -318,10 +318,6 @@ static void learn(Ports *c)
 static void begin_exchange(Ports *c)
 {
     const double time = c->time, h = time - c->origin;
-    for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++) {
-        const double *before = c->before + (s->row - c->outputs);
-        s->moved += memcmp(before, s->row, (size_t)s->width * sizeof *before) != 0;
-    }
     if (is_telling(c, h))
         for (int64_t k = 0; k < c->n_outputs; k++)
             c->rates[k] = (c->outputs[k] - c->before[k]) / h;

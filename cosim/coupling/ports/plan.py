@@ -1,6 +1,7 @@
 """A scene's ports, checked against its FMUs and brought into the numbers of ``ports.c``."""
 
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +53,7 @@ class Plan:
         self.width = first
         """Of the row of all outputs."""
         self.method = _method(scene, self.sides)
+        self.notes = [*_notes(scene, self.sides, self.method)]
         self.throughs = [*self._throughs()] if self.method == "redo" else []
         """What the circuit itself carries of the FMUs' feedthrough, and what leads to it."""
 
@@ -137,13 +139,13 @@ def _set_slope(origin: Any, port: Port, side: Side, output: Variable, place: int
     """How an output goes on between communication points."""
     kind, one = port.slope, output.size == 1
     if kind == "auto":
-        tells = output.real and one and (side.of.abilities.maxOutputDerivativeOrder or 0) >= 1
+        tells = output.continuous and one and (side.of.abilities.maxOutputDerivativeOrder or 0) >= 1
         if tells:
             origin.slope, origin.slope_place = _KNOWN, side.slope_place(output)
         elif output.slope in side.places:
             origin.slope, origin.slope_place = _KNOWN, side.places[output.slope] + place
         else:
-            origin.slope = _DIFFERENCE if output.real else _HELD
+            origin.slope = _DIFFERENCE if output.continuous else _HELD
     elif kind in ("held", "difference"):
         origin.slope = _HELD if kind == "held" else _DIFFERENCE
     else:
@@ -166,21 +168,64 @@ def _in_order(scene: Scene, sides: dict[str, Side]) -> list[Side]:
     return [sides[name] for name in order]
 
 
+def _fixed(side: Side) -> bool:
+    """Whether its steps are to be of one length."""
+    return not side.varies or bool(side.of.abilities.fixedInternalStepSize)
+
+
 def _method(scene: Scene, sides: list[Side]) -> str:
     """``coupling.method``, with the choice of "auto" made."""
     asked = scene.coupling.method
+    if asked == "auto" and any(map(_fixed, sides)):
+        return "macro-steps"
     through = _feedthrough(scene, sides)
     if asked == "redo" or (asked == "auto" and through):
         for side in sides:
             if not side.of.abilities.canGetAndSetFMUstate:
-                why = f"it feeds {through} through at once, so " if asked == "auto" else ""
+                why = f"{through} is fed through at once, so " if asked == "auto" else ""
                 raise side.of.bad(
                     f'{why}coupling.method = "redo" repeats its steps, which needs '
                     'canGetAndSetFMUstate = true; take "step-locked" with small circuit.max_step'
                 )
         return "redo"
-    fixed = any(not side.varies or side.of.abilities.fixedInternalStepSize for side in sides)
-    return ("macro-steps" if fixed else "step-locked") if asked == "auto" else asked
+    return "step-locked" if asked == "auto" else asked
+
+
+def _notes(scene: Scene, sides: list[Side], method: str) -> Iterator[str]:
+    """What the coupling errs in."""
+    through = _feedthrough(scene, sides)
+    if through and method != "redo":
+        able = all(side.of.abilities.canGetAndSetFMUstate and not _fixed(side) for side in sides)
+        cure = (
+            'coupling.method = "redo" is as exact as one netlist'
+            if able
+            else "smaller steps err less"
+        )
+        yield (
+            f"an FMU feeds {through} through at once, of which the circuit learns a step late with "
+            f'coupling.method = "{method}"; {cure}.'
+        )
+    if circle := _circle(scene, sides):
+        yield (
+            f"the FMUs feed each other at once ({circle}); this algebraic loop is not iterated: "
+            "one of them is given a value extrapolated from earlier steps."
+        )
+
+
+def _circle(scene: Scene, sides: list[Side]) -> str:
+    """Of variables of FMUs that depend on each other at once, as the FMUs say, or nothing."""
+    needs: dict[str, set[str]] = {}
+    for port in scene.port:
+        if port.to is not None and port.origin not in (None, "drive"):
+            needs.setdefault(port.to, set()).add(str(port.origin))
+    for side in sides:
+        for output, inputs in side.of.feedthrough.items():
+            needs[f"{side.name}.{output}"] = {f"{side.name}.{name}" for name in inputs}
+    try:
+        TopologicalSorter(needs).prepare()
+    except CycleError as error:
+        return ", ".join(dict.fromkeys(error.args[1]))
+    return ""
 
 
 def _feedthrough(scene: Scene, sides: list[Side]) -> str:
@@ -193,5 +238,5 @@ def _feedthrough(scene: Scene, sides: list[Side]) -> str:
             if f"{side.name}.{output}" in fed:
                 for name in sorted(inputs):
                     if f"{side.name}.{name}" in probed:
-                        return f"{name} to {output}"
+                        return f"{side.name}.{name} to {side.name}.{output}"
     return ""

@@ -14,6 +14,7 @@ from cosim.coupling.loop.agenda import count
 from cosim.coupling.loop.lead import engine
 from cosim.coupling.loop.structures import loop
 from cosim.coupling.ports.run import Run
+from cosim.errors import SimulationFailed, plain
 from cosim.files.spill import Tape, blocks
 from cosim.scene import Scene
 from cosim.toolchain.versions import versions
@@ -27,6 +28,7 @@ def joined(
     run = Run(scene, progress)
     run.run()
     signals = [*_signals(run)]
+    _refuse_divergence(scene, signals)
     waves = Tape(1 + len(signals))
     step, rows = scene.run.output_step, count(scene.run.output_step, scene.run.duration)
     for part in blocks(rows):
@@ -56,7 +58,7 @@ def joined(
         "wall_time": time.perf_counter() - began,
         "method": run.plan.method,
         "versions": {**versions(), **run.versions},
-        "notes": [*run.deck.notes, *_notes(run), *without],
+        "notes": [*run.deck.notes, *run.plan.notes, *_notes(run), *without],
     }
     return columns, summary, units
 
@@ -65,12 +67,36 @@ Signal = tuple[str, str, Array, Array, bool]
 """Name, unit, times (s), values, and whether it is continuous."""
 
 
+DIVERGED, BEYOND = 1e15, 1e150
+"""Magnitudes, SI, that nothing joined has, and whose squares no number holds."""
+
+
+def _refuse_divergence(scene: Scene, signals: list[Signal]) -> None:
+    """Raises SimulationFailed for what first grew without bound."""
+    ends = {end for port in scene.port for end in (port.origin, port.source, port.probe)}
+    grown: list[tuple[float, str]] = []
+    for name, _, times, values, _ in signals:
+        most = DIVERGED if name in ends else BEYOND
+        for part in blocks(len(times)):
+            beyond = np.abs(values[part]) > most
+            if beyond.any():
+                grown.append((float(times[part][beyond.argmax()]), name))
+                break
+    if grown:
+        time, name = min(grown)
+        raise SimulationFailed(
+            f"The run diverges: {plain(name)} has grown without bound by t = {time:.6g} s; check "
+            "the signs and scales of the ports, or take a smaller circuit.max_step or "
+            'coupling.macro_step, or coupling.method = "redo".'
+        )
+
+
 def _signals(run: Run) -> Iterator[Signal]:
     points, log = run.points.array(), run.log.array()
     place = 1
     for side in run.plan.sides:
-        for k, (name, of, real) in enumerate(side.columns):
-            yield name, of, points[:, 0], points[:, place + k], real
+        for k, (name, of, goes_on) in enumerate(side.columns):
+            yield name, of, points[:, 0], points[:, place + k], goes_on
         place += side.width
     for k, name in enumerate(run.plan.names):
         kind = run.deck.kinds[name.lower()]
@@ -130,8 +156,8 @@ def _numbers(settle: float, times: Array, values: Array, continuous: bool) -> di
 _OFTEN, _LONG, _WITHIN = 10, 10_000, 20
 """How many times as many steps as ``circuit.max_step`` asks for tell of ringing; of so many; by how
 much more a node within a subcircuit has to ring to be named."""
-_SELDOM, _MANY = 0.5, 100
-"""Share of its steps in which an FMU's outputs change that is too small; of so many steps."""
+_SELDOM, _MANY = 2, 10
+"""Every how manieth step at most an FMU's outputs are to change; after so many changes."""
 
 
 def _notes(run: Run) -> Iterator[str]:
@@ -151,13 +177,17 @@ def _notes(run: Run) -> Iterator[str]:
             f"asks for. It turned most often, {turns[node]} times, at node {node}: if it rings "
             "there, damp it, say by a resistor and a capacitor to ground."
         )
-    for side, state in zip(run.plan.sides, run.fmus, strict=False):
-        steps, moved = side.fmu.steps, state.moved
-        if steps > _MANY and 0 < moved < _SELDOM * steps:
+    points, place = run.points.array(), 1
+    for side in run.plan.sides:
+        own = points[:, [place + k for k, (*_, goes_on) in enumerate(side.columns) if goes_on]]
+        place += side.width
+        changed = np.flatnonzero((own[1:] != own[:-1]).any(axis=1)) + 1
+        # What has settled, or has not begun yet, does not move in steps.
+        if len(changed) > _MANY and np.median(np.diff(changed)) >= _SELDOM:
             yield (
-                f"the outputs of {side.name} changed in only {moved} of its {steps} steps: it "
-                f"moves in steps of its own, of {run.state.duration / moved:.2g} s on average. A "
-                "controller that samples is to do so; where it is a model that integrates by fixed "
-                'steps, coupling.method = "macro-steps" with a coupling.macro_step of that length '
-                "or more suits it."
+                f"the outputs of {side.name} changed in only {len(changed)} of {len(points) - 1} "
+                "steps: it moves in steps of its own, mostly of "
+                f"{np.median(np.diff(points[changed, 0])):.2g} s. A controller that samples is to "
+                "do so; where it is a model that integrates by fixed steps, coupling.method = "
+                '"macro-steps" with a coupling.macro_step of that length or more suits it.'
             )

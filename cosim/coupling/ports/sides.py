@@ -30,11 +30,11 @@ class Side:
         self.outputs = _grouped([v for v in of.variables.values() if v.causality == "output"])
         """Those with numbers, in the order of the row."""
         self.columns = [
-            (f"{self.name}.{v.name}" + (f"[{k}]" if v.size > 1 else ""), v.unit, v.real)
+            (f"{self.name}.{v.name}" + (f"[{k}]" if v.size > 1 else ""), v.unit, v.continuous)
             for v in self.outputs
             for k in range(v.size)
         ]
-        """Name, unit, and whether it is real, of each number of the row."""
+        """Name, unit, and whether it is continuous, of each number of the row."""
         self.slopes: list[Variable] = []
         """Outputs whose derivative the FMU itself tells; they follow in the row."""
         self.places: dict[str, int] = {}

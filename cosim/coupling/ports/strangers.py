@@ -58,6 +58,11 @@ class Variable:
     def real(self) -> bool:
         return self.kind < 2
 
+    @property
+    def continuous(self) -> bool:
+        """Whether it goes on between communication points."""
+        return self.real and self.variability == "continuous"
+
 
 class Stranger:
     """An FMU's file, unpacked and described. Raises BadInput, naming the file."""
