@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from cosim.errors import BadInput, plain
 from cosim.scene import Key, keys
 from cosim.scene.messages import ended, suggestion
-from cosim.scene.tables import LEVEL_KEY
+from cosim.scene.tables import LEVEL_KEY, PARAM_KEY
 
 FREQUENCIES = ("drive.frequency", "drive.pot_frequency", "drive.loop_time")
 
@@ -19,7 +19,8 @@ def numeric_key(name: str) -> Key:
     if table == "drive" and LEVEL_KEY.fullmatch(bare):
         text = f"Level of pair {bare.partition('.')[2]} of drive.table"
         return Key(table, bare, "1", None, float, None, -0.5, 0.5, text, "")
-    if (table, bare.partition(".")[0]) == ("circuit", "param") or (table == "fmu" and "." in bare):
+    param = table == "circuit" and PARAM_KEY.fullmatch(bare)
+    if param or (table == "fmu" and "." in bare):
         text = f"Value of {bare}, of the user's own"
         return Key(table, bare, "?", None, float, None, -1e30, 1e30, text, "")
     if any(key.full == name for key in keys()):

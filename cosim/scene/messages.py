@@ -18,6 +18,7 @@ ALLOWED_TOP = {
     "description": "one line of at most 200 characters",
 }
 ALLOWED_START = "a number, true, false or a text"
+PLAIN_NUMBER = "a number without suffix or unit, such as 3e3"
 
 
 def shown(value: object, limit: int = 60) -> str:
@@ -112,6 +113,10 @@ def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], defa
     if first["loc"][0] in PORT_LISTS:
         return _of_list(first, origins.get(first["loc"][0], (0, default))[1])
     full = ".".join(str(part) for part in first["loc"][:2])  # not the place in a list
+    if full == "circuit.param" and len(first["loc"]) > 2:
+        name = f"{full}.{first['loc'][2]}"
+        origin = origins.get(name, origins.get(full, (0, default)))[1]
+        return f"{origin}: {plain(name)} = {shown(first['input'])} must be {PLAIN_NUMBER}."
     key = next((key for key in keys() if key.full == full), None)
     allowed = key.allowed if key else ALLOWED_TOP.get(full, "a table")
     hint = suggestion(shown(first["input"]).strip('"'), map(str, (key and key.choices) or ()))
@@ -131,7 +136,10 @@ def _of_list(fault: Any, origin: str) -> str:
     allowed = extra.get("words") or "a number from {ge:g} to {le:g}".format(**limits)
     what = f"{origin}: [[{table}]] {place[0] + 1}: {place[1]}"
     if len(place) > 2:
-        what, allowed = f"{what}.{place[2]}", ALLOWED_START
+        what, allowed = f"{what}.{plain(str(place[2]))}", ALLOWED_START
+        if isinstance(fault["input"], dict) and fault["input"]:
+            inner = next(iter(fault["input"]))
+            allowed += f'; write a name with dots in quotes, "{plain(f"{place[2]}.{inner}")}"'
     if fault["type"] == "missing":
         return f"{what} is missing; it must be {allowed}."
     return ended(f"{what} = {shown(fault['input'])} must be {allowed}")

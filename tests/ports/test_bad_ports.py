@@ -117,3 +117,42 @@ def test_a_crash_is_exit_code_three(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert main(["run", str(scene), *given, "--out", str(tmp_path / "out")]) == 3
     told = capsys.readouterr().err.strip()
     assert told.count("\n") == 0 and "died after t = " in told
+
+
+@pytest.mark.parametrize("command", ["sweep", "tune"])
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("fmu.rotor.K", r"Rotor\.fmu: --over fmu\.rotor\.K must .* \(it has J, B, "),
+        ("fmu.motor.J", r"fmu\.motor\.J: there is no such FMU \(known: rotor\)"),
+        ("circuit.param.X", r"bridge\.cir: circuit\.param\.X must .* \(it has vdd\)"),
+        ("circuit.param", r"circuit\.param: this key is not a number"),
+    ],
+)
+def test_a_key_of_a_study_that_is_not_there_is_told_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str, key: str, said: str
+) -> None:
+    scene, tune = motor(tmp_path), command == "tune"
+    given = ["--over", f"{key}=1:2" if tune else f"{key}=1,2", "--out", str(tmp_path / "out")]
+    with in_place():
+        named = ["--maximise", "rotor.omega.mean"] if tune else []
+        assert main([command, str(scene), *given, *named]) == 2
+    told = capsys.readouterr().err.strip()
+    assert told.count("\n") == 0 and re.search(said, told), told
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "given", "said"),
+    [
+        ("", "", "circuit.param.vdd=3k", r'--set: circuit\.param\.vdd = "3k" must be .* 3e3\.'),
+        ("J = 2e-4", "a.J = 2e-4", "run.settle=0", r'parameters\.a = .* in quotes, "a\.J"\.'),
+    ],
+)
+def test_how_a_value_or_name_is_written_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, given: str, said: str
+) -> None:
+    scene = motor(tmp_path)
+    scene.write_text(scene.read_text().replace(old, new))
+    assert main(["run", str(scene), "--set", given]) == 2
+    assert re.search(said, capsys.readouterr().err)

@@ -18,7 +18,7 @@ from fmpy import fmi2, fmi3
 
 from cosim.errors import BadInput, plain
 from cosim.mechanics.fmi import INTERFACES, Interface, unit
-from cosim.scene.messages import ended, shown, suggestion
+from cosim.scene.messages import PLAIN_NUMBER, ended, shown, suggestion
 
 MOST_FILES, LARGEST = 10_000, 1 << 30
 """Of an FMU: files in it, and bytes once unpacked."""
@@ -182,17 +182,23 @@ class Stranger:
             raise self.bad(f"the FMU cannot be initialised{said}") from error
         return made
 
+    def settable(self, name: str, where: str) -> tuple[Variable, int]:
+        """A parameter or input that may have a start value, and the place of an array's element;
+        ``where`` is what :meth:`find` takes."""
+        known = self.variables.get(name) or self.variables.get(name.partition("[")[0])
+        is_input = known is not None and known.causality == "input"
+        found, place = self.find(name, "input" if is_input else "parameter", where)
+        if found.variability == "constant":
+            raise self.bad(f"{where}: it is a constant")
+        return found, place
+
     def _set(self, made: Interface, name: str, value: Any, arrays: dict[str, list[Any]]) -> None:
         """Set one, or an element of an array; ``arrays`` has those that were set before."""
         where = f"[[fmu]] parameters {name} = {shown(value)}"
         text = isinstance(value, str)
         if text:
-            raise self.bad(f"{where} must be a number, true or false")
-        kind = self.variables.get(name.partition("[")[0])
-        is_input = kind is not None and kind.causality == "input"
-        found, place = self.find(name, "input" if is_input else "parameter", where)
-        if found.variability == "constant":
-            raise self.bad(f"{where}: it is a constant")
+            raise self.bad(f"{where} must be {PLAIN_NUMBER}, or true or false")
+        found, place = self.settable(name, where)
         values = arrays.setdefault(found.name, [*found.start])
         values[place] = _allowed(found, value, where, self)
         kind = found.type if self.version == 3 else _AS_2.get(found.type, found.type)

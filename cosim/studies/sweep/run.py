@@ -17,6 +17,7 @@ from cosim.evaluate.point import Number
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
+from cosim.simulation.elsewhere import refuse_unknown
 from cosim.studies.sweep import dataset, families
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.toolchain.versions import versions
@@ -74,6 +75,7 @@ def sweep(
     if random and samples is None:
         raise BadInput("--random needs --samples N.")
     design = grid(over) if samples is None else sample(over, samples, seed, random)
+    refuse_unknown(scene, over)
     if keep and out is None:
         raise BadInput("keep: waveforms are kept in a folder; name one as out.")
     with TemporaryDirectory() if out is None else nullcontext(out) as folder:

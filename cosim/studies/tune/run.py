@@ -25,6 +25,7 @@ from cosim.search.known import Known
 from cosim.search.protocol import Feasible
 from cosim.search.turns import TURN, faces, turned
 from cosim.simulation.checks import motion
+from cosim.simulation.elsewhere import refuse_unknown
 from cosim.simulation.fidelity import Fidelity
 from cosim.studies.tune.families import family, most_heat
 from cosim.studies.tune.found import Run, Tuning, write_runs
@@ -109,6 +110,7 @@ def tune(
             "what to tune with --over table.key=low:high."
         )
     keys = _checked(over or KNOBS)
+    refuse_unknown(scene, keys)
     most = most_heat(scene, heat)
     both = {"coil.polarity": (-1.0, 1.0)} if polarity else {}
     families: dict[str, tuple[Scene, dict[str, tuple[float, float]]]] = {}
