@@ -152,6 +152,10 @@ def check_reading(
     """The top level of a netlist with what reads the ``words`` and what the measurements need, as
     :func:`check` gives it; and all these words, each once."""
     name = plain(str(path))
+    for each in words:
+        if not each.strip():
+            what = f'{called} = "{plain(each)}" must be a vector or an expression of the netlist'
+            raise BadInput(f"{name}: {what}.")
     every = {each: Line(each, f'{name}: {called} = "{plain(each)}"', 0) for each in words}
     for ask in asks:
         every |= {each: replace(ask.line, text=each) for each in ask.words if each not in every}

@@ -34,7 +34,9 @@ _TROUBLE = re.compile(
     re.IGNORECASE,
 )
 _NOISE = re.compile(
-    r"^Note|init|ngspice.dll|circuits? loaded|is ignored|No compatibility", re.IGNORECASE
+    r"^Note|init|ngspice.dll|circuits? loaded|is ignored|No compatibility|@\w+\[pulse\]|"
+    "no such device or model name",  # which was asked for its edges
+    re.IGNORECASE,
 )
 """What it says of itself, and what only follows from an earlier word."""
 

@@ -160,6 +160,22 @@ FUNCTIONS = [
     (".func f(x) {u(x)}\nRs s 0 {f(4)}", ":14: the function u works only in B sources."),
     (".func f(x) {max(x)}\nRs s 0 {f(4)}", ":14: the function max takes 2 arguments, not 1."),
     (".func f(x) {x+1}\nRs s 0 {f(1,2)}", ":15: the function f takes 1 argument, not 2."),
+    (".func f(x) {g(x)}\n.func g(x) {f(x)}\nRs s 0 {f(1)}", " calls itself"),
+    (".func f(x) {f(x)+1}\nRs s 0 4", ":14: the function f calls itself"),
+    (".func abs(x) {abs(x)}\nRs s 0 4", ":14: the function abs calls itself"),
+    (IN_B + "pwl(V(v1),0,0,0,1,2,1)", ":15: the x values of pwl() must rise, 0 comes after 0."),
+    (IN_B + "pwl(V(v1),1k,0,{k},1,-2,1,-3m,1,-4m,1)", "must rise, -0.004 comes after -0.003."),
+    (IN_B + "pwl(V(v1),0,0,1,1+1)", ":15: the points of pwl() must be plain numbers, or"),
+    (IN_B + "pwl(V(v1),0,0,1,-k)", ":15: the points of pwl() must be plain numbers, or"),
+    (IN_B + "pwl(V(v1),0,0,1,time)", ":15: the points of pwl() must be plain numbers, or"),
+    (IN_B + "V(v1)>0 ? 1", ":15: V(v1)>0 ? 1 must have a : for each ?"),
+    (IN_B + "V(v1)>0 ? 1 : 2 : 3", " must have a : for each ?"),
+    (IN_PARAM + "{k ? 2}", ":15: {k ? 2} must have a : for each ?"),
+    (IN_B + "2*(V(v1),5)", ":15: the comma in 2*(V(v1),5) parts no arguments"),
+    (IN_B + "max(1,(1,5))", ":15: the comma in max(1,(1,5)) parts no arguments"),
+    (IN_B + "(V(v1)>0) & (V(v1)<1)", ":15: write && instead of &."),
+    (IN_B + "(V(v1)>0) | (V(v1)<1)", ":15: write || instead of |."),
+    (IN_PARAM + "{~k}", ":15: write ! instead of ~."),
 ]
 
 
@@ -184,6 +200,9 @@ MORE_IN_SOURCES = [
     "agauss({k},1e-3,3)*V(v1)",
     "cut(3*V(v1))",
     "higher(V(v1))",
+    "V(v1)>0 && !(V(v1)>1) || V(v1,out)<0 ? V(v1)<2 ? 1 : -1 : (V(v1)>3 ? 0 : 1)",
+    "pwl(V(v1),-1m,0,0,1,1e-3,{max(k,1)},1.5E+0,-.3)",
+    "pwl(V(v1),0,-{k},(1), -(3))",
 ]
 MORE_IN_PARAMETERS = ["max (sqr(k), 3)", "agauss(2*k, 0, 3)", "twice(sqr(2))"]
 MORE = """
@@ -225,6 +244,10 @@ MISTAKES = [
     ("Rs s 0 4", "Rs s", ":14: rs has too few nodes"),
     ("Rs s 0 4", "Rs s 0 four", ":14: rs: four is neither a number nor a model"),
     ("Rs s 0 4", "Rs s 0 k", ":14: rs: write {k}"),
+    ("Rs s 0 4", "Rs s 0 2*k", ":14: rs: write {…} around its value, 2*k."),
+    ("Rs s 0 4", "Rs s 0 R = 1+V(s) tc1=0", ":14: rs: write {…} around its value, 1+V(s)."),
+    ("Rs s 0 4", "Rs s 0 4\nC1 s 0 Q=1u*V(s)", ":15: c1: write {…} around its value, 1u*V(s)."),
+    ("Rs s 0 4", "Rs s 0 4\nL1 s 0 1\nK1 Lcoil L1 1.5", ":16: k1 couples by 1.5; it must be from"),
     ("Rs s 0 4", "Rs s 0 dd", ":14: rs: the model dd is of type d"),
     ("Rs s 0 4", "Rs s 0 {four}", ":14: the parameter four is not defined"),
     ("Rs s 0 4", "Rs s 0 '2*four'", ":14: the parameter four is not defined"),

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from cosim import run
 from cosim.cli.main import main
+from cosim.errors import SimulationFailed
 from cosim.toolchain.processes import in_place
 from tests.ports.test_coupled import motor
 
@@ -33,6 +35,7 @@ WRONG = {
         r"bridge\.cir: probe or circuit\.save = \"v\(gp\)\*\": v\(gp\)\* is no expression",
     ),
     "two in one": ('"v(gp)"', '"v(gp), v(a)"', r"bridge\.cir: .* is no expression"),
+    "nothing": ('"v(gp)"', '""', r"save = \"\" must be a vector or an expression"),
     "within a device": ('"v(gp)"', '"@d1[id]"', r"\"@d1\[id\]\": .*source of 0 V in series"),
     "no such current": ('"i(Vemf)"', '"i(Rm)"', r"bridge\.cir: .*no V, L, E or H element rm"),
     "a command as probe": ('"v(gp)"', '"v(gp)\\n.control"', r"cannot stand in a netlist"),
@@ -109,6 +112,15 @@ def test_an_fmu_that_unpacks_outside_itself_is_refused(
         archive.writestr("../outside.txt", "x")
     assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == 2
     assert "outside itself" in capsys.readouterr().err
+
+
+def test_what_ngspice_cannot_read_has_nothing_to_do_with_steps(tmp_path: Path) -> None:
+    scene = motor(tmp_path)
+    netlist, flux = tmp_path / "bridge.cir", "Ls a q flux={1m}\nRq q 0 1"
+    netlist.write_text(netlist.read_text().replace(".end", f"{flux}\n.end"))
+    with in_place(), pytest.raises(SimulationFailed, match=r"t = 0 s.*not parsed") as told:
+        run(scene)
+    assert "max_step" not in str(told.value)
 
 
 def test_a_crash_is_exit_code_three(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

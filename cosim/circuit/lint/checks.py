@@ -8,7 +8,14 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from cosim.circuit.lint.deck import Line, refuse, shown
 from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, parse
-from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed
+from cosim.circuit.lint.expressions import (
+    Names,
+    body,
+    check_circles,
+    check_names,
+    sensed,
+    unbraced,
+)
 from cosim.circuit.lint.topology import check_topology
 from cosim.circuit.lint.words import number, word_set
 
@@ -16,6 +23,9 @@ REQUIRED = (("vemf", "vcommand"), ("vemf", "vdac", "voffset"))
 """Alternatives, each a set of top-level voltage sources that a co-simulation can replace."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d|\.\d)")
+_OPERATOR = re.compile(r"[*/^]")
+_BARE = re.compile(r"\b(?:[rclq]|flux)\s*=([^=]*?[()*/^][^=]*?)(?=\s\w+\s*=|$)", re.IGNORECASE)
+"""A value with operators outside braces, which ngspice does not evaluate."""
 _WAVES = {"pulse": 7, "sin": 6, "exp": 6}
 """Most values of each: one more is a number of periods in LTspice, and a phase in ngspice."""
 _FOREIGN = (
@@ -45,7 +55,7 @@ def check(lines: Sequence[Line], required: Sequence[Sequence[str]] = REQUIRED) -
         check_names(scope, names)
         for element in scope.elements:
             _check_element(element, scope, names)
-    check_circles(top)
+    check_circles(top, names)
     _check_required(top, required)
     check_topology(top)
     return top
@@ -93,6 +103,9 @@ def _check_element(element: Element, scope: Scope, names: Names) -> None:
         if len(element.words) != 3:
             element.refuse(" must name two inductors and their coupling; write K pair by pair")
         _check_named(element, scope, "inductor", element.words[:2])
+        coupling = number(element.words[2].rpartition("=")[2])
+        if coupling is not None and abs(coupling) > 1.0:
+            element.refuse(f" couples by {coupling:g}; it must be from -1 to 1")
     elif kind == "t" and not any(word.startswith(("z0=", "zo=")) for word in element.words):
         element.refuse(" has no Z0=…")
     elif kind == "x":
@@ -128,10 +141,14 @@ def _check_type(element: Element, model: str, types: set[str]) -> None:
 
 def _check_passive(element: Element, scope: Scope, names: Names) -> None:
     if any(word.partition("=")[0] not in _NO_VALUES for word in element.words if "=" in word):
+        if match := _BARE.search(unbraced(element.line.text)):
+            element.refuse(f": write {{…}} around its value, {shown(match[1].strip())}")
         return
     first = next((word for word in element.words if "=" not in word), None)
     if first is None:
         element.refuse(" has no value")
+    if _OPERATOR.search(unbraced(first)) and scope.model_types(first) is None:
+        element.refuse(f": write {{…}} around its value, {shown(first)}")
     if len(element.words) > 1 and None not in map(number, element.words[:2]):
         element.refuse(" has two values; a number has a decimal point, not a comma")
     if _NUMBER.match(first) or first[0] in "{'+-":

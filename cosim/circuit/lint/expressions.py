@@ -7,10 +7,11 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
 
 from cosim.circuit.lint.deck import Line, refuse, shown
 from cosim.circuit.lint.elements import Element, Scope
-from cosim.circuit.lint.words import closing, definitions, split_arguments, word_set
+from cosim.circuit.lint.words import closing, definitions, number, split_arguments, word_set
 
 _RANDOM = {"agauss": 3, "gauss": 3, "aunif": 2, "unif": 2, "limit": 2}
 _ONE_ARGUMENT = word_set(
@@ -39,8 +40,12 @@ _INSTEAD = {
     "if": "there is no if() in ngspice; write (condition ? yes : no)",
     "table": "there is no table() in ngspice; write pwl(x, x1, y1, x2, y2, ...) in a B source",
 }
+_NOT_NGSPICE = {"&": "&&", "|": "||", "~": "!"}
 _VARYING = re.compile(r"\b(?:[vi]\s*\(|(?:time|temper|hertz)\b)", re.IGNORECASE)
 _PLAIN = re.compile(r"\s*\{?\s*[+-]?\s*[\w.]+(?:(?<=\de)[+-]?\d+)?\s*\}?\s*", re.IGNORECASE)
+_POINT = re.compile(
+    r"(?:[\s(+-]*(?:\{ *\}|[\d.]\w*(?:\.\w*)?(?:(?<=\de)[+-]\d+)?)|[\s(]*[a-z_]\w*)[\s)]*", re.I
+)
 _TOKEN = re.compile(
     r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?[a-z]*|@[\w.#]+\[\w+\]|[a-z_][\w.$#]*|.", re.S
 )
@@ -157,11 +162,33 @@ def check_names(scope: Scope, names: Names) -> None:
                     _check_own(line, name, arguments, names, behavioural)
                 else:
                     _check_call(line, name, arguments, behavioural)
+            _check_operators(line, expression)
             pieces = "".join(str(piece.lastgroup)[0] for piece in _PIECE.finditer(expression))
             if pieces and (_BROKEN.search(pieces) or len(split_arguments(expression)) > 1):
                 refuse(line, f"{shown(expression.strip())} is no expression that ngspice can read")
         if element is not None and element.kind == "b":
             _check_blanks(line, own)
+
+
+def _check_operators(line: Line, expression: str) -> None:
+    """What ngspice cannot read, or reads as something else in silence."""
+    calls: list[bool] = []
+    counts = {"?": 0, ":": 0}
+    for piece in _PIECE.finditer(expression):
+        if piece["begin"]:
+            calls.append(piece["begin"][0] not in "({")
+        elif piece["end"] and calls:
+            calls.pop()
+        elif piece[0] in _NOT_NGSPICE:
+            refuse(line, f"write {_NOT_NGSPICE[piece[0]]} instead of {piece[0]}")
+        elif piece[0] in counts:
+            counts[piece[0]] += 1
+        elif piece[0] == "," and calls and not calls[-1]:
+            what = shown(expression.strip())
+            refuse(line, f"the comma in {what} parts no arguments; a number has a decimal point")
+    if counts["?"] != counts[":"]:
+        what = shown(expression.strip())
+        refuse(line, f"{what} must have a : for each ?, as in (condition ? yes : no)")
 
 
 def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str | None:
@@ -174,6 +201,15 @@ def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str |
     count = len(arguments)
     if name == "pwl" and behavioural:
         if count >= 5 and count % 2:
+            literal = (
+                _POINT.fullmatch(unbraced(each)) and not _varies(each) for each in arguments[1:]
+            )
+            if not all(literal):
+                return "the points of pwl() must be plain numbers, or expressions in braces"
+            points = [number(argument.strip()) for argument in arguments[1::2]]
+            for one, other in pairwise(points):
+                if one is not None and other is not None and one >= other:
+                    return f"the x values of pwl() must rise, {other:g} comes after {one:g}"
             return None
         return "pwl() takes a value and at least two points, each of two numbers"
     if name == "limit" and count != 2:
@@ -242,7 +278,7 @@ def _check_own(
 
 def _check_blanks(line: Line, own: set[str]) -> None:
     """In a B source ngspice takes a name before a blank for a parameter, and gives up."""
-    for match in _SPACED.finditer(_unbraced(body(line))):
+    for match in _SPACED.finditer(unbraced(body(line))):
         name = match[1].lower()
         if name in own or name in BEHAVIOURAL or name == "pwl":
             refuse(line, f"write {shown(name)}( without a blank, which ngspice cannot read here")
@@ -252,8 +288,18 @@ def _counted(count: int) -> str:
     return f"{count} argument{'' if count == 1 else 's'}"
 
 
-def check_circles(top: Scope) -> None:
-    """Raise BadInput where top-level parameters depend on themselves."""
+def check_circles(top: Scope, names: Names) -> None:
+    """Raise BadInput where functions or top-level parameters depend on themselves."""
+    single = {name: only for name in names.definitions if (only := names.only(name))}
+    calls = {
+        name: {inner for inner, arguments in used(function.body) if arguments is not None}
+        for name, function in single.items()
+    }
+    try:
+        TopologicalSorter(calls).prepare()
+    except CycleError as error:
+        name = error.args[1][0]
+        refuse(single[name].line, f"the function {shown(name)} calls itself; ngspice has no end")
     uses: dict[str, set[str]] = {}
     lines: dict[str, Line] = {}
     if any(line.text.lower().startswith(".if") for line, _ in top.lines):
@@ -321,7 +367,7 @@ def _expressions(line: Line, element: Element | None) -> Iterator[tuple[str, boo
     if element is not None and element.kind == "b":
         # Braces make no difference there, up to the next key.
         start = len(text) - len(body(line))
-        key = _NEXT_KEY.search(_unbraced(text), start)
+        key = _NEXT_KEY.search(unbraced(text), start)
         end = key.start() if key else len(text)
         yield text[start:end], True
     place = end
@@ -337,7 +383,7 @@ def _expressions(line: Line, element: Element | None) -> Iterator[tuple[str, boo
     if element is None and word not in (".model", ".subckt"):
         return
     if element is None or element.kind != "b":
-        for _, name in _ASSIGNMENT.findall(re.sub(r"\s*=\s*", "=", _unbraced(text))):
+        for _, name in _ASSIGNMENT.findall(re.sub(r"\s*=\s*", "=", unbraced(text))):
             yield name, _varies(name)
 
 
@@ -362,6 +408,6 @@ def _formals(text: str) -> tuple[str, ...]:
     return tuple(re.findall(r"\w+", text))
 
 
-def _unbraced(text: str) -> str:
+def unbraced(text: str) -> str:
     """The text with what is in braces or quotes blanked out, place by place."""
     return re.sub(r"\{[^{}]*\}|'[^']*'", lambda match: f"{{{' ' * (len(match[0]) - 2)}}}", text)

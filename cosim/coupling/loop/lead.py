@@ -217,7 +217,10 @@ def engine() -> ngspice.Engine:
 def finished(reached: float, duration: float) -> None:
     """Raise SimulationFailed where ngspice has only ``reached`` that time (s)."""
     if reached < duration - max(1e-9 * duration, ROUNDING):
-        raise SimulationFailed(
-            f"ngspice stopped at t = {reached:.6g} s of {duration:g} s: {engine().said()}. If the "
-            "circuit is right, a smaller circuit.max_step or another circuit.reltol may help."
-        )
+        told = f"ngspice stopped at t = {reached:.6g} s of {duration:g} s: {engine().said()}."
+        if reached > 0.0:  # else it has not read the netlist, or found no operating point
+            told += (
+                " If the circuit is right, a smaller circuit.max_step or another circuit.reltol "
+                "may help."
+            )
+        raise SimulationFailed(told)
