@@ -419,3 +419,10 @@ def passes_or_is_told(folder: Path, data: bytes) -> None:
         checked(folder, data)
     except BadInput as error:
         sentence(error)
+
+
+def test_names_are_told_as_they_are_written(tmp_path):
+    with pytest.raises(BadInput, match=r"kröte.cir:1: the netlist does not end"):
+        checked(tmp_path, "x", "kröte.cir")
+    with pytest.raises(BadInput, match=r"a\\x1b\\nb.cir:1: "):
+        checked(tmp_path, "x", "a\x1b\nb.cir")

@@ -195,6 +195,7 @@ def test_what_goes_wrong_is_told_in_a_message(tmp_path: Path) -> None:
     ("old", "new", "said"),
     [
         ('"v(b)"', "v(nowhere)", "no node nowhere"),
+        ('"v(b)"', "", '--output = "" must be a vector or an expression'),
         ("Iload", "R1", '--input = "R1" must be a V or I source'),
     ],
 )

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NoReturn
 
-from cosim.errors import BadInput
+from cosim.errors import BadInput, printable
 
 MAX_LINE = 200_000
 
@@ -29,4 +29,4 @@ def refuse(line: Line, reason: str) -> NoReturn:
 
 def shown(text: str) -> str:
     """A piece of a netlist as it may stand in a message: short and printable."""
-    return ascii(text if len(text) <= 40 else f"{text[:37]}...")[1:-1]
+    return printable(text if len(text) <= 40 else f"{text[:37]}...").replace("\n", "\\n")
