@@ -148,8 +148,9 @@ class Scene(BaseModel):
                     and (key, end) != ("from", "drive")
                     and (name not in names or not dot)
                 ):
-                    known = ", ".join(f"{name}.…" for name in names)
-                    raise fault(f'[[port]] {key} = "{end}" must be a variable {known}')
+                    lacks = f"; there is no [[fmu]] {name}" if dot else ""
+                    known = " or ".join(f"{name}.…" for name in names)
+                    raise fault(f'[[port]] {key} = "{end}" must be a variable {known}{lacks}')
         for key in ("source", "to"):
             given = [str(getattr(port, key)).lower() for port in self.port if getattr(port, key)]
             for end in given:

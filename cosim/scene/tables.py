@@ -577,7 +577,7 @@ class Fmu(Table):
         pattern=r"^[A-Za-z_]\w*$",
         max_length=32,
         description="Name, by which ports call it",
-        json_schema_extra={"words": "a name of letters, digits and _, but not drive"},
+        json_schema_extra={"words": "a name of at most 32 letters, digits and _, but not drive"},
     )
     file: str = Field(
         description="Path of an FMU for co-simulation, FMI 2.0 or 3.0, relative to the scene file",
@@ -630,7 +630,7 @@ class Port(Table):
     @property
     def words(self) -> str:
         """Both ends, for messages."""
-        return f"{self.probe or self.origin} -> {self.source or self.to}"
+        return f"{self.probe or self.origin or 'nothing'} -> {self.source or self.to or 'nothing'}"
 
     @model_validator(mode="after")
     def _check(self) -> "Port":
@@ -644,6 +644,11 @@ class Port(Table):
             raise fault(
                 f"the port {self.words} must lead to one thing: from a probe to an input (to), "
                 "else to an input or to a source"
+            )
+        if self.slope != "auto" and self.origin in (None, "drive"):
+            raise fault(
+                f'the port {self.words}: slope = "{self.slope}" is for ports from an output of an '
+                "FMU; leave it out"
             )
         return self
 

@@ -1,5 +1,6 @@
 """What is wrong with a scene's ports is told in one sentence: file, key, value, what is allowed."""
 
+import os
 import re
 import zipfile
 from pathlib import Path
@@ -25,7 +26,7 @@ WRONG = {
         r"to = \"rotor\.v\" must be one of its inputs",
     ),
     "an element of a number": ('"rotor.u"', '"rotor.u[1]"', r"elements must be \[0\]"),
-    "no such FMU": ("rotor.omega", "motor.omega", r"from = \"motor\.omega\" must be a variable"),
+    "no such FMU": ("rotor.omega", "motor.omega", r"\"motor\.omega\" must .* no \[\[fmu\]\] motor"),
     "no such source": ('"Vemf"\n', '"Vemg"\n', r"bridge\.cir: .*\"Vemg\".*did you mean vemf"),
     "no source at all": ('"Vemf"\n', '"Rm"\n', r"bridge\.cir: .*\"Rm\" must be a V or I source"),
     "no such node": ('"v(gp)"', '"v(gpp)"', r"bridge\.cir: .* = \"v\(gpp\)\": .*no node gpp"),
@@ -45,10 +46,16 @@ WRONG = {
     "a line": ('to = "rotor.u"', 'to = "rotor.u"\nfeed = "line"', r"canInterpolateInputs"),
     "a feed": ('to = "rotor.u"', 'to = "rotor.u"\nfeed = "now"', r"feed = \"now\" must be one of"),
     "a slope": (
-        "scale = 0.05\n",
-        'scale = 0.05\nslope = "w"\n',
+        "scale = 0.05\n[[port]]",
+        'scale = 0.05\nslope = "w"\n[[port]]',
         r"\"w\" must be one of its outputs",
     ),
+    "a probe's slope": (
+        'to = "rotor.u"',
+        'to = "rotor.u"\nslope = "w"',
+        r"slope = \"w\" is for ports from an output",
+    ),
+    "no target": ('source = "Vemf"\n', "", r"rotor\.omega -> nothing must lead to one thing"),
     "a source twice": (
         "[coupling]",
         '[[port]]\nfrom = "rotor.y"\nsource = "vemf"\n[coupling]',
@@ -121,6 +128,67 @@ def test_what_ngspice_cannot_read_has_nothing_to_do_with_steps(tmp_path: Path) -
     with in_place(), pytest.raises(SimulationFailed, match=r"t = 0 s.*not parsed") as told:
         run(scene)
     assert "max_step" not in str(told.value)
+
+
+KIND = (
+    '<TypeDefinitions><SimpleType name="Kind"><Enumeration><Item name="a" value="1"/>'
+    '<Item name="b" value="4"/></Enumeration></SimpleType></TypeDefinitions><ModelVariables>'
+    '<ScalarVariable name="kind" valueReference="22" causality="parameter" variability="fixed">'
+    '<Enumeration declaredType="Kind" start="1"/></ScalarVariable>'
+)
+OMEGA = '"omega" valueReference="1"'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "given", "said"),
+    [
+        ('start="2e-4"', 'start="2e-4" min="0" max="1"', "J=2.0", r"J = 2\.0 must be from 0 to 1"),
+        ('start="2e-4"', 'start="2e-4" min="0"', "J=-1", r"J = -1 must be from 0 to inf"),
+        ("<ModelVariables>", KIND, "kind=2", r"kind = 2 must be one of 1, 4"),
+        ('start="2e-4"', 'start="x"', "B=1e-4", r"start, min or max of J is no number"),
+        (OMEGA, OMEGA.replace("1", "-1"), "B=1e-4", r"valueReference of omega must be from 0 to"),
+        (OMEGA, OMEGA.replace("1", f"{1 << 32}"), "B=1e-4", r"valueReference of omega must be"),
+    ],
+)
+def test_what_an_fmu_says_of_its_variables_holds(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, given: str, said: str
+) -> None:
+    scene, path = motor(tmp_path), tmp_path / "Rotor.fmu"
+    with zipfile.ZipFile(path) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    about = files["modelDescription.xml"].decode()
+    assert old in about
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in (files | {"modelDescription.xml": about.replace(old, new)}).items():
+            archive.writestr(name, content)
+    with in_place():
+        assert main(["run", str(scene), "--set", f"fmu.rotor.{given}"]) == 2
+    assert re.search(said, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("kind", ["deflated", "lzma", "a pipe", "a NUL", "too long"])
+def test_what_is_no_file_of_an_fmu_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
+) -> None:
+    scene, path = motor(tmp_path), tmp_path / "Rotor.fmu"
+    if kind == "a pipe":
+        path.unlink()
+        os.mkfifo(path)
+    elif kind in ("a NUL", "too long"):
+        name = "a\\u0000.fmu" if kind == "a NUL" else f"{'a' * 300}.fmu"
+        scene.write_text(scene.read_text().replace("Rotor.fmu", name))
+    else:
+        method = zipfile.ZIP_LZMA if kind == "lzma" else zipfile.ZIP_DEFLATED
+        with zipfile.ZipFile(path, "w", method) as archive:
+            archive.writestr("modelDescription.xml", "x" * 1000 + "".join(map(chr, range(32, 99))))
+        content = bytearray(path.read_bytes())
+        content[60:100] = bytes(each ^ 0x5A for each in content[60:100])
+        path.write_bytes(content)
+    with in_place():
+        assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err.strip()
+    assert (told.count("\n") == 0 and ".fmu: " in told) or kind == "too long"
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_crash_is_exit_code_three(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

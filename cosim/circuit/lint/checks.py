@@ -68,7 +68,13 @@ def _check_required(top: Scope, required: Sequence[Sequence[str]]) -> None:
         ways = " or ".join(
             " and ".join(name.capitalize() for name in alternative) for alternative in required
         )
-        refuse(top.line, f"the netlist must have, outside subcircuits, the sources {ways}")
+        # One port makes the circuit a scene's own, in which nothing has a role.
+        other = '; without the machine a [[port]] is needed, as from = "drive" to any source'
+        refuse(
+            top.line,
+            f"the netlist must have, outside subcircuits, the sources {ways}"
+            f"{other if required is REQUIRED else ''}",
+        )
     for scope in top.in_use():
         for element in scope.elements:
             if "external" in element.words and (scope is not top or element.name not in agreed):

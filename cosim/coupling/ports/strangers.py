@@ -17,6 +17,7 @@ import fmpy
 from fmpy import fmi2, fmi3
 
 from cosim.errors import BadInput, plain
+from cosim.files import reader
 from cosim.mechanics.fmi import INTERFACES, Interface, unit
 from cosim.scene.messages import PLAIN_NUMBER, ended, shown, suggestion
 
@@ -53,6 +54,10 @@ class Variable:
     start: tuple[float, ...]
     slope: str
     """The output that is its derivative; empty where there is none."""
+    low: float
+    high: float
+    items: tuple[int, ...]
+    """The values of an enumeration."""
 
     @property
     def real(self) -> bool:
@@ -111,17 +116,23 @@ class Stranger:
             if each.type not in kinds:
                 continue
             size = math.prod(each.shape or (1,))
+            if not 0 <= each.valueReference < 1 << 32:
+                raise self.bad(f"the valueReference of {each.name} must be from 0 to 4294967295")
+            of: Any = each.declaredType or each
             try:
                 start = tuple(_number(text) for text in str(each.start or "").split())
-            except ValueError:
-                start = ()
+                low = float(each.min or of.min or -math.inf)
+                high = float(each.max or of.max or math.inf)
+                items = tuple(int(item.value) for item in getattr(of, "items", ()))
+            except ValueError as error:
+                raise self.bad(f"start, min or max of {each.name} is no number ({error})") from None
             start = start * size if len(start) == 1 else start
             known[each.name] = Variable(
                 *(each.name, each.valueReference, each.type, kinds[each.type], size),
                 unit(each),
                 *(each.causality or "local", each.variability or "continuous"),
                 start if len(start) == size else (0.0,) * size,
-                derivatives.get(each.name, ""),
+                *(derivatives.get(each.name, ""), low, high, items),
             )
         outputs = [each for each in known.values() if each.causality == "output"]
         if sum(each.size for each in outputs) > MOST_VALUES:
@@ -233,7 +244,11 @@ def _allowed(found: Variable, value: Any, where: str, of: Stranger) -> Any:
         low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
         if not low <= value <= high:
             raise of.bad(f"{where} must be from {low} to {high}")
-        return int(value)
+        if found.items and value not in found.items:
+            raise of.bad(f"{where} must be one of {', '.join(map(str, found.items))}")
+        value = int(value)
+    if not found.low <= value <= found.high:
+        raise of.bad(f"{where} must be from {found.low:g} to {found.high:g}")
     return value
 
 
@@ -244,7 +259,7 @@ def _number(text: str) -> float:
 
 def _unpack(path: Path, folder: str, name: str) -> None:
     try:
-        with zipfile.ZipFile(path) as archive:
+        with reader.opened(path, LARGEST) as file, zipfile.ZipFile(file) as archive:
             files = archive.infolist()
             if len(files) > MOST_FILES or sum(each.file_size for each in files) > LARGEST:
                 raise BadInput(f"{name}: it unpacks to more than {MOST_FILES} files or 1 GB.")
@@ -253,9 +268,9 @@ def _unpack(path: Path, folder: str, name: str) -> None:
                 if place.is_absolute() or ".." in place.parts:
                     raise BadInput(f"{name}: it has a file outside itself, {plain(str(place))}.")
             archive.extractall(folder)
-    except FileNotFoundError:
-        raise BadInput(f"{name}: there is no such file.") from None
-    except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, ValueError) as error:
+    except BadInput:
+        raise
+    except Exception as error:  # of zipfile, and of all that it unpacks with
         raise BadInput(f"{name}: this is no FMU ({plain(str(error))}).") from None
 
 
@@ -265,6 +280,8 @@ def stranger(path: str) -> Stranger:
         about = Path(path).stat()
     except OSError as error:
         raise BadInput(f"{plain(path)}: cannot be read ({error.strerror}).") from None
+    except ValueError:  # a NUL in it
+        raise BadInput(f"{plain(path)}: it is no possible file name.") from None
     return _stranger(path, about.st_mtime_ns, about.st_size)
 
 
