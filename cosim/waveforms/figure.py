@@ -16,6 +16,7 @@ from cosim.files.spill import release
 from cosim.scene import Scene
 from cosim.trials.camera import FRAME_RATE, accelerations, heights
 from cosim.trials.measured import measured
+from cosim.waveforms.quantities import signed
 from cosim.waveforms.report import asked_for
 
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
@@ -45,7 +46,7 @@ def draw(scene: Scene, waves: dict[str, Array], numbers: dict[str, Any]) -> Pict
     # Room that was measured once: a layout engine would double the time of a short run.
     top = 1 - (0.85 if beside else 0.62) / height
     figure.subplots_adjust(
-        left=0.06, right=0.955, bottom=0.5 / height, top=top, wspace=0.29, hspace=0.4
+        left=0.067, right=0.942, bottom=0.5 / height, top=top, wspace=0.3, hspace=0.4
     )
     shown = _last_periods(scene, waves["time"])
     time = waves["time"][shown] * 1e3
@@ -118,7 +119,7 @@ def _outline(time: Array, values: Array) -> tuple[Array, Array]:
 
 def _title(scene: Scene, numbers: dict[str, Any]) -> str:
     drive = scene.drive
-    words = f"{scene.name}: part moves at {numbers['v_average'] * 1e3:+.2f} mm/s"
+    words = f"{scene.name}: part moves at {signed(numbers['v_average'] * 1e3, '+.2f')} mm/s"
     if drive.file is not None:
         return f"{words}; the surface moves as in {Path(drive.file).name}"
     if scene.surface_is_given:
@@ -217,7 +218,7 @@ def _command(axis: Axes, scene: Scene, time: Array, cut: dict[str, Array]) -> No
     # On these scales the two curves coincide where the source does what it is told.
     scale = scene.circuit.sense_resistance * scene.coil.count
     both = np.concatenate([cut["current"], cut["command"] / scale])
-    edge = 0.05 * max(np.ptp(both), 1e-9)
+    edge = max(0.05 * np.ptp(both), 0.02)
     low, high = both.min() - edge, both.max() + edge
     axis.set_ylim(low, high)
     right.set_ylim(low * scale, high * scale)
@@ -251,6 +252,7 @@ def _velocities(axis: Axes, _: Scene, time: Array, cut: dict[str, Array]) -> Non
         relative = cut["v_ram"] - cut["v_surface"]
         behind = right.plot(time, relative, color=RAM, lw=0.8, label="ram on surface (right)")
         right.set(ylabel="of the ram [m/s]")
+        _at_least(right, 0.5)
         axis.set(zorder=right.get_zorder() + 1, frame_on=False)
     for body, style in BODIES.items():
         if (velocity := cut.get(f"v_{body}")) is not None:

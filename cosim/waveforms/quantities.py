@@ -42,6 +42,12 @@ def with_unit(value: float, unit: str, digits: int = 6) -> str:
     return f"{value:.{digits}g}" + ("" if unit in ("1", "?") else f" {unit}")
 
 
+def signed(value: float, form: str) -> str:
+    """A number without its sign where rounding leaves nothing of it."""
+    text = f"{value:{form}}"
+    return text if float(text) else text.lstrip("+-")
+
+
 def label(name: str, unit: str) -> str:
     """``name [unit]``, for an axis or a table."""
     return name if unit in UNITLESS else f"{name} [{unit}]"

@@ -5,7 +5,7 @@ from typing import Any
 
 from cosim.scene import Scene
 from cosim.trials.measured import measured
-from cosim.waveforms.quantities import label
+from cosim.waveforms.quantities import label, signed
 
 
 def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str:
@@ -201,16 +201,14 @@ def _periods(scene: Scene) -> str:
 
 
 def _scaled(value: float | None, factor: float, unit: str, form: str) -> str:
-    return "" if value is None else f"{value * factor:{form}} {unit}"
+    return "" if value is None else f"{signed(value * factor, form)} {unit}"
 
 
 def _range(summary: Mapping[str, Any], name: str, factor: float, unit: str, form: str) -> str:
     low, high = summary[f"{name}_min"], summary[f"{name}_max"]
     if low is None or high is None:
         return ""
-    ends = (f"{value * factor:{form}}" for value in (low, high))
-    # No sign where rounding leaves nothing.
-    low, high = (end if float(end) else end.lstrip("+-") for end in ends)
+    low, high = (signed(value * factor, form) for value in (low, high))
     return f"{low} … {high} {unit}"
 
 

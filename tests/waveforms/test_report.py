@@ -94,6 +94,20 @@ def test_rigid_walls_have_no_peak_and_rest_no_sign() -> None:
     assert any(line.split() == ["surface", "velocity", "0", "…", "0", "mm/s"] for line in lines)
 
 
+@pytest.mark.parametrize(
+    "still", [["held"], ["paper-limited", "drive.amplitude=0", "drive.offset=0"]]
+)
+def test_a_figure_in_which_nothing_moves(still: list[str]) -> None:
+    """No label is cut off, no axis magnifies rounding, and 0 has no sign."""
+    figure = simulate(load(still[0], [*SHORT, *still[1:]])).plot()
+    figure.png()
+    assert "at 0.00 mm/s" in figure.get_suptitle()
+    for axis in figure.axes:
+        box = axis.yaxis.label.get_window_extent()
+        assert box.x0 >= 0.0 and box.x1 <= figure.bbox.x1
+        assert axis.yaxis.get_offset_text().get_text() == ""
+
+
 def test_ports_of_which_all_numbers_are_zero() -> None:
     scene = load("dc-motor")
     whats = ("mean", "rms", "least", "greatest")
