@@ -7,6 +7,7 @@ A file begins with the page, its script and, of long runs, lowest and highest va
 import json
 import re
 from base64 import b64encode
+from csv import DictReader
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from cosim.files.cells import read_cells
 from cosim.live.page import page, script_of
 from cosim.scene import load
 from cosim.waveforms import formats
+from cosim.waveforms.quantities import bench_unit, label
 from cosim.waveforms.report import table
 from cosim.waveforms.storage import LARGEST, read_netcdf, read_sweep
 
@@ -70,8 +72,11 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
         return _sweep(results)
     if (results / "compare.json").exists():
         told = _json(results / "compare.json")
-        shown, runs = _table(results / "frames.csv")
-        shown["words"] = "\n".join(f"{name}: {value}" for name, value in told.items())
+        shown, runs = _comparison(results / "frames.csv")
+        rows = DictReader(reader.read(results / "compare.csv", LARGEST).decode().splitlines())
+        units = {row["name"]: row["unit"] for row in rows}
+        words = [_told(name, value, units.get(name, "")) for name, value in told.items()]
+        shown["words"] = "\n".join(words)
         return shown | {"title": f"{told.get('run')} against {told.get('trial')}"}, runs
     tables = sorted(results.glob("*.csv")) if results.is_dir() else [results]
     if len(tables) != 1:
@@ -148,6 +153,29 @@ def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
     pictures = [p for p in path.parent.glob("*.png") if f"{p.stem}-".startswith(f"{path.stem}-")]
     content = {p.name: b64encode(reader.read(p, LARGEST)).decode() for p in sorted(pictures)}
     return {"title": path.stem, "cloud": cloud, "pictures": content}, []
+
+
+def _comparison(path: Path) -> tuple[dict[str, Any], list[Run]]:
+    """Curves of a comparison's frames; heights from their first that was measured, as in its
+    figure: a camera's zero is not the machine's."""
+    shown, runs = _table(path)
+    ((time, *curves),) = runs
+    units = {column["name"]: column["unit"] for column in shown["signals"]["columns"]}
+    found = dict(zip(units, [time, *curves], strict=True))
+    for name, values in found.items():
+        if units[name] == "m":
+            known = np.isfinite(found[name.replace("_simulated", "_measured")])
+            found[name] = values - values[np.argmax(known)]
+    runs = [[*found.values()]]
+    about = "heights from the first that was measured" if "m" in units.values() else ""
+    return {"about": about, "signals": _signals(units, runs)}, runs
+
+
+def _told(name: str, value: Any, si: str) -> str:
+    if not si or value is None:
+        return f"{name}: {value}"
+    unit, scale = bench_unit(si)
+    return f"{label(name, unit)}: {value * scale:.6g}"
 
 
 def _json(path: Path) -> dict[str, Any]:

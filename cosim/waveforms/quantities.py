@@ -53,7 +53,6 @@ def label(name: str, unit: str) -> str:
     return name if unit in UNITLESS else f"{name} [{unit}]"
 
 
-def bench_unit(quantity: str) -> tuple[str, float]:
-    """The unit in which a number of the summary is shown, and how many of it are one in SI."""
-    si = meaning(quantity)["units"]
+def bench_unit(si: str) -> tuple[str, float]:
+    """The unit in which a number with this one is shown, and how many of it are one in SI."""
     return ("mm/s", 1e3) if si == "m/s" else (si, 1.0)

@@ -10,7 +10,7 @@ import pytest
 
 import cosim
 from cosim.cli.main import main
-from cosim.live.show import BLOCK, _table, show
+from cosim.live.show import BLOCK, _comparison, _table, show
 from cosim.waveforms import formats
 from cosim.waveforms.storage import netcdf
 
@@ -131,13 +131,17 @@ def test_a_comparison_and_a_chart(tab: Any, tmp_path: Path) -> None:
         "0,nan,0.5\n0.1,-0.25,0.125\n0.2,0.75,\n",
         encoding="utf-8",
     )
-    told = {"run": "paper", "trial": MARKUP, "v_surface": 0.1}
+    told = {"run": "paper", "trial": MARKUP, "drift_error": 0.125}
     (tmp_path / "compare.json").write_text(json.dumps(told), encoding="utf-8")
+    rows = "name,value,unit,meaning\ndrift_error,0.125,m/s,less measured\n"
+    (tmp_path / "compare.csv").write_text(rows, encoding="utf-8")
     opened(tab, show(tmp_path))
     values = "() => [1, 2].map((k) => [0, 1, 2].map((row) => signals.runs[0].value(k, row)))"
     found = np.array(tab.evaluate(values), dtype=float)
     np.testing.assert_array_equal(found, [[np.nan, -0.25, 0.75], [0.5, 0.125, np.nan]])
     assert tab.locator("img").count() == 0
+    assert "drift_error [mm/s]: 125" in tab.inner_text("#words")
+    assert "drag the cursors" in tab.inner_text("footer")
 
     table = tmp_path / "mine" / "table.csv"
     table.parent.mkdir()
@@ -148,8 +152,20 @@ def test_a_comparison_and_a_chart(tab: Any, tmp_path: Path) -> None:
         *("sizemm", "gain", "sizemm"),
     ]
     assert tab.evaluate("() => cloud.chosen") == 1
+    assert "Click on a point" in (how := tab.inner_text("footer")) and "cursors" not in how
     tab.locator("#cloud canvas").press("ArrowRight")
     assert MARKUP in tab.inner_text("#cloud dl") and tab.locator("img").count() == 0
+
+
+def test_heights_of_a_comparison_are_from_the_first_that_was_measured(tmp_path: Path) -> None:
+    """As in its figure: a camera's zero is not the machine's."""
+    rows = "time [s],z_part_measured [m],z_part_simulated [m],v_part_measured [m/s]\n"
+    rows += "0,nan,2,7\n1,5,3,nan\n2,5.25,3.5,9\n"
+    (tmp_path / "frames.csv").write_text(rows, encoding="utf-8")
+    shown, ((_, *columns),) = _comparison(tmp_path / "frames.csv")
+    found = [[np.nan, 0.0, 0.25], [-1.0, 0.0, 0.5], [7.0, np.nan, 9.0]]
+    np.testing.assert_array_equal(columns, found)
+    assert [each["most"] for each in shown["signals"]["columns"]] == [0.0, 0.25, 1.0, 9.0]
 
 
 def test_columns_of_one_name_in_two_units_are_two(tmp_path: Path) -> None:

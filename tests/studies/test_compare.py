@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -349,13 +350,14 @@ def test_command_prints_and_writes_units_and_meanings(
         rows = {row["name"]: row for row in csv.DictReader(file)}
     assert set(rows) == set(numbers) - {"run", "trial", "understood", "notes"}
     said = capsys.readouterr().out
+    assert re.search(r"drift \[mm/s\] +10 ", said)
     for name, row in rows.items():
         assert float(row["value"]) == numbers[name]
         assert row["unit"] in ("mm", "%", "1", "Hz", "m/s", "1/s", "s")
         printed = name.removesuffix("_measured").removesuffix("_simulated")
         for line in ("_ceiling", "_no_motion", "_straight_line"):
             printed = printed.removesuffix(line)
-        assert f"{printed} [{row['unit']}]" in said
+        assert f"{printed} [{row['unit'].replace('m/s', 'mm/s')}]" in said
         assert row["meaning"].partition("; of")[0] in said
         assert not row["meaning"].startswith("the same")  # as which other row?
 

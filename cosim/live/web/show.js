@@ -4,9 +4,11 @@
 
 const numbersOf = (text) => new Float64Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
 
-/* What a column is for a reader: a factor, a unit, and both in words. */
+/* What a column is for a reader: a factor, a unit, and both in words. Velocities are in mm/s as in
+   what a run prints. */
 function readable({ name, unit, most }) {
-  const scaled = ["m", "m/s", "A", "V", "s", "N", "W", "J"].includes(unit) && most > 0 && most < 0.5;
+  if (unit === "m/s") return { factor: 1e3, unit: "mm/s", words: `${name}, mm/s` };
+  const scaled = ["m", "A", "V", "s", "N", "W", "J"].includes(unit) && most > 0 && most < 0.5;
   const [factor, prefix] = !scaled ? [1, ""] : most < 5e-4 ? [1e6, "µ"] : [1e3, "m"];
   const shown = prefix + (unit === "1" ? "" : unit).replace(/s2/g, "s²");
   return { factor, unit: shown, words: name + (shown && `, ${shown}`) };
@@ -211,7 +213,7 @@ class Cloud {
 
 document.title = SHOWN.title;
 for (const id of ["title", "about", "words"]) $(id).textContent = SHOWN[id];
-for (const id of ["signals", "cloud"]) $(id).hidden = !SHOWN[id];
+for (const id of ["signals", "cloud"]) $(id).hidden = $(`${id}-how`).hidden = !SHOWN[id];
 const signals = SHOWN.signals && new Signals($("signals"), SHOWN.signals);
 const cloud = SHOWN.cloud && new Cloud($("cloud"), SHOWN.cloud, (run) => {
   if (!signals || run < 0) return;

@@ -7,8 +7,10 @@ from matplotlib.lines import Line2D
 from cosim.files.picture import Picture
 from cosim.studies.compare.compare import Found
 from cosim.studies.compare.scores import R2
+from cosim.studies.plots import headline
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.figure import DRIVE, PART, SURFACE
+from cosim.waveforms.quantities import signed
 
 PANELS = (
     (("z_surface", SURFACE), ("v_surface", SURFACE)),
@@ -37,8 +39,22 @@ def draw(title: str, found: Found) -> Picture:
     kinds = (Line2D([], [], color="0.25", ls="", marker="."), Line2D([], [], color="0.25", lw=1.4))
     words = ("measured: dots", "simulated: lines, in the body's colour")
     figure.legend(kinds, words, loc="outside lower center", ncols=2)
-    figure.suptitle(title, fontsize=12)
+    headline(figure, f"{title}: {_message(found)}".replace("$", "\\$"))
     return figure
+
+
+def _message(found: Found) -> str:
+    """How far the run repeats what was measured."""
+    scores = {score.name: score.values[0] for score in found.scores}
+    numbers = {number.name: number.value for number in found.numbers}
+    said = [
+        f"explains {100.0 * share:.0f} % of the variance of the {words}"
+        for name, words in R2.values()
+        if (share := scores.get(name)) is not None
+    ][:1]
+    if (error := numbers.get("drift_error")) is not None:
+        said.append(f"misses the part's mean velocity by {signed(1e3 * error, '+.1f')} mm/s")
+    return f"the run {' and '.join(said)}" if said else "nothing to be told"
 
 
 def _panel(axis: Axes, name: str, color: str, found: Found) -> None:

@@ -22,6 +22,7 @@ from cosim.trials.recording import Recording, read_recording
 from cosim.waveforms import formats
 from cosim.waveforms.columns import UNITS
 from cosim.waveforms.formats.tracker import laid_over
+from cosim.waveforms.quantities import bench_unit
 from cosim.waveforms.result import Result
 from cosim.waveforms.storage import write_csv
 
@@ -71,7 +72,7 @@ class Comparison:
     def __repr__(self) -> str:
         found, read = self.found, self.found.recording.told()
         heads = [line.replace("_", " ") for line in LINES]
-        rows = [(f"{one.name} [{one.unit}]", one.values, one.meaning) for one in found.scores]
+        rows = [_row(one.name, one.unit, one.values, one.meaning) for one in found.scores]
         lines = [*read, *[""] * bool(read), *_table(heads, rows), *LEGEND, ""]
         numbers = {number.name: number for number in found.numbers}
         pairs, alone = [], []
@@ -79,9 +80,9 @@ class Comparison:
             quantity, _, side = name.rpartition("_")
             if side == "measured":
                 values = number.value, numbers[f"{quantity}_simulated"].value
-                pairs.append((f"{quantity} [{number.unit}]", values, number.meaning))
+                pairs.append(_row(quantity, number.unit, values, number.meaning))
             elif side != "simulated":
-                alone.append((f"{name} [{number.unit}]", (number.value,), number.meaning))
+                alone.append(_row(name, number.unit, (number.value,), number.meaning))
         lines += [*_table(["measured", "simulated"], pairs), "", *_table([], alone)]
         return "\n".join(lines + [""] * bool(found.notes) + found.notes)
 
@@ -96,7 +97,17 @@ LEGEND = (
 )
 
 
-def _table(heads: list[str], rows: list[tuple[str, tuple[float | None, ...], str]]) -> list[str]:
+Row = tuple[str, tuple[float | None, ...], str]
+"""A name with its unit, values, and their meaning."""
+
+
+def _row(name: str, si: str, values: tuple[float | None, ...], meaning: str) -> Row:
+    unit, scale = bench_unit(si)
+    told = tuple(None if value is None else value * scale for value in values)
+    return f"{name} [{unit}]", told, meaning
+
+
+def _table(heads: list[str], rows: list[Row]) -> list[str]:
     """Lines of names, values and, below each, its meaning."""
     lines = [" " * 29 + "".join(f"{head:>14}" for head in heads)] if heads else []
     for name, values, meaning in rows:

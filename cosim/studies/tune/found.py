@@ -18,7 +18,7 @@ from cosim.scene import Scene, to_toml
 from cosim.scene.tables import COMMANDS, KNOBS
 from cosim.search.turns import TURN
 from cosim.studies.tables import write_csv
-from cosim.waveforms.quantities import bench_unit, label, with_unit
+from cosim.waveforms.quantities import bench_unit, label, meaning, with_unit
 from cosim.waveforms.report import motion_in_words
 
 COLORS = ("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#8d99ae", "#6a4c93")
@@ -114,7 +114,7 @@ class Tuning:
         figure = Picture(13.0, 8.0, "constrained")
         rows: Any = figure.subfigures(2, 1)
         top, bottom = rows
-        unit, scale = bench_unit(self.quantity)
+        unit, scale = bench_unit(meaning(self.quantity)["units"])
         ylabel = label(self.quantity, unit)
         values = np.array([np.nan if run.value is None else run.value for run in self.runs]) * scale
         number = np.arange(1, len(values) + 1)
@@ -214,7 +214,7 @@ class Tuning:
 
     def __repr__(self) -> str:
         """The best settings for a reader."""
-        unit, scale = bench_unit(self.quantity)
+        unit, scale = bench_unit(meaning(self.quantity)["units"])
         ahead = f" ({self.scouts} ahead, cheaper)" if self.scouts else ""
         value = with_unit(self.value * scale, unit, 5)
         lines = [
