@@ -112,6 +112,12 @@ def _on(scene: Scene, model: str) -> Scene:
     return there.having(run={"output_step": there.run.duration / 2.0})
 
 
+TOP = (
+    "The top, full, is the schematic with the data sheet's output stage and, under a sawtooth "
+    "without reset_time, the firmware's staircase of codes: what these two make is in every error "
+    "against it. The other rungs follow the smooth command."
+)
+
 Found = Sequence[tuple[Scene, list[Rung]]]
 """Scenes with their rungs."""
 
@@ -141,10 +147,10 @@ def report(found: Found) -> Report:
     """Which circuit each scene needs, and what it costs."""
     said = [words(scene, rungs) for scene, rungs in found]
     table = [row for pair in found for row in rows(*pair)]
-    notes, figures = [f"{message(found)}.", *said], {"": partial(draw, found)}
+    notes, figures = [f"{message(found)}.", *said, TOP], {"": partial(draw, found)}
     return Report(
         "ladder", "The ladder of circuits", table, notes, {"Each rung": table}, figures,
-        "\n".join([*said, "", *markdown(table)]),
+        "\n".join([*said, TOP, "", *markdown(table)]),
     )  # fmt: skip
 
 
@@ -200,7 +206,10 @@ def draw(found: Found, path: Path) -> None:
     errors = [rung.off_top for _, rungs in found for rung in rungs]
     top = 200.0 * max(*errors, *(scene.run.tolerance for scene, _ in found))
     size = (max(3.8 * wide, 6.0), 3.4 * high + 0.6)
-    note = "Green: the cheapest rung within run.tolerance, which is shaded."
+    note = (
+        "Green: the cheapest rung within run.tolerance, which is shaded. Under a sawtooth “full” "
+        "has the firmware's staircase, the others the smooth ramp."
+    )
     figure, axes = panels(message(found), note, size, high, wide, sharex=True, sharey=True)
     for axis, (scene, rungs) in zip(axes, found, strict=False):
         tolerance, taken = scene.run.tolerance, cheapest(rungs, scene.run.tolerance)
