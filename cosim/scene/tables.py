@@ -535,7 +535,7 @@ class Run(Table):
     average: Literal["ends", "slope"] = _choice(
         "ends",
         "v_average: from end to end over the time; or the slope of the straight line through the "
-        "part's heights in the frames of a camera, as a trial's record has it",
+        "part's heights in the frames of a camera, at settle + k/960 s, as a trial's record has it",
     )
     tolerance: float = _number(
         0.01,
