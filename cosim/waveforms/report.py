@@ -196,6 +196,8 @@ def _periods(scene: Scene) -> str:
         return ""
     if abs(periods - round(periods)) < 1e-6:
         return f"{periods:.0f} period{'s' if periods > 1.5 else ''}"
+    if scene.run.average == "slope":
+        return f"{periods:.4g} periods, by the slope in a camera's frames"
     hint = "" if periods > MANY else "; whole ones give a truer mean"
     return f"{periods:.4g} periods{hint}"
 

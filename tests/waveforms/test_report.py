@@ -35,6 +35,14 @@ def test_broken_periods_are_told(overrides: list[str], told: str | None) -> None
     assert told is None or told in text
 
 
+def test_a_slope_is_read_as_that_of_a_trials_record() -> None:
+    """Over the record's own length: whole periods would be another reading."""
+    broken = ["run.duration=0.1", "run.settle=0.033", "run.average=slope"]
+    scene = load("reference", ["circuit.model=ideal", *broken])
+    text = table(scene, simulate(scene).summary, UNITS)
+    assert "1.34 periods, by the slope in a camera's frames" in text and "truer" not in text
+
+
 @pytest.mark.parametrize("more", [[], ["circuit.model=full", "drive.pwm_ripple=true"]])
 def test_a_cycle_is_one_of_the_real_command(more: list[str]) -> None:
     """As long as from one fall of V1 to the next: 66 ms where 50 ms are commanded."""

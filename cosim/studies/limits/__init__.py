@@ -19,6 +19,6 @@ STUDIES = (
         Option("--rigs", RIGS, "FILE", Path),
         *(SEED, WORKERS, DASK),
         Option("--effort", "times the runs that each search may make", "X", float, 1.0),
-        quick("a coarse search, in a fraction of the time"),
+        quick("a first look: a coarse search with a fraction of the runs, which may miss much"),
     ),
 )

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,8 @@ COLORS = {
     **{"": "0.15", "waveform": VERMILION, "heat": ORANGE, "grip": GREEN},
     **{"circuit": BLUE, "coil": PURPLE},
 }
-"""By what of the device is changed."""
+"""By what of the device is changed; the device as it is stands on top of the others."""
+MARKERS = dict(zip(COLORS, "D^svoP", strict=True))
 
 
 def drawn(study: Study) -> dict[str, Callable[[Path], None]]:
@@ -43,9 +45,9 @@ def changes(path: Path, study: Study, goal: Goal) -> None:
         "Robust: the median over errors of ±2 % in the knobs, set anew for each change on each rig "
         "that fits the trials. Dot: the median over the rigs, hollow where it is within "
         "the noise; bar: their range; cross: the scene's rig; grey band: what nine in ten "
-        "repeated searches differ by at most. Red changes the waveform, orange the heat, green the "
-        "grip, blue the circuit, purple coil or magnet. All trials that were measured have a "
-        "rising sawtooth."
+        "repeated searches differ by at most. Dark orange changes the waveform, yellow the heat, "
+        "green the grip, blue the circuit, purple coil or magnet. All trials that were measured "
+        "have a rising sawtooth."
     )
     said = in_short(every, ranges=False)
     title = f"{goal.title.capitalize()}: {said}" if said else goal.title
@@ -73,7 +75,7 @@ def changes(path: Path, study: Study, goal: Goal) -> None:
 def settings(path: Path, study: Study) -> None:
     """Acceleration against velocity of every setting that was best or robust for something."""
     note = (
-        "Each dot: a setting that is the best, or the most robust, for one goal with one change, "
+        "Each mark: a setting that is the best, or the most robust, for one goal with one change, "
         "on the identified rig. Lines: accelerations at which a sticking part slips as the surface "
         "falls; the camera's reading is a mean over 4 ms, below the instant that decides."
     )
@@ -81,12 +83,13 @@ def settings(path: Path, study: Study) -> None:
     group = {change.name: change.group for change in study.changes}
     title = "The largest acceleration does not carry the part fastest"
     figure, (axis,) = panels(title, fill(note, 125), (9.0, 5.4))
-    for name, color in COLORS.items():
+    for rank, (name, color) in enumerate(COLORS.items()):
         some = [point for key, point in points.items() if group[key[0]] == name]
         words = name or AS_IT_IS.name
         velocity = [point.v_average * 1e3 for point in some]
         reading = [point.a_camera for point in some]
-        axis.plot(velocity, reading, "o", color=color, ms=5, alpha=0.75, label=words)
+        look: dict[str, Any] = {"color": color, "marker": MARKERS[name], "ms": 5, "alpha": 0.75}
+        axis.plot(velocity, reading, ls="", zorder=3.0 - 0.1 * rank, label=words, **look)
     for way, style in (("up", "--"), ("down", ":")):
         label = f"slips, part going {way}"
         axis.axhline(-study.slips[0][way][0], color=PURPLE, lw=1.2, ls=style, label=label)
