@@ -15,6 +15,7 @@ from cosim.errors import BadInput, plain
 from cosim.live import rigs
 from cosim.scene import load, to_link
 from cosim.scene.tables import FRAME_RATE
+from cosim.toolchain.processes import Progress
 from cosim.trials.recording import GAP, read_recording
 
 _WEB = Path(__file__).with_name("web")
@@ -114,11 +115,11 @@ def _record(path: Path) -> dict[str, Any]:
     return {"name": found.name, "step": step, "waveforms": signals}
 
 
-def answer(link: str, circuit: dict[str, str]) -> dict[str, Any]:
+def answer(link: str, circuit: dict[str, str], progress: Progress) -> dict[str, Any]:
     """What ngspice has for a link of the page: mean velocity (m/s) of a second, and the waveforms
-    of its last 0.3 s or two periods, from ``begin`` on, s after the drive's phase was 0. Raises
-    CosimError."""
-    import cosim
+    of its last 0.3 s or two periods, from ``begin`` on, s after the drive's phase was 0.
+    ``progress`` is told the simulated time, s, and may end the run. Raises CosimError."""
+    from cosim.simulation.simulate import simulate
 
     scene = load(link, circuit)
     frequency, settle = scene.drive.frequency, 0.7
@@ -126,7 +127,7 @@ def answer(link: str, circuit: dict[str, str]) -> dict[str, Any]:
         raise BadInput("The server runs frequencies of 0.5 Hz and more.")
     end = settle + ceil(frequency) / frequency
     times = {"run.settle": settle, "run.duration": end, "run.output_step": 5e-5}
-    result = cosim.run(load(scene, times))
+    result = simulate(load(scene, times), progress)
     rows = result.waveforms.sel(time=slice(end - min(end, max(0.3, 2.0 / frequency)), None))
     return {
         "v_average": result.summary["v_average"],

@@ -2,6 +2,7 @@
 
 import json
 import sys
+import time
 import warnings
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -14,6 +15,9 @@ from cosim.files.link import LONGEST, is_link
 from cosim.live.page import CIRCUITS, answer, html
 
 HOST = "127.0.0.1"
+
+MOST, MOST_AWAITED = 60.0, 5.0
+"""s that a run may take: at all, and once another request waits for its end."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -83,13 +87,25 @@ class Server(ThreadingHTTPServer):
         super().__init__((HOST, 0), _Handler)
         self.address = f"http://{HOST}:{self.server_port}"
         self.one_run = Lock()
+        self.asked = 0
         Thread(target=self._warm, args=(link,), daemon=True).start()
 
     def run(self, link: str, circuit: dict[str, str]) -> dict[str, Any]:
-        """One at a time. Raises CosimError."""
+        """One at a time. Raises CosimError, also where the run takes too long."""
+        self.asked = own = self.asked + 1
         with self.one_run, warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return answer(link, circuit)
+            began = time.monotonic()
+
+            def heed(reached: float) -> None:
+                most = MOST if self.asked == own else MOST_AWAITED
+                if time.monotonic() - began > most:
+                    raise BadInput(
+                        f"The run was given up at t = {reached:.3g} s: the page gives it {MOST:g} "
+                        f"s, and {MOST_AWAITED:g} s once another one waits; cosim run has no limit."
+                    )
+
+            return answer(link, circuit, heed)
 
     def _warm(self, link: str) -> None:
         """The first run would wait for what all runs need."""

@@ -1,20 +1,29 @@
 """The page in a browser: it runs, asks nobody, and what is turned turns."""
 
+import os
+import signal
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
+from http.client import HTTPConnection
 from pathlib import Path
 from threading import Thread
 from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
+import psutil
 import pytest
 
 import cosim
 from cosim.cli.main import main
+from cosim.errors import BadInput
 from cosim.files.resources import circuits
-from cosim.live.page import opened
+from cosim.live.page import CIRCUITS, opened
 from cosim.live.server import Server
 from cosim.scene import load
+from tests.helpers import needs
 
 AMPLITUDE = """() => {
   let low = Infinity, high = -Infinity;
@@ -240,3 +249,54 @@ def test_an_own_circuit_is_run_by_the_server(tmp_path: Path) -> None:
     expected = cosim.run(load("paper", {**own, **times})).waveforms
     rows = expected.v_surface.sel(time=slice(told["begin"] - 1e-9, None)).values
     assert told["waveforms"]["v_surface"][:6000] == pytest.approx(rows[:6000], abs=1e-9)
+
+
+ENDLESS = "#scene=paper&circuit.max_step=1e-9"
+
+
+def test_an_endless_run_gives_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By itself, and sooner when another one waits, which has its answer."""
+    told: list[str] = []
+
+    def ask(server: Server) -> None:
+        with pytest.raises(BadInput) as refused:
+            server.run(ENDLESS, CIRCUITS["amplifier"])
+        told.append(str(refused.value))
+
+    monkeypatch.setattr("cosim.live.server.MOST_AWAITED", 0.5)
+    with Server(*opened("paper")) as found:
+        first = Thread(target=ask, args=(found,))
+        first.start()
+        while found.asked < 2:  # its own first one, which warms up
+            time.sleep(0.01)
+        answer = found.run("#scene=paper", CIRCUITS["amplifier"])
+        first.join()
+        monkeypatch.setattr("cosim.live.server.MOST", 0.2)
+        ask(found)
+    assert answer["v_average"] != 0.0
+    assert len(told) == 2 and all(words.startswith("The run was given up at") for words in told)
+
+
+@needs.posix
+def test_ctrl_c_ends_an_endless_run_at_once() -> None:
+    command = [sys.executable, "-m", "cosim", "live", "paper"]
+    with subprocess.Popen(
+        command, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        env=os.environ | {"BROWSER": "true"},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    ) as process:  # fmt: skip
+        try:
+            assert process.stdout is not None
+            address = process.stdout.readline().partition("/#")[0]
+            asked = HTTPConnection(address.removeprefix("http://"), timeout=30)
+            asked.request("POST", "/run/amplifier", "#scene=paper", {"Origin": address})
+            assert asked.getresponse().read().startswith(b'{"v_average":')
+            asked.request("POST", "/run/amplifier", ENDLESS, {"Origin": address})
+            time.sleep(0.3)
+            workers = psutil.Process(process.pid).children()
+            process.send_signal(signal.SIGINT)
+            _, said = process.communicate(timeout=5)
+        finally:
+            process.kill()
+    assert (process.returncode, said) == (130, "cosim: interrupted.\n")
+    assert workers and not psutil.wait_procs(workers, timeout=5)[1]
