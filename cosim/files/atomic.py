@@ -37,14 +37,15 @@ def whole(path: Path) -> Iterator[Path]:
 def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[list[Path]]:
     """Temporary paths beside ``paths`` that take their places, one right after the other, when the
     block ends well; what is ``outdated`` by them goes right before. Raises BadInput where one
-    cannot be written, or is a device or a pipe."""
+    cannot be written, or is a directory, a device or a pipe."""
     name = paths[0]
     try:
         for name in (*outdated, *paths):
             with suppress(FileNotFoundError, NotADirectoryError):
                 mode = name.stat().st_mode  # of what a link names: root could replace it in /dev
-                if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-                    raise BadInput(f"{plain(str(name))}: this is not a regular file.")
+                if not stat.S_ISREG(mode):
+                    kind = "a directory, not a file" if stat.S_ISDIR(mode) else "not a regular file"
+                    raise BadInput(f"{plain(str(name))}: this is {kind}.")
         with ExitStack() as stack:
             pairs = []
             for path in paths:

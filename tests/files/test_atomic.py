@@ -100,6 +100,19 @@ def test_no_device_or_pipe_is_replaced(linked: bool, tmp_path: Path) -> None:
     assert link.read_text() == "new" and plain.read_text() == "old"
 
 
+def test_no_directory_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is told before any other file has its new content."""
+    monkeypatch.chdir(tmp_path)
+    first, last = Path("first"), Path("last")
+    first.write_text("old")
+    last.mkdir()
+    for name in ("", ".", "..", "/", "last"):
+        with pytest.raises(BadInput, match="is a directory"), together([first, Path(name)]) as new:
+            new[0].write_text("new")
+    assert {path.name for path in tmp_path.iterdir()} == {"first", "last"}
+    assert first.read_text() == "old"
+
+
 def test_what_is_outdated_goes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A kill between two names leaves no old figure beside new numbers; a failure before leaves
     all as it was."""

@@ -457,6 +457,9 @@ def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
         (["short", "--as", "csv,tracker"], r"short: tracker needs 8 to .* 5 of this run"),
         (["rare", "--as", "mat,wav"], r"rare: wav needs a run\.output_step of at most 0.01 s"),
         (["bare", "--as", "mat,tracker"], r"bare/scene\.toml"),
+        (["lacks", "--as", "mat,tracker"], r"lacks/waveforms\.nc: tracker needs the column z_surf"),
+        (["lacks", "--as", "mat,wav"], r"lacks/waveforms\.nc: wav needs the column v_surface"),
+        (["run", "--as", "csv,mat", "--out", "full"], r"full/waveforms\.mat: this is a directory"),
         (["run", "--as", "csv", "--out", "file"], "file: this is a file"),
     ],
 )
@@ -476,6 +479,11 @@ def test_bad_input(
     (tmp_path / "garbage" / "waveforms.nc").write_bytes(b"no such thing")
     (tmp_path / "bare" / "waveforms.nc").write_bytes(whole)
     (tmp_path / "file").touch()
+    (tmp_path / "full" / "waveforms.mat").mkdir(parents=True)
+    (tmp_path / "lacks").mkdir()
+    (tmp_path / "lacks" / "scene.toml").write_bytes((run / "scene.toml").read_bytes())
+    lacks = re.sub(rb"(?<=\0\0\0\x09)(.)_surface(?=\0)", rb"\1_plinths", whole)
+    (tmp_path / "lacks" / "waveforms.nc").write_bytes(lacks)
     (tmp_path / "run").symlink_to(run)
     if arguments[0] == "short":
         make_run(tmp_path / "short", "held", "run.duration=0.01", "run.settle=0.005")

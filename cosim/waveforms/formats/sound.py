@@ -35,7 +35,7 @@ RAREST = 1e-2  # s, of the rows
 
 def write(run: Run, file: BytesIO) -> str:
     """The whole run from its beginning; half a unit of the last place is the error."""
-    machine(run, "wav")
+    machine(run, "wav", "v_surface")
     for key, value, most in (
         ("output_step", run.step, RAREST),
         ("duration", run.waveforms["time"][-1], LONGEST),

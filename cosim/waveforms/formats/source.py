@@ -62,14 +62,18 @@ def read(folder: Path) -> Run:
     return Run(folder, waveforms, units, about, written)
 
 
-def machine(run: Run, form: str) -> Scene:
-    """The scene of a run of the built-in machine; raises BadInput for another."""
+def machine(run: Run, form: str, *columns: str) -> Scene:
+    """The scene of a run of the built-in machine; raises BadInput for another, and for one that
+    lacks one of the ``columns``."""
     scene = load(run.folder / "scene.toml")
     if scene.has_ports:
         raise BadInput(
             f"{plain(str(run.folder))}: {form} needs a run of the built-in machine, not one of a "
             "scene with its own [[port]]."
         )
+    if missing := [name for name in columns if name not in run.waveforms]:
+        path = plain(str(run.folder / "waveforms.nc"))
+        raise BadInput(f"{path}: {form} needs the column {missing[0]}, which is not in it.")
     return scene
 
 

@@ -33,7 +33,7 @@ MISSING = "\ufffd"
 
 def write(run: Run, file: BytesIO) -> str:
     """Platform p, part o and spring-loaded plate s, mm, frame by frame."""
-    scene = machine(run, "tracker")
+    scene = machine(run, "tracker", "z_surface", "v_surface", "z_part", "v_part")
     start, _ = laid_over(scene)
     n = frame_count(run.waveforms, start)
     if not FEWEST_ROWS <= n <= MOST_FRAMES:
