@@ -218,6 +218,24 @@ def test_a_file_with_other_content_is_other_work(tmp_path: Path) -> None:
         assert swept() != first
 
 
+@pytest.mark.parametrize("linked", [True, False])
+def test_waveforms_stay_within_the_sweeps_folder(linked: bool, tmp_path: Path) -> None:
+    """Nothing is removed or written where a link leads, nor is the sweep run for nothing."""
+    theirs, out = tmp_path / "theirs", tmp_path / "out"
+    theirs.mkdir()
+    out.mkdir()
+    (theirs / "0.nc").write_text("theirs")
+    if linked:
+        (out / "points").symlink_to(theirs)
+    else:
+        (out / "points").write_text("theirs")
+    for keep in ([], ["z_part"]):
+        with in_place(), pytest.raises(BadInput, match="points: this is no directory of the sweep"):
+            sweep("held", {"friction.mu_s": [0.7]}, {"run.duration": 0.01}, keep=keep, out=out)
+    assert [path.read_text() for path in theirs.iterdir()] == ["theirs"]
+    assert [*out.iterdir()] == [out / "points"]
+
+
 def test_keys_with_choices_are_drawn_from_them() -> None:
     over = {"coil.polarity": [-1, 1], "drive.amplitude": [5.0, 8.0]}
     design = sample(over, 12, 0, False)

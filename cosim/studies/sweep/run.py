@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import xarray as xr
 
-from cosim.errors import BadInput, Note
+from cosim.errors import BadInput, Note, plain
 from cosim.evaluate.evaluator import Evaluator, Settings
 from cosim.evaluate.point import Number
 from cosim.mechanics import package as fmu
@@ -96,6 +96,9 @@ def _sweep(
     dask: str | None,
     progress: Callable[[int, int, int], None],
 ) -> xr.Dataset:
+    family = folder / "points"
+    if family.is_symlink() or (family.exists() and not family.is_dir()):
+        raise BadInput(f"{plain(str(family))}: this is no directory of the sweep's own; remove it.")
     made_by, units = {**versions(), "fmu": fmu.token()}, dataset.units_of(scene)
     total, numbers = len(design), dataset.Numbers(len(design))
     asked = [(axis.key.full, axis.values) for axis in design.axes], design.sample
@@ -110,7 +113,7 @@ def _sweep(
         scene, folder / STORE, *asked, whole_periods=whole_periods, workers=workers, dask=dask
     ) as bench:
         if not bench.resumed:  # what was kept there is another sweep's
-            for old in (folder / "points").glob("*.nc"):
+            for old in family.glob("*.nc"):
                 if old.stem.isdecimal():
                     old.unlink()
         before: set[int] = set()
@@ -139,7 +142,7 @@ def _sweep(
         data = refreshed()
         if keep:
             points = [n for n in range(total) if not numbers.failures[n]]
-            families.keep(folder / "points", scene, design, keep, points, bench)
+            families.keep(family, scene, design, keep, points, bench)
         return data
 
 
