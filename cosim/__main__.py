@@ -1,5 +1,19 @@
+"""The command ``cosim``, whose imports Ctrl-C ends as it ends all that follows."""
+
 import sys
 
-from cosim.cli.main import main
 
-sys.exit(main())
+def main() -> int:
+    """Run the command; returns the exit code."""
+    try:
+        from cosim.cli.main import main as command
+
+        return command()
+    except KeyboardInterrupt:
+        exec("")  # as there
+        print("cosim: interrupted.", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

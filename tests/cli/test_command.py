@@ -346,6 +346,14 @@ def test_interrupt_within_an_executed_string_is_130_too(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (130, "cosim: interrupted.\n")
 
 
+def test_interrupt_within_the_commands_imports_is_130_too(tmp_path: Path) -> None:
+    (tmp_path / "argparse.py").write_text("exec('raise KeyboardInterrupt')\n")
+    run = [*COMMAND, "scenes"]
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(run, env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "cosim: interrupted.\n")
+
+
 def test_interrupt_while_writing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
