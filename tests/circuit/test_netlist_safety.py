@@ -321,6 +321,9 @@ def test_includes_that_grow_or_circle_are_refused(tmp_path):
         (tmp_path / f"w{i}.inc").write_text(f".include w{i + 1}.inc\n" * 30)
     (tmp_path / "w8.inc").write_text("* " + "x" * 5000)
     assert "larger" in refused(put(tmp_path, "t\n.include w0.inc\n.end\n"))
+    (tmp_path / "w8.inc").write_text("* small\n")  # but read 30⁸ times
+    said = refused(put(tmp_path, "t\n.include w0.inc\n.end\n"))
+    assert "files are included more than 1000 times" in said
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,8 @@ MAX_BYTES = 4_000_000
 MAX_LINES = 100_000
 MAX_WORD = 4_000
 MAX_DEPTH = 10
+MAX_INCLUDES = 1_000
+"""A file counts as often as it is included: that doubles with each file that includes two."""
 MAX_NAMES = 1_000
 """Of files, in one file."""
 
@@ -126,6 +128,7 @@ class _Reader:
     lines: list[Line] = field(default_factory=list)
     dropped: list[Line] = field(default_factory=list)
     bytes_read: int = 0
+    includes: int = 0
 
     def deck(self) -> list[Line]:
         name = shown(self.path.name)
@@ -208,6 +211,9 @@ class _Reader:
             refuse(line, f"{shown(name)} includes itself")
         if len(opened) >= MAX_DEPTH:
             refuse(line, f"files include each other more than {MAX_DEPTH} deep")
+        self.includes += 1
+        if self.includes > MAX_INCLUDES:
+            refuse(line, f"files are included more than {MAX_INCLUDES} times")
         file = shown(path.relative_to(self.folder).as_posix())
         lines = _logical(self._text(path, line), file, 1)
         if not self._take(lines, (*opened, path), section) and section:
