@@ -3,9 +3,11 @@
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from cosim.errors import BadInput, plain
 from cosim.studies.study import Option
 
 
@@ -52,6 +54,13 @@ def add_commands(
                 add_commands(one, command.commands, asked, names)
 
 
+def _named(suffix: str, text: str) -> Path:
+    """The path of a file to write, whose name tells what it is."""
+    if Path(text).suffix.lower() != suffix:
+        raise BadInput(f'--out "{plain(text)}": must end in {suffix}.')
+    return Path(text)
+
+
 def add_options(parser: ArgumentParser, command: Command) -> None:
     """Let ``parser`` take the options of a command."""
     options = [*(command.options() if callable(command.options) else command.options)]
@@ -72,7 +81,9 @@ def add_options(parser: ArgumentParser, command: Command) -> None:
             how["const"] = not option.name.startswith("--no-")
             place.add_argument(option.name, action="store_const", **how)
             continue
-        how |= {"type": option.kind, "metavar": option.metavar, "choices": option.choices or None}
+        suffix = Path(option.metavar or "").suffix if option.name == "--out" else ""
+        kind = partial(_named, suffix) if suffix else option.kind
+        how |= {"type": kind, "metavar": option.metavar, "choices": option.choices or None}
         if option.many == "repeat":
             how["action"] = "append"
         elif option.many:

@@ -17,7 +17,7 @@ def script(parser: argparse.ArgumentParser, shell: str) -> str:
     for action in _actions(parser):
         if action.metavar == "SCENE":
             action.complete = _SCENES  # type: ignore[attr-defined]
-        elif action.type is Path:
+        elif action.type is Path or action.dest == "out":
             action.complete = shtab.FILE  # type: ignore[attr-defined]
     names = " ".join(name for name, *_ in list_scenes())
     functions: Any = {  # shtab's annotation has it as one text for all shells

@@ -18,8 +18,9 @@ def _live(
 
     link, circuits = opened(scene, overrides)
     if out is not None:
-        from cosim.files.atomic import write_text
+        from cosim.files.atomic import tidy, write_text
 
+        tidy(out.parent)
         write_text(out, html(link, record=trial))
         print(f"Written to {out}; with another setting: {out}#scene=…")
         return

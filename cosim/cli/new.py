@@ -15,7 +15,7 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
     import re
 
     from cosim.errors import BadInput, plain
-    from cosim.files.atomic import as_json, together
+    from cosim.files.atomic import as_json, tidy, together
     from cosim.files.resources import circuits
     from cosim.scene.describe import schema
     from cosim.scene.loading import list_scenes, load
@@ -61,6 +61,7 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
     texts = {path: text.replace("NAME.", f"{file.stem}.") for path, text in texts.items()}
     texts[schema_there] = as_json(schema())
     paths = [*texts, *fmus]
+    tidy(file.parent)
     with together(paths) as temporary:
         for target, text in zip(temporary, texts.values(), strict=False):
             target.write_text(text, encoding="utf-8")

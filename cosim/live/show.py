@@ -17,7 +17,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.files import reader
-from cosim.files.atomic import whole
+from cosim.files.atomic import tidy, whole
 from cosim.files.cells import read_cells
 from cosim.live.page import page, script_of
 from cosim.scene import load
@@ -45,6 +45,7 @@ def show(results: Path, out: Path | None = None) -> Path:
     given = {"title": results.name, "about": "", "words": "", "pictures": {}, "cloud": None}
     given |= {"signals": None, "block": BLOCK, "bucket": BUCKET} | shown
     code = script_of({"SHOWN": given}, ("plot.js", "show.js"))
+    tidy(path.parent)
     with whole(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         file.write(page("show.html", code, "'none'"))
         for number, run in enumerate(runs):

@@ -341,3 +341,34 @@ def test_a_file_of_another_ending_is_found(tmp_path: Path, monkeypatch: pytest.M
     (tmp_path / "heavy.toml").touch()
     for name in ("heavy", "heavy.tml"):
         assert complaint(name).endswith("did you mean heavy.toml?")
+
+
+@pytest.mark.parametrize("words", [["live"], ["show", "a.csv"], ["fmu", "ssp", "paper"]])
+@pytest.mark.parametrize("name", ["x.txt", "x", "", ".", "/"])
+def test_a_file_to_write_tells_its_kind(
+    words: list[str],
+    name: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.csv").write_text("x\n1\n", encoding="utf-8")
+    assert main([*words, "--out", name]) == 2
+    ending = ".ssp" if "ssp" in words else ".html"
+    assert capsys.readouterr().err == f'cosim: --out "{name}": must end in {ending}.\n'
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+
+
+@needs.posix
+def test_what_a_kill_left_goes_with_the_next_single_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.csv").write_text("x\n1\n", encoding="utf-8")
+    old = tmp_path / ".cosim-left.html"
+    for words in (["new", "a.toml"], ["show", "a.csv"], ["live", "paper", "--out", "a.html"]):
+        old.touch()
+        os.utime(old, (0, 0))
+        assert main(words) == 0
+        assert not old.exists()
