@@ -10,7 +10,7 @@ def main() -> int:
 
         return command()
     except KeyboardInterrupt:
-        exec("")  # as there
+        exec("")  # as cosim.cli.main tells
         print("cosim: interrupted.", file=sys.stderr)
         return 130
 

@@ -110,11 +110,11 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
                 others.append(threads.submit(mean, _steps(scene, COARSER)))
             kind = threads.submit(motion, scene, going)
             result = run()
-        except BaseException:
+            own, told = result.summary["v_average"], [other.result() for other in others]
+            found: dict[str, Any] = kind.result()
+        except BaseException:  # also while only the others run
             stopped.set()
             raise
-        own, told = result.summary["v_average"], [other.result() for other in others]
-        found: dict[str, Any] = kind.result()
     if strict:
         fine, finest, *from_elsewhere = told
         error = None if fine is None or finest is None else max(abs(own - finest), abs(own - fine))
@@ -140,21 +140,20 @@ def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
 
     longer = min(scene.coupling.macro_step * COARSER, 1e-2)
     coarse = _longer(scene, COARSER).having(coupling={"macro_step": longer})
+    told: dict[str, Any] = {}
     with ThreadPoolExecutor(1) as threads:
         other = threads.submit(one_run, few_rows(coarse), going, alone=True)
         try:
             result = run()
-        except BaseException:
+            with suppress(CosimError):
+                told = other.result().summary
+        except BaseException:  # also while only the other runs
             stopped.set()
             raise
-        try:
-            told = other.result().summary
-        except CosimError:
-            return result
     errors = {
         f"{name}_error": abs(value - told[name])
         for name, value in result.summary.items()
-        if name.endswith(".mean")
+        if name.endswith(".mean") and name in told
     }
     return replace(result, summary=result.summary | errors)
 
