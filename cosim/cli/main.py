@@ -33,12 +33,19 @@ _NO_ROOM = re.compile(
 )
 
 
+_NO_CHOICE = re.compile(r"invalid choice: '(.*)' \(choose from (.*)\)$")
+
+
 class _Parser(argparse.ArgumentParser):
     """Tells a wrong command line in one sentence, like any other bad input."""
 
     def error(self, message: str) -> NoReturn:
         for kind, words in (("int", "a whole number"), ("float", "a number")):
             message = message.replace(f"invalid {kind} value:", f"must be {words}, not")
+        if match := _NO_CHOICE.search(message):
+            from cosim.scene.messages import suggestion
+
+            message += suggestion(match[1], re.findall(r"[\w-]+", match[2]))
         raise BadInput(f"{message} (see {self.prog} --help).")
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:  # pyright: ignore

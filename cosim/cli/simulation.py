@@ -244,7 +244,8 @@ COMMANDS = (
             ),
             Option(
                 "--link",
-                "only print the setting as a link, which all commands take in place of a scene",
+                "run nothing: print SCENE with its changes as a link, which every command takes as "
+                "SCENE",
                 kind=bool,
             ),
             SHOW,

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cosim.errors import BadInput, NoEffect, plain
+from cosim.errors import BadInput, NoEffect, Note, plain
 from cosim.files import link, reader
 from cosim.files.resources import circuits, compiled_fmus
 from cosim.scene import messages, toml
@@ -90,7 +90,7 @@ def load(source: "Scene | str | os.PathLike[str]", overrides: Overrides | None =
     if changes.tables:
         layers.append(changes)
     scene = _checked(layers, base)
-    _tell_idle(scene, layers)
+    _tell_doubts(scene, layers)
     return scene
 
 
@@ -381,14 +381,17 @@ def _origins(layers: list[_Layer]) -> dict[str, tuple[int, str]]:
     return origins
 
 
-def _tell_idle(scene: Scene, layers: list[_Layer]) -> None:
-    """Warn of each key that the user changed although circuit, waveform or method ignore it.
+FAR = 300.0
+"""Times its default: a length, mass or inductance so large is likely in mm, g or mH."""
+
+
+def _tell_doubts(scene: Scene, layers: list[_Layer]) -> None:
+    """Warn of each key that the user changed although circuit, waveform or method ignore it, and of
+    lengths, masses and inductances that are likely not in SI units.
 
     Not where a later layer chose these, nor for a scene.toml, which has every key.
     """
     origins = _origins(layers)
-    if scene.has_ports:
-        return  # its keys are of another machine
     chosen = scene.rung, scene.drive.waveform, METHODS[scene.coupling.method]
     every = [k for k in keys() if k.default is not None and k.name not in KNOBS.values()]
     silent = [
@@ -397,15 +400,22 @@ def _tell_idle(scene: Scene, layers: list[_Layer]) -> None:
     ]
     for key in keys():
         rank, origin = origins.get(key.full, (-1, ""))
+        if rank < 0 or silent[rank]:
+            continue
+        given = [layer.tables.get(key.table, {}) for layer in layers[: rank + 1]]
+        values = [key.default, *(table[key.name] for table in given if key.name in table)]
+        if values[-1] == values[-2]:
+            continue
+        usual = float(key.default or 0.0) if key.unit in ("m", "kg", "H") else 0.0
+        if 0.0 < FAR * usual <= values[-1]:
+            words = f"{key.full} = {values[-1]:g} {key.unit} is far from the usual {usual:g}"
+            warnings.warn(f"{origin}: {words}; keys are in SI units.", Note, stacklevel=3)
         choices = ["circuit.model"]
         choices += ["drive.waveform"] * (key.table == "drive")
         steered = key.table == "circuit" and key.name in METHODS[scene.coupling.method].chooses
         choices += ["coupling.method"] * (steered or key.table == "coupling")
         latest = max(origins.get(choice, (-1, ""))[0] for choice in choices)
-        if rank < max(latest, 0) or silent[rank]:
-            continue
-        given = [layer.tables.get(key.table, {}) for layer in layers[: rank + 1]]
-        values = [key.default, *(table[key.name] for table in given if key.name in table)]
-        if values[-1] != values[-2] and not acts(key, *chosen):
+        ported = scene.has_ports  # whose keys are of another machine
+        if rank >= latest and not ported and not acts(key, *chosen):
             sentence = f"{origin}: {messages.idle(key, *chosen)}."
             warnings.warn(sentence, NoEffect, stacklevel=3)

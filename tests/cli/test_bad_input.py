@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import cosim
 from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.scene import Scene, keys, list_scenes, load
@@ -372,3 +373,22 @@ def test_what_a_kill_left_goes_with_the_next_single_file(
         os.utime(old, (0, 0))
         assert main(words) == 0
         assert not old.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (("tuen",), "did you mean tune? (see cosim --help)."),
+        (("chart", "limit"), "did you mean limits? (see cosim chart --help)."),
+    ],
+)
+def test_a_misspelled_command(
+    words: tuple[str, ...], hint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*words]) == 2
+    assert capsys.readouterr().err.strip().endswith(hint)
+
+
+def test_a_trial_before_its_scene(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="a table is no run; the run's folder or the scene"):
+        cosim.compare(tmp_path / "Trial.csv", tmp_path / "x")

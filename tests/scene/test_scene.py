@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.errors import BadInput, NoEffect
+from cosim.errors import BadInput, NoEffect, Note
 from cosim.mechanics import package
 from cosim.scene import RUNGS, Key, Scene, changed, keys, list_scenes, load, to_toml
 from cosim.scene.methods import METHODS
@@ -423,6 +423,14 @@ def test_keys_of_no_effect_are_told(tmp_path: Path, scene: str, change: str, why
         (said,) = [str(warning.message) for warning in caught]
         assert said.startswith(f"{origin}: {full} has no effect with circuit.model = ")
         assert said.endswith(why)
+
+
+@pytest.mark.parametrize("change", ["coil.inductance=1.3", "mechanics.travel=1.9"])
+def test_numbers_that_are_likely_not_in_si_units_are_told_once(change: str) -> None:
+    key, _, value = change.partition("=")
+    with pytest.warns(Note, match=f"{key} = {value} . is far from the usual") as caught:
+        load(load("paper-limited", [change]), {"run.settle": 1.0})
+    assert len(caught) == 1
 
 
 @pytest.mark.parametrize(

@@ -137,6 +137,11 @@ def compare(
 
     Raises BadInput for files that cannot be read, and for a run that is too short.
     """
+    if not isinstance(run, Result | Scene) and Path(run).suffix.lower() == ".csv":
+        raise BadInput(
+            f"{plain(str(run))}: a table is no run; the run's folder or the scene comes first, the "
+            "trial second."
+        )
     measured = read_recording(Path(trial), columns)
     name, waveforms, scene = _run(run, overrides, measured)
     start, period = laid_over(scene)
