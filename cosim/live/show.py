@@ -7,6 +7,7 @@ A file begins with the page, its script and, of long runs, lowest and highest va
 import json
 import re
 from base64 import b64encode
+from collections.abc import Callable
 from csv import DictReader
 from math import isfinite
 from pathlib import Path
@@ -62,23 +63,21 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
     if (results / "waveforms.nc").exists():
         found, scene = formats.read(results), load(results / "scene.toml")
         runs = [[*found.waveforms.values()]]
-        summary = results / "summary.json"
-        try:
-            words = table(scene, _json(summary), found.units)
-        except (KeyError, TypeError):
-            raise BadInput(f"{plain(str(summary))}: this is no run's whole summary.") from None
+        words = _in_words(results / "summary.json", lambda told: table(scene, told, found.units))
         told = {"title": scene.name, "about": scene.description, "words": words}
         return told | {"signals": _signals(found.units, runs)}, runs
     if (results / "sweep.nc").exists():
         return _sweep(results)
     if (results / "compare.json").exists():
-        told = _json(results / "compare.json")
         shown, runs = _comparison(results / "frames.csv")
         rows = DictReader(reader.read(results / "compare.csv", LARGEST).decode().splitlines())
-        units = {row["name"]: row["unit"] for row in rows}
-        words = [_told(name, value, units.get(name, "")) for name, value in told.items()]
-        shown["words"] = "\n".join(words)
-        return shown | {"title": f"{told.get('run')} against {told.get('trial')}"}, runs
+        units = {row.get("name"): row.get("unit") or "" for row in rows}
+
+        def words(told: dict[str, Any]) -> str:
+            shown["title"] = f"{told.get('run')} against {told.get('trial')}"
+            return "\n".join(_told(*one, units.get(one[0], "")) for one in told.items())
+
+        return shown | {"words": _in_words(results / "compare.json", words)}, runs
     tables = sorted(results.glob("*.csv")) if results.is_dir() else [results]
     if len(tables) != 1:
         names = ", ".join(path.name for path in tables) or "no table"
@@ -179,11 +178,13 @@ def _told(name: str, value: Any, si: str) -> str:
     return f"{label(name, unit)}: {value * scale:.6g}"
 
 
-def _json(path: Path) -> dict[str, Any]:
+def _in_words(path: Path, words: Callable[[dict[str, Any]], str]) -> str:
+    """What ``words`` makes of a file of results. Raises BadInput where anything in it is not what
+    such a file has."""
     try:
-        return dict(json.loads(reader.read(path, LARGEST)))
-    except (ValueError, TypeError):
-        raise BadInput(f"{plain(str(path))}: this is no whole JSON file.") from None
+        return words(dict(json.loads(reader.read(path, LARGEST))))
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
+        raise BadInput(f"{plain(str(path))}: this is no whole file of results.") from None
 
 
 def _column(name: str, unit: str, values: list[Any], text: str = "") -> dict[str, Any]:

@@ -144,7 +144,13 @@ def read_sweep(folder: Path) -> "xr.Dataset":
     content = BytesIO(reader.read(path, LARGEST))
     try:
         data = xr.load_dataset(content, engine="scipy")
-        data["failure"]
+        grid, said = {*data["failure"].dims}, [data.attrs["title"]]
+        for name, each in data.variables.items():
+            said += [each.attrs.get(key, "") for key in ("units", "long_name")]
+            if not grid.issuperset(each.dims):
+                raise ValueError(f"{name} has other points")
+        if not grid or not all(isinstance(text, str) for text in said):
+            raise ValueError("there are no points, or no words for their numbers")
     except Exception as error:  # there is little that scipy does not raise on a damaged file
         raise BadInput(f"{plain(str(path))}: not a whole sweep ({plain(str(error))}).") from None
     return data

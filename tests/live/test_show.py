@@ -2,17 +2,23 @@
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
 
 import cosim
 from cosim.cli.main import main
 from cosim.live.show import BLOCK, _comparison, _table, show
 from cosim.waveforms import formats
 from cosim.waveforms.storage import netcdf
+from tests.helpers.examples import examples
 
 MARKUP = "</script><img src=x onerror=alert(1)><b>bold</b>"
 DRAWN = "() => document.readyState === 'complete'"
@@ -208,3 +214,59 @@ def test_what_cannot_be_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         told = capsys.readouterr().err
         assert said in told and told.startswith("cosim: ") and told.count("\n") == 1
     assert not list(tmp_path.rglob("*.html"))
+
+
+# --- what somebody has changed ---------------------------------------------------
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda each: st.lists(each, max_size=3) | st.dictionaries(st.text(max_size=3), each),
+    max_leaves=4,
+)
+
+
+@examples(60)
+@given(data=st.data())
+def test_a_summary_that_somebody_has_changed(run: Path, data: st.DataObject) -> None:
+    whole = json.loads((run / "summary.json").read_text())
+    changed = whole | data.draw(st.dictionaries(st.sampled_from([*whole]), JSON, min_size=1))
+    for name in data.draw(st.lists(st.sampled_from([*whole]), max_size=2)):
+        changed.pop(name, None)
+    with TemporaryDirectory() as place:
+        folder = Path(place) / "run"
+        shutil.copytree(run, folder)
+        (folder / "summary.json").write_text(json.dumps(changed))
+        assert main(["show", str(folder), "--out", str(folder / "page.html")]) in (0, 2)
+
+
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sweep")
+    over = {"drive.amplitude": [3.0, 4.0], "drive.frequency": [20.0, 30.0]}
+    cosim.sweep("paper-limited", over, {"run.duration": 0.1}, out=folder)
+    return folder
+
+
+CHANGES: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
+    "other points": lambda data: data.assign(v_average=("other", np.zeros(5))),
+    "no points": lambda data: data.drop_vars("failure").assign(failure=1.0),
+    "an own axis": lambda data: data.drop_vars("amplitude").assign(amplitude=("x", np.zeros(5))),
+    "numbers for a unit": lambda data: data.assign(
+        v_average=data.v_average.assign_attrs(units=[1, 2])
+    ),
+    "no title": lambda data: data.assign_attrs(title=3.0),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_sweep_that_somebody_has_changed(
+    sweep: Path, change: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "sweep.nc"
+    data = xr.load_dataset(sweep / "sweep.nc", engine="scipy")
+    CHANGES[change](data).to_netcdf(path, engine="scipy")
+    assert main(["show", str(tmp_path)]) == 2
+    assert main(["export", str(tmp_path), "--as", "csv"]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 2 and all(f"{path}: not a whole sweep (" in line for line in said)
+    assert [each.name for each in tmp_path.iterdir()] == ["sweep.nc"]
