@@ -73,11 +73,11 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
         rows = DictReader(reader.read(results / "compare.csv", LARGEST).decode().splitlines())
         units = {row.get("name"): row.get("unit") or "" for row in rows}
 
-        def words(told: dict[str, Any]) -> str:
+        def in_words(told: dict[str, Any]) -> str:
             shown["title"] = f"{told.get('run')} against {told.get('trial')}"
             return "\n".join(_told(*one, units.get(one[0], "")) for one in told.items())
 
-        return shown | {"words": _in_words(results / "compare.json", words)}, runs
+        return shown | {"words": _in_words(results / "compare.json", in_words)}, runs
     tables = sorted(results.glob("*.csv")) if results.is_dir() else [results]
     if len(tables) != 1:
         names = ", ".join(path.name for path in tables) or "no table"
