@@ -47,8 +47,8 @@ class Quantity:
 V_AVERAGE = Quantity("v_average", "Mean velocity of the part", "mm/s", 1e3)
 OTHERS = (
     Quantity("stick_fraction", "Sticking, share of the time", "%", 100.0),
+    Quantity("a_camera_min", "Largest fall of the surface, read by a camera", "m/s²", -1.0),
     Quantity("a_camera_max", "Peak acceleration upwards, read by a camera", "m/s²", 1.0),
-    Quantity("a_surface_max", "Peak acceleration upwards, true", "m/s²", 1.0),
 )
 
 
@@ -61,18 +61,18 @@ def draw(data: xr.Dataset, title: str) -> Picture:
         headline(figure, f"{title}: {_own(figure, data, swept(data))}, {words}")
         return figure
     if POINT in data.dims:
-        _scatters(figure, data, swept(data))
+        words += _scatters(figure, data, swept(data))
     else:
         names = [str(name) for name in data.dims]
         varied = [name for name in names if data.sizes[name] > 1] or names[:1]
         if len(varied) == 1:
             _curves(figure, data.squeeze([n for n in names if n != varied[0]]), varied[0])
         else:
-            _maps(figure, data, varied)
+            words += _maps(figure, data, varied)
     if len(data.squeeze().dims) > 1:
         words += f"; hatched: the part stays (below {STAYS * 1e3:g} mm/s)"
         if POINT not in data.dims:
-            words += "; dots: rugged, neighbours tell nothing of it"
+            words += "; dots: neighbours tell nothing of it"
     best = [
         f"fastest {way}, {data['v_average'].values.ravel()[place] * 1e3:+.3g} mm/s, at "
         f"{at(data, place, 4)}"
@@ -114,8 +114,7 @@ def _row(rows: Any, number: int, count: int) -> list[Axes]:
 
 
 def _others(data: xr.Dataset) -> list[Quantity]:
-    """The quantities beside the velocity that there are: rigid walls have no peak, and the fast
-    solver knows none."""
+    """The quantities beside the velocity that there are: short runs have no frames of a camera."""
     return [one for one in OTHERS if np.isfinite(_values(data, one).values).any()]
 
 
@@ -152,8 +151,9 @@ def _are_decades(values: Array) -> bool:
     return bool(len(steps) > 2 and values.max() > 20.0 * values.min() and np.ptp(steps) < 0.2)
 
 
-def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
-    """Two keys span the maps; a third gives slices; any further one stands at the best point."""
+def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> str:
+    """Two keys span the maps; a third gives slices; any further one stands at the best point. What
+    of the sweep is not shown, in words."""
     known = _values(data, V_AVERAGE).fillna(-np.inf)
     best: Any = known.argmax(known.dims)
     *fixed, third, y, x = ["", *names] if len(names) == 2 else names
@@ -190,14 +190,19 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
     for axis, quantity in others:
         norm = _one_sided(_values(here, quantity).values, quantity.unit)
         _head(axis, quantity, _map(axis, here, quantity, x, y, "viridis", norm))
+    left = f"; at {', '.join(said)} alone" if said else ""
+    if third and len(slices) < data.sizes[third]:
+        left += f"; drawn at {len(slices)} of {data.sizes[third]} {data[third].key}"
     said += [_setting(here, third)] if third else []
     if said and others:
         axis, quantity = others[0]
         axis.set_title(f"{quantity.title}\nat {', '.join(said)}", loc="left", fontsize=10.5)
+    return left
 
 
-def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
-    """The velocity over each key, and three quantities over the first two keys."""
+def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> str:
+    """The velocity over the first keys, and three quantities over the first two. What of the keys
+    is not shown, in words."""
     rows = figure.subfigures(2, 1)
     v = _values(data, V_AVERAGE).values
     norm = _two_sided(v)
@@ -209,7 +214,7 @@ def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
         axis.axhline(0.0, color="0.3", lw=0.8)
     top[0].set_ylabel(f"{V_AVERAGE.title} [mm/s]")
     if len(names) < 2:
-        return
+        return ""
     x, y = data[names[0]].values, data[names[1]].values
     shown_there = [V_AVERAGE, *(one for one in _others(data) if one is not OTHERS[0])]
     for axis, quantity in zip(_row(rows, 1, len(shown_there)), shown_there, strict=True):
@@ -222,6 +227,8 @@ def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> None:
         axis.plot(x[failed], y[failed], **FAILED)
         _name_axes(axis, data, names[0], names[1])
         _head(axis, quantity, shown)
+    rest = [data[name].key for name in names[MOST_SLICES:]]
+    return f"; not drawn over {', '.join(rest)}" if rest else ""
 
 
 def _over_key(axis: Axes, data: xr.Dataset, name: str) -> None:
