@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cosim
 from cosim.files.picture import Picture
+from cosim.studies.plots import headline
 
 PANELS = {
     "dc-motor": (("gear.speed", 1.0, "rotor [rad/s]"), ("i(Vemf)", 1.0, "current [A]")),
@@ -34,7 +35,11 @@ def main() -> None:
     heights = [targets[0], targets[1], targets[1]]
     panels[0, 2].step([0.0, change, end], heights, "k:", where="post", label="asked for")
     panels[0, 2].legend(loc="lower right", frameon=False)
-    figure.suptitle("Three circuits in ngspice, each with the mechanics of its own FMUs")
+    headline(
+        figure,
+        "Circuits drive FMUs of their own: friction holds a motor's gear until the bridge turns, a "
+        "relay bounces, a grip brings its part to the height asked for",
+    )
     figure.write(Path("results/ports.png"))
 
 

@@ -17,6 +17,7 @@ from cosim.files.picture import Picture
 from cosim.scene import Scene, to_toml
 from cosim.scene.tables import COMMANDS, KNOBS
 from cosim.search.turns import TURN
+from cosim.studies.plots import headline
 from cosim.studies.tables import write_csv
 from cosim.waveforms.quantities import bench_unit, label, meaning, with_unit
 from cosim.waveforms.report import motion_in_words
@@ -141,12 +142,14 @@ class Tuning:
             low, high = (np.nan if value is None else value * scale for value in row)
             heights = [low, self.value * scale, high]
             turn_axis.plot(turns, heights, color=color, ls=style, marker="o", ms=4, label=key)
-        turn_axis.axhline(self.value * scale, color="0.7", lw=0.9)
         turned = "turned by [% of the key's range]"
         turn_axis.set(xlabel=turned, ylabel=ylabel, xlim=1.1 * turns[[0, -1]])
         turn_axis.set_title(self.robustness.capitalize(), loc="left", fontsize=10.5)
         if self.neighbours:
+            turn_axis.axhline(self.value * scale, color="0.7", lw=0.9)
             turn_axis.legend(fontsize=8.5)
+        else:
+            turn_axis.set_axis_off()
 
         keys = list(self.ranges)[:MOST_KEYS]
         for axis, key in zip(np.atleast_1d(bottom.subplots(1, len(keys))), keys, strict=True):
@@ -161,11 +164,15 @@ class Tuning:
             if axis.get_label() != "<colorbar>":
                 axis.grid(alpha=0.25)
         best = with_unit(self.value * scale, unit, 4)
-        figure.suptitle(
+        where = [
+            f"{key} = {with_unit(value, numeric_key(key).unit, 4)}"
+            for key, value in self.best.values.items()
+        ]
+        headline(
+            figure,
             f"{self.scene.name}{self.waveform and f', {self.waveform}'}: "
-            f"{'robust ' * self.robust}{self.quantity} {best} after {len(values)} runs"
-            + (f", and {self.scouts} ahead, cheaper" if self.scouts else ""),
-            fontsize=12,
+            f"{'robust ' * self.robust}{self.quantity} {best} at {', '.join(where[:MOST_KEYS])}\n"
+            f"{len(values)} runs" + (f", and {self.scouts} ahead, cheaper" if self.scouts else ""),
         )
         return figure
 
