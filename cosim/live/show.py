@@ -75,7 +75,9 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
 
         def in_words(told: dict[str, Any]) -> str:
             shown["title"] = f"{told.get('run')} against {told.get('trial')}"
-            return "\n".join(_told(*one, units.get(one[0], "")) for one in told.items())
+            plainly = [one for one in told.items() if not isinstance(one[1], dict | list)]
+            notes = map(str, told.get("notes", []))
+            return "\n".join([*(_told(*one, units.get(one[0], "")) for one in plainly), *notes])
 
         return shown | {"words": _in_words(results / "compare.json", in_words)}, runs
     tables = sorted(results.glob("*.csv")) if results.is_dir() else [results]
