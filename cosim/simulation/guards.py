@@ -127,7 +127,7 @@ def _ram(scene: Scene, columns: Mapping[str, Array], surface: str) -> Iterator[s
     body = columns[f"z_surface{surface}"]
     # In direct drive the reaction body stands where the surface is at rest.
     ram = columns.get(f"z_ram{surface}")
-    low, high = _range(body, ram, body[0])
+    low, high = _range(body, ram, body[0] - mechanics.initial_lift)
     moving = "surface" if ram is None else "second ram" if surface else "ram"
     deep = max(high, -low) - mechanics.travel
     if deep > SHALLOW * mechanics.travel:

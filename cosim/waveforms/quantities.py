@@ -37,9 +37,19 @@ def meaning(name: str, units: Mapping[str, str] | None = None) -> dict[str, str]
     return {"units": found.unit, "long_name": found.text}
 
 
+_PRINTED = {"N/m1.5": "N/m^1.5", "N.s/m": "N·s/m", "m/s2": "m/s²", "Ohm": "Ω"} | {
+    f"{one}/m{power}": f"{one}/m{sign}" for one in "1N" for power, sign in (("2", "²"), ("3", "³"))
+}
+
+
+def printed(unit: str) -> str:
+    """A unit of a file, as people write it."""
+    return _PRINTED.get(unit, unit)
+
+
 def with_unit(value: float, unit: str, digits: int = 6) -> str:
     """``number unit``; a plain number has no unit."""
-    return f"{value:.{digits}g}" + ("" if unit in ("1", "?") else f" {unit}")
+    return f"{value:.{digits}g}" + ("" if unit in ("1", "?") else f" {printed(unit)}")
 
 
 def signed(value: float, form: str) -> str:
@@ -50,7 +60,7 @@ def signed(value: float, form: str) -> str:
 
 def label(name: str, unit: str) -> str:
     """``name [unit]``, for an axis or a table."""
-    return name if unit in UNITLESS else f"{name} [{unit}]"
+    return name if unit in UNITLESS else f"{name} [{printed(unit)}]"
 
 
 def bench_unit(si: str) -> tuple[str, float]:

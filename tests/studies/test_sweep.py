@@ -377,3 +377,22 @@ def test_a_sweep_in_other_programs_forms(
     assert found.stick_fraction.tolist() == data.stick_fraction.values.ravel().tolist()
     assert main(["export", str(tmp_path), "--as", "wav"]) == 2
     assert 'of a sweep "wav" must be one of csv, parquet, mat' in capsys.readouterr().err
+
+
+def test_a_figure_of_four_keys_says_what_it_leaves_out() -> None:
+    """Of the second key some slices, the best point's among them; the first at one value alone."""
+    keys = {"a": 2, "b": 6, "c": 2, "d": 2}
+    v = np.full(tuple(keys.values()), 0.001)
+    v[1, 2, 0, 1] = 0.02
+    data = xr.Dataset(
+        {"v_average": (tuple(keys), v), "failure": (tuple(keys), np.full(v.shape, ""))},
+        {
+            name: (name, np.arange(n), {"key": f"t.{name}", "units": "1"})
+            for name, n in keys.items()
+        },
+        {"title": "four"},
+    )
+    drawn = figure.draw(data, "four")
+    said = drawn.get_suptitle().replace("\n", " ")
+    assert "; at t.a = 1 alone; drawn at 4 of 6 t.b" in said
+    assert "at t.b = 2" in {axis.get_title("left") for axis in drawn.axes}

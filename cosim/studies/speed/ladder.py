@@ -166,7 +166,7 @@ def rows(scene: Scene, rungs: list[Rung]) -> list[Row]:
             "v_average [mm/s]": rung.v_average * 1e3,
             "off the amplifier [%]": 100.0 * rung.off_amplifier,
             "off the top [%]": 100.0 * rung.off_top,
-            "peak downward acceleration [m/s2]": rung.fall,
+            "peak downward acceleration [m/s²]": rung.fall,
         }
         for rung in rungs
     ]

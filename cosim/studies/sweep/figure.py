@@ -48,7 +48,7 @@ V_AVERAGE = Quantity("v_average", "Mean velocity of the part", "mm/s", 1e3)
 OTHERS = (
     Quantity("stick_fraction", "Sticking, share of the time", "%", 100.0),
     Quantity("a_camera_min", "Largest fall of the surface, read by a camera", "m/s²", -1.0),
-    Quantity("a_camera_max", "Peak acceleration upwards, read by a camera", "m/s²", 1.0),
+    Quantity("a_surface_max", "Peak acceleration upwards, true", "m/s²", 1.0),
 )
 
 
@@ -114,7 +114,8 @@ def _row(rows: Any, number: int, count: int) -> list[Axes]:
 
 
 def _others(data: xr.Dataset) -> list[Quantity]:
-    """The quantities beside the velocity that there are: short runs have no frames of a camera."""
+    """The quantities beside the velocity that there are: rigid walls have no peak, and the fast
+    solver knows none."""
     return [one for one in OTHERS if np.isfinite(_values(data, one).values).any()]
 
 
@@ -169,6 +170,8 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> str:
         moving = _moving(data, third)
         count = min(MOST_SLICES, len(moving))
         places = np.unique(np.linspace(0, len(moving) - 1, count).round().astype(int))
+        if (top := int(best[third])) in moving:  # the best point is in one that is shown
+            places[np.abs(places - moving.index(top)).argmin()] = moving.index(top)
         slices = [data.isel({third: moving[k]}) for k in places.tolist()]
         here = data.isel({third: int(best[third])})
         rows = figure.subfigures(2, 1)

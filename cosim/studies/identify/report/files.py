@@ -220,8 +220,6 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
 
 def _with_unit(name: str) -> str:
     (unit,) = (key.unit for key in keys() if key.full == name)
-    for plain, raised in (("1.5", "^1.5"), ("2", "²"), ("3", "³")):
-        unit = unit.replace(plain, raised)
     return label(name, unit)
 
 
