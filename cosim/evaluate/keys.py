@@ -1,9 +1,10 @@
 """The keys of a scene that a study may change."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 from cosim.errors import BadInput, plain
-from cosim.scene import Key, keys
+from cosim.scene import Key, Scene, changed, keys
 from cosim.scene.messages import ended, suggestion
 from cosim.scene.tables import LEVEL_KEY, PARAM_KEY
 
@@ -41,3 +42,35 @@ def split(options: Sequence[str], form: str) -> Iterator[tuple[str, str, str]]:
             raise BadInput(f"--over {plain(name)}: this key is given twice.")
         names.add(name)
         yield text, name, right
+
+
+def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
+    """Raise BadInput where one of the keys ``table.key`` is no ``.param`` of the scene's netlist,
+    or no parameter of its FMUs."""
+    own = [name for name in names if name.startswith(("circuit.param.", "fmu."))]
+    if not own:
+        return
+    # What only such a scene needs is imported here, since it takes a while.
+    from cosim.circuit.joined import own_parameters
+    from cosim.circuit.lint.deck import read
+    from cosim.circuit.lint.elements import parse
+    from cosim.circuit.netlist import path_of
+    from cosim.simulation.elsewhere import bounds
+    from cosim.toolchain.processes import isolated
+
+    scene = changed(scene, dict.fromkeys(own, 0.0), "--over")
+    if scene.circuit.param and scene.rung.ngspice:
+        path = path_of(scene)
+        own_parameters(parse(read(path)), plain(str(path)), scene.circuit.param)
+    files = {fmu.name: fmu.file for fmu in scene.fmu}
+    asked = [(files[name.split(".")[1]], name) for name in own if name.startswith("fmu.")]
+    if asked:
+        isolated(_known, asked, lambda _: None, bounds(scene))
+
+
+def _known(asked: Sequence[tuple[str, str]], progress: Any) -> None:
+    """Of an FMU's file and a key that is to be a parameter of it."""
+    from cosim.coupling.ports.strangers import stranger
+
+    for file, name in asked:
+        stranger(file).settable(name.split(".", 2)[2], f"--over {plain(name)}")

@@ -4,7 +4,7 @@ import json
 import os
 import stat
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from shutil import rmtree
@@ -70,6 +70,13 @@ def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[l
         if "embedded null" not in str(error):
             raise
         raise BadInput(f"{plain(str(name))}: it is no possible file name.") from None
+
+
+def write_all(files: Mapping[Path, bytes]) -> None:
+    """Write files, all or none. Raises BadInput as :func:`together`."""
+    with together([*files]) as temporary:
+        for path, content in zip(temporary, files.values(), strict=True):
+            path.write_bytes(content)
 
 
 @contextmanager

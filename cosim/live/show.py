@@ -7,7 +7,8 @@ A file begins with the page, its script and, of long runs, lowest and highest va
 import json
 import re
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from csv import DictReader
 from math import isfinite
 from pathlib import Path
@@ -63,7 +64,8 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
     if (results / "waveforms.nc").exists():
         found, scene = formats.read(results), load(results / "scene.toml")
         runs = [[*found.waveforms.values()]]
-        words = _in_words(results / "summary.json", lambda told: table(scene, told, found.units))
+        with _whole_results(results / "summary.json") as summary:
+            words = table(scene, summary, found.units)
         told = {"title": scene.name, "about": scene.description, "words": words}
         return told | {"signals": _signals(found.units, runs)}, runs
     if (results / "sweep.nc").exists():
@@ -72,14 +74,12 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
         shown, runs = _comparison(results / "frames.csv")
         rows = DictReader(reader.read(results / "compare.csv", LARGEST).decode().splitlines())
         units = {row.get("name"): row.get("unit") or "" for row in rows}
-
-        def in_words(told: dict[str, Any]) -> str:
-            shown["title"] = f"{told.get('run')} against {told.get('trial')}"
+        with _whole_results(results / "compare.json") as told:
             plainly = [one for one in told.items() if not isinstance(one[1], dict | list)]
-            notes = map(str, told.get("notes", []))
-            return "\n".join([*(_told(*one, units.get(one[0], "")) for one in plainly), *notes])
-
-        return shown | {"words": _in_words(results / "compare.json", in_words)}, runs
+            lines = [_told(*one, units.get(one[0], "")) for one in plainly]
+            shown["words"] = "\n".join([*lines, *map(str, told.get("notes", []))])
+            shown["title"] = f"{told.get('run')} against {told.get('trial')}"
+        return shown, runs
     tables = sorted(results.glob("*.csv")) if results.is_dir() else [results]
     if len(tables) != 1:
         names = ", ".join(path.name for path in tables) or "no table"
@@ -180,11 +180,12 @@ def _told(name: str, value: Any, si: str) -> str:
     return f"{label(name, unit)}: {value * scale:.6g}"
 
 
-def _in_words(path: Path, words: Callable[[dict[str, Any]], str]) -> str:
-    """What ``words`` makes of a file of results. Raises BadInput where anything in it is not what
-    such a file has."""
+@contextmanager
+def _whole_results(path: Path) -> Iterator[dict[str, Any]]:
+    """What a file of results holds. Raises BadInput where that, or what the block makes of it, is
+    not what such a file has."""
     try:
-        return words(dict(json.loads(reader.read(path, LARGEST))))
+        yield dict(json.loads(reader.read(path, LARGEST)))
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
         raise BadInput(f"{plain(str(path))}: this is no whole file of results.") from None
 

@@ -3,21 +3,17 @@
 What only the worker needs is not imported here, since it takes a while.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from cosim.arrays import Array
-from cosim.circuit.joined import own_parameters
-from cosim.circuit.lint.deck import named, read
-from cosim.circuit.lint.elements import parse
-from cosim.circuit.netlist import path_of
-from cosim.errors import plain
+from cosim.circuit.lint.deck import named
 from cosim.files import spill
 from cosim.files.resources import circuits
 from cosim.files.spill import Packed, place
-from cosim.scene import Scene, changed
+from cosim.scene import Scene
 from cosim.toolchain import fence
 from cosim.toolchain.libraries import ngspice_library
 from cosim.toolchain.processes import Bounds, ProcessLost, Progress, end_idle, in_a_worker, isolated
@@ -42,30 +38,6 @@ def one_run(scene: Scene, progress: Progress, fmi_version: int = 3, alone: bool 
         ) from None
     progress(scene.run.duration)
     return Result(scene, *ran)
-
-
-def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
-    """Raise BadInput where one of the keys ``table.key`` is no ``.param`` of the scene's netlist,
-    or no parameter of its FMUs."""
-    own = [name for name in names if name.startswith(("circuit.param.", "fmu."))]
-    if not own:
-        return
-    scene = changed(scene, dict.fromkeys(own, 0.0), "--over")
-    if scene.circuit.param and scene.rung.ngspice:
-        path = path_of(scene)
-        own_parameters(parse(read(path)), plain(str(path)), scene.circuit.param)
-    files = {fmu.name: fmu.file for fmu in scene.fmu}
-    asked = [(files[name.split(".")[1]], name) for name in own if name.startswith("fmu.")]
-    if asked:
-        isolated(_known, asked, lambda _: None, bounds(scene))
-
-
-def _known(asked: Sequence[tuple[str, str]], progress: Progress) -> None:
-    """Of an FMU's file and a key that is to be a parameter of it."""
-    from cosim.coupling.ports.strangers import stranger
-
-    for file, name in asked:
-        stranger(file).settable(name.split(".", 2)[2], f"--over {plain(name)}")
 
 
 @contextmanager

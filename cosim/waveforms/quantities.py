@@ -37,8 +37,9 @@ def meaning(name: str, units: Mapping[str, str] | None = None) -> dict[str, str]
     return {"units": found.unit, "long_name": found.text}
 
 
-_PRINTED = {"N/m1.5": "N/m^1.5", "N.s/m": "N·s/m", "m/s2": "m/s²", "Ohm": "Ω"} | {
-    f"{one}/m{power}": f"{one}/m{sign}" for one in "1N" for power, sign in (("2", "²"), ("3", "³"))
+_PRINTED = {
+    **{"m/s2": "m/s²", "1/m2": "1/m²", "N/m2": "N/m²", "N/m3": "N/m³"},
+    **{"N/m1.5": "N/m^1.5", "N.s/m": "N·s/m", "Ohm": "Ω"},
 }
 
 

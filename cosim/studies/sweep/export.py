@@ -4,7 +4,7 @@ from io import BytesIO
 from pathlib import Path
 
 from cosim.errors import BadInput, plain
-from cosim.files.atomic import together
+from cosim.files.atomic import write_all
 from cosim.waveforms.formats.matlab import legal
 from cosim.waveforms.quantities import UNITLESS
 from cosim.waveforms.storage import read_sweep
@@ -48,7 +48,5 @@ def export(folder: Path, lists: list[str], out: Path) -> dict[str, str]:
                 frame.to_parquet(file, index=False)
             except ImportError:
                 raise BadInput("--as parquet needs the package pyarrow: install it.") from None
-    with together([out / f"sweep.{name}" for name in names]) as temporary:
-        for path, file in zip(temporary, files.values(), strict=True):
-            path.write_bytes(file.getvalue())
+    write_all({out / f"sweep.{name}": file.getvalue() for name, file in files.items()})
     return {f"sweep.{name}": note for name in names}

@@ -13,11 +13,11 @@ import xarray as xr
 
 from cosim.errors import BadInput, Note, plain
 from cosim.evaluate.evaluator import Evaluator, Settings
+from cosim.evaluate.keys import refuse_unknown
 from cosim.evaluate.point import Number
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
-from cosim.simulation.elsewhere import refuse_unknown
 from cosim.studies.sweep import dataset, families
 from cosim.studies.sweep.design import Design, grid, sample
 from cosim.toolchain.versions import versions

@@ -13,7 +13,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, Note, SimulationFailed, plain
 from cosim.evaluate.evaluator import Evaluator, Settings
-from cosim.evaluate.keys import FREQUENCIES, numeric_key
+from cosim.evaluate.keys import FREQUENCIES, numeric_key, refuse_unknown
 from cosim.evaluate.point import Number, Outcome, in_whole_periods
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
@@ -25,7 +25,6 @@ from cosim.search.known import Known
 from cosim.search.protocol import Feasible
 from cosim.search.turns import TURN, faces, turned
 from cosim.simulation.checks import motion
-from cosim.simulation.elsewhere import refuse_unknown
 from cosim.simulation.fidelity import Fidelity
 from cosim.studies.tune.families import family, most_heat
 from cosim.studies.tune.found import Run, Tuning, write_runs

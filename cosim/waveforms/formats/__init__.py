@@ -10,7 +10,7 @@ from io import BytesIO
 from pathlib import Path
 
 from cosim.errors import BadInput, plain
-from cosim.files.atomic import together
+from cosim.files.atomic import write_all
 from cosim.files.declared import modules
 from cosim.waveforms.formats.source import Format, Run, read
 
@@ -44,7 +44,5 @@ def export(run: Run, names: list[str], out: Path) -> dict[str, str]:
     """
     made = {formats()[name].file: BytesIO() for name in names}
     notes = [formats()[name].write(run, made[formats()[name].file]) for name in names]
-    with together([out / name for name in made]) as temporary:
-        for path, file in zip(temporary, made.values(), strict=True):
-            path.write_bytes(file.getvalue())
+    write_all({out / name: file.getvalue() for name, file in made.items()})
     return dict(zip(made, notes, strict=True))

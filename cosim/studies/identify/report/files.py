@@ -4,8 +4,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from cosim.evaluate.keys import numeric_key
 from cosim.files.atomic import write_json, write_text
-from cosim.scene import keys
 from cosim.studies.identify.problem.gauges import GAUGES
 from cosim.studies.identify.report import figures
 from cosim.studies.identify.report.scenes import rounded, scene_file, trial_settings
@@ -219,8 +219,7 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
 
 
 def _with_unit(name: str) -> str:
-    (unit,) = (key.unit for key in keys() if key.full == name)
-    return label(name, unit)
+    return label(name, numeric_key(name).unit)
 
 
 def _told(row: Row) -> Row:
