@@ -140,7 +140,7 @@ def outcome_of(record: Any) -> Outcome | None:
         values = [float(value) for value in numbers.values() if type(value) in (int, float)]
     except (TypeError, KeyError, AttributeError, OverflowError):
         return None
-    told = type(failure) is str and machine is False
+    told = type(failure) is str and failure.isprintable() and machine is False
     if not (named and told and len(values) == len(numbers)):
         return None
     return Outcome(dict(zip(numbers, values, strict=True)), failure)

@@ -10,7 +10,7 @@ from base64 import b64encode
 from collections.abc import Iterator
 from contextlib import contextmanager
 from csv import DictReader
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -111,12 +111,17 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
     if not points:
         return shown, []
     kept = [read_netcdf(folder / "points" / f"{number}.nc") for number in points]
+    try:
+        frequencies = [float(about["frequency"]) for _, _, about in kept]
+    except (KeyError, ValueError):
+        frequencies = [nan]
+    alike = all(units == kept[0][1] for _, units, _ in kept)
+    if not (alike and points[-1] < grid.size and all(map(isfinite, frequencies))):
+        raise BadInput(f"{plain(str(folder / 'points'))}: these are not the sweep's own runs.")
     runs = [[*columns.values()] for columns, _, _ in kept]
     shown["signals"] = _signals(kept[0][1], runs)
-    for run, (_, _, about) in zip(shown["signals"]["runs"], kept, strict=True):
-        if "frequency" not in about:
-            raise BadInput(f"{plain(str(folder / 'points'))}: these are not the sweep's own runs.")
-        run["frequency"] = float(about["frequency"])
+    for run, frequency in zip(shown["signals"]["runs"], frequencies, strict=True):
+        run["frequency"] = frequency
     shown["cloud"]["family"] = points
     return shown, runs
 
@@ -186,7 +191,7 @@ def _whole_results(path: Path) -> Iterator[dict[str, Any]]:
     not what such a file has."""
     try:
         yield dict(json.loads(reader.read(path, LARGEST)))
-    except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError, RecursionError):
         raise BadInput(f"{plain(str(path))}: this is no whole file of results.") from None
 
 

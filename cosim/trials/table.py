@@ -27,6 +27,9 @@ from cosim.files.cells import Cells, read_cells
 Notes = tuple[str, ...]
 
 MISSING = {"", "nan", "?"}  # once U+FFFD is gone
+SHORTEST, LONGEST = 1e-9, 1e3
+"""s between rows, on average."""
+
 FEWEST_ROWS = 8
 
 WORDS = {
@@ -137,10 +140,17 @@ def read_table(path: Path, asked: str = "") -> Table:
     if len(lines) < FEWEST_ROWS:
         raise BadInput(f"{cells.name}: there are {len(lines)} rows, and {FEWEST_ROWS} are needed.")
     if "time" in columns:
-        late = np.flatnonzero(np.diff(table.complete("time")) <= 0)
+        time = table.complete("time")
+        late = np.flatnonzero(np.diff(time) <= 0)
         if len(late):
             where = f"row {table.lines[late[0] + 1]}, column {plain(known['time'].header, 40)}"
             raise BadInput(f"{cells.name}: {where}: the time does not increase.")
+        step = float(time[-1] - time[0]) / (len(time) - 1)
+        if not SHORTEST <= step <= LONGEST:
+            raise BadInput(
+                f"{cells.name}: its rows are {step:.3g} s apart, and must be {SHORTEST:g} to "
+                f"{LONGEST:g} s: is the time's unit right?"
+            )
     return table
 
 

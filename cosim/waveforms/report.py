@@ -5,6 +5,7 @@ from typing import Any
 
 from cosim.scene import Scene
 from cosim.trials.measured import measured
+from cosim.waveforms.columns import netcdf_name
 from cosim.waveforms.quantities import label, signed
 
 
@@ -66,7 +67,8 @@ def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str
     asked, moving = asked_for(scene), [name for name in every if summary[f"{name}.rms"] != 0.0]
     ranked = sorted(moving, key=lambda name: name not in asked)
     names = ranked[: max(MOST_ROWS, len(asked.intersection(moving)))]
-    shown = [label(name, units[name]) for name in names]
+    # A waveforms.nc has them by names that netCDF can have.
+    shown = [label(name, units.get(name) or units[netcdf_name(name)]) for name in names]
     width = max([20, *map(len, shown)])
     whats = ["mean", "rms", "least", "greatest"]
     told = any(name.endswith(".mean_error") for name in summary)

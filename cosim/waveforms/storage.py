@@ -149,6 +149,11 @@ def read_sweep(folder: Path) -> "xr.Dataset":
             said += [each.attrs.get(key, "") for key in ("units", "long_name")]
             if not grid.issuperset(each.dims):
                 raise ValueError(f"{name} has other points")
+            number = each.dtype.kind in "iuf" and name != "failure"
+            if not (number or all(isinstance(value, str) for value in each.values.flat)):
+                raise ValueError(f"{name} has other values")
+        if not any("key" in axis.attrs for axis in data.coords.values()):
+            raise ValueError("it goes over no key")
         if not grid or not all(isinstance(text, str) for text in said):
             raise ValueError("there are no points, or no words for their numbers")
     except Exception as error:  # there is little that scipy does not raise on a damaged file

@@ -255,6 +255,9 @@ CHANGES: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
         v_average=data.v_average.assign_attrs(units=[1, 2])
     ),
     "no title": lambda data: data.assign_attrs(title=3.0),
+    "no key": lambda data: data.assign_coords(amplitude=[3.0, 4.0], frequency=[20.0, 30.0]),
+    "a number for a failure": lambda data: data.assign(failure=0.0 * data.v_average),
+    "bytes": lambda data: data.assign(v_average=data.failure.astype("S1")),
 }
 
 
@@ -270,3 +273,35 @@ def test_a_sweep_that_somebody_has_changed(
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 2 and all(f"{path}: not a whole sweep (" in line for line in said)
     assert [each.name for each in tmp_path.iterdir()] == ["sweep.nc"]
+
+
+@pytest.mark.parametrize("frequency", ["twenty", "nan", None])
+def test_points_that_are_not_the_sweeps(
+    sweep: Path, frequency: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(sweep / "sweep.nc", tmp_path)
+    (tmp_path / "points").mkdir()
+    about = {} if frequency is None else {"frequency": frequency}
+    with (tmp_path / "points" / "0.nc").open("wb") as file:
+        netcdf(file, {"time": np.arange(3.0), "v": np.zeros(3)}, {"time": "s", "v": "m/s"}, about)
+    assert main(["show", str(tmp_path)]) == 2
+    told = capsys.readouterr().err
+    assert told == f"cosim: {tmp_path / 'points'}: these are not the sweep's own runs.\n"
+    assert not list(tmp_path.glob("*.html"))
+
+
+@pytest.mark.parametrize("taken", [None, 3, [], {"circuit.reltol": []}])
+def test_steps_that_were_not_taken(run: Path, taken: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(run, folder)
+    told = json.loads((run / "summary.json").read_text())
+    told |= {"error_estimate": 1e-3, "coupling_taken": taken}
+    (folder / "summary.json").write_text(json.dumps(told))
+    assert main(["show", str(folder), "--out", str(tmp_path / "page.html")]) == 2
+
+
+def test_a_waveform_whose_name_netcdf_cannot_have(tmp_path: Path) -> None:
+    settings = {"circuit.save": ["v(d)/2", "-v(d)"], "run.duration": 0.02, "run.settle": 0.0}
+    cosim.run("relay", settings).save(tmp_path)
+    words = show(tmp_path).read_text(encoding="utf-8")
+    assert "  v(d)/2  " in words and "  -v(d)  " in words

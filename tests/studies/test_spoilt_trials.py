@@ -87,6 +87,7 @@ REFUSED = {
         scaled(time=1e3),
         "0.96 rows/s are too few for a run that repeats",
     ),
+    "times without end": (HEADER, scaled(time=1e-300), "is the time's unit right?"),
     "times that go back": (HEADER, lambda c: [c[0][::-1], *c[1:]], "the time does not increase"),
     "a missing time": (HEADER, without(slice(7, 8), 0), "row 9, column time [s]: the value is"),
 }

@@ -1,9 +1,12 @@
 """Sweeps: what they find, what they make of points that fail, and where they run."""
 
+import json
 import os
 import re
+import sqlite3
 import threading
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -191,6 +194,16 @@ def test_folder_of_another_sweep(tmp_path: Path) -> None:
     (tmp_path / "sweep.sqlite").write_bytes(b'{"journal": "torn')
     with pytest.raises(BadInput, match="no store of this version"):
         sweep(scene, {"friction.mu_s": [0.7]}, out=tmp_path, workers=1)
+
+
+@pytest.mark.parametrize("failure", ["\ud800", "\x1b[2J", 3])
+def test_a_failure_that_no_sweep_has_told_is_run_again(failure: object, tmp_path: Path) -> None:
+    scene, over = load("held", ["run.duration=0.01"]), {"friction.mu_s": [0.7, 0.8]}
+    first = sweep(scene, over, out=tmp_path, workers=1)
+    with closing(sqlite3.connect(tmp_path / "sweep.sqlite")) as base, base:
+        told = json.dumps({"numbers": {}, "failure": failure, "machine": False})
+        base.execute("UPDATE found SET value = ? WHERE key != ''", (told,))
+    assert sweep(scene, over, out=tmp_path, workers=1).equals(first)
 
 
 def test_a_file_with_other_content_is_other_work(tmp_path: Path) -> None:
