@@ -164,7 +164,7 @@ def test_search_finds_what_an_exhaustive_grid_finds() -> None:
                 assert allowed.all() and mine[0, n] >= 0.95 * best[n], (kind, goal.name)
         points = judge.judged(made, {"": machine}, {"": found}, ("robust",))
     up = points["", "v_up", "robust"]
-    assert 0.0 < up.median <= up.value + 1e-4 and up.heat <= machine.heat
+    assert 0.0 < up.worst <= up.median and up.heat <= machine.heat
     monolithic = pytest.importorskip("tests.reference.monolithic")
     values = {key.split(".")[1]: value for key, value in up.settings.items()}
     duration, settle = values.pop("duration"), values.pop("settle")
