@@ -20,6 +20,7 @@ from cosim.studies.compare.run import Comparison
 from cosim.studies.fit.fit import FIRST_ROW, fit
 from cosim.studies.fit.results import Shown
 from cosim.studies.paper.figures import DASHED, PART, SURFACE
+from cosim.studies.plots import headline
 from cosim.studies.report import Progress, Report, silent
 from cosim.studies.tables import Row
 from cosim.trials.periods import drift
@@ -96,6 +97,14 @@ def _draw(found: list[Trial], rows: list[Row], path: Path) -> None:
         Line2D([], [], color=c, marker=m, lw=1.3, label=f"part: {w}") for _, c, m, w in SIDES
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9, frameon=False)
+    theirs, machine = (
+        np.mean([row[f"error_{side} [mm]"] for row in rows]) for side in ("theirs", "machine")
+    )
+    headline(
+        figure,
+        f"Given its drive, the whole machine is {machine:.2f} mm from the measured part, on "
+        f"average over the trials; the paper's model, given the surface, {theirs:.2f} mm",
+    )
     figure.write(path)
 
 
@@ -121,8 +130,9 @@ def _paths(axis: Axes, trial: Trial) -> None:
     row = trial.row()
     theirs, exact, machine = (row[f"error_{side} [mm]"] for side, *_ in SIDES)
     axis.set_title(
-        f"Trial {trial.number}, the paper's; mean error from the first frame {theirs:.2f} mm\n"
-        f"as published, {exact:.2f} mm exactly, {machine:.2f} mm the machine",
+        f"Trial {trial.number}: {theirs:.2f} mm as published, {exact:.2f} mm solved exactly, "
+        f"{machine:.2f} mm the machine",
+        loc="left",
         fontsize=11,
     )
 
@@ -137,4 +147,4 @@ def _velocities(axis: Axes, rows: list[Row]) -> None:
     axis.axhline(0.0, color="0.4", lw=0.8)
     axis.grid(alpha=0.25, axis="y")
     axis.set(xlabel="trial", ylabel="mean velocity of the part [mm/s]", xticks=numbers)
-    axis.set_title("All trials: measured (bars) and simulated", fontsize=11)
+    axis.set_title("All trials: measured (bars) and simulated", loc="left", fontsize=11)

@@ -14,6 +14,7 @@ from cosim.drive.surface import formulas
 from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import Cycle, optimal_cycle
 from cosim.files.picture import Picture, grid
+from cosim.studies.plots import headline
 
 # The colours of surface and part in all figures.
 SURFACE, PART, STICKING = "#1f6fb2", "#d1495b", "#f4e3c1"
@@ -42,13 +43,17 @@ def draw_cycle(case: Transport) -> Picture:
         axis.grid(alpha=0.25)
     _name_phases(axes[0], axes[1], cycle)
     axes[2].set(xlabel="time [ms]", xlim=(0.0, case.period * 1e3))
-    figure.suptitle(
-        f"Optimal waveform: the part moves at {mean * 1e3:+.2f} mm/s "
-        f"({mean / (gravity * case.period):.4f} gT)\n{_friction(case)}, "
-        f"F$_n$ = {case.f_n:g} m$_P$g, a$_{{max}}$ = {case.a_max / gravity:g} g, "
-        f"T = {case.period * 1e3:.5g} ms",
-        fontsize=12,
+    headline(
+        figure,
+        f"Sticking while the surface accelerates at {cycle.accelerations[0] / gravity:.3g} g, "
+        f"slipping while it brakes at {case.a_max / gravity:.3g} g, the part moves at "
+        f"{mean * 1e3:+.2f} mm/s",
     )
+    note = (
+        f"The optimal waveform. {_friction(case)}, F$_n$ = {case.f_n:g} m$_P$g, "
+        f"T = {case.period * 1e3:.5g} ms; {mean / (gravity * case.period):.4f} gT"
+    )
+    figure.supxlabel(note, x=0.01, ha="left", fontsize=9, color="0.35")
     return figure
 
 
@@ -131,8 +136,16 @@ def draw_velocities(case: Transport, peaks: Sequence[float]) -> Picture:
     figure.legend(
         handles=_legend(axis), loc="outside lower center", ncols=3, fontsize=9, frameon=False
     )
-    title = f"Fastest transport upwards: {_friction(case)}, T = {case.period * 1e3:.5g} ms"
-    axis.set_title(title, fontsize=12)
+    best = [
+        formulas.optimal_force_ratio(case.mu_s, case.mu_k, peak, case.gravity) for peak in peaks
+    ]
+    note = f"Fastest transport upwards. {_friction(case)}, T = {case.period * 1e3:.5g} ms."
+    axis.set_title(note, loc="left", fontsize=9, color="0.35")
+    headline(
+        figure,
+        "The harder the surface accelerates, the faster the part, and the tighter the best grip: "
+        f"{min(best):.2g} to {max(best):.2g} times the part's weight",
+    )
     return figure
 
 
