@@ -32,6 +32,9 @@ SHORTEST, LONGEST = 1e-9, 1e3
 
 FEWEST_ROWS = 8
 
+MOST = 1e9
+"""Of any value, SI: squares of these have room."""
+
 WORDS = {
     "time": ("time",),
     "z_surface": ("z_surface", "surface", "platform", "height", "position", "displacement"),
@@ -137,6 +140,13 @@ def read_table(path: Path, asked: str = "") -> Table:
     }
     lines = tuple(line for line, _ in cells.rows[heads:])
     table = Table(path, columns, known, notes, lines)
+    for name, values in columns.items():
+        beyond = np.flatnonzero(np.abs(values) > MOST)
+        if len(beyond):
+            where = f"row {lines[beyond[0]]}, column {plain(known[name].header, 40)}"
+            raise BadInput(
+                f"{cells.name}: {where}: the value must be within ±{MOST:g} in SI units."
+            )
     if len(lines) < FEWEST_ROWS:
         raise BadInput(f"{cells.name}: there are {len(lines)} rows, and {FEWEST_ROWS} are needed.")
     if "time" in columns:

@@ -3,6 +3,7 @@
 A velocity that is missing, or its whole column, is made by central differences, as Tracker does.
 """
 
+import os
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,9 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.trials.camera import velocities
 from cosim.trials.table import BODIES, FEWEST_ROWS, Table, read_table
+
+LONGEST_NAME = 100
+"""Bytes of a trial's file name: others, and descriptions of scenes, are made of it."""
 
 
 @dataclass(frozen=True)
@@ -50,18 +54,30 @@ def trial_files(folder: Path, apart: Path | None = None) -> list[Path]:
     """The trials' files in the order of their numbers; BadInput where there are none.
 
     Where files have “trial” in their names only these count, else all ``.csv`` and ``.txt`` but
-    the file ``apart``.
+    the file ``apart``. What is no file stays, for the reader to refuse: a trial whose link leads
+    nowhere must not be left out in silence.
     """
+    name = plain(str(folder))
     try:
         found = sorted(folder.iterdir())
     except OSError as error:
-        raise BadInput(f"{folder}: cannot be read ({error.strerror}).") from error
+        raise BadInput(f"{name}: cannot be read ({error.strerror}).") from error
+    except ValueError:  # a NUL in the path
+        raise BadInput(f"{name}: it is no possible file name.") from None
     files = [path for path in found if path.suffix.lower() in (".csv", ".txt")]
-    files = [path for path in files if path.is_file() and not path.name.startswith(".")]
+    files = [path for path in files if not path.name.startswith(".")]
     files = [path for path in files if apart is None or path.resolve() != apart.resolve()]
     files = [path for path in files if "trial" in path.name.lower()] or files
     if not files:
-        raise BadInput(f"{folder}: there are no trials (.csv or .txt) in this folder.")
+        raise BadInput(f"{name}: there are no trials (.csv or .txt) in this folder.")
+    stems: set[str] = set()
+    for path in files:  # a trial's name stands in tables, figures and names of files
+        if not path.name.isprintable() or len(os.fsencode(path.name)) > LONGEST_NAME:
+            words = f"must be printable and have at most {LONGEST_NAME} bytes; rename it"
+            raise BadInput(f"{plain(str(path))}: the name of a trial {words}.")
+        if path.stem in stems:
+            raise BadInput(f"{name}: two trials are called {path.stem}; rename one of them.")
+        stems.add(path.stem)
     return sorted(files, key=lambda p: (number_of(p) is None, number_of(p) or 0, p.stem))
 
 
@@ -72,11 +88,12 @@ def read(path: Path) -> Trial:
     for name, letters in (("time", "t"), ("z_surface", "zp"), ("z_part", "zo")):
         if name not in table.columns:
             found = ", ".join(table.headers.values())
-            raise BadInput(f"{path}: there is no column {letters} (found: {found}).")
+            raise BadInput(f"{plain(str(path))}: there is no column {letters} (found: {found}).")
     known = np.isfinite(table.columns["z_surface"] + table.columns["z_part"])
     if known.sum() < FEWEST_ROWS:
         raise BadInput(
-            f"{path}: {known.sum()} rows have both zp and zo, and {FEWEST_ROWS} are needed."
+            f"{plain(str(path))}: {known.sum()} rows have both zp and zo, and {FEWEST_ROWS} are "
+            "needed."
         )
     lines = tuple(np.array(table.lines)[known].tolist())
     columns = {name: values[known] for name, values in table.columns.items()}
@@ -91,15 +108,15 @@ def read(path: Path) -> Trial:
 
 def read_platform(path: Path) -> tuple[Array, Track]:
     """Times (s) and motion of the surface, which may be all that was tracked. Raises BadInput."""
-    table = read_table(path)
+    table, name = read_table(path), plain(str(path))
     found = ", ".join(table.headers.values())
     if "time" not in table.columns:
-        raise BadInput(f"{path}: there is no column with the time (found: {found}).")
+        raise BadInput(f"{name}: there is no column with the time (found: {found}).")
     if not {"z_surface", "v_surface"} & set(table.columns):
-        raise BadInput(f"{path}: there is no column with the surface's motion (found: {found}).")
+        raise BadInput(f"{name}: there is no column with the surface's motion (found: {found}).")
     platform = track(table, "surface")
     if np.isfinite(platform.v).sum() < 2:
-        raise BadInput(f"{path}: fewer than two velocities of the surface are known.")
+        raise BadInput(f"{name}: fewer than two velocities of the surface are known.")
     return table.columns["time"], platform
 
 

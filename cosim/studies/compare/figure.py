@@ -93,7 +93,8 @@ def _words(name: str, found: Found) -> str:
     if name in WORDS:
         score, words, beside = WORDS[name]
         run, ceiling, *_ = scores[score]
-        said.append(words.format(run) + ("" if ceiling is None else beside.format(ceiling)))
+        if run is not None:
+            said.append(words.format(run) + ("" if ceiling is None else beside.format(ceiling)))
     if name in BOTH:
         number, words = BOTH[name]
         sides = (numbers[f"{number}_{side}"] or 0.0 for side in ("simulated", "measured"))

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.files.atomic import write_json
 from cosim.files.picture import Picture
 from cosim.mechanics import part
@@ -95,8 +95,8 @@ def fit(
     if evaluate and names != list(published.TRIALS):
         first, last = published.TRIALS[0], published.TRIALS[-1]
         raise BadInput(
-            f"{folder}: the published parameters belong to the trials 1…10 exactly, as published, "
-            f"“{first}” to “{last}”."
+            f"{plain(str(folder))}: the published parameters belong to the trials 1…10 exactly, as "
+            f"published, “{first}” to “{last}”."
         )
     read = {} if forces is None else read_forces(forces, names)
     known = [read.get(name, Force()) for name in names]

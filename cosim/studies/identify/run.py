@@ -79,7 +79,7 @@ def identify(
     steady = [trial for trial in everything if trial.label not in apart and _steady(trial)]
     others = [trial for trial in everything if trial not in steady]
     if not steady:
-        raise BadInput(f"{trials}: no trial is left to be fitted: none repeats itself.")
+        raise BadInput(f"{plain(str(trials))}: no trial is left to be fitted: none repeats itself.")
     effort, count = QUICK if quick else FULL, workers_asked(workers)
 
     def made(store: Store) -> Identification:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.stepper.stepper import OWN
 from cosim.studies.identify.chain.chain import Target
 from cosim.studies.identify.problem.space import Space, own_bounds
@@ -61,18 +61,19 @@ class Measured:
 def read_trials(folder: Path, space: Space) -> list[Measured]:
     """The trials of a folder, in the order of their numbers. Raises BadInput."""
     found = [measured(read_recording(path), path, space) for path in trial_files(folder)]
-    labels = [one.label for one in found]
+    labels, name = [one.label for one in found], plain(str(folder))
     for label in labels:
         if labels.count(label) > 1:
-            raise BadInput(f"{folder}: two trials are called {label}; number their files.")
+            raise BadInput(f"{name}: two trials are called {label}; number their files.")
     return found
 
 
 def measured(recording: Recording, path: Path, space: Space) -> Measured:
     """One trial. Raises BadInput where it has no moving surface or does not repeat."""
+    file = plain(str(path))
     signals = {name: recording.signals[name] for name in WEIGHTS if name in recording.signals}
     if not {"z_surface", "v_surface"} & set(signals):
-        raise BadInput(f"{path}: there is no height or velocity of the surface.")
+        raise BadInput(f"{file}: there is no height or velocity of the surface.")
     differenced = set()
     for body in ("surface", "part"):
         if f"z_{body}" in signals:
@@ -82,13 +83,13 @@ def measured(recording: Recording, path: Path, space: Space) -> Measured:
             differenced.add(f"v_{body}")
     for name, values in signals.items():
         if not np.nanvar(values) > 0.0:
-            raise BadInput(f"{path}: {name} does not change: there is nothing to identify.")
+            raise BadInput(f"{file}: {name} does not change: there is nothing to identify.")
     current = recording.signals.get("current")
     if current is not None and not np.isfinite(current).all():
-        raise BadInput(f"{path}: the current has gaps; it is what drives the simulation.")
+        raise BadInput(f"{file}: the current has gaps; it is what drives the simulation.")
     frequency = 1.0 / (period_of(recording.time, signals["v_surface"]) or np.nan)
     if current is None and not np.isfinite(frequency):
-        raise BadInput(f"{path}: the surface's motion does not repeat, so its drive is not known.")
+        raise BadInput(f"{file}: the surface's motion does not repeat, so its drive is not known.")
     low, high, scale = own_bounds(space, frequency)
     if current is not None:
         needless = [OWN.index(name) for name in DRIVE]

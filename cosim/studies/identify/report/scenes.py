@@ -59,7 +59,7 @@ def rounded(settings: Settings, digits: int = RIG_DIGITS) -> Settings:
 
 def scene_file(description: str, settings: Settings) -> str:
     """A scene file that holds these keys, each with its unit."""
-    lines, table = [f'description = "{description}"'], ""
+    lines, table = [f"description = {toml_value(description)}"], ""
     for key in keys():
         if key.full not in settings:
             continue
