@@ -3,6 +3,7 @@ that is known, since the bench made its records."""
 
 import csv
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -515,12 +516,32 @@ def test_missing_frames_have_no_residual(folder: Path, tmp_path: Path) -> None:
         ('[rig."coil.force"]\nvalue = 1.0\n', '[rig."coil.force"]: this key is none of'),
         ('[rig."friction.mu_k"]\nlow = 0.5\n', "needs either a value, or low and high"),
         ('[rig."friction.mu_k"]\nlow = 0.5\nhigh = 0.4\n', "low = 0.5 must be below high = 0.4"),
-        ('[rig."friction.mu_k"]\nlow = "a"\nhigh = 0.4\n', "low = a must be a number"),
+        ('[rig."friction.mu_k"]\nlow = "a"\nhigh = 0.4\n', 'low = "a" must be a number within'),
+        ('[rig."friction.mu_k"]\nlow = nan\nhigh = 0.4\n', "low = nan must be a number within"),
+        (f'[rig."friction.mu_k"]\nlow = 0.5\nhigh = 1{"0" * 400}\n', "must be a number within"),
+        (f'[rig."friction.mu_k"]\nlow = 0.5\nhigh = 0x{"f" * 6000}\n', "high = an endless number"),
+        ('[rig."friction.mu_s"]\nvalue = 0.3\n', "low = 0.45 must be at most friction.mu_s = 0.3"),
+        ('[rig."mechanics.ram_mass"]\nvalue = -1\n', "value = -1 must be a number from 1e-09"),
+        ('[rig."circuit.supply"]\nvalue = 1.0\n', "must be below circuit.supply = 1 V"),
+        ("[measured.travel]\nvalue = 2e-3\nsd = 1e-320\n", "must be at least 1e-12"),
+        (
+            '[trial."friction.normal_force"]\nlow = -5\nhigh = -1\n',
+            "low = -5 must be a number from",
+        ),
+        (
+            '[trial."drive.frequency"]\nlow = 0\nhigh = 1\n',
+            "low = 0 must be a number from 0.1 to 10.",
+        ),
+        (
+            '[trial."drive.offset"]\nlow = 0\nhigh = 1\nprior = 0.5\nsigma = 0.1\n',
+            "prior, sigma is none of high, low, source, value",
+        ),
         ('[rig."mechanics.travel"]\nlow = -1.0\nhigh = 1.0\n', "low = -1 must be a number from"),
         ('[rig."mechanics.travel"]\nvalue = 1e-3\nprior = 1e-3\n', "needs either a value, or"),
         ('[rig."circuit.supply"]\nlow = 12.0\nhigh = 18.0\n', "it is not searched"),
         ('[trial."drive.offset"]\nmost = 1.0\n', "most is none of"),
         ('[rig."mechanics.suspension"]\nlaws = ["square"]\n', 'a list of some of "cubic", "knee"'),
+        ('[rig."mechanics.suspension"]\nlaws = ["knee"]\nlow = 3\n', "and stand alone"),
         ("[ring]\n", "ring: there are the tables rig, trial and measured only"),
         ("[rig\n", "is no valid TOML"),
     ],
@@ -548,11 +569,28 @@ def test_trials_are_refused_in_a_sentence(
     write(tmp_path / "drift", "1", {"time": time, "z_surface": time**2})
     (tmp_path / "part").mkdir()
     write(tmp_path / "part", "1", {"time": time, "z_part": np.sin(100 * time)})
+    (tmp_path / "far").mkdir()
+    write(tmp_path / "far", "1", {"time": time, "z_surface": 1e150 * np.sin(100 * time)})
+    names = {"link": "Trial 9.csv", "escape": "Trial \x1b[31m.csv", "long": f"Trial {'x' * 91}.csv"}
+    for name in (*names, "twice"):
+        shutil.copytree(folder, tmp_path / name)
+    for name, file in names.items():
+        (tmp_path / name / file).symlink_to(tmp_path / "nowhere")
+    (tmp_path / "twice" / "Trial 1.txt").touch()
     out = ["--out", str(tmp_path / "out")]
     for arguments, told in (
         ([str(tmp_path / "nothing")], "cannot be read"),
         ([str(tmp_path / "still")], "does not change"),
         ([str(tmp_path / "drift")], "does not repeat"),
+        ([str(tmp_path / "far")], "row 3, column z_surface [m]: the value must be within ±1e+09"),
+        ([str(tmp_path / "link")], "Trial 9.csv: cannot be read (No such file or directory)"),
+        (
+            [str(tmp_path / "escape")],
+            "Trial \\u001b[31m.csv: the name of a trial must be printable",
+        ),
+        ([str(tmp_path / "long")], "must be printable and have at most 100 bytes; rename it"),
+        ([str(tmp_path / "twice")], "two trials are called Trial 1; rename one of them"),
+        ([str(tmp_path / "no\x1b[31m")], "no\\u001b[31m: cannot be read"),
         ([str(tmp_path / "part")], "no height or velocity of the surface"),
         ([str(folder), "--apart", "7"], "There is no trial 7"),
         ([str(folder), "--seed", "-1"], "seed = -1 must be"),

@@ -134,8 +134,8 @@ def space_with(folder: Path, text: str) -> Space:
     [
         ('[measured."click"]\nvalue = 1.0\nsd = 0.1\n', 'click"]: this measurement is none of'),
         ("[measured.travel]\nvalue = 1.0\n", "it needs a value and a standard deviation sd"),
-        ("[measured.travel]\nvalue = true\nsd = 0.1\n", "value = True must be a number"),
-        ("[measured.travel]\nvalue = 4e-3\nsd = 0\n", "sd = 0 must be above 0"),
+        ("[measured.travel]\nvalue = true\nsd = 0.1\n", "value = true must be a number"),
+        ("[measured.travel]\nvalue = 4e-3\nsd = 0\n", "sd = 0 must be at least 1e-12"),
         ("measured = 1\n", "there are the tables rig, trial and measured only"),
     ],
 )

@@ -5,7 +5,6 @@ knows it by the numbers of ``RIG``, a scene by its keys.
 """
 
 from dataclasses import dataclass, replace
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,8 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.mechanics.stickslip import SUSPENSIONS
-from cosim.scene import keys, toml
+from cosim.scene import changed, keys, load, toml
+from cosim.scene.messages import shown
 from cosim.stepper.stepper import OWN, RIG
 from cosim.studies.identify.problem.gauges import GAUGES
 
@@ -54,8 +54,16 @@ OWN_KEYS = {
 what the plate's friction can hold, and the frequency one of that at which the record repeats."""
 
 _NUMBERS = ("value", "low", "high", "prior", "sigma")
-_PARTS = {*_NUMBERS, "scale", "source"}
-"""Of an entry."""
+_PARTS = {"rig": {*_NUMBERS, "scale", "source"}, "trial": {"value", "low", "high", "source"}}
+"""Of an entry, by its table: the search has no prior of a trial's own numbers, nor their scale."""
+_OTHERWISE = {
+    "drive.start_time": (-1e3, 1e3, "s"),
+    "mechanics.initial_lift": (-1.0, 1.0, "1"),
+    "drive.frequency": (0.1, 10.0, "1"),
+}
+"""Ranges of those OWN_KEYS that are not here what they are in a scene."""
+MOST, LEAST_SD = 1e18, 1e-12
+"""Of any number: the squares of residuals stay finite."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +192,7 @@ def _coordinates(values: Array, log: Array) -> Array:
 
 def read_space(own: Path | None = None) -> Space:
     """The shipped bounds, and those of a file of one's own in their place. Raises BadInput."""
-    tables, path = _tables(SHIPPED), own or SHIPPED
+    tables, path = _tables(SHIPPED), plain(str(own or SHIPPED))
     given = {} if own is None else _tables(own)
     measured = {name: _measured(path, name, x) for name, x in given.pop("measured", {}).items()}
     for name, table in given.items():
@@ -205,20 +213,29 @@ def read_space(own: Path | None = None) -> Space:
         raise BadInput(
             f"{path}: no key of the rig has a low and a high: there is nothing to search."
         )
-    return Space(rig, trial, laws, laws[0], measured)
+    if rig["friction.mu_k"].low > rig["friction.mu_s"].high:
+        raise BadInput(
+            f'{path}: [rig."friction.mu_k"]: low = {rig["friction.mu_k"].low:g} must be at most '
+            f"friction.mu_s = {rig['friction.mu_s'].high:g}."
+        )
+    space = Space(rig, trial, laws, laws[0], measured)
+    for law in laws:  # what no scene can have together would be told only when all is searched
+        one = space.of_law(law)
+        changed(load("reference"), one.settings(np.full(len(one.free), 0.5)), path)
+    return space
 
 
 def _tables(path: Path) -> dict[str, dict[str, Any]]:
-    content = toml.read(path)
+    content, file = toml.read(path), plain(str(path))
     for name, table in content.items():
         if name not in ("rig", "trial", "measured") or not isinstance(table, dict):
             raise BadInput(
-                f"{path}: {plain(name)}: there are the tables rig, trial and measured only."
+                f"{file}: {plain(name)}: there are the tables rig, trial and measured only."
             )
     return content
 
 
-def _measured(path: Path, name: str, entry: Any) -> tuple[float, float]:
+def _measured(path: str, name: str, entry: Any) -> tuple[float, float]:
     """Value and standard deviation of what was measured beside the trials."""
     where = f'{path}: [measured."{plain(name)}"]'
     if name not in GAUGES:
@@ -226,31 +243,36 @@ def _measured(path: Path, name: str, entry: Any) -> tuple[float, float]:
     if not isinstance(entry, dict) or set(entry) - {"source"} != {"value", "sd"}:
         raise BadInput(f"{where}: it needs a value and a standard deviation sd, and nothing else.")
     value, sd = (_number(where, part, entry[part]) for part in ("value", "sd"))
-    if sd <= 0.0:
-        raise BadInput(f"{where}: sd = {sd:g} must be above 0.")
+    if sd < LEAST_SD:
+        raise BadInput(f"{where}: sd = {sd:g} must be at least {LEAST_SD:g}.")
     return value, sd
 
 
 def _number(where: str, name: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        raise BadInput(f"{where}: {name} = {plain(str(value))} must be a number.")
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (number and -MOST <= value <= MOST):
+        raise BadInput(f"{where}: {name} = {shown(value)} must be a number within ±{MOST:g}.")
     return float(value)
 
 
-def _laws(path: Path, entry: Any) -> list[str]:
+def _laws(path: str, entry: Any) -> list[str]:
     """The laws of the suspension that are tried, the first for a start."""
-    laws = entry.get("laws") if isinstance(entry, dict) else None
+    known = isinstance(entry, dict) and not set(entry) - {"laws", "source"}
+    laws = entry.get("laws") if known else None
     if not isinstance(laws, list) or not laws or not all(law in [*LAW_KEYS] for law in laws):
         known = ", ".join(f'"{law}"' for law in LAW_KEYS)
-        raise BadInput(f'{path}: [rig."{SUSPENSION}"]: laws must be a list of some of {known}.')
+        where = f'{path}: [rig."{SUSPENSION}"]'
+        raise BadInput(f"{where}: laws must be a list of some of {known}, and stand alone.")
     return [*dict.fromkeys(laws)]
 
 
-def _entry(path: Path, table: str, key: str, entry: Any) -> Entry:
+def _entry(path: str, table: str, key: str, entry: Any) -> Entry:
     where = f'{path}: [{table}."{key}"]'
-    if not isinstance(entry, dict) or set(entry) - _PARTS:
-        wrong = ", ".join(map(plain, set(entry) - _PARTS)) if isinstance(entry, dict) else "this"
-        raise BadInput(f"{where}: {wrong} is none of {', '.join(sorted(_PARTS))}.")
+    parts = _PARTS[table]
+    if not isinstance(entry, dict) or set(entry) - parts:
+        others = sorted(set(entry) - parts) if isinstance(entry, dict) else ["this"]
+        wrong = ", ".join(map(plain, others))
+        raise BadInput(f"{where}: {wrong} is none of {', '.join(sorted(parts))}.")
     numbers = {name: _number(where, name, entry[name]) for name in _NUMBERS if name in entry}
     given, ends = {"value"} == set(numbers), {"low", "high"} <= set(numbers)
     if not given and ("value" in entry or not ends):
@@ -262,16 +284,18 @@ def _entry(path: Path, table: str, key: str, entry: Any) -> Entry:
     log = entry.get("scale", "linear") == "log"
     if entry.get("scale", "linear") not in ("log", "linear") or (log and low <= 0.0):
         raise BadInput(f'{where}: scale must be "linear", or "log" with low above 0.')
-    if (prior is None) != (sigma is None) or (sigma is not None and sigma <= 0.0):
-        raise BadInput(f"{where}: a prior needs a sigma above 0 beside it.")
+    if (prior is None) != (sigma is None) or (sigma is not None and sigma < LEAST_SD):
+        raise BadInput(f"{where}: a prior needs a sigma of at least {LEAST_SD:g} beside it.")
     if log and prior is not None and prior <= 0.0:
         raise BadInput(f'{where}: prior = {prior:g} must be above 0 with scale "log".')
-    if table == "rig":
-        known = next(one for one in keys() if one.full == key)
-        assert known.low is not None and known.high is not None
-        for name, value in (("low", low), ("high", high)):
-            if not known.low <= value <= known.high:
-                raise BadInput(f"{where}: {name} = {value:g} must be {known.allowed}.")
+    known = next(one for one in keys() if one.full == key)
+    if table == "trial" and key in _OTHERWISE:
+        least, most, unit = _OTHERWISE[key]
+        known = replace(known, low=least, high=most, unit=unit)
+    assert known.low is not None and known.high is not None
+    for name in ("value",) if given else ("low", "high"):
+        if not known.low <= numbers[name] <= known.high:
+            raise BadInput(f"{where}: {name} = {numbers[name]:g} must be {known.allowed}.")
     return Entry(key, low, high, log, prior, sigma)
 
 
