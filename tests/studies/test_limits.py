@@ -418,13 +418,30 @@ def test_ensemble(tmp_path: Path) -> None:
     shares = [float(rig["mechanics.surface_mass"]) / mass for rig in found]
     assert shares == pytest.approx([0.7, 1.3, 1.01]), "the second is the scene's own"
     assert [rig.get("friction.normal_force") for rig in found] == [None, None, 0.8 * force]
-    study.checked(scene, found, path)
-    with pytest.raises(BadInput, match=r"rigs\.json, ensemble 1: .*surface_mass"):
-        study.checked(scene, [{"mechanics.surface_mass": -1.0}], path)
+    for entry, told in (
+        ('"mechanics.surface_mass": -1', "surface_mass = -1 must be a number from"),
+        (f'"mechanics.surface_mass": 1{"0" * 400}', "must be a number from"),
+        ('"mechanics": {"surface_mass": 1}', 'must have keys "table.key", in quotes'),
+        ('"surface_mass": 1', 'must have keys "table.key", in quotes'),
+        ('"drive.waveform": "sine"', "drive.waveform is no key of a rig"),
+        ('"circuit.model": "none"', "circuit.model is no key of a rig"),
+        ('"name.x": 1', "name.x is no key of a rig"),
+        ('"friction.mu_k": 0.3, "normal_force_ratio": "x"', 'ratio = "x" must be a number above 0'),
+        (f'"friction.mu_k": 0.3, "normal_force_ratio": 1{"0" * 400}', "and at most 1e+06"),
+    ):
+        path.write_text(f'{{"ensemble": [{{}}, {{{entry}}}]}}')
+        with pytest.raises(BadInput) as caught:
+            study.ensemble(path, scene)
+        assert f"{path}, ensemble 2: " in str(caught.value) and told in str(caught.value)
     for text in ("[]", "{}", '{"ensemble": [1]}'):
         path.write_text(text)
         with pytest.raises(BadInput, match="has no list"):
             study.ensemble(path, scene)
-    path.write_text("{")
-    with pytest.raises(BadInput, match="neither JSON"):
-        study.ensemble(path, scene)
+    for name, text in (
+        ("rigs.json", "{"),
+        ("rigs.json", "[" * 100_000),
+        ("rigs.toml", "a = " + "[" * 100_000),
+    ):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(BadInput, match="neither JSON"):
+            study.ensemble(tmp_path / name, scene)

@@ -132,8 +132,8 @@ def limits(
         words += [f"--set {text}" for text in texts]
     base = load(scene, overrides)
     efforts = (QUICK if quick else FULL).times(effort)
+    checked(base)
     others: list[Settings] = ensemble(Path(rigs), base) if rigs is not None else []
-    checked(base, others, rigs)
     told = counted(progress, steps(efforts, CHANGES, len(others)))
 
     def found(store: Store) -> Study:

@@ -1,8 +1,7 @@
 """The study: each change on each rig, with the knobs set anew, and judged."""
 
 import json
-import os
-import tomllib
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -14,7 +13,8 @@ from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.store import Store
 from cosim.files.reader import read
-from cosim.scene import Scene
+from cosim.scene import Scene, toml
+from cosim.scene.messages import shown
 from cosim.simulation.summary import budget
 from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Change, Settings
 from cosim.studies.limits.judge import Key, Point, confirmed, judged, tried
@@ -224,6 +224,13 @@ that a search ended with."""
 MOST_BYTES = 1 << 24
 """Of a file of rigs."""
 
+MOST_RATIO = 1e6
+"""Of normal forces."""
+
+_OF_A_RIG = re.compile(r"(coil|mechanics|friction|circuit)\.(?!model$|param\.).*")
+_TABLES = "these are in the tables coil, mechanics, friction and circuit, but for circuit.model"
+"""What drives the machine, and how it is run, is the study's own."""
+
 
 def ensemble(path: Path, scene: Scene) -> list[Settings]:
     """The rigs of a file, without those for which the scene stands: the tables of its list
@@ -235,20 +242,30 @@ def ensemble(path: Path, scene: Scene) -> list[Settings]:
     name = plain(str(path))
     content = read(path, MOST_BYTES)
     try:
-        text = content.decode()
-        said = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
-    except ValueError as error:
+        text = content.decode("utf-8-sig")
+        said = toml.parse(text) if path.suffix.lower() == ".toml" else json.loads(text)
+    except (ValueError, RecursionError) as error:
         raise BadInput(f"{name}: is neither JSON nor, named .toml, TOML ({error}).") from error
     rigs = said.get("ensemble") if isinstance(said, dict) else None
     if not isinstance(rigs, list) or not rigs or not all(isinstance(rig, dict) for rig in rigs):
         raise BadInput(f'{name}: has no list "ensemble" of tables of keys and values.')
     found = []
-    for rig in rigs:
+    for number, rig in enumerate(rigs, 1):
+        where = f"{name}, ensemble {number}"
         settings: Settings = {key: value for key, value in rig.items() if "." in key}
+        if (rig and not settings) or any(isinstance(value, dict) for value in rig.values()):
+            raise BadInput(f'{where}: must have keys "table.key", in quotes, and their values.')
+        if other := [key for key in settings if not _OF_A_RIG.fullmatch(key)]:
+            raise BadInput(f"{where}: {plain(other[0])} is no key of a rig: {_TABLES}.")
+        Bench.base(scene, settings, where)
         if _is_own(scene, settings):
             continue
-        if isinstance(ratio := rig.get("normal_force_ratio"), int | float):
+        if (ratio := rig.get("normal_force_ratio")) is not None:
+            if type(ratio) not in (int, float) or not 0.0 < ratio <= MOST_RATIO:
+                words = f"must be a number above 0, and at most {MOST_RATIO:g}"
+                raise BadInput(f"{where}: normal_force_ratio = {shown(ratio)} {words}.")
             settings.setdefault("friction.normal_force", ratio * scene.friction.normal_force)
+            Bench.base(scene, settings, where)
         found.append(settings)
     return found
 
@@ -266,8 +283,8 @@ def _is_own(scene: Scene, rig: Settings) -> bool:
     return True
 
 
-def checked(scene: Scene, rigs: Sequence[Settings], file: str | os.PathLike[str] | None) -> None:
-    """Refuse a scene or a rig that cannot be studied. Raises BadInput."""
+def checked(scene: Scene) -> None:
+    """Refuse a scene that cannot be studied. Raises BadInput."""
     if not scene.rung.on_ladder:
         raise BadInput(
             f'scene {scene.name}: circuit.model = "{scene.circuit.model}" has no limits to change; '
@@ -277,5 +294,3 @@ def checked(scene: Scene, rigs: Sequence[Settings], file: str | os.PathLike[str]
         raise BadInput(
             f'scene {scene.name}: drive.waveform = "{scene.drive.waveform}" has no knobs to search.'
         )
-    for number, rig in enumerate(rigs, 1):
-        Bench.base(scene, rig, f"{plain(str(file))}, ensemble {number}")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput
+from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import inputs
 from cosim.evaluate.store import Store, reported
@@ -64,11 +64,13 @@ def measure(
     if seed < 0:
         raise BadInput(f"--seed {seed}: must be a whole number from 0.")
     base = load(scene, overrides)
+    checked(base)
     others = ensemble(Path(rigs), base)
-    checked(base, others, rigs)
     given = whole(base, others)
     if len(given) < LEAST:
-        raise BadInput(f"{rigs}: {len(given)} rigs are too few; it must have {LEAST} at least.")
+        raise BadInput(
+            f"{plain(str(rigs))}: {len(given)} rigs are too few; it must have {LEAST} at least."
+        )
     count = max(len(given), QUICK if quick else RIGS)
     more = drawn(base, given, count - len(given), np.random.default_rng(seed))
     tick = counted(progress, 1 + len(given) + len(more))
