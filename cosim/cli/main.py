@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 from cosim.cli import live, new, simulation, studies
 from cosim.cli.command import Command, add_commands
-from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain
+from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain, printable
 from cosim.files.reader import watched
 from cosim.studies.study import Option
 from cosim.toolchain import memory
@@ -177,12 +177,12 @@ def _note(message: Warning | str, *_: object, **__: object) -> None:
     """Print a warning on one line, without its place in the program, above a progress bar."""
     from tqdm import tqdm
 
-    tqdm.write(f"cosim: note: {' '.join(str(message).split())}", file=sys.stderr)
+    tqdm.write(f"cosim: note: {printable(' '.join(str(message).split()))}", file=sys.stderr)
 
 
 def _told(sentence: str, code: int) -> int:
     """Print the sentence on one line; returns the exit code."""
-    words = " ".join(sentence.split())
+    words = printable(" ".join(sentence.split()))
     if len(words) > _LONGEST:  # of what was given, not of what is said of it
         words = f"{words[: _LONGEST // 2]} … {words[-_LONGEST // 2 :]}"
     print(f"cosim: {words}" + ("" if words.endswith((".", "?")) else "."), file=sys.stderr)

@@ -65,7 +65,7 @@ def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[l
                 name = path
                 os.replace(temporary, path)
     except OSError as error:
-        raise BadInput(f"{name}: cannot be written ({error.strerror}).") from error
+        raise BadInput(f"{plain(str(name))}: cannot be written ({error.strerror}).") from error
     except ValueError as error:
         if "embedded null" not in str(error):
             raise

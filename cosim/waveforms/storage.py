@@ -123,7 +123,9 @@ def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str,
     except (BadInput, MemoryError):
         raise
     except Exception as error:  # there is little that scipy does not raise on a damaged file
-        raise BadInput(f"{path}: this is not a whole waveforms.nc ({plain(str(error))}).") from None
+        raise BadInput(
+            f"{plain(str(path))}: this is not a whole waveforms.nc ({plain(str(error))})."
+        ) from None
     return {name: np.array(v, dtype=np.float64) for name, v in columns.items()}, units, attributes
 
 
