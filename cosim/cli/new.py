@@ -12,15 +12,18 @@ _TITLE = b'"Scene of cosim"'
 
 
 def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
+    import os
     import re
 
     from cosim.errors import BadInput, plain
     from cosim.files.atomic import as_json, tidy, together
+    from cosim.files.reader import read
     from cosim.files.resources import circuits
     from cosim.scene.describe import schema
     from cosim.scene.loading import list_scenes, load
     from cosim.scene.messages import suggestion
     from cosim.scene.model import CAREFUL, to_toml
+    from cosim.scene.toml import LARGEST
 
     name = plain(str(file))
     if file.suffix != ".toml" or not file.stem.replace("-", "").replace("_", "").isalnum():
@@ -52,9 +55,9 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
         texts[file.with_suffix(".cir")] = text
     fmus = [file.with_suffix(".fmu")] if kind == "fmu" else []
     schema_there = file.with_name(_SCHEMA)
-    theirs = schema_there.is_file() and _TITLE not in schema_there.read_bytes()
+    theirs = schema_there.is_file() and _TITLE not in read(schema_there, LARGEST)
     for path in (*texts, *fmus, *[schema_there] * theirs):
-        if path.exists():
+        if os.path.lexists(path):  # a link that leads nowhere, too
             raise BadInput(f"{plain(str(path))}: is there already; choose another name.")
     if not file.parent.is_dir():
         raise BadInput(f"{plain(str(file.parent))}: there is no such folder.")

@@ -6,7 +6,7 @@ from typing import Any
 from cosim.errors import BadInput, plain
 from cosim.scene import Key, Scene, changed, keys
 from cosim.scene.messages import ended, suggestion
-from cosim.scene.tables import LEVEL_KEY, PARAM_KEY
+from cosim.scene.tables import KNOBS, LEVEL_KEY, PARAM_KEY
 
 FREQUENCIES = ("drive.frequency", "drive.pot_frequency", "drive.loop_time")
 
@@ -46,7 +46,11 @@ def split(options: Sequence[str], form: str) -> Iterator[tuple[str, str, str]]:
 
 def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
     """Raise BadInput where one of the keys ``table.key`` is no ``.param`` of the scene's netlist,
-    or no parameter of its FMUs."""
+    or no parameter of its FMUs, or says what another one says."""
+    names = [*names]
+    for knob, name in KNOBS.items():  # else each run would fail by itself
+        if {one := f"drive.{knob}", other := f"drive.{name}"} <= set(names):
+            raise BadInput(f"--over: {one} and {other} say the same thing twice; give one of them.")
     own = [name for name in names if name.startswith(("circuit.param.", "fmu."))]
     if not own:
         return
@@ -59,7 +63,12 @@ def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
     from cosim.toolchain.processes import isolated
 
     scene = changed(scene, dict.fromkeys(own, 0.0), "--over")
-    if scene.circuit.param and scene.rung.ngspice:
+    if scene.circuit.param and not scene.rung.ngspice:
+        raise BadInput(
+            f'--over {own[0]}: moves nothing with circuit.model = "{scene.circuit.model}", whose '
+            "circuit ngspice does not solve."
+        )
+    if scene.circuit.param:
         path = path_of(scene)
         own_parameters(parse(read(path)), plain(str(path)), scene.circuit.param)
     files = {fmu.name: fmu.file for fmu in scene.fmu}

@@ -1,6 +1,7 @@
 """What is there to begin with: new scenes, a schema for editors, what is in a built-in scene."""
 
 import json
+import os
 import tomllib
 from pathlib import Path
 
@@ -51,6 +52,7 @@ def test_a_new_machine_is_the_scene_that_it_starts_from(tmp_path: Path) -> None:
         (["a b.toml"], "letters, digits"),
         (["x.toml", "--base", "papr"], "did you mean paper"),
         (["there.toml"], "is there already"),
+        (["link.toml"], "link.toml: is there already"),
         (["no/x.toml"], "there is no such folder"),
     ],
 )
@@ -63,10 +65,11 @@ def test_what_cannot_be_made_is_told(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("there.toml").write_text("")
+    Path("link.toml").symlink_to("nowhere")
     assert main(["new", *words]) == 2
     said = capsys.readouterr().err
     assert told in said and said.count("\n") == 1
-    assert [path.name for path in tmp_path.iterdir()] == ["there.toml"]
+    assert {path.name for path in tmp_path.iterdir()} == {"there.toml", "link.toml"}
 
 
 def test_anothers_schema_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -75,6 +78,9 @@ def test_anothers_schema_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main(["new", str(tmp_path / "a.toml")]) == 2
     assert "scene.schema.json: is there already" in capsys.readouterr().err
     assert theirs.read_text() == '{"title": "mine"}' and [*tmp_path.iterdir()] == [theirs]
+    os.truncate(theirs, 1 << 40)  # a file without end, but for its blocks
+    assert main(["new", str(tmp_path / "a.toml")]) == 2
+    assert "scene.schema.json: cannot be read (it is larger than" in capsys.readouterr().err
     theirs.unlink()
     for name in ("a.toml", "b.toml"):
         assert main(["new", str(tmp_path / name)]) == 0

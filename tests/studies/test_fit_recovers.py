@@ -212,8 +212,17 @@ def test_forces_from_a_file(ending: str, tmp_path: Path) -> None:
     ("name", "text", "told"),
     [
         ("f.csv", "name,force\na,1\n", "f.csv: row 1: the column “trial” is missing"),
+        ("f.csv", "trial,force\na,1_000\n", "f.csv: row 2, column force: “1_000” is not a number."),
+        ("f.csv", "trial,mass,force\na,1e-9,1\n", "row 2: mass makes more than 1e+06 weights"),
+        ("f.csv", "trial,force,force\na,1,2\n", "row 1: the column “force” stands there twice."),
+        (
+            "f.toml",
+            "[a]\nforce = true\n",
+            "[a]: force must be above 0 and at most 1e+06, not “true”",
+        ),
+        ("f.toml", f"[a]\nforce = 0x{'f' * 6000}\n", "not “an endless number”."),
         ("f.csv", "trial,force\na,-1\n", "f.csv: row 2: force must be above 0 and at most 1e+06, "),
-        ("f.csv", "trial,force\na,much\n", "not “much”"),
+        ("f.csv", "trial,force\na,much\n", "f.csv: row 2, column force: “much” is not a number."),
         ("f.csv", "trial,force\na,1,2\n", "row 2: it has 3 cells, the header 2"),
         ("f.csv", "trial,weight\na,1\n", "“weight” is none of force, lower, upper, mass"),
         ("f.csv", "trial,force\na,1\na,2\n", "row 3: the trial “a” stands there twice"),
@@ -244,7 +253,7 @@ def test_options_that_cannot_be(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("\n".join(["t [s],zp [mm],zo [mm]", *rows]), encoding="utf-8")
     with pytest.raises(BadInput, match="bounds of normal forces are known"):
         cosim.fit(tmp_path, mu_k="free")
-    with pytest.raises(BadInput, match="mu_k must be above 0"):
+    with pytest.raises(BadInput, match="mu_k must be from"):
         cosim.fit(tmp_path, mu_k=0.0)
     with pytest.raises(BadInput, match="scheme needs"):
         cosim.fit(tmp_path, solver="published")

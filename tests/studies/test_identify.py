@@ -593,7 +593,7 @@ def test_trials_are_refused_in_a_sentence(
         ([str(tmp_path / "no\x1b[31m")], "no\\u001b[31m: cannot be read"),
         ([str(tmp_path / "part")], "no height or velocity of the surface"),
         ([str(folder), "--apart", "7"], "There is no trial 7"),
-        ([str(folder), "--seed", "-1"], "seed = -1 must be"),
+        ([str(folder), "--seed", "-1"], "--seed -1: must be"),
     ):
         assert main(["identify", *arguments, *out]) == 2
         assert told in capsys.readouterr().err

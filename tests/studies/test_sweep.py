@@ -287,6 +287,11 @@ BAD = [
     (["--over", "drive.offset=1,200"], "a number from -100 to 100 V"),
     (["--over", "mechanics.n_surfaces=1.5,2"], "a whole number from 1 to 16"),
     (["--over", "drive.offset=1,2", "--over", "drive.offset=3,4"], "given twice"),
+    (
+        ["--over", "drive.pot_offset=0,1", "--over", "drive.offset=3,4"],
+        "drive.pot_offset and drive.offset say the same thing twice",
+    ),
+    (["--over", "circuit.param.x=1,2"], "circuit.param.x: moves nothing with circuit.model ="),
     (["--over", "coil.polarity=0,1"], "0 must be one of -1, 1"),
     (["--over", "drive.offset=1,2", "--samples", "0"], "--samples 0"),
     (["--over", "drive.offset=1", "--samples", "5"], "needs a range"),

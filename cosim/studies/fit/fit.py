@@ -62,6 +62,10 @@ class TrialResults:
         return told(self.numbers)
 
 
+LEAST_MU_K = 1e-3
+"""Less than any dry pair has; normal forces, the friction over µ_k, would be beyond all sense."""
+
+
 def fit(
     trials: str | os.PathLike[str],
     *,
@@ -104,8 +108,9 @@ def fit(
         if mu_k != published.MU_K or not plate:
             raise BadInput("The published parameters have a µ_k of their own, and no plate.")
         return _evaluated(found, known, solver)
-    if mu_k != "free" and not (isinstance(mu_k, int | float) and 0 < mu_k <= 10):
-        raise BadInput(f"mu_k must be above 0 and at most 10, or “free”, and is {mu_k}.")
+    if mu_k != "free" and not (isinstance(mu_k, int | float) and LEAST_MU_K <= mu_k <= 10):
+        words = f"must be from {LEAST_MU_K:g} to 10, or “free”, and is"
+        raise BadInput(f"mu_k {words} {plain(str(mu_k))}.")
     if mu_k == "free" and not any(force.lower or force.upper for force in known):
         raise BadInput(
             "µ_k can only be fitted where bounds of normal forces are known: name a file."

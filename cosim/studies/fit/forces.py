@@ -18,6 +18,7 @@ from typing import Any
 from cosim.errors import BadInput, plain
 from cosim.files.cells import read_cells
 from cosim.scene import toml
+from cosim.scene.messages import shown
 from cosim.trials import published
 
 KEYS = ("force", "lower", "upper", "mass")
@@ -78,8 +79,13 @@ def _rows(path: Path) -> list[tuple[str, str, dict[str, Any]]]:
         said = plain(str(head))
         raise BadInput(f"{name}: row {line}: the column “trial” is missing (found: {said}).")
     cells.even(1)
-    for line, row in rows:
-        known = {key: cell for key, cell in zip(head, row, strict=False) if cell}
+    if twice := next((key for key in head if key and head.count(key) > 1), ""):
+        raise BadInput(f"{name}: row {line}: the column “{plain(twice)}” stands there twice.")
+    places = ((key, head.index(key)) for key in KEYS if key in head)
+    columns = {key: cells.numbers(1, place, key, ("",)).tolist() for key, place in places}
+    for k, (line, row) in enumerate(rows):
+        known: dict[str, Any] = {key: cell for key, cell in zip(head, row, strict=False) if cell}
+        known |= {key: values[k] for key, values in columns.items() if key in known}
         found.append((known.pop("trial", ""), f"{name}: row {line}", known))
     return found
 
@@ -89,16 +95,15 @@ def _force(where: str, row: dict[str, Any]) -> Force:
     for key, value in row.items():
         if key not in KEYS:
             raise BadInput(f"{where}: “{plain(key)}” is none of {', '.join(KEYS)}.")
-        try:
-            numbers[key] = float(value)
-        except (TypeError, ValueError, OverflowError):
-            numbers[key] = float("nan")
-        if not 0 < numbers[key] <= LARGEST:
-            said = plain(str(value))
+        if type(value) not in (int, float) or not 0 < value <= LARGEST:
+            said = shown(value)
             raise BadInput(f"{where}: {key} must be above 0 and at most {LARGEST:g}, not “{said}”.")
+        numbers[key] = float(value)
     if "mass" in numbers:
         weight = numbers.pop("mass") * published.GRAVITY
         numbers = {key: value / weight for key, value in numbers.items()}
+        if numbers and max(numbers.values()) > LARGEST:
+            raise BadInput(f"{where}: mass makes more than {LARGEST:g} weights of the part.")
     lower, upper = numbers.get("lower"), numbers.get("upper")
     if lower is not None and upper is not None and lower > upper:
         raise BadInput(f"{where}: lower must not be above upper, and is {row['lower']}.")

@@ -67,7 +67,7 @@ def identify(
     The method: :mod:`cosim.studies.identify.search.plan`. Raises BadInput.
     """
     if seed < 0:
-        raise BadInput(f"seed = {seed} must be 0 or more.")
+        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
     space = read_space(Path(bounds) if bounds is not None else None)
     everything = read_trials(Path(trials), space)
     labels = [trial.label for trial in everything]
@@ -79,7 +79,7 @@ def identify(
     steady = [trial for trial in everything if trial.label not in apart and _steady(trial)]
     others = [trial for trial in everything if trial not in steady]
     if not steady:
-        raise BadInput(f"{plain(str(trials))}: no trial is left to be fitted: none repeats itself.")
+        raise BadInput(f"{plain(str(trials))}: no trial that repeats itself is left to be fitted.")
     effort, count = QUICK if quick else FULL, workers_asked(workers)
 
     def made(store: Store) -> Identification:
