@@ -134,6 +134,7 @@ TOLD = {
     "V9 x 0 PULSE(0 1 0 1n 1n 1u 2u 3)": "PULSE takes 7 values; one more means a number of periods",
     "V9 x 0 SINE(0 1 1k 0 0 0 5)": "SIN takes 6 values",
     "V9 x 0 PWL(0 0 +1m 1)": "write the times of PWL since the start",
+    "V9 x 0 PWL(0 0 1m 1 0.5m 0)": "the times of PWL must rise, 0.0005 s comes after 0.001 s",
     "V9 x 0 PWL REPEAT FOREVER (0 0 1m 1) ENDREPEAT": "instead of REPEAT write r=0",
     "S9 x 0 in 0 W\n.model W SW(Ron=1 Vt=.5 Vh=-.2)": "vh of w below 0 is LTspice's smooth switch",
     "D9 x 0 W\n.model W D(Vfwd=.5)": "vfwd of w is LTspice's ideal diode",

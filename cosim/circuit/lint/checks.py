@@ -5,6 +5,7 @@ What cannot be decided without evaluating the netlist passes.
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise, takewhile
 
 from cosim.circuit.lint.deck import Line, refuse, shown
 from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, parse
@@ -183,6 +184,10 @@ def _check_source(element: Element, scope: Scope, names: Names) -> None:
             element.refuse(": write the times of PWL since the start, not since the last one")
         if "repeat" in after:
             element.refuse(": instead of REPEAT write r=0 after the points of PWL")
+        points = [*takewhile(lambda word: "=" not in word and word not in _WAVEFORMS, after)]
+        for one, other in pairwise(map(number, points[::2])):
+            if one is not None and other is not None and one > other:
+                element.refuse(f": the times of PWL must rise, {other:g} s comes after {one:g} s")
     for word in element.words:
         plain = word.lstrip("+-")
         known = plain in _WAVEFORMS or names.is_parameter(scope, plain)
