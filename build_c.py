@@ -39,12 +39,13 @@ FMU = ROOT / "fmu"
 MODEL = "stickslip"
 LIBRARIES = {
     "loop": tuple(
-        ROOT / "cosim" / folder for folder in ("coupling/loop", "drive", "simulation/rungs")
+        ROOT / "cosim" / folder for folder in ("drive", "coupling/loop", "simulation/rungs")
     ),
     "part": (ROOT / "cosim/mechanics",),
     "stepper": tuple(ROOT / "cosim" / folder for folder in ("stepper", "studies/identify/chain")),
 }
-"""The package's libraries; each is made of all C files of its folders."""
+"""The package's libraries; each is made of all C files of its folders. Those come first whose
+structures others hold."""
 DESCRIBE = FMU / "src/fmi/describe.c"
 THIN = tuple(FMU / folder for folder in ("thin", "netlist", "models"))
 """What makes FMUs of models with numbers alone, and those models."""

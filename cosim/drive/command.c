@@ -21,6 +21,23 @@ double command_value(const Piece *p, double t)
     return value_of(p, p->kind, t);
 }
 
+const Piece *piece_at(Pieces *drive, double t)
+{
+    while (t >= drive->pieces[drive->now].until) {
+        if (drive->now + 1 < drive->count) {
+            drive->now++;
+            continue;
+        }
+        const double last = drive->pieces[drive->now].until;
+        drive->refill();
+        if (drive->pieces[drive->count - 1].until <= last)
+            break;
+    }
+    while (drive->now > 0 && t < drive->pieces[drive->now].begin)
+        drive->now--;
+    return &drive->pieces[drive->now];
+}
+
 /* Those of one piece at n times; with a constant kind the compiler makes vectors of them. */
 static void values_within(const Piece piece, int64_t n, const double *restrict times,
                           double *restrict values)

@@ -24,10 +24,19 @@ typedef struct {
     double pin;                /* V at the offset pin */
 } Piece;
 
+typedef struct {
+    const Piece *pieces; /* in the order of time; one of them holds */
+    int64_t count, now;
+    void (*refill)(void); /* makes the first piece the one that holds where the run is */
+} Pieces;
+
 /* V1 (V) at `t` (s) in [begin, until). With the phase (t - origin) rate it is `offset` for a LEVEL,
    offset + amplitude/2 sin(2π phase) for a SINE, and offset + amplitude (phase / span - 1/2) in a RAMP,
    of which no more than its end is taken. */
 EXPORT double command_value(const Piece *p, double t);
+
+/* The piece that holds at `t` (s); the last one where no more are to be had. */
+const Piece *piece_at(Pieces *drive, double t);
 
 /* V1 at each of `n` times, which do not fall, from pieces that cover them; or its left limits there,
    times within 1e-12 s after a corner being on it. */

@@ -16,6 +16,7 @@ from cosim.coupling.loop.structures import (
 )
 from cosim.coupling.methods import methods
 from cosim.coupling.rewind.joint import Joint
+from cosim.drive import ahead
 from cosim.drive.periodic import Lines
 from cosim.drive.pieces import Piece
 from cosim.errors import SimulationFailed
@@ -80,7 +81,7 @@ def test_blocks_change_nothing(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     # Blocks as small as can be, so that a short run goes over many of their ends.
     monkeypatch.setattr(recorder, "STEPS", 7)
     monkeypatch.setattr(lead, "_POINTS", 7)
-    monkeypatch.setattr(lead, "_PIECES", 2)
+    monkeypatch.setattr(ahead, "_MANY", 2)
     assert_same(whole, simulate(scene))
 
 
@@ -210,7 +211,7 @@ def test_python_fails_below_ngspice(
 
     with monkeypatch.context() as patch:
         patch.setattr(lead, "_POINTS", 100)
-        patch.setattr(lead, "_PIECES", 1)
+        patch.setattr(ahead, "_MANY", 1)
         patch.setattr(owner, name, failing)
         with pytest.raises(type(failure)):
             simulate(load("reference", [*BRIEF, "run.duration=10"]))

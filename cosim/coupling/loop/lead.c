@@ -53,23 +53,6 @@ static int going(const Lead *c)
 
 /* --- the command --- */
 
-static const Piece *piece_at(Lead *c, double t)
-{
-    while (t >= c->pieces[c->piece].until) {
-        if (c->piece + 1 < c->n_pieces) {
-            c->piece++;
-            continue;
-        }
-        const double last = c->pieces[c->piece].until;
-        c->refill();
-        if (!going(c) || c->pieces[c->n_pieces - 1].until <= last)
-            break;
-    }
-    while (c->piece > 0 && t < c->pieces[c->piece].begin)
-        c->piece--;
-    return &c->pieces[c->piece];
-}
-
 enum { EMF, GAIN, COMMAND, DAC, PIN, UNKNOWN };
 
 static int kind_of(const Lead *c, const char *name)
@@ -107,10 +90,10 @@ static double held(Lead *c, int source, double t)
     if (t <= 0.0)
         return source == COMMAND ? 0.0 : c->v_offset;
     if (t >= c->jump - ON_TIME) {
-        const Piece *before = piece_at(c, nextafter(c->jump, 0.0));
+        const Piece *before = piece_at(&c->drive, nextafter(c->jump, 0.0));
         return pin_of(c, source, before, before->end);
     }
-    const Piece *p = piece_at(c, t);
+    const Piece *p = piece_at(&c->drive, t);
     return pin_of(c, source, p, command_value(p, t));
 }
 
@@ -169,8 +152,8 @@ void macro_point_replayed(Lead *c)
    error ngspice would take a third of that in a step and lose some 0.1 % of the charge. */
 static void pass_jump(Lead *c)
 {
-    const double before = piece_at(c, nextafter(c->jump, 0.0))->end;
-    const Piece *p = piece_at(c, c->jump);
+    const double before = piece_at(&c->drive, nextafter(c->jump, 0.0))->end;
+    const Piece *p = piece_at(&c->drive, c->jump);
     const double share = fabs(command_value(p, c->jump) - before) / c->range;
     c->restart_step = c->after_jump / fmax(share, SMALL_JUMP);
     if (share > SETTLED_SHARE)
@@ -204,7 +187,7 @@ static double longest_step(Lead *c, const double *values, double h)
     double step = INFINITY;
     if (is_near_limit(c, values[OUTPUT], h))
         step = c->near_step;
-    const Piece *p = &c->pieces[c->piece];
+    const Piece *p = &c->drive.pieces[c->drive.now];
     if (p->kind == SINE)
         step = fmin(step, 1.0 / (c->fineness * STEPS_OF_SINE * p->rate));
     if (c->at_jump)
@@ -260,7 +243,7 @@ static double accepted(Lead *c, double time, double next_step)
     next_step = fmin(next_step, fmax(change / fabs(c->segment.c[1]), c->answer_step));
     if (c->impact - time < next_step)
         next_step = c->impact - time;
-    const double corner = piece_at(c, time)->until; /* where V1 or its slope jumps */
+    const double corner = piece_at(&c->drive, time)->until; /* where V1 or its slope jumps */
     if (corner > time && corner - time < next_step)
         next_step = corner - time;
     return c->jump - time < next_step ? c->jump - time : next_step;
@@ -337,7 +320,7 @@ EXPORT int lead_step(double time, double *delta, double old_delta, int redo, int
 
 void lead_begin(Lead *c)
 {
-    c->jump = piece_at(c, 0.0)->jump;
+    c->jump = piece_at(&c->drive, 0.0)->jump;
     c->impact = INFINITY;
     c->answer_step = c->time_constant / 28.0 / c->fineness;
     c->limited_step = c->time_constant / 5.0 / c->fineness;

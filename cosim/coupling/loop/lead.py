@@ -7,7 +7,6 @@ prepares the command and takes the log away in blocks.
 import ctypes
 from collections.abc import Callable
 from ctypes import c_int64
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +23,8 @@ from cosim.coupling.loop.structures import (
     callback,
     loop,
 )
-from cosim.drive.pieces import Command, Piece
+from cosim.drive.ahead import Ahead
+from cosim.drive.pieces import Command
 from cosim.errors import SimulationFailed
 from cosim.files.spill import Tape
 from cosim.scene import Scene
@@ -54,9 +54,6 @@ flux of the mechanics at the last macro point, V s."""
 _POINTS = 4096
 """Places for accepted points between two emptyings of the log."""
 
-_PIECES = 512
-"""How many pieces of the command are prepared at a time."""
-
 
 class Lead:
     """ngspice leads; the mechanics follow each of its accepted steps, or as ``use`` says."""
@@ -74,7 +71,6 @@ class Lead:
         the steps of the run that these are from.
         """
         self._duration = scene.run.duration
-        self._command = command
         self._recorder = recorder
         self._replay = replay
         self._deck, vectors = deck or prepare(scene)
@@ -84,8 +80,6 @@ class Lead:
         # With `uic`, ngspice accepts t = 0 before it has sent any value.
         self._block = np.zeros((_POINTS, width))
         self.places = (c_int64 * (len(self._saved) + 1))()
-        self._pieces: list[Piece] = []
-        self._row: Any = None
         self._time = 0.0
         coil, loop_resistance = scene.coil, scene.circuit.sense_resistance * scene.coil.count
         motional = self._saved.index(MOTIONAL) if MOTIONAL in self._saved else -1
@@ -111,7 +105,6 @@ class Lead:
             motional=motional,
             log=self._block.ctypes.data,
             log_rows=_POINTS,
-            refill=callback(self._refill, self._fail),
             attend=callback(self._attend, self._fail),
         )
         named = scene.renamed
@@ -122,8 +115,11 @@ class Lead:
         self.state.flux_at_start = flux
         segment = self.state.segment
         segment.c[0], segment.c[1], segment.end = emf, slope, -np.inf
-        self._refill()
-        self.state.jump = self._pieces[0].jump
+        state = self.state
+        self._ahead = Ahead(state.drive, command, self._duration, lambda: state.time)
+        state.drive.refill = callback(self._ahead.refill, self._fail)
+        self._ahead.refill()
+        state.jump = self._ahead.pieces[0].jump
 
     def run(self) -> None:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
@@ -188,15 +184,6 @@ class Lead:
         self._log.append(self._block[:filled])
         self.state.n_log = 0
         self._recorder.tell()
-
-    def _refill(self) -> None:
-        """Keep the pieces that are still needed, and prepare those that follow them."""
-        state = self.state
-        kept = [piece for piece in self._pieces if piece.until > state.time]
-        begin = self._pieces[-1].until if self._pieces else 0.0
-        self._pieces = kept + self._command.pieces(begin, self._duration, _PIECES)
-        self._row = (Piece * len(self._pieces))(*self._pieces)
-        state.pieces, state.n_pieces, state.piece = ctypes.addressof(self._row), len(self._row), 0
 
 
 def after_jump(scene: Scene) -> float:

@@ -160,8 +160,7 @@ typedef struct Lead {
     void (*macro_point)(struct Lead *); /* see above; Python's takes no notice of the argument */
     Segment segment;
     const double *replay; /* back-EMF, slope and impact after each step, for macro_point_replayed() */
-    const Piece *pieces;  /* of the command in the order of time; one of them holds */
-    int64_t n_pieces, piece;
+    Pieces drive;
     double gain, v_offset;        /* of the difference amplifier; mean voltage of the pin, V */
     double count;                 /* of coils */
     double after_jump;            /* s; longest step after a jump of the command */
@@ -199,7 +198,6 @@ typedef struct Lead {
     int64_t stopped;              /* by Python: nothing is to be done any more */
     char source[64];              /* name of the one that nothing feeds */
     char names[5][64];            /* of the back-EMF, its gain, the command, the DAC and the pin */
-    void (*refill)(void);         /* makes the first piece the one that holds at `time` */
     void (*attend)(void);         /* empties the log */
 } Lead;
 
@@ -292,8 +290,7 @@ typedef struct Ports {
                                       the communication point, and their integrals since then */
     const int64_t *places;     /* as in Lead */
     int64_t n_saved;
-    const Piece *pieces;       /* of the drive */
-    int64_t n_pieces, piece;
+    Pieces drive;
     double jump;               /* s; the drive's next one */
     int64_t driven;            /* whether a port is from it */
     Pulse *pulses;
@@ -322,7 +319,7 @@ typedef struct Ports {
     int64_t logged, attempts, redone, exchanged, quiet;
     int64_t status, stopped, failed; /* failed: which FMU */
     char source[64];           /* the one that nothing feeds */
-    void (*refill)(void), (*attend)(void);
+    void (*attend)(void);
 } Ports;
 
 EXPORT void ports_begin(Ports *c);

@@ -67,34 +67,17 @@ static int going(const Ports *c)
 
 /* --- the drive --- */
 
-static const Piece *piece_at(Ports *c, double t)
-{
-    while (t >= c->pieces[c->piece].until) {
-        if (c->piece + 1 < c->n_pieces) {
-            c->piece++;
-            continue;
-        }
-        const double last = c->pieces[c->piece].until;
-        c->refill();
-        if (!going(c) || c->pieces[c->n_pieces - 1].until <= last)
-            break;
-    }
-    while (c->piece > 0 && t < c->pieces[c->piece].begin)
-        c->piece--;
-    return &c->pieces[c->piece];
-}
-
 static double drive_before(Ports *c, double t)
 {
     if (t <= 0.0)
         return 0.0;
-    const Piece *p = piece_at(c, nextafter(t, 0.0));
+    const Piece *p = piece_at(&c->drive, nextafter(t, 0.0));
     return t >= p->until - ON_TIME ? p->end : command_value(p, t);
 }
 
 static double drive_after(Ports *c, double t)
 {
-    return command_value(piece_at(c, t), t);
+    return command_value(piece_at(&c->drive, t), t);
 }
 
 /* Until a step has ended on the jump, the drive keeps its left limit. */
@@ -397,7 +380,7 @@ static double accepted(Ports *c, double time, double next_step)
     c->tries = 0;
     const int at_jump = c->driven && time >= c->jump - ON_TIME;
     if (at_jump)
-        c->jump = piece_at(c, c->jump)->jump;
+        c->jump = piece_at(&c->drive, c->jump)->jump;
     if (time <= 0.0) {
         memcpy(c->last, c->now, (size_t)c->n_saved * sizeof *c->last);
         begin_exchange(c);
@@ -424,7 +407,7 @@ static double accepted(Ports *c, double time, double next_step)
         next_step = fmin(next_step, fmax(HALF * (c->duration - time), LAST * c->after_jump));
     next_step = fmin(next_step, until(c, c->end));
     if (c->driven)
-        next_step = fmin(next_step, fmin(until(c, piece_at(c, time)->until), until(c, c->jump)));
+        next_step = fmin(next_step, fmin(until(c, piece_at(&c->drive, time)->until), until(c, c->jump)));
     return next_step;
 }
 
@@ -666,7 +649,7 @@ void ports_begin(Ports *c)
     memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
     set_lines(c);
     c->learn = c->n_throughs > 0;
-    c->jump = c->driven ? piece_at(c, 0.0)->jump : INFINITY;
+    c->jump = c->driven ? piece_at(&c->drive, 0.0)->jump : INFINITY;
     late = loop_milliseconds() + LOOP_PATIENCE;
     run = c;
 }

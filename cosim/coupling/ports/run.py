@@ -19,14 +19,14 @@ from cosim.coupling.loop.structures import (
 )
 from cosim.coupling.ports.plan import Plan
 from cosim.coupling.ports.structures import PortsState, Pulse, Source, StrangerState, Through
+from cosim.drive.ahead import Ahead
 from cosim.drive.command import command
-from cosim.drive.pieces import Piece
 from cosim.errors import SimulationFailed, plain
 from cosim.files.spill import Tape
 from cosim.scene import Scene
 
-_POINTS, _PIECES = 2048, 512
-"""Places of the logs between two emptyings; pieces of the drive that are prepared at a time."""
+_POINTS = 2048
+"""Places of the logs between two emptyings."""
 
 ENOUGH, BEGINNING, BUDGET = 1_000_000, 10_000_000, 1e9
 """Steps after which a run is judged, after which it no longer is, and that it may take (hours)."""
@@ -46,8 +46,6 @@ class Run:
         self.plan = plan = Plan(scene)
         self.deck = plan.deck()
         self._failure: BaseException | None = None
-        self._command = command(scene)
-        self._pieces: list[Piece] = []
         count, width = len(self.deck.vectors), plan.width
         self.places = (c_int64 * (count + 1))()
         self._rows = [(c_double * max(width, 1))() for _ in range(3)]
@@ -98,10 +96,12 @@ class Run:
             log=self._blocks[0].ctypes.data,
             points=self._blocks[1].ctypes.data,
             log_rows=_POINTS,
-            refill=callback(self._refill, self._fail),
             attend=callback(self._attend_and_judge, self._fail),
         )
-        self._refill()
+        state = self.state
+        self._ahead = Ahead(state.drive, command(scene), scene.run.duration, lambda: state.origin)
+        state.drive.refill = callback(self._ahead.refill, self._fail)
+        self._ahead.refill()
 
     def run(self) -> None:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
@@ -209,15 +209,6 @@ class Run:
                 f"{duration:g} s. A node may ring undamped; where coupling.method is "
                 '"redo", an FMU\'s outputs may jump without end.'
             )
-
-    def _refill(self) -> None:
-        """Keep the pieces of the drive that are still needed, and prepare those that follow."""
-        state = self.state
-        kept = [piece for piece in self._pieces if piece.until > state.origin]
-        begin = self._pieces[-1].until if self._pieces else 0.0
-        self._pieces = kept + self._command.pieces(begin, self._scene.run.duration, _PIECES)
-        self._row = (Piece * len(self._pieces))(*self._pieces)
-        state.pieces, state.n_pieces, state.piece = ctypes.addressof(self._row), len(self._row), 0
 
 
 def _named(names: tuple[str, ...], arrays: list[Any]) -> dict[str, int]:
