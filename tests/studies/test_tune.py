@@ -90,7 +90,7 @@ BAD = [
     (["--maxmise", "v_average"], "--maximise --minimise is required (see cosim tune --help)"),
     (["--maximise", "v_average", "--robst"], "--robst; did you mean --robust? (see cosim tune"),
     (["--maximise", "v_average", "--over", "drive.offset"], "table.key=low:high"),
-    (["--maximise", "v_average", "--over", "drive.offset=1:0"], "must be a range"),
+    (["--maximise", "v_average", "--over", "drive.offset=1:0"], "LOW below HIGH, each a number"),
     (["--maximise", "v_average", "--over", "drive.offset=0:1e9"], "from -100 to 100 V"),
     (["--maximise", "v_average", "--over", "circuit.model=0:1"], "not a number"),
     (["--maximise", "v_average", "--minimise", "v_average"], "not allowed with"),

@@ -176,7 +176,8 @@ def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, 
         key = numeric_key(name)
         assert key.low is not None and key.high is not None
         if not (isfinite(low) and isfinite(high) and key.low <= low < high <= key.high):
-            raise BadInput(f"--over {name}={low:g}:{high:g}: must be a range, of {key.allowed}.")
+            words = f"must be LOW:HIGH, LOW below HIGH, each {key.allowed}"
+            raise BadInput(f"--over {name}={low:g}:{high:g}: {words}.")
     return dict(over)
 
 
