@@ -19,13 +19,13 @@ class Ahead:
     ) -> None:
         self._drive, self._command, self._duration = drive, command, duration
         self._reached = reached
-        self.pieces: list[Piece] = []
+        self.pieces = (Piece * 0)()
 
     def refill(self) -> None:
         """Keep the pieces that are still needed, and prepare those that follow them."""
         reached, drive = self._reached(), self._drive
         kept = [piece for piece in self.pieces if piece.until > reached]
         begin = self.pieces[-1].until if self.pieces else 0.0
-        self.pieces = kept + self._command.pieces(begin, self._duration, _MANY)
-        self._row = (Piece * len(self.pieces))(*self.pieces)
-        drive.pieces, drive.count, drive.now = ctypes.addressof(self._row), len(self._row), 0
+        every = kept + self._command.pieces(begin, self._duration, _MANY)
+        self.pieces = (Piece * len(every))(*every)
+        drive.pieces, drive.count, drive.now = ctypes.addressof(self.pieces), len(every), 0

@@ -6,7 +6,7 @@ from typing import Any
 from cosim.errors import BadInput, plain
 from cosim.scene import Key, Scene, changed, keys
 from cosim.scene.messages import ended, suggestion
-from cosim.scene.tables import KNOBS, LEVEL_KEY, PARAM_KEY
+from cosim.scene.tables import KNOBS, LEVEL_KEY, PARAM_KEY, said_twice
 
 FREQUENCIES = ("drive.frequency", "drive.pot_frequency", "drive.loop_time")
 
@@ -49,8 +49,9 @@ def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
     or no parameter of its FMUs, or says what another one says."""
     names = [*names]
     for knob, name in KNOBS.items():  # else each run would fail by itself
-        if {one := f"drive.{knob}", other := f"drive.{name}"} <= set(names):
-            raise BadInput(f"--over: {one} and {other} say the same thing twice; give one of them.")
+        both = f"drive.{knob}", f"drive.{name}"
+        if set(both) <= set(names):
+            raise BadInput(f"--over: {said_twice(*both)}.")
     own = [name for name in names if name.startswith(("circuit.param.", "fmu."))]
     if not own:
         return

@@ -55,8 +55,9 @@ def fault(sentence: str, *unnamed: str) -> PydanticCustomError:
     return PydanticCustomError("check", "{sentence}", {"sentence": sentence, "keys": keys})
 
 
-def _doubled(one: str, other: str) -> PydanticCustomError:
-    return fault(f"{one} and {other} say the same thing twice; give one of them")
+def said_twice(one: str, other: str) -> str:
+    """What is wrong where both keys are given."""
+    return f"{one} and {other} say the same thing twice; give one of them"
 
 
 def _both_or_neither(table: str, values: BaseModel, *pair: str) -> None:
@@ -201,7 +202,7 @@ class Drive(Table):
         data = dict(data)
         for knob, key in KNOBS.items():
             if data.get(knob) is not None and key in data:
-                raise _doubled(f"drive.{knob}", f"drive.{key}")
+                raise fault(said_twice(f"drive.{knob}", f"drive.{key}"))
 
         # anything else fails in the validation of the knob itself
         pots = {k: data.get(k) for k in KNOBS if is_number(data.get(k)) and 0 <= data[k] <= 1}
@@ -465,7 +466,7 @@ class Friction(Table):
     @classmethod
     def _one_force(cls, data: Any) -> Any:
         if isinstance(data, dict) and None not in map(data.get, NORMAL_FORCES):
-            raise _doubled(*(f"friction.{key}" for key in NORMAL_FORCES))
+            raise fault(said_twice(*(f"friction.{key}" for key in NORMAL_FORCES)))
         return data
 
     @model_validator(mode="after")

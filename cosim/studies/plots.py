@@ -30,6 +30,11 @@ def headline(figure: Picture, message: str) -> None:
     figure.suptitle(lines, x=0.01, ha="left", fontsize=12, fontweight="bold")
 
 
+def footnote(figure: Picture, note: str) -> None:
+    """Write below a figure how to read it."""
+    figure.supxlabel(note, x=0.01, ha="left", fontsize=9, color="0.35")
+
+
 def panels(
     title: str,
     note: str,
@@ -45,7 +50,7 @@ def panels(
     figure = Picture(*size, "constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options)
     headline(figure, title)
-    figure.supxlabel(note, x=0.01, ha="left", fontsize=9, color="0.35")
+    footnote(figure, note)
     for axis in axes.flat:
         axis.grid(alpha=0.25)
         axis.set_axisbelow(True)

@@ -169,11 +169,15 @@ def _check_passive(element: Element, scope: Scope, names: Names) -> None:
         element.refuse(f": write {{{shown(first)}}}, as ngspice takes a bare word for a model")
 
 
+def _values(words: Sequence[str]) -> list[str]:
+    """Those of a waveform: the words up to another one or an assignment."""
+    return [*takewhile(lambda word: word not in _WAVEFORMS and "=" not in word, words)]
+
+
 def _check_source(element: Element, scope: Scope, names: Names) -> None:
     for wave, most in _WAVES.items():
         after = element.words[element.words.index(wave) + 1 :] if wave in element.words else []
-        ends = (k for k, word in enumerate(after) if word in _WAVEFORMS or "=" in word)
-        if next(ends, len(after)) > most:
+        if len(_values(after)) > most:
             element.refuse(
                 f": {wave.upper()} takes {most} values; one more means a number of periods to "
                 "LTspice and a phase to ngspice"
@@ -184,8 +188,7 @@ def _check_source(element: Element, scope: Scope, names: Names) -> None:
             element.refuse(": write the times of PWL since the start, not since the last one")
         if "repeat" in after:
             element.refuse(": instead of REPEAT write r=0 after the points of PWL")
-        points = [*takewhile(lambda word: "=" not in word and word not in _WAVEFORMS, after)]
-        for one, other in pairwise(map(number, points[::2])):
+        for one, other in pairwise(map(number, _values(after)[::2])):
             if one is not None and other is not None and one > other:
                 element.refuse(f": the times of PWL must rise, {other:g} s comes after {one:g} s")
     for word in element.words:

@@ -107,15 +107,15 @@ class Lead:
             log_rows=_POINTS,
             attend=callback(self._attend, self._fail),
         )
+        state = self.state
         named = scene.renamed
         names = named.get("machine.back_emf", "vemf"), "vgain", named.get("drive", "vcommand")
         for k, name in enumerate((*names, "vdac", "voffset")):
-            self.state.names[k].value = name.lower().encode()
+            state.names[k].value = name.lower().encode()
         emf, slope, flux = recorder.mechanics.step_outputs[:3]
-        self.state.flux_at_start = flux
-        segment = self.state.segment
+        state.flux_at_start = flux
+        segment = state.segment
         segment.c[0], segment.c[1], segment.end = emf, slope, -np.inf
-        state = self.state
         self._ahead = Ahead(state.drive, command, self._duration, lambda: state.time)
         state.drive.refill = callback(self._ahead.refill, self._fail)
         self._ahead.refill()

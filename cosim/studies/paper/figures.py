@@ -14,7 +14,7 @@ from cosim.drive.surface import formulas
 from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import Cycle, optimal_cycle
 from cosim.files.picture import Picture, grid
-from cosim.studies.plots import headline
+from cosim.studies.plots import footnote, headline
 
 # The colours of surface and part in all figures.
 SURFACE, PART, STICKING = "#1f6fb2", "#d1495b", "#f4e3c1"
@@ -49,11 +49,11 @@ def draw_cycle(case: Transport) -> Picture:
         f"slipping while it brakes at {case.a_max / gravity:.3g} g, the part moves at "
         f"{mean * 1e3:+.2f} mm/s",
     )
-    note = (
+    footnote(
+        figure,
         f"The optimal waveform. {_friction(case)}, F$_n$ = {case.f_n:g} m$_P$g, "
-        f"T = {case.period * 1e3:.5g} ms; {mean / (gravity * case.period):.4f} gT"
+        f"T = {case.period * 1e3:.5g} ms; {mean / (gravity * case.period):.4f} gT",
     )
-    figure.supxlabel(note, x=0.01, ha="left", fontsize=9, color="0.35")
     return figure
 
 
@@ -120,8 +120,7 @@ def draw_velocities(case: Transport, peaks: Sequence[float]) -> Picture:
     """Figure 4: v_ave over the normal force for several a_max, m/s²."""
     figure, (axis,) = grid(1, 1, 9.0, 6.0, 0.0)
     axis.axvspan(*(weight / case.mu_s for weight in GUIDELINE), color=STICKING, alpha=0.45, lw=0)
-    for peak, color in zip(peaks, CURVES, strict=False):
-        _curve(axis, case, peak, color)
+    best = [_curve(axis, case, *one) for one in zip(peaks, CURVES, strict=False)]
     ratios, speeds = optima(case, max(peaks))
     axis.plot(ratios, speeds * 1e3, color="0.15", lw=1.3, ls=DASHED, zorder=2, label=OPTIMA)
     axis.axhline(0.0, color="0.5", lw=0.8, zorder=1)
@@ -136,9 +135,6 @@ def draw_velocities(case: Transport, peaks: Sequence[float]) -> Picture:
     figure.legend(
         handles=_legend(axis), loc="outside lower center", ncols=3, fontsize=9, frameon=False
     )
-    best = [
-        formulas.optimal_force_ratio(case.mu_s, case.mu_k, peak, case.gravity) for peak in peaks
-    ]
     note = f"Fastest transport upwards. {_friction(case)}, T = {case.period * 1e3:.5g} ms."
     axis.set_title(note, loc="left", fontsize=9, color="0.35")
     headline(
@@ -164,7 +160,8 @@ def optima(case: Transport, most: float) -> tuple[Array, Array]:
     return np.array(ratios), np.array(speeds)
 
 
-def _curve(axis: Axes, case: Transport, peak: float, color: str) -> None:
+def _curve(axis: Axes, case: Transport, peak: float, color: str) -> float:
+    """Draw v_ave for one a_max; gives the best f_n."""
     mu_s, mu_k, gravity = case.mu_s, case.mu_k, case.gravity
     sticking = formulas.largest_force_ratio(mu_s, peak, gravity)
     sliding = formulas.largest_force_ratio(mu_k, peak, gravity)
@@ -186,6 +183,7 @@ def _curve(axis: Axes, case: Transport, peak: float, color: str) -> None:
     axis.plot(best, speed(best), "o", color=color, ms=6)
     axis.plot(sticking, speed(sticking), "s", color=color, ms=5.5)
     axis.plot(sliding, 0.0, "v", color=color, ms=6.5, clip_on=False, zorder=3)
+    return best
 
 
 def _legend(axis: Axes) -> list[Artist]:

@@ -219,9 +219,10 @@ def read_space(own: Path | None = None) -> Space:
             f"friction.mu_s = {rig['friction.mu_s'].high:g}."
         )
     space = Space(rig, trial, laws, laws[0], measured)
+    scene = load("reference")
     for law in laws:  # what no scene can have together would be told only when all is searched
         one = space.of_law(law)
-        changed(load("reference"), one.settings(np.full(len(one.free), 0.5)), path)
+        changed(scene, one.settings(np.full(len(one.free), 0.5)), path)
     return space
 
 
