@@ -176,7 +176,7 @@ class Drive(Table):
     )
     quantised: bool = _choice(
         False,
-        "Firmware's staircase of 10-bit codes every 50 us: 12 to 20 times the time in full",
+        "Firmware's staircase of 10-bit codes every 50 us: 15 to 40 times the time in full",
     )
     loop_time: float = _number(
         0.0, "s", 0.0, 1e-3, "Pass of the firmware's loop, about 22 us; 0 makes steps of 50 us"
