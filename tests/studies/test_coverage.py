@@ -33,7 +33,7 @@ KINDS = ("rigid walls", "changing force")
 COUNTS = (3, 6, 9)
 RIGS = 2
 """Of each kind with each count of trials."""
-EFFORT = Effort(3, 50, ((12, 60, 0.12), (5, 120, 0.08), (2, 250, 0.05)), (), 1, 2)
+EFFORT = Effort(3, 50, ((12, 80, 0.07), (5, 160, 0.06), (2, 330, 0.04)), (), 1, 2)
 """Less than the program's, for one law."""
 MOVED = 0.1
 """Standard deviation of the moves, of the bounds' ranges."""

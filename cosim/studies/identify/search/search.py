@@ -28,7 +28,7 @@ STEP = 2e-3
 """Of a bound's range, for derivatives: below it impacts make the cost rough."""
 SOFT = 0.03
 """Damping of the sensitivities, relative to the diagonal of the normal matrix."""
-POPULATION = 16
+POPULATION = 12
 REFRESH, RESCREEN = 4, 30
 """Generations after which sensitivities are found anew, and own parameters drawn anew."""
 STARTS = 15
