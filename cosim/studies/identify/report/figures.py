@@ -15,6 +15,7 @@ from cosim.studies.identify.report.solved import KINDS, Solved
 from cosim.studies.identify.report.verdicts import TRUSTED, forces
 from cosim.studies.plots import headline
 from cosim.studies.tables import Row
+from cosim.waveforms import quantities
 from cosim.waveforms.columns import COLUMNS
 
 MEASURED, SIMULATED, OTHER, FLOOR = "0.15", "#d1495b", "#1f6fb2", "#2a9d8f"
@@ -142,8 +143,8 @@ def rigs(found: Solved) -> Picture:
             axis.xaxis.set_minor_formatter(NullFormatter())
         else:
             axis.locator_params(axis="x", nbins=4)
-        unit = "" if units[name] in ("1", "") else f" [{units[name]}]"
-        axis.set_title(f"{name.partition('.')[2]}{unit}: cost", loc="left", fontsize=9)
+        named = quantities.label(name.partition(".")[2], units[name])
+        axis.set_title(f"{named}: cost", loc="left", fontsize=9)
     for axis in (first, *others):
         axis.tick_params(labelsize=7)
     _legend(figure, first, "outside upper right", 3)
