@@ -76,10 +76,12 @@ def _series(time: Array, values: Array, period: float) -> float:
     rows = (len(time) - 1) * period / (time[-1] - time[0])
     harmonics = max(1, min(HARMONICS, len(time) // ROWS_A_HARMONIC, max(3, int(rows) - 1)))
     angles = np.outer(time, 2 * np.pi / period * np.arange(1, harmonics + 1))
+    # Columns: cosine and sine of the first harmonic, then those of the next ones.
     terms = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(time), -1)
     terms, values = terms - terms.mean(axis=0), values - values.mean()
     whole, count = max(float(values @ values), 1e-300), len(values) - 1
     left = values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0]
+    # As many terms as samples would explain all of any signal.
     free = count / max(count - 2 * harmonics, 1)
     first = np.sum((values @ terms[:, :2]) ** 2 / np.sum(terms[:, :2] ** 2, axis=0))
     return 1.0 - free * float(left @ left) / whole + FUNDAMENTAL * float(first) / whole

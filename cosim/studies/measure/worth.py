@@ -34,6 +34,8 @@ class Worth:
 def likely(values: Array, shown: Array, sd: Array) -> Array:
     """Weights of rigs with ``values`` (n × numbers) where ``shown`` was measured to ``sd``."""
     square = (((values - shown) / sd) ** 2).sum(axis=1)
+    # Rigs are few: where next to none is as likely as the truth, the weights are made flatter until
+    # the effective number of rigs, (Σ w)² / Σ w², suffices.
     square = square - square.min()
     while True:
         weights = np.exp(-0.5 * square)

@@ -79,14 +79,19 @@ class Target:
     _kept: list[npt.NDArray[Any]] = field(init=False)
 
     def __post_init__(self) -> None:
+        # Each gap between samples is cut into equal steps of at most ``step``. ``edges`` are the
+        # ends of all steps; ``sample`` is the number of the sample at an edge, -1 where there is
+        # none.
         gaps = np.diff(self.time)
         parts = np.maximum(1, np.ceil(gaps / self.step - 1e-9).astype(np.int64))
         at = np.concatenate([[0], np.cumsum(parts)])
         edges = np.interp(np.arange(at[-1] + 1), at, self.time)
         sample = np.full(len(edges), -1, dtype=np.int32)
         sample[at] = np.arange(len(self.time))
+        # A velocity made of heights is their change over two gaps; the first and last have none.
         rate = np.full(len(self.time), np.nan)
         rate[1:-1] = 1.0 / (self.time[2:] - self.time[:-2])
+        # The structure has addresses only, so the arrays are kept for as long.
         self._kept = [edges, sample, rate]
         state = _Trial(samples=len(self.time), rate=rate.ctypes.data)
         state.schedule.steps = len(edges) - 1
@@ -138,6 +143,7 @@ def look_around(
     parameters with these, and the costs.
     """
     n, m, _ = own.shape
+    # LANES sets run side by side; the last block is filled up with the first set.
     blocks = -(-m // LANES)
     padded = np.concatenate([own, np.repeat(own[:, :1], blocks * LANES - m, axis=1)], axis=1)
     padded = np.ascontiguousarray(padded).reshape(n * blocks, LANES, len(OWN))
@@ -154,6 +160,7 @@ def _work(
     jobs = np.zeros(n, _JOB)
     jobs["trial"], jobs["rounds"] = [target.address for target in targets], rounds
     for name, each in (("rig", rigs), ("own", own), ("cost", cost)):
+        # The address of each row: the compiled code works in place.
         jobs[name] = each.ctypes.data + np.arange(n) * each.strides[0]
 
     def work(_: int) -> int:
@@ -181,6 +188,7 @@ def simulate(target: Target, rigs: Array, own: Array) -> tuple[dict[str, Array],
     residuals = np.empty((n, len(signals) * samples))
     out, apart = (np.empty((samples * len(OUTPUTS), LANES)) for _ in range(2))
     for start in range(0, n, LANES):
+        # The last block is filled up with the last machine. Lanes are innermost in compiled code.
         rows = np.minimum(np.arange(start, start + LANES), n - 1)
         both = np.ascontiguousarray(np.concatenate([rigs[rows], own[rows]], axis=1).T)
         pointers = (both.ctypes.data, out.ctypes.data, apart.ctypes.data)

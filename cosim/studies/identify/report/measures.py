@@ -65,6 +65,8 @@ def samples(trials: Sequence[Measured], found: Found) -> float:
         left = trial.fine.signals["v_surface"] - shown(trial, rig, own)["v_surface"]
         left = np.where(np.isfinite(left), left - np.nanmean(left), 0.0)
         n, known = len(left), int(np.isfinite(trial.fine.signals["v_surface"]).sum())
+        # The residual's correlation with itself by the lag in samples, 1 at none. ``short`` adds it
+        # up to its first zero, ``again`` at whole periods, where the next cycle errs alike.
         like = np.correlate(left, left, "full")[n - 1 :] / max(float(left @ left), 1e-300)
         short = like[1 : 1 + int(np.argmax(np.append(like, -1.0)[1:] <= 0.0))].sum()
         period = (n - 1) / float(trial.fine.time[-1]) / trial.frequency
@@ -91,6 +93,7 @@ def repeatability(trial: Measured) -> Row:
     period = 1.0 / trial.frequency
     count = int((time[known][-1] - time[known][0]) / period)
     within = np.arange(0.0, period, float(np.median(np.diff(time))))
+    # A row for each whole cycle, at equal phases.
     at = time[known][0] + np.add.outer(period * np.arange(count), within)
     cycles, found = np.interp(at, time[known], v[known]), {}
     for name, some in (("floor", cycles), ("floor_late", cycles[int(count >= LATE) :])):
@@ -112,6 +115,7 @@ def bands(trial: Measured, rig: Array, own: Array) -> list[Row]:
     known = np.isfinite(v) & np.isfinite(residual)
     step = float(np.median(np.diff(time)))
     even = np.arange(time[known][0], time[known][-1] + 0.5 * step, step)
+    # The window keeps a strong line from leaking into the other bands.
     window = np.hanning(len(even))
     f = np.fft.rfftfreq(len(window), step)
     both = (np.interp(even, time[known], values[known]) for values in (v, residual))

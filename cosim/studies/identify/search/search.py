@@ -84,6 +84,7 @@ def best_of(several: Sequence[Found]) -> Found:
 def _started(targets: Sequence[Target], own: Array) -> Array:
     """Own parameters (n × m × OWN), each as it is and with the drive switched on at other times."""
     k = OWN.index("start")
+    # n × m × (as it is, and at STARTS moments) × OWN; the moments are in the middle of equal parts.
     found = np.repeat(own[:, :, None], 1 + STARTS, axis=2)
     for rows, target in zip(found, targets, strict=True):
         if target.scale[k] > 0.0:
@@ -144,6 +145,7 @@ class Search:
         """For each rig the best of ``count`` random own parameters, ``kept`` of which are
         refined."""
         trials = len(self.targets)
+        # From here on a row for each pair of rig and trial, all trials of the first rig first.
         rigs = np.repeat(self.space.rigs(points), trials, axis=0)
         each = [*self.targets] * len(points)
         drawn = np.stack([draws(target, count, rng) for target in each])
@@ -184,6 +186,7 @@ class Search:
     def borrowed(self, found: Found, others: Sequence[Found]) -> Found:
         """With the own parameters of other rigs' trials where they fit this one better, the drives
         scaled to the same force."""
+        # Rigs × trials × OWN until turned; the first rig is the one to be fitted.
         every = [found, *others]
         rigs = self.space.rigs(np.array([one.point for one in every]))
         force = rigs[:, RIG.index("force_factor")]
@@ -200,6 +203,8 @@ class Search:
         in units of their scales (rows)."""
         target = self.targets[k]
         free = np.flatnonzero(target.scale > 0.0)
+        # Rows: the rig and own parameters as they are; each coordinate of the rig moved; each
+        # fitted own parameter moved. Where a step would leave the bounds it goes the other way.
         points, steps = _perturbed(point, STEP)
         rigs = self.space.rigs(points)
         rigs = np.concatenate([rigs, np.repeat(rigs[:1], len(free), axis=0)])
@@ -215,6 +220,9 @@ class Search:
         def one(k: int) -> Array:
             slopes, d = self.slopes(point, own, k), len(point)
             normal = np.einsum("ij,kj->ik", slopes, slopes)  # on any number of threads the same
+            # The blocks of the normal matrix N are the rig's d coordinates r, then the own
+            # parameters o. Where these are fitted N_oo do + N_or dr = 0; damping keeps do small
+            # where the trial does not tell it.
             inner = normal[d:, d:] + SOFT * np.diag(np.diag(normal)[d:] + 1e-9)
             found = np.zeros((len(OWN), d))
             free = np.flatnonzero(self.targets[k].scale > 0.0)
@@ -263,6 +271,7 @@ class Search:
             apart = ((points[:, None] - parents) / spread) ** 2
             nearest = apart.sum(axis=2).argmin(axis=1)
             moved = theirs[nearest] + np.einsum("tkd,nd->ntk", follow, points - parents[nearest])
+            # One round of least squares for each pair of rig and trial.
             own, costs = refine(
                 [*self.targets] * population,
                 np.repeat(space.rigs(points), trials, axis=0),
@@ -274,6 +283,7 @@ class Search:
             search.tell([*zip(asked, totals.tolist(), strict=True)])
             k = int(totals.argmin())
             here = self.made(points[k], own[k], costs[k])
+            # The better half, by which CMA-ES moves on, are the parents of the next generation.
             good = np.argsort(totals)[: population // 2]
             parents, theirs = points[good], own[good]
             if generation % RESCREEN == 0:
