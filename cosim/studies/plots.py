@@ -1,5 +1,6 @@
 """What the figures of the studies share: size, colours, labels at the ends of lines, saving."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from textwrap import fill
@@ -21,13 +22,15 @@ VERMILION, BLUE, GREEN, ORANGE, SKY, PURPLE = (
 """Okabe and Ito's colours, which the colour-blind tell apart; a darker purple."""
 FAINT: dict[str, Any] = {"color": "0.74", "marker": ".", "ms": 4, "lw": 0.0, "zorder": 1}
 """Style of points that are there to be counted, not to be read."""
+TIE = "\N{NO-BREAK SPACE}"
 
 
 def headline(figure: Picture, message: str) -> None:
     """Write the message of a figure above it."""
     width = round(10.0 * figure.get_figwidth())
-    lines = "\n".join(fill(line, width) for line in message.splitlines())
-    figure.suptitle(lines, x=0.01, ha="left", fontsize=12, fontweight="bold")
+    tied = re.sub(r"(?<=\d) (?=[^\W\d])", TIE, message)  # a number and its unit
+    lines = "\n".join(fill(line, width) for line in tied.splitlines())
+    figure.suptitle(lines.replace(TIE, " "), x=0.01, ha="left", fontsize=12, fontweight="bold")
 
 
 def footnote(figure: Picture, note: str) -> None:

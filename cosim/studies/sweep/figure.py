@@ -69,10 +69,6 @@ def draw(data: xr.Dataset, title: str) -> Picture:
             _curves(figure, data.squeeze([n for n in names if n != varied[0]]), varied[0])
         else:
             words += _maps(figure, data, varied)
-    if len(data.squeeze().dims) > 1:
-        words += f"; hatched: the part stays (below {STAYS * 1e3:g} mm/s)"
-        if POINT not in data.dims:
-            words += "; dots: neighbours tell nothing of it"
     best = [
         f"fastest {way}, {data['v_average'].values.ravel()[place] * 1e3:+.3g} mm/s, at "
         f"{at(data, place, 4)}"
@@ -139,7 +135,9 @@ def _curves(figure: Figure, data: xr.Dataset, name: str) -> None:
 
 
 def _panels(figure: Figure, shown: Sequence[T]) -> list[tuple[Axes, T]]:
-    """Axes for each, two beside each other."""
+    """Axes for each, two beside each other; of three the first has a column of its own."""
+    if len(shown) == 3:
+        return [*zip(figure.subplot_mosaic([[0, 1], [0, 2]]).values(), shown, strict=True)]
     every = [*figure.subplots(-(-len(shown) // 2), 2, squeeze=False).flat]
     for axis in every[len(shown) :]:
         axis.set_visible(False)
@@ -181,11 +179,13 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> str:
         (first, _), *others = _panels(figure, (V_AVERAGE, *beside))
         panels = [(first, data)]
     norm = _two_sided(np.concatenate([_values(part, V_AVERAGE).values.ravel() for part in slices]))
+    hatched = dotted = False
     for k, (axis, part) in enumerate(panels):
         head = f"at {_setting(part, third)}" if third else V_AVERAGE.title
         rugged = _rugged(_values(part, V_AVERAGE).transpose(y, x).values, norm)
         shown = _map(axis, part, V_AVERAGE, x, y, "RdBu", norm, rugged)
-        _boundary(axis, part, x, y)
+        hatched |= _boundary(axis, part, x, y)
+        dotted |= bool(rugged.any())
         axis.set_title(head, loc="left", fontsize=10.5)
         if k == len(panels) - 1:
             label = f"{V_AVERAGE.title} [mm/s]" if third else "[mm/s]"
@@ -197,6 +197,8 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> str:
     if third and len(slices) < data.sizes[third]:
         left += f"; drawn at {len(slices)} of {data.sizes[third]} {data[third].key}"
     said += [_setting(here, third)] if third else []
+    left += f"; hatched: the part stays (below {STAYS * 1e3:g} mm/s)" if hatched else ""
+    left += "; dots: far off the points beside them" if dotted else ""
     if said and others:
         axis, quantity = others[0]
         axis.set_title(f"{quantity.title}\nat {', '.join(said)}", loc="left", fontsize=10.5)
@@ -272,13 +274,15 @@ def _map(
     return shown
 
 
-def _boundary(axis: Axes, data: xr.Dataset, x: str, y: str) -> None:
-    """Where transport ends: hatched where the part stays."""
+def _boundary(axis: Axes, data: xr.Dataset, x: str, y: str) -> bool:
+    """Where transport ends: hatched where the part stays. Whether it stays anywhere."""
     speeds = np.abs(_values(data, V_AVERAGE).transpose(y, x).values) / V_AVERAGE.scale
-    if min(speeds.shape) > 1 and (speeds < STAYS).any():
-        over = data[x].values, data[y].values, speeds
-        axis.contourf(*over, levels=[0.0, STAYS], colors="none", hatches=["////"])
-        axis.contour(*over, levels=[STAYS], colors="k", linewidths=1.4)
+    if min(speeds.shape) < 2 or not (speeds < STAYS).any():
+        return False
+    over = data[x].values, data[y].values, speeds
+    axis.contourf(*over, levels=[0.0, STAYS], colors="none", hatches=["////"])
+    axis.contour(*over, levels=[STAYS], colors="k", linewidths=1.4)
+    return True
 
 
 def _moving(data: xr.Dataset, third: str) -> list[int]:
