@@ -175,6 +175,27 @@ def test_numbers_are_those_that_people_write(tmp_path: Path) -> None:
     assert ".param i0=1" in found
 
 
+@needs.ngspice_library
+def test_an_area_without_its_name_is_that_many_devices_in_parallel(tmp_path: Path) -> None:
+    """ngspice 39 crashes on it at a diode, and at a transistor where it is a parameter; at a
+    MESFET it drops it."""
+    kinds = {"d": "D", "q": "NPN", "j": "NJF(vto=-1)", "z": "NMF(vto=-1)"}
+    lines = [".param two=2"]
+    for kind, model in kinds.items():
+        lines += [f".model {kind}m {model}", f"R{kind}p {kind}p 0 1", f"R{kind}a {kind}a 0 1"]
+        nodes = "b" if kind == "d" else "b b"
+        lines += [f"{kind}{n} {nodes} {kind}p {kind}m" for n in (1, 2)]
+        lines.append(f"{kind}3 {nodes} {kind}a {kind}m {2 if kind in 'dz' else '{two}'}")
+    differences = [f"v({kind}a)-v({kind}p)" for kind in kinds]
+    with in_place():
+        columns = found(
+            tmp_path, "", "\n".join((HEAD, *lines, ".end\n")), "v(zp)", *differences
+        ).columns
+    assert columns["v(zp)"][-1] > 1e-4
+    for word in differences:
+        assert np.abs(columns[word]).max() < 1e-6, word
+
+
 def test_names_of_nodes_may_begin_with_digits(tmp_path: Path) -> None:
     """Dividers of them, in closed form; a node 5V is no number, and 2 is none of a source's."""
     text = """title

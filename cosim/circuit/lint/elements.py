@@ -34,7 +34,8 @@ MODEL_TYPES = {
 _SPECIAL = {"poly", "table", "laplace", "freq", "value", "vol", "cur", "and", "nand", "or", "nor"}
 """First words of controlled sources that have no controlling nodes."""
 
-
+_FLAG = re.compile("=|^(?:off|thermal)$")
+"""In a word behind the model that is no bare area: ngspice 39 crashes on one, or drops it."""
 COPY = "; copy its .model line into the netlist"
 
 
@@ -259,6 +260,8 @@ def _place(element: Element, scope: Scope) -> None:
             element.refuse(f": no model {shown(name)} is defined here{COPY}")
         _split(element, place)
         element.model = element.words.pop(0)
+        if kind != "m" and element.words and not _FLAG.search(element.words[0]):
+            element.words[0] = f"area={element.words[0]}"
     else:
         _split(element, NODES[kind])
     element.nodes = [node(name) for name in element.nodes]
