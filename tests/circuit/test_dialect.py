@@ -138,21 +138,26 @@ TOLD = {
     "V9 x 0 PWL REPEAT FOREVER (0 0 1m 1) ENDREPEAT": "instead of REPEAT write r=0",
     "S9 x 0 in 0 W\n.model W SW(Ron=1 Vt=.5 Vh=-.2)": "vh of w below 0 is LTspice's smooth switch",
     "D9 x 0 W\n.model W D(Vfwd=.5)": "vfwd of w is LTspice's ideal diode",
-    "A9 in 0 0 0 0 x 0 0 SCHMITT Vt=.5": "is no element that a netlist may have",
+    "A9 in 0 0 0 0 x 0 0 SCHMITT Vt=.5": "that a netlist may have; write it with R, C and B",
+    "V9 x 0 PWL file=stimulus.txt": "write the values of this one into the line",
+    "S9 x 0 in 0 W\n.model W VSWITCH(Ron=1 Von=1 Voff=0)": "write sw with vt=(von+voff)/2",
+    "Q9 x in 0 W\n.model W ako:BC547 NPN(Bf=250)": "write all of the model instead of ako",
     "XU9 in x level2 Avol=1Meg": "include the file with its .subckt",
     ".lib UniversalOpamps2.sub": "was not found in the netlist's folder: copy it there",
     ".lib C:\\models\\mine.lib": "copy the file into the netlist's folder and give its name alone",
     "B9 x 0 V=idt(V(in))": "the function idt is not defined",
     "K9 L1 L2 L3 1": "must name two inductors and their coupling",
     "C9 x 0 1u Rser=1 m=2": "write a resistor in series",
+    "C9 x 0 1u x2": "x2 is neither a model nor name=value; leave it out",
     "R9 x 0 4,7k": "has two values; a number has a decimal point",
-    "X9 in x part rr=4k\n.subckt part a b params: r=1\nR1 a b {r}\n.ends": "no parameter rr",
+    "X9 in x part rr=4k\n.subckt part a b params: r=1\nR1 a b {r}\n.ends": "no parameter rr "
+    "(it has r); give it a value in the .subckt line, rr=…",
     ".options maxstep=1u": "the option maxstep is not allowed in a netlist; leave it out",
     ".meas tran a DERIV V(in) AT=1m": ".meas a is nothing known here; it may be AVG",
     ".meas tran a WHEN V(in)": ".meas a is nothing known here; it may be AVG",
     ".meas a": "is no complete .meas",
     "F9 x 0": "names no source whose current controls it",
-    ".param k=": ".param gives no name a value",
+    ".param k 5": ".param gives no name a value; write NAME=VALUE",
     ".if ()\nR9 x 0 1k\n.endif": ".if has no condition",
 }
 
@@ -162,6 +167,23 @@ def test_what_would_mean_something_else_is_told(line: str, tmp_path: Path) -> No
     path = tmp_path / "own.cir"
     path.write_text(f"{HEAD}R8 x 0 1k\n{line}\n.end\n")
     with pytest.raises(BadInput, match=rf"^own\.cir:\d+: .*{re.escape(TOLD[line])}"):
+        deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False, {})
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("V1 in 0 1\nR1 in 0 1k\n.end\n", "the first line of the netlist, where it stands, is the"),
+        (
+            "Version 4\nSHEET 1 880 680\nWIRE 192 128 96 128\n",
+            "a drawing of LTspice and no netlist",
+        ),
+    ],
+)
+def test_a_source_as_title_and_a_drawing_are_told(text: str, told: str, tmp_path: Path) -> None:
+    path = tmp_path / "own.cir"
+    path.write_text(text)
+    with pytest.raises(BadInput, match=told):
         deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False, {})
 
 

@@ -158,6 +158,9 @@ def _check_passive(element: Element, scope: Scope, names: Names) -> None:
         element.refuse(f": write {{…}} around its value, {shown(first)}")
     if len(element.words) > 1 and None not in map(number, element.words[:2]):
         element.refuse(" has two values; a number has a decimal point, not a comma")
+    for word in (word for word in element.words[1:] if re.match(r"[a-z_]\w*$", word)):
+        if scope.model_types(word) is None and not names.is_parameter(scope, word):
+            element.refuse(f": {shown(word)} is neither a model nor name=value; leave it out")
     if _NUMBER.match(first) or first[0] in "{'+-":
         return
     types = scope.model_types(first)
@@ -239,4 +242,5 @@ def _check_call(element: Element, scope: Scope) -> None:
     for key in (word.partition("=")[0] for word in element.words if "=" in word):
         if key not in known:
             has = ", ".join(sorted(known - {"m"})) or "none"
-            element.refuse(f": {shown(name)} has no parameter {shown(key)} (it has {has})")
+            cure = f"(it has {has}); give it a value in the .subckt line, {shown(key)}=…"
+            element.refuse(f": {shown(name)} has no parameter {shown(key)} {cure}")

@@ -193,7 +193,7 @@ class _Parser:
     def _param(self, line: Line, found: list[str]) -> None:
         given = definitions(line.text)
         if not given or not all(expression for _, expression in given):
-            refuse(line, ".param gives no name a value")
+            refuse(line, ".param gives no name a value; write NAME=VALUE")
         for (name, formal), _ in given:
             (self.scope.parameters if formal is None else self.scope.functions).add(name)
 
