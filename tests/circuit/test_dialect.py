@@ -148,6 +148,11 @@ TOLD = {
     "B9 x 0 V=idt(V(in))": "the function idt is not defined",
     "K9 L1 L2 L3 1": "must name two inductors and their coupling",
     "C9 x 0 1u Rser=1 m=2": "write a resistor in series",
+    "M9 x b 0 W\n.model W NMOS": "has too few nodes: drain, gate, source and bulk",
+    "M9 x b 0 0 W 2u 10u\n.model W NMOS": "2u behind the model has no name; write name=value",
+    "I9 0 x TBL=(0,0,1,1m)": "tbl is nothing that ngspice knows of it; leave it out",
+    "V9 x 0 2*3": "write {…} around its value, 2*3",
+    "R9 x 0 1k 5%": "5% is neither a model nor name=value; leave it out",
     "C9 x 0 1u x2": "x2 is neither a model nor name=value; leave it out",
     "R9 x 0 4,7k": "has two values; a number has a decimal point",
     "X9 in x part rr=4k\n.subckt part a b params: r=1\nR1 a b {r}\n.ends": "no parameter rr "

@@ -260,8 +260,12 @@ def _place(element: Element, scope: Scope) -> None:
             element.refuse(f": no model {shown(name)} is defined here{COPY}")
         _split(element, place)
         element.model = element.words.pop(0)
+        if kind == "m" and place < 4 and scope.model_types(element.model) != {"vdmos"}:
+            element.refuse(" has too few nodes: drain, gate, source and bulk")
         if kind != "m" and element.words and not _FLAG.search(element.words[0]):
             element.words[0] = f"area={element.words[0]}"
+        if word := next((word for word in element.words if not _FLAG.search(word)), None):
+            element.refuse(f": {shown(word)} behind the model has no name; write name=value")
     else:
         _split(element, NODES[kind])
     element.nodes = [node(name) for name in element.nodes]
