@@ -91,6 +91,8 @@ def deck(
         if source.lower() not in found or source[0].lower() not in "vi":
             able = sorted(each for each in found if each[0] in "vi")
             hint = suggestion(source.lower(), able) or f" (it has {', '.join(able) or 'none'})"
+            if lines[0].text.lower().split()[1] == source.lower():
+                hint = "; the first line of the netlist, where it stands, is the title"
             shown = f'{called[0]} = "{plain(source)}"'
             raise BadInput(ended(f"{name}: {shown} must be a V or I source of its own{hint}"))
     top, every = check_reading(

@@ -64,6 +64,8 @@ def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[l
             for temporary, path in pairs:
                 name = path
                 os.replace(temporary, path)
+    except FileExistsError as error:  # of the folder: the files have names of their own
+        raise BadInput(f"{plain(str(name.parent))}: this is a file, not a directory.") from error
     except OSError as error:
         raise BadInput(f"{plain(str(name))}: cannot be written ({error.strerror}).") from error
     except ValueError as error:

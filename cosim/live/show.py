@@ -82,8 +82,11 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
         return shown, runs
     tables = sorted(results.glob("*.csv")) if results.is_dir() else [results]
     if len(tables) != 1:
-        names = ", ".join(path.name for path in tables) or "no table"
-        raise BadInput(f"{plain(str(results))}: no run, sweep or comparison; name one of: {names}.")
+        names = f"; name one of: {', '.join(path.name for path in tables)}" if tables else ""
+        where = f"{plain(str(results))}: there is no run, sweep or comparison in this folder"
+        raise BadInput(f"{where}{names}.")
+    if results.suffix in (".nc", ".json", ".toml"):
+        raise BadInput(f"{plain(str(results))}: this is no table; name the folder that it is in.")
     return _table(tables[0])
 
 

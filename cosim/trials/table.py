@@ -148,7 +148,7 @@ def read_table(path: Path, asked: str = "") -> Table:
                 f"{cells.name}: {where}: the value must be within ±{MOST:g} in SI units."
             )
     if len(lines) < FEWEST_ROWS:
-        raise BadInput(f"{cells.name}: there are {len(lines)} rows, and {FEWEST_ROWS} are needed.")
+        raise BadInput(f"{cells.name}: it has {len(lines)} of the {FEWEST_ROWS} rows needed.")
     if "time" in columns:
         time = table.complete("time")
         late = np.flatnonzero(np.diff(time) <= 0)

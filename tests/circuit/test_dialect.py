@@ -138,21 +138,31 @@ TOLD = {
     "V9 x 0 PWL REPEAT FOREVER (0 0 1m 1) ENDREPEAT": "instead of REPEAT write r=0",
     "S9 x 0 in 0 W\n.model W SW(Ron=1 Vt=.5 Vh=-.2)": "vh of w below 0 is LTspice's smooth switch",
     "D9 x 0 W\n.model W D(Vfwd=.5)": "vfwd of w is LTspice's ideal diode",
-    "A9 in 0 0 0 0 x 0 0 SCHMITT Vt=.5": "is no element that a netlist may have",
+    "A9 in 0 0 0 0 x 0 0 SCHMITT Vt=.5": "that a netlist may have; write it with R, C and B",
+    "V9 x 0 PWL file=stimulus.txt": "write the values of this one into the line",
+    "S9 x 0 in 0 W\n.model W VSWITCH(Ron=1 Von=1 Voff=0)": "write sw with vt=(von+voff)/2",
+    "Q9 x in 0 W\n.model W ako:BC547 NPN(Bf=250)": "write all of the model instead of ako",
     "XU9 in x level2 Avol=1Meg": "include the file with its .subckt",
     ".lib UniversalOpamps2.sub": "was not found in the netlist's folder: copy it there",
     ".lib C:\\models\\mine.lib": "copy the file into the netlist's folder and give its name alone",
     "B9 x 0 V=idt(V(in))": "the function idt is not defined",
     "K9 L1 L2 L3 1": "must name two inductors and their coupling",
     "C9 x 0 1u Rser=1 m=2": "write a resistor in series",
+    "M9 x b 0 W\n.model W NMOS": "has too few nodes: drain, gate, source and bulk",
+    "M9 x b 0 0 W 2u 10u\n.model W NMOS": "2u behind the model has no name; write name=value",
+    "I9 0 x TBL=(0,0,1,1m)": "tbl is nothing that ngspice knows of it; leave it out",
+    "V9 x 0 2*3": "write {…} around its value, 2*3",
+    "R9 x 0 1k 5%": "5% is neither a model nor name=value; leave it out",
+    "C9 x 0 1u x2": "x2 is neither a model nor name=value; leave it out",
     "R9 x 0 4,7k": "has two values; a number has a decimal point",
-    "X9 in x part rr=4k\n.subckt part a b params: r=1\nR1 a b {r}\n.ends": "no parameter rr",
+    "X9 in x part rr=4k\n.subckt part a b params: r=1\nR1 a b {r}\n.ends": "no parameter rr "
+    "(it has r); give it a value in the .subckt line, rr=…",
     ".options maxstep=1u": "the option maxstep is not allowed in a netlist; leave it out",
     ".meas tran a DERIV V(in) AT=1m": ".meas a is nothing known here; it may be AVG",
     ".meas tran a WHEN V(in)": ".meas a is nothing known here; it may be AVG",
     ".meas a": "is no complete .meas",
     "F9 x 0": "names no source whose current controls it",
-    ".param k=": ".param gives no name a value",
+    ".param k 5": ".param gives no name a value; write NAME=VALUE",
     ".if ()\nR9 x 0 1k\n.endif": ".if has no condition",
 }
 
@@ -165,6 +175,23 @@ def test_what_would_mean_something_else_is_told(line: str, tmp_path: Path) -> No
         deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False, {})
 
 
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("V1 in 0 1\nR1 in 0 1k\n.end\n", "the first line of the netlist, where it stands, is the"),
+        (
+            "Version 4\nSHEET 1 880 680\nWIRE 192 128 96 128\n",
+            "a drawing of LTspice and no netlist",
+        ),
+    ],
+)
+def test_a_source_as_title_and_a_drawing_are_told(text: str, told: str, tmp_path: Path) -> None:
+    path = tmp_path / "own.cir"
+    path.write_text(text)
+    with pytest.raises(BadInput, match=told):
+        deck(path, ["V1"], [], {}, 1e-3, 1e-5, 1e-6, False, {})
+
+
 def test_numbers_are_those_that_people_write(tmp_path: Path) -> None:
     """4k7 and 4R7 for 4.7 k and 4.7, also behind a name; an A for amperes is no atto."""
     lines = ["R8 in x R=4k7", "R9 x 0 4R7", "X9 in 0 part r=1n5", "I9 in 0 0.5A", ".param i0=1A"]
@@ -173,6 +200,27 @@ def test_numbers_are_those_that_people_write(tmp_path: Path) -> None:
     for wanted in ("r8 in x r=4.7k", "r9 x 0 4.7", "x9 in 0 part r=1.5n", "i9 in 0 0.5"):
         assert wanted in found
     assert ".param i0=1" in found
+
+
+@needs.ngspice_library
+def test_an_area_without_its_name_is_that_many_devices_in_parallel(tmp_path: Path) -> None:
+    """ngspice 39 crashes on it at a diode, and at a transistor where it is a parameter; at a
+    MESFET it drops it."""
+    kinds = {"d": "D", "q": "NPN", "j": "NJF(vto=-1)", "z": "NMF(vto=-1)"}
+    lines = [".param two=2"]
+    for kind, model in kinds.items():
+        lines += [f".model {kind}m {model}", f"R{kind}p {kind}p 0 1", f"R{kind}a {kind}a 0 1"]
+        nodes = "b" if kind == "d" else "b b"
+        lines += [f"{kind}{n} {nodes} {kind}p {kind}m" for n in (1, 2)]
+        lines.append(f"{kind}3 {nodes} {kind}a {kind}m {2 if kind in 'dz' else '{two}'}")
+    differences = [f"v({kind}a)-v({kind}p)" for kind in kinds]
+    with in_place():
+        columns = found(
+            tmp_path, "", "\n".join((HEAD, *lines, ".end\n")), "v(zp)", *differences
+        ).columns
+    assert columns["v(zp)"][-1] > 1e-4
+    for word in differences:
+        assert np.abs(columns[word]).max() < 1e-6, word
 
 
 def test_names_of_nodes_may_begin_with_digits(tmp_path: Path) -> None:

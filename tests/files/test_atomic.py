@@ -47,6 +47,13 @@ def test_old_leftovers_go_where_others_may_be_at_work(tmp_path: Path) -> None:
             assert {*tmp_path.iterdir()} == {young, locked}
 
 
+def test_a_file_in_the_place_of_the_folder_is_told(tmp_path: Path) -> None:
+    (tmp_path / "taken").touch()
+    told = pytest.raises(BadInput, match=r"taken: this is a file, not a directory\.$")
+    with told, whole(tmp_path / "taken" / "page.html"):
+        pass
+
+
 def test_two_at_once_are_told(tmp_path: Path) -> None:
     wait = KILLED.format(deed="print(flush=True); sys.stdin.read()")
     with subprocess.Popen(

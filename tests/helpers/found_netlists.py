@@ -150,6 +150,7 @@ B1 a 0 V=clip(V(in)) ; hard
 B2 b 0 V=uplim(dnlim(V(in),-0.8,0.1),0.8,0.1)
 B3 c 0 V=if(V(in)>0,V(in)**2,-0.5*V(in))
 B4 d 0 V=table(V(in),-0.5,-1,0,0,0.5,2)
+B6 f 0 V=2*buf(V(in))+inv(4*V(in))
 B5 0 e I=1m*hypot(V(in),sin(w*time))
 R5 e 0 1k
 .tran 3m

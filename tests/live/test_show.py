@@ -199,7 +199,8 @@ def test_what_cannot_be_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     (tmp_path / "half").mkdir()
     (tmp_path / "half" / "waveforms.nc").write_bytes(b"CDF\x01")
     for name, said in (
-        ("empty", "no run, sweep or comparison"),
+        ("empty", "there is no run, sweep or comparison in this folder.\n"),
+        ("half/waveforms.nc", "this is no table; name the folder that it is in"),
         ("two", "name one of: a.csv, b.csv"),
         ("words.csv", "no column of numbers"),
         ("torn", "not a whole"),

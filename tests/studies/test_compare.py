@@ -368,6 +368,7 @@ def test_command_prints_and_writes_units_and_meanings(
         (["paper", "gone.csv"], "gone.csv"),
         (["nosuch", "t.csv"], "nosuch"),
         (["run", "t.csv", "--set", "run.duration=1"], "finished run"),
+        ([".", "t.csv"], "there is no run in this folder"),
         (["paper", "unit.csv"], "the unit mm is not m/s"),
         (["held", "foo.csv"], "no column is understood (found: foo, bar)"),
     ],

@@ -151,7 +151,7 @@ def changed(row: int, column: str, value: str) -> str:
         (changed(5, "zo", "-inf"), "row 6, column zo: “-inf” is not finite"),
         (changed(3, "t", ""), "row 4, column t: the value is missing"),
         (changed(3, "t", "0.001"), "row 4, column t: the time does not increase"),
-        (text(table()[:8]), "there are 7 rows, and 8 are needed"),
+        (text(table()[:8]), "it has 7 of the 8 rows needed"),
         (text(table()) + "\r\n0.5,1", "row 14: it has 2 cells, the header 19"),
         (tracker(names="\tmass A\t\t\tmass B\t\t\t"), "(found: mass A, mass B)"),
         ("#multi:\n\tpart\n\nx\ty\n", "row 2: a header t x y … of Tracker's is missing"),

@@ -158,6 +158,10 @@ def _check_passive(element: Element, scope: Scope, names: Names) -> None:
         element.refuse(f": write {{…}} around its value, {shown(first)}")
     if len(element.words) > 1 and None not in map(number, element.words[:2]):
         element.refuse(" has two values; a number has a decimal point, not a comma")
+    for word in element.words[1:]:
+        known = number(word) is not None or "=" in word or word[0] in "{'"
+        if not (known or scope.model_types(word) or names.is_parameter(scope, word)):
+            element.refuse(f": {shown(word)} is neither a model nor name=value; leave it out")
     if _NUMBER.match(first) or first[0] in "{'+-":
         return
     types = scope.model_types(first)
@@ -193,6 +197,8 @@ def _check_source(element: Element, scope: Scope, names: Names) -> None:
                 element.refuse(f": the times of PWL must rise, {other:g} s comes after {one:g} s")
     for word in element.words:
         plain = word.lstrip("+-")
+        if _OPERATOR.search(unbraced(word)):
+            element.refuse(f": write {{…}} around its value, {shown(word)}")
         known = plain in _WAVEFORMS or names.is_parameter(scope, plain)
         if known or "=" in word or _NUMBER.match(word) or plain[:1] in ("{", "'", ""):
             continue
@@ -239,4 +245,5 @@ def _check_call(element: Element, scope: Scope) -> None:
     for key in (word.partition("=")[0] for word in element.words if "=" in word):
         if key not in known:
             has = ", ".join(sorted(known - {"m"})) or "none"
-            element.refuse(f": {shown(name)} has no parameter {shown(key)} (it has {has})")
+            cure = f"(it has {has}); give it a value in the .subckt line, {shown(key)}=…"
+            element.refuse(f": {shown(name)} has no parameter {shown(key)} {cure}")

@@ -61,11 +61,16 @@ DROPPED_OPTIONS = word_set(
 
 MODELS = word_set("r res c l d npn pnp nmos pmos vdmos njf pjf nmf pmf sw csw ltra")
 """Not numd, nbjt, numos, whose cards name files, and no code models."""
+_MODEL_INSTEAD = {
+    "vswitch": "; write sw with vt=(von+voff)/2 and vh=(von-voff)/2",
+    "iswitch": "; write csw with it=(ion+ioff)/2 and ih=(ion-ioff)/2",
+}
 MOS_LEVELS = frozenset("123469")
 """The BSIM models write a log into the working folder."""
 
 _INLINED = (".include", ".inc", ".lib")
 _END = re.compile(r"^[ \t]*\.end\b(?![.\w])", re.IGNORECASE | re.MULTILINE)
+_SCHEMATIC = re.compile(r"Version 4\S*\s+SHEET ")
 _TEXT = re.compile(r"[ -~]*")
 _UNSAFE = re.compile(r'["`\\]')
 _FILE_WORD = re.compile(r"\b(?:\w*_)?(?:file|filename|wavefile)\b", re.IGNORECASE)
@@ -135,6 +140,9 @@ class _Reader:
         text = self._top()
         if not _END.search(text):
             # It may be any file, of which no message may tell a word.
+            if _SCHEMATIC.match(text):
+                cure = "save what LTspice shows under View, SPICE Netlist, and name that file"
+                refuse(Line("", name, 1), f"this is a drawing of LTspice and no netlist: {cure}")
             last = Line("", name, text.rstrip().count("\n") + 1)
             refuse(last, "the netlist does not end with .end, so it may be cut short")
         title, rest = text.split("\n", 1) if "\n" in text else (text, "")
@@ -358,14 +366,16 @@ def _passed(line: Line, word: str, rest: str) -> str | None:
     if max(map(len, line.text.split())) > MAX_WORD:
         refuse(line, f"a word is longer than {MAX_WORD} characters")
     if found := _FILE_WORD.search(line.text):
-        refuse(line, f"{shown(found[0])} is not allowed, as a netlist may not name files")
+        cure = "a netlist may not name files; write the values of this one into the line"
+        refuse(line, f"{shown(found[0])} is not allowed, as {cure}")
     if word in (".options", ".option", ".opt"):
         return _options(line, word, rest)
     if word == ".model":
         _check_model(line)
     elif not word and line.text[0].lower() not in ELEMENTS:
         letter = line.text.split()[0]
-        refuse(line, f"{shown(letter)} is no element that a netlist may have")
+        cure = "write it with R, C and B sources"
+        refuse(line, f"{shown(letter)} is no element that a netlist may have; {cure}")
     return line.text
 
 
@@ -388,10 +398,12 @@ def _options(line: Line, word: str, rest: str) -> str | None:
 def _check_model(line: Line) -> None:
     match = _MODEL.match(line.text)
     if match is None:
-        refuse(line, f"{shown(line.text)} is no complete .model line")
+        ako = re.search(r"(?i)\sako:", line.text)
+        cure = "; write all of the model instead of ako" if ako else ""
+        refuse(line, f"{shown(line.text)} is no complete .model line{cure}")
     kind = match[2].lower()
     if kind not in MODELS:
-        cure = "; write it as sw" if kind == "vswitch" else ""
+        cure = _MODEL_INSTEAD.get(kind, "")
         refuse(line, f"models of type {shown(kind)} are not allowed in a netlist{cure}")
     if kind not in ("nmos", "pmos"):
         return

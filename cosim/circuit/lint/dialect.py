@@ -30,6 +30,8 @@ _FUNCTIONS = {
     "dnlim": ("x,y,z", "max(x,y+z)-min(max(y+z-x,0),2*z)+min(max(y+z-x,0),2*z)**2/(4*z)"),
     "pwrs": ("x,y", "sgn(x)*pwr(x,y)"),
     "stp": ("x", "u(x)"),
+    "buf": ("x", "u(x-0.5)"),
+    "inv": ("x", "u(0.5-x)"),
     "hypot": ("x,y", "sqrt(x*x+y*y)"),
 }
 """Their functions that ngspice lacks: parameters, and the same in its own."""

@@ -34,7 +34,8 @@ MODEL_TYPES = {
 _SPECIAL = {"poly", "table", "laplace", "freq", "value", "vol", "cur", "and", "nand", "or", "nor"}
 """First words of controlled sources that have no controlling nodes."""
 
-
+_FLAG = re.compile("=|^(?:off|thermal)$")
+"""In a word behind the model that is no bare area: ngspice 39 crashes on one, or drops it."""
 COPY = "; copy its .model line into the netlist"
 
 
@@ -192,7 +193,7 @@ class _Parser:
     def _param(self, line: Line, found: list[str]) -> None:
         given = definitions(line.text)
         if not given or not all(expression for _, expression in given):
-            refuse(line, ".param gives no name a value")
+            refuse(line, ".param gives no name a value; write NAME=VALUE")
         for (name, formal), _ in given:
             (self.scope.parameters if formal is None else self.scope.functions).add(name)
 
@@ -259,6 +260,12 @@ def _place(element: Element, scope: Scope) -> None:
             element.refuse(f": no model {shown(name)} is defined here{COPY}")
         _split(element, place)
         element.model = element.words.pop(0)
+        if kind == "m" and place < 4 and scope.model_types(element.model) != {"vdmos"}:
+            element.refuse(" has too few nodes: drain, gate, source and bulk")
+        if kind != "m" and element.words and not _FLAG.search(element.words[0]):
+            element.words[0] = f"area={element.words[0]}"
+        if word := next((word for word in element.words if not _FLAG.search(word)), None):
+            element.refuse(f": {shown(word)} behind the model has no name; write name=value")
     else:
         _split(element, NODES[kind])
     element.nodes = [node(name) for name in element.nodes]

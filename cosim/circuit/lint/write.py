@@ -17,6 +17,7 @@ _NODES = re.compile(r"[vi]\s*\([^(){}=']*\)", re.IGNORECASE)
 _DEVICE = re.compile(r"@[\w.#]+\[\w+\]")
 _SIGNS = frozenset("+-*/^%()<>=!&|?:,~ {}[]'")
 _HEAD = re.compile(r"[^\s(),{}='\"`\\]+")
+_KEY = re.compile(r"([a-z_]\w*)=(?!=)", re.IGNORECASE)
 _PAIR = re.compile(r"([a-z_]\w*)=(.+)", re.IGNORECASE | re.DOTALL)
 _INITIAL = re.compile(r"\s*v\s*\(\s*([^\s(),{}=']+)\s*\)\s*=\s*(\{[^{}]*\}|'[^']*'|[^\s,]+)\s*,?")
 
@@ -81,15 +82,15 @@ def written(line: Line, element: Element | None, values: Mapping[str, float]) ->
 def _element(element: Element) -> str:
     line = element.line
     known = _KEYS.get(element.kind)
-    found = [match[1].lower() for match in map(_PAIR.match, element.words) if match]
-    for key in found if known is not None else ():
-        if key not in word_set(known or ""):
-            cure = _ELSEWHERE.get(key, "leave it out")
-            element.refuse(f": {shown(key)} is nothing that ngspice knows of it; {cure}")
     if element.kind in "efgh":
         for word in element.words:
             if cure := _FORMS.get(word.partition("=")[0]):
                 element.refuse(f": {cure}")
+    found = [match[1].lower() for match in map(_KEY.match, element.words) if match]
+    for key in found if known is not None else ():
+        if key not in word_set(known or ""):
+            cure = _ELSEWHERE.get(key, "leave it out")
+            element.refuse(f": {shown(key)} is nothing that ngspice knows of it; {cure}")
     head = [element.name, *element.nodes, *element.controls]
     head += [element.model] if element.model else []
     for part in head:

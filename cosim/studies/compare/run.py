@@ -158,11 +158,12 @@ def _run(
         name = run.scene.name if isinstance(run, Result) else str(run)
         if overrides:
             raise BadInput(f"--set cannot change {plain(name)}, which is a finished run.")
-        scene = run.scene if isinstance(run, Result) else load(Path(name) / "scene.toml")
-        _check_rate(scene, trial)
         if isinstance(run, Result):
-            return name, run.columns, run.scene
-        return name, formats.read(Path(name)).waveforms, scene
+            columns, scene = run.columns, run.scene
+        else:
+            columns, scene = formats.read(Path(name)).waveforms, load(Path(name) / "scene.toml")
+        _check_rate(scene, trial)
+        return name, columns, scene
     name = run.name if isinstance(run, Scene) else str(run)
     scene = load(run, overrides)
     period = _check_rate(scene, trial)
