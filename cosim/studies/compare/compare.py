@@ -16,7 +16,6 @@ from cosim.errors import BadInput, plain
 from cosim.studies.compare.hints import hints
 from cosim.studies.compare.scores import (
     Number,
-    Score,
     Signals,
     both_sides,
     explained,
@@ -52,13 +51,13 @@ APART = 0.05
 class Found:
     """A run laid over a recording, from ``start`` (s) of the run on.
 
-    ``recording`` is the stretch that was compared, ``simulated`` has its signals.
+    ``recording`` is the stretch that was compared, ``simulated`` has its signals. ``numbers`` begin
+    with the scores.
     """
 
     recording: Recording
     simulated: Signals
     start: float
-    scores: list[Score]
     numbers: list[Number]
     notes: list[str]
 
@@ -182,8 +181,9 @@ def measure(
             return Seen(waveforms, at, 0.0).signal(name, first)
 
         notes += hints(recording, shown, guide, np.concatenate([[start], others]))
-    numbers = both_sides(recording, simulated, (repeats, period or repeats))
-    numbers += [
+    numbers = [
+        *scores(recording, simulated, repeats),
+        *both_sides(recording, simulated, (repeats, period or repeats)),
         *filter(None, [horizontal_share(recording)]),
         Number("rate", 1.0 / row, "1/s", "rows of the recording in a second, the median"),
         Number("start", start, "s", "time of the run that is laid over the recording's first row"),
@@ -195,8 +195,7 @@ def measure(
             "is what the digits of the file make, and camera_… is the error that the camera alone "
             "makes, the run's rows against straight lines between the frames."
         )
-    found = scores(recording, simulated, repeats)
-    return Found(recording, simulated, start, found, numbers, notes)
+    return Found(recording, simulated, start, numbers, notes)
 
 
 def _of_periods(
