@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cosim.scene import firmware
-from cosim.scene.describe import Key, keys
+from cosim.scene.describe import KEYS, Key, keys
 from cosim.scene.methods import OF_PORTS
 from cosim.scene.rungs import RUNGS, Rung
 from cosim.scene.tables import (
@@ -244,7 +244,7 @@ class Scene(BaseModel):
         ):
             value = getattr(rig, key)
             if value > most:
-                unit = next(one.unit for one in keys() if one.full == f"mechanics.{key}")
+                unit = KEYS[f"mechanics.{key}"].unit
                 raise fault(
                     f"mechanics.{key} = {value:g} {unit} must be at most {most:.3g} {unit} with "
                     f"{named}, or the bodies move too fast to be solved"
@@ -471,5 +471,4 @@ def _turned(scene: Scene, key: Key) -> str:
     if key.name not in KNOBS or getattr(scene.drive, key.name) is None:
         return ""
     name = KNOBS[key.name]
-    unit = next(key.unit for key in keys() if key.full == f"drive.{name}")
-    return f"; {name} {getattr(scene.drive, name):.4g} {unit}"
+    return f"; {name} {getattr(scene.drive, name):.4g} {KEYS[f'drive.{name}'].unit}"

@@ -16,7 +16,8 @@ from cosim.evaluate.point import Outcome
 from cosim.files.atomic import together
 from cosim.mechanics import fmi
 from cosim.mechanics.package import unpacked
-from cosim.scene import Scene, firmware, keys, to_toml
+from cosim.scene import Scene, firmware, to_toml
+from cosim.scene.describe import KEYS
 from cosim.scene.tables import MACHINE
 from cosim.studies.sweep.design import Design
 from cosim.waveforms.columns import netcdf_name
@@ -159,9 +160,9 @@ def _meant(scene: Scene, data: xr.Dataset) -> dict[str, xr.DataArray]:
     add("frequency", firmware.knob_frequency, "pot_frequency")
     amplitude = found.get("amplitude", axes.get("amplitude", scene.drive.amplitude))
     add("offset", firmware.knob_offset, "pot_offset", amplitude)
-    for key in keys():
-        if key.table == "drive" and key.name in found:
-            found[key.name].attrs = {"units": key.unit, "long_name": key.text}
+    for name, values in found.items():
+        key = KEYS[f"drive.{name}"]
+        values.attrs = {"units": key.unit, "long_name": key.text}
     return {name: values for name, values in found.items() if name not in axes}
 
 
