@@ -86,18 +86,16 @@ class Seen:
         names = [name for name in ("z_surface", "z_part") if name in signals]
         if not names or at[-1] > self.waveforms["time"][-1] + 1e-9:
             return False
-        pairs = [(self.signal(name, start), signals[name]) for name in names]
-        return all(np.allclose(*_known(run, seen), *DIGITS) for run, seen in pairs)
+        known = {name: np.isfinite(signals[name]) for name in names}
+        pairs = ((self.signal(name, start)[k], signals[name][k]) for name, k in known.items())
+        return all(np.allclose(run, seen, *DIGITS) for run, seen in pairs)
 
-    def best_start(self, earliest: float, latest: float) -> float:
-        """The start at which the run explains most of the guiding signal, if there is one."""
-        name = next((name for name in GUIDES if name in self.recording.signals), "")
-        if not name:
-            return earliest
-        wanted = self.recording.signals[name]
+    def best_start(self, guide: str, earliest: float, latest: float) -> float:
+        """The start at which the run explains most of the guiding signal."""
+        wanted = self.recording.signals[guide]
 
         def missed(start: float) -> float:
-            return -explained(self.signal(name, start), wanted)
+            return -explained(self.signal(guide, start), wanted)
 
         starts = np.linspace(earliest, latest, SHIFTS)
         best = int(np.argmin([missed(float(start)) for start in starts]))
@@ -124,11 +122,6 @@ class Seen:
             meaning = f"mean error of the {words} that the camera alone makes"
             found.append(Number(name, value, unit, meaning))
         return found
-
-
-def _known(run: Array, seen: Array) -> tuple[Array, Array]:
-    known = np.isfinite(seen)
-    return run[known], seen[known]
 
 
 def measure(
@@ -166,11 +159,11 @@ def measure(
             f"The run ends at {end:.4g} s, too early to cover the {rows} rows of "
             f"{plain(recording.name)}: run.duration must be at least {needed:.4g} s."
         )
-    start = earliest
-    if period is not None and not own and not aligned:
-        start = seen.best_start(earliest, max(earliest, min(end - span, earliest + period)))
-    simulated = {name: seen.signal(name, start) for name in recording.signals}
     guide, repeats = _period(recording, period)
+    start = earliest
+    if guide and period is not None and not own and not aligned:
+        start = seen.best_start(guide, earliest, max(earliest, min(end - span, earliest + period)))
+    simulated = {name: seen.signal(name, start) for name in recording.signals}
     notes += _of_periods(repeats, period, span, row)
     if not own and guide:
         phases = np.linspace(-0.5, 0.5, 0 if aligned or period is None else PHASES)

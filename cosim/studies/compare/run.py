@@ -139,17 +139,16 @@ def _run(
     run: Result | Scene | str | os.PathLike[str], overrides: Overrides | None, trial: Recording
 ) -> tuple[str, dict[str, Array], Scene]:
     """The run's name, its waveforms and its scene."""
-    folder = None if isinstance(run, Result | Scene) else Path(run)
-    if isinstance(run, Result) or (folder and folder.is_dir()):
-        name = run.scene.name if isinstance(run, Result) else str(run)
+    name = str(run)
+    if isinstance(run, Result | Scene):
+        name = run.name if isinstance(run, Scene) else run.scene.name
+    if isinstance(run, Result) or (not isinstance(run, Scene) and Path(run).is_dir()):
         if overrides:
             raise BadInput(f"--set cannot change {plain(name)}, which is a finished run.")
-        scene = run.scene if isinstance(run, Result) else load(Path(name) / "scene.toml")
+        scene = run.scene if isinstance(run, Result) else load(Path(run) / "scene.toml")
         _check_rate(scene, trial)
-        if isinstance(run, Result):
-            return name, run.columns, run.scene
-        return name, formats.read(Path(name)).waveforms, scene
-    name = run.name if isinstance(run, Scene) else str(run)
+        finished = run.columns if isinstance(run, Result) else formats.read(Path(run)).waveforms
+        return name, finished, scene
     scene = load(run, overrides)
     period = _check_rate(scene, trial)
     span = float(trial.time[-1]) * len(trial.time) / (len(trial.time) - 1) + (period or 0.0)
