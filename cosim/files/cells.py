@@ -112,9 +112,9 @@ class Cells:
         raise BadInput(f"{self.name}: row {line}, column {plain(column, 40)}: “{shown}” {words}.")
 
 
-def read_cells(path: Path, most: int = LARGEST) -> Cells:
+def read_cells(path: Path) -> Cells:
     """The cells of a text file. Raises BadInput, with the row, for what is no table."""
-    text = _decoded(reader.read(path, most))
+    text = _decoded(reader.read(path, LARGEST))
     name = plain(str(path))
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if odd := _CONTROL.search(text):
