@@ -9,14 +9,7 @@ from itertools import pairwise, takewhile
 
 from cosim.circuit.lint.deck import Line, refuse, shown
 from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, parse
-from cosim.circuit.lint.expressions import (
-    Names,
-    body,
-    check_circles,
-    check_names,
-    sensed,
-    unbraced,
-)
+from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed, unbraced
 from cosim.circuit.lint.topology import check_topology
 from cosim.circuit.lint.words import number, word_set
 

@@ -13,11 +13,7 @@ Output = Literal["saturated", "regulated"]
 Cut = Literal["coil in circuit", "coil in mechanics"]
 Table = Mapping[str, float]
 
-_LINEAR: Table = {
-    "mechanics.gravity": 0.0,
-    "mechanics.suspension_k3": 0.0,
-    "mechanics.travel": 1e3,
-}
+_LINEAR: Table = {"mechanics.gravity": 0.0, "mechanics.suspension_k3": 0.0, "mechanics.travel": 1e3}
 """No gravity, no hardening, no wall in reach."""
 
 

@@ -69,11 +69,7 @@ class Numbers:
 
 
 def dataset(
-    scene: Scene,
-    design: Design,
-    found: Numbers,
-    versions: dict[str, str],
-    units: Mapping[str, str],
+    scene: Scene, design: Design, found: Numbers, versions: dict[str, str], units: Mapping[str, str]
 ) -> xr.Dataset:
     """The numbers of each point's summary over the keys of the sweep, with their units.
 
