@@ -10,6 +10,7 @@ import re
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -95,7 +96,6 @@ class Cells:
         if text.lstrip("+-").lower() in ("inf", "infinity", "nan"):
             words = "is not finite"
         self._refuse(line, column, text, words)
-        raise AssertionError
 
     def _signed(self, sign: str, line: int, column: str) -> None:
         """Note a decimal sign: a file has only one."""
@@ -107,7 +107,7 @@ class Cells:
                 f"{other}, column {plain(second, 40)} a decimal comma."
             )
 
-    def _refuse(self, line: int, column: str, text: str, words: str) -> None:
+    def _refuse(self, line: int, column: str, text: str, words: str) -> NoReturn:
         shown = plain(text, 40)
         raise BadInput(f"{self.name}: row {line}, column {plain(column, 40)}: “{shown}” {words}.")
 
