@@ -321,7 +321,6 @@ _TWINS = {
 
 
 def _merge(layers: list[_Layer]) -> dict[str, Any]:
-    """The layers as one."""
     merged: dict[str, Any] = {}
     for layer in layers:
         for table, content in layer.tables.items():

@@ -392,7 +392,6 @@ def _varies(expression: str) -> bool:
 
 
 def _functions(line: Line) -> Iterator[_Function]:
-    """The functions that a line defines."""
     lower = line.text.lower()
     if lower.startswith(".func"):
         match = _FUNC.match(lower)

@@ -26,7 +26,6 @@ class Machine:
 
     @cached_property
     def scene(self) -> Scene:
-        """Its rig."""
         return changed(load("reference"), {**_LINEAR, **self.settings}, "stability")
 
     @property
