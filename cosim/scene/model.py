@@ -142,12 +142,10 @@ class Scene(BaseModel):
                 raise fault(f'[[fmu]] name = "{name}" must be another: it is taken')
         for port in self.port:
             for key, end in (("from", port.origin), ("to", port.to)):
-                name, dot, _ = (end or "").partition(".")
-                if (
-                    end is not None
-                    and (key, end) != ("from", "drive")
-                    and (name not in names or not dot)
-                ):
+                if end is None or (key, end) == ("from", "drive"):
+                    continue
+                name, dot, _ = end.partition(".")
+                if name not in names or not dot:
                     lacks = f"; there is no [[fmu]] {name}" if dot else ""
                     known = " or ".join(f"{name}.…" for name in names)
                     raise fault(f'[[port]] {key} = "{end}" must be a variable {known}{lacks}')
@@ -176,12 +174,11 @@ class Scene(BaseModel):
         for end in MACHINE_ENDS[:3]:
             if end not in names:
                 raise fault(f'[[port]]: nothing is joined to "{end}"')
-        if "".join(names["machine.current"].lower().split()) != (
-            f"i({names['machine.back_emf'].lower()})"
-        ):
+        emf, current = names["machine.back_emf"], names["machine.current"]
+        if "".join(current.lower().split()) != f"i({emf.lower()})":
             raise fault(
-                f'the port of machine.current must have probe = "i({names["machine.back_emf"]})", '
-                "the current of the source that is the back-EMF"
+                f'the port of machine.current must have probe = "i({emf})", the current of the '
+                "source that is the back-EMF"
             )
         return self
 

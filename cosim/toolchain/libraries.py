@@ -131,10 +131,8 @@ def _check(folder: Path, name: str) -> None:
 
 def _check_writers(folder: Path, paths: list[Path]) -> None:
     """Refuse what others may write to, unless they may write to this very code."""
-    if (
-        os.name != "posix"
-        or (Path(__file__).stat().st_mode | folder.parent.stat().st_mode) & _OTHERS
-    ):
+    ours = Path(__file__).stat().st_mode | folder.parent.stat().st_mode
+    if os.name != "posix" or ours & _OTHERS:
         return
     between = {above for path in paths for above in path.parents if above.is_relative_to(folder)}
     for path in sorted({*paths, *between}):

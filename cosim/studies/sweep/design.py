@@ -108,11 +108,10 @@ def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: 
                 f"--over {axis.key.full}: a sample needs a range, from one value to another."
             )
     generator = np.random.default_rng(seed)
-    unit = (
-        generator.random((count, len(axes)))
-        if random
-        else qmc.LatinHypercube(len(axes), rng=generator).random(count)
-    )
+    if random:
+        unit = generator.random((count, len(axes)))
+    else:
+        unit = qmc.LatinHypercube(len(axes), rng=generator).random(count)
     columns = []
     for axis, column in zip(axes, unit.T, strict=True):
         low, high = min(axis.values), max(axis.values)
