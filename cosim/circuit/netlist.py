@@ -10,10 +10,6 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
-from cosim.arrays import Array
 from cosim.circuit.joined import check_reading, own_parameters, reading, text_of
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.deck import Line, read_all, refuse
@@ -171,23 +167,3 @@ def _carry_inertia(external: dict[Line, str], title: Line, present: set[str], em
 AT_WORK, AT_WORK_HERE = 0.5, 1e-3
 """V: from which magnitude on the nodes ``swing`` and ``climit`` tell that a limit acts, in a user's
 netlist and in those of ``circuits/``, where they are 0 else."""
-
-
-def limits_at_work(
-    log: dict[str, Array], least: float = AT_WORK
-) -> dict[str, npt.NDArray[np.bool_]]:
-    """Which limits of the amplifier act, at each point of the log, by name; only those known.
-    ``least`` is the magnitude, V, from which on a node tells that its limit acts.
-    """
-    nothing = np.zeros(len(log["time"]))
-    known: dict[str, npt.NDArray[np.bool_]] = {}
-    limited = np.abs(log.get("v(climit)", nothing)) >= least
-    swing = log.get("v(swing)", nothing)
-    if "v(swing)" in log:
-        known["swing_high"] = (swing >= least) & ~limited
-        known["swing_low"] = (swing <= -least) & ~limited
-    if "v(climit)" in log:
-        known["current_limit"] = limited
-    if "v(slewing)" in log:
-        known["slew"] = (np.abs(log["v(slewing)"]) >= 0.5) & (np.abs(swing) < least) & ~limited
-    return known
