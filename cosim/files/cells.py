@@ -35,7 +35,7 @@ _QUOTED = re.compile(r' *"((?:[^"]|"")*+)" *')
 
 @dataclass
 class Cells:
-    """The rows of a table, each with the number of its line; ``plain`` is the file's name."""
+    """The rows of a table, each with the number of its line."""
 
     path: Path
     separator: str

@@ -83,21 +83,13 @@ def dataset(
     columns = [list(axis.values) for axis in design.axes]
     if design.sample is not None:
         columns = [list(column) for column in zip(*design.sample, strict=True)]
-    coordinates = {
-        name: (
-            name if design.sample is None else POINT,
-            column,
-            {"units": axis.key.unit, "long_name": axis.key.text, "key": axis.key.full},
-        )
-        for name, column, axis in zip(axes, columns, design.axes, strict=True)
-    }
-    variables = {
-        netcdf_name(name): (
-            *(dims, values.reshape(design.shape)),
-            _JUDGED if name == JUDGED else meaning(name, units),
-        )
-        for name, values in numbers.items()
-    }
+    coordinates, variables = {}, {}
+    for name, column, axis in zip(axes, columns, design.axes, strict=True):
+        about = {"units": axis.key.unit, "long_name": axis.key.text, "key": axis.key.full}
+        coordinates[name] = (name if design.sample is None else POINT, column, about)
+    for name, values in numbers.items():
+        about = _JUDGED if name == JUDGED else meaning(name, units)
+        variables[netcdf_name(name)] = (dims, values.reshape(design.shape), about)
     about = {"long_name": "Why the point failed; empty where it did not"}
     variables[FAILURE] = (dims, found.failures.astype(str).reshape(design.shape), about)
     attributes = {
