@@ -90,10 +90,7 @@ class Scope:
 
     def model_types(self, name: str) -> set[str] | None:
         """The types of the model that ``name`` means here, None if there is none."""
-        for scope in self.chain():
-            if types := scope.models.get(name):
-                return types
-        return None
+        return next((s.models[name] for s in self.chain() if name in s.models), None)
 
     def subcircuit(self, name: str) -> "list[Scope] | None":
         return next((s.subcircuits[name] for s in self.chain() if name in s.subcircuits), None)
