@@ -100,23 +100,12 @@ def deck(
     )
     values = {**known, **own_parameters(top, name, parameters)}
     fed = {source.lower() for source in sources}
-    text = [lines[0].text]
-    for line, element, holder in top.order:
-        if not all(each.used for each in holder.chain()):
-            continue  # nothing calls the subcircuit
-        if holder is top and element is not None and element.name in fed:
-            text += _external(element, through)
-        else:
-            text.append(written(line, element, values if holder is top else {}))
-    text += [
-        f".options norefvalue reltol={reltol!r}",
-        ".save none",
-        f".tran {max_step!r} {duration!r} 0 {max_step!r}",
-        ".end",
-    ]
+    external = {
+        each.line: "\n".join(_external(each, through)) for each in top.elements if each.name in fed
+    }
     read_as = reading(every, len(words) if asked else 0)
     return Deck(
-        "\n".join(text),
+        text_of(lines[0], top, external, values, duration, reltol, max_step),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
         tuple(every),
@@ -125,6 +114,34 @@ def deck(
         tuple(device if k < len(words) else "" for k, (_, device) in enumerate(read_as)),
         tuple(_pulses(top, fed)),
     )
+
+
+def text_of(
+    title: Line,
+    top: Scope,
+    external: Mapping[Line, str],
+    values: Mapping[str, float],
+    duration: float,
+    reltol: float,
+    max_step: float,
+) -> str:
+    """What ngspice gets of a netlist: other lines for ``external`` sources, ``values`` for the top
+    level's parameters, and the analysis."""
+    text = [title.text]
+    for line, element, holder in top.order:
+        if holder is top and line in external:
+            text.append(external[line])
+        elif all(each.used for each in holder.chain()):  # something calls the subcircuit
+            text.append(written(line, element, values if holder is top else {}))
+    text += [
+        # Without norefvalue it asks for the CPU time at each step, to print how far it is.
+        f".options norefvalue reltol={reltol!r}",
+        # All vectors are sent step by step; ngspice is to keep none, which would take memory.
+        ".save none",
+        f".tran {max_step!r} {duration!r} 0 {max_step!r}",
+        ".end",
+    ]
+    return "\n".join(text)
 
 
 def _external(element: Element, through: Sequence[tuple[str, str]]) -> Iterator[str]:
@@ -171,7 +188,14 @@ def check_reading(
 def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:
     """For each of the words the vector that has its value, and the device parameter. So many of
     them, the first, are asked for within a step, where only currents have a parameter."""
-    return [_read_as(k, match) for k, match in enumerate(_direct(words, asked))]
+    found = []
+    for place, match in enumerate(_direct(words, asked)):
+        if match is None:
+            found.append((f"v({_NODE}{place})", f"@bcosim{place}[v]"))
+        else:
+            kind, inner = match[1].lower(), match[2].lower()
+            found.append((f"{kind}({inner})", f"@{inner}[i]" if kind == "i" else ""))
+    return found
 
 
 def _direct(words: Sequence[str], asked: int) -> list[re.Match[str] | None]:
@@ -187,14 +211,6 @@ def _source_of(place: int, words: Line) -> Line:
     line = replace(words, text=f"Bcosim{place} {_NODE}{place} 0 V={words.text}")
     passed(line)
     return line
-
-
-def _read_as(place: int, match: re.Match[str] | None) -> tuple[str, str]:
-    """The vector that has the words' value, and the device parameter."""
-    if match is None:
-        return f"v({_NODE}{place})", f"@bcosim{place}[v]"
-    kind, inner = match[1].lower(), match[2].lower()
-    return f"{kind}({inner})", f"@{inner}[i]" if kind == "i" else ""
 
 
 def _check_vectors(top: Scope, wanted: Iterable[Line]) -> None:

@@ -4,7 +4,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.arrays import Array
-from cosim.circuit.netlist import limits_at_work
 
 _NODES = {"swing": ("v(swing)", "v(out)"), "current_limit": ("v(climit)", "i(vemf)")}
 """The node that tells of a limit, which falls about straight while the limit ceases to act; and
@@ -13,8 +12,8 @@ what the limit holds, which came there about straight."""
 
 def shares_of_steps(log: dict[str, Array], least: float) -> dict[str, Array]:
     """The share of each step of the log in which each known limit acts, by name, and ``output`` for
-    any of them but the slew rate, if the swing is known; ``least`` is that of
-    :func:`limits_at_work`.
+    any of them but the slew rate, if the swing is known; ``least`` is the magnitude, V, from which
+    on a node tells that its limit acts.
 
     Where a limit begins or ends within a step, the straight line through the two points before it
     tells when: there what the limit holds reaches the value that it then has, and the limit's node
@@ -23,7 +22,7 @@ def shares_of_steps(log: dict[str, Array], least: float) -> dict[str, Array]:
     """
     found: dict[str, Array] = {}
     time = log["time"]
-    for name, acts in limits_at_work(log, least).items():
+    for name, acts in _at_work(log, least).items():
         shares = 0.5 * acts[1:] + 0.5 * acts[:-1]
         kind = name.removesuffix("_high").removesuffix("_low")
         if kind in _NODES:
@@ -47,3 +46,19 @@ def _place(time: Array, values: Array, steps: npt.NDArray[np.int64], goal: Array
     place = np.full(len(steps), 0.5)
     np.divide(needed, possible, out=place, where=needed * possible > 0.0)
     return np.minimum(place, 1.0)
+
+
+def _at_work(log: dict[str, Array], least: float) -> dict[str, npt.NDArray[np.bool_]]:
+    """Which limits of the amplifier act, at each point of the log, by name; only those known."""
+    nothing = np.zeros(len(log["time"]))
+    known: dict[str, npt.NDArray[np.bool_]] = {}
+    limited = np.abs(log.get("v(climit)", nothing)) >= least
+    swing = log.get("v(swing)", nothing)
+    if "v(swing)" in log:
+        known["swing_high"] = (swing >= least) & ~limited
+        known["swing_low"] = (swing <= -least) & ~limited
+    if "v(climit)" in log:
+        known["current_limit"] = limited
+    if "v(slewing)" in log:
+        known["slew"] = (np.abs(log["v(slewing)"]) >= 0.5) & (np.abs(swing) < least) & ~limited
+    return known

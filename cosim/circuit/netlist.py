@@ -10,16 +10,11 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
-from cosim.arrays import Array
-from cosim.circuit.joined import check_reading, own_parameters, reading
+from cosim.circuit.joined import check_reading, own_parameters, reading, text_of
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.deck import Line, read_all, refuse
 from cosim.circuit.lint.elements import Element, Scope
 from cosim.circuit.lint.outputs import Measure, measures, without_effect
-from cosim.circuit.lint.write import written
 from cosim.files.resources import circuits
 from cosim.scene import Scene
 
@@ -86,11 +81,8 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
         emf = scene.renamed.get("machine.back_emf", "vemf").lower()
         _carry_inertia(external, title, present, emf)
     values = parameters(scene) | own_parameters(top, str(path), scene.circuit.param or {})
-    deck = [title.text]
-    for line, element, holder in top.order:
-        if not all(each.used for each in holder.chain()):
-            continue  # nothing calls the subcircuit
-        deck.append(external.get(line) or written(line, element, values if holder is top else {}))
+    steps = scene.circuit.reltol, scene.circuit.max_step
+    text = text_of(title, top, external, values, scene.run.duration, *steps)
     for node in ("out", "sense"):
         if f"v({node})" not in words and node not in present:
             port = f', or a [[port]] to "machine.{node}"' if scene.renamed else ""
@@ -101,16 +93,7 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
         saved[MOTIONAL] = MOTIONAL
     read = dict(zip(every, reading(every), strict=True))
     saved |= {name: read[word][0] for name, word in words.items()}
-    run, circuit = scene.run, scene.circuit
-    deck += [
-        # Without norefvalue it asks for the CPU time at each step, to print how far it is.
-        f".options norefvalue reltol={circuit.reltol!r}",
-        # All vectors are sent step by step; ngspice is to keep none, which would take memory.
-        ".save none",
-        f".tran {circuit.max_step!r} {run.duration!r} 0 {circuit.max_step!r}",
-        ".end",
-    ]
-    return "\n".join(deck), saved
+    return text, saved
 
 
 def _words(scene: Scene) -> dict[str, str]:
@@ -184,23 +167,3 @@ def _carry_inertia(external: dict[Line, str], title: Line, present: set[str], em
 AT_WORK, AT_WORK_HERE = 0.5, 1e-3
 """V: from which magnitude on the nodes ``swing`` and ``climit`` tell that a limit acts, in a user's
 netlist and in those of ``circuits/``, where they are 0 else."""
-
-
-def limits_at_work(
-    log: dict[str, Array], least: float = AT_WORK
-) -> dict[str, npt.NDArray[np.bool_]]:
-    """Which limits of the amplifier act, at each point of the log, by name; only those known.
-    ``least`` is the magnitude, V, from which on a node tells that its limit acts.
-    """
-    nothing = np.zeros(len(log["time"]))
-    known: dict[str, npt.NDArray[np.bool_]] = {}
-    limited = np.abs(log.get("v(climit)", nothing)) >= least
-    swing = log.get("v(swing)", nothing)
-    if "v(swing)" in log:
-        known["swing_high"] = (swing >= least) & ~limited
-        known["swing_low"] = (swing <= -least) & ~limited
-    if "v(climit)" in log:
-        known["current_limit"] = limited
-    if "v(slewing)" in log:
-        known["slew"] = (np.abs(log["v(slewing)"]) >= 0.5) & (np.abs(swing) < least) & ~limited
-    return known

@@ -14,6 +14,7 @@ import logging
 import os
 import re
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Protocol
 
 from PySpice.Spice.NgSpice import Shared
@@ -72,21 +73,13 @@ class Leader(Protocol):
         """Nothing is to be done any more: the sources become NaN, so that no step succeeds."""
 
 
-_one: "list[Engine]" = []
-
-
+@cache
 def engine(callbacks: Callbacks) -> "Engine":
     """The process's one ngspice, which calls back. Raises BadInput where the library is missing.
 
     It loads no code models: ``lint/dialect.py`` writes what would need them otherwise, and each
     step looks at all kinds of elements, so they would cost 5 % of a run.
     """
-    if not _one:
-        _one.append(_made(callbacks))
-    return _one[0]
-
-
-def _made(callbacks: Callbacks) -> "Engine":
     name = ngspice_library()
     os.environ["SPICE_SCRIPTS"] = os.curdir  # not its own start-up file, which loads code models
     try:

@@ -33,10 +33,7 @@ class Command:
 
 
 def add_commands(
-    parser: ArgumentParser,
-    commands: Iterable[Command],
-    asked: Collection[str] | None,
-    metavar: str,
+    parser: ArgumentParser, commands: Iterable[Command], asked: Collection[str] | None, metavar: str
 ) -> None:
     """Let ``parser`` take one of the commands; what was parsed then has its ``call``.
 

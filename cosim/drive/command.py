@@ -11,15 +11,7 @@ from cosim.drive.periodic import Constant, Corners, Lines, Sine, held
 from cosim.drive.pieces import Command, Piece, level
 from cosim.drive.staircase import Staircase, WithPwm
 from cosim.scene import Scene
-from cosim.scene.firmware import (
-    GAIN,
-    nearest_code,
-    offset_pin,
-    passes,
-    sampled,
-    staircase,
-    volts,
-)
+from cosim.scene.firmware import GAIN, nearest_code, offset_pin, passes, sampled, staircase, volts
 from cosim.scene.tables import Drive
 
 

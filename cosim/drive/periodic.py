@@ -9,19 +9,16 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.drive.pieces import RAMP, SINE, Command, Piece, edge_before, level
-from cosim.scene.firmware import GAIN, offset_pin
+from cosim.scene.firmware import offset_pin
 
 
 class Constant(Command):
-    """A command that never changes: ``level`` in V."""
+    """0 V for ever."""
 
-    def __init__(self, level: float = 0.0) -> None:
-        self.level = level
-        self.v_offset = level / GAIN
-        self.period = inf
+    v_offset, period = 0.0, inf
 
     def piece(self, t: float) -> Piece:
-        return level(inf, self.level, self.v_offset)
+        return level(inf, 0.0, 0.0)
 
 
 class _Periodic(Command):

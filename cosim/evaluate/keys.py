@@ -4,7 +4,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from cosim.errors import BadInput, plain
-from cosim.scene import Key, Scene, changed, keys
+from cosim.scene import Key, Scene, changed
+from cosim.scene.describe import KEYS
 from cosim.scene.messages import ended, suggestion
 from cosim.scene.tables import KNOBS, LEVEL_KEY, PARAM_KEY, said_twice
 
@@ -13,7 +14,7 @@ FREQUENCIES = ("drive.frequency", "drive.pot_frequency", "drive.loop_time")
 
 def numeric_key(name: str) -> Key:
     """The key with this full name. Raises BadInput for one that is unknown or no number."""
-    numeric = {key.full: key for key in keys() if key.kind in (int, float)}
+    numeric = {full: key for full, key in KEYS.items() if key.kind in (int, float)}
     if name in numeric:
         return numeric[name]
     table, _, bare = name.partition(".")
@@ -24,7 +25,7 @@ def numeric_key(name: str) -> Key:
     if param or (table == "fmu" and "." in bare):
         text = f"Value of {bare}, of the user's own"
         return Key(table, bare, "?", None, float, None, -1e30, 1e30, text, "")
-    if any(key.full == name for key in keys()):
+    if name in KEYS:
         raise BadInput(f"--over {plain(name)}: this key is not a number.")
     bare = [full for full, key in numeric.items() if key.name == name]
     hint = f"; did you mean {bare[0]}?" if bare else suggestion(name, numeric)

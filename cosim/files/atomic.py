@@ -160,7 +160,6 @@ def folder_of_ones_own(parent: Path) -> tuple[str, int]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text as UTF-8."""
     with whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 

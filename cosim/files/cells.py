@@ -10,6 +10,7 @@ import re
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -34,7 +35,7 @@ _QUOTED = re.compile(r' *"((?:[^"]|"")*+)" *')
 
 @dataclass
 class Cells:
-    """The rows of a table, each with the number of its line; ``plain`` is the file's name."""
+    """The rows of a table, each with the number of its line."""
 
     path: Path
     separator: str
@@ -95,7 +96,6 @@ class Cells:
         if text.lstrip("+-").lower() in ("inf", "infinity", "nan"):
             words = "is not finite"
         self._refuse(line, column, text, words)
-        raise AssertionError
 
     def _signed(self, sign: str, line: int, column: str) -> None:
         """Note a decimal sign: a file has only one."""
@@ -107,14 +107,14 @@ class Cells:
                 f"{other}, column {plain(second, 40)} a decimal comma."
             )
 
-    def _refuse(self, line: int, column: str, text: str, words: str) -> None:
+    def _refuse(self, line: int, column: str, text: str, words: str) -> NoReturn:
         shown = plain(text, 40)
         raise BadInput(f"{self.name}: row {line}, column {plain(column, 40)}: “{shown}” {words}.")
 
 
-def read_cells(path: Path, most: int = LARGEST) -> Cells:
+def read_cells(path: Path) -> Cells:
     """The cells of a text file. Raises BadInput, with the row, for what is no table."""
-    text = _decoded(reader.read(path, most))
+    text = _decoded(reader.read(path, LARGEST))
     name = plain(str(path))
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if odd := _CONTROL.search(text):

@@ -3,7 +3,7 @@
 import math
 from io import BytesIO
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -33,6 +33,11 @@ class Picture(Figure):
         return content.getvalue()
 
     _repr_png_ = png
+
+
+def legend_above(axis: Axes, **style: Any) -> None:
+    """The legend on the right above the axes, where it covers no curve."""
+    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), frameon=False, **style)
 
 
 def grid(

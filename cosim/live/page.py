@@ -96,7 +96,6 @@ def page(name: str, code: str, asks: str) -> str:
 
 
 def script(names: tuple[str, ...]) -> str:
-    """The scripts as one."""
     return "\n".join((_WEB / name).read_text(encoding="utf-8") for name in names)
 
 

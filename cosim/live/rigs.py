@@ -7,7 +7,8 @@ from typing import Any
 from cosim.circuit.heat import rise
 from cosim.files.link import LONGEST
 from cosim.mechanics.stickslip import parameters
-from cosim.scene import Key, Scene, firmware, keys, list_scenes, load
+from cosim.scene import Key, Scene, firmware, list_scenes, load
+from cosim.scene.describe import KEYS
 from cosim.scene.tables import COMMANDS, KNOBS
 
 _MACHINE = Path(__file__).with_name("web") / "machine.json"
@@ -25,9 +26,10 @@ _CHOICES = {"drive.waveform": COMMANDS, "circuit.model": (MODEL,)}
 
 def turned() -> dict[str, Key]:
     """The keys that the page turns, by their full names."""
-    of_fmu = {key for key in keys() if key.variable and key.name != "tolerance"}
     return {
-        key.full: key for key in keys() if key in of_fmu or key.name in _TURNED.get(key.table, ())
+        full: key
+        for full, key in KEYS.items()
+        if (key.variable and key.name != "tolerance") or key.name in _TURNED.get(key.table, ())
     }
 
 

@@ -78,6 +78,9 @@ def _key(table: str, name: str) -> Key:
 
 _KEYS = tuple(_key(table, name) for table, model in TABLES.items() for name in model.model_fields)
 
+KEYS = {key.full: key for key in _KEYS}
+"""Every key by its full name."""
+
 
 def keys() -> tuple[Key, ...]:
     """Every key of every table, in order."""

@@ -17,20 +17,10 @@ from cosim.errors import BadInput, NoEffect, Note, plain
 from cosim.files import link, reader
 from cosim.files.resources import circuits, compiled_fmus
 from cosim.scene import messages, toml
-from cosim.scene.describe import acts, keys
+from cosim.scene.describe import KEYS, acts, keys
 from cosim.scene.methods import METHODS
 from cosim.scene.model import Scene, toml_value
-from cosim.scene.tables import (
-    KNOBS,
-    LEVEL_KEY,
-    NORMAL_FORCES,
-    PARAM_KEY,
-    PATHS,
-    PORT_LISTS,
-    TABLES,
-)
-
-_FULL = frozenset(key.full for key in keys())
+from cosim.scene.tables import KNOBS, LEVEL_KEY, NORMAL_FORCES, PARAM_KEY, PATHS, PORT_LISTS, TABLES
 
 _LIBRARY = Path(__file__).with_name("library")
 
@@ -276,7 +266,7 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
         if not isinstance(full, str):
             raise BadInput(f"{origin}: {messages.shown(full)} must be a text, table.key.")
         table, dot, key = full.partition(".")
-        if full not in _FULL:
+        if full not in KEYS:
             if not dot:
                 hint = messages.full_name(full)
                 raise messages.bad(f"{origin}: {plain(full)} must be table.key{hint}")
@@ -331,7 +321,6 @@ _TWINS = {
 
 
 def _merge(layers: list[_Layer]) -> dict[str, Any]:
-    """The layers as one."""
     merged: dict[str, Any] = {}
     for layer in layers:
         for table, content in layer.tables.items():

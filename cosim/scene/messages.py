@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from cosim.errors import BadInput, plain
-from cosim.scene.describe import Key, acts, keys
+from cosim.scene.describe import KEYS, Key, acts, keys
 from cosim.scene.methods import METHODS, CouplingMethod
 from cosim.scene.model import toml_value
 from cosim.scene.rungs import RUNGS, Rung
@@ -66,7 +66,7 @@ def unknown_key(table: str, name: str) -> str:
     hint = (
         full_name(name)
         or suggestion(name, here, f"{table}.")
-        or suggestion(full, [key.full for key in keys()])
+        or suggestion(full, KEYS)
         or f" (keys of {table}: {', '.join(here)})"
     )
     return f'there is no key "{plain(full)}"{hint}'
@@ -117,7 +117,7 @@ def explain(error: ValidationError, origins: Mapping[str, tuple[int, str]], defa
         name = f"{full}.{first['loc'][2]}"
         origin = origins.get(name, origins.get(full, (0, default)))[1]
         return f"{origin}: {plain(name)} = {shown(first['input'])} must be {PLAIN_NUMBER}."
-    key = next((key for key in keys() if key.full == full), None)
+    key = KEYS.get(full)
     allowed = key.allowed if key else ALLOWED_TOP.get(full, "a table")
     hint = suggestion(shown(first["input"]).strip('"'), map(str, (key and key.choices) or ()))
     origin = origins.get(full, (0, default))[1]

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cosim.scene import firmware
-from cosim.scene.describe import Key, keys
+from cosim.scene.describe import KEYS, Key, keys
 from cosim.scene.methods import OF_PORTS
 from cosim.scene.rungs import RUNGS, Rung
 from cosim.scene.tables import (
@@ -142,12 +142,10 @@ class Scene(BaseModel):
                 raise fault(f'[[fmu]] name = "{name}" must be another: it is taken')
         for port in self.port:
             for key, end in (("from", port.origin), ("to", port.to)):
-                name, dot, _ = (end or "").partition(".")
-                if (
-                    end is not None
-                    and (key, end) != ("from", "drive")
-                    and (name not in names or not dot)
-                ):
+                if end is None or (key, end) == ("from", "drive"):
+                    continue
+                name, dot, _ = end.partition(".")
+                if name not in names or not dot:
                     lacks = f"; there is no [[fmu]] {name}" if dot else ""
                     known = " or ".join(f"{name}.…" for name in names)
                     raise fault(f'[[port]] {key} = "{end}" must be a variable {known}{lacks}')
@@ -176,12 +174,11 @@ class Scene(BaseModel):
         for end in MACHINE_ENDS[:3]:
             if end not in names:
                 raise fault(f'[[port]]: nothing is joined to "{end}"')
-        if "".join(names["machine.current"].lower().split()) != (
-            f"i({names['machine.back_emf'].lower()})"
-        ):
+        emf, current = names["machine.back_emf"], names["machine.current"]
+        if "".join(current.lower().split()) != f"i({emf.lower()})":
             raise fault(
-                f'the port of machine.current must have probe = "i({names["machine.back_emf"]})", '
-                "the current of the source that is the back-EMF"
+                f'the port of machine.current must have probe = "i({emf})", the current of the '
+                "source that is the back-EMF"
             )
         return self
 
@@ -244,7 +241,7 @@ class Scene(BaseModel):
         ):
             value = getattr(rig, key)
             if value > most:
-                unit = next(one.unit for one in keys() if one.full == f"mechanics.{key}")
+                unit = KEYS[f"mechanics.{key}"].unit
                 raise fault(
                     f"mechanics.{key} = {value:g} {unit} must be at most {most:.3g} {unit} with "
                     f"{named}, or the bodies move too fast to be solved"
@@ -471,5 +468,4 @@ def _turned(scene: Scene, key: Key) -> str:
     if key.name not in KNOBS or getattr(scene.drive, key.name) is None:
         return ""
     name = KNOBS[key.name]
-    unit = next(key.unit for key in keys() if key.full == f"drive.{name}")
-    return f"; {name} {getattr(scene.drive, name):.4g} {unit}"
+    return f"; {name} {getattr(scene.drive, name):.4g} {KEYS[f'drive.{name}'].unit}"

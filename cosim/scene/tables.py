@@ -221,9 +221,8 @@ class Drive(Table):
         if self.file is not None and self.waveform != "file":
             raise fault(f'drive.file is for drive.waveform = "file", not for "{self.waveform}"')
         for key, able in _SHAPES.items():
-            if getattr(self, key) != type(self).model_fields[key].default and (
-                self.waveform not in able
-            ):
+            given = getattr(self, key) != type(self).model_fields[key].default
+            if given and self.waveform not in able:
                 quoted = " or ".join(f'"{name}"' for name in able)
                 raise fault(f'drive.{key} is for drive.waveform = {quoted}, not "{self.waveform}"')
         period = 1 / self.frequency

@@ -22,19 +22,20 @@ if TYPE_CHECKING:
 POPULATION = 10
 """Points of a generation."""
 
+NARROW = 5e-3
+"""Standard deviation at which a climb ends."""
+
 APART = 0.1
 """How far the start of a climb is from those of all before it, as the greatest difference."""
 
 
 class Climb:
     """Climbs in ``keys`` dimensions, each from the best point that is ``APART`` from where those
-    before it began, with ``step`` as its first standard deviation, until that is ``narrow``, both
+    before it began, with ``step`` as its first standard deviation, until that is ``NARROW``, both
     of the cube's edge. It is to be told of a point before it is asked for any."""
 
-    def __init__(
-        self, keys: int, seed: int | list[int], step: float = 0.06, narrow: float = 5e-3
-    ) -> None:
-        self._keys, self._step, self._narrow = keys, step, narrow
+    def __init__(self, keys: int, seed: int | list[int], step: float = 0.06) -> None:
+        self._keys, self._step = keys, step
         self._random = np.random.default_rng(seed)
         self._points, self._scores = np.empty((0, keys)), np.empty(0)
         self._starts = np.empty((0, keys))
@@ -43,7 +44,7 @@ class Climb:
 
     def ask(self) -> Array:
         """The next generation (rows)."""
-        if self._climb is None or self._climb._sigma < self._narrow:
+        if self._climb is None or self._climb._sigma < NARROW:
             self._climb = self._next()
         self._asked = np.array([self._climb.ask() for _ in range(POPULATION)])
         return self._asked[:, : self._keys]

@@ -69,12 +69,10 @@ DASK = Option("--dask", "run on the Dask cluster at this address", "ADDRESS")
 
 
 def folder_of_trials(help: str) -> Option:
-    """TRIALS_DIR."""
     return Option("trials", help, "TRIALS_DIR", Path)
 
 
 def quick(help: str) -> Option:
-    """``--quick``."""
     return Option("--quick", help, kind=bool)
 
 

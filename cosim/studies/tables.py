@@ -4,6 +4,7 @@ import csv
 import os
 import platform
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from math import isfinite
 from pathlib import Path
@@ -21,20 +22,16 @@ def machine() -> dict[str, Any]:
     found: dict[str, Any] = {"processor": _processor(), "cores": os.cpu_count()}
     found |= {"system": f"{platform.system()} {platform.machine()}"} | versions()
     for package in ("scipy", "scikit-sundae"):
-        try:
+        with suppress(PackageNotFoundError):
             found[package] = version(package)
-        except PackageNotFoundError:
-            continue
     return found
 
 
 def _processor() -> str:
-    try:
+    with suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
-    except OSError:
-        pass
     return platform.processor() or platform.machine()
 
 

@@ -45,7 +45,7 @@ def library(name: str) -> ctypes.CDLL:
         found = ctypes.CDLL(str(path))
     except OSError as error:
         raise BadInput(f"The compiled library {path} cannot be loaded: {error}.") from error
-    for function, (result, arguments) in _interface(name)["functions"].items():
+    for function, (result, arguments) in _built(name)["interfaces"][name]["functions"].items():
         of = getattr(found, function)
         of.restype, of.argtypes = _TYPES[result], [_TYPES[kind] for kind in arguments]
     return found
@@ -56,7 +56,7 @@ def structures(name: str) -> dict[str, type[ctypes.Structure]]:
     """The structures that the C of the library ``name`` declares; pointers are addresses in them.
     Raises BadInput."""
     known = dict(_TYPES)
-    declared = _interface(name)["structures"]
+    declared = _built(name)["interfaces"][name]["structures"]
     for structure, fields in declared.items():
         kinds = [
             (field, reduce(mul, reversed(lengths), known[kind])) for field, kind, lengths in fields
@@ -66,10 +66,10 @@ def structures(name: str) -> dict[str, type[ctypes.Structure]]:
     return {structure: known[structure] for structure in declared}
 
 
-def _interface(name: str) -> dict[str, Any]:
-    """What the build wrote down of a library's C."""
+def _built(name: str) -> dict[str, Any]:
+    """What the build wrote down; the shared library ``name`` is checked against it."""
     path = compiled(name + SUFFIX)
-    return json.loads((path.parent / "build.json").read_bytes())["interfaces"][name]
+    return json.loads((path.parent / "build.json").read_bytes())
 
 
 def ngspice_library() -> str:
@@ -96,9 +96,7 @@ def _found_library(prefix: str) -> str | None:
 
 def digest(name: str) -> str:
     """The hash of the shared library ``name``, as the build wrote it down."""
-    path = compiled(name + SUFFIX)
-    found = json.loads((path.parent / "build.json").read_bytes())["files"][path.name][1]
-    return str(found)
+    return _built(name)["files"][name + SUFFIX][1]
 
 
 def compiled(name: str) -> Path:
@@ -133,10 +131,8 @@ def _check(folder: Path, name: str) -> None:
 
 def _check_writers(folder: Path, paths: list[Path]) -> None:
     """Refuse what others may write to, unless they may write to this very code."""
-    if (
-        os.name != "posix"
-        or (Path(__file__).stat().st_mode | folder.parent.stat().st_mode) & _OTHERS
-    ):
+    ours = Path(__file__).stat().st_mode | folder.parent.stat().st_mode
+    if os.name != "posix" or ours & _OTHERS:
         return
     between = {above for path in paths for above in path.parents if above.is_relative_to(folder)}
     for path in sorted({*paths, *between}):

@@ -369,9 +369,8 @@ def _taken(function: Callable[[Any, Progress], Any], bounds: Bounds | None) -> W
 
 def _thin_out() -> None:
     """End those that have waited longest, beyond one for each processor."""
-    while len(waiting := [worker for each in list(_idle.values()) for worker in list(each)]) > (
-        processors()
-    ):
+    most = processors()
+    while len(waiting := [one for each in list(_idle.values()) for one in list(each)]) > most:
         longest = min(waiting, key=lambda worker: worker.rested)
         with suppress(ValueError):  # another thread has it
             _idle[longest.kind].remove(longest)
@@ -412,16 +411,9 @@ def _start(pipe: Connection, folder: str, lock: int, library: str) -> "subproces
     kept |= {"NGSPICE_LIBRARY_PATH": library} if library else {}
     kept |= dict.fromkeys(("HOME", "TMPDIR", "TEMP"), folder) | {"OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, "-P", "-c", _PROGRAM, type(pipe).__name__, str(handle)]
+    options |= {"stdin": subprocess.PIPE, "cwd": folder, "env": kept}
     with open(os.path.join(folder, _SAID), "wb") as said:
-        return subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=said,
-            stderr=said,
-            cwd=folder,
-            env=kept,
-            **options,
-        )
+        return subprocess.Popen(command, stdout=said, stderr=said, **options)
 
 
 def serve(pipe: Connection) -> None:

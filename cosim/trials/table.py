@@ -19,6 +19,7 @@ from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
@@ -104,7 +105,6 @@ class Table:
     ``known``: where they are from; ``notes``: what was left out.
     """
 
-    path: Path
     columns: dict[str, Array]
     known: dict[str, Column]
     notes: tuple[str, ...]
@@ -114,14 +114,6 @@ class Table:
     def headers(self) -> dict[str, str]:
         """The headers as they are written."""
         return {name: column.header for name, column in self.known.items()}
-
-    def complete(self, name: str) -> Array:
-        """A column without gaps. Raises BadInput, with the place, where it has one."""
-        missing = np.flatnonzero(np.isnan(self.columns[name]))
-        if len(missing):
-            where = f"row {self.lines[missing[0]]}, column {self.headers[name]}"
-            raise BadInput(f"{plain(str(self.path))}: {where}: the value is missing.")
-        return self.columns[name]
 
 
 def read_table(path: Path, asked: str = "") -> Table:
@@ -139,29 +131,28 @@ def read_table(path: Path, asked: str = "") -> Table:
         for name, column in known.items()
     }
     lines = tuple(line for line, _ in cells.rows[heads:])
-    table = Table(path, columns, known, notes, lines)
+
+    def refuse(name: str, wrong: npt.NDArray[np.bool_], words: str) -> None:
+        """Raise BadInput for the first row in which a column is ``wrong``, if there is one."""
+        if wrong.any():
+            where = f"row {lines[wrong.argmax()]}, column {plain(known[name].header, 40)}"
+            raise BadInput(f"{cells.name}: {where}: {words}.")
+
     for name, values in columns.items():
-        beyond = np.flatnonzero(np.abs(values) > MOST)
-        if len(beyond):
-            where = f"row {lines[beyond[0]]}, column {plain(known[name].header, 40)}"
-            raise BadInput(
-                f"{cells.name}: {where}: the value must be within ±{MOST:g} in SI units."
-            )
+        refuse(name, np.abs(values) > MOST, f"the value must be within ±{MOST:g} in SI units")
     if len(lines) < FEWEST_ROWS:
         raise BadInput(f"{cells.name}: it has {len(lines)} of the {FEWEST_ROWS} rows needed.")
     if "time" in columns:
-        time = table.complete("time")
-        late = np.flatnonzero(np.diff(time) <= 0)
-        if len(late):
-            where = f"row {table.lines[late[0] + 1]}, column {plain(known['time'].header, 40)}"
-            raise BadInput(f"{cells.name}: {where}: the time does not increase.")
+        time = columns["time"]
+        refuse("time", np.isnan(time), "the value is missing")
+        refuse("time", np.diff(time, prepend=-np.inf) <= 0, "the time does not increase")
         step = float(time[-1] - time[0]) / (len(time) - 1)
         if not SHORTEST <= step <= LONGEST:
             raise BadInput(
                 f"{cells.name}: its rows are {step:.3g} s apart, and must be {SHORTEST:g} to "
                 f"{LONGEST:g} s: is the time's unit right?"
             )
-    return table
+    return Table(columns, known, notes, lines)
 
 
 def _header(cells: Cells, tracker: bool, asked: str) -> tuple[dict[str, Column], int, Notes]:

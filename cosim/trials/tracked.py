@@ -5,7 +5,7 @@ A velocity that is missing, or its whole column, is made by central differences,
 
 import os
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.trials.camera import velocities
-from cosim.trials.table import BODIES, FEWEST_ROWS, Table, read_table
+from cosim.trials.table import FEWEST_ROWS, read_table
 
 LONGEST_NAME = 100
 """Bytes of a trial's file name: others, and descriptions of scenes, are made of it."""
@@ -95,15 +95,10 @@ def read(path: Path) -> Trial:
             f"{plain(str(path))}: {known.sum()} rows have both zp and zo, and {FEWEST_ROWS} are "
             "needed."
         )
-    lines = tuple(np.array(table.lines)[known].tolist())
     columns = {name: values[known] for name, values in table.columns.items()}
-    table = replace(table, columns=columns, lines=lines)
-    tracks = {body: track(table, body) for body in BODIES.values()}
-    return Trial(
-        *(path.stem, number_of(path), table.columns["time"]),
-        *(tracks["surface"], tracks["part"]),
-        tracks["plate"] if "z_plate" in table.columns else None,
-    )
+    platform, part = track(columns, "surface"), track(columns, "part")
+    plate = track(columns, "plate") if "z_plate" in columns else None
+    return Trial(path.stem, number_of(path), columns["time"], platform, part, plate)
 
 
 def read_platform(path: Path) -> tuple[Array, Track]:
@@ -114,14 +109,15 @@ def read_platform(path: Path) -> tuple[Array, Track]:
         raise BadInput(f"{name}: there is no column with the time (found: {found}).")
     if not {"z_surface", "v_surface"} & set(table.columns):
         raise BadInput(f"{name}: there is no column with the surface's motion (found: {found}).")
-    platform = track(table, "surface")
+    platform = track(table.columns, "surface")
     if np.isfinite(platform.v).sum() < 2:
         raise BadInput(f"{name}: fewer than two velocities of the surface are known.")
     return table.columns["time"], platform
 
 
-def track(table: Table, body: str) -> Track:
-    """The motion of a body (a value of ``BODIES``) in a table with a time and its heights."""
-    nothing = np.full(len(table.lines), np.nan)
-    z, v = (table.columns.get(f"{quantity}_{body}", nothing) for quantity in ("z", "v"))
-    return Track(z, np.where(np.isnan(v), velocities(table.columns["time"], z), v))
+def track(columns: dict[str, Array], body: str) -> Track:
+    """The motion of a body (a value of ``BODIES``) in the columns of a table, which has a time."""
+    time = columns["time"]
+    nothing = np.full(len(time), np.nan)
+    z, v = (columns.get(f"{quantity}_{body}", nothing) for quantity in ("z", "v"))
+    return Track(z, np.where(np.isnan(v), velocities(time, z), v))

@@ -11,7 +11,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from cosim.arrays import Array
-from cosim.files.picture import Picture, grid
+from cosim.files.picture import Picture, grid, legend_above
 from cosim.files.spill import release
 from cosim.scene import Scene
 from cosim.trials.camera import FRAME_RATE, accelerations, heights
@@ -173,21 +173,13 @@ def _whole_run(axis: Axes, scene: Scene, waves: dict[str, Array]) -> None:
 
 
 def _head(axis: Axes, title: str, handles: Sequence[Artist] | None = None) -> None:
-    """The title on the left, and the legend above the axes, where it covers no curve."""
+    """The title on the left, and the legend above the axes."""
     axis.set_title(title, loc="left", fontsize=10.5)
     if handles is None:
         handles, _ = axis.get_legend_handles_labels()
     if handles:
-        axis.legend(
-            handles=handles,
-            loc="lower right",
-            bbox_to_anchor=(1.0, 0.99),
-            ncols=len(handles),
-            fontsize=8,
-            frameon=False,
-            borderpad=0.1,
-            columnspacing=1.2,
-        )
+        spacing = {"borderpad": 0.1, "columnspacing": 1.2}
+        legend_above(axis, handles=handles, ncols=len(handles), fontsize=8, **spacing)
 
 
 def _at_least(axis: Axes, span: float) -> None:
@@ -264,18 +256,9 @@ def _velocities(axis: Axes, _: Scene, time: Array, cut: dict[str, Array]) -> Non
 
 
 def _shade_sticking(axis: Axes, time: Array, sticking: Array) -> None:
-    axis.fill_between(
-        time,
-        0,
-        1,
-        where=sticking > 0.5,
-        transform=axis.get_xaxis_transform(),
-        color="#f4e3c1",
-        alpha=0.6,
-        lw=0,
-        zorder=0,
-        label="sticking",
-    )
+    style: dict[str, Any] = {"color": "#f4e3c1", "alpha": 0.6, "lw": 0, "zorder": 0}
+    style |= {"transform": axis.get_xaxis_transform(), "label": "sticking"}
+    axis.fill_between(time, 0, 1, where=sticking > 0.5, **style)
 
 
 def _power_of_ten(value: float, _: float) -> str:

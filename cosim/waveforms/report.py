@@ -168,18 +168,14 @@ def motion_in_words(summary: Mapping[str, Any]) -> str:
     if kind == "no transport":
         return "the part shakes in its place, from other starts too"
     if kind == "regular":
-        return _repeating(summary)
+        count, settled = summary["motion_periods"], summary["motion_settled"]
+        each = "every period" if count == 1 else f"every {count} periods"
+        return f"repeats {each}, to 0.1 % from {settled:.2g} s on"
     if kind == "chaotic":
         low, high = (1e3 * value for value in summary["v_average_range"])
         return f"chaotic: means over as many periods lie between {low:+.3f} and {high:+.3f} mm/s"
     answers = " or ".join(f"{1e3 * value:+.3f}" for value in summary["v_average_answers"])
     return f"the start decides: {answers} mm/s"
-
-
-def _repeating(summary: Mapping[str, Any]) -> str:
-    count, settled = summary["motion_periods"], summary["motion_settled"]
-    each = "every period" if count == 1 else f"every {count} periods"
-    return f"repeats {each}, to 0.1 % from {settled:.2g} s on"
 
 
 def _error(summary: dict[str, Any]) -> str:

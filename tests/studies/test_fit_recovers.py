@@ -180,7 +180,7 @@ def test_the_path_of_a_slide_is_the_exact_one() -> None:
         slow = np.array([-1.0, -1.0])  # the surface, far below the part's velocity all the while
         z = part.exact(time[[0, -1]], slow, output=time, v0=0.1, gravity=9.81, **law).z
         ends = np.array([time[0]]), np.array([time[-1]])
-        span = Span(-1, np.arange(0), np.arange(16), np.arange(0), *ends)
+        span = Span(-1, np.arange(16), np.arange(16), *ends)
         nothing = Track(z, np.gradient(z, time))
         trial = Trial("any", 1, time, nothing, nothing, None)
         found = slide(trial, span, 2e-6, 1e5)

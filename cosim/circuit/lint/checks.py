@@ -9,14 +9,7 @@ from itertools import pairwise, takewhile
 
 from cosim.circuit.lint.deck import Line, refuse, shown
 from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, parse
-from cosim.circuit.lint.expressions import (
-    Names,
-    body,
-    check_circles,
-    check_names,
-    sensed,
-    unbraced,
-)
+from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed, unbraced
 from cosim.circuit.lint.topology import check_topology
 from cosim.circuit.lint.words import number, word_set
 
@@ -134,10 +127,9 @@ def _check_model(element: Element, scope: Scope) -> None:
     if types is None:
         element.refuse(f": no model {shown(name)} is defined here{COPY}")
     _check_type(element, name, types)
-    line = next((s.model_lines[name] for s in scope.chain() if name in s.model_lines), None)
-    text = line.text.lower() if line else ""
+    line = next(s.model_lines[name] for s in scope.chain() if name in s.model_lines)
     for kinds, parameter, cure in _FOREIGN:
-        if line and element.kind in kinds and (found := parameter.search(text)):
+        if element.kind in kinds and (found := parameter.search(line.text.lower())):
             refuse(line, f"{found[1]} of {shown(name)} {cure}")
 
 

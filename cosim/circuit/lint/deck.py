@@ -138,20 +138,16 @@ class _Reader:
     def deck(self) -> list[Line]:
         name = shown(self.path.name)
         text = self._top()
-        if not _END.search(text):
-            # It may be any file, of which no message may tell a word.
-            if _SCHEMATIC.match(text):
-                cure = "save what LTspice shows under View, SPICE Netlist, and name that file"
-                refuse(Line("", name, 1), f"this is a drawing of LTspice and no netlist: {cure}")
-            last = Line("", name, text.rstrip().count("\n") + 1)
-            refuse(last, "the netlist does not end with .end, so it may be cut short")
-        title, rest = text.split("\n", 1) if "\n" in text else (text, "")
-        self.lines.append(Line(_title(Line(title, name, 1)), name, 1))
-        ended = self._take(_logical(rest, name, 2), (self.path,))
-        if not ended:
-            last = Line("", name, text.rstrip().count("\n") + 1)
-            refuse(last, "the netlist does not end with .end, so it may be cut short")
-        return [self.lines[0], *prelude(self.lines), *self.lines[1:]]
+        if _END.search(text):  # else it may be any file, of which no message may tell a word
+            title, _, rest = text.partition("\n")
+            self.lines.append(Line(_title(Line(title, name, 1)), name, 1))
+            if self._take(_logical(rest, name, 2), (self.path,)):
+                return [self.lines[0], *prelude(self.lines), *self.lines[1:]]
+        elif _SCHEMATIC.match(text):
+            cure = "save what LTspice shows under View, SPICE Netlist, and name that file"
+            refuse(Line("", name, 1), f"this is a drawing of LTspice and no netlist: {cure}")
+        last = Line("", name, text.rstrip().count("\n") + 1)
+        refuse(last, "the netlist does not end with .end, so it may be cut short")
 
     def _top(self) -> str:
         """The text of the netlist itself."""
@@ -191,7 +187,7 @@ class _Reader:
                 for after in lines:
                     refuse(after, "there is text after .end, which must come last")
                 return True
-            elif (text := _passed(line, word, rest)) is not None:
+            elif (text := passed(line)) is not None:
                 self._add(self.lines, Line(text, line.file, line.number))
             else:
                 self._add(self.dropped, line)
@@ -348,11 +344,7 @@ def _directive(line: Line) -> tuple[str, str]:
 
 def passed(line: Line) -> str | None:
     """The text of a logical line if ngspice may see it, None if it is dropped. Raises BadInput."""
-    return _passed(line, *_directive(line))
-
-
-def _passed(line: Line, word: str, rest: str) -> str | None:
-    """The line's text if ngspice may see it, None if it is dropped."""
+    word, rest = _directive(line)
     if "ng_script" in line.text.lower():
         refuse(line, "ng_script would make the netlist a script of commands")
     if word in DROPPED:

@@ -91,10 +91,7 @@ class Scope:
 
     def model_types(self, name: str) -> set[str] | None:
         """The types of the model that ``name`` means here, None if there is none."""
-        for scope in self.chain():
-            if types := scope.models.get(name):
-                return types
-        return None
+        return next((s.models[name] for s in self.chain() if name in s.models), None)
 
     def subcircuit(self, name: str) -> "list[Scope] | None":
         return next((s.subcircuits[name] for s in self.chain() if name in s.subcircuits), None)
@@ -142,21 +139,17 @@ class _Parser:
             ".model": self._model,
             ".global": self._global,
         }
+        element, holder = None, self.scope
         if not line.text.startswith("."):
             element = Element(found[0], [], found[1:], line, bool(self.ifs))
-            self.scope.elements.append(element)
-            self.scope.names.add(element.name)
-            self.scope.lines.append((line, element))
-            self.top.order.append((line, element, self.scope))
-            return
-        word = re.match(r"\.\w*", line.text)
-        before = self.scope
-        if handler := handlers.get(word[0].lower() if word else ""):
+            holder.elements.append(element)
+            holder.names.add(element.name)
+        elif handler := handlers.get(re.findall(r"\.\w*", line.text)[0].lower()):
             handler(line, found)
-        if self.scope.line is not line:
-            self.scope.lines.append((line, None))
-        began = self.scope.parent is before
-        self.top.order.append((line, None, self.scope if began else before))
+            if self.scope.parent is holder:  # the line begins it
+                holder = self.scope
+        holder.lines.append((line, element))
+        self.top.order.append((line, element, holder))
 
     def _subckt(self, line: Line, found: list[str]) -> None:
         positional, assigned = split_assignments(found[1:])
@@ -165,7 +158,6 @@ class _Parser:
         name, *pins = positional
         scope = Scope(name, line, self.scope, bool(self.ifs), [node(pin) for pin in pins])
         scope.parameters = {word.partition("=")[0] for word in assigned}
-        scope.lines.append((line, None))
         self.scope.subcircuits.setdefault(name, []).append(scope)
         self.outer_ifs.append(len(self.ifs))
         self.scope = scope

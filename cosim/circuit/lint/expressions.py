@@ -103,13 +103,8 @@ class Names:
         self.calls: dict[str, int] = {}
         """How many calls one of each becomes when ngspice writes them out."""
         self.mentioned = {word for s in scopes for e in s.elements for word in [e.model, *e.words]}
-        self.called = {
-            name
-            for text in lines
-            for name in _CALLED.findall(
-                text.partition(")")[2] if text.startswith(".func") else text
-            )
-        }
+        calls = (text.partition(")")[2] if text.startswith(".func") else text for text in lines)
+        self.called = {name for text in calls for name in _CALLED.findall(text)}
         growing = True
         while growing:
             growing = sum(self._inherit(scope) for scope in scopes) > 0
@@ -392,7 +387,6 @@ def _varies(expression: str) -> bool:
 
 
 def _functions(line: Line) -> Iterator[_Function]:
-    """The functions that a line defines."""
     lower = line.text.lower()
     if lower.startswith(".func"):
         match = _FUNC.match(lower)

@@ -179,7 +179,6 @@ def accuracy(
 
 
 def report(runs: Sequence[Run], solvers: Sequence[Solver] = SOLVERS) -> Report:
-    """What the runs show."""
     study = Comparison(runs, solvers)
     trust = max(reference(name).other_method for name in study.scenes)
     growth = max(reference(name).growth for name in study.scenes)

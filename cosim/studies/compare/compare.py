@@ -16,7 +16,6 @@ from cosim.errors import BadInput, plain
 from cosim.studies.compare.hints import hints
 from cosim.studies.compare.scores import (
     Number,
-    Score,
     Signals,
     both_sides,
     explained,
@@ -52,13 +51,13 @@ APART = 0.05
 class Found:
     """A run laid over a recording, from ``start`` (s) of the run on.
 
-    ``recording`` is the stretch that was compared, ``simulated`` has its signals.
+    ``recording`` is the stretch that was compared, ``simulated`` has its signals. ``numbers`` begin
+    with the scores.
     """
 
     recording: Recording
     simulated: Signals
     start: float
-    scores: list[Score]
     numbers: list[Number]
     notes: list[str]
 
@@ -87,18 +86,16 @@ class Seen:
         names = [name for name in ("z_surface", "z_part") if name in signals]
         if not names or at[-1] > self.waveforms["time"][-1] + 1e-9:
             return False
-        pairs = [(self.signal(name, start), signals[name]) for name in names]
-        return all(np.allclose(*_known(run, seen), *DIGITS) for run, seen in pairs)
+        known = {name: np.isfinite(signals[name]) for name in names}
+        pairs = ((self.signal(name, start)[k], signals[name][k]) for name, k in known.items())
+        return all(np.allclose(run, seen, *DIGITS) for run, seen in pairs)
 
-    def best_start(self, earliest: float, latest: float) -> float:
-        """The start at which the run explains most of the guiding signal, if there is one."""
-        name = next((name for name in GUIDES if name in self.recording.signals), "")
-        if not name:
-            return earliest
-        wanted = self.recording.signals[name]
+    def best_start(self, guide: str, earliest: float, latest: float) -> float:
+        """The start at which the run explains most of the guiding signal."""
+        wanted = self.recording.signals[guide]
 
         def missed(start: float) -> float:
-            return -explained(self.signal(name, start), wanted)
+            return -explained(self.signal(guide, start), wanted)
 
         starts = np.linspace(earliest, latest, SHIFTS)
         best = int(np.argmin([missed(float(start)) for start in starts]))
@@ -125,11 +122,6 @@ class Seen:
             meaning = f"mean error of the {words} that the camera alone makes"
             found.append(Number(name, value, unit, meaning))
         return found
-
-
-def _known(run: Array, seen: Array) -> tuple[Array, Array]:
-    known = np.isfinite(seen)
-    return run[known], seen[known]
 
 
 def measure(
@@ -167,11 +159,11 @@ def measure(
             f"The run ends at {end:.4g} s, too early to cover the {rows} rows of "
             f"{plain(recording.name)}: run.duration must be at least {needed:.4g} s."
         )
-    start = earliest
-    if period is not None and not own and not aligned:
-        start = seen.best_start(earliest, max(earliest, min(end - span, earliest + period)))
-    simulated = {name: seen.signal(name, start) for name in recording.signals}
     guide, repeats = _period(recording, period)
+    start = earliest
+    if guide and period is not None and not own and not aligned:
+        start = seen.best_start(guide, earliest, max(earliest, min(end - span, earliest + period)))
+    simulated = {name: seen.signal(name, start) for name in recording.signals}
     notes += _of_periods(repeats, period, span, row)
     if not own and guide:
         phases = np.linspace(-0.5, 0.5, 0 if aligned or period is None else PHASES)
@@ -182,8 +174,9 @@ def measure(
             return Seen(waveforms, at, 0.0).signal(name, first)
 
         notes += hints(recording, shown, guide, np.concatenate([[start], others]))
-    numbers = both_sides(recording, simulated, (repeats, period or repeats))
-    numbers += [
+    numbers = [
+        *scores(recording, simulated, repeats),
+        *both_sides(recording, simulated, (repeats, period or repeats)),
         *filter(None, [horizontal_share(recording)]),
         Number("rate", 1.0 / row, "1/s", "rows of the recording in a second, the median"),
         Number("start", start, "s", "time of the run that is laid over the recording's first row"),
@@ -195,8 +188,7 @@ def measure(
             "is what the digits of the file make, and camera_… is the error that the camera alone "
             "makes, the run's rows against straight lines between the frames."
         )
-    found = scores(recording, simulated, repeats)
-    return Found(recording, simulated, start, found, numbers, notes)
+    return Found(recording, simulated, start, numbers, notes)
 
 
 def _of_periods(

@@ -45,12 +45,11 @@ def draw(title: str, found: Found) -> Picture:
 
 def _message(found: Found) -> str:
     """How far the run repeats what was measured."""
-    scores = {score.name: score.values[0] for score in found.scores}
     numbers = {number.name: number.value for number in found.numbers}
     said = [
         f"explains {100.0 * share:.0f} % of the variance of the {words}"
         for name, words in R2.values()
-        if (share := scores.get(name)) is not None
+        if (share := numbers.get(name)) is not None
     ][:1]
     if (error := numbers.get("drift_error")) is not None:
         said.append(f"misses the part's mean velocity by {signed(1e3 * error, '+.1f')} mm/s")
@@ -87,12 +86,11 @@ BOTH = {
 
 def _words(name: str, found: Found) -> str:
     """The scores of a panel, and what both sides say of it."""
-    scores = {score.name: score.values for score in found.scores}
     numbers = {number.name: number.value for number in found.numbers}
     said = []
     if name in WORDS:
         score, words, beside = WORDS[name]
-        run, ceiling, *_ = scores[score]
+        run, ceiling = numbers[score], numbers[f"{score}_ceiling"]
         if run is not None:
             said.append(words.format(run) + ("" if ceiling is None else beside.format(ceiling)))
     if name in BOTH:

@@ -62,16 +62,11 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
             yield _agree(COLUMNS[name].long_name, after, before) + _scaled(recording, name, factor)
     if fine:
         near = starts[np.argsort(np.abs(starts - start))[:17]]
-        clocks = {
-            clock: max(
-                explained(
-                    observe(replace(recording, time=recording.time * clock), guide, first),
-                    signals[guide],
-                )
-                for first in near
-            )
-            for clock in (1.0, *CLOCKS)
-        }
+        clocks = {}
+        for clock in (1.0, *CLOCKS):
+            timed = replace(recording, time=recording.time * clock)
+            runs = (observe(timed, guide, first) for first in near)
+            clocks[clock] = max(explained(run, signals[guide]) for run in runs)
         clock = max(clocks, key=lambda clock: clocks[clock])
         if _better(clocks[clock], clocks[1.0]) and clocks[clock] - clocks[1.0] > 0.02:
             agree = _agree(COLUMNS[guide].long_name, clocks[clock], clocks[1.0])

@@ -16,7 +16,7 @@ from cosim.simulation.rungs.given_surface import surface
 from cosim.simulation.simulate import simulate
 from cosim.studies.compare import figure
 from cosim.studies.compare.compare import Found, measure
-from cosim.studies.compare.scores import LINES, Number
+from cosim.studies.compare.scores import LINES
 from cosim.studies.tables import write_csv as write_rows
 from cosim.trials.recording import Recording, read_recording
 from cosim.waveforms import formats
@@ -40,15 +40,7 @@ class Comparison:
         """All numbers by name; SI but for ``_mm`` and ``_percent``. A score stands by its own name,
         and with ``_ceiling``, ``_no_motion`` and ``_straight_line`` for what needs no model.
         """
-        return {number.name: number.value for number in self._all()}
-
-    def _all(self) -> list[Number]:
-        found = []
-        for score in self.found.scores:
-            for (line, of), value in zip(LINES.items(), score.values, strict=True):
-                name = score.name if line == "run" else f"{score.name}_{line}"
-                found.append(Number(name, value, score.unit, f"{score.meaning}{of}"))
-        return found + self.found.numbers
+        return {number.name: number.value for number in self.found.numbers}
 
     def plot(self) -> Picture:
         """Every signal that was measured, over time, and simulated."""
@@ -60,7 +52,7 @@ class Comparison:
         about = {"understood": self.found.recording.understood, "notes": self.found.notes}
         told = {"run": self.run, "trial": self.trial, **self.numbers, **about}
         write_json(out / "compare.json", told)
-        write_rows(out / "compare.csv", [asdict(number) for number in self._all()])
+        write_rows(out / "compare.csv", [asdict(number) for number in self.found.numbers])
         recording, simulated = self.found.recording, self.found.simulated
         table, units = {"time": recording.time}, {"time": "s"}
         for side, signals in (("measured", recording.signals), ("simulated", simulated)):
@@ -71,18 +63,20 @@ class Comparison:
 
     def __repr__(self) -> str:
         found, read = self.found, self.found.recording.told()
-        heads = [line.replace("_", " ") for line in LINES]
-        rows = [_row(one.name, one.unit, one.values, one.meaning) for one in found.scores]
-        lines = [*read, *[""] * bool(read), *_table(heads, rows), *LEGEND, ""]
         numbers = {number.name: number for number in found.numbers}
-        pairs, alone = [], []
-        for name, number in numbers.items():
+        scores, pairs, alone = [], [], []
+        while numbers:
+            name, one = next(iter(numbers.items()))
             quantity, _, side = name.rpartition("_")
-            if side == "measured":
-                values = number.value, numbers[f"{quantity}_simulated"].value
-                pairs.append(_row(quantity, number.unit, values, number.meaning))
-            elif side != "simulated":
-                alone.append(_row(name, number.unit, (number.value,), number.meaning))
+            title, names, rows = name, [name], alone
+            if f"{name}_ceiling" in numbers:
+                names, rows = [f"{name}{line}" for line in LINES], scores
+            elif side == "measured":
+                title, names, rows = quantity, [name, f"{quantity}_simulated"], pairs
+            values = [numbers.pop(each).value for each in names]
+            rows.append((title, one.unit, values, one.meaning))
+        heads = [line.replace("_", " ").strip() or "run" for line in LINES]
+        lines = [*read, *[""] * bool(read), *_table(heads, scores), *LEGEND, ""]
         lines += [*_table(["measured", "simulated"], pairs), "", *_table([], alone)]
         return "\n".join(lines + [""] * bool(found.notes) + found.notes)
 
@@ -97,22 +91,14 @@ LEGEND = (
 )
 
 
-Row = tuple[str, tuple[float | None, ...], str]
-"""A name with its unit, values, and their meaning."""
-
-
-def _row(name: str, si: str, values: tuple[float | None, ...], meaning: str) -> Row:
-    unit, scale = bench_unit(si)
-    told = tuple(None if value is None else value * scale for value in values)
-    return f"{name} [{unit}]", told, meaning
-
-
-def _table(heads: list[str], rows: list[Row]) -> list[str]:
-    """Lines of names, values and, below each, its meaning."""
+def _table(heads: list[str], rows: list[tuple[str, str, list[float | None], str]]) -> list[str]:
+    """Lines of names, values in the units of the bench and, below each, its meaning."""
     lines = [" " * 29 + "".join(f"{head:>14}" for head in heads)] if heads else []
-    for name, values, meaning in rows:
-        told = ("none" if value is None else f"{value:.4g}" for value in values)
-        lines += [f"  {name:<27}" + "".join(f"{value:>14}" for value in told), f"      {meaning}"]
+    for name, si, values, meaning in rows:
+        unit, scale = bench_unit(si)
+        told = ("none" if value is None else f"{value * scale:.4g}" for value in values)
+        line = f"  {f'{name} [{unit}]':<27}" + "".join(f"{value:>14}" for value in told)
+        lines += [line, f"      {meaning}"]
     return lines
 
 
@@ -153,18 +139,18 @@ def _run(
     run: Result | Scene | str | os.PathLike[str], overrides: Overrides | None, trial: Recording
 ) -> tuple[str, dict[str, Array], Scene]:
     """The run's name, its waveforms and its scene."""
-    folder = None if isinstance(run, Result | Scene) else Path(run)
-    if isinstance(run, Result) or (folder and folder.is_dir()):
-        name = run.scene.name if isinstance(run, Result) else str(run)
+    name = str(run)
+    if isinstance(run, Result | Scene):
+        name = run.name if isinstance(run, Scene) else run.scene.name
+    if isinstance(run, Result) or (not isinstance(run, Scene) and Path(run).is_dir()):
         if overrides:
             raise BadInput(f"--set cannot change {plain(name)}, which is a finished run.")
         if isinstance(run, Result):
-            columns, scene = run.columns, run.scene
+            finished, scene = run.columns, run.scene
         else:
-            columns, scene = formats.read(Path(name)).waveforms, load(Path(name) / "scene.toml")
+            finished, scene = formats.read(Path(run)).waveforms, load(Path(run) / "scene.toml")
         _check_rate(scene, trial)
-        return name, columns, scene
-    name = run.name if isinstance(run, Scene) else str(run)
+        return name, finished, scene
     scene = load(run, overrides)
     period = _check_rate(scene, trial)
     span = float(trial.time[-1]) * len(trial.time) / (len(trial.time) - 1) + (period or 0.0)

@@ -15,13 +15,13 @@ STICKS = 0.01
 """m/s; part and surface that differ by less between frames count as sticking, on both sides."""
 
 LINES = {
-    "run": "",
-    "ceiling": "; of the measured motion's forecast of itself one period later",
-    "no_motion": "; of nothing that moves",
-    "straight_line": "; of the best straight line",
+    "": "",
+    "_ceiling": "; of the measured motion's forecast of itself one period later",
+    "_no_motion": "; of nothing that moves",
+    "_straight_line": "; of the best straight line",
 }
-"""What a score is given for, with what that adds to its meaning. No model need beat the ceiling;
-the last two are floors."""
+"""What a score is given for, the run first: what that adds to its name and to its meaning. No model
+need beat the ceiling; the last two are floors."""
 
 Signals = dict[str, Array]
 Distance = Callable[[Array, Array], float]
@@ -35,16 +35,6 @@ class Number:
     value: float | None
     unit: str
     meaning: str
-
-
-@dataclass(frozen=True)
-class Score:
-    """How far a signal and its measured one are apart; ``values`` for each of ``LINES``."""
-
-    name: str
-    unit: str
-    meaning: str
-    values: tuple[float | None, ...]
 
 
 def explained(found: Array, wanted: Array) -> float:
@@ -79,9 +69,14 @@ R2 = {
 }
 
 
-def scores(recording: Recording, simulated: Signals, period: float | None) -> list[Score]:
-    """The scores of all signals; ``period`` is the measured one, s."""
+def scores(recording: Recording, simulated: Signals, period: float | None) -> list[Number]:
+    """The scores of all signals, each for all of ``LINES``; ``period`` is the measured one, s."""
     found, time = [], recording.time
+
+    def add(name: str, unit: str, meaning: str, values: list[float | None]) -> None:
+        for (line, of), value in zip(LINES.items(), values, strict=True):
+            found.append(Number(f"{name}{line}", value, unit, f"{meaning}{of}"))
+
     if "z_part" in simulated:
         measured, run = (side["z_part"] for side in (recording.signals, simulated))
         first = int(np.argmax(np.isfinite(measured)))
@@ -97,25 +92,24 @@ def scores(recording: Recording, simulated: Signals, period: float | None) -> li
             ("centred_error_mm", "mm", 1e3, centred_distance, centred),
         ):
             values = _lines(time, measured, run, period, gained, distance)
-            scaled = tuple(value and value * scale for value in values)
-            found.append(Score(name, unit, words, scaled))
+            add(name, unit, words, [value and value * scale for value in values])
     for signal, (name, words) in R2.items():
         if signal in simulated:
             values = _lines(
                 time, recording.signals[signal], simulated[signal], period, 0.0, explained
             )
-            found.append(Score(name, "1", SHARE.format(words), values))
+            add(name, "1", SHARE.format(words), values)
     return found
 
 
 def _lines(
     time: Array, measured: Array, run: Array, period: float | None, gained: float, score: Distance
-) -> tuple[float | None, ...]:
+) -> list[float | None]:
     known = np.isfinite(measured)
     line = np.polynomial.Polynomial.fit(time[known], measured[known], 1)
     later = one_period_later(time, measured, period, gained) if period else None
     every = run, later, np.zeros(len(time)), line(time)
-    return tuple(None if one is None else _told(score(one, measured)) for one in every)
+    return [None if one is None else _told(score(one, measured)) for one in every]
 
 
 def _told(value: float) -> float | None:

@@ -40,14 +40,11 @@ def trials(shown: Sequence[Shown], result: dict[str, Any]) -> Picture:
         axis.set_xlabel("time [ms]")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
-    title = (
-        headline(result)
-        if fitted
-        else (
-            f"Trials with {_words(result)}; mean error {result['mean_error_mm']:.3f} mm, "
-            f"{result['mean_error_percent']:.2f} %"
-        )
-    )
+    if fitted:
+        title = headline(result)
+    else:
+        error, percent = result["mean_error_mm"], result["mean_error_percent"]
+        title = f"Trials with {_words(result)}; mean error {error:.3f} mm, {percent:.2f} %"
     figure.suptitle(fill(title, 60 * columns), fontsize=12)
     return figure
 

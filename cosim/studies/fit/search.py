@@ -170,10 +170,7 @@ def _interval(value: float, likely: Interval, drawn: Array, count: int, limit: I
     """From what is likely and what was drawn; few slides scatter less than many would."""
     few = float(student.ppf((1 + LEVEL) / 2, max(1, count - 1)) / student.ppf((1 + LEVEL) / 2, 1e9))
     ends = []
-    for end, share, side in (
-        (likely[0], (1 - LEVEL) / 2, -1),
-        (likely[1], (1 + LEVEL) / 2, 1),
-    ):
+    for end, share, side in ((likely[0], (1 - LEVEL) / 2, -1), (likely[1], (1 + LEVEL) / 2, 1)):
         scatter = few * (float(np.quantile(drawn, share)) - value)
         far = max(side * scatter, side * (end - value), 0.0)
         ends.append(value + side * float(np.hypot(far, SYSTEMATIC * value)))

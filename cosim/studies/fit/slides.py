@@ -139,19 +139,13 @@ class Slide:
 
 @dataclass(frozen=True)
 class Span:
-    """Where a slide stands: frames before, in and after it, and its possible instants, s."""
+    """Where a slide stands: the frames in it and about it, and its possible instants, s."""
 
     sign: int
-    before: Rows
+    frames: Rows
     inside: Rows
-    after: Rows
     begins: Array
     ends: Array
-
-    @property
-    def frames(self) -> Rows:
-        """All of them."""
-        return np.concatenate([self.before, self.inside, self.after])
 
 
 def noise_of(trial: Trial) -> float:
@@ -187,7 +181,8 @@ def spans(trial: Trial, noise: float) -> list[Span]:
             continue
         begins = time[i + 1] - wider[i] * lost if len(before) else time[[i + 1]]
         ends = time[j] + wider[min(j, len(steps) - 1)] * lost if len(after) else time[[j]]
-        found.append(Span(int(signs[i]), before, inside, after, begins, ends))
+        frames = np.concatenate([before, inside, after])
+        found.append(Span(int(signs[i]), frames, inside, begins, ends))
     return found
 
 

@@ -54,15 +54,16 @@ class Trial:
         frequency = numbers["frequency_measured"]
         period = 1.0 / frequency if frequency else None
         solved = {"theirs": self.theirs, "exact": self.exact}
-        velocities: dict[str, float | None] = {"measured": numbers["drift_measured"]}
-        velocities |= {side: drift(*one.simulated, period) for side, one in solved.items()}
-        velocities["machine"] = numbers["drift_simulated"]
-        errors: dict[str, float | None] = {side: one.error * 1e3 for side, one in solved.items()}
-        errors["machine"] = numbers["mean_error_mm"]
+        velocities = {
+            "measured": numbers["drift_measured"],
+            **{side: drift(*one.simulated, period) for side, one in solved.items()},
+            "machine": numbers["drift_simulated"],
+        }
         return {
             "trial": self.number,
             **{f"v_{side} [mm/s]": (v or 0.0) * 1e3 for side, v in velocities.items()},
-            **{f"error_{side} [mm]": error for side, error in errors.items()},
+            **{f"error_{side} [mm]": one.error * 1e3 for side, one in solved.items()},
+            "error_machine [mm]": numbers["mean_error_mm"],
         }
 
 

@@ -13,7 +13,7 @@ from cosim.arrays import Array
 from cosim.drive.surface import formulas
 from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import Cycle, optimal_cycle
-from cosim.files.picture import Picture, grid
+from cosim.files.picture import Picture, grid, legend_above
 from cosim.studies.plots import footnote, headline
 
 # The colours of surface and part in all figures.
@@ -100,15 +100,7 @@ def _name_phases(above: Axes, between: Axes, cycle: Cycle) -> None:
     first, second = (time * 1e3 for time in cycle.times[1:3])
     title = f"T$_1$ = {first:.5g} ms, T$_2$ = {second:.5g} ms"
     above.set_title(title, loc="left", fontsize=10.5)
-    above.legend(
-        loc="lower right",
-        bbox_to_anchor=(1.0, 0.99),
-        ncols=4,
-        columnspacing=1.1,
-        handlelength=1.6,
-        fontsize=9,
-        frameon=False,
-    )
+    legend_above(above, ncols=4, columnspacing=1.1, handlelength=1.6, fontsize=9)
     near = second - first < 0.05e3 * cycle.times[3]
     axis = between.get_xaxis_transform()
     for name, time, side in (("1", first, "right"), ("2", second, "left")):

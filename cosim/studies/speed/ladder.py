@@ -46,7 +46,6 @@ class Rung:
 
 
 def runs_in_all() -> int:
-    """How many runs a ladder takes."""
     return sum(REPEATS.get(model, MOST) for model in RUNGS)
 
 
@@ -155,7 +154,6 @@ def report(found: Found) -> Report:
 
 
 def rows(scene: Scene, rungs: list[Rung]) -> list[Row]:
-    """The table of one scene."""
     return [
         {
             "scene": scene.name,

@@ -7,14 +7,13 @@ from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.evaluator import Evaluator
-from cosim.scene import Scene, keys, load
+from cosim.scene import Scene, load
+from cosim.scene.describe import KEYS
 from cosim.scene.loading import Overrides
 from cosim.scene.tables import KNOBS
 from cosim.search.turns import TURN
 from cosim.simulation.fidelity import Fidelity
 from cosim.waveforms.quantities import with_unit
-
-UNITS = {key.full: key.unit for key in keys()}
 
 Settings = dict[str, float]
 """Values of keys, ``table.key``, SI."""
@@ -33,7 +32,7 @@ class Turned:
     """Why it failed."""
 
     def __str__(self) -> str:
-        named = (f"{k} = {with_unit(v, UNITS[k])}" for k, v in self.settings.items())
+        named = (f"{k} = {with_unit(v, KEYS[k].unit)}" for k, v in self.settings.items())
         return ", ".join(named) or "the scene's own setting"
 
 
@@ -151,7 +150,6 @@ def turns(scene: Scene) -> list[Settings]:
             f'scene {scene.name}: circuit.model = "{scene.circuit.model}" has no knobs that '
             "--spread could turn."
         )
-    ranges = {key.full: (key.low, key.high) for key in keys()}
     found = []
     for knob, name in KNOBS.items():
         given = getattr(scene.drive, knob) is not None
@@ -160,7 +158,7 @@ def turns(scene: Scene) -> list[Settings]:
         size = TURN if given else TURN * abs(value)
         if name == "offset" and not size:
             size = TURN * scene.drive.amplitude
-        low, high = ranges[full]
+        low, high = KEYS[full].low, KEYS[full].high
         assert low is not None and high is not None
         for place in (value - size, value + size):
             if size and low <= place <= high:

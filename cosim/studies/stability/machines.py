@@ -13,11 +13,7 @@ Output = Literal["saturated", "regulated"]
 Cut = Literal["coil in circuit", "coil in mechanics"]
 Table = Mapping[str, float]
 
-_LINEAR: Table = {
-    "mechanics.gravity": 0.0,
-    "mechanics.suspension_k3": 0.0,
-    "mechanics.travel": 1e3,
-}
+_LINEAR: Table = {"mechanics.gravity": 0.0, "mechanics.suspension_k3": 0.0, "mechanics.travel": 1e3}
 """No gravity, no hardening, no wall in reach."""
 
 
@@ -30,21 +26,16 @@ class Machine:
 
     @cached_property
     def scene(self) -> Scene:
-        """Its rig."""
         return changed(load("reference"), {**_LINEAR, **self.settings}, "stability")
-
-    @property
-    def loop(self) -> float:
-        """Resistance around which the back-EMF drives a current, Ω."""
-        return self.scene.coil.resistance + self.scene.circuit.sense_resistance
 
     @property
     def strength(self) -> float:
         """How strongly coil and mechanics are coupled while the part sticks, Bl²/(m R) in 1/s; m
-        is the mass that the coil feels at once."""
-        m = self.scene.mechanics
+        is the mass that the coil feels at once, R around what the back-EMF drives a current."""
+        m, coil = self.scene.mechanics, self.scene.coil
         mass = 1.0 / (1.0 / m.ram_mass + 1.0 / (m.surface_mass + m.part_mass))
-        return self.scene.coil.force_factor**2 / (mass * self.loop)
+        around = coil.resistance + self.scene.circuit.sense_resistance
+        return coil.force_factor**2 / (mass * around)
 
     def but(self, name: str, settings: Table) -> "Machine":
         """One that differs in some settings."""

@@ -121,7 +121,6 @@ def observed(method: str, regime: Regime, expected: float) -> float:
 
 
 def limits(regimes: Sequence[Regime], store: Store) -> Iterator[Limit]:
-    """Each method in each regime."""
     for regime in regimes:
         m, part = regime.machine, "slips" if regime.slips else "sticks"
         given = (m.name, m.strength, regime.output, part, regime.cut)

@@ -16,7 +16,8 @@ from cosim.evaluate.point import Outcome
 from cosim.files.atomic import together
 from cosim.mechanics import fmi
 from cosim.mechanics.package import unpacked
-from cosim.scene import Scene, firmware, keys, to_toml
+from cosim.scene import Scene, firmware, to_toml
+from cosim.scene.describe import KEYS
 from cosim.scene.tables import MACHINE
 from cosim.studies.sweep.design import Design
 from cosim.waveforms.columns import netcdf_name
@@ -68,11 +69,7 @@ class Numbers:
 
 
 def dataset(
-    scene: Scene,
-    design: Design,
-    found: Numbers,
-    versions: dict[str, str],
-    units: Mapping[str, str],
+    scene: Scene, design: Design, found: Numbers, versions: dict[str, str], units: Mapping[str, str]
 ) -> xr.Dataset:
     """The numbers of each point's summary over the keys of the sweep, with their units.
 
@@ -86,21 +83,13 @@ def dataset(
     columns = [list(axis.values) for axis in design.axes]
     if design.sample is not None:
         columns = [list(column) for column in zip(*design.sample, strict=True)]
-    coordinates = {
-        name: (
-            name if design.sample is None else POINT,
-            column,
-            {"units": axis.key.unit, "long_name": axis.key.text, "key": axis.key.full},
-        )
-        for name, column, axis in zip(axes, columns, design.axes, strict=True)
-    }
-    variables = {
-        netcdf_name(name): (
-            *(dims, values.reshape(design.shape)),
-            _JUDGED if name == JUDGED else meaning(name, units),
-        )
-        for name, values in numbers.items()
-    }
+    coordinates, variables = {}, {}
+    for name, column, axis in zip(axes, columns, design.axes, strict=True):
+        about = {"units": axis.key.unit, "long_name": axis.key.text, "key": axis.key.full}
+        coordinates[name] = (name if design.sample is None else POINT, column, about)
+    for name, values in numbers.items():
+        about = _JUDGED if name == JUDGED else meaning(name, units)
+        variables[netcdf_name(name)] = (dims, values.reshape(design.shape), about)
     about = {"long_name": "Why the point failed; empty where it did not"}
     variables[FAILURE] = (dims, found.failures.astype(str).reshape(design.shape), about)
     attributes = {
@@ -159,9 +148,9 @@ def _meant(scene: Scene, data: xr.Dataset) -> dict[str, xr.DataArray]:
     add("frequency", firmware.knob_frequency, "pot_frequency")
     amplitude = found.get("amplitude", axes.get("amplitude", scene.drive.amplitude))
     add("offset", firmware.knob_offset, "pot_offset", amplitude)
-    for key in keys():
-        if key.table == "drive" and key.name in found:
-            found[key.name].attrs = {"units": key.unit, "long_name": key.text}
+    for name, values in found.items():
+        key = KEYS[f"drive.{name}"]
+        values.attrs = {"units": key.unit, "long_name": key.text}
     return {name: values for name, values in found.items() if name not in axes}
 
 

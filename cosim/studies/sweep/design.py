@@ -50,11 +50,8 @@ class Design:
         if self.sample is not None:
             row = self.sample[index]
         else:
-            backwards = []
-            for axis in reversed(self.axes):
-                index, place = divmod(index, len(axis.values))
-                backwards.append(axis.values[place])
-            row = tuple(reversed(backwards))
+            places = np.unravel_index(index, self.shape)
+            row = [axis.values[k] for axis, k in zip(self.axes, places, strict=True)]
         return {axis.key.full: value for axis, value in zip(self.axes, row, strict=True)}
 
     def alike(self, points: Iterable[int]) -> list[int]:
@@ -111,11 +108,10 @@ def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: 
                 f"--over {axis.key.full}: a sample needs a range, from one value to another."
             )
     generator = np.random.default_rng(seed)
-    unit = (
-        generator.random((count, len(axes)))
-        if random
-        else qmc.LatinHypercube(len(axes), rng=generator).random(count)
-    )
+    if random:
+        unit = generator.random((count, len(axes)))
+    else:
+        unit = qmc.LatinHypercube(len(axes), rng=generator).random(count)
     columns = []
     for axis, column in zip(axes, unit.T, strict=True):
         low, high = min(axis.values), max(axis.values)

@@ -323,9 +323,8 @@ def _one_sided(values: Array, unit: str) -> Normalize:
 
 def _levels(norm: Normalize) -> list[float]:
     low, high = float(norm.vmin or 0.0), float(norm.vmax or 1.0)
-    ticks = (
-        LogLocator(10.0, (1.0, 3.0)) if isinstance(norm, LogNorm) else MaxNLocator(7)
-    ).tick_values(low, high)
+    locator = LogLocator(10.0, (1.0, 3.0)) if isinstance(norm, LogNorm) else MaxNLocator(7)
+    ticks = locator.tick_values(low, high)
     # Zero is a plateau where the part stays; its edge is drawn as such.
     return [float(level) for level in ticks if low < level < high and level != 0.0]
 

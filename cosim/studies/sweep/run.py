@@ -14,13 +14,16 @@ import xarray as xr
 from cosim.errors import BadInput, Note, plain
 from cosim.evaluate.evaluator import Evaluator, Settings
 from cosim.evaluate.keys import refuse_unknown
-from cosim.evaluate.point import Number
+from cosim.evaluate.point import Number, in_whole_periods
+from cosim.files.atomic import whole
 from cosim.mechanics import package as fmu
-from cosim.scene import Scene, load
+from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
-from cosim.studies.sweep import dataset, families
+from cosim.studies.sweep import dataset
 from cosim.studies.sweep.design import Design, grid, sample
+from cosim.toolchain.processes import Progress
 from cosim.toolchain.versions import versions
+from cosim.waveforms.storage import netcdf
 
 STORE = "sweep.sqlite"
 RESULT = "sweep.nc"
@@ -142,8 +145,38 @@ def _sweep(
         data = refreshed()
         if keep:
             points = [n for n in range(total) if not numbers.failures[n]]
-            families.keep(family, scene, design, keep, points, bench)
+            _keep(family, scene, design, keep, points, bench)
         return data
+
+
+def _keep(
+    folder: Path,
+    scene: Scene,
+    design: Design,
+    names: Sequence[str],
+    points: Sequence[int],
+    bench: Evaluator,
+) -> None:
+    """Run ``points`` once more, here, and write their waveforms ``names`` from ``run.settle`` on,
+    each point's as ``NUMBER.nc``. Raises CosimError."""
+    from cosim.simulation.simulate import simulate
+
+    def kept(_: Scene, number: int, progress: Progress) -> None:
+        of = changed(scene, design.point(number), "--over")  # the bench's own has no rows
+        if design.changes_frequency:
+            of = in_whole_periods(of)
+        result = simulate(of, progress)
+        if unknown := [name for name in names if name not in result.columns]:
+            known = ", ".join(result.columns)
+            raise BadInput(f'--keep: the runs have no "{plain(unknown[0])}" (they have {known}).')
+        later = result.columns["time"] >= of.run.settle
+        columns = {name: result.columns[name][later] for name in ("time", *names)}
+        with whole(folder / f"{number}.nc") as temporary, temporary.open("wb") as file:
+            netcdf(file, columns, result.units, {"frequency": repr(1.0 / of.period)})
+
+    for _, failed in bench.apply(kept, points):
+        if isinstance(failed, Exception):
+            raise failed
 
 
 def _judged(design: Design, numbers: dataset.Numbers) -> Iterator[tuple[int, Settings]]:

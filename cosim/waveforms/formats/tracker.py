@@ -49,11 +49,7 @@ def write(run: Run, file: BytesIO) -> str:
     for body, name in (("p", "surface"), ("o", "part"), ("s", "")):
         z = heights(run.waveforms, name, at, exposure) if name else rest
         across, along = rest, 1e3 * z
-        for kind, of in (
-            ("", np.copy),
-            ("v", partial(velocities, time)),
-            ("a", accelerations),
-        ):
+        for kind, of in (("", np.copy), ("v", partial(velocities, time)), ("a", accelerations)):
             columns[f"{kind}x{body}"] = of(across)
             columns[f"{kind}z{body}"] = of(along)
     rows = zip(*(map(number, values.tolist()) for values in columns.values()), strict=True)
