@@ -30,6 +30,7 @@ from cosim.studies.measure.worth import FEWEST, Worth, chance, worth
 from cosim.studies.plots import BLUE, ORANGE, panels
 from cosim.studies.report import Progress, Report, counted, silent
 from cosim.studies.tables import Row, brief
+from cosim.waveforms.quantities import signed
 
 RIGS, QUICK, LEAST = 48, 24, 4
 """Rigs of the sample, with ``quick``, and those that a file must name at least."""
@@ -164,8 +165,8 @@ def _films(values: Mapping[Candidate, Array]) -> str:
     """What the films of three shapes show, of nine rigs in ten."""
     shapes = ("rising sawtooth", "falling sawtooth", "sine")
     ends = {one.name: np.quantile(shown[:, 0], (0.05, 0.95)) * 1e3 for one, shown in values.items()}
-    told = ((shape, *ends[f"film, {shape}"].tolist()) for shape in shapes)
-    return ", ".join(f"{low:.0f} to {high:.0f} mm/s with a {shape}" for shape, low, high in told)
+    told = ((shape, [signed(end, ".0f") for end in ends[f"film, {shape}"]]) for shape in shapes)
+    return ", ".join(f"{low} to {high} mm/s with a {shape}" for shape, (low, high) in told)
 
 
 def _accuracy(one: Candidate) -> str:
