@@ -140,7 +140,8 @@ TOLD = {
     "D9 x 0 W\n.model W D(Vfwd=.5)": "vfwd of w is LTspice's ideal diode",
     "A9 in 0 0 0 0 x 0 0 SCHMITT Vt=.5": "that a netlist may have; write it with R, C and B",
     "V9 x 0 PWL file=stimulus.txt": "write the values of this one into the line",
-    "S9 x 0 in 0 W\n.model W VSWITCH(Ron=1 Von=1 Voff=0)": "write sw with vt=(von+voff)/2",
+    "S9 x 0 in 0 W\n.model W VSWITCH(Ron=0)": "ron and roff must be above 0, von and voff apart",
+    "W9 x 0 V1 W\n.model W ISWITCH(Ion=0)": "ron and roff must be above 0, ion and ioff apart",
     "Q9 x in 0 W\n.model W ako:BC547 NPN(Bf=250)": "write all of the model instead of ako",
     "XU9 in x level2 Avol=1Meg": "include the file with its .subckt",
     ".lib UniversalOpamps2.sub": "was not found in the netlist's folder: copy it there",
@@ -221,6 +222,54 @@ def test_an_area_without_its_name_is_that_many_devices_in_parallel(tmp_path: Pat
     assert columns["v(zp)"][-1] > 1e-4
     for word in differences:
         assert np.abs(columns[word]).max() < 1e-6, word
+
+
+@needs.ngspice_library
+def test_a_smooth_switch_has_the_resistance_of_pspices_reference(tmp_path: Path) -> None:
+    """Its formula for a control between off and on, with the model of the nearest scope."""
+    lines = """
+.param half=0.5
+.subckt relay a b c d
+S1 a b c d W
+.model W VSWITCH(Ron=10 Roff=1k Von={half} Voff=-0.25)
+.ends
+.model W VSWITCH(Ron=1k Roff=50 Von=-0.5 Voff=0.8)
+.model T ISWITCH Ron=5 Roff=2k Ion=0.5m Ioff=-0.5m
+X1 x 0 in 0 relay
+S2 y 0 (in,0) W
+W3 z 0 V1 T
+V4 s 0 1
+R4 s x 100
+R5 s y 100
+R6 s z 100
+.end
+"""
+    with in_place():
+        columns = found(tmp_path, "", HEAD + lines, "v(in)", "v(x)", "v(y)", "v(z)").columns
+    control = columns["v(in)"]
+    for word, at, on_off, ron, roff in (
+        ("v(x)", control, (0.5, -0.25), 10.0, 1e3),
+        ("v(y)", control, (-0.5, 0.8), 1e3, 50.0),
+        ("v(z)", -control / 1e3, (0.5e-3, -0.5e-3), 5.0, 2e3),
+    ):
+        middle, width = sum(on_off) / 2.0, on_off[0] - on_off[1]
+        mean, ratio = np.log(np.sqrt(ron * roff)), np.log(ron / roff)
+        off = np.clip(at, min(on_off), max(on_off)) - middle
+        resistance = np.exp(mean + 3 * ratio * off / (2 * width) - 2 * ratio * off**3 / width**3)
+        share = resistance / (resistance + 100.0)
+        assert np.ptp(share) > 0.5
+        assert columns[word] == pytest.approx(share, abs=1e-4), word
+
+
+@needs.ngspice_library
+def test_words_of_logic_and_steps_of_ltspice(tmp_path: Path) -> None:
+    lines = "B1 x 0 V=if(V(in)>0 & V(in)<0.5 | ~(V(in)>-0.5), 1, 0) tripdv=1m tripdt=1u\n.end\n"
+    with in_place():
+        columns = found(tmp_path, "", HEAD + lines, "v(in)", "v(x)").columns
+    v = columns["v(in)"]
+    known = np.min(np.abs(v[:, None] - np.array([0.0, 0.5, -0.5])), axis=1) > 0.05
+    true = ((v > 0) & (v < 0.5)) | (v < -0.5)
+    assert np.array_equal(columns["v(x)"][known], true[known].astype(float))
 
 
 def test_names_of_nodes_may_begin_with_digits(tmp_path: Path) -> None:

@@ -173,9 +173,6 @@ FUNCTIONS = [
     (IN_PARAM + "{k ? 2}", ":15: {k ? 2} must have a : for each ?"),
     (IN_B + "2*(V(v1),5)", ":15: the comma in 2*(V(v1),5) parts no arguments"),
     (IN_B + "max(1,(1,5))", ":15: the comma in max(1,(1,5)) parts no arguments"),
-    (IN_B + "(V(v1)>0) & (V(v1)<1)", ":15: write && instead of &."),
-    (IN_B + "(V(v1)>0) | (V(v1)<1)", ":15: write || instead of |."),
-    (IN_PARAM + "{~k}", ":15: write ! instead of ~."),
 ]
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from unicodedata import category
 
-from cosim.circuit.lint.dialect import in_ngspice, prelude
+from cosim.circuit.lint.dialect import in_ngspice, prelude, without_smooth_switches
 from cosim.circuit.lint.lines import MAX_LINE, Line, refuse, shown
 from cosim.circuit.lint.words import word_set
 from cosim.errors import BadInput, plain
@@ -54,17 +54,16 @@ NUMERIC_OPTIONS = word_set(
     "xmu"
 )
 DROPPED_OPTIONS = word_set(
-    "acct autostop brief cptime filetype ingold interp limpts limtim list lvltim measdgt noacct "
-    "noinit nomod nopage node numdgt opts plotwinsize post probe savecurrents warn wnflag"
+    "accurate acct autostop brief cptime fastaccess filetype flagloads ingold interp limpts limtim "
+    "list lvltim measdgt meascplxfmt noacct noinit nomarch nomod nopage node numdgt opts "
+    "plotreltol plotvntol plotabstol plotwinsize post probe savecurrents srcstepmethod thev_induc "
+    "topologycheck warn wnflag"
 )
-"""Options of output, which a host sets itself (``interp`` gives wrong waveforms)."""
+"""Options of output, which a host sets itself (``interp`` gives wrong waveforms), and of how other
+programs compute."""
 
-MODELS = word_set("r res c l d npn pnp nmos pmos vdmos njf pjf nmf pmf sw csw ltra")
+MODELS = word_set("r res c l d npn pnp nmos pmos vdmos njf pjf nmf pmf sw csw vswitch iswitch ltra")
 """Not numd, nbjt, numos, whose cards name files, and no code models."""
-_MODEL_INSTEAD = {
-    "vswitch": "; write sw with vt=(von+voff)/2 and vh=(von-voff)/2",
-    "iswitch": "; write csw with it=(ion+ioff)/2 and ih=(ion-ioff)/2",
-}
 MOS_LEVELS = frozenset("123469")
 """The BSIM models write a log into the working folder."""
 
@@ -142,7 +141,8 @@ class _Reader:
             title, _, rest = text.partition("\n")
             self.lines.append(Line(_title(Line(title, name, 1)), name, 1))
             if self._take(_logical(rest, name, 2), (self.path,)):
-                return [self.lines[0], *prelude(self.lines), *self.lines[1:]]
+                title, *lines = without_smooth_switches(self.lines)
+                return [title, *prelude([title, *lines]), *lines]
         elif _SCHEMATIC.match(text):
             cure = "save what LTspice shows under View, SPICE Netlist, and name that file"
             refuse(Line("", name, 1), f"this is a drawing of LTspice and no netlist: {cure}")
@@ -395,8 +395,7 @@ def _check_model(line: Line) -> None:
         refuse(line, f"{shown(line.text)} is no complete .model line{cure}")
     kind = match[2].lower()
     if kind not in MODELS:
-        cure = _MODEL_INSTEAD.get(kind, "")
-        refuse(line, f"models of type {shown(kind)} are not allowed in a netlist{cure}")
+        refuse(line, f"models of type {shown(kind)} are not allowed in a netlist")
     if kind not in ("nmos", "pmos"):
         return
     for equals, level in _LEVEL.findall(line.text):

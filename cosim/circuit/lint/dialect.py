@@ -8,12 +8,12 @@ library does not bring on every machine, which cost each step, and which round a
 """
 
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, combinations_with_replacement, count, pairwise
 from math import pi
 
-from cosim.circuit.lint.lines import MAX_LINE, Line
+from cosim.circuit.lint.lines import MAX_LINE, Line, refuse
 from cosim.circuit.lint.words import closing, number, split_arguments, word_set, words
 
 _LETTERS = str.maketrans(
@@ -42,10 +42,11 @@ _PI = re.compile(r"(?<![\w.])pi(?!\w|\s*\()")
 
 _MAKERS = word_set("mfg pn type pppkg iave vpk vceo icrating qg")
 _REMARKS = {
-    "r": word_set("tol pwr"), "c": word_set("v irms vrms mtbf") | _MAKERS,
+    "b": word_set("tripdv tripdt"), "r": word_set("tol pwr"),
+    "c": word_set("v irms vrms mtbf") | _MAKERS,
     "l": word_set("ipk irms mtbf") | _MAKERS, "vdmos": word_set("vds ron") | _MAKERS,
 }  # fmt: skip
-"""Ratings and makers, which nothing computes with."""
+"""Ratings, makers and LTspice's steps, which nothing computes with."""
 _PARASITES = {"c": word_set("rser lser rpar cpar rlshunt"), "l": word_set("rser rpar cpar"),
               "v": word_set("rser cpar")}  # fmt: skip
 _PAIR = re.compile(
@@ -56,17 +57,27 @@ _GLUED = re.compile(r"(?<==)\s*(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECA
 """4k7 for 4.7k, as a value and behind a name."""
 _POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)
 _MODEL = re.compile(r"\.model\s+\S+\s+(\w+)", re.IGNORECASE)
+_SWITCH = re.compile(r"\.model\s+(\S+)\s+([vi]switch)\b", re.IGNORECASE)
+_CONTROL = {"vswitch": ("v", "1", "0"), "iswitch": ("i", "1m", "0")}
+"""Of PSpice's switches: what controls them, and at how much of it they are on and off."""
+_LOGIC = re.compile(r"(?<!&)&(?!&)|(?<!\|)\|(?!\|)|~")
+_LOGICAL = {"&": "&&", "|": "||", "~": "!"}
+"""LTspice's and, or, not."""
 
 
 def in_ngspice(line: Line) -> list[Line]:
     """The line as ngspice knows it, in one line or more."""
     text = _without_tables(line.text.translate(_LETTERS))
     kind = text[:1].lower()
+    if not text.startswith((".inc", ".lib")):
+        text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
     if kind in "rclv":
         found = [*_passive(text, kind)]
     elif kind in "efgh":
         found = [_source(text)]
+    elif kind == "b":
+        found = [_taken(text, _REMARKS[kind])[0]]
     elif model := _MODEL.match(text):
         remarks = _REMARKS["vdmos"] if model[1].lower() == "vdmos" else _MAKERS
         found = [_taken(text.replace("(", " ( ", 1), remarks)[0]]
@@ -97,6 +108,63 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
     if "pi" in called and "pi" not in defined:
         found.append(f".param pi={pi!r}")
     return [Line(text, lines[0].file, 1) for text in found]
+
+
+def without_smooth_switches(lines: Sequence[Line]) -> list[Line]:
+    """PSpice's switches as B sources: from off to on the logarithm of their resistance is a cubic
+    of the control (Cadence, *PSpice Reference Guide*, voltage-controlled switch). Raises BadInput.
+    """
+    scopes = [*_scopes(lines)]
+    cards = {
+        (scope, match[1].lower()): _conductance(line, match[2].lower())
+        for line, scope in zip(lines, scopes, strict=True)
+        if (match := _SWITCH.match(line.text))
+    }
+    found = []
+    for line, scope in zip(lines, scopes, strict=True):
+        name, *rest = words(line.text)
+        controls = {"s": 2, "w": 1}.get(name[0], 0)
+        model = rest[2 + controls] if controls and len(rest) > 2 + controls else ""
+        about = (cards.get((scope[:depth], model)) for depth in range(len(scope), -1, -1))
+        if conductance := next(filter(None, about), None):
+            nodes, control = rest[:2], ",".join(rest[2 : 2 + controls])
+            law = conductance(f"{'v' if controls == 2 else 'i'}({control})")
+            text = f"b{name} {' '.join(nodes)} i=v({','.join(nodes)})*{law}"
+            found.append(replace(line, text=text))
+        elif not _SWITCH.match(line.text):
+            found.append(line)
+    return found
+
+
+def _scopes(lines: Sequence[Line]) -> Iterator[tuple[int, ...]]:
+    """For each line the places of the .subckt lines about it, the outermost first."""
+    scope: tuple[int, ...] = ()
+    for place, line in enumerate(lines):
+        word = line.text.split(None, 1)[0].lower()
+        if word == ".subckt":
+            scope = (*scope, place)
+        elif word == ".ends":
+            scope = scope[:-1]
+        yield scope
+
+
+def _conductance(line: Line, kind: str) -> Callable[[str], str]:
+    """Of a model of a switch, the expression by its control."""
+    by, *ends = _CONTROL[kind]
+    given = {"ron": "1", "roff": "1meg", f"{by}on": ends[0], f"{by}off": ends[1]}
+    given |= _taken(line.text, given)[1]
+    on_resistance, off_resistance, on, off = (f"({value})" for value in given.values())
+    known = [number(value) for value in given.values()]
+    if 0.0 in known[:2] or (known[2] == known[3] and known[2] is not None):
+        refuse(line, f"ron and roff must be above 0, {by}on and {by}off apart")
+    middle = f"0.5*ln({on_resistance}*{off_resistance})"
+    span = f"ln({on_resistance}/{off_resistance})"
+
+    def law(control: str) -> str:
+        way = f"min(max(({control}-0.5*({on}+{off}))/({on}-{off}),-0.5),0.5)"
+        return f"exp(-{middle}-{span}*{way}*(1.5-2*{way}*{way}))"
+
+    return law
 
 
 def _taken(text: str, keys: Collection[str]) -> tuple[str, dict[str, str]]:

@@ -40,7 +40,6 @@ _INSTEAD = {
     "if": "there is no if() in ngspice; write (condition ? yes : no)",
     "table": "there is no table() in ngspice; write pwl(x, x1, y1, x2, y2, ...) in a B source",
 }
-_NOT_NGSPICE = {"&": "&&", "|": "||", "~": "!"}
 _VARYING = re.compile(r"\b(?:[vi]\s*\(|(?:time|temper|hertz)\b)", re.IGNORECASE)
 _PLAIN = re.compile(r"\s*\{?\s*[+-]?\s*[\w.]+(?:(?<=\de)[+-]?\d+)?\s*\}?\s*", re.IGNORECASE)
 _POINT = re.compile(
@@ -174,8 +173,6 @@ def _check_operators(line: Line, expression: str) -> None:
             calls.append(piece["begin"][0] not in "({")
         elif piece["end"] and calls:
             calls.pop()
-        elif piece[0] in _NOT_NGSPICE:
-            refuse(line, f"write {_NOT_NGSPICE[piece[0]]} instead of {piece[0]}")
         elif piece[0] in counts:
             counts[piece[0]] += 1
         elif piece[0] == "," and calls and not calls[-1]:
