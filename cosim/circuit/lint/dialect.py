@@ -122,8 +122,8 @@ def without_smooth_switches(lines: Sequence[Line]) -> list[Line]:
     }
     found = []
     for line, scope in zip(lines, scopes, strict=True):
-        name, *rest = words(line.text)
-        controls = {"s": 2, "w": 1}.get(name[0], 0)
+        controls = {"s": 2, "w": 1}.get(line.text[0].lower(), 0)
+        name, *rest = words(line.text) if controls else [""]
         model = rest[2 + controls] if controls and len(rest) > 2 + controls else ""
         about = (cards.get((scope[:depth], model)) for depth in range(len(scope), -1, -1))
         if conductance := next(filter(None, about), None):
