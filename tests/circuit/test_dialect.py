@@ -141,6 +141,7 @@ TOLD = {
     "A9 in 0 0 0 0 x 0 0 SCHMITT Vt=.5": "that a netlist may have; write it with R, C and B",
     "V9 x 0 PWL file=stimulus.txt": "write the values of this one into the line",
     "S9 x 0 in 0 W\n.model W VSWITCH(Ron=0)": "ron and roff must be above 0, von and voff apart",
+    "S9 x 0 in 0 W\n.model W ISWITCH": "no model w is defined here",
     "W9 x 0 V1 W\n.model W ISWITCH(Ion=0)": "ron and roff must be above 0, ion and ioff apart",
     "Q9 x in 0 W\n.model W ako:BC547 NPN(Bf=250)": "write all of the model instead of ako",
     "XU9 in x level2 Avol=1Meg": "include the file with its .subckt",

@@ -116,19 +116,19 @@ def without_smooth_switches(lines: Sequence[Line]) -> list[Line]:
     """
     scopes = [*_scopes(lines)]
     cards = {
-        (scope, match[1].lower()): _conductance(line, match[2].lower())
+        (scope, match[2][0].lower(), match[1].lower()): _conductance(line, match[2].lower())
         for line, scope in zip(lines, scopes, strict=True)
         if (match := _SWITCH.match(line.text))
     }
     found = []
     for line, scope in zip(lines, scopes, strict=True):
-        controls = {"s": 2, "w": 1}.get(line.text[0].lower(), 0)
+        by, controls = {"s": ("v", 2), "w": ("i", 1)}.get(line.text[0].lower(), ("", 0))
         name, *rest = words(line.text) if controls else [""]
         model = rest[2 + controls] if controls and len(rest) > 2 + controls else ""
-        about = (cards.get((scope[:depth], model)) for depth in range(len(scope), -1, -1))
+        about = (cards.get((scope[:depth], by, model)) for depth in range(len(scope), -1, -1))
         if conductance := next(filter(None, about), None):
             nodes, control = rest[:2], ",".join(rest[2 : 2 + controls])
-            law = conductance(f"{'v' if controls == 2 else 'i'}({control})")
+            law = conductance(f"{by}({control})")
             text = f"b{name} {' '.join(nodes)} i=v({','.join(nodes)})*{law}"
             found.append(replace(line, text=text))
         elif not _SWITCH.match(line.text):
