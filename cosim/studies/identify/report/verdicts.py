@@ -24,7 +24,7 @@ LIKELY = 2.71
 MISFIT = 2.0
 """Of a standard deviation, which takes residuals for noise; what a rig leaves of the trials is
 mostly what the model lacks. On twelve made rigs with such residuals, and priors of their own, the
-ranges held 92 % of the true values with it."""
+ranges held 95 % of the true values with it, and 82 % without."""
 WITHIN = 1.645 * MISFIT
 """Standard deviations to either side, which hold 90 %."""
 ALONE = 1.5
