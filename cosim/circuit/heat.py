@@ -69,10 +69,18 @@ def rise(coil: Coil, on_time: float = inf, duty: float = 1.0, side: int = 0) -> 
     ``on_time`` (s) of each of many cycles, their share ``duty``, where 0 is a single one. ``side``
     1 and -1 take the upper and lower end of the estimate.
     """
-    return _rise(tuple(getattr(coil, name) for name in SPREAD), on_time, duty, side)
+    return _rise(_estimate(coil), on_time, duty, side)
+
+
+def _estimate(coil: Coil) -> tuple[float, ...]:
+    return tuple(getattr(coil, name) for name in SPREAD)
 
 
 @lru_cache  # all settings of a study have one coil
+def _ends(estimate: tuple[float, ...]) -> list[list[float]]:
+    return [[_rise(estimate, *on, side) for side in (-1, 1)] for on in _CYCLES]
+
+
 def _rise(estimate: tuple[float, ...], on_time: float, duty: float, side: int) -> float:
     given = dict(zip(SPREAD, estimate, strict=True))
     for name, factor in SPREAD.items():
@@ -107,7 +115,7 @@ def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float 
 def rises(coil: Coil, heat: float) -> list[list[float | None]]:
     """The rises, K, that a current which makes ``heat`` (W) of the cold winding brings in a LIFT
     and in continuous use: the lower and the upper end of the estimate of each, None without end."""
-    ends = [[warmed(heat, rise(coil, *on, side)) for side in (-1, 1)] for on in _CYCLES]
+    ends = [[warmed(heat, cold) for cold in both] for both in _ends(_estimate(coil))]
     return [[end if isfinite(end) else None for end in both] for both in ends]
 
 

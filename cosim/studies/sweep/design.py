@@ -50,8 +50,11 @@ class Design:
         if self.sample is not None:
             row = self.sample[index]
         else:
-            places = np.unravel_index(index, self.shape)
-            row = [axis.values[k] for axis, k in zip(self.axes, places, strict=True)]
+            backwards = []
+            for axis in reversed(self.axes):
+                index, place = divmod(index, len(axis.values))
+                backwards.append(axis.values[place])
+            row = tuple(reversed(backwards))
         return {axis.key.full: value for axis, value in zip(self.axes, row, strict=True)}
 
     def alike(self, points: Iterable[int]) -> list[int]:
