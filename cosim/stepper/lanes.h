@@ -1,6 +1,7 @@
 /* The steps of WIDTH lanes side by side, for each kind of processor: lanes2.c, lanes4.c and lanes8.c
- * include this with WIDTH, INLINE and FUNCTION defined. No lane's numbers depend on another's, and
- * nothing is contracted, so each width gives the same bits.
+ * include this with WIDTH, INLINE and FUNCTION defined, and LEAST, MOST and ANY where the processor has
+ * one instruction for what compilers make four of. No lane's numbers depend on another's, and nothing is
+ * contracted, so each width gives the same bits.
  *
  * Moreau's time stepping with the midpoint rule. What is not smooth is either linear within a step
  * (the current at its limits) or solved for at its end (friction), and steps end where the command
@@ -20,16 +21,24 @@ typedef double Wide __attribute__((vector_size(8 * WIDTH)));
 typedef int64_t Mask __attribute__((vector_size(8 * WIDTH)));
 
 INLINE Wide choose(Mask mask, Wide a, Wide b) { return (Wide)((mask & (Mask)a) | (~mask & (Mask)b)); }
-INLINE Wide least(Wide a, Wide b) { return choose(a < b, a, b); }
-INLINE Wide most(Wide a, Wide b) { return choose(a > b, a, b); }
+#ifndef LEAST /* the second where the two are equal, or one is no number: so do the instructions */
+#define LEAST(a, b) choose((a) < (b), a, b)
+#define MOST(a, b) choose((a) > (b), a, b)
+#endif
+INLINE Wide least(Wide a, Wide b) { return LEAST(a, b); }
+INLINE Wide most(Wide a, Wide b) { return MOST(a, b); }
 INLINE Wide within(Wide x, Wide bound) { return least(most(x, -bound), bound); }
 
 INLINE int any(Mask mask)
 {
+#ifdef ANY
+    return ANY(mask);
+#else
     int64_t found = 0;
     for (int l = 0; l < WIDTH; l++)
         found |= mask[l];
     return found != 0;
+#endif
 }
 
 INLINE Wide root(Wide x)
@@ -393,10 +402,9 @@ INLINE void write_row(const Wide p[N_ALL], const State *a, const State *b, const
 /* Where a line has ended, the next one begins. */
 INLINE void pass_corners(const Drive *drives, const Wide p[N_ALL], Mask drops, State *m)
 {
-    int64_t any = 0;
-    for (int l = 0; l < WIDTH; l++)
-        any |= drops[l];
-    for (int l = 0; any && l < WIDTH; l++) {
+    if (!any(drops))
+        return;
+    for (int l = 0; l < WIDTH; l++) {
         if (!drops[l])
             continue;
         double end, top, slope;

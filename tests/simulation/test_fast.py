@@ -1,11 +1,14 @@
 """The fast solver against the FMU, which finds each event: one table of numbers, one law."""
 
 import ctypes
+import subprocess
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import build_c
 import cosim
 from cosim.cli.main import main
 from cosim.errors import BadInput
@@ -146,6 +149,35 @@ def test_lanes_do_not_know_each_other() -> None:
         with Evaluator(scene, whole_periods=True) as bench:
             ((_, alone),) = bench.run([(number, point)])
         assert alone == together[number]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("most", ["0", '!strcmp(which, "avx2")'], ids=["2 lanes", "4 lanes"])
+def test_every_processor_computes_the_same_bits(
+    most: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As many lanes at once as a lesser processor has, against as many as this one has."""
+    ours = library("stepper")
+    sources = [path for folder in build_c.LIBRARIES["stepper"] for path in folder.glob("*.c")]
+    lesser = (f"-D__builtin_cpu_supports(which)=({most})", "-include", "string.h")
+    made = tmp_path / "stepper.so"
+    subprocess.run(
+        [*build_c.compiler(), *build_c.FLAGS, *build_c.LIBRARY_FLAGS, "-shared", *lesser]
+        + [f"-I{folder}" for folder in build_c.LIBRARIES["stepper"]]
+        + [*map(str, sources), "-o", str(made), "-lm"],
+        check=True,
+    )
+    theirs = ctypes.CDLL(str(made))
+    for name in ("stepper_begin", "stepper_run"):
+        getattr(theirs, name).argtypes = getattr(ours, name).argtypes
+    scenes = [
+        load(name, ({} if name.startswith("trial") else PERIODS) | changes | FAST)
+        for name, changes in SCENES
+    ]
+    found = fast.summaries(scenes)
+    monkeypatch.setattr(fast, "library", lambda _: theirs)
+    for one, other in zip(found, fast.summaries(scenes), strict=True):
+        assert one | {"wall_time": 0.0} == other | {"wall_time": 0.0}
 
 
 def test_a_sweep_is_judged_by_the_fmu(capsys: pytest.CaptureFixture[str]) -> None:
