@@ -105,7 +105,7 @@ def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float 
     """
     if not (rise_limit > 0.0 and 0.0 <= duty <= 1.0 and on_time > 0.0):
         raise BadInput(
-            f"A limit of heat needs a rise above 0 K, a duty from 0 to 1 and a time above 0 s, not "
+            f"a limit of heat needs a rise above 0 K, a duty from 0 to 1 and a time above 0 s, not "
             f"{rise_limit:g} K, {duty:g} and {on_time:g} s."
         )
     cold = rise(coil, on_time if duty < 1.0 else inf, duty)

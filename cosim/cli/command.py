@@ -51,9 +51,11 @@ def add_commands(
                 add_commands(one, command.commands, asked, names)
 
 
-def _named(suffix: str, text: str) -> Path:
-    """The path of a file to write, whose name tells what it is."""
-    if Path(text).suffix.lower() != suffix:
+def _written(suffix: str, text: str) -> Path:
+    """The path of a folder to write, or of a file, whose name tells what it is."""
+    if not text and not suffix:
+        raise BadInput('--out "": must name a folder (. is the one you are in).')
+    if suffix and Path(text).suffix.lower() != suffix:
         raise BadInput(f'--out "{plain(text)}": must end in {suffix}.')
     return Path(text)
 
@@ -78,8 +80,9 @@ def add_options(parser: ArgumentParser, command: Command) -> None:
             how["const"] = not option.name.startswith("--no-")
             place.add_argument(option.name, action="store_const", **how)
             continue
-        suffix = Path(option.metavar or "").suffix if option.name == "--out" else ""
-        kind = partial(_named, suffix) if suffix else option.kind
+        kind = option.kind
+        if option.name == "--out":
+            kind = partial(_written, Path(option.metavar or "").suffix)
         how |= {"type": kind, "metavar": option.metavar, "choices": option.choices or None}
         if option.many == "repeat":
             how["action"] = "append"

@@ -113,28 +113,36 @@ def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str,
             attributes = {name: _text(value) for name, value in file._attributes.items()}
         for name, values in columns.items():
             if not ((name + units[name]).isascii() and (name + units[name]).isprintable()):
-                raise ValueError(f"{name!r} in {units[name]!r} is not a name and a unit")
+                raise _Damaged(f"{name!r} in {units[name]!r} is not a name and a unit")
             if values.dtype != ">f8" or values.ndim != 1:
-                raise ValueError(f"{name!r} is not a column")
+                raise _Damaged(f"{name!r} is not a column")
             if len(values) != len(columns["time"]) or not np.isfinite(values).all():
-                raise ValueError(f"{name!r} is not complete")
+                raise _Damaged(f"{name!r} is not complete")
         if len(columns["time"]) < 2 or np.any(np.diff(columns["time"]) <= 0):
-            raise ValueError("the time does not increase")
+            raise _Damaged("the time does not increase")
     except (BadInput, MemoryError):
         raise
     except Exception as error:  # there is little that scipy does not raise on a damaged file
         raise BadInput(
-            f"{plain(str(path))}: this is not a whole waveforms.nc ({plain(str(error))})."
+            f"{plain(str(path))}: this is not a whole waveforms.nc ({_why(error)})."
         ) from None
     return {name: np.array(v, dtype=np.float64) for name, v in columns.items()}, units, attributes
 
 
+class _Damaged(Exception):
+    """What is wrong with a file that can be read."""
+
+
+def _why(error: Exception) -> str:
+    return plain(str(error)) if isinstance(error, _Damaged) else "it is damaged, or cut off"
+
+
 def _text(value: object) -> str:
     if not isinstance(value, bytes):
-        raise ValueError(f"{value!r} is not text")
+        raise _Damaged(f"{value!r} is not text")
     text = value.decode()
     if not all(char.isprintable() or char in "\n\t" for char in text):
-        raise ValueError("a text has control characters")
+        raise _Damaged("a text has control characters")
     return text
 
 
@@ -150,14 +158,14 @@ def read_sweep(folder: Path) -> "xr.Dataset":
         for name, each in data.variables.items():
             said += [each.attrs.get(key, "") for key in ("units", "long_name")]
             if not grid.issuperset(each.dims):
-                raise ValueError(f"{name} has other points")
+                raise _Damaged(f"{name} has other points")
             number = each.dtype.kind in "iuf" and name != "failure"
             if not (number or all(isinstance(value, str) for value in each.values.flat)):
-                raise ValueError(f"{name} has other values")
+                raise _Damaged(f"{name} has other values")
         if not any("key" in axis.attrs for axis in data.coords.values()):
-            raise ValueError("it goes over no key")
+            raise _Damaged("it goes over no key")
         if not grid or not all(isinstance(text, str) for text in said):
-            raise ValueError("there are no points, or no words for their numbers")
+            raise _Damaged("there are no points, or no words for their numbers")
     except Exception as error:  # there is little that scipy does not raise on a damaged file
-        raise BadInput(f"{plain(str(path))}: not a whole sweep ({plain(str(error))}).") from None
+        raise BadInput(f"{plain(str(path))}: not a whole sweep ({_why(error)}).") from None
     return data

@@ -344,6 +344,16 @@ def test_a_file_of_another_ending_is_found(tmp_path: Path, monkeypatch: pytest.M
         assert complaint(name).endswith("did you mean heavy.toml?")
 
 
+def test_an_empty_name_is_no_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As that of a variable of the shell that nobody has set."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "held", "--out", ""]) == 2
+    told = 'cosim: --out "": must name a folder (. is the one you are in).\n'
+    assert capsys.readouterr().err == told and not any(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("words", [["live"], ["show", "a.csv"], ["fmu", "ssp", "paper"]])
 @pytest.mark.parametrize("name", ["x.txt", "x", "", ".", "/"])
 def test_a_file_to_write_tells_its_kind(

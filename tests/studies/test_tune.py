@@ -300,7 +300,10 @@ def test_robust_is_the_median_of_all_turns() -> None:
         (["--waveform", "steps:" + "9" * 5000], "N from 2 to 64"),
         (["--waveform", "sine,"], "--waveform : must be one of"),
         (["--heat", "0"], "must be a number above 0 W"),
-        (["--heat", "60:2"], "a duty from 0 to 1"),
+        (
+            ["--heat", "60:2"],
+            "--heat 60:2: a limit of heat needs a rise above 0 K, a duty from 0 to 1",
+        ),
         (["--heat", "60:0.3:1:1"], "RISE:DUTY:SECONDS"),
         (["--heat", "warm"], "--heat warm: must be a number above 0 W"),
     ],

@@ -41,6 +41,8 @@ def most_heat(scene: Scene, limit: float | str | None) -> float:
     try:
         watts, *cycle = (float(part) for part in str(limit).split(":"))
         found = heat_limit(scene.coil, watts, *cycle) if cycle else watts
+    except BadInput as error:
+        raise BadInput(f"--heat {plain(str(limit))}: {error}") from None
     except (ValueError, TypeError):
         found = float("nan")
     if not found > 0.0:
