@@ -58,7 +58,8 @@ AHEAD = (0.25, 0.5, 0.75)
 """Of a period, by which the drive begins later in its course in the other runs."""
 
 LONGEST = 10.0
-"""Times the scene's own duration that such a run may last."""
+"""Times the scene's own duration: a run of LONG is shorter where it would be longer, and none is
+made where PERIODS would be."""
 
 ASIDE = 1e-9
 """m; far above rounding, and far below what regular motion makes of it."""
@@ -177,12 +178,14 @@ def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
         or normal_force(scene) is not None
     ):
         return {}
-    if PERIODS * length > LONGEST * scene.run.duration:
+    longest = LONGEST * scene.run.duration
+    if PERIODS * length > longest:
         return {}
+    periods = max(PERIODS, round(min(LONG, longest) / length))
     averaged = max(1, round((scene.run.duration - scene.run.settle) / length))
     found: dict[str, Any] = {}
     for share in SHARES:
-        end = round(share * max(PERIODS, round(LONG / length))) * length
+        end = round(share * periods) * length
         times = {"duration": end, "settle": end / 2.0, "output_step": length}
         base = _looser(changed(scene, simple or {}, "limited")).having(run=times)
         starts = (base, _aside(base), *(_started(base, ahead) for ahead in AHEAD))
