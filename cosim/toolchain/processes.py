@@ -157,7 +157,8 @@ class Worker:
                 continue
             try:
                 kind, value = self._heard()
-            except OSError as error:
+            except OSError as error:  # whoever talks nonsense need not die of it
+                self._process.kill()
                 raise EOFError from error
             self.began = True
             if kind == "progress":
@@ -181,7 +182,8 @@ class Worker:
         )
 
     def _heard(self) -> tuple[str, Any]:
-        """What the process says: a kind, and what belongs to it. Raises EOFError, OSError."""
+        """What the process says: a kind, and what belongs to it. Raises EOFError where it has died,
+        OSError also where it makes no sense."""
         if self.kind[1] is None:
             return self.pipe.recv()
         try:
@@ -190,7 +192,7 @@ class Worker:
                 return kind, float(value)
             return kind, _error(*value) if kind == "failure" else _printable(value)
         except (ValueError, TypeError, OverflowError, RecursionError) as error:
-            raise EOFError from error
+            raise OSError from error
 
     def _columns(self, found: dict[str, Any]) -> Any:
         return unpacked(self.folder, *found[_PACKED]) if set(found) == {_PACKED} else found
