@@ -236,7 +236,8 @@ def nine(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 @pytest.mark.physics
 def test_nine_trials_and_the_travel_give_the_rig_back(nine: Path, tmp_path: Path) -> None:
-    """The best of three starts, each 6 % of the bounds away in every key, is within 10 %. Without
+    """The best of three starts, each 6 % of the bounds away in every key, is within 10 %, and the
+    suspension's force within 5 % of its greatest; k1 and k3 share it in more than one way. Without
     the travel it need not be: a ram that goes farther, in a heavier surface on stiffer flexures,
     moves that nearly alike, and such ends had the mass 11 % and the force factor 37 % off."""
     bounds = tmp_path / "bounds.toml"
@@ -244,25 +245,41 @@ def test_nine_trials_and_the_travel_give_the_rig_back(nine: Path, tmp_path: Path
     space = read_space(bounds)
     trials = read_trials(nine, space)
     true = np.array([KNOWN["rig"][key] for key in space.names])
-    ends = [_from_beside(trials, space, space.point(true), seed) for seed in (1, 2, 3)]
-    found = min(ends, key=lambda one: one.total)
+    found = _from_beside(trials, space, space.point(true))
     assert found.costs.mean() <= 0.001
-    share = dict(zip(space.names, space.values(found.point) / true, strict=True))
+    values = dict(zip(space.names, space.values(found.point), strict=True))
     for key in (
         *("mechanics.surface_mass", "mechanics.flexure_stiffness", "friction.mu_plate"),
-        *("mechanics.suspension_k2", "mechanics.suspension_k3", "coil.force_factor"),
+        *("mechanics.suspension_k2", "coil.force_factor"),
     ):
-        assert share[key] == pytest.approx(1.0, abs=0.1), key
+        assert values[key] == pytest.approx(KNOWN["rig"][key], rel=0.1), key
+    forces = [
+        sum(rig[f"mechanics.suspension_k{n}"] * Q**n for n in (1, 2, 3))
+        for rig in (values, KNOWN["rig"])
+    ]
+    assert forces[0] == pytest.approx(forces[1], abs=0.05 * np.abs(forces[1]).max())
 
 
-def _from_beside(trials: list[Measured], space: Space, true: Array, seed: int) -> Found:
-    """What the search makes of a start beside the true point."""
-    rng = np.random.default_rng(seed)
+Q = np.linspace(-2e-3, 2e-3, 9)
+"""m; ways of the ram at which the suspension's forces are compared."""
+
+
+def _from_beside(trials: list[Measured], space: Space, true: Array) -> Found:
+    """What the search makes of three starts beside the true point: all go some way, the best one
+    all the way, as in the search itself."""
     coarse = Search(space, [trial.target for trial in trials], 2)
     fine = Search(space, [trial.fine for trial in trials], 2)
-    beside = true + 0.06 * rng.choice([-1.0, 1.0], len(true))
-    found = coarse.screen(np.clip(beside, 0.0, 1.0)[None], rng, 256, 16, 4)[0]
-    found = coarse.nested(coarse.rescreened(found, rng, 256, 16, 4), rng, 250, 0.05, quiet)
+
+    def further(found: Found, rng: np.random.Generator, count: int, sigma: float) -> Found:
+        return coarse.nested(coarse.rescreened(found, rng, 256, 16, 4), rng, count, sigma, quiet)
+
+    ends = []
+    for rng in map(np.random.default_rng, (1, 2, 3)):
+        beside = true + 0.06 * rng.choice([-1.0, 1.0], len(true))
+        found = coarse.screen(np.clip(beside, 0.0, 1.0)[None], rng, 256, 16, 4)[0]
+        ends.append(further(found, rng, 160, 0.05))
+    found, rng = min(ends, key=lambda one: one.total), np.random.default_rng(9)
+    found = further(further(found, rng, 330, 0.04), rng, 400, 0.02)
     found = fine.rescreened(fine.refined(found.point, found.own, 5), rng, 256, 16, 4)
     return finish(fine, found, 60)
 
