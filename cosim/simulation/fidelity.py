@@ -1,16 +1,9 @@
 """The one policy of fidelity: a simple circuit model searches, a more complete one judges."""
 
-from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import TypeVar
 
 from cosim.errors import BadInput
 from cosim.scene import Scene, changed
-
-Circuit = Mapping[str, str | bool]
-"""Values of keys, ``table.key``, that make a scene one of a circuit model."""
-
-Found = TypeVar("Found")
 
 SEARCHES, JUDGES, COMPLETE = "limited", "amplifier", "full"
 """The model that searches, with the mechanics and without ngspice; the one that judges it; and the
@@ -59,22 +52,3 @@ class Fidelity:
     def judge(self, current: float, limit: float) -> str:
         """The model that judges a run whose current reached ``current``, A, of ``limit``."""
         return COMPLETE if current > AT_LIMIT * limit else JUDGES
-
-    def run(
-        self,
-        numbers: Collection[int],
-        run: Callable[[Collection[int], Circuit], dict[int, Found]],
-        matter: Callable[[dict[int, Found]], Collection[int]],
-        value: Callable[[Found], float | None],
-    ) -> dict[int, Found]:
-        """What ``run`` finds of numbered points on the model that a circuit names: of all on the
-        simple one, of those that ``matter`` on the scene's own. Where the simple one is off at one
-        of these, it may be at any: then all are run on the scene's own."""
-        if self.simple is None:
-            return run(numbers, {})
-        found = run(numbers, self.simple)
-        first = matter(found)
-        own = run(first, {})
-        if not all(self.agrees(value(found[n]), value(own[n])) for n in first):
-            own |= run([n for n in numbers if n not in own], {})
-        return found | own

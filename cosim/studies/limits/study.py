@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from cosim.errors import BadInput, plain
@@ -123,7 +122,7 @@ def study(
             cost = efforts.others if number else efforts.own
             # What a seed has found on the scene's own rig is where its searches of others begin.
             for turn in range(1 + (min(1, efforts.again) if number else efforts.again)):
-                known, asked = own[turn] if number else _NOTHING, again if turn else first
+                known, asked = own[turn] if number else {}, again if turn else first
                 both = work.searched(asked, cost, [seed, number, turn], known)
                 points = work.points(both, turn, own=not number and not turn)
                 if turn:
@@ -133,9 +132,6 @@ def study(
                 if not number:
                     own.append(both)
     return Study(scene, changes, found, repeats)
-
-
-_NOTHING: Mapping[str, Candidates] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -158,31 +154,17 @@ class _Work:
         """The candidates of each change by name, from those that are ``known``: first each by
         itself, then with the best of all others, so that what helps one is tried on all, and a
         limit that is eased never lowers what is found."""
-        found = self._candidates(changes, efforts[0], [*seed, 0], known)
-        words = ", with what helps others"
-        for turn, effort in enumerate(efforts[1:], 1):
-            found = self._candidates(changes, effort, [*seed, turn], found, found, words)
-        return found
-
-    def _candidates(
-        self,
-        changes: Sequence[Change],
-        effort: Effort,
-        seed: list[int],
-        known: Mapping[str, Candidates],
-        others: Mapping[str, Candidates] = _NOTHING,
-        words: str = "",
-    ) -> dict[str, Candidates]:
-        """The candidates of each change by name, from its own that are ``known`` and the best of
-        those of all ``others``."""
-        found: dict[str, Candidates] = {}
-        for number, change in enumerate(changes):
-            warm = [self._warm(change, other, others) for other in changes if others]
-            machine, own = change.machine(self.bench.scene), known.get(change.name)
-            seeds = [*seed, number]
-            search = partial(searched, self.bench, machine, effort, seeds, own, warm)
-            found[change.name] = self.store.once(f"{change.name} {seeds}", search)
-            self.told(f"rig {self.rig}{words}: {change.name}")
+        found = dict(known)
+        for turn, effort in enumerate(efforts):
+            before, found = found, dict[str, Candidates]()
+            for number, change in enumerate(changes):
+                warm = [self._warm(change, other, before) for other in changes if turn]
+                machine, own = change.machine(self.bench.scene), before.get(change.name)
+                seeds = [*seed, turn, number]
+                search = partial(searched, self.bench, machine, effort, seeds, own, warm)
+                found[change.name] = self.store.once(f"{change.name} {seeds}", search)
+                words = ", with what helps others" if turn else ""
+                self.told(f"rig {self.rig}{words}: {change.name}")
         return found
 
     def _warm(self, change: Change, other: Change, found: Mapping[str, Candidates]) -> Candidates:

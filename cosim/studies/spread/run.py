@@ -1,8 +1,9 @@
 """Runs a scene with each knob turned a little, on the cheapest circuit that suffices."""
 
 import os
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
+from itertools import count
 from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
@@ -102,29 +103,25 @@ def spread(
     """
     scene = load(scene, overrides)
     every: list[Settings] = [{}, *turns(scene)]
-    done = 0
+    fidelity, steps, found = Fidelity.of(scene), count(1), dict[int, Turned]()
 
-    def run(numbers: Collection[int], circuit: Mapping[str, str | bool]) -> dict[int, Turned]:
-        nonlocal done
+    def run(numbers: Iterable[int], circuit: Mapping[str, str | bool]) -> None:
         points = {n: {**every[n], **circuit} for n in numbers}
         model = str(circuit.get("circuit.model", scene.circuit.model))
-        found: dict[int, Turned] = {}
         for n, outcome in bench.run(points.items()):
             value = None if outcome.failure else outcome.numbers["v_average"]
             found[n] = Turned(every[n], model, value, outcome.failure)
-            done += 1
-            progress(done)
-        return found
-
-    def ends(found: dict[int, Turned]) -> set[int]:
-        """The scene itself, the slowest and the fastest."""
-        known = [n for n, one in found.items() if one.v_average is not None]
-        return {0, *(end(known, key=lambda n: _speed(found[n])) for end in (min, max) if known)}
+            progress(next(steps))
 
     with Evaluator(scene, whole_periods=True, workers=workers) as bench:
-        found = Fidelity.of(scene).run(
-            range(len(every)), run, ends, lambda turned: turned.v_average
-        )
+        run(range(len(every)), fidelity.simple or {})
+        if fidelity.simple is not None:
+            simple, known = dict(found), [n for n, one in found.items() if not one.failure]
+            ends = (end(known, key=lambda n: _speed(simple[n])) for end in (min, max) if known)
+            first = {0, *ends}
+            run(first, {})
+            if not all(fidelity.agrees(simple[n].v_average, found[n].v_average) for n in first):
+                run([n for n in range(len(every)) if n not in first], {})
     made = Spread([found[n] for n in sorted(found)])
     if not made.known:
         raise SimulationFailed(f"No setting could be run; the first one: {made.runs[0].failure}")
