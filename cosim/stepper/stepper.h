@@ -31,9 +31,11 @@ enum {
 #include "parameters.def"
 #undef RIG
 #undef OWN
-    N_ALL,
-    N_OWN = N_ALL - N_RIG
+    N_ALL
 };
+
+enum { N_OWN = 7 }; /* as a number, which the build reads: the lengths of a structure's arrays */
+_Static_assert(N_OWN == N_ALL - N_RIG, "parameters.def has another number of OWN");
 
 /* What is computed at each sample. */
 enum { Z_SURFACE, V_SURFACE, Z_PART, V_PART, Z_PLATE, N_OUTPUTS };

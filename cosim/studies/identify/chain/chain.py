@@ -3,12 +3,10 @@ trials, and the fit of each trial's own parameters. See ``refine.h`` and
 ``cosim/stepper/stepper.h``.
 """
 
-import ctypes
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from ctypes import POINTER, Structure, addressof, byref, c_double, c_int64, c_longlong, c_void_p
+from ctypes import addressof, byref, c_longlong
 from dataclasses import dataclass, field
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,42 +15,13 @@ import numpy.typing as npt
 from cosim.arrays import Array
 from cosim.errors import SimulationFailed
 from cosim.stepper.stepper import LANES, OWN
-from cosim.toolchain.libraries import library
+from cosim.toolchain.libraries import library, structures
 
 OUTPUTS = ("z_surface", "v_surface", "z_part", "v_part", "z_plate")
 """What is simulated, m and m/s."""
 
 
-class _Schedule(Structure):
-    _fields_ = (
-        ("steps", c_int64),
-        *((name, c_void_p) for name in ("edges", "sample", "current")),
-    )
-
-
-class _Trial(Structure):
-    _fields_ = (
-        *(("schedule", _Schedule), ("samples", c_int64)),
-        *(("measured", c_void_p * len(OUTPUTS)), ("weight", c_double * len(OUTPUTS))),
-        *(("differenced", c_int64 * len(OUTPUTS)), ("rate", c_void_p)),
-        *((name, c_double * len(OWN)) for name in ("low", "high", "scale")),
-    )
-
-
-_JOB = np.dtype(
-    [*((name, np.uintp) for name in ("trial", "rig", "own", "cost")), ("rounds", np.int64)]
-)
-
-
-@cache
-def compiled() -> Any:
-    """The functions of ``refine.c``."""
-    found = library("stepper")
-    found.chain_work.restype = found.chain_look.restype = found.chain_sizes.restype = c_int64
-    found.chain_work.argtypes = (c_void_p, c_int64, POINTER(c_longlong))
-    found.chain_look.argtypes = (c_void_p, c_void_p, c_void_p, c_void_p)
-    found.chain_sizes.argtypes = (c_int64,)
-    return found
+_Trial, _Job = (structures("stepper")[name] for name in ("Trial", "Job"))
 
 
 @dataclass(eq=False)
@@ -75,7 +44,7 @@ class Target:
     scale: Array
     step: float
     current: Array | None = None
-    _state: _Trial = field(init=False)
+    _state: Any = field(init=False)
     _kept: list[npt.NDArray[Any]] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -111,7 +80,7 @@ class Target:
             state.weight[k] = self.weights.get(name, 0.0)
             state.differenced[k] = int(name in self.differenced)
         for name in ("low", "high", "scale"):
-            setattr(state, name, (c_double * len(OWN))(*getattr(self, name)))
+            getattr(state, name)[:] = getattr(self, name).tolist()
         self._state = state
 
     @property
@@ -157,14 +126,14 @@ def _work(
     targets: Sequence[Target], rigs: Array, own: Array, cost: Array, rounds: int, workers: int
 ) -> None:
     n, done = len(targets), c_longlong(0)
-    jobs = np.zeros(n, _JOB)
+    jobs = np.zeros(n, _Job)
     jobs["trial"], jobs["rounds"] = [target.address for target in targets], rounds
     for name, each in (("rig", rigs), ("own", own), ("cost", cost)):
         # The address of each row: the compiled code works in place.
         jobs[name] = each.ctypes.data + np.arange(n) * each.strides[0]
 
     def work(_: int) -> int:
-        return compiled().chain_work(jobs.ctypes.data, n, byref(done))
+        return library("stepper").chain_work(jobs.ctypes.data, n, byref(done))
 
     threads = range(min(workers, n))
     if len(threads) == 1:
@@ -192,15 +161,9 @@ def simulate(target: Target, rigs: Array, own: Array) -> tuple[dict[str, Array],
         rows = np.minimum(np.arange(start, start + LANES), n - 1)
         both = np.ascontiguousarray(np.concatenate([rigs[rows], own[rows]], axis=1).T)
         pointers = (both.ctypes.data, out.ctypes.data, apart.ctypes.data)
-        count = compiled().chain_look(target.address, *pointers)
+        count = library("stepper").chain_look(target.address, *pointers)
         used = slice(start, min(start + LANES, n))
         k = used.stop - used.start
         found[used] = out.reshape(samples, len(OUTPUTS), LANES).transpose(2, 1, 0)[:k]
         residuals[used] = apart[:count].T[:k]
     return {name: found[:, k] for k, name in enumerate(OUTPUTS)}, residuals
-
-
-def sizes() -> tuple[tuple[int, int], tuple[int, int]]:
-    """Bytes of the two structures, here and in the compiled code."""
-    there = compiled().chain_sizes
-    return (ctypes.sizeof(_Trial), there(0)), (_JOB.itemsize, there(1))

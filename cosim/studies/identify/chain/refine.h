@@ -7,8 +7,6 @@
 
 #include <stdatomic.h>
 
-/* chain.py has the structures with the same fields in the same order. */
-
 typedef struct {
     Schedule schedule;
     int64_t samples;
