@@ -17,10 +17,9 @@ not have, near a border between two of them; and chaos that dies out before the 
 """
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from dataclasses import replace
-from math import isinf
 from threading import Event
 from typing import Any
 
@@ -79,6 +78,27 @@ class _Stopped(CosimError):
     """Nobody waits for this run any more."""
 
 
+Progress = Callable[[float], None]
+
+
+@contextmanager
+def _beside(count: int) -> Iterator[tuple[ThreadPoolExecutor, Progress]]:
+    """Threads for ``count`` other runs at once, and their progress, which ends them where the block
+    does not end well, also while only they run."""
+    stopped = Event()
+
+    def going(_: float) -> None:
+        if stopped.is_set():
+            raise _Stopped
+
+    with ThreadPoolExecutor(count) as threads:
+        try:
+            yield threads, going
+        except BaseException:
+            stopped.set()
+            raise
+
+
 def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Result:
     """The result of ``run``, which runs ``scene``, with what is told of its numbers: the error of
     v_average, m/s, and the kind of motion.
@@ -86,36 +106,24 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
     ``strict`` tells the error by two finer runs and three more starts, on the scene's own circuit,
     which costs ten times as much. Raises what ``run`` raises.
     """
-    stopped = Event()
-
-    def going(_: float) -> None:
-        if stopped.is_set():
-            raise _Stopped
-
-    def mean(of: Scene | None) -> float | None:
-        with suppress(CosimError):
-            if of is not None:
-                return one_run(few_rows(of), going, alone=True).summary["v_average"]
-        return None
-
     load(3)
-    with ThreadPoolExecutor(2) as threads:
-        try:
-            others: list[Future[float | None]] = []
-            if strict:
-                finer = [_steps(scene, 1.0 / STRICT**k) for k in (1, 2)]
-                others += [threads.submit(mean, each) for each in finer]
-                starts = [_started(scene, quarter / 4.0) for quarter in (1, 2, 3)]
-                others += [threads.submit(mean, start) for start in starts]
-            else:
-                others.append(threads.submit(mean, _steps(scene, COARSER)))
-            kind = threads.submit(motion, scene, going)
-            result = run()
-            own, told = result.summary["v_average"], [other.result() for other in others]
-            found: dict[str, Any] = kind.result()
-        except BaseException:  # also while only the others run
-            stopped.set()
-            raise
+    with _beside(2) as (threads, going):
+
+        def mean(of: Scene | None) -> float | None:
+            with suppress(CosimError):
+                if of is not None:
+                    return one_run(few_rows(of), going, alone=True).summary["v_average"]
+            return None
+
+        asked = [_steps(scene, COARSER)]
+        if strict:
+            asked = [_steps(scene, 1.0 / STRICT**k) for k in (1, 2)]
+            asked += [_started(scene, ahead) for ahead in AHEAD]
+        others = [threads.submit(mean, each) for each in asked]
+        kind = threads.submit(motion, scene, going)
+        result = run()
+        own, told = result.summary["v_average"], [other.result() for other in others]
+        found: dict[str, Any] = kind.result()
     if strict:
         fine, finest, *from_elsewhere = told
         error = None if fine is None or finest is None else max(abs(own - finest), abs(own - fine))
@@ -133,24 +141,14 @@ def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
     mean is from that of a run with all steps COARSER times as long; nothing where that one fails.
     Raises what ``run`` raises.
     """
-    stopped = Event()
-
-    def going(_: float) -> None:
-        if stopped.is_set():
-            raise _Stopped
-
     longer = min(scene.coupling.macro_step * COARSER, 1e-2)
     coarse = _longer(scene, COARSER).having(coupling={"macro_step": longer})
     told: dict[str, Any] = {}
-    with ThreadPoolExecutor(1) as threads:
+    with _beside(1) as (threads, going):
         other = threads.submit(one_run, few_rows(coarse), going, alone=True)
-        try:
-            result = run()
-            with suppress(CosimError):
-                told = other.result().summary
-        except BaseException:  # also while only the other runs
-            stopped.set()
-            raise
+        result = run()
+        with suppress(CosimError):
+            told = other.result().summary
     errors = {
         f"{name}_error": abs(value - told[name])
         for name, value in result.summary.items()
@@ -159,7 +157,7 @@ def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
     return replace(result, summary=result.summary | errors)
 
 
-def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
+def motion(scene: Scene, progress: Progress) -> dict[str, Any]:
     """The kind of motion of a scene, by the keys of a summary; empty where it is not known: nothing
     repeats, there is no simpler circuit, or too few periods are run.
 
@@ -171,15 +169,11 @@ def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
     """
     length = scene.period
     simple = Fidelity.of(scene).simple
-    if (
-        (scene.rung.ngspice and simple is None)
-        or not scene.rung.driven
-        or isinf(length)
-        or normal_force(scene) is not None
-    ):
-        return {}
+    solvable = not scene.rung.ngspice or simple is not None
+    steady = scene.rung.driven and normal_force(scene) is None
     longest = LONGEST * scene.run.duration
-    if PERIODS * length > longest:
+    # Where nothing drives the scene its period is infinite.
+    if not (solvable and steady) or PERIODS * length > longest:
         return {}
     periods = max(PERIODS, round(min(LONG, longest) / length))
     averaged = max(1, round((scene.run.duration - scene.run.settle) / length))
@@ -188,8 +182,10 @@ def motion(scene: Scene, progress: Callable[[float], None]) -> dict[str, Any]:
         end = round(share * periods) * length
         times = {"duration": end, "settle": end / 2.0, "output_step": length}
         base = _looser(changed(scene, simple or {}, "limited")).having(run=times)
-        starts = (base, _aside(base), *(_started(base, ahead) for ahead in AHEAD))
-        ways = (_ways(start, progress) for start in starts if start is not None)
+        aside = base.having(mechanics={"initial_lift": base.mechanics.initial_lift + ASIDE})
+        starts = (base, aside, *(_started(base, ahead) for ahead in AHEAD))
+        runs = (simulate_here(start, progress) for start in starts if start is not None)
+        ways = (np.diff(run.columns["z_part"]) for run in runs)
         try:
             found = _kind(ways, length, averaged, share >= 1.0)
         except CosimError:
@@ -242,11 +238,6 @@ def _mean(way: Array) -> float:
     return float(way[len(way) // 2 :].mean())
 
 
-def _ways(scene: Scene, progress: Callable[[float], None]) -> Array:
-    """How far the part goes in each period, m."""
-    return np.diff(simulate_here(scene, progress).columns["z_part"])
-
-
 def _stretches(way: Array, count: int) -> Array:
     """The mean way over each ``count`` periods in a row of its second half, at most over all."""
     way = way[len(way) // 2 :]
@@ -293,10 +284,6 @@ def _longer(scene: Scene, longer: float) -> Scene:
 
 def _looser(scene: Scene) -> Scene:
     return scene.having(mechanics={"tolerance": max(scene.mechanics.tolerance, LOOSER)})
-
-
-def _aside(scene: Scene) -> Scene:
-    return scene.having(mechanics={"initial_lift": scene.mechanics.initial_lift + ASIDE})
 
 
 def _started(scene: Scene, ahead: float) -> Scene | None:
