@@ -7,6 +7,7 @@ prepares the command and takes the log away in blocks.
 import ctypes
 from collections.abc import Callable
 from ctypes import c_int64
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -105,7 +106,7 @@ class Lead:
             motional=motional,
             log=self._block.ctypes.data,
             log_rows=_POINTS,
-            attend=callback(self._attend, self._fail),
+            attend=callback(self._attend, engine().fail),
         )
         state = self.state
         named = scene.renamed
@@ -117,7 +118,7 @@ class Lead:
         segment = state.segment
         segment.c[0], segment.c[1], segment.end = emf, slope, -np.inf
         self._ahead = Ahead(state.drive, command, self._duration, lambda: state.time)
-        state.drive.refill = callback(self._ahead.refill, self._fail)
+        state.drive.refill = callback(self._ahead.refill, engine().fail)
         self._ahead.refill()
         state.jump = self._ahead.pieces[0].jump
 
@@ -130,14 +131,7 @@ class Lead:
             self._attend()
         if state.status == FMU_FAILED:
             raise self._recorder.failure()
-        if state.status == NOT_FINITE:
-            raise SimulationFailed(
-                f"The circuit left the range of numbers at t = {state.told:.6g} s."
-            )
-        if state.status == UNKNOWN_SOURCE:
-            name = state.source.decode().lower()
-            raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
-        finished(self._time, self._duration)
+        finished(state, self._time, self._duration)
 
     @property
     def steps(self) -> int:
@@ -155,12 +149,9 @@ class Lead:
 
     def use(self, macro_point: Callable[[], None]) -> None:
         """Ask ``macro_point`` at each macro point from now on."""
-        called = callback(macro_point, self._fail)
+        called = callback(macro_point, engine().fail)
         self._macro_point = macro_point, called  # which the structure does not keep
         self.state.macro_point = ctypes.cast(called, ctypes.c_void_p).value
-
-    def _fail(self, failure: BaseException) -> None:
-        engine().fail(failure)
 
     # What ngspice's engine asks for (see cosim.circuit.ngspice.Leader).
 
@@ -201,8 +192,14 @@ def engine() -> ngspice.Engine:
     return ngspice.engine(ngspice.Callbacks(*map(address, names)))
 
 
-def finished(reached: float, duration: float) -> None:
-    """Raise SimulationFailed where ngspice has only ``reached`` that time (s)."""
+def finished(state: Any, reached: float, duration: float) -> None:
+    """Raise SimulationFailed where ngspice has only ``reached`` that time (s), or the ``state`` of
+    the loop tells what is wrong with the circuit."""
+    if state.status == NOT_FINITE:
+        raise SimulationFailed(f"The circuit left the range of numbers at t = {state.told:.6g} s.")
+    if state.status == UNKNOWN_SOURCE:
+        name = state.source.decode().lower()
+        raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
     if reached < duration - max(1e-9 * duration, ROUNDING):
         told = f"ngspice stopped at t = {reached:.6g} s of {duration:g} s: {engine().said()}."
         if reached > 0.0:  # else it has not read the netlist, or found no operating point

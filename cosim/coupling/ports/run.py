@@ -9,14 +9,7 @@ import numpy as np
 
 from cosim.circuit import ngspice
 from cosim.coupling.loop.lead import after_jump, engine, finished
-from cosim.coupling.loop.structures import (
-    FMU_FAILED,
-    NO_AGREEMENT,
-    NOT_FINITE,
-    UNKNOWN_SOURCE,
-    callback,
-    loop,
-)
+from cosim.coupling.loop.structures import FMU_FAILED, NO_AGREEMENT, callback, loop
 from cosim.coupling.ports.plan import Plan
 from cosim.coupling.ports.structures import PortsState, Pulse, Source, StrangerState, Through
 from cosim.drive.ahead import Ahead
@@ -96,11 +89,11 @@ class Run:
             log=self._blocks[0].ctypes.data,
             points=self._blocks[1].ctypes.data,
             log_rows=_POINTS,
-            attend=callback(self._attend_and_judge, self._fail),
+            attend=callback(self._attend_and_judge, engine().fail),
         )
         state = self.state
         self._ahead = Ahead(state.drive, command(scene), scene.run.duration, lambda: state.origin)
-        state.drive.refill = callback(self._ahead.refill, self._fail)
+        state.drive.refill = callback(self._ahead.refill, engine().fail)
         self._ahead.refill()
 
     def run(self) -> None:
@@ -115,20 +108,12 @@ class Run:
         if state.status == FMU_FAILED:
             raise self._fmu_failure()
         self._refuse_what_is_no_number()
-        if state.status == NOT_FINITE:
-            raise SimulationFailed(
-                f"The circuit left the range of numbers at t = {state.told:.6g} s."
-            )
-        if state.status == UNKNOWN_SOURCE:
-            name = state.source.decode().lower()
-            raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
         if state.status == NO_AGREEMENT:
             raise SimulationFailed(
                 f"Circuit and FMUs do not agree at t = {state.told:.6g} s, however often the step "
                 "is repeated; a smaller circuit.max_step may help."
             )
-        reached = float(self.log.column()[-1]) if len(self.log) else 0.0
-        finished(reached, duration)
+        finished(state, float(self.log.column()[-1]) if len(self.log) else 0.0, duration)
 
     @property
     def steps(self) -> int:
@@ -185,9 +170,6 @@ class Run:
 
     def stop(self) -> None:
         self.state.stopped = 1
-
-    def _fail(self, failure: BaseException) -> None:
-        engine().fail(failure)
 
     def _attend(self) -> None:
         """Take the logs away."""
