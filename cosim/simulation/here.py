@@ -28,10 +28,9 @@ def simulate_here(
 
         return Result(scene, *joined(few_rows(scene) if alone else scene, progress))
     if scene.surface_is_given:
-        waveforms, moved = move_part(scene)
-        summary = numbers(scene, moved, Driven(None, "exact"), 0, began)
+        (waveforms, moved), driven, force = move_part(scene), Driven(None, "exact"), None
+        summary = numbers(scene, moved, driven, 0, began)
         progress(scene.run.duration)
-        force, driven = None, Driven(None, "exact")
     else:
         with closing(Mechanics(scene, fmi_version)) as mechanics:
             recorder = Recorder(scene, mechanics, progress)
@@ -44,16 +43,12 @@ def simulate_here(
         return Result(scene, {}, summary)
     told = remarks(scene, waveforms, summary, force)
     told["notes"] = [*driven.notes, *told["notes"]]
-    return Result(scene, waveforms, summary | told, {**UNITS, **_units(scene)})
+    units = dict(UNITS)
+    if scene.circuit.save:
+        from cosim.circuit.joined import unit
 
-
-def _units(scene: Scene) -> dict[str, str]:
-    """Of what is saved of a netlist of the user's own."""
-    if not scene.circuit.save:
-        return {}
-    from cosim.circuit.joined import unit
-
-    return {name: unit(name) for name in scene.circuit.save}
+        units |= {name: unit(name) for name in scene.circuit.save}
+    return Result(scene, waveforms, summary | told, units)
 
 
 def few_rows(scene: Scene) -> Scene:

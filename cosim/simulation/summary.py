@@ -21,8 +21,11 @@ _RESOLVED = 1e-15
 """J: below this the account of a rig at rest is what the solver's tolerances leave."""
 
 
-def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[str, Any]:
-    """Averages, extremes and counts after ``run.settle``; energies over the whole run. SI.
+def numbers(
+    scene: Scene, motion: Motion, driven: Driven, steps: int, began: float
+) -> dict[str, Any]:
+    """The summary but for its notes: averages, extremes and counts after ``run.settle``; energies
+    over the whole run. SI. ``steps`` are those of the FMU; the run began at ``began`` on the clock.
 
     Where two surfaces move by themselves, extremes and limits are those of the first, counts and
     energies those of both.
@@ -33,6 +36,7 @@ def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[
     in the last row: with no ``impacts`` besides, it tells a ram that rests there from a free one.
     """
     run, totals, before, extremes = scene.run, motion.totals, motion.at_settle, motion.extremes
+    electric = driven.electric
     span = run.duration - run.settle
     ends = (totals["z_part"] - before["z_part"]) / span
     v_average = ends if motion.slope is None else motion.slope
@@ -65,7 +69,16 @@ def summarise(scene: Scene, motion: Motion, electric: Electrics | None) -> dict[
         # A rigid wall holds the ram within rounding.
         result["at_wall"] = int(abs(motion.ram) >= scene.mechanics.travel * (1.0 - 1e-12))
     result |= _energies(scene, totals, electric) | slips(scene, result)
-    return result if electric is None else result | heats(scene, result["energy_copper"])
+    if electric is not None:
+        result |= heats(scene, result["energy_copper"])
+    return result | {
+        "circuit_steps": driven.circuit_steps,
+        "circuit_rejected": driven.circuit_rejected,
+        "fmu_steps": steps,
+        "wall_time": time.perf_counter() - began,
+        "method": driven.method,
+        "versions": {**versions(), **driven.versions},
+    }
 
 
 def budget(scene: Scene) -> dict[str, tuple[float, float]]:
@@ -166,18 +179,3 @@ def _extremes(scene: Scene, recorder: Recorder) -> dict[str, float]:
     if scene.mechanics.contact == "rigid":  # an impact changes velocities in no time
         found |= {"a_surface_max": math.inf, "a_surface_min": -math.inf}
     return found
-
-
-def numbers(
-    scene: Scene, motion: Motion, driven: Driven, steps: int, began: float
-) -> dict[str, Any]:
-    """The summary but for its notes. ``steps`` are those of the FMU; the run began at ``began`` on
-    the clock."""
-    return summarise(scene, motion, driven.electric) | {
-        "circuit_steps": driven.circuit_steps,
-        "circuit_rejected": driven.circuit_rejected,
-        "fmu_steps": steps,
-        "wall_time": time.perf_counter() - began,
-        "method": driven.method,
-        "versions": {**versions(), **driven.versions},
-    }

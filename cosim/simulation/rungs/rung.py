@@ -95,7 +95,11 @@ def average_slope(run: Run, time: Array, heights: Array) -> float | None:
 
 
 def drive(scene: Scene, recorder: Recorder) -> Driven:
-    """What the scene's rung does."""
+    """What the scene's rung does; without a coil the mechanics move by themselves."""
+    if not scene.rung.driven:
+        nothing = np.zeros((1, 1))
+        recorder.follow(np.array([scene.run.duration]), nothing, nothing)
+        return Driven(None)
     name = "spice" if scene.rung.ngspice else scene.circuit.model
     return import_module(f"{__package__}.{name}").drive(scene, recorder)
 
