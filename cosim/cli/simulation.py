@@ -130,10 +130,10 @@ def _build(out: Path = Path(_FMU)) -> None:
         print(path)
 
 
-def _check() -> int:
+def _check() -> bool:
     from cosim.mechanics import package
 
-    return 1 if package.check() else 0
+    return bool(package.check())
 
 
 def _netlist(

@@ -75,8 +75,13 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
         rows = DictReader(reader.read(results / "compare.csv", LARGEST).decode().splitlines())
         units = {row.get("name"): row.get("unit") or "" for row in rows}
         with _whole_results(results / "compare.json") as told:
-            plainly = [one for one in told.items() if not isinstance(one[1], dict | list)]
-            lines = [_told(*one, units.get(one[0], "")) for one in plainly]
+            lines = []
+            for name, value in told.items():
+                unit, scale = bench_unit(units.get(name, ""))
+                if unit and not (value is None or isinstance(value, dict | list)):
+                    lines.append(f"{label(name, unit)}: {value * scale:.6g}")
+                elif not isinstance(value, dict | list):
+                    lines.append(f"{name}: {value}")
             shown["words"] = "\n".join([*lines, *map(str, told.get("notes", []))])
             shown["title"] = f"{told.get('run')} against {told.get('trial')}"
         return shown, runs
@@ -179,13 +184,6 @@ def _comparison(path: Path) -> tuple[dict[str, Any], list[Run]]:
     runs = [[*found.values()]]
     about = "heights from the first that was measured" if "m" in units.values() else ""
     return {"about": about, "signals": _signals(units, runs)}, runs
-
-
-def _told(name: str, value: Any, si: str) -> str:
-    if not si or value is None:
-        return f"{name}: {value}"
-    unit, scale = bench_unit(si)
-    return f"{label(name, unit)}: {value * scale:.6g}"
 
 
 @contextmanager

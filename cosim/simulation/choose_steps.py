@@ -51,9 +51,10 @@ def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> R
     """
     seconds = 0.0
 
-    def timed(*settings: Any) -> Result:
+    def timed(level: tuple[float, float], coupling: dict[str, Any]) -> Result:
         nonlocal seconds
-        result = run(_with(scene, *settings))
+        steps = {"reltol": level[0], "max_step": level[1]}
+        result = run(scene.having(circuit=steps, coupling=coupling))
         seconds += result.summary["wall_time"]
         return result
 
@@ -69,11 +70,8 @@ def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> R
         if off <= scene.coupling.tolerance and found.summary["wall_time"] < least:
             best, error, least = found, off, found.summary["wall_time"]
     circuit, coupling = best.scene.circuit, best.scene.coupling
-    taken: dict[str, Any] = {
-        "coupling.method": coupling.method,
-        "circuit.reltol": circuit.reltol,
-        "circuit.max_step": circuit.max_step,
-    }
+    taken: dict[str, Any] = {"coupling.method": coupling.method}
+    taken |= {"circuit.reltol": circuit.reltol, "circuit.max_step": circuit.max_step}
     if coupling.method != "step-locked":
         taken["coupling.macro_step"] = coupling.macro_step
     found = {"wall_time": seconds, "error_estimate": error, "coupling_taken": taken}
@@ -113,8 +111,3 @@ def difference(result: Result, truth: Result) -> float:
     path, true = result.columns["z_part"], truth.columns["z_part"]
     off, span = float(np.abs(path - true).max()), float(np.ptp(true))
     return off / span if span else (0.0 if off == 0.0 else np.inf)
-
-
-def _with(scene: Scene, level: tuple[float, float], coupling: dict[str, Any]) -> Scene:
-    reltol, max_step = level
-    return scene.having(circuit={"reltol": reltol, "max_step": max_step}, coupling=coupling)

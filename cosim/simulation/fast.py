@@ -135,15 +135,12 @@ def _numbers(
     span, length = run.duration - run.settle, scene.period
     whole = all(map(math.isfinite, sums.values()))
     v_average = (sums["x_end"] - sums["x_settle"]) / span if whole else math.nan
-    share = {
-        name: _clear(sums[name] / span) for name in ("swing_high", "swing_low", "current_limit")
-    }
-    if not scene.rung.has_limits:
-        share = {}
+    limits = ("swing_high", "swing_low", "current_limit") if scene.rung.has_limits else ()
+    # Rounding leaves something where a limit is touched.
+    share = {name: part if (part := sums[name] / span) > 1e-9 else 0.0 for name in limits}
     held = 0.5 * scene.coil.inductance * sums["i_end"] ** 2
     lost = {name: coils * sums[name] for name in ("copper", "friction", "impact", "damping")}
-    moved = math.isfinite(seen[0])
-    high, low = (seen[0], -seen[1]) if moved else (None, None)
+    high, low = (seen[0], -seen[1]) if math.isfinite(seen[0]) else (None, None)
     camera = {"a_camera_max": high, "a_camera_min": low}
     return {
         "v_average": v_average,
@@ -165,11 +162,6 @@ def _numbers(
         "method": "fast",
         "versions": versions(),
     }
-
-
-def _clear(share: float) -> float:
-    """A share without what rounding leaves where a limit is touched."""
-    return share if share > 1e-9 else 0.0
 
 
 def _waveforms(scene: Scene, progress: Progress) -> dict[str, Array]:

@@ -50,15 +50,12 @@ def remarks(
         found += _part(scene, columns)
     told: dict[str, Any] = {"notes": found}
     if not scene.surface_is_given and scene.mechanics.free_ram:
-        told["rests"] = _rests(scene)
-        found += _told_of(told["rests"], scene.mechanics.travel)
+        rests, travel = rests_of(numbers_of(scene)), scene.mechanics.travel
+        if scene.mechanics.contact == "rigid":
+            rests = [max(-travel, min(travel, q)) for q in rests]
+        told["rests"] = rests
+        found += _told_of(rests, travel)
     return told
-
-
-def _rests(scene: Scene) -> list[float]:
-    found, travel = rests_of(numbers_of(scene)), scene.mechanics.travel
-    rigid = scene.mechanics.contact == "rigid"
-    return [max(-travel, min(travel, q)) for q in found] if rigid else found
 
 
 def _told_of(found: list[float], travel: float) -> Iterator[str]:

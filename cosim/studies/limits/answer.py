@@ -206,20 +206,17 @@ def _share(gain: Gain) -> str:
 
 
 def _slips(study: Study) -> str:
-    (up, rising), (down, _) = (
-        [_over([abs(slips[way][end]) for slips in study.slips]) for end in (0, 1)]
-        for way in ("up", "down")
-    )
+    told = []
+    for way, end in (("up", 0), ("up", 1), ("down", 0)):
+        values = [abs(slips[way][end]) for slips in study.slips]
+        over = f" ({span(values)} over the rigs)" if len(values) > 1 else ""
+        told.append(f"{values[0]:.0f}{over}")
+    up, rising, down = told
     return (
         f"While the part moves up it slips where the surface accelerates downwards at more than "
         f"{up} m/s² or upwards at more than {rising}; while it moves down, downwards at more than "
         f"{down}. A camera averages over 4 ms, so it reads less than the peak that makes it slip."
     )
-
-
-def _over(values: Sequence[float]) -> str:
-    """The own rig's value and, of several rigs, the range."""
-    return f"{values[0]:.0f}" + (f" ({span(values)} over the rigs)" if len(values) > 1 else "")
 
 
 def _warmth(study: Study) -> str:

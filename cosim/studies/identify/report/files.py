@@ -1,6 +1,5 @@
 """The files of an identification, and its words."""
 
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +62,10 @@ def write(folder: Path, found: Solved) -> None:
         [{name: row.get(name) for name in names} for row in rows],
         [*NOTES, *_priors(found), *findings(numbers)],
         tables(numbers),
-        {f"-{name}": partial(_draw, name, found) for name in figures.FIGURES},
+        {
+            f"-{name}": lambda path, draw=draw: draw(found).write(path)
+            for name, draw in figures.FIGURES.items()
+        },
     ).save(folder)
     write_json(folder / "identify.json", numbers)
     words = f"The rig identified from {len(found.trials)} trials"
@@ -78,10 +80,6 @@ def write(folder: Path, found: Solved) -> None:
             told = f"Trial {trial.label} on the identified rig, which does not reproduce it"
         label = f"{int(trial.label):02d}" if trial.label.isdecimal() else trial.label
         write_text(folder / f"trial-{label}.toml", scene_file(told, rig | settings))
-
-
-def _draw(name: str, found: Solved, path: Path) -> None:
-    figures.FIGURES[name](found).write(path)
 
 
 def _priors(found: Solved) -> list[str]:
@@ -179,8 +177,9 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
     rig, whole = numbers["rig"], _whole(numbers["overall"]) | {"floor": "", "late": ""}
     tables: dict[str, list[Row]] = {
         "The rig": [
-            {"key": _with_unit(one["key"]), "value": rig[one["key"]], "verdict": one["words"]}
+            {"key": label(key, numeric_key(key).unit), "value": rig[key], "verdict": one["words"]}
             for one in numbers["verdicts"]
+            for key in (one["key"],)
         ],
         "Laws of the suspension": [
             {
@@ -216,10 +215,6 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
             {name: "-" if row.get(name) is None else row[name] for name in names} for row in checks
         ]
     return tables
-
-
-def _with_unit(name: str) -> str:
-    return label(name, numeric_key(name).unit)
 
 
 def _told(row: Row) -> Row:
