@@ -3,7 +3,6 @@
 Both go through fmpy's own functions, which check every return code.
 """
 
-from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterable
 from contextlib import suppress
@@ -12,7 +11,7 @@ from ctypes import byref, c_double, c_uint, c_void_p, cast
 from functools import cache, cached_property, partial
 from itertools import count
 from threading import Lock
-from typing import Any, ClassVar
+from typing import Any
 from weakref import WeakValueDictionary
 
 import fmpy
@@ -56,38 +55,65 @@ def unit(variable: Any) -> str:
     return variable.unit or (variable.declaredType and variable.declaredType.unit) or "1"
 
 
-class Interface(ABC):
+SLAVES: dict[int, Any] = {2: fmi2.FMU2Slave, 3: fmi3.FMU3Slave}
+"""fmpy's class of an FMU for co-simulation, by the version of FMI."""
+
+_STEP_ENDS: dict[int, tuple[Any, ...]] = {
+    2: (1,),
+    3: (True, *(byref(fmi3.fmi3Boolean()) for _ in range(3)), byref(c_double())),
+}
+"""What a call of do_step ends with."""
+
+
+class Interface:
     """One instance of the FMU. Places and values are ctypes arrays of equal length."""
 
-    version: ClassVar[int]
-    """Of FMI."""
-    _slave: ClassVar[Any]
-    _step_ends: tuple[Any, ...]  # what a call of do_step ends with
-
-    def __init__(self, loaded: Any = None) -> None:
+    def __init__(self, version: int, loaded: Any = None) -> None:
         """Of an FMU that fmpy has ``loaded``; by default the project's own."""
+        self.version = version
+        """Of FMI."""
         self.messages: deque[str] = deque(maxlen=100)
         """What the FMU has said, the newest last."""
         self._running = False
-        self._fmu = copy(load(self.version) if loaded is None else loaded)
-        self._begin(new=True)
-        self._names = {name: names[self.version - 2] for name, names in _FUNCTIONS.items()}
+        self._fmu = copy(load(version) if loaded is None else loaded)
+        if version == 2:
+            callbacks = fmi2.fmi2CallbackFunctions()
+            callbacks.logger = _logger_2
+            callbacks.componentEnvironment = next(_number)
+            _said[callbacks.componentEnvironment] = self.messages
+            with suppress(OSError):  # fmpy has none for every machine
+                from fmpy.logging import addLoggerProxy
+
+                addLoggerProxy(byref(callbacks))
+            callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
+            callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
+            self._fmu.instantiate(callbacks=callbacks)
+        else:
+            self._logger = fmi3.fmi3LogMessageCallback(lambda *a: self.messages.append(_text(a[3])))
+            self._fmu.instantiate(logMessage=self._logger)
+        self._begin()
+        self._names = {name: names[version - 2] for name, names in _FUNCTIONS.items()}
         self._call = {
             name: partial(getattr(self._fmu, function), self._fmu.component)
             for name, function in self._names.items()
             if hasattr(self._fmu, function)  # a stranger may lack what it does not need
         }
 
-    @abstractmethod
-    def _begin(self, new: bool) -> None:
-        """Instantiate a new instance, and enter the initialisation."""
+    def _begin(self) -> None:
+        """Enter the initialisation."""
+        if self.version == 2:
+            self._fmu.setupExperiment()
+        self._fmu.enterInitializationMode()
 
-    @abstractmethod
-    def _exchange(self, name: str, places: Any, values: Any) -> None: ...
+    def _exchange(self, name: str, places: Any, values: Any) -> None:
+        count = (len(values),) if self.version == 3 else ()
+        self._call[name](places, len(places), values, *count)
 
-    @abstractmethod
     def derivative(self, unknown: Any, known: Any, result: Any) -> None:
         """Put d(outputs ``unknown``)/d(input ``known``) into ``result``; ``known`` is one place."""
+        n = len(unknown)
+        rest = (_ONE, 1, result, n) if self.version == 3 else (_ONE, result)
+        self._call["derivative"](unknown, n, known, 1, *rest)
 
     def places(self, names: Iterable[str]) -> Any:
         """The value references of variables, as an array for the calls."""
@@ -98,7 +124,7 @@ class Interface(ABC):
         self._fmu.reset()
         self._running = False
         self.messages.clear()
-        self._begin(new=False)
+        self._begin()
 
     @property
     def raw(self) -> Any:
@@ -112,7 +138,7 @@ class Interface(ABC):
 
     def do_step(self, time: float, step: float) -> None:
         """Advance by ``step`` from ``time``, s."""
-        self._call["do_step"](time, step, *self._step_ends)
+        self._call["do_step"](time, step, *_STEP_ENDS[self.version])
 
     def set_reals(self, places: Any, values: Any) -> None:
         self._exchange("set_reals", places, values)
@@ -152,57 +178,6 @@ class Interface(ABC):
         self._call["free_instance"]()
 
 
-class Fmi2(Interface):
-    """The FMU through FMI 2.0 for co-simulation."""
-
-    version = 2
-    _slave = fmi2.FMU2Slave
-    _step_ends = (1,)
-
-    def _begin(self, new: bool) -> None:
-        if new:
-            callbacks = fmi2.fmi2CallbackFunctions()
-            callbacks.logger = _logger_2
-            callbacks.componentEnvironment = next(_number)
-            _said[callbacks.componentEnvironment] = self.messages
-            with suppress(OSError):  # fmpy has none for every machine
-                from fmpy.logging import addLoggerProxy
-
-                addLoggerProxy(byref(callbacks))
-            callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
-            callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
-            self._fmu.instantiate(callbacks=callbacks)
-        self._fmu.setupExperiment()
-        self._fmu.enterInitializationMode()
-
-    def _exchange(self, name: str, places: Any, values: Any) -> None:
-        self._call[name](places, len(places), values)
-
-    def derivative(self, unknown: Any, known: Any, result: Any) -> None:
-        self._call["derivative"](unknown, len(unknown), known, 1, _ONE, result)
-
-
-class Fmi3(Interface):
-    """The FMU through FMI 3.0 for co-simulation."""
-
-    version = 3
-    _slave = fmi3.FMU3Slave
-    _step_ends = (True, *(byref(fmi3.fmi3Boolean()) for _ in range(3)), byref(c_double()))
-
-    def _begin(self, new: bool) -> None:
-        if new:
-            self._logger = fmi3.fmi3LogMessageCallback(lambda *a: self.messages.append(_text(a[3])))
-            self._fmu.instantiate(logMessage=self._logger)
-        self._fmu.enterInitializationMode()
-
-    def _exchange(self, name: str, places: Any, values: Any) -> None:
-        self._call[name](places, len(places), values, len(values))
-
-    def derivative(self, unknown: Any, known: Any, result: Any) -> None:
-        n = len(unknown)
-        self._call["derivative"](unknown, n, known, 1, _ONE, 1, result, n)
-
-
 _ONE = (c_double * 1)(1.0)
 _number = count(1)
 _said: WeakValueDictionary[int, deque[str]] = WeakValueDictionary()
@@ -222,8 +197,6 @@ def _logger_2(environment: int | None, *said: Any) -> None:
         _said[environment or newest].append(_text(said[-1]))
 
 
-INTERFACES: dict[int, type[Interface]] = {2: Fmi2, 3: Fmi3}
-
 _loading = Lock()
 _loaded: dict[int, Any] = {}
 
@@ -239,13 +212,13 @@ def load(version: int) -> Any:
             folder = str(unpacked(version))
             names = {"instanceName": "cosim", "guid": token(), "modelIdentifier": MODEL}
             try:
-                _loaded[version] = INTERFACES[version]._slave(**names, unzipDirectory=folder)
+                _loaded[version] = SLAVES[version](**names, unzipDirectory=folder)
             except Exception as error:
                 raise BadInput(f"The FMU in {folder} cannot be loaded: {error}") from error
         return _loaded[version]
 
 
-_idle: dict[int, list[Interface]] = {version: [] for version in INTERFACES}
+_idle: dict[int, list[Interface]] = {version: [] for version in SLAVES}
 
 
 def borrow(version: int) -> Interface:
@@ -254,7 +227,7 @@ def borrow(version: int) -> Interface:
     Making one takes as long as a tenth of a short run.
     """
     if not _idle[version]:
-        return INTERFACES[version]()
+        return Interface(version)
     kept = _idle[version].pop()
     kept.restart()
     return kept

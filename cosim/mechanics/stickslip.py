@@ -8,7 +8,6 @@ or, where the FMU has the current source too (circuit.model "limited"), the comm
 from collections import deque
 from collections.abc import Mapping
 from ctypes import c_double, c_int
-from dataclasses import dataclass
 from functools import cache
 from operator import attrgetter, is_
 from typing import Any
@@ -73,18 +72,11 @@ SUSPENSIONS = {"cubic": 1, "knee": 2, "repulsion": 3}
 """Choices of a scene, as the FMU numbers them."""
 
 
-@dataclass(frozen=True)
-class _Names:
-    """Names of variables: ``by_role`` all of them."""
-
-    ports: tuple[str, ...]
-    columns: tuple[str, ...]
-    totals: tuple[str, ...]
-    by_role: dict[str, tuple[str, ...]]
-
-
 @cache
-def _names(has_source: bool, two_surfaces: bool, changing_force: bool) -> _Names:
+def _names(
+    has_source: bool, two_surfaces: bool, changing_force: bool
+) -> tuple[tuple[str, ...], dict[str, tuple[str, ...]]]:
+    """Names of variables: of the inputs that are led from outside, and of all by their roles."""
     given = "command" if has_source else "current"
     step_outputs, sampled, totals = STEP_OUTPUTS, SAMPLE_OUTPUTS, TOTALS
     if has_source:
@@ -99,7 +91,7 @@ def _names(has_source: bool, two_surfaces: bool, changing_force: bool) -> _Names
         totals += ("stick_time_2",)
     inputs = (*ports, "normal_force") if changing_force else ports
     ramps = tuple(part for name in inputs for part in (name, f"{name}_slope"))
-    by_role = {
+    return ports, {
         "inputs": ramps,
         "held_inputs": (*ramps, "inputs_hold_for"),
         "step_outputs": step_outputs,
@@ -109,7 +101,6 @@ def _names(has_source: bool, two_surfaces: bool, changing_force: bool) -> _Names
         "counters": COUNTERS,
         "internal": INTERNAL,
     }
-    return _Names(ports, (*sampled, *wholes), totals, by_role)
 
 
 class Mechanics:
@@ -124,13 +115,13 @@ class Mechanics:
         self.has_source = scene.rung.source_in_fmu
         """Whether the input is the command of the FMU's own source, V, and not a current, A."""
         two, changing = scene.drive.phase_deg is not None, self.normal_force is not None
-        names = _names(self.has_source, two, changing)
-        self.ports, self.columns, self.total_names = names.ports, names.columns, names.totals
+        self.ports, names = _names(self.has_source, two, changing)
+        self.columns, self.total_names = names["reals"] + names["wholes"], names["totals"]
         """Names of the inputs that are led from outside; of what a row holds: reals, then whole
         numbers; and of the totals."""
         self.instance = borrow(fmi_version)
         places = self.instance.places
-        self.places: dict[str, Any] = {role: places(of) for role, of in names.by_role.items()}
+        self.places: dict[str, Any] = {role: places(of) for role, of in names.items()}
         """Value references by role."""
         self.inputs = (c_double * len(self.places["inputs"]))()
         """Value and slope of each input, as set last."""

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from ctypes import Array, c_double, c_int
 from typing import Any, Self
 
-from cosim.mechanics.fmi import INTERFACES, references
+from cosim.mechanics.fmi import Interface, references
 
 COMPLIANT, RIGID = 1, 2
 FIRST_INTEGER = 1001  # value references from here on are integers (fmu/README.md)
@@ -28,7 +28,7 @@ class Bench:
         """Set parameters and first inputs, then initialise."""
         self._version = version
         self._known = references(version)
-        self.fmi = INTERFACES[version]()
+        self.fmi = Interface(version)
         self.time = 0.0
         self.set(**start)
         self.fmi.initialise()

@@ -11,7 +11,7 @@ from scipy.optimize import root_scalar
 
 import cosim
 from cosim.errors import BadInput
-from cosim.mechanics.fmi import INTERFACES
+from cosim.mechanics.fmi import Interface
 from cosim.mechanics.stickslip import (
     SUSPENSIONS,
     numbers_of,
@@ -146,7 +146,7 @@ def test_a_magnet_too_near_is_refused_in_a_sentence() -> None:
     told = "mechanics.suspension_distance = 0.0028 m must be at least 1.1 times mechanics.travel"
     assert told in str(error.value)
     load("reference", {"mechanics.travel": 2.6e-3})
-    with closing(INTERFACES[3]()) as fmu:
+    with closing(Interface(3)) as fmu:
         fmu.set_integers(fmu.places(("suspension",)), (c_int * 1)(3))
         fmu.set_reals(fmu.places(("travel",)), (c_double * 1)(2.6e-3))
         with pytest.raises(FMICallException):

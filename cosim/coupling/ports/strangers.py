@@ -14,11 +14,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import fmpy
-from fmpy import fmi2, fmi3
 
 from cosim.errors import BadInput, plain
 from cosim.files import reader
-from cosim.mechanics.fmi import INTERFACES, Interface, unit
+from cosim.mechanics.fmi import SLAVES, Interface, unit
 from cosim.scene.messages import PLAIN_NUMBER, ended, shown, suggestion
 
 MOST_FILES, LARGEST = 10_000, 1 << 30
@@ -84,7 +83,7 @@ class Stranger:
         except Exception as error:
             raise self.bad(f"its modelDescription.xml cannot be read ({error})") from error
         self.version = int(str(found.fmiVersion).partition(".")[0])
-        if self.version not in INTERFACES:
+        if self.version not in SLAVES:
             raise self.bad(f"it is of FMI {found.fmiVersion}; it must be of FMI 2.0 or 3.0")
         if found.coSimulation is None:
             raise self.bad("it must be for co-simulation; it has model exchange alone")
@@ -140,14 +139,10 @@ class Stranger:
         return known
 
     def _load(self, folder: str) -> Any:
-        slave = fmi2.FMU2Slave if self.version == 2 else fmi3.FMU3Slave
-        names = {
-            "instanceName": "cosim",
-            "guid": self.token,
-            "modelIdentifier": self.abilities.modelIdentifier,
-        }
+        model = self.abilities.modelIdentifier
+        names = {"instanceName": "cosim", "guid": self.token, "modelIdentifier": model}
         try:
-            return slave(**names, unzipDirectory=folder)
+            return SLAVES[self.version](**names, unzipDirectory=folder)
         except Exception as error:
             words = str(error).replace(folder, "…")
             _, lacks, function = words.partition("undefined symbol: ")
@@ -181,7 +176,7 @@ class Stranger:
         """A new instance with these start values of parameters, initialised."""
         made = None
         try:
-            made = INTERFACES[self.version](self.loaded)
+            made = Interface(self.version, self.loaded)
             arrays: dict[str, list[Any]] = {}
             for name, value in parameters.items():
                 self._set(made, name, value, arrays)
