@@ -11,7 +11,9 @@ import re
 import sys
 import time
 import warnings
+from collections.abc import Iterator
 from io import TextIOWrapper
+from pathlib import Path
 from typing import Any, NoReturn
 
 from cosim.cli import live, new, simulation, studies
@@ -75,9 +77,32 @@ def _parser(arguments: list[str] | None) -> argparse.ArgumentParser:
 
 
 def _completion(shell: str) -> None:
-    from cosim.cli.completion import script
+    """Print the shell's program; a scene's name and the names of files are completed, too."""
+    import shtab
 
-    print(script(_parser(None), shell))
+    from cosim.scene import list_scenes
+
+    parser = _parser(None)
+    for action in _actions(parser):
+        if action.metavar == "SCENE":
+            shells = dict.fromkeys(("bash", "zsh"), "_cosim_scenes")
+            action.complete = shells  # type: ignore[attr-defined]
+        elif action.type is Path or action.dest == "out":
+            action.complete = shtab.FILE  # type: ignore[attr-defined]
+    names = " ".join(name for name, *_ in list_scenes())
+    functions: Any = {  # shtab's annotation has it as one text for all shells
+        "bash": f'_cosim_scenes() {{ compgen -W "{names}" -- "$1"; compgen -f -- "$1"; }}',
+        "zsh": f"_cosim_scenes() {{ compadd {names}; _files }}",
+    }
+    print(shtab.complete(parser, shell, preamble=functions))
+
+
+def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    for action in parser._actions:
+        yield action
+        if isinstance(action, argparse._SubParsersAction):
+            for one in action.choices.values():
+                yield from _actions(one)
 
 
 _COMPLETION = Command(

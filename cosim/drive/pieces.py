@@ -4,7 +4,8 @@ The one formula of a piece's value is in ``command.c``, which ngspice's callback
 """
 
 from abc import ABC, abstractmethod
-from ctypes import byref
+from collections.abc import Callable
+from ctypes import addressof, byref
 from math import floor
 from typing import Any
 
@@ -17,6 +18,9 @@ from cosim.toolchain.libraries import library, structures
 
 LEVEL, RAMP, SINE = range(3)
 """Kinds of pieces."""
+
+PREPARED = 512
+"""Pieces that are prepared for compiled code at a time."""
 
 
 class Piece(structures("loop")["Piece"]):
@@ -136,6 +140,27 @@ class Command(ABC):
             pieces.append(self.piece(float(times[done])))
             done = int(times.searchsorted(pieces[-1].until))
         return pieces
+
+
+class Ahead:
+    """The pieces of a command until ``duration`` (s) that compiled code has at hand, in ``drive``,
+    the structure ``Pieces`` of ``command.h``; ``reached`` tells how far the run is, s."""
+
+    def __init__(
+        self, drive: Any, command: Command, duration: float, reached: Callable[[], float]
+    ) -> None:
+        self._drive, self._command, self._duration = drive, command, duration
+        self._reached = reached
+        self.pieces = (Piece * 0)()
+
+    def refill(self) -> None:
+        """Keep the pieces that are still needed, and prepare those that follow them."""
+        reached, drive = self._reached(), self._drive
+        kept = [piece for piece in self.pieces if piece.until > reached]
+        begin = self.pieces[-1].until if self.pieces else 0.0
+        every = kept + self._command.pieces(begin, self._duration, PREPARED)
+        self.pieces = (Piece * len(every))(*every)
+        drive.pieces, drive.count, drive.now = addressof(self.pieces), len(every), 0
 
 
 def edge_before(t: float, rate: float) -> int:

@@ -16,13 +16,13 @@ from cosim.coupling.loop.structures import (
 )
 from cosim.coupling.methods import methods
 from cosim.coupling.rewind.joint import Joint
-from cosim.drive import ahead
+from cosim.drive import pieces
 from cosim.drive.periodic import Lines
 from cosim.drive.pieces import Piece
 from cosim.errors import SimulationFailed
 from cosim.files.resources import circuits
 from cosim.mechanics import fmi
-from cosim.mechanics.fmi import Fmi3
+from cosim.mechanics.fmi import Interface
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, load
 from cosim.simulation.simulate import simulate
@@ -81,7 +81,7 @@ def test_blocks_change_nothing(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     # Blocks as small as can be, so that a short run goes over many of their ends.
     monkeypatch.setattr(recorder, "STEPS", 7)
     monkeypatch.setattr(lead, "_POINTS", 7)
-    monkeypatch.setattr(ahead, "_MANY", 2)
+    monkeypatch.setattr(pieces, "PREPARED", 2)
     assert_same(whole, simulate(scene))
 
 
@@ -107,7 +107,7 @@ def test_no_step_goes_through_python(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*arguments: object) -> None:
         raise AssertionError("a step in Python")
 
-    monkeypatch.setattr(Fmi3, "do_step", refuse)
+    monkeypatch.setattr(Interface, "do_step", refuse)
     for model in ("amplifier", "full", "ideal"):
         simulate(load("reference", [*BRIEF, f"circuit.model={model}"]))
     for scene in ("two-surfaces", "closed-loop-grasp"):
@@ -171,10 +171,10 @@ DO_STEP = ctypes.CFUNCTYPE(
 @pytest.mark.parametrize("model", ["amplifier", "ideal"])
 def test_a_call_of_the_mechanics_fails(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = load("reference", [*BRIEF, f"circuit.model={model}"])
-    before, original, calls = simulate(scene), Fmi3.addresses.func, iter(range(300))
+    before, original, calls = simulate(scene), Interface.addresses.func, iter(range(300))
     kept = []
 
-    def addresses(self: Fmi3) -> dict:
+    def addresses(self: Interface) -> dict:
         fields = original(self)
         true = DO_STEP(fields["do_step"])
 
@@ -186,7 +186,7 @@ def test_a_call_of_the_mechanics_fails(model: str, monkeypatch: pytest.MonkeyPat
 
     with monkeypatch.context() as patch:
         patch.setattr(fmi, "_idle", {3: []})  # the failing instance is no other run's
-        patch.setattr(Fmi3, "addresses", property(addresses))
+        patch.setattr(Interface, "addresses", property(addresses))
         with pytest.raises(SimulationFailed, match=r"at t = 0\.\d+ s: do_step failed with"):
             simulate(scene)
     assert_same(simulate(scene), before)
@@ -211,7 +211,7 @@ def test_python_fails_below_ngspice(
 
     with monkeypatch.context() as patch:
         patch.setattr(lead, "_POINTS", 100)
-        patch.setattr(ahead, "_MANY", 1)
+        patch.setattr(pieces, "PREPARED", 1)
         patch.setattr(owner, name, failing)
         with pytest.raises(type(failure)):
             simulate(load("reference", [*BRIEF, "run.duration=10"]))

@@ -13,10 +13,7 @@ import pytest
 
 import cosim
 from cosim.arrays import Array
-from cosim.coupling.loop.structures import loop
-from cosim.coupling.ports import run as ports_run
-from cosim.coupling.ports.run import Run
-from cosim.coupling.ports.structures import (
+from cosim.coupling.loop.structures import (
     Feed,
     Group,
     PortsState,
@@ -24,7 +21,10 @@ from cosim.coupling.ports.structures import (
     Source,
     StrangerState,
     Through,
+    loop,
 )
+from cosim.coupling.ports import run as ports_run
+from cosim.coupling.ports.run import Run
 from cosim.errors import BadInput, SimulationFailed
 from cosim.scene import changed, load, to_toml
 from cosim.toolchain.processes import in_place

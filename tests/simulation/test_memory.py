@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cosim.coupling.loop import agenda, lead
-from cosim.drive import ahead, straights
+from cosim.drive import pieces, straights
 from cosim.files import spill as tape
 from cosim.scene import load
 from cosim.simulation import simulate
@@ -101,7 +101,7 @@ def test_blocks_and_disk_change_nothing(
     monkeypatch.setattr(agenda, "ENTRIES", 50)
     monkeypatch.setattr(straights, "_TOGETHER", 3)
     monkeypatch.setattr(lead, "_POINTS", 11)
-    monkeypatch.setattr(ahead, "_MANY", 2)
+    monkeypatch.setattr(pieces, "PREPARED", 2)
     with on_disk_in(tmp_path), processes.in_place():
         parts = simulate.simulate(scene)
     assert not os.listdir(tmp_path)

@@ -24,8 +24,7 @@ from cosim.coupling.loop.structures import (
     callback,
     loop,
 )
-from cosim.drive.ahead import Ahead
-from cosim.drive.pieces import Command
+from cosim.drive.pieces import Ahead, Command
 from cosim.errors import SimulationFailed
 from cosim.files.spill import Tape
 from cosim.scene import Scene

@@ -11,6 +11,13 @@ from cosim.toolchain.libraries import library, structures
 Fmu, Schedule, RecorderState, LeadState = (
     structures("loop")[name] for name in ("Fmu", "Schedule", "Recorder", "Lead")
 )
+Group, Origin, Source, Feed, StrangerState, Pulse, Through, PortsState = (
+    structures("loop")[name]
+    for name in ("Group", "Origin", "Source", "Feed", "Stranger", "Pulse", "Through", "Ports")
+)
+
+PROBE, OUTPUT, DRIVE = range(3)
+"""Kinds of an Origin."""
 
 GOOD, FMU_FAILED, NOT_FINITE, UNKNOWN_SOURCE, NO_AGREEMENT = range(5)
 """Values of ``LeadState.status`` and ``PortsState.status``."""

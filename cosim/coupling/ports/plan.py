@@ -7,9 +7,9 @@ from typing import Any
 
 from cosim.circuit import netlist
 from cosim.circuit.joined import Deck, deck
+from cosim.coupling.loop.structures import DRIVE, OUTPUT, PROBE, Feed, Origin, Source, Through
 from cosim.coupling.ports.sides import Side
 from cosim.coupling.ports.strangers import Variable, stranger
-from cosim.coupling.ports.structures import DRIVE, OUTPUT, PROBE, Feed, Origin, Source, Through
 from cosim.mechanics.package import unpacked
 from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene

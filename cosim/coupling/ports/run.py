@@ -9,11 +9,20 @@ import numpy as np
 
 from cosim.circuit import ngspice
 from cosim.coupling.loop.lead import after_jump, engine, finished
-from cosim.coupling.loop.structures import FMU_FAILED, NO_AGREEMENT, callback, loop
+from cosim.coupling.loop.structures import (
+    FMU_FAILED,
+    NO_AGREEMENT,
+    PortsState,
+    Pulse,
+    Source,
+    StrangerState,
+    Through,
+    callback,
+    loop,
+)
 from cosim.coupling.ports.plan import Plan
-from cosim.coupling.ports.structures import PortsState, Pulse, Source, StrangerState, Through
-from cosim.drive.ahead import Ahead
 from cosim.drive.command import command
+from cosim.drive.pieces import Ahead
 from cosim.errors import SimulationFailed, plain
 from cosim.files.spill import Tape
 from cosim.scene import Scene

@@ -7,9 +7,8 @@ from contextlib import suppress
 from ctypes import c_double, c_uint32, c_void_p
 from typing import Any
 
-from cosim.coupling.loop.structures import Fmu, loop
+from cosim.coupling.loop.structures import PROBE, Feed, Fmu, Group, StrangerState, loop
 from cosim.coupling.ports.strangers import Stranger, Variable
-from cosim.coupling.ports.structures import PROBE, Feed, Group, StrangerState
 from cosim.scene import tables
 
 _FUNCTIONS = {
