@@ -20,14 +20,10 @@ from time import monotonic
 from typing import Any, Protocol, TypeVar
 
 from cosim.errors import BadInput, Note, plain
+from cosim.files.atomic import locked
 from cosim.mechanics import package
 from cosim.toolchain.libraries import digest
 from cosim.toolchain.versions import versions
-
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None
 
 T = TypeVar("T")
 
@@ -224,12 +220,9 @@ def _locked(path: Path) -> int:
         file = os.open(path, flags, 0o666)
     except OSError as error:
         raise BadInput(f"{name}: cannot be written ({error.strerror}).") from error
-    try:
-        if fcntl is not None:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
+    if not locked(file):
         os.close(file)
-        raise BadInput(f"{name}: another process is writing it.") from error
+        raise BadInput(f"{name}: another process is writing it.")
     return file
 
 

@@ -81,6 +81,19 @@ def write_all(files: Mapping[Path, bytes]) -> None:
             path.write_bytes(content)
 
 
+def locked(handle: int) -> bool:
+    """Whether an open file or folder is this process's own until it is closed: nobody else has
+    locked it, or nobody can, on a file system without locks."""
+    try:
+        if fcntl is not None:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        pass
+    return True
+
+
 @contextmanager
 def _temporary(path: Path) -> Iterator[Path]:
     """A new file beside ``path``, locked while this process has it at hand."""
@@ -92,8 +105,7 @@ def _temporary(path: Path) -> Iterator[Path]:
         os.close(handle)
     try:
         if fcntl is not None:
-            with suppress(OSError):  # a file system without locks
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            locked(handle)
         yield temporary
     finally:
         if fcntl is not None:
@@ -110,15 +122,11 @@ def alone(folder: Path) -> Iterator[None]:
         return
     handle = os.open(folder, os.O_RDONLY)
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        if not locked(handle):
             raise BadInput(
                 f"{plain(str(folder))}: another process is writing into this folder; wait for it, "
                 "or choose another --out."
-            ) from None
-        except OSError:  # a file system without locks
-            pass
+            )
         tidy(folder, ours=True)
         yield
     finally:
@@ -153,9 +161,7 @@ def folder_of_ones_own(parent: Path) -> tuple[str, int]:
     tidy(parent)
     folder = mkdtemp(prefix=_PREFIX, dir=parent)
     handle = os.open(folder if fcntl is not None else os.devnull, os.O_RDONLY)
-    if fcntl is not None:
-        with suppress(OSError):  # a file system without locks
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    locked(handle)
     return folder, handle
 
 

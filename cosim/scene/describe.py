@@ -76,15 +76,17 @@ def _key(table: str, name: str) -> Key:
     )
 
 
-_KEYS = tuple(_key(table, name) for table, model in TABLES.items() for name in model.model_fields)
-
-KEYS = {key.full: key for key in _KEYS}
+KEYS = {
+    f"{table}.{name}": _key(table, name)
+    for table, model in TABLES.items()
+    for name in model.model_fields
+}
 """Every key by its full name."""
 
 
 def keys() -> tuple[Key, ...]:
     """Every key of every table, in order."""
-    return _KEYS
+    return tuple(KEYS.values())
 
 
 def acts(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> bool:

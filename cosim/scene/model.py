@@ -94,9 +94,7 @@ class Scene(BaseModel):
         if not isinstance(data, dict):
             return data
         circuit, coupling = data.get("circuit", {}), data.get("coupling", {})
-        model = circuit.get("model") if isinstance(circuit, dict) else None
-        rung = RUNGS.get(model) if isinstance(model, str) else None
-        if rung and rung.own_netlist:
+        if isinstance(circuit, dict) and circuit.get("model") == "file":
             data = data | {"circuit": CAREFUL | circuit}
         if data.get("fmu") and isinstance(coupling, dict):
             data = data | {"coupling": {"method": "auto"} | coupling}
@@ -310,14 +308,11 @@ class Scene(BaseModel):
                 f'drive.waveform = "{drive.waveform}" with circuit.model = "none" moves the part '
                 "at a constant friction.normal_force, not at that of friction.normal_force_file"
             )
-        if not self.rung.driven:
+        if not self.rung.driven or not (self.rung.firmware or drive.quantised):
             return self
+        why = "with drive.quantised = true"
         if self.rung.firmware:
             why = f'with circuit.model = "{self.rung.name}"'
-        elif drive.quantised:
-            why = "with drive.quantised = true"
-        else:
-            return self
         others = ("drive.pot_max", "circuit.model", "drive.quantised")
         reach = firmware.GAIN * firmware.V_REFERENCE
         if drive.amplitude > reach:

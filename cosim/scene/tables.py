@@ -656,10 +656,7 @@ class Port(Table):
 MACHINE = "machine"
 """The name by which ports call the built-in machine."""
 
-MACHINE_ENDS = (
-    *("drive", f"{MACHINE}.back_emf", f"{MACHINE}.current"),
-    *(f"{MACHINE}.out", f"{MACHINE}.sense"),
-)
+MACHINE_ENDS = ("drive", *(f"{MACHINE}.{end}" for end in ("back_emf", "current", "out", "sense")))
 """What a netlist needs of the built-in machine, or has for it; the last two are the coils' ends."""
 
 PORT_LISTS: dict[str, type[Table]] = {"fmu": Fmu, "port": Port}

@@ -13,7 +13,8 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.mechanics.stickslip import SUSPENSIONS
-from cosim.scene import changed, keys, load, toml
+from cosim.scene import changed, load, toml
+from cosim.scene.describe import KEYS
 from cosim.scene.messages import shown
 from cosim.stepper.stepper import OWN, RIG
 from cosim.studies.identify.problem.gauges import GAUGES
@@ -289,7 +290,7 @@ def _entry(path: str, table: str, key: str, entry: Any) -> Entry:
         raise BadInput(f"{where}: a prior needs a sigma of at least {LEAST_SD:g} beside it.")
     if log and prior is not None and prior <= 0.0:
         raise BadInput(f'{where}: prior = {prior:g} must be above 0 with scale "log".')
-    known = next(one for one in keys() if one.full == key)
+    known = KEYS[key]
     if table == "trial" and key in _OTHERWISE:
         least, most, unit = _OTHERWISE[key]
         known = replace(known, low=least, high=most, unit=unit)
@@ -306,8 +307,7 @@ def own_bounds(space: Space, frequency: float) -> tuple[Array, Array, Array]:
     The phase is not bounded: it is the same again after a period.
     """
     entries = {OWN_KEYS[key]: entry for key, entry in space.trial.items()}
-    low = np.array([entries[name].low for name in OWN])
-    high = np.array([entries[name].high for name in OWN])
+    low, high = (np.array([getattr(entries[name], end) for name in OWN]) for end in ("low", "high"))
     cycle, rate = OWN.index("phase"), OWN.index("frequency")
     low[rate], high[rate] = low[rate] * frequency, high[rate] * frequency
     scale = high - low

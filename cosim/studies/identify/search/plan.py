@@ -8,6 +8,7 @@ numbers: only where both come to the same cost does a range mean the trials and 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 from zlib import crc32
 
@@ -97,17 +98,17 @@ class Plan:
 
     def singles(self) -> list[Found]:
         """Rigs that fit one trial each, ``effort.singles`` of each."""
+
+        def single(rng: np.random.Generator, k: int) -> list[Found]:
+            alone, told = self.coarse.part([k]), self._telling(f"trial {k + 1} alone")
+            start = best_of(alone.screen(rng.random((24, len(alone.space.free))), rng, 64, 4, 2))
+            return [alone.nested(start, rng, self.effort.single_generations, 0.15, told, 12)]
+
         return [
-            self._stage(f"single {k + 1}-{n + 1}", lambda rng, k=k: [self._single(k, rng)])[0]
+            self._stage(f"single {k + 1}-{n + 1}", partial(single, k=k))[0]
             for k in range(len(self.coarse.targets))
             for n in range(self.effort.singles)
         ]
-
-    def _single(self, k: int, rng: np.random.Generator) -> Found:
-        alone = self.coarse.part([k])
-        start = best_of(alone.screen(rng.random((24, len(alone.space.free))), rng, 64, 4, 2))
-        told = self._telling(f"trial {k + 1} alone")
-        return alone.nested(start, rng, self.effort.single_generations, 0.15, told, 12)
 
     def ensemble(
         self, name: str, rows: Sequence[int], rounds: Sequence[tuple[int, int, float]]
@@ -122,6 +123,11 @@ class Plan:
             every = np.concatenate([points, search.space.scaled(points, scale, walls)])
             return search.screen(every, rng, SCREENED, KEPT, SCREEN_ROUNDS)
 
+        def further(rng: np.random.Generator, given: Any) -> list[Found]:
+            start, others, *effort = given
+            begun = search.rescreened(search.borrowed(start, others), rng, *AGAIN)
+            return [search.nested(begun, rng, *effort)]
+
         several, ended = self._stage(f"{name}: starts", starts), []
         for number, (count, generations, sigma) in enumerate(rounds, 1):
             several = sorted(several, key=lambda one: one.total)
@@ -130,24 +136,10 @@ class Plan:
             new = []
             for k, start in enumerate(several, 1):
                 title = f"{name}: round {number}, {k} of {len(several)}"
-                new += self._further(title, search, start, several, generations, sigma)
+                given = start, several, generations, sigma, self._telling(title)
+                new += self._stage(title, partial(further, given=given))
             several = new
         return sorted([*several, *ended], key=lambda one: one.total)
-
-    def _further(
-        self,
-        title: str,
-        search: Search,
-        start: Found,
-        others: Sequence[Found],
-        generations: int,
-        sigma: float,
-    ) -> list[Found]:
-        def work(rng: np.random.Generator) -> list[Found]:
-            begun = search.rescreened(search.borrowed(start, others), rng, *AGAIN)
-            return [search.nested(begun, rng, generations, sigma, self._telling(title))]
-
-        return self._stage(title, work)
 
     def finished(self, name: str, rows: Sequence[int], found: Found) -> Found:
         """The solution at the finish's step, and by least squares."""
