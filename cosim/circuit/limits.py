@@ -23,10 +23,13 @@ def shares_of_steps(log: dict[str, Array], least: float) -> dict[str, Array]:
     found: dict[str, Array] = {}
     time = log["time"]
     for name, acts in _at_work(log, least).items():
+        # A step lies between two points of the log. It counts whole where the limit acts at both,
+        # half where at one; of those halves the lines below know better.
         shares = 0.5 * acts[1:] + 0.5 * acts[:-1]
         kind = name.removesuffix("_high").removesuffix("_low")
         if kind in _NODES:
             node, held = (log[vector] for vector in _NODES[kind])
+            # Steps by their first point, which has one before it: no, no, yes and yes, yes, no.
             begins = np.flatnonzero(~acts[:-2] & ~acts[1:-1] & acts[2:]) + 1
             ends = np.flatnonzero(acts[:-2] & acts[1:-1] & ~acts[2:]) + 1
             shares[begins] = 1.0 - _place(time, held, begins, held[begins + 1])

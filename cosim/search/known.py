@@ -31,6 +31,7 @@ class Known:
         """The rows here of the nearest points that can be set, which are run where they are not
         known."""
         points = np.round(np.clip(points, 0.0, 1.0) * self._steps) / self._steps
+        # Rounded alike, equal points have equal bytes; one that is asked for twice is run once.
         keys = [point.tobytes() for point in points]
         new = [n for n, key in enumerate(keys) if key not in self._rows]
         new = [n for n in new if keys.index(keys[n]) == n]
@@ -81,6 +82,8 @@ class Known:
         order = self._order(quantity)[:MOST]
         self._tree = self._tree or KDTree(self.points)
         column = self.scores[:, quantity]
+        # The cube about a point, not the ball: each key is turned by itself. The quartile is one of
+        # the scores and no mean of two, since those that are not feasible have -inf.
         near = self._tree.query_ball_point(self.points[order], NEAR, p=inf)
         quartile = [
             np.sort(column[rows])[(len(rows) - 1) // 4] if len(rows) >= FEWEST else -inf

@@ -21,6 +21,7 @@ def turned(point: Array, keys: int) -> Array:
     """A point and all turns of its first ``keys``, one by one and together (rows)."""
     if not keys:
         return point[np.newaxis]
+    # 1 + 2 n + 2^n rows: the point, its turns one by one, and all together; the other keys stay.
     first = point[:keys]
     every = np.vstack([first, faces(first), corners(first)])
     return np.hstack([every, np.tile(point[keys:], (len(every), 1))])

@@ -72,6 +72,8 @@ class LinearParticipant:
     def _new_propagator(self, h: float, degree: int, gain: float) -> Array:
         n, outputs, inputs = len(self._a), len(self._c), self._b.shape[1]
         size = n + outputs + inputs * (degree + 1)
+        # d/dt of (x, integral of y, u, u', ...) is m times the same: the exponential moves all of
+        # them by h, the integral exactly (Van Loan, IEEE Trans. Autom. Control 23 (1978) 395).
         m = np.zeros((size, size))
         here, there = slice(0, n), slice(n, n + outputs)
         first = slice(n + outputs, n + outputs + inputs)

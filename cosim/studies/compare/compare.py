@@ -97,6 +97,7 @@ class Seen:
         def missed(start: float) -> float:
             return -explained(self.signal(guide, start), wanted)
 
+        # Within a period the share has several maxima: all are looked at before one is climbed.
         starts = np.linspace(earliest, latest, SHIFTS)
         best = int(np.argmin([missed(float(start)) for start in starts]))
         around = starts[max(best - 1, 0)], starts[min(best + 1, SHIFTS - 1)]
@@ -115,6 +116,7 @@ class Seen:
             if signal not in signals:
                 continue
             known = np.isfinite(signals.get("v_surface", self.recording.time))
+            # Where the velocity is known, since a trial's first and last frames have none.
             frames = (self.recording.time + start)[known]
             shown = (time >= frames[0] - 1e-9) & (time <= frames[-1] + 1e-9)
             drawn = np.interp(time[shown], frames, signals[signal][known])
@@ -205,7 +207,7 @@ def _of_periods(
             f"driven at {1.0 / period:.4g} Hz (drive.frequency). At the end of the recording they "
             f"are {apart:.2g} periods apart, which spoils the scores."
         )
-        power = round(np.log10(period / repeats))
+        power = round(np.log10(period / repeats))  # milliseconds that were taken for seconds
         if power and abs(period / repeats / 10.0**power - 1.0) < APART:
             yield f"Hint: with times multiplied by {10.0**power:g} they would not differ."
     if period and span < period:

@@ -105,6 +105,7 @@ def scores(recording: Recording, simulated: Signals, period: float | None) -> li
 def _lines(
     time: Array, measured: Array, run: Array, period: float | None, gained: float, score: Distance
 ) -> list[float | None]:
+    # In the order of LINES; where the motion does not repeat it has no forecast of itself.
     known = np.isfinite(measured)
     line = np.polynomial.Polynomial.fit(time[known], measured[known], 1)
     later = one_period_later(time, measured, period, gained) if period else None
@@ -151,6 +152,7 @@ def both_sides(
         apart = min(apart, len(time) // 2)
         velocities = [signals["v_surface"] for _, signals in sides]
         changes = [np.abs(v[apart:] - v[:-apart]) for v in velocities]
+        # fmax leaves out what is not known; where nothing is, the start is left, which is no kick.
         kicks = [_told(float(np.fmax.reduce(each, initial=-np.inf))) for each in changes]
         words = f"largest change of the surface's velocity in {time[apart] * 1e3:.3g} ms"
         pair("kick", "m/s", f"{words}: what impacts show", [*kicks])

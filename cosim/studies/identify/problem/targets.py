@@ -99,6 +99,7 @@ def measured(recording: Recording, path: Path, space: Space) -> Measured:
     def target(step: float, weights: Mapping[str, float]) -> Target:
         chosen = {name: signals[name] for name in weights if name in signals}
         whole = sum(weights[name] for name in chosen)
+        # So that the weighted sum of squared residuals is that of the squared NRMSE.
         each = {
             name: weights[name] / whole / np.isfinite(values).sum() / np.nanvar(values)
             for name, values in chosen.items()
@@ -127,5 +128,5 @@ def draws(target: Target, count: int, rng: np.random.Generator) -> Array:
     low[rate] = high[rate] = 0.5 * (low[rate] + high[rate])
     found = low + rng.random((count, len(OWN))) * (high - low)
     middle = 0.5 * (low[lift] + high[lift])
-    found[:, lift] = middle + 0.5 * (found[:, lift] - middle)
+    found[:, lift] = middle + 0.5 * (found[:, lift] - middle)  # the middle half of its bounds
     return found

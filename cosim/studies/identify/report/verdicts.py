@@ -90,6 +90,7 @@ def judge(
                 min(value, *(one[key][0] for one in ranges)),
                 max(value, *(one[key][1] for one in ranges)),
             )
+            # The rig that is reported with this key at either end: how near the search's bounds.
             at = np.repeat(reported[None], 2, axis=0)
             at[:, k] = ends
             low, high = space.point(at)[:, k].tolist()
@@ -130,6 +131,7 @@ def _tie(key: str, partners: Mapping[str, Array]) -> str:
     alone = partners[key]
     if np.std(alone) < SCATTER:
         return ""
+    # Logarithms: a product that all rigs share is a sum without scatter, a ratio a difference.
     found = [
         (float(np.std(alone + sign * other)), f"{word} {name}")
         for name, other in partners.items()
@@ -143,7 +145,7 @@ def _tie(key: str, partners: Mapping[str, Array]) -> str:
 def forces(rig: Found, places: Array) -> tuple[Array, Array]:
     """The suspension's force at ``places`` (q, m) less that at the centre, N; over Bl, A."""
     numbers = rig.numbers
-    found = suspension_force(numbers, np.append(places, 0.0))
+    found = suspension_force(numbers, np.append(places, 0.0))  # the last one is the centre's
     apart = found[:-1] - found[-1]
     return apart, apart / numbers["force_factor"]
 
