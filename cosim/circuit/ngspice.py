@@ -180,7 +180,10 @@ class Engine(Shared.NgSpiceShared):
         """ngspice's own words of trouble, as the end of a message."""
         words = [" ".join(word.split()) for word in (*self._stderr, *self._stdout)]
         telling = [word for word in words if _TROUBLE.search(word) and not _NOISE.search(word)]
-        return "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
+        said = "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
+        if "imestep too small" in said:  # for 1 pA and 10 fC, where amperes are switched
+            said += "; .options abstol=1e-8 vntol=1e-5 chgtol=1e-11 in the netlist may help"
+        return said
 
     def ignored(self) -> list[str]:
         """The models' parameters that it does not know."""
