@@ -132,7 +132,8 @@ def text_of(
         if holder is top and line in external:
             text.append(external[line])
         elif all(each.used for each in holder.chain()):  # something calls the subcircuit
-            text.append(written(line, element, values if holder is top else {}))
+            free = (f" {key}=0" for key in sorted(holder.free) if line is holder.line)
+            text.append("".join([written(line, element, values if holder is top else {}), *free]))
     text += [
         # Without norefvalue it asks for the CPU time at each step, to print how far it is.
         f".options norefvalue reltol={reltol!r}",

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -78,6 +79,10 @@ PARTS = {
     ),
     'C1 x 0 1µ V=16 Irms=1 Rser=0 Lser=0 mfg="A B" type="Al"': lambda s: 1 / (1e-6 * s),
     "R9 x 0 4k7 tol=1": lambda s: 4700 + 0 * s,
+    "R9 x 0 4k7 TC=0,0": lambda s: 4700 + 0 * s,
+    "R9 x 0 4k TC=1e-2 , {2*1e-4}\n.temp 37": lambda s: 4000 * (1.1 + 0.02) + 0 * s,
+    "G9 x 0 x 0 1m Rpar=1k Cpar=1n": lambda s: 1 / (2e-3 + 1e-9 * s),
+    "L1 x y 1m\nL2 y z 1m\nL3 z 0 1m\nK1 L1 L2 L3 0.5": lambda s: s * (3e-3 + 6 * 0.5e-3),
 }
 
 
@@ -136,19 +141,30 @@ TOLD = {
     "V9 x 0 PWL(0 0 +1m 1)": "write the times of PWL since the start",
     "V9 x 0 PWL(0 0 1m 1 0.5m 0)": "the times of PWL must rise, 0.0005 s comes after 0.001 s",
     "V9 x 0 PWL REPEAT FOREVER (0 0 1m 1) ENDREPEAT": "instead of REPEAT write r=0",
-    "S9 x 0 in 0 W\n.model W SW(Ron=1 Vt=.5 Vh=-.2)": "vh of w below 0 is LTspice's smooth switch",
-    "D9 x 0 W\n.model W D(Vfwd=.5)": "vfwd of w is LTspice's ideal diode",
+    "S9 x 0 in 0 W\n.model W SW(Ron=1 Vt=.5 Vh={-.2})": "smooth switch; give it as a plain number",
+    "S9 x 0 in 0 W\n.model W SW(Ron=0 Vt=.5 Vh=-.2)": "ron and roff must be above 0",
+    "S9 x 0 in 0 W\n.model W SW(Lser=1n Vh=-1)": "lser of w is LTspice's own; write it apart",
+    "D9 x 0 W\n.model W D(Vfwd=.5 Ilimit=2)": "ilimit of w is LTspice's ideal diode",
+    "D9 x 0 W\n.model W D(Vfwd=.5 Ron=0)": "ron and roff must be above 0",
+    "D9 x 0 W 2\n.model W D(Vfwd=.5)": "2 of an ideal diode is not read; leave it out",
+    "Q9 x in 0 W\n.model W ako:V PNP(Bf=2)\n.model V NPN": "V is of type npn; write all of the",
+    "Q9 x in 0 W\n.model W ako:V\n.model V ako:W NPN": "is defined here; copy its .model",
+    "S9 x 0 in 0 W\n.model W SW(Vh=-1)\n.model W SW(Vh=1)": "there is a second model w, so this",
+    ".ic i(R8)=1\nR9 x 0 1": "i(r8)=1 is not v(node)=value",
     "A9 in 0 0 0 0 x 0 0 SCHMITT Vt=.5": "that a netlist may have; write it with R, C and B",
-    "V9 x 0 PWL file=stimulus.txt": "write the values of this one into the line",
+    "V9 x 0 PWL file=stimulus.txt": "was not found in the netlist's folder: copy it there",
+    "V9 x 0 PWL file=own.cir": "own.cir must hold pairs of numbers",
+    "V9 x 0 PWL time_scale_factor=2 file=own.cir": "write the values of this one into the line",
     "S9 x 0 in 0 W\n.model W VSWITCH(Ron=0)": "ron and roff must be above 0, von and voff apart",
     "S9 x 0 in 0 W\n.model W ISWITCH": "no model w is defined here",
     "W9 x 0 V1 W\n.model W ISWITCH(Ion=0)": "ron and roff must be above 0, ion and ioff apart",
-    "Q9 x in 0 W\n.model W ako:BC547 NPN(Bf=250)": "write all of the model instead of ako",
+    "Q9 x in 0 W\n.model W ako:BC547 NPN(Bf=250)": "no model BC547 is defined here; copy its",
     "XU9 in x level2 Avol=1Meg": "include the file with its .subckt",
     ".lib UniversalOpamps2.sub": "was not found in the netlist's folder: copy it there",
-    ".lib C:\\models\\mine.lib": "copy the file into the netlist's folder and give its name alone",
+    ".lib C:\\models\\mine.lib": "was not found in the netlist's folder: copy it there",
     "B9 x 0 V=idt(V(in))": "the function idt is not defined",
-    "K9 L1 L2 L3 1": "must name two inductors and their coupling",
+    "K9 L1 L2 L3 1": "there is no inductor l1 here",
+    "K9 L1 L2 0.9 core": "must name two inductors and their coupling; write K pair by pair",
     "C9 x 0 1u Rser=1 m=2": "write a resistor in series",
     "M9 x b 0 W\n.model W NMOS": "has too few nodes: drain, gate, source and bulk",
     "M9 x b 0 0 W 2u 10u\n.model W NMOS": "2u behind the model has no name; write name=value",
@@ -159,12 +175,19 @@ TOLD = {
     "R9 x 0 4,7k": "has two values; a number has a decimal point",
     "X9 in x part rr=4k\n.subckt part a b params: r=1\nR1 a b {r}\n.ends": "no parameter rr "
     "(it has r); give it a value in the .subckt line, rr=…",
-    ".options maxstep=1u": "the option maxstep is not allowed in a netlist; leave it out",
+    "X8 in x w rr=4k\nX9 in x w\n.subckt w a b\nR1 a b {rr}\n.ends": "x9 gives w no rr; write it",
+    ".options rawfile=x": "the option rawfile is not allowed in a netlist; leave it out",
     ".meas tran a DERIV V(in) AT=1m": ".meas a is nothing known here; it may be AVG",
     ".meas tran a WHEN V(in)": ".meas a is nothing known here; it may be AVG",
     ".meas a": "is no complete .meas",
+    ".meas a PARAM odd*2": "the parameter odd is not defined",
+    ".meas a PARAM V(in)/2": "v(in)/2 is no expression of numbers and names",
+    ".meas a PARAM abs.real": "is no expression of numbers and names",
+    ".meas a PARAM min(2 3)": "is no expression of numbers and names",
+    ".meas a PARAM pow(x=2)": "is no expression of numbers and names",
+    ".meas a PARAM {----(2": "is no expression of numbers and names",
     "F9 x 0": "names no source whose current controls it",
-    ".param k 5": ".param gives no name a value; write NAME=VALUE",
+    ".param k": ".param gives no name a value; write NAME=VALUE",
     ".if ()\nR9 x 0 1k\n.endif": ".if has no condition",
 }
 
@@ -196,7 +219,7 @@ def test_a_source_as_title_and_a_drawing_are_told(text: str, told: str, tmp_path
 
 def test_numbers_are_those_that_people_write(tmp_path: Path) -> None:
     """4k7 and 4R7 for 4.7 k and 4.7, also behind a name; an A for amperes is no atto."""
-    lines = ["R8 in x R=4k7", "R9 x 0 4R7", "X9 in 0 part r=1n5", "I9 in 0 0.5A", ".param i0=1A"]
+    lines = ["R8 in x R=4k7", "R9 x 0 4R7", "X9 in 0 part r=1n5", "I9 in 0 0.5A", ".param i0 1A"]
     library = ".subckt part a b params: r=1\nR1 a b {r}\n.ends"
     found = anew(tmp_path, *lines, library)
     for wanted in ("r8 in x r=4.7k", "r9 x 0 4.7", "x9 in 0 part r=1.5n", "i9 in 0 0.5"):
@@ -260,6 +283,139 @@ R6 s z 100
         share = resistance / (resistance + 100.0)
         assert np.ptp(share) > 0.5
         assert columns[word] == pytest.approx(share, abs=1e-4), word
+
+
+POINTS = {
+    "PWL file=points.txt": "0 0\n1e-3, 1\n2m -1V\n",
+    'PWL FILE "C:\\Users\\me\\points.txt"': "(0,0) (1m,1) (2m,-1)",
+    "PWL(file = '../points.txt') r=-1": "0 0 1e-3 1 2e-3 -1",
+}
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("wave", POINTS)
+def test_points_of_a_source_may_lie_in_a_file(wave: str, tmp_path: Path) -> None:
+    (tmp_path / "points.txt").write_text(POINTS[wave])
+    result = found(tmp_path, "", f"{HEAD}V9 x 0 {wave}\nR9 x 0 1k\n.end\n", "v(x)")
+    true = np.interp(result.columns["time"], [0, 1e-3, 2e-3], [0, 1, -1])
+    assert result.columns["v(x)"] == pytest.approx(true, abs=1e-6)
+    told = [note for note in result.summary["notes"] if "read from the netlist's folder" in note]
+    assert len(told) == (".txt" in wave and "/" in wave.replace("\\", "/"))
+
+
+def test_files_are_those_beside_the_netlist(tmp_path: Path) -> None:
+    """Wherever a program found them when it wrote the netlist; a name may have blanks."""
+    (tmp_path / "own").mkdir()
+    path, name = tmp_path / "own" / "own.cir", "my parts.lib"
+    for folder in (tmp_path, tmp_path / "own"):
+        (folder / name).write_text(f".model Q NPN(Bf={len(folder.parts)})\n")
+    wanted = f".model Q NPN ( Bf={len(path.parent.parts)})"
+    for given in (name, f'"../{name}"', f"C:\\lib\\{name}", f"\\\\nas\\{name}", f'"/x/{name}"'):
+        path.write_text(f"{HEAD}.lib {given}\n.end\n")
+        assert [line.text for line in read(path)][-1] == wanted
+        assert [file.name for file in named(path)] == ["own.cir", name]
+    (tmp_path / "own" / name).unlink()
+    with pytest.raises(BadInput, match=r"own\.cir:8: my parts.lib was not found in the netlist's"):
+        read(path)
+    (tmp_path / "own" / "many.txt").write_text("1m 0 " * 50_000)
+    path.write_text(f"{HEAD}V9 b c PWL file=many.txt\n.end\n")
+    with pytest.raises(BadInput, match=r"own\.cir:8: many.txt has more than 200000 characters"):
+        read(path)
+    (tmp_path / "own" / "points.txt").symlink_to(tmp_path / name)
+    path.write_text(f"{HEAD}V9 b c PWL file=points.txt\n.end\n")
+    with pytest.raises(BadInput, match=r"own\.cir:8: points.txt must be a file in the netlist's"):
+        read(path)
+    path.write_text(f'{HEAD}.lib "nom.lib"\n.end\n')
+    assert read(path)[-1].text == "R3 c 0 1k"
+
+
+@needs.ngspice_library
+def test_switches_and_diodes_of_ltspice_are_what_its_help_says(tmp_path: Path) -> None:
+    """Straight lines; between off and on the logarithm of the resistance is a cubic, level at its
+    ends."""
+    lines = """
+S1 x 0 in 0 W
+.model W SW(Ron=10 Roff=1k Vt=0.2 Vh=-0.4)
+S2 y 0 b 0 U
+.model U ako:T SW(Roff=1Meg)
+.model T SW(Ron=50 Vt=1 Lser=0)
+D1 z 0 D
+.model D D(Ron=.1k Roff=10k Vfwd=.3 Vrev=.5 Rrev=200 Epsilon=.1)
+V4 s 0 1
+R4 s x 100
+R5 in y 100
+R6 in z 1k
+"""
+    with in_place():
+        result = found(tmp_path, "", f"{HEAD}{lines}.end\n", "v(in)", "v(x)", "v(y)", "v(z)")
+    v = result.columns["v(in)"]
+    way = np.clip((v - 0.2) / 0.8, -0.5, 0.5)
+    resistance = 100.0 * 100.0 ** -(way * (1.5 - 2.0 * way**2))
+    assert result.columns["v(x)"] == pytest.approx(resistance / (resistance + 100.0), abs=1e-4)
+    z = result.columns["v(z)"]
+    ahead, back = np.maximum(z - 0.3, 0), np.maximum(-z - 0.5, 0)
+    through = z / 10e3 + ahead * (1 / 100 - 1e-4) - back * (1 / 200 - 1e-4)
+    assert np.quantile(np.abs((v - z) / 1e3 - through), 0.98) < 1e-7
+    assert result.columns["v(y)"] == pytest.approx(v / 3.0, abs=1e-6)
+    told = [note.partition(": ")[2] for note in result.summary["notes"]]
+    assert sorted(note[:11] for note in told) == ["", "between off", "epsilon has"]
+
+
+@needs.ngspice_library
+def test_an_inductor_may_begin_with_a_current(tmp_path: Path) -> None:
+    """It decays from there, whatever the circuit would give it."""
+    lines = "L8 b y 10m Rser=1\nR8 y 0 {4}\nL9 b z 10m\nR9 z 0 5\n.ic I(L8)={-3} v(c)=-3"
+    with in_place():
+        columns = found(tmp_path, "", f"{HEAD}{lines}\n.end\n", "i(L8)", "i(L9)", "time").columns
+    true = 0.4 + (-3.0 - 0.4) * np.exp(-columns["time"] * 500.0)
+    assert columns["i(L8)"] == pytest.approx(true, abs=1e-4)
+    assert columns["i(L9)"] == pytest.approx(0.4, abs=1e-6)
+
+
+def test_a_model_may_be_a_kind_of_another(tmp_path: Path) -> None:
+    """Of the nearest scope, with its own parameters instead of those of the same name."""
+    lines = """.model A NPN(Bf=100 Is=1f mfg=X)
+.subckt pair c b e
+Q1 c b e C
+.model C AKO: B NPN(Bf=300 Vaf=50)
+.model B ako:A (Is=2f Vaf={20+20})
+.ends
+X1 b in 0 pair
+Q2 b in 0 D
+.model D ako:A
+.model E VDMOS(pchan Kp=3)
+M3 b in c F
+.model F ako:E VDMOS(Kp=4 Vds=3)"""
+    models = {line.split()[1]: line for line in anew(tmp_path, lines) if line.startswith(".model")}
+    assert models["c"] == ".model c npn bf=300 vaf=50 is=2f" or (
+        models["c"] == ".model c npn is=2f bf=300 vaf=50"
+    )
+    assert models["d"] == ".model d npn bf=100 is=1f"
+    assert models["f"] == ".model f vdmos pchan kp=4"
+
+
+@needs.ngspice_library
+def test_a_call_may_set_what_the_subcircuit_does_not_declare(tmp_path: Path) -> None:
+    """Each for itself; resistances in closed form."""
+    library = """
+.subckt div a b top=1
+R1 a m {top*bot}
+R2 m b {bot}
+.ends
+.subckt outer a b
+X1 a b div bot={own/2}
+.ends
+X1 b x div bot=2k top=3
+X2 b y div bot=1k
+X3 b z outer own=6k
+R7 x 0 1k
+R8 y 0 1k
+R9 z 0 1k
+"""
+    with in_place():
+        columns = found(tmp_path, "", f"{HEAD}{library}.end\n", "v(x)", "v(y)", "v(z)").columns
+    for word, resistance in {"v(x)": 8e3, "v(y)": 2e3, "v(z)": 6e3}.items():
+        assert columns[word][-1] == pytest.approx(2e3 / (1e3 + resistance), rel=1e-6), word
 
 
 @needs.ngspice_library
@@ -349,6 +505,22 @@ def test_measurements_are_those_of_the_program(tmp_path: Path) -> None:
         assert summary[f"meas.{name}"] == pytest.approx(float(value), rel=near), name
 
 
+def test_a_measurement_may_be_computed_from_others(tmp_path: Path) -> None:
+    lines = (
+        ".meas ratio PARAM {2*rms^2/(t1*1k)}\n.meas tran rms RMS V(in) FROM 0 TO 2m\n"
+        ".meas size param='sqrt(max(ratio, 3)) + 1e1m'\n.meas none WHEN V(in)=5\n"
+        ".meas no PARAM none*2\n.meas nor PARAM 1/(rms-rms)\n"
+    )
+    summary = summary_of(tmp_path, f"{HEAD}.param t1=1m\n{lines}")
+    given = {key: value for key, value in summary.items() if key.startswith("meas")}
+    true = {"meas.rms": 0.5**0.5, "meas.ratio": 1.0, "meas.size": 3**0.5 + 0.01}
+    assert given == pytest.approx(true, rel=1e-4)
+    whys = [note.partition("has ")[2] for note in summary["notes"]]
+    assert (
+        whys == ["no value: its event does not come."] + ["no value: what it needs has none."] * 2
+    )
+
+
 def test_an_event_that_does_not_come_has_no_value(tmp_path: Path) -> None:
     path = tmp_path / "own.cir"
     path.write_text(f"{HEAD}.meas x WHEN V(in)=5 rise=2\n.meas y AVG V(in) from=2 to=3\n.end\n")
@@ -421,3 +593,12 @@ def test_a_netlist_on_the_built_in_mechanics_measures_too(tmp_path: Path) -> Non
     mean = np.trapezoid(current[late], time[late]) / 0.03
     assert result.summary["meas.mean"] == pytest.approx(mean, rel=1e-3)
     assert any(".print has no effect" in note for note in result.summary["notes"])
+
+
+def test_a_step_that_is_too_small_is_told_with_its_cure() -> None:
+    from cosim.circuit.ngspice import Engine
+
+    words: Any = SimpleNamespace(_stdout=["Note"], _stderr=["TRAN:  Timestep too small; time = 1."])
+    assert re.search(r"time = 1; \.options abstol=\S+ vntol=\S+ chgtol=\S+ ", Engine.said(words))
+    words._stderr = ["singular matrix"]
+    assert Engine.said(words) == "singular matrix"

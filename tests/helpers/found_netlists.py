@@ -207,7 +207,7 @@ REFUSED = {
         r"own\.cir:3: e1: LAPLACE is not known here; write the filter with R and C\.",
     ),
     "an ideal diode": (
-        "* x\nV1 in 0 1\nD1 in out DI\nR1 out 0 1k\n.model DI D(Ron=.1 Roff=1Meg Vfwd=.4)\n.end\n",
-        r"own\.cir:5: roff of di is LTspice's ideal diode; write is, n and rs, or a B source\.",
+        "* x\nV1 in 0 1\nD1 in out DI\nR1 out 0 1k\n.model DI D(Ron=.1 Vfwd=.4 Ilimit=2)\n.end\n",
+        r"own\.cir:5: ilimit of di is LTspice's ideal diode; write is, n and rs, or a B source\.",
     ),
 }

@@ -7,9 +7,9 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise, takewhile
 
-from cosim.circuit.lint.deck import Line, refuse, shown
-from cosim.circuit.lint.elements import COPY, MODEL_TYPES, Element, Scope, parse
+from cosim.circuit.lint.elements import MODEL_TYPES, Element, Scope, parse
 from cosim.circuit.lint.expressions import Names, body, check_circles, check_names, sensed, unbraced
+from cosim.circuit.lint.lines import COPY, Line, refuse, shown
 from cosim.circuit.lint.topology import check_topology
 from cosim.circuit.lint.words import number, word_set
 
@@ -23,11 +23,12 @@ _BARE = re.compile(r"\b(?:[rclq]|flux)\s*=([^=]*?[()*/^][^=]*?)(?=\s\w+\s*=|$)",
 _WAVES = {"pulse": 7, "sin": 6, "exp": 6}
 """Most values of each: one more is a number of periods in LTspice, and a phase in ngspice."""
 _FOREIGN = (
-    ("d", re.compile(r"\b(roff|vfwd|vrev|rrev|(?:rev)?(?:ilimit|epsilon))\s*="),
+    ("d", re.compile(r"\b((?:rev)?ilimit)\s*="),
      "is LTspice's ideal diode; write is, n and rs, or a B source"),
-    ("sw", re.compile(r"\b(lser|vser|ilimit|epsilon)\s*="), "is LTspice's own; write it apart"),
+    ("sw", re.compile(r"\b([lv]ser|ilimit|epsilon)\s*=\s*(?!0(?![\w.]))"),
+     "is LTspice's own; write it apart"),
     ("sw", re.compile(r"\b([vi]h)\s*=\s*[{']?\s*-"),
-     "below 0 is LTspice's smooth switch; give one of 0, or write a B source"),
+     "below 0 is LTspice's smooth switch; give it as a plain number"),
 )  # fmt: skip
 """What models of these elements mean in LTspice alone, and ngspice would ignore."""
 _NO_VALUES = {"m", "temp", "dtemp", "tc", "tc1", "tc2", "ic", "scale", "noisy"}

@@ -10,13 +10,13 @@ import os
 import re
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from unicodedata import category
 
-from cosim.circuit.lint.dialect import in_ngspice, prelude, without_smooth_switches
+from cosim.circuit.lint.dialect import in_ngspice, in_ngspice_together, prelude
 from cosim.circuit.lint.lines import MAX_LINE, Line, refuse, shown
-from cosim.circuit.lint.words import word_set
+from cosim.circuit.lint.words import number, word_set
 from cosim.errors import BadInput, plain
 from cosim.files import reader
 
@@ -36,7 +36,7 @@ KEPT = word_set(
 )
 DROPPED = word_set(
     ".tran .op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .meas .measure .save .print "
-    ".plot .probe .width .title .csparam .backanno .prot .unprot .protect .unprotect"
+    ".plot .probe .probe64 .width .title .csparam .backanno .prot .unprot .protect .unprotect"
 )
 """Analyses, output and remarks: a host sets its own; see ``outputs.py``."""
 _INSTEAD = {
@@ -54,10 +54,10 @@ NUMERIC_OPTIONS = word_set(
     "xmu"
 )
 DROPPED_OPTIONS = word_set(
-    "accurate acct autostop brief cptime fastaccess filetype flagloads ingold interp limpts limtim "
-    "list lvltim measdgt meascplxfmt noacct noinit nomarch nomod nopage node numdgt opts "
-    "plotreltol plotvntol plotabstol plotwinsize post probe savecurrents srcstepmethod thev_induc "
-    "topologycheck warn wnflag"
+    "acct accurate advconv autostop brief cptime fastaccess filetype flagloads ingold interp "
+    "limpts limtim list lvltim maxstep meascplxfmt measdgt noacct node noinit nomarch nomod "
+    "nopage numdgt opts plotabstol plotreltol plotvntol plotwinsize post probe savecurrents "
+    "srcstepmethod stepgmin thev_induc topologycheck warn wnflag"
 )
 """Options of output, which a host sets itself (``interp`` gives wrong waveforms), and of how other
 programs compute."""
@@ -76,16 +76,29 @@ _FILE_WORD = re.compile(r"\b(?:\w*_)?(?:file|filename|wavefile)\b", re.IGNORECAS
 _COMMAND_COMMENT = re.compile(r"\*\s*(?:#\s*[\w!/.]|ng_script)", re.IGNORECASE)
 _TRAILING = re.compile(r";|//|(?:^|(?<=[\s,]))\$")
 _OPTION = re.compile(r"([a-z_]\w*)(?:\s*=\s*(\{[^{}]*\}|'[^']*'|[\w.+-]+))?[\s,]*", re.IGNORECASE)
-_MODEL = re.compile(r"\.model\s+([^\s=(){}']+)\s+([a-z]\w*)(?![\w:])", re.IGNORECASE)
+_MODEL = re.compile(
+    r"\.model\s+[^\s=(){}']+\s+(ako:[^\s(){}'=]+(?:\s+[a-z]\w*(?![\w:=]))?|[a-z]\w*)(?![\w:])",
+    re.IGNORECASE,
+)
 _LEVEL = re.compile(r"(?<![\w.])level\s*(=?)\s*([^\s,()]*)", re.IGNORECASE)
-_PATH = re.compile(r"""\s*(?:"([^"]*)"|'([^']*)'|([^\s"']+))\s*([^\s"']*)\s*""")
+_PIECE = r"""(?:"([^"\n]*)"|'([^'\n]*)'|([^\s"'()]+))"""
+_NAMES = re.compile(_PIECE)
+_POINTS = re.compile(rf"(?<=pwl)([\s(]*)file\b\s*=?\s*{_PIECE}", re.IGNORECASE)
 _NAMED = re.compile(
-    r"""^[ \t]*\.(?:include|inc|lib)[\s+]+(?:"([^"\n]+)|'([^'\n]+)|([^\s"']+))""", re.I | re.M
+    r"^[ \t]*\.(?:include|inc|lib)[\s+]+(.*)|\bfile\b[\s=+]*(.*)", re.IGNORECASE | re.MULTILINE
 )
+_ELSEWHERE = re.compile(r"[a-z]:|/|.*\.\.(?:/|$)", re.IGNORECASE)
 _STANDARD = re.compile(
-    r"(?<![\w.-])standard\.(?:bjt|dio|mos|jft|cap|ind|res|bead)\b", re.IGNORECASE
+    r"(?<![\w.-])(?:standard\.(?:bjt|dio|mos|jft|cap|ind|res|bead)|nom\.lib)\b", re.IGNORECASE
 )
-"""LTspice's own models, which it names wherever it draws a part, whether it needs them or not."""
+"""LTspice's and PSpice's own models, which they name whether they need them or not."""
+
+
+def _beside(name: str) -> str:
+    """The name from the netlist's folder: of a path that leads elsewhere its last part alone, since
+    programs write where a file lay on another machine."""
+    plain = name.strip("\"' \t\r").replace("\\", "/")
+    return plain.rpartition("/")[2] if _ELSEWHERE.match(plain) else plain
 
 
 def named(path: Path) -> list[Path]:
@@ -99,8 +112,9 @@ def named(path: Path) -> list[Path]:
         except (reader.Refused, OSError, ValueError):  # a NUL in its name
             continue
         size += len(data)
-        names = {next(filter(None, groups)) for groups in _NAMED.findall(text)}
-        names.update(_STANDARD.findall(text))
+        rests = ["".join(groups) for groups in _NAMED.findall(text)]
+        pieces = ("".join(piece) for rest in rests for piece in _NAMES.findall(rest))
+        names = {_beside(name) for name in (*rests, *pieces, *_STANDARD.findall(text))}
         for name in sorted(names)[:MAX_NAMES]:
             with suppress(OSError, ValueError, RuntimeError):
                 file = (one.parent / name).resolve()
@@ -141,7 +155,9 @@ class _Reader:
             title, _, rest = text.partition("\n")
             self.lines.append(Line(_title(Line(title, name, 1)), name, 1))
             if self._take(_logical(rest, name, 2), (self.path,)):
-                title, *lines = without_smooth_switches(self.lines)
+                every = in_ngspice_together(self.lines)
+                self.dropped += [line for line in every if line.text.startswith(".told")]
+                title, *lines = [line for line in every if not line.text.startswith(".told")]
                 return [title, *prelude([title, *lines]), *lines]
         elif _SCHEMATIC.match(text):
             cure = "save what LTspice shows under View, SPICE Netlist, and name that file"
@@ -187,7 +203,7 @@ class _Reader:
                 for after in lines:
                     refuse(after, "there is text after .end, which must come last")
                 return True
-            elif (text := passed(line)) is not None:
+            elif (text := passed(self._with_points(line, opened[-1]))) is not None:
                 self._add(self.lines, Line(text, line.file, line.number))
             else:
                 self._add(self.dropped, line)
@@ -203,13 +219,12 @@ class _Reader:
             rest = standard[0]
             if not os.path.lexists(opened[-1].parent / rest):
                 return  # a model of it that is needed is missed where it is used
-        match = _PATH.fullmatch(rest)
-        if match is None:
+        pieces = ["".join(piece) for piece in _NAMES.findall(rest)]
+        if len(pieces) > 2 or os.path.lexists(opened[-1].parent / _beside(rest)):
+            pieces = [rest]  # a name with blanks
+        if not 1 <= len(pieces) <= 1 + line.text.lower().startswith(".lib"):
             refuse(line, f"{shown(line.text)} does not name one file")
-        name = next(group for group in match.groups() if group is not None)
-        section = match[4].lower() or None
-        if section and not line.text.lower().startswith(".lib"):
-            refuse(line, f"{shown(line.text)} names more than one file")
+        name, section = pieces[0], "".join(pieces[1:]).lower() or None
         path = self._inside(line, name, opened[-1])
         if path in opened:
             refuse(line, f"{shown(name)} includes itself")
@@ -223,17 +238,28 @@ class _Reader:
         if not self._take(lines, (*opened, path), section) and section:
             refuse(line, f"{shown(name)} has no section {shown(section)}")
 
+    def _with_points(self, line: Line, base: Path) -> Line:
+        """A source's line with the points of the file that its PWL names."""
+        match = _POINTS.search(line.text) if line.text[0] in "vViI" else None
+        if match is None:
+            return line
+        name = "".join(filter(None, match.groups()[1:]))
+        points = re.findall(r"[^\s,()]+", self._text(self._inside(line, name, base), line))
+        if len(points) % 2 or any(number(point) is None or point[0] == "+" for point in points):
+            refuse(line, f"{shown(name)} must hold pairs of numbers, a time and a value")
+        text = f"{line.text[: match.end(1)]} {' '.join(points)} {line.text[match.end() :]}"
+        if len(text) > MAX_LINE:
+            refuse(line, f"{shown(name)} has more than {MAX_LINE} characters: give it fewer points")
+        return replace(line, text=text)
+
     def _inside(self, line: Line, name: str, base: Path) -> Path:
-        """The regular file that an include means, if it lies in the netlist's own folder."""
-        parts = name.split("/")
-        if not name.isprintable() or re.search(r"[\\:$~|*?<>`;]", name):
-            refuse(
-                line,
-                f"{shown(name)} is no plain file name: copy the file into the netlist's folder and "
-                "give its name alone",
-            )
-        if name.startswith("/") or ".." in parts:
-            refuse(line, f"{shown(name)} must lie in the netlist's own folder: copy it there")
+        """The regular file that a name means, if it lies in the netlist's own folder."""
+        name, given = _beside(name), name
+        if not name.isprintable() or re.search(r"[:$~|*?<>`;]", name):
+            refuse(line, f"{shown(name)} is no plain file name: rename the file")
+        if _ELSEWHERE.match(given.strip("\"'").replace("\\", "/")):
+            what = f"{shown(name)} is read from the netlist's folder, not from where its path leads"
+            self._add(self.dropped, Line(f".told {what}", line.file, line.number))
         try:
             path = (base.parent / name).resolve(strict=True)
             if path.is_relative_to(self.folder) and path.is_file():
@@ -302,11 +328,11 @@ def _logical(text: str, file: str, first: int) -> Iterator[Line]:
 def _joined(text: str, file: str, first: int) -> Iterator[Line]:
     """The lines without comments, continuations joined to what they continue."""
     pending: Line | None = None
-    for number, raw in enumerate(text.split("\n"), first):
-        content = _without_comment(Line(raw, file, number))
+    for place, raw in enumerate(text.split("\n"), first):
+        content = _without_comment(Line(raw, file, place))
         if not content:
             continue
-        line = Line(content, file, number)
+        line = Line(content, file, place)
         if content.startswith("+"):
             if pending is None:
                 refuse(line, "the line continues nothing")
@@ -390,13 +416,11 @@ def _options(line: Line, word: str, rest: str) -> str | None:
 def _check_model(line: Line) -> None:
     match = _MODEL.match(line.text)
     if match is None:
-        ako = re.search(r"(?i)\sako:", line.text)
-        cure = "; write all of the model instead of ako" if ako else ""
-        refuse(line, f"{shown(line.text)} is no complete .model line{cure}")
-    kind = match[2].lower()
-    if kind not in MODELS:
+        refuse(line, f"{shown(line.text)} is no complete .model line")
+    kind = match[1].lower().split()[-1]  # of a kind of another model it may not be told
+    if kind not in MODELS and not kind.startswith("ako:"):
         refuse(line, f"models of type {shown(kind)} are not allowed in a netlist")
-    if kind not in ("nmos", "pmos"):
+    if kind in MODELS - {"nmos", "pmos"}:
         return
     for equals, level in _LEVEL.findall(line.text):
         if not equals or level not in MOS_LEVELS:

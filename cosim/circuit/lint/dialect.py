@@ -8,13 +8,17 @@ library does not bring on every machine, which cost each step, and which round a
 """
 
 import re
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain, combinations_with_replacement, count, pairwise
+from itertools import chain, combinations, combinations_with_replacement, count, pairwise
 from math import pi
+from typing import Any
 
-from cosim.circuit.lint.lines import MAX_LINE, Line, refuse
+from cosim.circuit.lint.lines import COPY, MAX_LINE, Line, refuse, shown
 from cosim.circuit.lint.words import closing, number, split_arguments, word_set, words
+
+_Key = tuple[Any, ...]  # a scope, and what is named in it
+
 
 _LETTERS = str.maketrans(
     {"\u00b5": "u", "\u03bc": "u", "\u03a9": "ohm", "\u2126": "ohm", "\u00a7": "_"}
@@ -23,7 +27,8 @@ _LETTERS = str.maketrans(
 _MOST = 50
 """Coefficients of a polynomial, and tables in a line."""
 
-_FUNCTIONS = {
+_WAY = "min(max((c-0.5*(n+f))/(n-f),-0.5),0.5)"
+FUNCTIONS = {
     "if": ("c,x,y", "ternary_fcn(c,x,y)"),
     "limit": ("x,y,z", "min(max(x,min(y,z)),max(y,z))"),
     "uplim": ("x,y,z", "min(x,y-z)+min(max(x-y+z,0),2*z)-min(max(x-y+z,0),2*z)**2/(4*z)"),
@@ -33,8 +38,12 @@ _FUNCTIONS = {
     "buf": ("x", "u(x-0.5)"),
     "inv": ("x", "u(0.5-x)"),
     "hypot": ("x,y", "sqrt(x*x+y*y)"),
+    "cosim_switch": ("c,n,f,r,q", f"exp(-0.5*ln(r*q)-ln(r/q)*{_WAY}*(1.5-2*{_WAY}**2))"),
+    "cosim_diode": ("x,f,b,r,q,d", "x/q+max(x-f,0)*(1/r-1/q)-max(-x-b,0)*(1/d-1/q)"),
 }
-"""Their functions that ngspice lacks: parameters, and the same in its own."""
+"""Their functions that ngspice lacks: parameters, and the same in its own. The logarithm of a
+switch's resistance is a cubic of the control (Cadence, *PSpice Reference Guide*, voltage-controlled
+switch)."""
 _CALL = re.compile(r"(?<![\w.])([a-z_]\w*)\s*\(")
 _DEFINED = re.compile(r"\.func\s+(\w+)|(\w+)\s*(?:\([^()]*\)\s*)?=(?!=)")
 _TABLE = re.compile(r"(?<![\w.])table\s*\(", re.IGNORECASE)
@@ -48,18 +57,31 @@ _REMARKS = {
 }  # fmt: skip
 """Ratings, makers and LTspice's steps, which nothing computes with."""
 _PARASITES = {"c": word_set("rser lser rpar cpar rlshunt"), "l": word_set("rser rpar cpar"),
-              "v": word_set("rser cpar")}  # fmt: skip
-_PAIR = re.compile(
-    r"""(?<!\S)([a-z]\w*)\s*=\s*("[^"]*"|\{[^{}]*\}|'[^']*'|[^\s,()"{}']+)""", re.IGNORECASE
-)
+              "v": word_set("rser cpar"),
+              **dict.fromkeys("befghi", word_set("rpar cpar"))}  # fmt: skip
+_VALUE = r"(\{[^{}]*\}|'[^']*'|[^\s,()\"{}'=]++)"
+_PAIR = re.compile(rf"""(?<!\S)([a-z]\w*)\s*=\s*("[^"]*"|{_VALUE[1:-1]})""", re.IGNORECASE)
 _SPLIT_NUMBER = re.compile(r"^(\d+)(meg|[tgkmunpf])(\d+)(?!\S)", re.IGNORECASE)
 _GLUED = re.compile(r"(?<==)\s*(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE)
 """4k7 for 4.7k, as a value and behind a name."""
 _POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)
-_MODEL = re.compile(r"\.model\s+\S+\s+(\w+)", re.IGNORECASE)
-_SWITCH = re.compile(r"\.model\s+(\S+)\s+([vi]switch)\b", re.IGNORECASE)
-_CONTROL = {"vswitch": ("v", "1", "0"), "iswitch": ("i", "1m", "0")}
-"""Of PSpice's switches: what controls them, and at how much of it they are on and off."""
+_TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECASE)
+_COILS = re.compile(r"(k\S*)((?:\s+l\S*){3,})\s+(\S+)", re.IGNORECASE)
+_UNEQUAL = re.compile(r"(?<=\s)([a-z_]\w*)\s+(?=[{'\d.+-])", re.IGNORECASE)
+_MODEL = re.compile(r"\.model\s+\S+\s+(?:ako:\s*\S+\s+)?(\w+)", re.IGNORECASE)
+_AKO = re.compile(r"\.model\s+\S+\s+ako:([^\s()]+)", re.IGNORECASE)
+_DEVICES = {"vswitch": "s", "sw": "s", "iswitch": "w", "csw": "w", "d": "d"}
+_SWITCHING = re.compile(rf"\.model\s+(\S+)\s+({'|'.join(_DEVICES)})\b")
+_ODD = word_set("lser vser ilimit revilimit epsilon revepsilon")
+_CARDS = {
+    "vswitch": {"von": "1", "voff": "0", "ron": "1", "roff": "1meg"},
+    "iswitch": {"ion": "1m", "ioff": "0", "ron": "1", "roff": "1meg"},
+    "sw": {"vt": "0", "vh": "0", "ron": "1", "roff": "1e12"},
+    "csw": {"it": "0", "ih": "0", "ron": "1", "roff": "1e12"},
+    "d": {"vfwd": "0", "vrev": "1e30", "ron": "1", "roff": "1e12", "rrev": ""},
+}
+"""What these models have if it is not given."""
+_CURRENT = re.compile(rf"\bi\s*\(\s*(l[^\s()]*)\s*\)\s*=\s*{_VALUE}[\s,]*", re.IGNORECASE)
 _LOGIC = re.compile(r"(?<!&)&(?!&)|(?<!\|)\|(?!\|)|~")
 _LOGICAL = {"&": "&&", "|": "||", "~": "!"}
 """LTspice's and, or, not."""
@@ -72,14 +94,17 @@ def in_ngspice(line: Line) -> list[Line]:
     if not text.startswith((".inc", ".lib")):
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
-    if kind in "rclv":
-        found = [*_passive(text, kind)]
-    elif kind in "efgh":
-        found = [_source(text)]
-    elif kind == "b":
-        found = [_taken(text, _REMARKS[kind])[0]]
+    if kind in "rclvibefgh":
+        *parts, own = _with_parts(text, kind)
+        found = [*parts, _source(own) if kind in "efgh" else own]
+    elif coils := _COILS.fullmatch(text):
+        pairs = enumerate(combinations(coils[2].split(), 2))
+        found = [f"{coils[1]}_{place} {' '.join(pair)} {coils[3]}" for place, pair in pairs]
+    elif text.lower().startswith(".param") and "=" not in text:
+        found = [_UNEQUAL.sub(r"\1=", text)]
     elif model := _MODEL.match(text):
         remarks = _REMARKS["vdmos"] if model[1].lower() == "vdmos" else _MAKERS
+        text = re.sub(r"(?i)(?<=\sako:)\s+", "", text)
         found = [_taken(text.replace("(", " ( ", 1), remarks)[0]]
     else:
         found = [text]
@@ -97,12 +122,12 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
         if ("{" in text or "'" in text or text.startswith(".param")) and _PI.search(text):
             called["pi"] = {0}
         for match in _CALL.finditer(text):
-            if match[1] in _FUNCTIONS:
+            if match[1] in FUNCTIONS:
                 inside = text[match.end() : closing(text, match.end() - 1) - 1]
                 called.setdefault(match[1], set()).add(len(split_arguments(inside)))
     found = [
         f".func {name}({formals}) {{{body}}}"
-        for name, (formals, body) in _FUNCTIONS.items()
+        for name, (formals, body) in FUNCTIONS.items()
         if name not in defined and len(formals.split(",")) in called.get(name, ())
     ]
     if "pi" in called and "pi" not in defined:
@@ -110,30 +135,85 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
     return [Line(text, lines[0].file, 1) for text in found]
 
 
-def without_smooth_switches(lines: Sequence[Line]) -> list[Line]:
-    """PSpice's switches as B sources: from off to on the logarithm of their resistance is a cubic
-    of the control (Cadence, *PSpice Reference Guide*, voltage-controlled switch). Raises BadInput.
+def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
+    """What takes more than one line to read: models that are a kind of another (``ako:``), switches
+    and diodes of other programs as B sources, and currents of inductors in ``.ic``. Where a model
+    is not theirs to the letter a line ``.told`` says so. Raises BadInput.
     """
-    scopes = [*_scopes(lines)]
-    cards = {
-        (scope, match[2][0].lower(), match[1].lower()): _conductance(line, match[2].lower())
-        for line, scope in zip(lines, scopes, strict=True)
-        if (match := _SWITCH.match(line.text))
-    }
-    found = []
-    for line, scope in zip(lines, scopes, strict=True):
-        by, controls = {"s": ("v", 2), "w": ("i", 1)}.get(line.text[0].lower(), ("", 0))
-        name, *rest = words(line.text) if controls else [""]
-        model = rest[2 + controls] if controls and len(rest) > 2 + controls else ""
-        about = (cards.get((scope[:depth], by, model)) for depth in range(len(scope), -1, -1))
-        if conductance := next(filter(None, about), None):
-            nodes, control = rest[:2], ",".join(rest[2 : 2 + controls])
-            law = conductance(f"{by}({control})")
-            text = f"b{name} {' '.join(nodes)} i=v({','.join(nodes)})*{law}"
-            found.append(replace(line, text=text))
-        elif not _SWITCH.match(line.text):
-            found.append(line)
-    return found
+    scopes, lines = [*_scopes(lines)], [*lines]
+    _complete(lines, scopes)
+    known: dict[_Key, str] = {}
+    for place, (line, scope) in enumerate(zip(lines, scopes, strict=True)):
+        text = line.text.lower()
+        if match := _SWITCHING.match(text):
+            law, told = _law(line, match[2])
+            if known.setdefault((scope, _DEVICES[match[2]], match[1]), law) != law:
+                refuse(line, f"there is a second model {shown(match[1])}, so this cannot be read")
+            if law:
+                lines[place] = replace(line, text=told and f".told {told}")
+        elif text.startswith(".ic"):
+            known |= {(scope, each[1]): each[2] for each in _CURRENT.finditer(text)}
+            lines[place] = replace(line, text=_CURRENT.sub("", line.text).strip())
+    apart = (_apart(*each, known) for each in zip(lines, scopes, strict=True))
+    return [line for line in chain(*apart) if line.text.lower() not in ("", ".ic")]
+
+
+def _apart(line: Line, scope: tuple[int, ...], known: Mapping[_Key, str]) -> list[Line]:
+    """A switch or a diode by its law, an inductor with the current that it has at first."""
+    name, *rest = words(line.text) if line.text[:1].lower() in {*"swdl"} else [""]
+    count = {"s": 4, "w": 3}.get(name[:1], 2)
+    law = _nearest(known, scope, name[:1], rest[count]) if len(rest) > count else None
+    texts, (plus, minus, *control) = [line.text], rest[:count] if law else ["", ""]
+    if (scope, name) in known and len(rest) > 2:
+        # At the operating point its error is a voltage of a gigavolt an ampere, then nothing.
+        error = f"1e9*(i(v{name}_ic)-({known[scope, name]}))"
+        texts = [
+            " ".join([name, rest[0], f"{name}_ic", *rest[2:]]),
+            f"v{name}_ic {name}_ic {name}_at 0",
+            f"b{name}_ic {name}_at {rest[1]} v=time > 0 ? 0 : {error}",
+        ]
+    elif law and name[0] == "d":
+        if rest[3:] not in ([], ["off"]):
+            refuse(line, f"{shown(rest[3])} of an ideal diode is not read; leave it out")
+        texts = [f"b{name} {plus} {minus} i=cosim_diode(v({plus},{minus}),{law})"]
+    elif law:
+        by = f"{'i' if name[0] == 'w' else 'v'}({','.join(control)})"
+        texts = [f"b{name} {plus} {minus} i=v({plus},{minus})*cosim_switch({by},{law})"]
+    return [replace(line, text=text) for text in texts]
+
+
+def _nearest(known: Mapping[_Key, Any], scope: tuple[int, ...], *key: str) -> Any:
+    """What the name means in this scope: of the innermost one that has it."""
+    about = ((scope[:depth], *key) for depth in range(len(scope), -1, -1))
+    return next((known[each] for each in about if each in known), None)
+
+
+def _complete(lines: list[Line], scopes: Sequence[tuple[int, ...]]) -> None:
+    """Put all parameters into each model that is a kind of another one."""
+    own: dict[_Key, int] = {}
+    for place, (line, scope) in enumerate(zip(lines, scopes, strict=True)):
+        if _MODEL.match(line.text):  # of two of a name neither is meant
+            key = scope, words(line.text)[1]
+            own[key] = -1 if key in own else place
+
+    def complete(place: int, seen: tuple[int, ...] = (-1,)) -> None:
+        if (match := _AKO.match(lines[place].text)) is None:
+            return
+        base = _nearest(own, scopes[place], match[1].lower())
+        if base is None or base in (place, *seen):
+            refuse(lines[place], f"no model {shown(match[1])} is defined here{COPY}")
+        complete(base, (place, *seen))
+        kind, *given = words(lines[base].text)[2:] or [""]
+        name, _, *rest = words(lines[place].text)[1:]
+        if rest and "=" not in rest[0] and rest.pop(0) != kind:
+            refuse(lines[place], f"{shown(match[1])} is of type {kind}; write all of the model")
+        keys = {word.partition("=")[0] for word in rest}
+        kept = (word for word in given if word.partition("=")[0] not in keys)
+        text = " ".join([".model", name, kind, *kept, *rest])
+        lines[place] = replace(lines[place], text=text)
+
+    for place in range(len(lines)):
+        complete(place)
 
 
 def _scopes(lines: Sequence[Line]) -> Iterator[tuple[int, ...]]:
@@ -148,23 +228,25 @@ def _scopes(lines: Sequence[Line]) -> Iterator[tuple[int, ...]]:
         yield scope
 
 
-def _conductance(line: Line, kind: str) -> Callable[[str], str]:
-    """Of a model of a switch, the expression by its control."""
-    by, *ends = _CONTROL[kind]
-    given = {"ron": "1", "roff": "1meg", f"{by}on": ends[0], f"{by}off": ends[1]}
-    given |= _taken(line.text, given)[1]
-    on_resistance, off_resistance, on, off = (f"({value})" for value in given.values())
-    known = [number(value) for value in given.values()]
-    if 0.0 in known[:2] or (known[2] == known[3] and known[2] is not None):
-        refuse(line, f"ron and roff must be above 0, {by}on and {by}off apart")
-    middle = f"0.5*ln({on_resistance}*{off_resistance})"
-    span = f"ln({on_resistance}/{off_resistance})"
-
-    def law(control: str) -> str:
-        way = f"min(max(({control}-0.5*({on}+{off}))/({on}-{off}),-0.5),0.5)"
-        return f"exp(-{middle}-{span}*{way}*(1.5-2*{way}*{way}))"
-
-    return law
+def _law(line: Line, kind: str) -> tuple[str, str]:
+    """Of a model that ngspice lacks what a function of ours takes, and what is to be told of it."""
+    given = _taken(line.text, _CARDS[kind])[1]
+    first, second, ron, roff, *rrev = (_CARDS[kind] | given).values()
+    odd = {key for key, value in _taken(line.text, _ODD)[1].items() if number(value) != 0.0}
+    told, same = "", number(first) == number(second) is not None
+    if kind == "d":
+        if not given or odd - {"epsilon", "revepsilon"}:
+            return "", ""
+        told, same = "epsilon has no effect: the ideal diode has corners here" * bool(odd), False
+    elif kind in ("sw", "csw"):
+        if odd or (number(second) or 0.0) >= 0.0:
+            return "", ""
+        told = "between off and on this switch is PSpice's, as LTspice's curve is not published"
+        first, second = f"({first})-({second})", f"({first})+({second})"
+    if same or 0.0 in map(number, (ron, roff, *rrev)):
+        refuse(line, f"ron and roff must be above 0, {' and '.join([*_CARDS[kind]][:2])} apart")
+    values = (first, second, ron, roff, *(value or ron for value in rrev))
+    return ",".join(f"({value})" for value in values), told
 
 
 def _taken(text: str, keys: Collection[str]) -> tuple[str, dict[str, str]]:
@@ -196,8 +278,8 @@ def _lines(x: str, points: list[str]) -> str | None:
     return f"pwl(min(max({x}, {points[0]}), {points[-2]}), {', '.join(points)})"
 
 
-def _passive(text: str, kind: str) -> Iterator[str]:
-    """R, C, L and V: without ratings; their parasitic parts as elements of their own."""
+def _with_parts(text: str, kind: str) -> Iterator[str]:
+    """An element without ratings, behind its parasitic parts as elements of their own."""
     parts = _PARASITES.get(kind, frozenset())
     less, given = _taken(text, parts | _REMARKS.get(kind, frozenset()))
     given = {key: value for key, value in given.items() if key in parts and number(value) != 0.0}
@@ -208,9 +290,10 @@ def _passive(text: str, kind: str) -> Iterator[str]:
     name, plus, minus, rest = found
     if kind == "v":
         rest = re.sub(r"(?i)\bsine\b", "sin", rest)
-    else:
+    elif kind in "rcl":
         rest = _SPLIT_NUMBER.sub(r"\1.\3\2", rest)
         rest = _POINT.sub(r"\1.\2", rest) if kind == "r" else rest
+        rest = _TC.sub(lambda tc: f"tc1={tc[1]} tc2={tc[2] or 0}", rest)
     at = plus
     for key in ("rser", "lser"):
         if key in given:
@@ -218,10 +301,10 @@ def _passive(text: str, kind: str) -> Iterator[str]:
             if key == "lser" and "rlshunt" in given:
                 yield f"r{name}_rlshunt {at} {name}_{key} {given['rlshunt']}"
             at = f"{name}_{key}"
-    yield f"{name} {at} {minus} {rest}"
     for key in ("rpar", "cpar"):
         if key in given:
             yield f"{key[0]}{name}_{key} {plus} {minus} {given[key]}"
+    yield f"{name} {at} {minus} {rest}"
 
 
 def _source(text: str) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NoReturn
 
-from cosim.circuit.lint.deck import Line, refuse, shown
+from cosim.circuit.lint.lines import COPY, Line, refuse, shown
 from cosim.circuit.lint.words import definitions, split_assignments, words
 
 GROUND = "0"
@@ -36,7 +36,6 @@ _SPECIAL = {"poly", "table", "laplace", "freq", "value", "vol", "cur", "and", "n
 
 _FLAG = re.compile("=|^(?:off|thermal)$")
 """In a word behind the model that is no bare area: ngspice 39 crashes on one, or drops it."""
-COPY = "; copy its .model line into the netlist"
 
 
 @dataclass
@@ -82,6 +81,8 @@ class Scope:
     order: list[tuple[Line, Element | None, "Scope"]] = field(default_factory=list)
     """Of the top level: all lines as they stand, each with its element and its scope."""
     used: bool = False
+    free: set[str] = field(default_factory=set)
+    """Of a subcircuit: parameters that its calls set and only its body names."""
 
     def chain(self) -> "Iterator[Scope]":
         scope: Scope | None = self
@@ -205,6 +206,7 @@ class _Parser:
         self.top.globals.update(found[1:])
 
     def _place_nodes(self) -> None:
+        calls: list[tuple[Element, set[str], Scope]] = []
         waiting = [self.top]
         while waiting:
             scope = waiting.pop()
@@ -214,7 +216,19 @@ class _Parser:
             for element in scope.elements:
                 _place(element, scope)
                 if element.kind == "x":
-                    waiting += scope.subcircuit(element.model or "") or ()
+                    given = {word.partition("=")[0] for word in element.words}
+                    for called in scope.subcircuit(element.model or "") or ():
+                        waiting.append(called)
+                        calls.append((element, given, called))
+        for _, given, called in calls:
+            body = " ".join(line.text.lower() for line, _ in called.lines[1:])
+            for key in given - called.parameters - {"m"}:
+                if re.search(rf"(?<![\w.]){re.escape(key)}(?![\w.(])", body):
+                    called.free.add(key)
+        for element, given, called in calls:
+            if lacking := called.free - given:
+                element.refuse(f" gives {shown(called.name)} no {shown(min(lacking))}; write it")
+            called.parameters |= called.free
 
 
 def _check_brackets(line: Line) -> None:

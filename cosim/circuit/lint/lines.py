@@ -6,6 +6,7 @@ from typing import NoReturn
 from cosim.errors import BadInput, printable
 
 MAX_LINE = 200_000
+COPY = "; copy its .model line into the netlist"
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,19 @@ A measurement is computed on what ngspice recorded. All that it compares or aver
 an expression of ngspice's, so a limit in braces is one too, constant in time.
 """
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cosim.arrays import Array
 from cosim.circuit.lint.lines import Line, refuse, shown
-from cosim.circuit.lint.words import number, word_set
+from cosim.circuit.lint.words import NUMBER, number, word_set
 
-_SAVING = word_set(".save .probe .plot .print")
+_SAVING = word_set(".save .probe .probe64 .plot .print")
 _ANALYSES = word_set(".op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .csparam")
 _REDUCED = word_set("avg rms min max pp integ")
 _MEAS = re.compile(r"\.meas\w*\s+(?:(tran|ac|dc|op|tf|noise|sp)\s+)?(\w+)\s+(\w+)\b(.*)", re.DOTALL)
@@ -23,8 +25,11 @@ _BRACKETS = re.compile(r"\([^()]*\)|\{[^{}]*\}")
 _LONGEST = 2_000
 _FORMS = (
     "it may be AVG, RMS, MIN, MAX, PP or INTEG of an expression with FROM= and TO=, FIND with AT= "
-    "or WHEN, WHEN, or TRIG and TARG, of expression=value with TD= and CROSS=, RISE= or FALL="
+    "or WHEN, WHEN, TRIG and TARG, of expression=value, TD=, CROSS=, RISE=, FALL=, PARAM of .meas"
 )
+_CALLS = {name: getattr(math, name) for name in word_set("sqrt exp log log10 pow sin cos")}
+_CALLS |= {"abs": abs, "min": min, "max": max, "ln": math.log}
+_PIECE = re.compile(rf"{NUMBER.pattern}|[a-z_]\w*|[-+*/^(), ]", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -48,10 +53,14 @@ class Measure:
     what: str
     of: str
     events: tuple[Event, ...]
+    others: tuple[str, ...] = ()  # measurements that it may be computed from
 
     @property
     def words(self) -> list[str]:
         """The vectors and expressions that it needs."""
+        if self.what == "param":
+            names = dict.fromkeys(re.findall(r"(?<![\w.])[a-z_]\w*", self.of))
+            return [name for name in names if name not in self.others and name not in _CALLS]
         needed = [word for e in self.events for word in (e.at, e.left, e.right, e.delay)]
         return [word for word in (self.of, *needed) if word and number(word) is None]
 
@@ -62,7 +71,9 @@ def without_effect(dropped: Sequence[Line]) -> Iterator[str]:
         text = line.text.lower()
         word, match = text.split()[0], _MEAS.match(text)
         without = re.search(r"\b(uic|startup)\b", text) if word == ".tran" else None
-        if word in _SAVING:
+        if word == ".told":
+            yield f"{line.place}: {line.text[6:]}."
+        elif word in _SAVING:
             yield f"{line.place}: {word} has no effect; circuit.save keeps vectors."
         elif word in _ANALYSES or without or (match and match[1] not in (None, "tran")):
             what = f"{word} {without[0]}" if without else word
@@ -83,10 +94,12 @@ def measures(dropped: Sequence[Line]) -> list[Measure]:
             if match[2] in found:
                 refuse(line, f"there is a second .meas {shown(match[2])}")
             found[match[2]] = _measure(line, match[2], match[3], match[4])
-    return list(found.values())
+    return [replace(each, others=tuple(found)) for each in found.values()]
 
 
 def _measure(line: Line, name: str, what: str, rest: str) -> Measure:
+    if what == "param":
+        return Measure(line, name, what, _computed(line, _plain(rest.strip(" ="))), ())
     (_, of), *clauses = _clauses(f"{what}{rest}" if what in ("when", "trig") else rest)
     keys = [key for key, _ in clauses]
     given, events = dict(clauses), [Event()]
@@ -102,6 +115,16 @@ def _measure(line: Line, name: str, what: str, rest: str) -> Measure:
     if not all(event.at or (event.left and event.right) for event in events):
         refuse(line, f".meas {shown(name)} is nothing known here; {_FORMS}")
     return Measure(line, name, what, of, tuple(events))
+
+
+def _computed(line: Line, text: str) -> str:
+    """An expression of but numbers, names and what joins them, in Python's words."""
+    pieces = [match[0] for match in _PIECE.finditer(text)]
+    plain = [repr(number(each)) if each[0] in ".0123456789" else each for each in pieces]
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        if "".join(pieces) == text and compile("".join(plain).replace("^", "**"), "", "eval"):
+            return "".join(plain).replace("^", "**")
+    refuse(line, f"{shown(text)} is no expression of numbers and names")
 
 
 def _clauses(text: str) -> list[tuple[str, str]]:
@@ -146,18 +169,26 @@ def measured(
     """The measurements by the names of a summary, and a sentence for each whose event does not
     come. ``known`` are the values of their words at the times (s)."""
     values, notes = {}, []
-    for each in every:
-        value = _value(each, time, known)
+    for each in sorted(every, key=lambda each: each.what == "param"):
+        others = {key.removeprefix("meas."): np.full(1, value) for key, value in values.items()}
+        value = _value(each, time, {**known, **others} if each.what == "param" else known)
         if value is not None:
             values[f"meas.{each.name}"] = value
         else:
-            what = f".meas {each.name} has no value: its event does not come."
-            notes.append(f"{each.line.place}: {what}")
+            why = "what it needs has none" if each.what == "param" else "its event does not come"
+            notes.append(f"{each.line.place}: .meas {each.name} has no value: {why}.")
     return values, notes
 
 
 def _value(each: Measure, time: Array, known: Mapping[str, Array]) -> float | None:
     """The measurement's value, SI; None where an event does not happen."""
+    if each.what == "param":
+        try:  # nothing is in it but what _computed lets be there
+            needed = (word for word in (*each.words, *each.others) if word in known)
+            names = {word: float(known[word][0]) for word in needed}
+            return float(eval(each.of, {"__builtins__": {}}, {**_CALLS, **names}))
+        except (ArithmeticError, NameError, TypeError, ValueError):
+            return None
 
     def at(words: str, place: float) -> float:
         return float(np.interp(place, time, values(words)))
