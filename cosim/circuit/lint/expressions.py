@@ -10,6 +10,7 @@ from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 
 from cosim.circuit.lint.deck import Line, refuse, shown
+from cosim.circuit.lint.dialect import FUNCTIONS
 from cosim.circuit.lint.elements import Element, Scope
 from cosim.circuit.lint.words import closing, definitions, number, split_arguments, word_set
 
@@ -35,11 +36,7 @@ many in some 0.15 s."""
 CONSTANTS = word_set("time temper hertz")
 BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
 
-_INSTEAD = {
-    "limit": "limit() is no limiter in ngspice; write max(low, min(high, x))",
-    "if": "there is no if() in ngspice; write (condition ? yes : no)",
-    "table": "there is no table() in ngspice; write pwl(x, x1, y1, x2, y2, ...) in a B source",
-}
+_LIMITER = "limit() is no limiter in ngspice; write max(low, min(high, x))"
 _VARYING = re.compile(r"\b(?:[vi]\s*\(|(?:time|temper|hertz)\b)", re.IGNORECASE)
 _PLAIN = re.compile(r"\s*\{?\s*[+-]?\s*[\w.]+(?:(?<=\de)[+-]?\d+)?\s*\}?\s*", re.IGNORECASE)
 _POINT = re.compile(
@@ -154,8 +151,8 @@ def check_names(scope: Scope, names: Names) -> None:
                         refuse(line, f"the parameter {shown(name)} is not defined")
                 elif name in own:
                     _check_own(line, name, arguments, names, behavioural)
-                else:
-                    _check_call(line, name, arguments, behavioural)
+                elif reason := _misused(name, arguments, behavioural):
+                    refuse(line, reason)
             _check_operators(line, expression)
             pieces = "".join(str(piece.lastgroup)[0] for piece in _PIECE.finditer(expression))
             if pieces and (_BROKEN.search(pieces) or len(split_arguments(expression)) > 1):
@@ -191,25 +188,26 @@ def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str |
         return reasons[name not in PARAMETRIC] if all(reasons) else None
     known, other = (BEHAVIOURAL, PARAMETRIC) if behavioural else (PARAMETRIC, BEHAVIOURAL)
     count = len(arguments)
-    if name == "pwl" and behavioural:
+    if name in ("pwl", "table") and behavioural:
         if count >= 5 and count % 2:
             literal = (
                 _POINT.fullmatch(unbraced(each)) and not _varies(each) for each in arguments[1:]
             )
             if not all(literal):
-                return "the points of pwl() must be plain numbers, or expressions in braces"
+                return f"the points of {name}() must be plain numbers, or expressions in braces"
             points = [number(argument.strip()) for argument in arguments[1::2]]
             for one, other in pairwise(points):
                 if one is not None and other is not None and one >= other:
-                    return f"the x values of pwl() must rise, {other:g} comes after {one:g}"
+                    return f"the x values of {name}() must rise, {other:g} comes after {one:g}"
             return None
-        return "pwl() takes a value and at least two points, each of two numbers"
+        return f"{name}() takes a value and at least two points, each of two numbers"
     if name == "limit" and count != 2:
-        return _INSTEAD[name]
+        return _LIMITER
     if name not in known:
-        if name in _INSTEAD:
-            return _INSTEAD[name]
-        if name in other or name == "pwl":
+        if name in FUNCTIONS:
+            wanted = len(FUNCTIONS[name][0].split(","))
+            return f"the function {name} takes {_counted(wanted)}, not {count}"
+        if name in other or name in ("pwl", "table"):
             where = "where all is known before the run" if behavioural else "in B sources"
             return f"the function {name} works only {where}"
         return f"the function {shown(name)} is not defined"
@@ -217,15 +215,9 @@ def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str |
         return f"the function {name} takes {_counted(known[name])}, not {count}"
     plain = all(_PLAIN.fullmatch(argument) and not _varies(argument) for argument in arguments)
     if name in _RANDOM and behavioural and not plain:
-        return _INSTEAD.get(
-            name, f"in a B source {name}() takes plain numbers only; write it in a .param line"
-        )
+        plainly = f"in a B source {name}() takes plain numbers only; write it in a .param line"
+        return _LIMITER if name == "limit" else plainly
     return None
-
-
-def _check_call(line: Line, name: str, arguments: list[str], behavioural: bool | None) -> None:
-    if reason := _misused(name, arguments, behavioural):
-        refuse(line, reason)
 
 
 def _check_own(
@@ -254,8 +246,8 @@ def _check_own(
             continue
         if inner in names.definitions:
             _check_own(function.line, inner, inner_arguments, names, behavioural, depth + 1)
-        else:
-            _check_call(function.line, inner, inner_arguments, behavioural)
+        elif reason := _misused(inner, inner_arguments, behavioural):
+            refuse(function.line, reason)
     # Those that it calls are counted by now; one that calls itself is not.
     calls = [inner for inner, found in used(function.body) if found is not None]
     names.calls[name] = 1 + sum(names.calls.get(inner, 0) for inner in calls)
