@@ -4,11 +4,15 @@ A measurement is computed on what ngspice recorded. All that it compares or aver
 an expression of ngspice's, so a limit in braces is one too, constant in time.
 """
 
+import ast
 import math
+import operator
 import re
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +33,10 @@ _FORMS = (
 )
 _CALLS = {name: getattr(math, name) for name in word_set("sqrt exp log log10 pow sin cos")}
 _CALLS |= {"abs": abs, "min": min, "max": max, "ln": math.log}
+_OPERATIONS: dict[type[ast.AST], Any] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: math.pow, ast.UAdd: operator.pos, ast.USub: operator.neg,
+}  # fmt: skip
 _PIECE = re.compile(rf"{NUMBER.pattern}|[a-z_]\w*|[-+*/^(), ]", re.IGNORECASE)
 
 
@@ -118,13 +126,33 @@ def _measure(line: Line, name: str, what: str, rest: str) -> Measure:
 
 
 def _computed(line: Line, text: str) -> str:
-    """An expression of but numbers, names and what joins them, in Python's words."""
+    """An expression of numbers, names and what joins them, as Python spells it."""
     pieces = [match[0] for match in _PIECE.finditer(text)]
     plain = [repr(number(each)) if each[0] in ".0123456789" else each for each in pieces]
-    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        if "".join(pieces) == text and compile("".join(plain).replace("^", "**"), "", "eval"):
-            return "".join(plain).replace("^", "**")
+    found = "".join(plain).replace("^", "**")
+    with suppress(SyntaxError, TypeError, RecursionError, MemoryError):
+        if "".join(pieces) == text:
+            with suppress(ArithmeticError, ValueError):  # which the values are to tell
+                _value_of(ast.parse(found, mode="eval").body, defaultdict(lambda: math.nan))
+            return found
     refuse(line, f"{shown(text)} is no expression of numbers and names")
+
+
+def _value_of(node: ast.AST, names: Mapping[str, float]) -> float:
+    """The value of an expression: nothing but what stands here is ever computed. Raises TypeError
+    for all else, ArithmeticError, ValueError and KeyError."""
+    match node:
+        case ast.Constant(value=float(value)):
+            return value
+        case ast.Name(id=name) if name not in _CALLS:
+            return names[name]
+        case ast.UnaryOp(op=op, operand=one) if type(op) in _OPERATIONS:
+            return _OPERATIONS[type(op)](_value_of(one, names))
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATIONS:
+            return _OPERATIONS[type(op)](_value_of(left, names), _value_of(right, names))
+        case ast.Call(func=ast.Name(id=name), args=[*given], keywords=[]) if name in _CALLS:
+            return _CALLS[name](*(_value_of(each, names) for each in given))
+    raise TypeError
 
 
 def _clauses(text: str) -> list[tuple[str, str]]:
@@ -183,11 +211,10 @@ def measured(
 def _value(each: Measure, time: Array, known: Mapping[str, Array]) -> float | None:
     """The measurement's value, SI; None where an event does not happen."""
     if each.what == "param":
-        try:  # nothing is in it but what _computed lets be there
-            needed = (word for word in (*each.words, *each.others) if word in known)
-            names = {word: float(known[word][0]) for word in needed}
-            return float(eval(each.of, {"__builtins__": {}}, {**_CALLS, **names}))
-        except (ArithmeticError, NameError, TypeError, ValueError):
+        try:
+            names = {word: float(values[0]) for word, values in known.items()}
+            return _value_of(ast.parse(each.of, mode="eval").body, names)
+        except (ArithmeticError, KeyError, ValueError):
             return None
 
     def at(words: str, place: float) -> float:
