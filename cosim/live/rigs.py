@@ -57,12 +57,12 @@ def _scene(scene: Scene) -> dict[str, Any]:
     values = {full: x for full, x in own.items() if x not in (None, turned()[full].default)}
     values.pop("circuit.model", None)
     _, integers = parameters(load(scene, {"circuit.model": MODEL}))
-    fixed = integers.keys() - {key.variable for key in turned().values()}
+    variables = {key.variable for key in turned().values()}
     return {
         "text": scene.description,
         "model": scene.circuit.model,
         "values": values,
-        "integers": {name: integers[name] for name in fixed},
+        "integers": {name: value for name, value in integers.items() if name not in variables},
         "rise": rise(scene.coil),
     }
 
