@@ -138,7 +138,7 @@ TOLD = {
     "E9 x 0 FREQ {V(in)} = (0,0,0)": "FREQ is not known here",
     "V9 x 0 PULSE(0 1 0 1n 1n 1u 2u 3)": "PULSE takes 7 values; one more means a number of periods",
     "V9 x 0 SINE(0 1 1k 0 0 0 5)": "SIN takes 6 values",
-    "V9 x 0 PWL(0 0 +1m 1)": "write the times of PWL since the start",
+    "V9 x 0 PWL(0 0 {1m} 1 +1m 2)": "write the times of PWL since the start",
     "V9 x 0 PWL(0 0 1m 1 0.5m 0)": "the times of PWL must rise, 0.0005 s comes after 0.001 s",
     "V9 x 0 PWL REPEAT FOREVER (0 0 1m 1) ENDREPEAT": "instead of REPEAT write r=0",
     "S9 x 0 in 0 W\n.model W SW(Ron=1 Vt=.5 Vh={-.2})": "smooth switch; give it as a plain number",
@@ -289,6 +289,8 @@ POINTS = {
     "PWL file=points.txt": "0 0\n1e-3, 1\n2m -1V\n",
     'PWL FILE "C:\\Users\\me\\points.txt"': "(0,0) (1m,1) (2m,-1)",
     "PWL(file = '../points.txt') r=-1": "0 0 1e-3 1 2e-3 -1",
+    "PWL file=points.txt r=-1": "0 0 +1m 1 +1m -1",
+    "PWL(0 0, +1m 1, +1e-3 -1)": "",
 }
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from unicodedata import category
 
-from cosim.circuit.lint.dialect import in_ngspice, in_ngspice_together, prelude
+from cosim.circuit.lint.dialect import in_ngspice, in_ngspice_together, prelude, since_the_start
 from cosim.circuit.lint.lines import MAX_LINE, Line, refuse, shown
 from cosim.circuit.lint.words import number, word_set
 from cosim.errors import BadInput, plain
@@ -245,9 +245,9 @@ class _Reader:
             return line
         name = "".join(filter(None, match.groups()[1:]))
         points = re.findall(r"[^\s,()]+", self._text(self._inside(line, name, base), line))
-        if len(points) % 2 or any(number(point) is None or point[0] == "+" for point in points):
+        if len(points) % 2 or any(number(point) is None for point in points):
             refuse(line, f"{shown(name)} must hold pairs of numbers, a time and a value")
-        text = f"{line.text[: match.end(1)]} {' '.join(points)} {line.text[match.end() :]}"
+        text = f"{line.text[: match.end(1)]} {since_the_start(points)} {line.text[match.end() :]}"
         if len(text) > MAX_LINE:
             refuse(line, f"{shown(name)} has more than {MAX_LINE} characters: give it fewer points")
         return replace(line, text=text)

@@ -67,6 +67,8 @@ _GLUED = re.compile(r"(?<==)\s*(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECA
 _POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)
 _TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECASE)
 _COILS = re.compile(r"(k\S*)((?:\s+l\S*){3,})\s+(\S+)", re.IGNORECASE)
+_PWL = re.compile(r"(\bpwl\b[\s(]*)([^()]*)", re.IGNORECASE)
+_WORD = re.compile(r"[^\s,]+")
 _UNEQUAL = re.compile(r"(?<=\s)([a-z_]\w*)\s+(?=[{'\d.+-])", re.IGNORECASE)
 _MODEL = re.compile(r"\.model\s+\S+\s+(?:ako:\s*\S+\s+)?(\w+)", re.IGNORECASE)
 _AKO = re.compile(r"\.model\s+\S+\s+ako:([^\s()]+)", re.IGNORECASE)
@@ -288,8 +290,9 @@ def _with_parts(text: str, kind: str) -> Iterator[str]:
         yield text
         return
     name, plus, minus, rest = found
-    if kind == "v":
+    if kind in "vi":
         rest = re.sub(r"(?i)\bsine\b", "sin", rest)
+        rest = _PWL.sub(lambda pwl: pwl[1] + since_the_start(_WORD.findall(pwl[2])), rest)
     elif kind in "rcl":
         rest = _SPLIT_NUMBER.sub(r"\1.\3\2", rest)
         rest = _POINT.sub(r"\1.\2", rest) if kind == "r" else rest
@@ -305,6 +308,18 @@ def _with_parts(text: str, kind: str) -> Iterator[str]:
         if key in given:
             yield f"{key[0]}{name}_{key} {plus} {minus} {given[key]}"
     yield f"{name} {at} {minus} {rest}"
+
+
+def since_the_start(points: list[str]) -> str:
+    """The points of PWL, times since the last one (``+1u``) as such since the start."""
+    found, last = [*points], 0.0
+    for place, text in enumerate(points):
+        if (value := number(text)) is None:
+            break  # an expression, or what follows the points
+        if place % 2 == 0:
+            last = last + value if text.startswith("+") else value
+            found[place] = repr(last) if text.startswith("+") else text
+    return " ".join(found)
 
 
 def _source(text: str) -> str:
