@@ -94,7 +94,8 @@ class Scene(BaseModel):
         if not isinstance(data, dict):
             return data
         circuit, coupling = data.get("circuit", {}), data.get("coupling", {})
-        if isinstance(circuit, dict) and circuit.get("model") == "file":
+        model = circuit.get("model") if isinstance(circuit, dict) else None
+        if isinstance(model, str) and model in RUNGS and RUNGS[model].own_netlist:
             data = data | {"circuit": CAREFUL | circuit}
         if data.get("fmu") and isinstance(coupling, dict):
             data = data | {"coupling": {"method": "auto"} | coupling}
