@@ -1,6 +1,10 @@
 #include "stepper.h"
 
+#include <stdatomic.h>
 #include <string.h>
+#ifdef __x86_64__
+#include <cpuid.h>
+#endif
 
 double stepper_suspension(const double p[N_RIG], double q)
 {
@@ -103,21 +107,40 @@ static void rest_of(const double p[N_ALL][LANES], int l, double middle, Rest *re
     rest->jump[l] = (cycle - p[PHASE][l]) / p[FREQUENCY][l];
 }
 
-/* How many lanes this processor steps at once. */
-static int width(void)
-{
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
-        return 8;
-    if (__builtin_cpu_supports("avx2"))
-        return 4;
+#ifndef WIDEST
+#define WIDEST 8 /* lanes at once, at most */
 #endif
-    return 2;
-}
 
 #ifdef __x86_64__
+/* How many lanes the processor can step at once, where the system keeps registers of that width. The
+ * compilers have a function for it, but that of zig's library says that no processor can do anything. */
+static int able(void)
+{
+    unsigned a, b, c, d, kept, high;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_OSXSAVE) || !(c & bit_AVX))
+        return 2;
+    __asm__("xgetbv" : "=a"(kept), "=d"(high) : "c"(0));
+    if (!__get_cpuid_count(7, 0, &a, &b, &c, &d))
+        return 2;
+    const unsigned avx512 = bit_AVX512F | bit_AVX512DQ;
+    if (WIDEST >= 8 && (b & avx512) == avx512 && (kept & 0xe6) == 0xe6)
+        return 8;
+    return WIDEST >= 4 && (b & bit_AVX2) && (kept & 0x6) == 0x6 ? 4 : 2;
+}
+
+/* How many it steps; asked once, since under a hypervisor an answer takes as long as many steps. */
+static int width(void)
+{
+    static _Atomic int known;
+    if (!known)
+        known = able();
+    return known;
+}
+
 #define OF_WIDTH(name) (width() == 8 ? name##_8 : width() == 4 ? name##_4 : name##_2)
 #else
+static int width(void) { return 2; }
+
 #define OF_WIDTH(name) name##_2
 #endif
 
