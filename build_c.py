@@ -295,7 +295,7 @@ def interface(folders: tuple[Path, ...]) -> dict[str, Any]:
         if all(kind in {*_NUMBERS, *structures, "*", "()"} for _, kind, _ in fields):
             structures[name] = fields
     functions = {
-        name: [result, [_argument(one) for one in arguments.split(",")]]
+        name: [result, [_argument(one) for one in arguments.split(",") if one != "void"]]
         for result, name, arguments in _EXPORTS.findall(text)
     }
     return {"structures": structures, "functions": functions}

@@ -186,6 +186,8 @@ void stepper_run(const Stretch *piece, const Parameters p, const Span *span, Kep
     OF_WIDTH(stepper_follow)(piece, p, span, kept, out);
 }
 
+int64_t stepper_width(void) { return width(); }
+
 int64_t stepper_sizes(int64_t which)
 {
     return (int64_t)(which ? sizeof(Stretch) : sizeof(Kept));

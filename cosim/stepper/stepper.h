@@ -108,6 +108,8 @@ enum { MAX_RESTS = 4 };
 /* The places (q, m) at which the ram rests without a current, rising: how many. */
 EXPORT int64_t stepper_rests(const double rig[N_RIG], double rests[MAX_RESTS]);
 
+EXPORT int64_t stepper_width(void); /* how many lanes this processor steps at once */
+
 EXPORT int64_t stepper_sizes(int64_t which); /* bytes of Kept, of Stretch */
 
 /* ---- between the files of the stepper ---- */

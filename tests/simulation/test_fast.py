@@ -1,6 +1,7 @@
 """The fast solver against the FMU, which finds each event: one table of numbers, one law."""
 
 import ctypes
+import re
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -149,6 +150,14 @@ def test_lanes_do_not_know_each_other() -> None:
         with Evaluator(scene, whole_periods=True) as bench:
             ((_, alone),) = bench.run([(number, point)])
         assert alone == together[number]
+
+
+@pytest.mark.skipif(not Path("/proc/cpuinfo").exists(), reason="Linux tells of its processor")
+def test_it_takes_as_many_lanes_as_the_processor_has() -> None:
+    """In which a build by another compiler may be wrong without another number."""
+    flags = {*re.findall(r"\w+", Path("/proc/cpuinfo").read_text(encoding="utf-8"))}
+    wide = 8 if {"avx512f", "avx512dq"} <= flags else 4 if "avx2" in flags else 2
+    assert library("stepper").stepper_width() == wide
 
 
 @pytest.mark.slow
