@@ -9,9 +9,10 @@ from cosim.arrays import Array
 ENDS = (0.05, 0.95)
 """Of an interval, as shares of the weight."""
 
-FEWEST = 12.0
-"""Effective rigs that an interval stands on at least: of fewer it would be too narrow, so a
-measurement finer than the sample counts for no more than the sample can tell."""
+FEWEST = 20.0
+"""Effective rigs that an interval stands on at least: of 19 equally likely ones the ends of a 90 %
+interval are the least and the greatest, so of fewer it would be too narrow. A measurement finer
+than the sample counts for no more than the sample can tell."""
 
 DRAWS = 8
 """Of the measurement's noise, on each rig."""
@@ -46,12 +47,14 @@ def likely(values: Array, shown: Array, sd: Array) -> Array:
 
 def interval(targets: Array, weights: Array) -> Array:
     """The ends of the 90 % interval of each target (n × targets), by weighted quantiles: ends ×
-    targets."""
-    columns = []
+    targets. The i-th of n equally likely values, n the effective number, stands at i/(n + 1): so
+    often a further one lies below it (Weibull's plotting position, 1939)."""
+    weights = weights / weights.sum()
+    n, columns = 1.0 / (weights**2).sum(), []
     for column in targets.T:
         order = np.argsort(column)
-        share = np.cumsum(weights[order]) - 0.5 * weights[order]
-        columns.append(np.interp(ENDS, share / weights.sum(), column[order]))
+        share = (n * (np.cumsum(weights[order]) - 0.5 * weights[order]) + 0.5) / (n + 1.0)
+        columns.append(np.interp(ENDS, share, column[order]))
     return np.array(columns).T
 
 

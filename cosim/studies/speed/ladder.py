@@ -8,6 +8,7 @@ from functools import partial
 from math import nan
 from pathlib import Path
 from statistics import median
+from textwrap import fill
 from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
@@ -199,16 +200,20 @@ def words(scene: Scene, rungs: list[Rung]) -> str:
 
 def draw(found: Found, path: Path) -> None:
     """Draw error over cost, a panel a scene, and mark the cheapest rung within the tolerance."""
-    wide = min(len(found), 3)
+    wide = 2 if len(found) == 4 else min(len(found), 3)
     high = -(-len(found) // wide)
     errors = [rung.off_top for _, rungs in found for rung in rungs]
     top = 200.0 * max(*errors, *(scene.run.tolerance for scene, _ in found))
+    costs = [rung.cost[0] for _, rungs in found for rung in rungs]
+    ends = min(costs) / 6.0, max(costs) * 6.0  # with room for the names
     size = (max(3.8 * wide, 6.0), 3.4 * high + 0.6)
     note = (
         "Green: the cheapest rung within run.tolerance, which is shaded. Under a sawtooth “full” "
         "has the firmware's staircase, the others the smooth ramp."
     )
-    figure, axes = panels(message(found), note, size, high, wide, sharex=True, sharey=True)
+    figure, axes = panels(
+        message(found), fill(note, int(12.5 * size[0])), size, high, wide, sharex=True, sharey=True
+    )
     for axis, (scene, rungs) in zip(axes, found, strict=False):
         tolerance, taken = scene.run.tolerance, cheapest(rungs, scene.run.tolerance)
         axis.axhspan(0.0, 100.0 * tolerance, color=GREEN, alpha=0.12, lw=0)
@@ -222,9 +227,12 @@ def draw(found: Found, path: Path) -> None:
         axis.set_title(scene.name, loc="left")
         axis.set_xscale("log")
         axis.set_yscale("symlog", linthresh=0.1)
-        axis.set(xlabel="computing per simulated second [s]", ylim=(-0.03, top))
-        axis.margins(x=0.35)
-    axes[0].set_ylabel("error of v_average against “full” [%]")
+        axis.set(xlabel="computing per simulated second [s]", xlim=ends, ylim=(-0.03, top))
+        axis.tick_params(labelbottom=True)
+    for axis in axes[len(found) :]:
+        axis.set_visible(False)
+    for axis in axes[::wide]:
+        axis.set_ylabel("error of v_average against “full” [%]")
     figure.write(path)
 
 
