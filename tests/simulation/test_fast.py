@@ -2,7 +2,6 @@
 
 import ctypes
 import re
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -167,14 +166,10 @@ def test_every_processor_computes_the_same_bits(
 ) -> None:
     """As many lanes at once as a lesser processor has, against as many as this one has."""
     ours = library("stepper")
-    sources = [path for folder in build_c.LIBRARIES["stepper"] for path in folder.glob("*.c")]
-    made = tmp_path / "stepper.so"
-    subprocess.run(
-        [*build_c.compiler(), *build_c.FLAGS, *build_c.LIBRARY_FLAGS, "-shared", f"-DWIDEST={most}"]
-        + [f"-I{folder}" for folder in build_c.LIBRARIES["stepper"]]
-        + [*map(str, sources), "-o", str(made), "-lm"],
-        check=True,
-    )
+    folders, made = build_c.LIBRARIES["stepper"], tmp_path / "stepper.so"
+    sources = [path for folder in folders for path in folder.glob("*.c")]
+    paths = (f"-I{folder}" for folder in folders)
+    build_c.link(sources, made, "-shared", *build_c.LIBRARY_FLAGS, *paths, f"-DWIDEST={most}")
     theirs = ctypes.CDLL(str(made))
     for name in ("stepper_begin", "stepper_run"):
         getattr(theirs, name).argtypes = getattr(ours, name).argtypes

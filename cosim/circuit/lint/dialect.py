@@ -317,8 +317,10 @@ def since_the_start(points: list[str]) -> str:
         if (value := number(text)) is None:
             break  # an expression, or what follows the points
         if place % 2 == 0:
-            last = last + value if text.startswith("+") else value
-            found[place] = repr(last) if text.startswith("+") else text
+            if text.startswith("+"):
+                value += last
+                found[place] = repr(value)
+            last = value
     return " ".join(found)
 
 

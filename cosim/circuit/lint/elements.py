@@ -221,9 +221,9 @@ class _Parser:
                         waiting.append(called)
                         calls.append((element, given, called))
         for _, given, called in calls:
-            body = " ".join(line.text.lower() for line, _ in called.lines[1:])
-            for key in given - called.parameters - {"m"}:
-                if re.search(rf"(?<![\w.]){re.escape(key)}(?![\w.(])", body):
+            for key in given - called.parameters - called.free - {"m"}:
+                name = re.compile(rf"(?<![\w.]){re.escape(key)}(?![\w.(])")
+                if any(name.search(line.text.lower()) for line, _ in called.lines[1:]):
                     called.free.add(key)
         for element, given, called in calls:
             if lacking := called.free - given:
