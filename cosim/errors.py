@@ -33,6 +33,10 @@ class SimulationFailed(CosimError):
     exit_code = 3
 
 
+class StepTooSmall(SimulationFailed):
+    """ngspice found no step that was small enough for its tolerances."""
+
+
 def printable(text: str) -> str:
     """A text, of any number of lines, without what a terminal would obey."""
     return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)

@@ -13,6 +13,8 @@ Importing this module loads PySpice, which takes a while: only workers do.
 import logging
 import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Protocol
@@ -40,6 +42,11 @@ _NOISE = re.compile(
     re.IGNORECASE,
 )
 """What it says of itself, and what only follows from an earlier word."""
+
+
+LOOSER = "abstol=1e-8 vntol=1e-5 chgtol=1e-11"
+"""A, V, C. ngspice's own 1 pA, 1 uV and 10 fC are made for integrated circuits: where amperes are
+switched, no step is small enough for them."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +107,7 @@ class Engine(Shared.NgSpiceShared):
 
     sent: tuple[str, ...] = ()
     """The names of all vectors of the run, as they are sent."""
+    _looser = False
     poisoned = False
     """ngspice has given up for good: nothing runs in this process's library any more."""
 
@@ -160,7 +168,10 @@ class Engine(Shared.NgSpiceShared):
                     self._library.ngSpice_Command(command)
 
     def _load(self, deck: str) -> None:
-        lines = [_ffi.new("char[]", line.encode()) for line in (*deck.splitlines(), "")]
+        given = deck.splitlines()
+        if self._looser:
+            given.insert(-1, f".options {LOOSER}")
+        lines = [_ffi.new("char[]", line.encode()) for line in (*given, "")]
         self._library.ngSpice_Circ(_ffi.new("char *[]", [*lines, _ffi.NULL]))
 
     def address(self, function: str) -> int:
@@ -181,9 +192,21 @@ class Engine(Shared.NgSpiceShared):
         words = [" ".join(word.split()) for word in (*self._stderr, *self._stdout)]
         telling = [word for word in words if _TROUBLE.search(word) and not _NOISE.search(word)]
         said = "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
-        if "imestep too small" in said:  # for 1 pA and 10 fC, where amperes are switched
-            said += "; .options abstol=1e-8 vntol=1e-5 chgtol=1e-11 in the netlist may help"
         return said
+
+    @property
+    def too_small(self) -> bool:
+        """It ended its last run since no step was small enough for its tolerances."""
+        return any("imestep too small" in word for word in (*self._stderr, *self._stdout))
+
+    @contextmanager
+    def looser(self) -> Iterator[None]:
+        """Runs with the absolute tolerances ``LOOSER``, whatever the netlist has."""
+        self._looser = True
+        try:
+            yield
+        finally:
+            self._looser = False
 
     def ignored(self) -> list[str]:
         """The models' parameters that it does not know."""

@@ -2,9 +2,11 @@
 
 import time
 from contextlib import closing
+from dataclasses import replace
 
 from cosim.arrays import Array
 from cosim.coupling.loop.recorder import Recorder
+from cosim.errors import StepTooSmall
 from cosim.files.spill import Tape, blocks
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene
@@ -16,12 +18,40 @@ from cosim.toolchain.processes import Progress
 from cosim.waveforms.columns import COLUMNS, UNITS
 from cosim.waveforms.result import Result
 
+_MORE = 100.0
+"""Times ``circuit.reltol``, for a netlist that ngspice cannot run with less."""
+
 
 def simulate_here(
     scene: Scene, progress: Progress, fmi_version: int = 3, alone: bool = False
 ) -> Result:
     """The run of a scene whose circuit and coupling are chosen; ``alone``: its summary alone,
     without waveforms and notes. Raises as :func:`cosim.simulation.simulate.simulate` does."""
+    try:
+        return _simulated(scene, progress, fmi_version, alone)
+    except StepTooSmall:
+        if not scene.rung.own_netlist:
+            raise
+    from cosim.circuit.ngspice import LOOSER
+    from cosim.coupling.loop.lead import engine
+
+    own = scene.circuit.reltol
+    looser = min(_MORE * own, 1e-2)
+    with engine().looser():
+        try:
+            result, reltol = _simulated(scene, progress, fmi_version, alone), own
+        except StepTooSmall:
+            loose = scene.having(circuit={"reltol": looser})
+            result, reltol = _simulated(loose, progress, fmi_version, alone), looser
+    if not alone:
+        result.summary["notes"].append(
+            "no step was small enough for the circuit's tolerances; the run is with .options "
+            f"{LOOSER} reltol={reltol:g}."
+        )
+    return replace(result, scene=scene)
+
+
+def _simulated(scene: Scene, progress: Progress, fmi_version: int, alone: bool) -> Result:
     began = time.perf_counter()
     if scene.has_ports:
         from cosim.coupling.ports.results import joined

@@ -34,7 +34,7 @@ from shutil import rmtree
 from typing import Any
 from weakref import finalize, ref
 
-from cosim.errors import BadInput, SimulationFailed, plain, printable
+from cosim.errors import BadInput, SimulationFailed, StepTooSmall, plain, printable
 from cosim.files.atomic import folder_of_ones_own
 from cosim.files.spill import Packed, unpacked
 from cosim.toolchain import fence
@@ -279,7 +279,9 @@ def in_a_worker() -> bool:
 
 def _error(name: str, text: str) -> Exception:
     """An error of a bounded process: one of ours or of Python's, by its name."""
-    known = vars(builtins) | {one.__name__: one for one in (BadInput, SimulationFailed)}
+    known = vars(builtins) | {
+        one.__name__: one for one in (BadInput, SimulationFailed, StepTooSmall)
+    }
     kind: Any = known.get(name)
     with suppress(TypeError):  # one that takes more than a text
         if issubclass(kind, Exception):

@@ -25,7 +25,7 @@ from cosim.coupling.loop.structures import (
     loop,
 )
 from cosim.drive.pieces import Ahead, Command
-from cosim.errors import SimulationFailed
+from cosim.errors import SimulationFailed, StepTooSmall
 from cosim.files.spill import Tape
 from cosim.scene import Scene
 from cosim.scene.firmware import GAIN
@@ -201,9 +201,10 @@ def finished(state: Any, reached: float, duration: float) -> None:
         raise SimulationFailed(f"The netlist has an external source {name} that nothing feeds.")
     if reached < duration - max(1e-9 * duration, ROUNDING):
         told = f"ngspice stopped at t = {reached:.6g} s of {duration:g} s: {engine().said()}."
+        kind = StepTooSmall if engine().too_small else SimulationFailed
         if reached > 0.0:  # else it has not read the netlist, or found no operating point
             told += (
                 " If the circuit is right, a smaller circuit.max_step or another circuit.reltol "
                 "may help."
             )
-        raise SimulationFailed(told)
+        raise kind(told)
