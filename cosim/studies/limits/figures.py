@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -51,7 +50,7 @@ def changes(path: Path, study: Study, goal: Goal) -> None:
     )
     said = in_short(every, ranges=False)
     title = f"{goal.title.capitalize()}: {said}" if said else goal.title
-    figure, (axis,) = panels(title, fill(note, 125), (10.0, 0.27 * len(every) + 1.9))
+    figure, (axis,) = panels(title, note, (10.0, 0.27 * len(every) + 1.9))
     apart = 100.0 * noise(study, goal)
     axis.axvspan(-apart, apart, color="0.88", zorder=0)
     axis.axvline(0.0, color="0.15", lw=1.0)
@@ -82,7 +81,7 @@ def settings(path: Path, study: Study) -> None:
     points = study.rigs[0].points
     group = {change.name: change.group for change in study.changes}
     title = "The largest acceleration does not carry the part fastest"
-    figure, (axis,) = panels(title, fill(note, 125), (9.0, 5.4))
+    figure, (axis,) = panels(title, note, (9.0, 5.4))
     for rank, (name, color) in enumerate(COLORS.items()):
         some = [point for key, point in points.items() if group[key[0]] == name]
         words = name or AS_IT_IS.name

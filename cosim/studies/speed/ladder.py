@@ -8,7 +8,6 @@ from functools import partial
 from math import nan
 from pathlib import Path
 from statistics import median
-from textwrap import fill
 from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
@@ -211,9 +210,7 @@ def draw(found: Found, path: Path) -> None:
         "Green: the cheapest rung within run.tolerance, which is shaded. Under a sawtooth “full” "
         "has the firmware's staircase, the others the smooth ramp."
     )
-    figure, axes = panels(
-        message(found), fill(note, int(12.5 * size[0])), size, high, wide, sharex=True, sharey=True
-    )
+    figure, axes = panels(message(found), note, size, high, wide, sharex=True, sharey=True)
     for axis, (scene, rungs) in zip(axes, found, strict=False):
         tolerance, taken = scene.run.tolerance, cheapest(rungs, scene.run.tolerance)
         axis.axhspan(0.0, 100.0 * tolerance, color=GREEN, alpha=0.12, lw=0)
