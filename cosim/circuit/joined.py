@@ -116,6 +116,12 @@ def deck(
     )
 
 
+_ONE_BREAK, _ONE_TIME = 1e-10, 3e-15
+"""Of the longest step and of the run: nearer than that two edges are one. ngspice's own is the
+first, less than the rounding of its times in a long run with short steps: then a step between an
+edge and the same edge, which two sources round differently, makes noise of amperes."""
+
+
 def text_of(
     title: Line,
     top: Scope,
@@ -134,9 +140,10 @@ def text_of(
         elif all(each.used for each in holder.chain()):  # something calls the subcircuit
             free = (f" {key}=0" for key in sorted(holder.free) if line is holder.line)
             text.append("".join([written(line, element, values if holder is top else {}), *free]))
+    one = max(_ONE_BREAK * max_step, _ONE_TIME * duration)
     text += [
         # Without norefvalue it asks for the CPU time at each step, to print how far it is.
-        f".options norefvalue reltol={reltol!r}",
+        f".options norefvalue reltol={reltol!r} minbreak={one!r}",
         # All vectors are sent step by step; ngspice is to keep none, which would take memory.
         ".save none",
         f".tran {max_step!r} {duration!r} 0 {max_step!r}",

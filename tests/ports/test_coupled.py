@@ -369,6 +369,17 @@ def test_no_edge_of_a_pulse_is_lost(tmp_path: Path, period: float) -> None:
             assert nearest.max() < 1e-11, (step, macro)
 
 
+def test_edges_that_rounding_parts_are_one(tmp_path: Path) -> None:
+    """From 1/16 s on, times are further apart than what ngspice takes for one with such steps."""
+    scene, times = motor(tmp_path), {"run.duration": 0.066, "run.settle": 0.0}
+    with in_place():
+        run = Run(load(scene, {"circuit.max_step": 1e-7, **times}), lambda _: None)
+        run.run()
+    late = run.log.column()[-60_000:]
+    assert late[0] < 0.0625 < late[-1]
+    assert np.diff(late).min() > 1e-12
+
+
 def test_arrays_truth_values_and_whole_numbers(tmp_path: Path) -> None:
     """Two FMUs and a drive: the second is fed by the first and switched off by a voltage."""
     build(tmp_path, "Three", 3)
