@@ -24,6 +24,7 @@ TITLES = bench.TITLES | {
     "coupled_over_parts": "Coupled run over the sum of its parts, each alone",
     "all_in_ngspice_over_ours": "The whole machine in one netlist, over ours",
     "naive_over_ours": "PySpice's and fmpy's plain calls, over ours",
+    "naive_motor_over_ours": "The same on an H-bridge and a gearbox FMU",
     "solve_ivp_over_ours": "SciPy's solve_ivp (LSODA, events), over ours",
     "masters_over_jacobi": "Other masters with the .ssp, CPU time over our Jacobi",
     "masters_error_over_jacobi": "The same, their error over that of our Jacobi",
@@ -35,6 +36,7 @@ TARGETS: bench.Targets = bench.TARGETS | {
     "coupled_over_parts.full": (-inf, 1.25),
     "all_in_ngspice_over_ours": (5.0, inf),
     "naive_over_ours": (4.0, inf),
+    "naive_motor_over_ours": (5.0, inf),
     "solve_ivp_over_ours": (3.0, inf),
     **{f"masters_error_over_jacobi.{name}": (-inf, 1.1) for name in masters.PACKAGES},
 }

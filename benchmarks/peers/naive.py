@@ -7,15 +7,18 @@ since a process has one ngspice and ours has other callbacks.
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 from time import process_time
 from typing import Any, Literal
 
 import numpy as np
+from fmpy import read_model_description
 from fmpy.fmi3 import FMU3Slave
 from PySpice.Spice.NgSpice.Shared import NgSpiceShared
 
 from cosim.arrays import Array
 from cosim.circuit.netlist import prepare
+from cosim.coupling.ports.plan import Plan
 from cosim.mechanics.fmi import references
 from cosim.mechanics.package import MODEL, token, unpacked
 from cosim.mechanics.stickslip import parameters
@@ -32,21 +35,34 @@ def run(scene: Scene, times: Sequence[float]) -> tuple[float, Array]:
     return isolated(partial(_run, times=times), scene, lambda _: None)
 
 
-class Shared(NgSpiceShared):
-    """ngspice with the two callbacks that PySpice means to be replaced."""
+def run_motor(scene: Scene, times: Sequence[float]) -> tuple[float, Array]:
+    """CPU seconds, and the speed (rad/s) of the scene `dc-motor` at ``times`` (s)."""
+    return isolated(partial(_run_motor, times=times), scene, lambda _: None)
 
-    def __init__(self) -> None:
+
+class Shared(NgSpiceShared):
+    """ngspice with the two callbacks that PySpice means to be replaced.
+
+    The FMU gets ``factor`` times the current (A) of the source Vemf in its variable ``into``; that
+    source's voltage is ``factor`` times the first of ``outputs``; the last one is the path.
+    """
+
+    def __init__(self, into: int, outputs: list[int], factor: float = 1.0) -> None:
         self.LIBRARY_PATH = ngspice_library()
-        known = references(3)
-        self.inputs = [known["current"]]
-        self.outputs = [known["back_emf"], known["z_part"]]
+        self.inputs, self.outputs, self.factor = [into], outputs, factor
         super().__init__(send_data=True)
 
-    def begin(self, fmu: FMU3Slave) -> None:
-        """At rest, at time 0."""
+    def follow(self, fmu: FMU3Slave, deck: str) -> Array:
+        """Run the deck from rest: times (s) and the path, as columns."""
         self.fmu = fmu
         self.time = self.current = self.emf = 0.0
         self.path: list[tuple[float, float]] = []
+        self.load_circuit(deck)
+        self.run()
+        self.destroy()
+        self.remove_circuit()
+        fmu.freeInstance()
+        return np.array(self.path).T
 
     def get_vsrc_data(self, voltage: Any, time: float, node: str, ngspice_id: int) -> Literal[0]:
         voltage[0] = self.emf
@@ -58,24 +74,47 @@ class Shared(NgSpiceShared):
         time = actual_vector_values["time"].real
         current = actual_vector_values["vemf#branch"].real
         if time > self.time:
-            self.fmu.setFloat64(self.inputs, [0.5 * (current + self.current)])
+            mean = 0.5 * (current + self.current)
+            self.fmu.setFloat64(self.inputs, [self.factor * mean])
             self.fmu.doStep(self.time, time - self.time)
-            self.emf, height = self.fmu.getFloat64(self.outputs)
-            self.path.append((time, height))
+            values = self.fmu.getFloat64(self.outputs)
+            self.emf = self.factor * values[0]
+            self.path.append((time, values[-1]))
         self.time, self.current = time, current
         return 0
 
 
 def _run(scene: Scene, _: Callable[[float], None], times: Sequence[float]) -> tuple[float, Array]:
-    shared, deck = Shared(), _deck(scene)
+    known, deck = references(3), _deck(scene)
+    shared = Shared(known["current"], [known["back_emf"], known["z_part"]])
     began = process_time()
-    shared.begin(_instance(scene))
-    shared.load_circuit(deck)
-    shared.run()
-    shared.destroy()
-    shared.remove_circuit()
-    shared.fmu.freeInstance()
-    path = np.interp(times, *np.array(shared.path).T)
+    path = np.interp(times, *shared.follow(_instance(scene), deck))
+    return process_time() - began, path
+
+
+def _run_motor(
+    scene: Scene, _: Callable[[float], None], times: Sequence[float]
+) -> tuple[float, Array]:
+    (fmu,), (port, _probe) = scene.fmu, scene.port
+    folder = str(fmu.file)
+    described = read_model_description(folder, validate=False)
+    known = {each.name: each.valueReference for each in described.modelVariables}
+    shared = Shared(known["torque"], [known["speed"]], port.scale)
+    began = process_time()
+    gear = FMU3Slave(
+        guid=described.guid,
+        unzipDirectory=folder,
+        modelIdentifier=Path(folder).name,
+        instanceName="peer",
+    )
+    gear.instantiate()
+    gear.setFloat64([known[name] for name in fmu.parameters], [*fmu.parameters.values()])
+    gear.enterInitializationMode()
+    gear.exitInitializationMode()
+    # Its own are not wanted, and all vectors are sent to Python.
+    dropped = ("bcosim", ".save none")
+    lines = [line for line in Plan(scene).deck().text.splitlines() if not line.startswith(dropped)]
+    path = np.interp(times, *shared.follow(gear, "\n".join(lines)))
     return process_time() - began, path
 
 
