@@ -5,6 +5,7 @@ The FMUs are strangers, compiled by the test (foreign.c); ngspice runs by itself
 
 import ctypes
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ import pytest
 
 import cosim
 from cosim.arrays import Array
+from cosim.coupling.loop.macro_steps import coupled
+from cosim.coupling.loop.recorder import Recorder
 from cosim.coupling.loop.structures import (
     Feed,
     Group,
@@ -26,6 +29,7 @@ from cosim.coupling.loop.structures import (
 from cosim.coupling.ports import run as ports_run
 from cosim.coupling.ports.run import Run
 from cosim.errors import BadInput, SimulationFailed
+from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import changed, load, to_toml
 from cosim.toolchain.processes import in_place
 from tests.helpers import spice
@@ -367,6 +371,54 @@ def test_no_edge_of_a_pulse_is_lost(tmp_path: Path, period: float) -> None:
             times = run.log.column()
             nearest = np.abs(times[np.searchsorted(times, corners - 1e-12)] - corners)
             assert nearest.max() < 1e-11, (step, macro)
+
+
+DRIVEN = """
+.param coil_resistance=7.1 coil_inductance=1.2m eddy_inductance=0 eddy_resistance=1 count=1
+V1 p 0 PULSE(0 1 0 1u 1u 24u 50u)
+V2 r 0 PWL(0 0 5m 0 5.001m 1 10m 1 10.001m 0)
+R1 p 0 1
+R2 r 0 1
+C1 r p 1u
+Vcommand v1 0 0
+Rv v1 0 1k
+Bout out 0 V=V(v1)*V(p)
+Rcoil out c1 {coil_resistance/count}
+Lcoil c1 c2 {coil_inductance/count}
+Leddy c2 c3 {eddy_inductance/count}
+Reddy c2 c3 {eddy_resistance/count}
+Vemf c3 sense 0
+Rs sense 0 1
+.end
+"""
+
+
+@pytest.mark.parametrize("frequency", [50, 100, 200])
+def test_a_jump_of_the_drive_on_an_edge_of_the_circuit_is_one_time(
+    tmp_path: Path, frequency: float
+) -> None:
+    """Each is computed by another program, a rounding apart; led on the machine and with FMUs."""
+    scene = motor(tmp_path)
+    (tmp_path / "bridge.cir").write_text(f"* edges{DRIVEN}")
+    port = '\n[[port]]\nfrom = "drive"\nsource = "Vcommand"\n'
+    scene.write_text(scene.read_text().replace('["v(a)*i(Vemf)", "v(gp)"]', '["v(p)"]') + port)
+    given = {"drive.waveform": "square", "drive.amplitude": 2, "drive.offset": 0}
+    given |= {"drive.frequency": frequency, "run.duration": 0.0201, "run.settle": 0.0}
+    own = {"circuit.model": "file", "circuit.netlist": tmp_path / "bridge.cir"}
+    edges = np.arange(1, 400) * 5e-5
+    for step in (2e-6, 5e-6):
+        with in_place():
+            run = Run(load(scene, {**given, "circuit.max_step": step}), lambda _: None)
+            run.run()
+            alone = load("paper-limited", {**given, **own, "circuit.max_step": step})
+            with closing(Mechanics(alone, 3)) as mechanics:
+                lead = coupled(alone, Recorder(alone, mechanics, lambda _: None))
+                lead.run()
+        for times in (run.log.column(), lead.log()["time"]):
+            assert (
+                np.diff(times).min() > 1e-15
+            )  # ngspice itself begins again with a part of the last
+            assert np.abs(times[np.searchsorted(times, edges - 1e-12)] - edges).max() < 1e-12
 
 
 def test_edges_that_rounding_parts_are_one(tmp_path: Path) -> None:

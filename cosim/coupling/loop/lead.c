@@ -201,6 +201,14 @@ static double longest_step(Lead *c, const double *values, double h)
     return step;
 }
 
+/* A step that may not pass `end`. Ends that rounding alone parts are one: ngspice cuts the step on
+   its own sources' edges itself, and between two such ends it would begin again from 1e-18 s. */
+double cut(double step, double time, double end)
+{
+    const double left = end - time;
+    return left > ON_TIME && left < step - ON_TIME ? left : step;
+}
+
 /* The values that were sent last stand where the next row of the log begins to be filled. */
 static double accepted(Lead *c, double time, double next_step)
 {
@@ -235,18 +243,14 @@ static double accepted(Lead *c, double time, double next_step)
             return next_step;
         row[LOG_OWED] = c->owed = flux_owed(c);
     }
-    if (c->segment.end > time && c->segment.end - time < next_step)
-        next_step = c->segment.end - time;
+    next_step = cut(next_step, time, c->segment.end);
     /* A limit that a passing back-EMF touches is not to be stepped over. */
     const double room = fmin(c->output_high - c->output, c->output - c->output_low);
     const double change = fmax(c->emf_change, EMF_OF_ROOM * room) / c->fineness;
     next_step = fmin(next_step, fmax(change / fabs(c->segment.c[1]), c->answer_step));
-    if (c->impact - time < next_step)
-        next_step = c->impact - time;
-    const double corner = piece_at(&c->drive, time)->until; /* where V1 or its slope jumps */
-    if (corner > time && corner - time < next_step)
-        next_step = corner - time;
-    return c->jump - time < next_step ? c->jump - time : next_step;
+    next_step = cut(next_step, time, c->impact);
+    next_step = cut(next_step, time, piece_at(&c->drive, time)->until); /* V1 or its slope jumps */
+    return cut(next_step, time, c->jump);
 }
 
 static void attend(Lead *c)

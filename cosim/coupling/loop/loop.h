@@ -210,6 +210,8 @@ EXPORT void macro_point_replayed(Lead *c);
 EXPORT void lead_begin(Lead *c);
 EXPORT void lead_finish(Lead *c);
 
+double cut(double step, double time, double end);
+
 /* --- ports.c: a circuit and FMUs of the user's own; ngspice leads --- */
 
 enum { FROM_PROBE, FROM_OUTPUT, FROM_DRIVE };

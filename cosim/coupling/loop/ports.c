@@ -341,16 +341,6 @@ static void announce(Ports *c, double time)
         }
 }
 
-/* How long the next step may be for the sake of a time at which one is to end. Where an edge is
-   announced, ngspice ends one itself; between two ends that are apart by rounding alone it fails. */
-static double until(const Ports *c, double at)
-{
-    for (const Pulse *p = c->pulses; p < c->pulses + c->n_pulses; p++)
-        if (fabs(p->previous - at) <= ON_TIME || fabs(p->announced - at) <= ON_TIME)
-            return INFINITY;
-    return at > c->time ? at - c->time : INFINITY;
-}
-
 static double *log_row(const Ports *c)
 {
     return c->log + c->n_log * (1 + c->n_sources + c->n_saved);
@@ -405,9 +395,9 @@ static double accepted(Ports *c, double time, double next_step)
     next_step = fmin(next_step, c->after_jump + GROWTH * (time - c->jumped));
     if (c->repeats)
         next_step = fmin(next_step, fmax(HALF * (c->duration - time), LAST * c->after_jump));
-    next_step = fmin(next_step, until(c, c->end));
+    next_step = cut(next_step, time, c->end);
     if (c->driven)
-        next_step = fmin(next_step, fmin(until(c, piece_at(&c->drive, time)->until), until(c, c->jump)));
+        next_step = cut(cut(next_step, time, piece_at(&c->drive, time)->until), time, c->jump);
     return next_step;
 }
 
