@@ -90,7 +90,7 @@ def is_fast(base: Scene, values: Mapping[str, Number | str]) -> bool:
 def point(base: Scene, values: Mapping[str, Number | str], whole_periods: bool) -> Scene:
     """The scene of a point. Raises BadInput."""
     few_rows = float(values.get("run.duration", base.run.duration)) / 2.0
-    if few_rows != base.run.output_step and base.run.average == "ends":
+    if few_rows != base.run.output_step:
         values = {"run.output_step": few_rows, **values}
     scene = changed(base, values, "--over")
     return in_whole_periods(scene) if whole_periods else scene

@@ -83,8 +83,6 @@ def _simulated(scene: Scene, progress: Progress, fmi_version: int, alone: bool) 
 
 def few_rows(scene: Scene) -> Scene:
     """The scene with as few rows as its summary needs."""
-    if scene.run.average == "slope":
-        return scene  # the rows show the part's way
     return scene.having(run={"output_step": scene.run.duration / 2.0})
 
 

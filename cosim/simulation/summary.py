@@ -168,7 +168,7 @@ def motion(scene: Scene, recorder: Recorder) -> Motion:
         ram = last["z_ram"] - last["z_surface"]
     return Motion(
         *(recorder.at_end, recorder.at_settle, _extremes(scene, recorder), recorder.frames),
-        average_slope(scene.run, recorder.time, recorder.column("z_part")),
+        average_slope(scene.run, recorder.parts),
         ram,
     )
 

@@ -19,7 +19,7 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
     rows = [
         ("part's mean velocity", _scaled(summary["v_average"], 1e3, "mm/s", "+.3f")),
         ("  off by its own steps", _own_error(summary)),
-        ("  averaged over", _periods(scene)),
+        ("  averaged over", _periods(scene, summary)),
         ("motion", motion_in_words(summary)),
         ("transport per cycle", _scaled(summary["transport_per_cycle"], 1e6, "µm", "+.1f")),
         ("sticking", _scaled(summary["stick_fraction"], 100, "% of the time", ".1f")),
@@ -187,13 +187,16 @@ def _error(summary: dict[str, Any]) -> str:
     return f"{summary['error_estimate']:.1e} of its range, with {', '.join(words)}"
 
 
-def _periods(scene: Scene) -> str:
+def _periods(scene: Scene, summary: dict[str, Any]) -> str:
     """How many periods the averages are over, where something repeats."""
     periods = (scene.run.duration - scene.run.settle) / scene.period
     if not periods:
         return ""
     if abs(periods - round(periods)) < 1e-6:
-        return f"{periods:.0f} period{'s' if periods > 1.5 else ''}"
+        repeats = summary.get("motion_periods", 1)
+        broken = round(periods) % repeats and periods <= MANY
+        hint = f"; a multiple of the motion's {repeats} gives a truer mean" if broken else ""
+        return f"{periods:.0f} period{'s' if periods > 1.5 else ''}{hint}"
     if scene.run.average == "slope":
         return f"{periods:.4g} periods, by the slope in a camera's frames"
     hint = "" if periods > MANY else "; whole ones give a truer mean"

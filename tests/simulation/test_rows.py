@@ -82,3 +82,23 @@ def test_friction_belongs_to_the_normal_force_of_its_row(tmp_path: Path) -> None
     pull = np.abs(w["friction_force"])
     np.testing.assert_allclose(pull[slips], 0.59 * w["normal_force"][slips], rtol=1e-9)
     assert (pull <= 0.72 * w["normal_force"] * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("scene", ["trial-05", "paper", "quaid"])
+def test_a_slope_does_not_depend_on_the_rows(scene: str) -> None:
+    """That of the straight line through the part's heights at settle + k/960 s, where rows lie."""
+    frames, settle = 240, 0.31
+    duration = settle + frames / 960
+    settings = [f"run.settle={settle}", f"run.duration={duration!r}", "run.average=slope"]
+    if scene != "quaid":
+        settings.append("circuit.model=limited")
+    found = [
+        simulate(load(scene, [*settings, f"run.output_step={step!r}"]))
+        for step in (1 / 96000, 7e-3, 0.1)
+    ]
+    fine = found[0].columns
+    time = settle + np.arange(frames + 1) / 960
+    heights = np.interp(time, fine["time"], fine["z_part"])
+    truth = np.polyfit(time - settle, heights, 1)[0]
+    for result in found:
+        assert result.summary["v_average"] == pytest.approx(truth, rel=1e-6)

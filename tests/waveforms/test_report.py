@@ -35,6 +35,26 @@ def test_broken_periods_are_told(overrides: list[str], told: str | None) -> None
     assert told is None or told in text
 
 
+@pytest.mark.physics
+@pytest.mark.parametrize(("periods", "whole"), [(36, True), (38, False)])
+def test_periods_that_break_the_motions_repeats_are_told(periods: int, whole: bool) -> None:
+    """It repeats every three: the mean over the last three is the truth."""
+    scene = load(
+        "reference",
+        {
+            **{"circuit.model": "limited", "drive.frequency": 76, "drive.amplitude": 7},
+            **{"run.duration": 1.5, "run.settle": 1.5 - periods / 76, "run.output_step": 1 / 7600},
+        },
+    )
+    result = simulate(scene, checks="usual")
+    height = result.columns["z_part"]
+    truth = (height[-1] - height[-301]) / (3 / 76)
+    assert result.summary["motion_periods"] == 3
+    assert (result.summary["v_average"] == pytest.approx(truth, rel=2e-2)) == whole
+    told = "38 periods; a multiple of the motion's 3 gives a truer mean"
+    assert (told in table(scene, result.summary, UNITS)) != whole
+
+
 def test_a_slope_is_read_as_that_of_a_trials_record() -> None:
     """Over the record's own length: whole periods would be another reading."""
     broken = ["run.duration=0.1", "run.settle=0.033", "run.average=slope"]

@@ -1,4 +1,5 @@
-"""When something is to be written down: rows, frames of the camera, the end of settling."""
+"""When something is to be written down: rows, frames of the camera, the end of settling, the part's
+heights of which v_average is the slope."""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -8,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.arrays import Array
-from cosim.trials.camera import FRAME_RATE, instants, instants_a_frame
+from cosim.trials.camera import FRAME_RATE, frame_times, instants, instants_a_frame
 
 ENTRIES = 1 << 14
 """Rows and frames of the camera that are planned, and taken, at a time."""
@@ -17,7 +18,7 @@ KEPT = 1 << 17
 """Rows of a run whose agenda is kept for others, such as those of a sweep: 2 MB."""
 
 SAME_TIME = 1e-12  # s; communication points closer than this are one
-_ROW, _FRAME, _SETTLED = 1, 2, 4
+_ROW, _FRAME, _SETTLED, _PART = 1, 2, 4, 8
 _NEVER = 1 << 80  # multiples of SAME_TIME
 
 
@@ -44,14 +45,20 @@ class Agenda:
 
 
 def agendas(
-    row_step: float, duration: float, settle: float, stops: tuple[float, ...], shutter: float
+    row_step: float,
+    duration: float,
+    settle: float,
+    stops: tuple[float, ...],
+    shutter: float,
+    slope: bool = False,
 ) -> Iterator[Agenda]:
     """When something is to be written down, part after part; not more than ENTRIES rows and frames
     in one. The last time of all is endless.
 
-    Of frames, which are exposed for a share ``shutter`` of their interval, the instants.
+    Of frames, which are exposed for a share ``shutter`` of their interval, the instants. With
+    ``slope`` also the part's heights at :func:`part_times`.
     """
-    given = (row_step, duration, settle, stops, shutter)
+    given = (row_step, duration, settle, stops, shutter, slope)
     return iter(_kept(*given)) if count(row_step, duration) <= KEPT else _agendas(*given)
 
 
@@ -65,10 +72,18 @@ def _kept(*given: Any) -> tuple[Agenda, ...]:
 
 
 def _agendas(
-    row_step: float, duration: float, settle: float, stops: tuple[float, ...], shutter: float
+    row_step: float,
+    duration: float,
+    settle: float,
+    stops: tuple[float, ...],
+    shutter: float,
+    slope: bool,
 ) -> Iterator[Agenda]:
     frame_step = 1.0 / FRAME_RATE
-    extra, kinds = np.array([settle, *stops]), np.array([_SETTLED, *[0] * len(stops)], np.int32)
+    parts = part_times(duration, settle) if slope else np.empty(0)
+    extra = np.concatenate([[settle, *stops], parts])
+    kinds = np.repeat(np.array([_SETTLED, 0, _PART], np.int32), [1, len(stops), len(parts)])
+    places = np.rint(extra / SAME_TIME)
     # Whole numbers of SAME_TIME, so that no part ends between times that are one.
     shortest = min(row_step, frame_step / instants_a_frame(shutter * frame_step))
     length = max(1, int(ENTRIES / 3 * shortest / SAME_TIME))
@@ -78,7 +93,7 @@ def _agendas(
         end = begin + length if begin + length < last else _NEVER
         rows = _within(row_step, duration, begin, end)
         frames = exposures(duration, settle, shutter, begin, end)
-        here = (np.rint(extra / SAME_TIME) >= begin) & (np.rint(extra / SAME_TIME) < end)
+        here = (places >= begin) & (places < end)
         times = np.concatenate([rows, frames, extra[here]])
         what = np.concatenate(
             [np.repeat(np.array([_ROW, _FRAME], np.int32), [len(rows), len(frames)]), kinds[here]]
@@ -95,6 +110,13 @@ def _agendas(
             yield Agenda(np.append(times, np.inf), np.append(joined, np.int32(0)))
         else:
             yield Agenda(times, joined)
+
+
+def part_times(duration: float, settle: float) -> Array:
+    """When the camera reads the part's heights for ``run.average = "slope"``, s. A record's length
+    in a scene is rounded, to less than a hundredth of a frame: the last may be the run's end."""
+    times = frame_times(settle, int((duration - settle) * FRAME_RATE + 0.01) + 1)
+    return np.minimum(times, duration)
 
 
 def exposures(

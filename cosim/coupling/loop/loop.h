@@ -77,7 +77,7 @@ typedef struct {
 /* Places among the outputs of a step: V, V/s, V s, s. */
 enum { BACK_EMF, SLOPE, FLUX, TIME_TO_IMPACT, EXTREMES };
 
-enum { ROW = 1, FRAME = 2, SETTLED = 4 }; /* what is to be written down at a time */
+enum { ROW = 1, FRAME = 2, SETTLED = 4, PART = 8 }; /* what is to be written down at a time */
 
 typedef struct Recorder {
     Fmu *fmu;
@@ -97,16 +97,16 @@ typedef struct Recorder {
     const double *times; /* at which something is to be written down; the last of all is endless */
     const int32_t *what;
     int64_t n_times, next;
-    double *rows, *frames;
-    int64_t n_rows, n_frames; /* since Python took them away */
-    int64_t z_surface;        /* its place in a row */
+    double *rows, *frames, *parts;
+    int64_t n_rows, n_frames, n_parts; /* since Python took them away */
+    int64_t z_surface, z_part;         /* their places in a row */
     double *totals_at_settle;
     int32_t *counters_at_settle;
     double *extremes;    /* pairs, as the step's outputs have them */
     double began;        /* of the interval under way */
     double holds_until;  /* how long the inputs go on as they were set last; s */
     int64_t inside;      /* whether one is */
-    void (*plan)(void);  /* Python takes rows and frames away, and gives the next times */
+    void (*plan)(void);  /* Python takes rows, frames and parts away, and gives the next times */
     int64_t stopped;     /* by Python: it failed there */
 } Recorder;
 

@@ -123,7 +123,7 @@ static int visit(Recorder *r)
             return 0;
         r->holds_until = f->time; /* the inputs are to be set again, so that extremes begin here */
     }
-    if (what & (ROW | FRAME)) {
+    if (what & (ROW | FRAME | PART)) {
         /* The row's place holds the sample of a frame too; the array has one row to spare. */
         double *row = r->rows + r->n_rows * (r->reals + r->wholes);
         int32_t whole[2];
@@ -134,6 +134,8 @@ static int visit(Recorder *r)
             row[r->reals + k] = whole[k];
         if (what & FRAME)
             r->frames[r->n_frames++] = row[r->z_surface];
+        if (what & PART)
+            r->parts[r->n_parts++] = row[r->z_part];
         if (what & ROW)
             r->n_rows++;
     }

@@ -46,9 +46,11 @@ class Recorder:
         self._step_of_rows = run.output_step
         rows = agenda.count(run.output_step, run.duration)
         # One row more, since a frame's sample goes behind the last row.
-        self._rows, self._frames, self._time = Tape(width, rows + 1), Tape(1), Tape(1, rows)
+        self._rows, self._time = Tape(width, rows + 1), Tape(1, rows)
+        self._frames, self._parts = Tape(1), Tape(1)
         # What is not on the tapes yet; rows only where their tape has no room for them.
-        self._new_rows, self._new_frames = np.empty((0, width)), np.empty(0)
+        self._new_rows = np.empty((0, width))
+        self._new_frames, self._new_parts = np.empty(0), np.empty(0)
         self._totals = (c_double * len(mechanics.total_names))()
         self._counters = (c_int32 * len(COUNTERS))()
         self._inputs = (c_double * len(mechanics.places["held_inputs"]))()
@@ -62,7 +64,8 @@ class Recorder:
         grip = mechanics.normal_force
         corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
         self._agendas = agenda.agendas(
-            *(run.output_step, run.duration, run.settle, (*corners, run.duration), run.shutter)
+            *(run.output_step, run.duration, run.settle, (*corners, run.duration), run.shutter),
+            slope=run.average == "slope",
         )
         self._corners = np.array([grip.corners, grip.forces] if grip else [])
         self._schedule = None
@@ -89,6 +92,7 @@ class Recorder:
             outputs=addressof(mechanics.step_outputs),
             settle=run.settle,
             z_surface=mechanics.columns.index("z_surface"),
+            z_part=mechanics.columns.index("z_part"),
             totals_at_settle=addressof(self._totals),
             counters_at_settle=addressof(self._counters),
             extremes=addressof(self.extremes),
@@ -176,9 +180,9 @@ class Recorder:
         if room is None and len(self._new_rows) <= entries:
             self._new_rows = np.empty((entries + 1, self._width))
         if len(self._new_frames) <= entries:
-            self._new_frames = np.empty(entries + 1)
+            self._new_frames, self._new_parts = np.empty(entries + 1), np.empty(entries + 1)
         state.rows = (self._new_rows if room is None else room).ctypes.data
-        state.frames = self._new_frames.ctypes.data
+        state.frames, state.parts = self._new_frames.ctypes.data, self._new_parts.ctypes.data
         state.times, state.what = self._agenda.addresses
         state.n_times, state.next = entries, 0
 
@@ -191,7 +195,9 @@ class Recorder:
             self._rows.append(self._new_rows[: state.n_rows])
         if state.n_frames:
             self._frames.append(self._new_frames[: state.n_frames])
-        state.n_rows = state.n_frames = 0
+        if state.n_parts:
+            self._parts.append(self._new_parts[: state.n_parts])
+        state.n_rows = state.n_frames = state.n_parts = 0
 
     @property
     def steps(self) -> int:
@@ -220,6 +226,12 @@ class Recorder:
         """The surface's height (m) at the instants of each frame of the camera after settling."""
         self._take()
         return self._frames.column()
+
+    @property
+    def parts(self) -> Array:
+        """The part's height (m) at the agenda's ``part_times``, where they are asked for."""
+        self._take()
+        return self._parts.column()
 
     @property
     def time(self) -> Array:

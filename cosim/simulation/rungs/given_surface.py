@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.coupling.loop.agenda import exposures, grid
+from cosim.coupling.loop.agenda import exposures, grid, part_times
 from cosim.errors import BadInput, Note, plain
 from cosim.files.cells import read_timetable
 from cosim.mechanics import part
@@ -113,7 +113,8 @@ def move_part(scene: Scene) -> tuple[dict[str, Array], Motion]:
         )
     rows = grid(run.output_step, run.duration)
     frames = exposures(run.duration, run.settle, run.shutter)
-    wanted = np.unique(np.concatenate([rows, frames, [run.settle, run.duration]]))
+    parts = part_times(run.duration, run.settle) if run.average == "slope" else rows[:0]
+    wanted = np.unique(np.concatenate([rows, frames, parts, [run.settle, run.duration]]))
     friction, gravity = scene.friction, scene.mechanics.gravity
     found = part.account(
         moved,
@@ -150,6 +151,6 @@ def move_part(scene: Scene) -> tuple[dict[str, Array], Motion]:
         at_settle={name: values[settled].item() for name, values in totals.items()} | none,
         extremes=moved.extremes(run.settle, run.duration),
         frames=found["z_surface"][np.searchsorted(wanted, frames)],
-        slope=average_slope(run, wanted, found["z"]),
+        slope=average_slope(run, found["z"][np.searchsorted(wanted, parts)]),
     )
     return {name: values[at] for name, values in columns.items()}, motion

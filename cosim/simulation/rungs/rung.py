@@ -21,7 +21,7 @@ from cosim.drive.pieces import Command
 from cosim.files.spill import Tape, blocks
 from cosim.scene import Scene
 from cosim.scene.tables import Run
-from cosim.trials.camera import FRAME_RATE, frame_times
+from cosim.trials.camera import frame_times
 
 
 @dataclass(frozen=True)
@@ -85,13 +85,11 @@ class Motion:
     """Where the ram is in its actuator in the last row, m; None where there is no ram."""
 
 
-def average_slope(run: Run, time: Array, heights: Array) -> float | None:
-    """``slope`` of a motion whose part has ``heights`` (m) at ``time`` (s)."""
+def average_slope(run: Run, heights: Array) -> float | None:
+    """``slope`` of a motion whose part has ``heights`` (m) at the agenda's ``part_times``."""
     if run.average == "ends":
         return None
-    # A record's length in a scene is rounded, to less than a hundredth of a frame.
-    frames = frame_times(run.settle, int((run.duration - run.settle) * FRAME_RATE + 0.01) + 1)
-    return slope(frames, np.interp(frames, time, heights))
+    return slope(frame_times(run.settle, len(heights)), heights)
 
 
 def drive(scene: Scene, recorder: Recorder) -> Driven:

@@ -379,6 +379,8 @@ int stickslip_advance(Model *m, double h, char *message)
             if (end->knot.tau > h)
                 end->knot.tau = h;
             stickslip_note_inner_extremes(m, 0.0, ahead->end);
+        } else {
+            stickslip_note_short_extreme(m, &now->knot, &end->knot, ending.taken);
         }
         note_time(m, ending.taken);
         note_point(m, end);

@@ -57,6 +57,17 @@ void stickslip_note_inner_extremes(Model *m, double from, double to)
     }
 }
 
+void stickslip_note_short_extreme(Model *m, const Knot *from, const Knot *to, double h)
+{
+    static const double SHORTEST = 1e-8; /* s; in less the rounding of the velocities would count */
+    if (h < SHORTEST)
+        return;
+    const double rise = to->dy[V] - from->dy[V], mean = 0.5 * (from->dy[V] + to->dy[V]);
+    const double bend = 6.0 * ((to->y[V] - from->y[V]) / h - mean);
+    if (fabs(rise) < fabs(bend))
+        widen(mean + 0.25 * (bend + rise * rise / bend), &m->r.a_surface_max, &m->r.a_surface_min);
+}
+
 /* Does the current bend? Else it is its straight target. */
 static int bends(const Model *m)
 {

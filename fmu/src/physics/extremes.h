@@ -18,6 +18,10 @@ int stickslip_may_have_extreme(const Model *m, int wall, const Knot *from, const
 /* What lies between the ends of the long step that m->ahead holds, from time tau on. */
 void stickslip_find_extremes(Model *m, double tau);
 
+/* Take in the acceleration's extreme between the ends of a short step over h (s): that of the parabola
+ * with the acceleration at both, under which the velocity changes as it did. */
+void stickslip_note_short_extreme(Model *m, const Knot *from, const Knot *to, double h);
+
 /* Take in what of that lies between two times after the step's start, s. */
 void stickslip_note_inner_extremes(Model *m, double from, double to);
 
