@@ -69,6 +69,14 @@ _FAST_NEEDS: list[tuple[str, Sequence[object], str]] = [
 """What the fast solver models: keys, their allowed values, and these in words."""
 
 
+def averaged(count: int) -> int:
+    """Over how many periods of the drive to average where about ``count`` are meant: as many that
+    motion which repeats after 2, 3, 4, 6 or 8 of them does so within, if they are enough for it. A
+    mean that breaks such a motion is off by up to half of it."""
+    unit = next((each for each in (24, 12, 6, 2) if count >= 0.75 * each), 1)
+    return (2 * count + unit) // (2 * unit) * unit
+
+
 class Scene(BaseModel):
     """Everything that a run needs to know, checked; frozen and comparable."""
 
@@ -103,14 +111,16 @@ class Scene(BaseModel):
 
     @model_validator(mode="after")
     def _fit_times(self) -> "Scene":
-        """The mean over a broken period is off by per cents, so whole ones are the default."""
+        """The mean over a broken period is off by per cents, so whole ones are the default, and as
+        many as motion mostly repeats in."""
         given, duration = self.run.model_fields_set, self.run.duration
         fitted = {"output_step": min(self.run.output_step, duration / 2)}
         if "settle" not in given and self.drive.waveform == "file":
             fitted["settle"] = 0.0  # a record has no period
         elif "settle" not in given:
             length = self.period
-            count = max(int(duration / 2 / length * (1 + 1e-9)), int(duration >= length))
+            half = int(duration / 2 / length * (1 + 1e-9))
+            count = averaged(half) or int(duration >= length)
             fitted["settle"] = max(0.0, duration - count * length) if count else duration / 2
         # Not as what was given: another drive or duration has another default.
         known = {name: getattr(self.run, name) for name in given}
