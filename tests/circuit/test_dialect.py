@@ -639,3 +639,35 @@ def test_what_ngspice_says_of_a_failure_is_told() -> None:
 
     words: Any = SimpleNamespace(_stdout=["Note"], _stderr=["singular matrix"])
     assert Engine.said(words) == "singular matrix"
+
+
+POWERS = {
+    "V(in)**3": lambda x: x**3,
+    "-2*V(in)^3+1": lambda x: 1 - 2 * x**3,
+    "V(in)**{odd}": lambda x: x**3,
+    "(V(in)**odd+0.5)**(odd+2)": lambda x: (x**3 + 0.5) ** 5,
+    "(V(in)-2)**-1": lambda x: 1 / (x - 2),
+    "V(in)**4+2e-3**2": lambda x: x**4 + 4e-6,
+    "pow(V(in),3)+pow(V(in),2)": lambda x: x**3 + x**2,
+    "abs(V(in))**0.5": lambda x: np.sqrt(np.abs(x)),
+    "pwr(V(in),3)": lambda x: np.abs(x) ** 3,
+    "pwrs(V(in),0.5)": lambda x: np.sign(x) * np.sqrt(np.abs(x)),
+    "V(in)*{(-odd)**3}": lambda x: -27 * x,
+    "arctan(V(in))": np.arctan,
+    "int(4*V(in))": lambda x: np.trunc(4 * x),
+    "round(4*V(in))": lambda x: np.floor(4 * x + 0.5),
+}
+
+
+@needs.ngspice_library
+def test_powers_have_the_sign_that_they_have_in_algebra(tmp_path: Path) -> None:
+    """ngspice alone raises the magnitude by ``**`` and ``pow``, and gives ``pwr`` the sign, against
+    the references of LTspice and PSpice."""
+    lines = [f"B{n} x{n} 0 V={word}\nR1{n} x{n} 0 1k" for n, word in enumerate(POWERS)]
+    text = "\n".join((f"{HEAD}.param odd=3", *lines, ".end\n"))
+    with in_place():
+        columns = found(tmp_path, "", text, "v(in)", *(f"v(x{n})" for n in range(len(POWERS)))).columns
+    for n, law in enumerate(POWERS.values()):
+        true = law(columns["v(in)"])
+        error = np.abs(columns[f"v(x{n})"] - true) / max(1.0, np.abs(true).max())
+        assert np.quantile(error, 0.98) < 1e-4, [*POWERS][n]

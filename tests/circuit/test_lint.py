@@ -141,7 +141,7 @@ FUNCTIONS = [
     (IN_B + "table(V(v1),1,0,0,1)", ":15: the x values of table() must rise, 0 comes after 1."),
     (IN_B + "if(V(v1)>0,1)", ":15: the function if takes 3 arguments, not 2."),
     (IN_B + "pwl(V(v1),0,0,1)", ":15: pwl() takes a value and at least two points"),
-    (IN_B + "int(V(v1))", f":15: the function int {BEFORE}"),
+    (IN_B + "sqr(V(v1))", f":15: the function sqr {BEFORE}"),
     (IN_B + "{sqr(3)}*V(v1)", f":15: the function sqr {BEFORE}"),
     (IN_B + "atan2(V(v1),1)", ":15: the function atan2 is not defined."),
     (IN_B + "2*abs (V(v1))", ":15: write abs( without a blank"),

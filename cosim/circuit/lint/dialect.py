@@ -33,7 +33,12 @@ FUNCTIONS = {
     "limit": ("x,y,z", "min(max(x,min(y,z)),max(y,z))"),
     "uplim": ("x,y,z", "min(x,y-z)+min(max(x-y+z,0),2*z)-min(max(x-y+z,0),2*z)**2/(4*z)"),
     "dnlim": ("x,y,z", "max(x,y+z)-min(max(y+z-x,0),2*z)+min(max(y+z-x,0),2*z)**2/(4*z)"),
-    "pwrs": ("x,y", "sgn(x)*pwr(x,y)"),
+    "pow": ("x,y", "ternary_fcn(x<0&&abs(y-2*floor(y/2)-1)<1e-9,-1,1)*(abs(x)+1e-99)**(y)"),
+    "pwr": ("x,y", "(abs(x)+1e-99)**(y)"),
+    "pwrs": ("x,y", "sgn(x)*(abs(x)+1e-99)**(y)"),
+    "arctan": ("x", "atan(x)"),
+    "int": ("x", "sgn(x)*floor(abs(x))"),
+    "round": ("x", "floor(x+0.5)"),
     "stp": ("x", "u(x)"),
     "buf": ("x", "u(x-0.5)"),
     "inv": ("x", "u(0.5-x)"),
@@ -41,7 +46,8 @@ FUNCTIONS = {
     "cosim_switch": ("c,n,f,r,q", f"exp(-0.5*ln(r*q)-ln(r/q)*{_WAY}*(1.5-2*{_WAY}**2))"),
     "cosim_diode": ("x,f,b,r,q,d", "x/q+max(x-f,0)*(1/r-1/q)-max(-x-b,0)*(1/d-1/q)"),
 }
-"""Their functions that ngspice lacks: parameters, and the same in its own. The logarithm of a
+"""Their functions that ngspice lacks, or takes for others in B sources (there ``pwr`` has the sign
+of x, ``pow`` never one): parameters, and the same in its own; at 0 a root has a slope. The logarithm of a
 switch's resistance is a cubic of the control (Cadence, *PSpice Reference Guide*, voltage-controlled
 switch)."""
 _CALL = re.compile(r"(?<![\w.])([a-z_]\w*)\s*\(")
@@ -84,6 +90,9 @@ _CARDS = {
 }
 """What these models have if it is not given."""
 _CURRENT = re.compile(rf"\bi\s*\(\s*(l[^\s()]*)\s*\)\s*=\s*{_VALUE}[\s,]*", re.IGNORECASE)
+_UNSIGNED = ("", *"0123456789.")  # no base, or a number, perhaps behind an exponent
+_NAMING = re.compile(r"[\w.$#]")
+_POWER = re.compile(r"(\s*(?:\*\*|\^)\s*)([+-]?)(?:(\d*[02468])(?![\w.])|[\w.]*)")
 _LOGIC = re.compile(r"(?<!&)&(?!&)|(?<!\|)\|(?!\|)|~")
 _LOGICAL = {"&": "&&", "|": "||", "~": "!"}
 """LTspice's and, or, not."""
@@ -95,6 +104,7 @@ def in_ngspice(line: Line) -> list[Line]:
     kind = text[:1].lower()
     if not text.startswith((".inc", ".lib")):
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
+    text = text if text.startswith((".m", ".inc", ".lib")) else _powers(text)
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
     if kind in "rclvibefgh":
         *parts, own = _with_parts(text, kind)
@@ -268,6 +278,27 @@ def _without_tables(text: str) -> str:
         call = _lines(x, points)
         if call is not None and len(text) + len(call) < MAX_LINE:
             text = text[: match.start()] + call + text[end:]
+    return text
+
+
+def _powers(text: str) -> str:
+    """``x**y`` as ``pow(x,y)`` unless y is an even number: ngspice raises the magnitude of x."""
+    place = 0
+    while match := _POWER.search(text, place):
+        start = place = match.start()
+        depth = 0
+        while start and (depth or text[start - 1] in ")}" or _NAMING.match(text[start - 1])):
+            start -= 1
+            depth += (text[start] in ")}") - (text[start] in "({")
+        end = match.end()
+        if text[end : end + 1] in ("(", "{"):
+            end = closing(text, end)
+        base, exponent = text[start:place], text[place + len(match[1]) : end]
+        if match[3] or base[:1] in _UNSIGNED or not exponent.strip("+-"):
+            place = match.end()
+            continue
+        text = f"{text[:start]}pow({base},{exponent}){text[end:]}"
+        place = start
     return text
 
 
