@@ -163,6 +163,7 @@ TOLD = {
     ".lib UniversalOpamps2.sub": "was not found in the netlist's folder: copy it there",
     ".lib C:\\models\\mine.lib": "was not found in the netlist's folder: copy it there",
     "B9 x 0 V=idt(V(in))": "the function idt is not defined",
+    "R9 x 0 RM 5\n.model RM RES(R=2 TC1=1m)": "r=2 of rm multiplies its value in PSpice",
     "K9 L1 L2 L3 1": "there is no inductor l1 here",
     "K9 L1 L2 0.9 core": "must name two inductors and their coupling; write K pair by pair",
     "C9 x 0 1u Rser=1 m=2": "write a resistor in series",
@@ -666,8 +667,44 @@ def test_powers_have_the_sign_that_they_have_in_algebra(tmp_path: Path) -> None:
     lines = [f"B{n} x{n} 0 V={word}\nR1{n} x{n} 0 1k" for n, word in enumerate(POWERS)]
     text = "\n".join((f"{HEAD}.param odd=3", *lines, ".end\n"))
     with in_place():
-        columns = found(tmp_path, "", text, "v(in)", *(f"v(x{n})" for n in range(len(POWERS)))).columns
+        columns = found(
+            tmp_path, "", text, "v(in)", *(f"v(x{n})" for n in range(len(POWERS)))
+        ).columns
     for n, law in enumerate(POWERS.values()):
         true = law(columns["v(in)"])
         error = np.abs(columns[f"v(x{n})"] - true) / max(1.0, np.abs(true).max())
         assert np.quantile(error, 0.98) < 1e-4, [*POWERS][n]
+
+
+SPELT = {
+    "R9 x 0 RM 500\n.model RM RES(R=1 TC1=1e-2)\n.temp 37": 2.2,
+    "R9 x 0 RX\nR8 0 x {550*2}\n.model RX R(R=1100)": 2.2,
+    "G9 x 0 VALUE={V(x)/(500+5*(TEMP-27))}\n.OPTIONS RELTOL=1E-4 TEMP=37": 2.2,
+    "X9 x W temp=1100\n.subckt W a PARAMS: temp=1\nR1 a 0 {temp/2}\n.ends": 2.2,
+    ".DEFINE R_SET {2*RH}\n.params RH=275\nR9 x 0 {R_SET}\n.wave a.wav 16 44.1k V(x)": 2.2,
+    "R9 x 0 550\nC9 x y CM 1n\nL9 y 0 LM 1m\n.model CM CAP(C=1)\n.model LM IND(L=1)": 2.2,
+    "R9 x 0 1k\nC9 x 0 1\n.ic V(x) {2*1.1}": 2.2,
+    "R9 x 0 550\n.options runlvl=5 DIGFREQ=10G WIDTH=80": 2.2,
+}
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("lines", SPELT)
+def test_words_of_other_programs_are_known(lines: str, tmp_path: Path) -> None:
+    """4 mA through 550 Ohm, warm or held there."""
+    with in_place():
+        columns = found(tmp_path, "", f"{HEAD}I9 0 x 4m\n{lines}\n.end\n", "v(x)").columns
+    assert columns["v(x)"] == pytest.approx(SPELT[lines], rel=1e-4)
+
+
+@needs.ngspice_library
+def test_a_port_may_have_the_sign_of_ltspice(tmp_path: Path) -> None:
+    """§ stands between a part's kind and its name; and what lies beyond the run is no value."""
+    text = HEAD.replace("V1", "V§1") + ".meas late FIND V(in) AT 5m\n.end\n"
+    (tmp_path / "own.cir").write_text(text)
+    (tmp_path / "own.toml").write_text(SCENE.format('"v(in)"').replace('"V1"', '"V§1"'))
+    with in_place():
+        result = cosim.run(tmp_path / "own.toml")
+    true = np.sin(2e3 * np.pi * result.columns["time"])
+    assert result.columns["v(in)"] == pytest.approx(true, abs=1e-3)
+    assert "meas.late" not in result.summary

@@ -47,9 +47,9 @@ FUNCTIONS = {
     "cosim_diode": ("x,f,b,r,q,d", "x/q+max(x-f,0)*(1/r-1/q)-max(-x-b,0)*(1/d-1/q)"),
 }
 """Their functions that ngspice lacks, or takes for others in B sources (there ``pwr`` has the sign
-of x, ``pow`` never one): parameters, and the same in its own; at 0 a root has a slope. The logarithm of a
-switch's resistance is a cubic of the control (Cadence, *PSpice Reference Guide*, voltage-controlled
-switch)."""
+of x, ``pow`` never one): parameters, and the same in its own; at 0 a root has a slope. The
+logarithm of a switch's resistance is a cubic of the control (Cadence, *PSpice Reference Guide*,
+voltage-controlled switch)."""
 _CALL = re.compile(r"(?<![\w.])([a-z_]\w*)\s*\(")
 _DEFINED = re.compile(r"\.func\s+(\w+)|(\w+)\s*(?:\([^()]*\)\s*)?=(?!=)")
 _TABLE = re.compile(r"(?<![\w.])table\s*\(", re.IGNORECASE)
@@ -72,6 +72,9 @@ _GLUED = re.compile(r"(?<==)\s*(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECA
 """4k7 for 4.7k, as a value and behind a name."""
 _POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)
 _TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECASE)
+_TEMP = re.compile(r"\.(?:temp\b[\s=]*|opt\w*\s(?:.*[\s,])?temp\s*=\s*)(\{[^{}]*\}|[^\s,]+)", re.I)
+_WARMTH = re.compile(r"(?<![\w.])temp(?!\w|\s*[=(])")
+_SYNONYMS = {".params": ".param", ".define": ".param", "cap": "c", "ind": "l"}
 _COILS = re.compile(r"(k\S*)((?:\s+l\S*){3,})\s+(\S+)", re.IGNORECASE)
 _PWL = re.compile(r"(\bpwl\b[\s(]*)([^()]*)", re.IGNORECASE)
 _WORD = re.compile(r"[^\s,]+")
@@ -104,7 +107,7 @@ def in_ngspice(line: Line) -> list[Line]:
     kind = text[:1].lower()
     if not text.startswith((".inc", ".lib")):
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
-    text = text if text.startswith((".m", ".inc", ".lib")) else _powers(text)
+    text = text if text[:4].lower() in (".mea", ".inc", ".lib") else _powers(text)
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
     if kind in "rclvibefgh":
         *parts, own = _with_parts(text, kind)
@@ -112,11 +115,17 @@ def in_ngspice(line: Line) -> list[Line]:
     elif coils := _COILS.fullmatch(text):
         pairs = enumerate(combinations(coils[2].split(), 2))
         found = [f"{coils[1]}_{place} {' '.join(pair)} {coils[3]}" for place, pair in pairs]
-    elif text.lower().startswith(".param") and "=" not in text:
-        found = [_UNEQUAL.sub(r"\1=", text)]
+    elif text.lower().startswith((".param", ".define")):
+        word, _, rest = text.partition(" ")
+        rest = rest if "=" in rest else _UNEQUAL.sub(r"\1=", f" {rest}")
+        found = [f"{_SYNONYMS.get(word.lower(), word)} {rest}"]
+    elif text.lower().startswith((".ic", ".nodeset")):
+        found = [re.sub(r"\)\s+(?=[{'\d.+-])", ")=", text)]
     elif model := _MODEL.match(text):
         remarks = _REMARKS["vdmos"] if model[1].lower() == "vdmos" else _MAKERS
         text = re.sub(r"(?i)(?<=\sako:)\s+", "", text)
+        kind = _SYNONYMS.get(model[1].lower(), model[1])
+        text = text[: model.start(1)] + kind + text[model.end(1) :]
         found = [_taken(text.replace("(", " ( ", 1), remarks)[0]]
     else:
         found = [text]
@@ -126,13 +135,17 @@ def in_ngspice(line: Line) -> list[Line]:
 def prelude(lines: Sequence[Line]) -> list[Line]:
     """The functions and constants of theirs that the lines use and do not define."""
     called: dict[str, set[int]] = {}
-    defined: set[str] = set()
+    defined, temperature = set[str](), "27"
     for line in lines:
         text = line.text.lower()
         if text.startswith((".func", ".param")):
             defined.update(*_DEFINED.findall(text))
         if ("{" in text or "'" in text or text.startswith(".param")) and _PI.search(text):
             called["pi"] = {0}
+        if temp := _TEMP.match(text):
+            temperature = temp[1]
+        elif _WARMTH.search(text):
+            called["temp"] = {0}
         for match in _CALL.finditer(text):
             if match[1] in FUNCTIONS:
                 inside = text[match.end() : closing(text, match.end() - 1) - 1]
@@ -144,6 +157,8 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
     ]
     if "pi" in called and "pi" not in defined:
         found.append(f".param pi={pi!r}")
+    if "temp" in called and "temp" not in defined:
+        found.append(f".param temp={temperature}")
     return [Line(text, lines[0].file, 1) for text in found]
 
 
