@@ -162,7 +162,8 @@ TOLD = {
     "XU9 in x level2 Avol=1Meg": "include the file with its .subckt",
     ".lib UniversalOpamps2.sub": "was not found in the netlist's folder: copy it there",
     ".lib C:\\models\\mine.lib": "was not found in the netlist's folder: copy it there",
-    "B9 x 0 V=idt(V(in))": "the function idt is not defined",
+    "B9 x 0 V=idt(V(in),0,V(b))": "the function idt is not defined",
+    "B9 x 0 V=delay(V(in),V(b)*1m)": "the function delay is not defined",
     "R9 x 0 RM 5\n.model RM RES(R=2 TC1=1m)": "r=2 of rm multiplies its value in PSpice",
     "K9 L1 L2 L3 1": "there is no inductor l1 here",
     "K9 L1 L2 0.9 core": "must name two inductors and their coupling; write K pair by pair",
@@ -708,3 +709,36 @@ def test_a_port_may_have_the_sign_of_ltspice(tmp_path: Path) -> None:
     true = np.sin(2e3 * np.pi * result.columns["time"])
     assert result.columns["v(in)"] == pytest.approx(true, abs=1e-3)
     assert "meas.late" not in result.summary
+
+
+OMEGA = 2e3 * np.pi
+LAWS = {
+    "B9 x 0 V=idt(V(in)*6k)": lambda t: 6e3 * (1 - np.cos(OMEGA * t)) / OMEGA,
+    "E9 x 0 VALUE={SDT(6k*V(in),-1)}": lambda t: 6e3 * (1 - np.cos(OMEGA * t)) / OMEGA - 1,
+    "B9 x 0 V=2*delay(V(in),{w/2})-1\n.param w=200u": lambda t: (
+        2 * np.where(t > 1e-4, np.sin(OMEGA * (t - 1e-4)), 0) - 1
+    ),
+    "B9 x 0 V=delay(idt(6k*V(in)),100u)": lambda t: (
+        6e3 * (1 - np.cos(OMEGA * np.maximum(t - 1e-4, 0))) / OMEGA
+    ),
+    "G9 0 x in 0 1\nL9 x 0 Flux=0.2m*tanh(2*x)": lambda t: (
+        0.4e-3 * OMEGA * np.cos(OMEGA * t) / np.cosh(2 * np.sin(OMEGA * t)) ** 2
+    ),
+    "V9 y 0 0\nC9 in y Q={100u*x+100u*x**3}\nB9 x 0 V=I(V9)": lambda t: (
+        1e-4 * OMEGA * np.cos(OMEGA * t) * (1 + 3 * np.sin(OMEGA * t) ** 2)
+    ),
+    "I9 0 x 1\nR9 x 0 R=2+V(in)*0.5": lambda t: 2 + np.sin(OMEGA * t) / 2,
+}
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("lines", LAWS)
+def test_integrals_delays_and_laws_of_parts_are_those_of_calculus(
+    lines: str, tmp_path: Path
+) -> None:
+    """At 1 V of sine."""
+    with in_place():
+        columns = found(tmp_path, "", f"{HEAD}{lines}\nR8 x 0 1Meg\n.end\n", "v(x)").columns
+    true = LAWS[lines](columns["time"])
+    error = np.abs(columns["v(x)"] - true)[5:] / np.abs(true).max()
+    assert error.max() < 2e-3 and error.mean() < 3e-4

@@ -75,6 +75,11 @@ _TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECA
 _TEMP = re.compile(r"\.(?:temp\b[\s=]*|opt\w*\s(?:.*[\s,])?temp\s*=\s*)(\{[^{}]*\}|[^\s,]+)", re.I)
 _WARMTH = re.compile(r"(?<![\w.])temp(?!\w|\s*[=(])")
 _SYNONYMS = {".params": ".param", ".define": ".param", "cap": "c", "ind": "l"}
+_LAW = re.compile(
+    r"([rclq]|flux)\s*=\s*(?:\{([^{}]*)\}|([^={}']*[*/^()][^={}']*?))(?=\s+\w+\s*=(?!=)|$)", re.I
+)
+_OWN = re.compile(r"(?<![\w.])x(?![\w.(])", re.IGNORECASE)
+_MEMORY = re.compile(r"(?<![\w.])(idt|sdt|delay)\s*\(", re.IGNORECASE)
 _COILS = re.compile(r"(k\S*)((?:\s+l\S*){3,})\s+(\S+)", re.IGNORECASE)
 _PWL = re.compile(r"(\bpwl\b[\s(]*)([^()]*)", re.IGNORECASE)
 _WORD = re.compile(r"[^\s,]+")
@@ -112,6 +117,10 @@ def in_ngspice(line: Line) -> list[Line]:
     if kind in "rclvibefgh":
         *parts, own = _with_parts(text, kind)
         found = [*parts, _source(own) if kind in "efgh" else own]
+        if kind in "beg":
+            found = [*parts, *_with_memory(found[-1])]
+        elif kind in "rcl":
+            found = [*parts, *_with_law(own)]
     elif coils := _COILS.fullmatch(text):
         pairs = enumerate(combinations(coils[2].split(), 2))
         found = [f"{coils[1]}_{place} {' '.join(pair)} {coils[3]}" for place, pair in pairs]
@@ -123,9 +132,9 @@ def in_ngspice(line: Line) -> list[Line]:
         found = [re.sub(r"\)\s+(?=[{'\d.+-])", ")=", text)]
     elif model := _MODEL.match(text):
         remarks = _REMARKS["vdmos"] if model[1].lower() == "vdmos" else _MAKERS
-        text = re.sub(r"(?i)(?<=\sako:)\s+", "", text)
         kind = _SYNONYMS.get(model[1].lower(), model[1])
         text = text[: model.start(1)] + kind + text[model.end(1) :]
+        text = re.sub(r"(?i)(?<=\sako:)\s+", "", text)
         found = [_taken(text.replace("(", " ( ", 1), remarks)[0]]
     else:
         found = [text]
@@ -354,6 +363,49 @@ def _with_parts(text: str, kind: str) -> Iterator[str]:
         if key in given:
             yield f"{key[0]}{name}_{key} {plus} {minus} {given[key]}"
     yield f"{name} {at} {minus} {rest}"
+
+
+def _with_law(text: str) -> Iterator[str]:
+    """A part whose value is an expression of its own voltage x, or current x, in braces."""
+    name, plus, minus, rest = [*text.strip().split(None, 3), "", "", ""][:4]
+    law = _LAW.match(rest)
+    if law is None:
+        yield text
+    elif (key := law[1].lower()) == "flux" and name[0] in "lL":
+        # The voltage of a node is the current, a charge there the flux.
+        yield f"g{name}_flux {plus} {minus} {name}_i 0 1"
+        yield f"g{name}_x 0 {name}_i {plus} {minus} 1"
+        value = _OWN.sub(f"v({name}_i)", law[2] or law[3])
+        yield f"c{name}_flux {name}_i 0 q={{{value}}} {rest[law.end() :]}"
+    else:
+        value = law[2] or law[3]
+        value = _OWN.sub(f"v({plus},{minus})", value) if key == "q" else value
+        yield f"{name} {plus} {minus} {key}={{{value}}} {rest[law.end() :]}"
+
+
+def _with_memory(text: str) -> Iterator[str]:
+    """A source behind what integrates or delays for it: a capacitor of 1 F, a line of 1 Ohm."""
+    for place in range(_MOST):
+        match = [*_MEMORY.finditer(text, text.find("=") + 1)][-1:]  # what lies within comes first
+        if not match or len(text) > MAX_LINE // 2 or "=" not in text:
+            break
+        start, what, after = match[0].start(), match[0][1].lower(), match[0].end()
+        end = closing(text, after - 1)
+        x, *more = (each.strip() for each in split_arguments(text[after : end - 1]) or [""])
+        node = f"{text.split()[0]}_{what}{place}"
+        if what == "delay" and len(more) == 1 and not re.search(r"\(|\btime\b", more[0]):
+            yield f"b{node} {node}_in 0 v=2*({x})"
+            yield f"r{node}_in {node}_in {node}_at 1"
+            yield f"t{node} {node}_at 0 {node} 0 z0=1 td={{{more[0].strip('{}')}}}"
+            yield f"r{node} {node} 0 1"
+        elif what != "delay" and len(more) < 2:
+            start_at = more[0] if more else "0"
+            yield f"b{node} 0 {node} i=time > 0 ? {x} : 1e9*(({start_at})-v({node}))"
+            yield f"c{node} {node} 0 1"
+        else:
+            break
+        text = f"{text[:start]}v({node}){text[end:]}"
+    yield text
 
 
 def since_the_start(points: list[str]) -> str:
