@@ -678,6 +678,7 @@ def test_powers_have_the_sign_that_they_have_in_algebra(tmp_path: Path) -> None:
 
 
 SPELT = {
+    "R9 x 0 550 noiseless\nC9 x 0 1n Rpar=1G noiseless": 2.2,
     "R9 x 0 RM 500\n.model RM RES(R=1 TC1=1e-2)\n.temp 37": 2.2,
     "R9 x 0 RX\nR8 0 x {550*2}\n.model RX R(R=1100)": 2.2,
     "G9 x 0 VALUE={V(x)/(500+5*(TEMP-27))}\n.OPTIONS RELTOL=1E-4 TEMP=37": 2.2,
@@ -742,3 +743,23 @@ def test_integrals_delays_and_laws_of_parts_are_those_of_calculus(
     true = LAWS[lines](columns["time"])
     error = np.abs(columns["v(x)"] - true)[5:] / np.abs(true).max()
     assert error.max() < 2e-3 and error.mean() < 3e-4
+
+
+PASTED = {
+    "B9 x 0 V={k+1}*V(in)-{k-1}": lambda v: 4 * v - 2,
+    "B9 x 0 V=2*{V(in)+k}**2": lambda v: 2 * (v + 3) ** 2,
+    "E9 x 0 VALUE={{k+1}*V(in)-'k-1'}": lambda v: 4 * v - 2,
+    "E9 x 0 TABLE {V(in)*{k+1}} = (-2,-1) ({k-1},1)": lambda v: np.interp(4 * v, [-2, 2], [-1, 1]),
+    "E9 x 0 VALUE={IF(k==3, V(in), 9)}": lambda v: v,
+    "B9 x 0 V=if({k}!=3 | k > 3, 9, V(in)) + if(seven<=7 & k>=3, 1, 0)": lambda v: v + 1,
+}
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("line", PASTED)
+def test_parameters_in_b_sources_are_the_numbers_that_they_are(line: str, tmp_path: Path) -> None:
+    """ngspice pastes what is in braces without them, and 3 as 3.0000000000000004."""
+    lines = f".param k=3 seven=7\n{line}\nR9 x 0 1k"
+    with in_place():
+        columns = found(tmp_path, "", f"{HEAD}{lines}\n.end\n", "v(x)", "v(in)").columns
+    assert columns["v(x)"] == pytest.approx(PASTED[line](columns["v(in)"]), abs=2e-3)

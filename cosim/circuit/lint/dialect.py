@@ -75,10 +75,20 @@ _TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECA
 _TEMP = re.compile(r"\.(?:temp\b[\s=]*|opt\w*\s(?:.*[\s,])?temp\s*=\s*)(\{[^{}]*\}|[^\s,]+)", re.I)
 _WARMTH = re.compile(r"(?<![\w.])temp(?!\w|\s*[=(])")
 _SYNONYMS = {".params": ".param", ".define": ".param", "cap": "c", "ind": "l"}
+_COMPOUND = re.compile(r"\{[^{}]*[^\w.{}\s][^{}]*\}")
+"""In B sources ngspice pastes what is in braces without them: ``{a+b}*2``."""
+_EQUAL = re.compile(
+    r"(?<![\w.)}\]])((?!time)[a-z_]\w*|\{\w+\})\s*([=!<]=|<>|>(?!=))\s*(\d+\.?\d*)(?![\w.*/^+-])",
+    re.I,
+)
+_NEAR = {"==": "(abs({}-{})<1e-9)", "<=": "({}-{}<1e-9)", ">": "({}-{}>1e-9)"}
+"""There it reads a parameter 3 as 3.0000000000000004, which is not 3."""
+_NOISELESS = re.compile(r"\s+noiseless\b", re.IGNORECASE)
 _LAW = re.compile(
     r"([rclq]|flux)\s*=\s*(?:\{([^{}]*)\}|([^={}']*[*/^()][^={}']*?))(?=\s+\w+\s*=(?!=)|$)", re.I
 )
 _OWN = re.compile(r"(?<![\w.])x(?![\w.(])", re.IGNORECASE)
+_CHANGING = re.compile(r"\b(?:[vi]\s*\(|time\b)", re.IGNORECASE)
 _MEMORY = re.compile(r"(?<![\w.])(idt|sdt|delay)\s*\(", re.IGNORECASE)
 _COILS = re.compile(r"(k\S*)((?:\s+l\S*){3,})\s+(\S+)", re.IGNORECASE)
 _PWL = re.compile(r"(\bpwl\b[\s(]*)([^()]*)", re.IGNORECASE)
@@ -108,12 +118,17 @@ _LOGICAL = {"&": "&&", "|": "||", "~": "!"}
 
 def in_ngspice(line: Line) -> list[Line]:
     """The line as ngspice knows it, in one line or more."""
-    text = _without_tables(line.text.translate(_LETTERS))
+    text = _without_tables(_NOISELESS.sub("", line.text.translate(_LETTERS)))
     kind = text[:1].lower()
     if not text.startswith((".inc", ".lib")):
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
     text = text if text[:4].lower() in (".mea", ".inc", ".lib") else _powers(text)
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
+    if kind in "beg":
+        text = _EQUAL.sub(lambda m: _NEAR.get(m[2], "(abs({}-{})>1e-9)").format(m[1], m[3]), text)
+        text = re.sub(r"'([^']*)'", r"{\1}", text)
+        if _COMPOUND.search(text):
+            text = text.replace("{", "{(").replace("}", ")}")
     if kind in "rclvibefgh":
         *parts, own = _with_parts(text, kind)
         found = [*parts, _source(own) if kind in "efgh" else own]
@@ -393,7 +408,7 @@ def _with_memory(text: str) -> Iterator[str]:
         end = closing(text, after - 1)
         x, *more = (each.strip() for each in split_arguments(text[after : end - 1]) or [""])
         node = f"{text.split()[0]}_{what}{place}"
-        if what == "delay" and len(more) == 1 and not re.search(r"\(|\btime\b", more[0]):
+        if what == "delay" and len(more) == 1 and not _CHANGING.search(more[0]):
             yield f"b{node} {node}_in 0 v=2*({x})"
             yield f"r{node}_in {node}_in {node}_at 1"
             yield f"t{node} {node}_at 0 {node} 0 z0=1 td={{{more[0].strip('{}')}}}"
