@@ -655,6 +655,9 @@ POWERS = {
     "pwr(V(in),3)": lambda x: np.abs(x) ** 3,
     "pwrs(V(in),0.5)": lambda x: np.sign(x) * np.sqrt(np.abs(x)),
     "V(in)*{(-odd)**3}": lambda x: -27 * x,
+    "(V(in)>0.3)^(V(in)<-0.3 | V(in) > 0.6)": lambda x: np.where(
+        (x < -0.3) | ((x > 0.3) & (x <= 0.6)), 1, 0
+    ),
     "arctan(V(in))": np.arctan,
     "int(4*V(in))": lambda x: np.trunc(4 * x),
     "round(4*V(in))": lambda x: np.floor(4 * x + 0.5),

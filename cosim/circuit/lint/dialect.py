@@ -321,7 +321,8 @@ def _without_tables(text: str) -> str:
 
 
 def _powers(text: str) -> str:
-    """``x**y`` as ``pow(x,y)`` unless y is an even number: ngspice raises the magnitude of x."""
+    """``x**y`` as ``pow(x,y)`` unless y is an even number: ngspice raises the magnitude of x.
+    Between comparisons ``^`` is LTspice's and PSpice's exclusive or."""
     place = 0
     while match := _POWER.search(text, place):
         start = place = match.start()
@@ -336,7 +337,9 @@ def _powers(text: str) -> str:
         if match[3] or base[:1] in _UNSIGNED or not exponent.strip("+-"):
             place = match.end()
             continue
-        text = f"{text[:start]}pow({base},{exponent}){text[end:]}"
+        exclusive = "^" in match[1] and re.search("[<>]|==", base + exponent)
+        call = f"({base}!={exponent})" if exclusive else f"pow({base},{exponent})"
+        text = f"{text[:start]}{call}{text[end:]}"
         place = start
     return text
 
