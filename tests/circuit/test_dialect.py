@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import cosim
+from cosim.arrays import Array
 from cosim.circuit.joined import deck
 from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import named, read, read_all
@@ -151,7 +152,7 @@ TOLD = {
     "Q9 x in 0 W\n.model W ako:V\n.model V ako:W NPN": "is defined here; copy its .model",
     "S9 x 0 in 0 W\n.model W SW(Vh=-1)\n.model W SW(Vh=1)": "there is a second model w, so this",
     ".ic i(R8)=1\nR9 x 0 1": "i(r8)=1 is not v(node)=value",
-    "A9 in 0 0 0 0 x 0 0 SCHMITT Vt=.5": "that a netlist may have; write it with R, C and B",
+    "A9 in 0 0 0 0 x 0 0 COUNTER": "that a netlist may have; write it with R, C and B",
     "V9 x 0 PWL file=stimulus.txt": "was not found in the netlist's folder: copy it there",
     "V9 x 0 PWL file=own.cir": "own.cir must hold pairs of numbers",
     "V9 x 0 PWL time_scale_factor=2 file=own.cir": "write the values of this one into the line",
@@ -766,3 +767,51 @@ def test_parameters_in_b_sources_are_the_numbers_that_they_are(line: str, tmp_pa
     with in_place():
         columns = found(tmp_path, "", f"{HEAD}{lines}\n.end\n", "v(x)", "v(in)").columns
     assert columns["v(x)"] == pytest.approx(PASTED[line](columns["v(in)"]), abs=2e-3)
+
+
+def square(t: Array) -> Array:
+    """V8 of the next test."""
+    return np.where((t > 1e-4) & (np.mod(t - 1e-4, 0.37e-3) < 0.2e-3), 1.0, 0.0)
+
+
+def remembered(on: Array, off: Array) -> Array:
+    """1 from where ``on`` was true last, 0 from where ``off`` was."""
+    state = np.where(on, 1.0, np.where(off, 0.0, np.nan))
+    state[0] = np.nan_to_num(state[0])
+    places = np.where(np.isnan(state), 0, np.arange(len(state)))
+    return state[np.maximum.accumulate(places)]
+
+
+GATES = {
+    "A9 in 0 0 0 0 0 x 0 BUF Vhigh=5 Vlow=-1 Ref=.2": lambda v, t: np.where(v > 0.2, 5, -1),
+    "A9 in 0 0 0 0 x 0 0 BUF Vhigh={2+3}": lambda v, t: 0 * t + 5,
+    "A9 in y 0 0 0 0 x 0 AND tripdt=1n": lambda v, t: np.minimum(v > 0.5, square(t)),
+    "A9 0 y 0 in 0 x 0 0 OR": lambda v, t: 1 - np.maximum(v > 0.5, square(t)),
+    "A9 in y 0 0 0 0 x 0 XOR Trise=5n": lambda v, t: np.abs((v > 0.5) - square(t)),
+    "A9 in 0 y 0 0 0 x 0 OR Td=100u Rout=1k": lambda v, t: (
+        np.maximum(np.sin(OMEGA * (t - 1e-4)) > 0.5, square(t - 1e-4)) * (t > 1e-4)
+    ),
+    "A9 in 0 0 0 0 0 x 0 SCHMITT Vt=.1 Vh=.3": lambda v, t: remembered(v > 0.4, v < -0.2),
+    "A9 b in c c c c x c SCHMITT Vt=2 Vh=.5": lambda v, t: remembered(v < -0.5, v > 0.5) - 3,
+    "A9 in y 0 0 0 0 x 0 SRFLOP": lambda v, t: remembered(
+        (v > 0.5) & (square(t) < 0.5), (v < 0.5) & (square(t) > 0.5)
+    ),
+}
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("gate", GATES)
+def test_gates_of_ltspice_are_what_their_names_say(gate: str, tmp_path: Path) -> None:
+    """An input at the common node is none, as LTspice's help has it."""
+    lines = f"V8 y 0 PULSE(0 1 0.1m 1n 1n 0.2m 0.37m)\nR9 y x 1Meg\n{gate}"
+    with in_place():
+        columns = found(tmp_path, "", f"{HEAD}{lines}\n.end\n", "v(x)", "v(in)").columns
+    true = np.asarray(GATES[gate](columns["v(in)"], columns["time"]), dtype=float)
+    error = np.abs(columns["v(x)"] - true)
+    assert np.quantile(error, 0.98) < 2e-3
+
+
+@pytest.mark.parametrize("what", ["DFLOP", "OTA g=1m", "AND Rhigh=2", "SCHMITT", "XOR"])
+def test_other_gates_are_refused(what: str, tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"own\.cir:8: A9 is no element that a netlist may have"):
+        anew(tmp_path, f"A9 in b c 0 0 0 x 0 {what}")

@@ -10,6 +10,7 @@ library does not bring on every machine, which cost each step, and which round a
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
 from itertools import chain, combinations, combinations_with_replacement, count, pairwise
 from math import pi
 from typing import Any
@@ -107,6 +108,10 @@ _CARDS = {
     "d": {"vfwd": "0", "vrev": "1e30", "ron": "1", "roff": "1e12", "rrev": ""},
 }
 """What these models have if it is not given."""
+_GATE = {
+    "vhigh": "1", "vlow": "0", "ref": "0.5*(vhigh+vlow)", "vt": "0.5", "vh": "0.01", "td": "0",
+    "trise": "0", "tfall": "0", "rout": "1", "cout": "0", "tripdt": "", "tripv": "",
+}  # fmt: skip
 _CURRENT = re.compile(rf"\bi\s*\(\s*(l[^\s()]*)\s*\)\s*=\s*{_VALUE}[\s,]*", re.IGNORECASE)
 _UNSIGNED = ("", *"0123456789.")  # no base, or a number, perhaps behind an exponent
 _NAMING = re.compile(r"[\w.$#]")
@@ -136,6 +141,8 @@ def in_ngspice(line: Line) -> list[Line]:
             found = [*parts, *_with_memory(found[-1])]
         elif kind in "rcl":
             found = [*parts, *_with_law(own)]
+    elif kind == "a":
+        found = _gate(text)
     elif coils := _COILS.fullmatch(text):
         pairs = enumerate(combinations(coils[2].split(), 2))
         found = [f"{coils[1]}_{place} {' '.join(pair)} {coils[3]}" for place, pair in pairs]
@@ -424,6 +431,50 @@ def _with_memory(text: str) -> Iterator[str]:
             break
         text = f"{text[:start]}v({node}){text[end:]}"
     yield text
+
+
+def _gate(text: str) -> list[str]:
+    """LTspice's gate, Schmitt trigger or set-reset flip-flop: a switch whose control is above the
+    middle of a hysteresis (an AND's its least input), a delay, an edge of 1 ns or more, and for
+    each output a source. Inputs at the common node are none."""
+    less, given = _taken(text, _GATE)
+    name, *nodes = less.lower().split()
+    if len(nodes) != 9:
+        return [text]
+    *inputs, below, above, common, kind = nodes
+    law = {key: "(" + value.strip("{}'") + ")" for key, value in (_GATE | given).items()}
+    ref = re.sub("v(?:high|low)", lambda match: law[match[0]], law["ref"])
+    x = [f"v({each},{common})" for each in inputs if each != common]
+    middle, half, y = ref, "0", x[0] if x else ""
+    if kind in ("and", "or") and x:
+        y = reduce(lambda a, b: f"{'min' if kind == 'and' else 'max'}({a},{b})", x)
+    elif kind == "xor" and len(x) == 2:
+        y, middle = f"-({x[0]}-{ref})*({x[1]}-{ref})", "0"
+    elif kind == "schmitt" and (len(x) == 1 or (len(x) == 2 and common not in inputs[:2])):
+        y, middle, half = "-".join(x), law["vt"], law["vh"]
+    elif kind == "srflop" and len(x) == 2 and common not in inputs[:2]:
+        y, middle, half = "-".join(x), "0", ref
+    elif kind != "buf" or len(x) != 1:
+        return [text]
+    state, td = f"1.001*v({name}_p)", law["td"][1:-1]
+    state = state if number(td) == 0.0 else f"delay({state},{{{td}}})"
+    found = [
+        f"b{name}_x {name}_x 0 v={y}",
+        f"s{name} {name}_1 {name}_p {name}_x 0 {name}_m",
+        f".model {name}_m sw vt={{{middle}}} vh={{{half}}} ron=1 roff=1e9",
+        f"v{name}_1 {name}_1 0 1",
+        f"r{name}_p {name}_p 0 1k",
+        *_with_memory(f"b{name}_d {name}_d 0 v={state}"),
+        f"r{name}_q {name}_d {name}_q 1",
+        f"c{name}_q {name}_q 0 {{max(1n,{law['trise']})/2.2}}",
+    ]
+    for pin, out, share in ((6, below, f"(1-v({name}_q))"), (7, above, f"v({name}_q)")):
+        if out != common:
+            level = f"{law['vlow']}+({law['vhigh']}-{law['vlow']})*{share}"
+            found.append(f"b{name}_{pin} {name}_{pin} {common} v={level}")
+            found.append(f"r{name}_{pin} {name}_{pin} {out} {{{law['rout']}}}")
+            found.append(f"c{name}_{pin} {out} {common} {{{law['cout']}}}")
+    return found
 
 
 def since_the_start(points: list[str]) -> str:
