@@ -548,11 +548,12 @@ def test_what_has_no_effect_is_told(tmp_path: Path) -> None:
 .ac dec 1 1 2
 .meas ac x MAX V(in)
 .tran 1u 1m uic
+.step param k list 1 2
 .backanno
 .tran 1m
 """
     notes = summary_of(tmp_path, f"{HEAD}{lines}")["notes"]
-    assert [note.split(" ")[0] for note in notes[:-1]] == [f"own.cir:{n}:" for n in range(10, 17)]
+    assert [note.split(" ")[0] for note in notes[:-1]] == [f"own.cir:{n}:" for n in range(10, 18)]
     assert notes[-1] == "ngspice knows no odd of a model, and ignored it."
 
 
@@ -755,6 +756,7 @@ PASTED = {
     "E9 x 0 VALUE={{k+1}*V(in)-'k-1'}": lambda v: 4 * v - 2,
     "E9 x 0 TABLE {V(in)*{k+1}} = (-2,-1) ({k-1},1)": lambda v: np.interp(4 * v, [-2, 2], [-1, 1]),
     "E9 x 0 VALUE={IF(k==3, V(in), 9)}": lambda v: v,
+    "B9 x 0 V=if(tiny>0, V(in), 9)": lambda v: v,
     "B9 x 0 V=if({k}!=3 | k > 3, 9, V(in)) + if(seven<=7 & k>=3, 1, 0)": lambda v: v + 1,
 }
 
@@ -763,7 +765,7 @@ PASTED = {
 @pytest.mark.parametrize("line", PASTED)
 def test_parameters_in_b_sources_are_the_numbers_that_they_are(line: str, tmp_path: Path) -> None:
     """ngspice pastes what is in braces without them, and 3 as 3.0000000000000004."""
-    lines = f".param k=3 seven=7\n{line}\nR9 x 0 1k"
+    lines = f".param k=3 seven=7 tiny=1e-12\n{line}\nR9 x 0 1k"
     with in_place():
         columns = found(tmp_path, "", f"{HEAD}{lines}\n.end\n", "v(x)", "v(in)").columns
     assert columns["v(x)"] == pytest.approx(PASTED[line](columns["v(in)"]), abs=2e-3)

@@ -36,12 +36,10 @@ KEPT = word_set(
 )
 DROPPED = word_set(
     ".tran .op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .meas .measure .save .print "
-    ".plot .wave .probe .probe64 .width .title .csparam .backanno .prot .unprot .protect .unprotect"
+    ".plot .step .wave .probe .probe64 .width .title .csparam .backanno .prot .unprot .protect "
+    ".unprotect"
 )
 """Analyses, output and remarks: a host sets its own; see ``outputs.py``."""
-_INSTEAD = {
-    ".step": "; run cosim sweep with --over circuit.param.NAME=START:STOP:COUNT instead",
-}
 ELEMENTS = frozenset("bcdefghijklmoqrstvwxz")
 """First letters of elements. Not A (code models start processes and read files), N (compiled
 Verilog-A), U (translated to code models), P and Y (lossy lines, of no use here)."""
@@ -375,8 +373,7 @@ def passed(line: Line) -> str | None:
     if word in DROPPED:
         return None
     if word and word not in KEPT:
-        cure = _INSTEAD.get(word, "; leave it out")
-        refuse(line, f"{shown(word)} is not allowed in a netlist{cure}")
+        refuse(line, f"{shown(word)} is not allowed in a netlist; leave it out")
     if not _TEXT.fullmatch(line.text) or _UNSAFE.search(line.text):
         odd = next(c for c in line.text if not " " <= c <= "~" or c in '"`\\')
         refuse(line, f"the character {shown(odd)} cannot stand in a netlist outside comments")

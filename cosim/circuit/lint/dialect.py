@@ -82,8 +82,8 @@ _EQUAL = re.compile(
     r"(?<![\w.)}\]])((?!time)[a-z_]\w*|\{\w+\})\s*([=!<]=|<>|>(?!=))\s*(\d+\.?\d*)(?![\w.*/^+-])",
     re.I,
 )
-_NEAR = {"==": "(abs({}-{})<1e-9)", "<=": "({}-{}<1e-9)", ">": "({}-{}>1e-9)"}
-"""There it reads a parameter 3 as 3.0000000000000004, which is not 3."""
+_NEAR = {"==": "(abs({}-{})<1e-9*{})", "<=": "({}-{}<1e-9*{})", ">": "({}-{}>1e-9*{})"}
+"""There it reads a parameter 3 as 3.0000000000000004, which is not 3; 0 is 0."""
 _NOISELESS = re.compile(r"\s+noiseless\b", re.IGNORECASE)
 _LAW = re.compile(
     r"([rclq]|flux)\s*=\s*(?:\{([^{}]*)\}|([^={}']*[*/^()][^={}']*?))(?=\s+\w+\s*=(?!=)|$)", re.I
@@ -130,7 +130,7 @@ def in_ngspice(line: Line) -> list[Line]:
     text = text if text[:4].lower() in (".mea", ".inc", ".lib") else _powers(text)
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
     if kind in "beg":
-        text = _EQUAL.sub(lambda m: _NEAR.get(m[2], "(abs({}-{})>1e-9)").format(m[1], m[3]), text)
+        text = _EQUAL.sub(_compared, text)
         text = re.sub(r"'([^']*)'", r"{\1}", text)
         if _COMPOUND.search(text):
             text = text.replace("{", "{(").replace("}", ")}")
@@ -325,6 +325,12 @@ def _without_tables(text: str) -> str:
         if call is not None and len(text) + len(call) < MAX_LINE:
             text = text[: match.start()] + call + text[end:]
     return text
+
+
+def _compared(match: re.Match[str]) -> str:
+    parameter, how, value = match.groups()
+    law = _NEAR.get(how, "(abs({}-{})>1e-9*{})")
+    return law.format(parameter, value, value) if float(value) else match[0]
 
 
 def _powers(text: str) -> str:
