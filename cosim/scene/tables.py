@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from cosim.scene import firmware
@@ -626,6 +626,12 @@ class Port(Table):
         "where the FMU can, else mean",
         words='one of "auto", "mean", "line", "end"',
     )
+
+    @field_validator("source", "probe")
+    @classmethod
+    def _read(cls, name: str | None) -> str | None:
+        """As the netlist is read, in which LTspice puts § between a part's kind and its name."""
+        return name and name.replace("\u00a7", "_")
 
     @property
     def words(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import cosim
+from cosim.arrays import Array
 from cosim.circuit.joined import deck
 from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import named, read, read_all
@@ -151,7 +152,7 @@ TOLD = {
     "Q9 x in 0 W\n.model W ako:V\n.model V ako:W NPN": "is defined here; copy its .model",
     "S9 x 0 in 0 W\n.model W SW(Vh=-1)\n.model W SW(Vh=1)": "there is a second model w, so this",
     ".ic i(R8)=1\nR9 x 0 1": "i(r8)=1 is not v(node)=value",
-    "A9 in 0 0 0 0 x 0 0 SCHMITT Vt=.5": "that a netlist may have; write it with R, C and B",
+    "A9 in 0 0 0 0 x 0 0 COUNTER": "that a netlist may have; write it with R, C and B",
     "V9 x 0 PWL file=stimulus.txt": "was not found in the netlist's folder: copy it there",
     "V9 x 0 PWL file=own.cir": "own.cir must hold pairs of numbers",
     "V9 x 0 PWL time_scale_factor=2 file=own.cir": "write the values of this one into the line",
@@ -162,7 +163,9 @@ TOLD = {
     "XU9 in x level2 Avol=1Meg": "include the file with its .subckt",
     ".lib UniversalOpamps2.sub": "was not found in the netlist's folder: copy it there",
     ".lib C:\\models\\mine.lib": "was not found in the netlist's folder: copy it there",
-    "B9 x 0 V=idt(V(in))": "the function idt is not defined",
+    "B9 x 0 V=idt(V(in),0,V(b))": "the function idt is not defined",
+    "B9 x 0 V=delay(V(in),V(b)*1m)": "the function delay is not defined",
+    "R9 x 0 RM 5\n.model RM RES(R=2 TC1=1m)": "r=2 of rm multiplies its value in PSpice",
     "K9 L1 L2 L3 1": "there is no inductor l1 here",
     "K9 L1 L2 0.9 core": "must name two inductors and their coupling; write K pair by pair",
     "C9 x 0 1u Rser=1 m=2": "write a resistor in series",
@@ -545,11 +548,12 @@ def test_what_has_no_effect_is_told(tmp_path: Path) -> None:
 .ac dec 1 1 2
 .meas ac x MAX V(in)
 .tran 1u 1m uic
+.step param k list 1 2
 .backanno
 .tran 1m
 """
     notes = summary_of(tmp_path, f"{HEAD}{lines}")["notes"]
-    assert [note.split(" ")[0] for note in notes[:-1]] == [f"own.cir:{n}:" for n in range(10, 17)]
+    assert [note.split(" ")[0] for note in notes[:-1]] == [f"own.cir:{n}:" for n in range(10, 18)]
     assert notes[-1] == "ngspice knows no odd of a model, and ignored it."
 
 
@@ -639,3 +643,177 @@ def test_what_ngspice_says_of_a_failure_is_told() -> None:
 
     words: Any = SimpleNamespace(_stdout=["Note"], _stderr=["singular matrix"])
     assert Engine.said(words) == "singular matrix"
+
+
+POWERS = {
+    "V(in)**3": lambda x: x**3,
+    "-2*V(in)^3+1": lambda x: 1 - 2 * x**3,
+    "V(in)**{odd}": lambda x: x**3,
+    "(V(in)**odd+0.5)**(odd+2)": lambda x: (x**3 + 0.5) ** 5,
+    "(V(in)-2)**-1": lambda x: 1 / (x - 2),
+    "V(in)**4+2e-3**2": lambda x: x**4 + 4e-6,
+    "pow(V(in),3)+pow(V(in),2)": lambda x: x**3 + x**2,
+    "abs(V(in))**0.5": lambda x: np.sqrt(np.abs(x)),
+    "pwr(V(in),3)": lambda x: np.abs(x) ** 3,
+    "pwrs(V(in),0.5)": lambda x: np.sign(x) * np.sqrt(np.abs(x)),
+    "V(in)*{(-odd)**3}": lambda x: -27 * x,
+    "(V(in)>0.3)^(V(in)<-0.3 | V(in) > 0.6)": lambda x: np.where(
+        (x < -0.3) | ((x > 0.3) & (x <= 0.6)), 1, 0
+    ),
+    "arctan(V(in))": np.arctan,
+    "int(4*V(in))": lambda x: np.trunc(4 * x),
+    "round(4*V(in))": lambda x: np.floor(4 * x + 0.5),
+}
+
+
+@needs.ngspice_library
+def test_powers_have_the_sign_that_they_have_in_algebra(tmp_path: Path) -> None:
+    """ngspice alone raises the magnitude by ``**`` and ``pow``, and gives ``pwr`` the sign, against
+    the references of LTspice and PSpice."""
+    lines = [f"B{n} x{n} 0 V={word}\nR1{n} x{n} 0 1k" for n, word in enumerate(POWERS)]
+    text = "\n".join((f"{HEAD}.param odd=3", *lines, ".end\n"))
+    with in_place():
+        columns = found(
+            tmp_path, "", text, "v(in)", *(f"v(x{n})" for n in range(len(POWERS)))
+        ).columns
+    for n, law in enumerate(POWERS.values()):
+        true = law(columns["v(in)"])
+        error = np.abs(columns[f"v(x{n})"] - true) / max(1.0, np.abs(true).max())
+        assert np.quantile(error, 0.98) < 1e-4, [*POWERS][n]
+
+
+SPELT = {
+    "R9 x 0 550 noiseless\nC9 x 0 1n Rpar=1G noiseless": 2.2,
+    "R9 x 0 RM 500\n.model RM RES(R=1 TC1=1e-2)\n.temp 37": 2.2,
+    "R9 x 0 RX\nR8 0 x {550*2}\n.model RX R(R=1100)": 2.2,
+    "G9 x 0 VALUE={V(x)/(500+5*(TEMP-27))}\n.OPTIONS RELTOL=1E-4 TEMP=37": 2.2,
+    "X9 x W temp=1100\n.subckt W a PARAMS: temp=1\nR1 a 0 {temp/2}\n.ends": 2.2,
+    ".DEFINE R_SET {2*RH}\n.params RH=275\nR9 x 0 {R_SET}\n.wave a.wav 16 44.1k V(x)": 2.2,
+    "R9 x 0 550\nC9 x y CM 1n\nL9 y 0 LM 1m\n.model CM CAP(C=1)\n.model LM IND(L=1)": 2.2,
+    "R9 x 0 1k\nC9 x 0 1\n.ic V(x) {2*1.1}": 2.2,
+    "R9 x 0 550\n.options runlvl=5 DIGFREQ=10G WIDTH=80": 2.2,
+}
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("lines", SPELT)
+def test_words_of_other_programs_are_known(lines: str, tmp_path: Path) -> None:
+    """4 mA through 550 Ohm, warm or held there."""
+    with in_place():
+        columns = found(tmp_path, "", f"{HEAD}I9 0 x 4m\n{lines}\n.end\n", "v(x)").columns
+    assert columns["v(x)"] == pytest.approx(SPELT[lines], rel=1e-4)
+
+
+@needs.ngspice_library
+def test_a_port_may_have_the_sign_of_ltspice(tmp_path: Path) -> None:
+    """§ stands between a part's kind and its name; and what lies beyond the run is no value."""
+    text = HEAD.replace("V1", "V§1") + ".meas late FIND V(in) AT 5m\n.end\n"
+    (tmp_path / "own.cir").write_text(text)
+    (tmp_path / "own.toml").write_text(SCENE.format('"v(in)"').replace('"V1"', '"V§1"'))
+    with in_place():
+        result = cosim.run(tmp_path / "own.toml")
+    true = np.sin(2e3 * np.pi * result.columns["time"])
+    assert result.columns["v(in)"] == pytest.approx(true, abs=1e-3)
+    assert "meas.late" not in result.summary
+
+
+OMEGA = 2e3 * np.pi
+LAWS = {
+    "B9 x 0 V=idt(V(in)*6k)": lambda t: 6e3 * (1 - np.cos(OMEGA * t)) / OMEGA,
+    "E9 x 0 VALUE={SDT(6k*V(in),-1)}": lambda t: 6e3 * (1 - np.cos(OMEGA * t)) / OMEGA - 1,
+    "B9 x 0 V=2*delay(V(in),{w/2})-1\n.param w=200u": lambda t: (
+        2 * np.where(t > 1e-4, np.sin(OMEGA * (t - 1e-4)), 0) - 1
+    ),
+    "B9 x 0 V=delay(idt(6k*V(in)),100u)": lambda t: (
+        6e3 * (1 - np.cos(OMEGA * np.maximum(t - 1e-4, 0))) / OMEGA
+    ),
+    "G9 0 x in 0 1\nL9 x 0 Flux=0.2m*tanh(2*x)": lambda t: (
+        0.4e-3 * OMEGA * np.cos(OMEGA * t) / np.cosh(2 * np.sin(OMEGA * t)) ** 2
+    ),
+    "V9 y 0 0\nC9 in y Q={100u*x+100u*x**3}\nB9 x 0 V=I(V9)": lambda t: (
+        1e-4 * OMEGA * np.cos(OMEGA * t) * (1 + 3 * np.sin(OMEGA * t) ** 2)
+    ),
+    "I9 0 x 1\nR9 x 0 R=2+V(in)*0.5": lambda t: 2 + np.sin(OMEGA * t) / 2,
+}
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("lines", LAWS)
+def test_integrals_delays_and_laws_of_parts_are_those_of_calculus(
+    lines: str, tmp_path: Path
+) -> None:
+    """At 1 V of sine."""
+    with in_place():
+        columns = found(tmp_path, "", f"{HEAD}{lines}\nR8 x 0 1Meg\n.end\n", "v(x)").columns
+    true = LAWS[lines](columns["time"])
+    error = np.abs(columns["v(x)"] - true)[5:] / np.abs(true).max()
+    assert error.max() < 2e-3 and error.mean() < 3e-4
+
+
+PASTED = {
+    "B9 x 0 V={k+1}*V(in)-{k-1}": lambda v: 4 * v - 2,
+    "B9 x 0 V=2*{V(in)+k}**2": lambda v: 2 * (v + 3) ** 2,
+    "E9 x 0 VALUE={{k+1}*V(in)-'k-1'}": lambda v: 4 * v - 2,
+    "E9 x 0 TABLE {V(in)*{k+1}} = (-2,-1) ({k-1},1)": lambda v: np.interp(4 * v, [-2, 2], [-1, 1]),
+    "E9 x 0 VALUE={IF(k==3, V(in), 9)}": lambda v: v,
+    "B9 x 0 V=if(tiny>0, V(in), 9)": lambda v: v,
+    "B9 x 0 V=if({k}!=3 | k > 3, 9, V(in)) + if(seven<=7 & k>=3, 1, 0)": lambda v: v + 1,
+}
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("line", PASTED)
+def test_parameters_in_b_sources_are_the_numbers_that_they_are(line: str, tmp_path: Path) -> None:
+    """ngspice pastes what is in braces without them, and 3 as 3.0000000000000004."""
+    lines = f".param k=3 seven=7 tiny=1e-12\n{line}\nR9 x 0 1k"
+    with in_place():
+        columns = found(tmp_path, "", f"{HEAD}{lines}\n.end\n", "v(x)", "v(in)").columns
+    assert columns["v(x)"] == pytest.approx(PASTED[line](columns["v(in)"]), abs=2e-3)
+
+
+def square(t: Array) -> Array:
+    """V8 of the next test."""
+    return np.where((t > 1e-4) & (np.mod(t - 1e-4, 0.37e-3) < 0.2e-3), 1.0, 0.0)
+
+
+def remembered(on: Array, off: Array) -> Array:
+    """1 from where ``on`` was true last, 0 from where ``off`` was."""
+    state = np.where(on, 1.0, np.where(off, 0.0, np.nan))
+    state[0] = np.nan_to_num(state[0])
+    places = np.where(np.isnan(state), 0, np.arange(len(state)))
+    return state[np.maximum.accumulate(places)]
+
+
+GATES = {
+    "A9 in 0 0 0 0 0 x 0 BUF Vhigh=5 Vlow=-1 Ref=.2": lambda v, t: np.where(v > 0.2, 5, -1),
+    "A9 in 0 0 0 0 x 0 0 BUF Vhigh={2+3}": lambda v, t: 0 * t + 5,
+    "A9 in y 0 0 0 0 x 0 AND tripdt=1n": lambda v, t: np.minimum(v > 0.5, square(t)),
+    "A9 0 y 0 in 0 x 0 0 OR": lambda v, t: 1 - np.maximum(v > 0.5, square(t)),
+    "A9 in y 0 0 0 0 x 0 XOR Trise=5n": lambda v, t: np.abs((v > 0.5) - square(t)),
+    "A9 in 0 y 0 0 0 x 0 OR Td=100u Rout=1k": lambda v, t: (
+        np.maximum(np.sin(OMEGA * (t - 1e-4)) > 0.5, square(t - 1e-4)) * (t > 1e-4)
+    ),
+    "A9 in 0 0 0 0 0 x 0 SCHMITT Vt=.1 Vh=.3": lambda v, t: remembered(v > 0.4, v < -0.2),
+    "A9 b in c c c c x c SCHMITT Vt=2 Vh=.5": lambda v, t: remembered(v < -0.5, v > 0.5) - 3,
+    "A9 in y 0 0 0 0 x 0 SRFLOP": lambda v, t: remembered(
+        (v > 0.5) & (square(t) < 0.5), (v < 0.5) & (square(t) > 0.5)
+    ),
+}
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("gate", GATES)
+def test_gates_of_ltspice_are_what_their_names_say(gate: str, tmp_path: Path) -> None:
+    """An input at the common node is none, as LTspice's help has it."""
+    lines = f"V8 y 0 PULSE(0 1 0.1m 1n 1n 0.2m 0.37m)\nR9 y x 1Meg\n{gate}"
+    with in_place():
+        columns = found(tmp_path, "", f"{HEAD}{lines}\n.end\n", "v(x)", "v(in)").columns
+    true = np.asarray(GATES[gate](columns["v(in)"], columns["time"]), dtype=float)
+    error = np.abs(columns["v(x)"] - true)
+    assert np.quantile(error, 0.98) < 2e-3
+
+
+@pytest.mark.parametrize("what", ["DFLOP", "OTA g=1m", "AND Rhigh=2", "SCHMITT", "XOR"])
+def test_other_gates_are_refused(what: str, tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"own\.cir:8: A9 is no element that a netlist may have"):
+        anew(tmp_path, f"A9 in b c 0 0 0 x 0 {what}")

@@ -1,6 +1,7 @@
 """The compiled loop: blocks change nothing, faults are told, and it sees what it is to see."""
 
 import ctypes
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -247,3 +248,18 @@ def test_progress_goes_on_within_long_steps_of_the_command() -> None:
     simulate(load("reference", ["run.duration=1"]), told.append)
     assert told == sorted(told) and told[0] == 0.0 and told[-1] == 1.0
     assert len(told) > 3
+
+
+def test_a_step_of_no_length_moves_nothing() -> None:
+    """Where an edge of the netlist's own is, ngspice steps by 1e-19 s, over which its error of a
+    milliampere is steeper than any slope that the FMU takes."""
+    scene = load("reference", {"circuit.model": "ideal", "run.duration": 4e-3, "run.settle": 0.0})
+
+    def moved(edges: list[float], end: list[float]) -> float:
+        with closing(Mechanics(scene)) as mechanics:
+            log = recorder.Recorder(scene, mechanics, lambda time: None)
+            log.follow(*map(np.array, (edges, [0.0, *end[:-1]], end)))
+            return float(log.column("v_surface")[-1])
+
+    usual = moved([2e-3, 4e-3], [1.0, 1.0])
+    assert moved([2e-3, 2e-3 + 5e-19, 4e-3], [1.0, 1.001, 1.0]) == pytest.approx(usual, rel=1e-3)

@@ -20,6 +20,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d|\.\d)")
 _OPERATOR = re.compile(r"[*/^]")
 _BARE = re.compile(r"\b(?:[rclq]|flux)\s*=([^=]*?[()*/^][^=]*?)(?=\s\w+\s*=|$)", re.IGNORECASE)
 """A value with operators outside braces, which ngspice does not evaluate."""
+_FACTOR = re.compile(r"\s[rcl]\s*=\s*(?!1(?:\.0*)?(?![\w.]))[^\s()]+")
 _WAVES = {"pulse": 7, "sin": 6, "exp": 6}
 """Most values of each: one more is a number of periods in LTspice, and a phase in ngspice."""
 _FOREIGN = (
@@ -151,6 +152,13 @@ def _check_passive(element: Element, scope: Scope, names: Names) -> None:
         element.refuse(f": write {{…}} around its value, {shown(first)}")
     if len(element.words) > 1 and None not in map(number, element.words[:2]):
         element.refuse(" has two values; a number has a decimal point, not a comma")
+    for word in element.words:
+        line = next((s.model_lines[word] for s in scope.chain() if word in s.model_lines), None)
+        if line and len(element.words) > 1 and (factor := _FACTOR.search(line.text.lower())):
+            element.refuse(
+                f": {factor[0].strip()} of {shown(word)} multiplies its value in PSpice, and "
+                "nothing in ngspice; write the product here, and 1 there"
+            )
     for word in element.words[1:]:
         known = number(word) is not None or "=" in word or word[0] in "{'"
         if not (known or scope.model_types(word) or names.is_parameter(scope, word)):

@@ -36,13 +36,10 @@ KEPT = word_set(
 )
 DROPPED = word_set(
     ".tran .op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .meas .measure .save .print "
-    ".plot .probe .probe64 .width .title .csparam .backanno .prot .unprot .protect .unprotect"
+    ".plot .step .wave .probe .probe64 .width .title .csparam .backanno .prot .unprot .protect "
+    ".unprotect"
 )
 """Analyses, output and remarks: a host sets its own; see ``outputs.py``."""
-_INSTEAD = {
-    ".step": "; run cosim sweep with --over circuit.param.NAME=START:STOP:COUNT instead",
-    ".wave": "; cosim export writes sound",
-}
 ELEMENTS = frozenset("bcdefghijklmoqrstvwxz")
 """First letters of elements. Not A (code models start processes and read files), N (compiled
 Verilog-A), U (translated to code models), P and Y (lossy lines, of no use here)."""
@@ -57,7 +54,7 @@ DROPPED_OPTIONS = word_set(
     "acct accurate advconv autostop brief cptime fastaccess filetype flagloads ingold interp "
     "limpts limtim list lvltim maxstep meascplxfmt measdgt noacct node noinit nomarch nomod "
     "nopage numdgt opts plotabstol plotreltol plotvntol plotwinsize post probe savecurrents "
-    "srcstepmethod stepgmin thev_induc topologycheck warn wnflag"
+    "runlvl srcstepmethod stepgmin thev_induc topologycheck warn width wnflag"
 )
 """Options of output, which a host sets itself (``interp`` gives wrong waveforms), and of how other
 programs compute."""
@@ -376,8 +373,7 @@ def passed(line: Line) -> str | None:
     if word in DROPPED:
         return None
     if word and word not in KEPT:
-        cure = _INSTEAD.get(word, "; leave it out")
-        refuse(line, f"{shown(word)} is not allowed in a netlist{cure}")
+        refuse(line, f"{shown(word)} is not allowed in a netlist; leave it out")
     if not _TEXT.fullmatch(line.text) or _UNSAFE.search(line.text):
         odd = next(c for c in line.text if not " " <= c <= "~" or c in '"`\\')
         refuse(line, f"the character {shown(odd)} cannot stand in a netlist outside comments")
@@ -407,7 +403,7 @@ def _options(line: Line, word: str, rest: str) -> str | None:
         name = match[1].lower()
         if name in NUMERIC_OPTIONS:
             kept.append(match[0].strip(" ,"))
-        elif name not in DROPPED_OPTIONS:
+        elif name not in DROPPED_OPTIONS and not name.startswith("dig"):
             refuse(line, f"the option {shown(name)} is not allowed in a netlist; leave it out")
         place = match.end()
     return f"{word} {' '.join(kept)}" if kept else None

@@ -10,6 +10,7 @@ library does not bring on every machine, which cost each step, and which round a
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
 from itertools import chain, combinations, combinations_with_replacement, count, pairwise
 from math import pi
 from typing import Any
@@ -33,7 +34,12 @@ FUNCTIONS = {
     "limit": ("x,y,z", "min(max(x,min(y,z)),max(y,z))"),
     "uplim": ("x,y,z", "min(x,y-z)+min(max(x-y+z,0),2*z)-min(max(x-y+z,0),2*z)**2/(4*z)"),
     "dnlim": ("x,y,z", "max(x,y+z)-min(max(y+z-x,0),2*z)+min(max(y+z-x,0),2*z)**2/(4*z)"),
-    "pwrs": ("x,y", "sgn(x)*pwr(x,y)"),
+    "pow": ("x,y", "ternary_fcn(x<0&&abs(y-2*floor(y/2)-1)<1e-9,-1,1)*(abs(x)+1e-99)**(y)"),
+    "pwr": ("x,y", "(abs(x)+1e-99)**(y)"),
+    "pwrs": ("x,y", "sgn(x)*(abs(x)+1e-99)**(y)"),
+    "arctan": ("x", "atan(x)"),
+    "int": ("x", "sgn(x)*floor(abs(x))"),
+    "round": ("x", "floor(x+0.5)"),
     "stp": ("x", "u(x)"),
     "buf": ("x", "u(x-0.5)"),
     "inv": ("x", "u(0.5-x)"),
@@ -41,9 +47,10 @@ FUNCTIONS = {
     "cosim_switch": ("c,n,f,r,q", f"exp(-0.5*ln(r*q)-ln(r/q)*{_WAY}*(1.5-2*{_WAY}**2))"),
     "cosim_diode": ("x,f,b,r,q,d", "x/q+max(x-f,0)*(1/r-1/q)-max(-x-b,0)*(1/d-1/q)"),
 }
-"""Their functions that ngspice lacks: parameters, and the same in its own. The logarithm of a
-switch's resistance is a cubic of the control (Cadence, *PSpice Reference Guide*, voltage-controlled
-switch)."""
+"""Their functions that ngspice lacks, or takes for others in B sources (there ``pwr`` has the sign
+of x, ``pow`` never one): parameters, and the same in its own; at 0 a root has a slope. The
+logarithm of a switch's resistance is a cubic of the control (Cadence, *PSpice Reference Guide*,
+voltage-controlled switch)."""
 _CALL = re.compile(r"(?<![\w.])([a-z_]\w*)\s*\(")
 _DEFINED = re.compile(r"\.func\s+(\w+)|(\w+)\s*(?:\([^()]*\)\s*)?=(?!=)")
 _TABLE = re.compile(r"(?<![\w.])table\s*\(", re.IGNORECASE)
@@ -66,6 +73,24 @@ _GLUED = re.compile(r"(?<==)\s*(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECA
 """4k7 for 4.7k, as a value and behind a name."""
 _POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)
 _TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECASE)
+_TEMP = re.compile(r"\.(?:temp\b[\s=]*|opt\w*\s(?:.*[\s,])?temp\s*=\s*)(\{[^{}]*\}|[^\s,]+)", re.I)
+_WARMTH = re.compile(r"(?<![\w.])temp(?!\w|\s*[=(])")
+_SYNONYMS = {".params": ".param", ".define": ".param", "cap": "c", "ind": "l"}
+_COMPOUND = re.compile(r"\{[^{}]*[^\w.{}\s][^{}]*\}")
+"""In B sources ngspice pastes what is in braces without them: ``{a+b}*2``."""
+_EQUAL = re.compile(
+    r"(?<![\w.)}\]])((?!time)[a-z_]\w*|\{\w+\})\s*([=!<]=|<>|>(?!=))\s*(\d+\.?\d*)(?![\w.*/^+-])",
+    re.I,
+)
+_NEAR = {"==": "(abs({}-{})<1e-9*{})", "<=": "({}-{}<1e-9*{})", ">": "({}-{}>1e-9*{})"}
+"""There it reads a parameter 3 as 3.0000000000000004, which is not 3; 0 is 0."""
+_NOISELESS = re.compile(r"\s+noiseless\b", re.IGNORECASE)
+_LAW = re.compile(
+    r"([rclq]|flux)\s*=\s*(?:\{([^{}]*)\}|([^={}']*[*/^()][^={}']*?))(?=\s+\w+\s*=(?!=)|$)", re.I
+)
+_OWN = re.compile(r"(?<![\w.])x(?![\w.(])", re.IGNORECASE)
+_CHANGING = re.compile(r"\b(?:[vi]\s*\(|time\b)", re.IGNORECASE)
+_MEMORY = re.compile(r"(?<![\w.])(idt|sdt|delay)\s*\(", re.IGNORECASE)
 _COILS = re.compile(r"(k\S*)((?:\s+l\S*){3,})\s+(\S+)", re.IGNORECASE)
 _PWL = re.compile(r"(\bpwl\b[\s(]*)([^()]*)", re.IGNORECASE)
 _WORD = re.compile(r"[^\s,]+")
@@ -83,7 +108,14 @@ _CARDS = {
     "d": {"vfwd": "0", "vrev": "1e30", "ron": "1", "roff": "1e12", "rrev": ""},
 }
 """What these models have if it is not given."""
+_GATE = {
+    "vhigh": "1", "vlow": "0", "ref": "0.5*(vhigh+vlow)", "vt": "0.5", "vh": "0.01", "td": "0",
+    "trise": "0", "tfall": "0", "rout": "1", "cout": "0", "tripdt": "", "tripv": "",
+}  # fmt: skip
 _CURRENT = re.compile(rf"\bi\s*\(\s*(l[^\s()]*)\s*\)\s*=\s*{_VALUE}[\s,]*", re.IGNORECASE)
+_UNSIGNED = ("", *"0123456789.")  # no base, or a number, perhaps behind an exponent
+_NAMING = re.compile(r"[\w.$#]")
+_POWER = re.compile(r"(\s*(?:\*\*|\^)\s*)([+-]?)(?:(\d*[02468])(?![\w.])|[\w.]*)")
 _LOGIC = re.compile(r"(?<!&)&(?!&)|(?<!\|)\|(?!\|)|~")
 _LOGICAL = {"&": "&&", "|": "||", "~": "!"}
 """LTspice's and, or, not."""
@@ -91,21 +123,39 @@ _LOGICAL = {"&": "&&", "|": "||", "~": "!"}
 
 def in_ngspice(line: Line) -> list[Line]:
     """The line as ngspice knows it, in one line or more."""
-    text = _without_tables(line.text.translate(_LETTERS))
+    text = _without_tables(_NOISELESS.sub("", line.text.translate(_LETTERS)))
     kind = text[:1].lower()
     if not text.startswith((".inc", ".lib")):
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
+    text = text if text[:4].lower() in (".mea", ".inc", ".lib") else _powers(text)
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
+    if kind in "beg":
+        text = _EQUAL.sub(_compared, text)
+        text = re.sub(r"'([^']*)'", r"{\1}", text)
+        if _COMPOUND.search(text):
+            text = text.replace("{", "{(").replace("}", ")}")
     if kind in "rclvibefgh":
         *parts, own = _with_parts(text, kind)
         found = [*parts, _source(own) if kind in "efgh" else own]
+        if kind in "beg":
+            found = [*parts, *_with_memory(found[-1])]
+        elif kind in "rcl":
+            found = [*parts, *_with_law(own)]
+    elif kind == "a":
+        found = _gate(text)
     elif coils := _COILS.fullmatch(text):
         pairs = enumerate(combinations(coils[2].split(), 2))
         found = [f"{coils[1]}_{place} {' '.join(pair)} {coils[3]}" for place, pair in pairs]
-    elif text.lower().startswith(".param") and "=" not in text:
-        found = [_UNEQUAL.sub(r"\1=", text)]
+    elif text.lower().startswith((".param", ".define")):
+        word, _, rest = text.partition(" ")
+        rest = rest if "=" in rest else _UNEQUAL.sub(r"\1=", f" {rest}")
+        found = [f"{_SYNONYMS.get(word.lower(), word)} {rest}"]
+    elif text.lower().startswith((".ic", ".nodeset")):
+        found = [re.sub(r"\)\s+(?=[{'\d.+-])", ")=", text)]
     elif model := _MODEL.match(text):
         remarks = _REMARKS["vdmos"] if model[1].lower() == "vdmos" else _MAKERS
+        kind = _SYNONYMS.get(model[1].lower(), model[1])
+        text = text[: model.start(1)] + kind + text[model.end(1) :]
         text = re.sub(r"(?i)(?<=\sako:)\s+", "", text)
         found = [_taken(text.replace("(", " ( ", 1), remarks)[0]]
     else:
@@ -116,13 +166,17 @@ def in_ngspice(line: Line) -> list[Line]:
 def prelude(lines: Sequence[Line]) -> list[Line]:
     """The functions and constants of theirs that the lines use and do not define."""
     called: dict[str, set[int]] = {}
-    defined: set[str] = set()
+    defined, temperature = set[str](), "27"
     for line in lines:
         text = line.text.lower()
         if text.startswith((".func", ".param")):
             defined.update(*_DEFINED.findall(text))
         if ("{" in text or "'" in text or text.startswith(".param")) and _PI.search(text):
             called["pi"] = {0}
+        if temp := _TEMP.match(text):
+            temperature = temp[1]
+        elif _WARMTH.search(text):
+            called["temp"] = {0}
         for match in _CALL.finditer(text):
             if match[1] in FUNCTIONS:
                 inside = text[match.end() : closing(text, match.end() - 1) - 1]
@@ -134,6 +188,8 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
     ]
     if "pi" in called and "pi" not in defined:
         found.append(f".param pi={pi!r}")
+    if "temp" in called and "temp" not in defined:
+        found.append(f".param temp={temperature}")
     return [Line(text, lines[0].file, 1) for text in found]
 
 
@@ -271,6 +327,36 @@ def _without_tables(text: str) -> str:
     return text
 
 
+def _compared(match: re.Match[str]) -> str:
+    parameter, how, value = match.groups()
+    law = _NEAR.get(how, "(abs({}-{})>1e-9*{})")
+    return law.format(parameter, value, value) if float(value) else match[0]
+
+
+def _powers(text: str) -> str:
+    """``x**y`` as ``pow(x,y)`` unless y is an even number: ngspice raises the magnitude of x.
+    Between comparisons ``^`` is LTspice's and PSpice's exclusive or."""
+    place = 0
+    while match := _POWER.search(text, place):
+        start = place = match.start()
+        depth = 0
+        while start and (depth or text[start - 1] in ")}" or _NAMING.match(text[start - 1])):
+            start -= 1
+            depth += (text[start] in ")}") - (text[start] in "({")
+        end = match.end()
+        if text[end : end + 1] in ("(", "{"):
+            end = closing(text, end)
+        base, exponent = text[start:place], text[place + len(match[1]) : end]
+        if match[3] or base[:1] in _UNSIGNED or not exponent.strip("+-"):
+            place = match.end()
+            continue
+        exclusive = "^" in match[1] and re.search("[<>]|==", base + exponent)
+        call = f"({base}!={exponent})" if exclusive else f"pow({base},{exponent})"
+        text = f"{text[:start]}{call}{text[end:]}"
+        place = start
+    return text
+
+
 def _lines(x: str, points: list[str]) -> str | None:
     """An expression for straight lines between points, level outside; None if they are none."""
     known = [number(point) for point in points[::2]]
@@ -308,6 +394,93 @@ def _with_parts(text: str, kind: str) -> Iterator[str]:
         if key in given:
             yield f"{key[0]}{name}_{key} {plus} {minus} {given[key]}"
     yield f"{name} {at} {minus} {rest}"
+
+
+def _with_law(text: str) -> Iterator[str]:
+    """A part whose value is an expression of its own voltage x, or current x, in braces."""
+    name, plus, minus, rest = [*text.strip().split(None, 3), "", "", ""][:4]
+    law = _LAW.match(rest)
+    if law is None:
+        yield text
+    elif (key := law[1].lower()) == "flux" and name[0] in "lL":
+        # The voltage of a node is the current, a charge there the flux.
+        yield f"g{name}_flux {plus} {minus} {name}_i 0 1"
+        yield f"g{name}_x 0 {name}_i {plus} {minus} 1"
+        value = _OWN.sub(f"v({name}_i)", law[2] or law[3])
+        yield f"c{name}_flux {name}_i 0 q={{{value}}} {rest[law.end() :]}"
+    else:
+        value = law[2] or law[3]
+        value = _OWN.sub(f"v({plus},{minus})", value) if key == "q" else value
+        yield f"{name} {plus} {minus} {key}={{{value}}} {rest[law.end() :]}"
+
+
+def _with_memory(text: str) -> Iterator[str]:
+    """A source behind what integrates or delays for it: a capacitor of 1 F, a line of 1 Ohm."""
+    for place in range(_MOST):
+        match = [*_MEMORY.finditer(text, text.find("=") + 1)][-1:]  # what lies within comes first
+        if not match or len(text) > MAX_LINE // 2 or "=" not in text:
+            break
+        start, what, after = match[0].start(), match[0][1].lower(), match[0].end()
+        end = closing(text, after - 1)
+        x, *more = (each.strip() for each in split_arguments(text[after : end - 1]) or [""])
+        node = f"{text.split()[0]}_{what}{place}"
+        if what == "delay" and len(more) == 1 and not _CHANGING.search(more[0]):
+            yield f"b{node} {node}_in 0 v=2*({x})"
+            yield f"r{node}_in {node}_in {node}_at 1"
+            yield f"t{node} {node}_at 0 {node} 0 z0=1 td={{{more[0].strip('{}')}}}"
+            yield f"r{node} {node} 0 1"
+        elif what != "delay" and len(more) < 2:
+            start_at = more[0] if more else "0"
+            yield f"b{node} 0 {node} i=time > 0 ? {x} : 1e9*(({start_at})-v({node}))"
+            yield f"c{node} {node} 0 1"
+        else:
+            break
+        text = f"{text[:start]}v({node}){text[end:]}"
+    yield text
+
+
+def _gate(text: str) -> list[str]:
+    """LTspice's gate, Schmitt trigger or set-reset flip-flop: a switch whose control is above the
+    middle of a hysteresis (an AND's its least input), a delay, an edge of 1 ns or more, and for
+    each output a source. Inputs at the common node are none."""
+    less, given = _taken(text, _GATE)
+    name, *nodes = less.lower().split()
+    if len(nodes) != 9:
+        return [text]
+    *inputs, below, above, common, kind = nodes
+    law = {key: "(" + value.strip("{}'") + ")" for key, value in (_GATE | given).items()}
+    ref = re.sub("v(?:high|low)", lambda match: law[match[0]], law["ref"])
+    x = [f"v({each},{common})" for each in inputs if each != common]
+    middle, half, y = ref, "0", x[0] if x else ""
+    if kind in ("and", "or") and x:
+        y = reduce(lambda a, b: f"{'min' if kind == 'and' else 'max'}({a},{b})", x)
+    elif kind == "xor" and len(x) == 2:
+        y, middle = f"-({x[0]}-{ref})*({x[1]}-{ref})", "0"
+    elif kind == "schmitt" and (len(x) == 1 or (len(x) == 2 and common not in inputs[:2])):
+        y, middle, half = "-".join(x), law["vt"], law["vh"]
+    elif kind == "srflop" and len(x) == 2 and common not in inputs[:2]:
+        y, middle, half = "-".join(x), "0", ref
+    elif kind != "buf" or len(x) != 1:
+        return [text]
+    state, td = f"1.001*v({name}_p)", law["td"][1:-1]
+    state = state if number(td) == 0.0 else f"delay({state},{{{td}}})"
+    found = [
+        f"b{name}_x {name}_x 0 v={y}",
+        f"s{name} {name}_1 {name}_p {name}_x 0 {name}_m",
+        f".model {name}_m sw vt={{{middle}}} vh={{{half}}} ron=1 roff=1e9",
+        f"v{name}_1 {name}_1 0 1",
+        f"r{name}_p {name}_p 0 1k",
+        *_with_memory(f"b{name}_d {name}_d 0 v={state}"),
+        f"r{name}_q {name}_d {name}_q 1",
+        f"c{name}_q {name}_q 0 {{max(1n,{law['trise']})/2.2}}",
+    ]
+    for pin, out, share in ((6, below, f"(1-v({name}_q))"), (7, above, f"v({name}_q)")):
+        if out != common:
+            level = f"{law['vlow']}+({law['vhigh']}-{law['vlow']})*{share}"
+            found.append(f"b{name}_{pin} {name}_{pin} {common} v={level}")
+            found.append(f"r{name}_{pin} {name}_{pin} {out} {{{law['rout']}}}")
+            found.append(f"c{name}_{pin} {out} {common} {{{law['cout']}}}")
+    return found
 
 
 def since_the_start(points: list[str]) -> str:

@@ -20,7 +20,7 @@ from cosim.arrays import Array
 from cosim.circuit.lint.lines import Line, refuse, shown
 from cosim.circuit.lint.words import NUMBER, number, word_set
 
-_SAVING = word_set(".save .probe .probe64 .plot .print")
+_SAVING = word_set(".save .probe .probe64 .plot .print .wave")
 _ANALYSES = word_set(".op .ac .dc .tf .noise .disto .pz .sens .sp .four .fourier .csparam")
 _REDUCED = word_set("avg rms min max pp integ")
 _MEAS = re.compile(r"\.meas\w*\s+(?:(tran|ac|dc|op|tf|noise|sp)\s+)?(\w+)\s+(\w+)\b(.*)", re.DOTALL)
@@ -83,6 +83,11 @@ def without_effect(dropped: Sequence[Line]) -> Iterator[str]:
             yield f"{line.place}: {line.text[6:]}."
         elif word in _SAVING:
             yield f"{line.place}: {word} has no effect; circuit.save keeps vectors."
+        elif word == ".step":
+            yield (
+                f"{line.place}: .step has no effect: a run takes the values of .param; "
+                "cosim sweep --over circuit.param.NAME=START:STOP:COUNT takes several."
+            )
         elif word in _ANALYSES or without or (match and match[1] not in (None, "tran")):
             what = f"{word} {without[0]}" if without else word
             yield (
@@ -230,7 +235,7 @@ def _value(each: Measure, time: Array, known: Mapping[str, Array]) -> float | No
         return _crossing(time, off, at(event.delay, 0.0), event)
 
     times = [found for event in each.events if (found := when(event)) is not None]
-    if len(times) < len(each.events):
+    if len(times) < len(each.events) or (each.what == "find" and times[0] > time[-1]):
         return None
     if each.what in _REDUCED:
         first, last = max(times[0], float(time[0])), min(times[1], float(time[-1]))

@@ -60,6 +60,9 @@ static void widen(Recorder *r, const double *found)
     }
 }
 
+/* Of an input, per second, the most that the FMU takes: over 1e-18 s an error of ngspice is steeper. */
+#define STEEPEST 1e15
+
 /* The inputs of the interval under way from the time reached on: they go linearly from `start`, or
  * what the schedule has, until the interval's or the schedule's next corner. */
 static int set_inputs(Recorder *r, double edge, const double *start, const double *end)
@@ -75,7 +78,8 @@ static int set_inputs(Recorder *r, double edge, const double *start, const doubl
     double *input = r->inputs;
     r->holds_until = edge;
     for (int64_t k = 0; k < r->ports; k++) {
-        const double slope = (end[k] - start[k]) / (edge - r->began);
+        double slope = (end[k] - start[k]) / (edge - r->began);
+        slope = slope > STEEPEST ? STEEPEST : slope < -STEEPEST ? -STEEPEST : slope;
         *input++ = start[k] + slope * reached;
         *input++ = slope;
     }
