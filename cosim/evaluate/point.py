@@ -11,7 +11,6 @@ from typing import Any
 from cosim.circuit.lint.deck import named as netlist_files
 from cosim.errors import CosimError
 from cosim.scene import Scene, changed
-from cosim.scene.model import averaged
 from cosim.toolchain.processes import TRIES, ProcessLost
 
 Number = float | int
@@ -148,8 +147,7 @@ def outcome_of(record: Any) -> Outcome | None:
 
 
 def in_whole_periods(scene: Scene) -> Scene:
-    """The scene with ``run.settle`` and ``run.duration`` about as long, whole periods apart, and as
-    many as :func:`cosim.scene.model.averaged` says.
+    """The scene with ``run.settle`` and ``run.duration`` at least as long and whole periods apart.
 
     The mean over a broken period is off by per cents, which differ from frequency to frequency.
     They stay as they are where nothing repeats.
@@ -159,5 +157,4 @@ def in_whole_periods(scene: Scene) -> Scene:
         return scene
     times = scene.run.settle, scene.run.duration - scene.run.settle
     settle, span = (max(1, ceil(time / length - 1e-9)) for time in times)
-    span = averaged(span)
     return scene.having(run={"settle": settle * length, "duration": (settle + span) * length})

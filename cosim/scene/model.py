@@ -121,7 +121,8 @@ class Scene(BaseModel):
             length = self.period
             half = int(duration / 2 / length * (1 + 1e-9))
             count = averaged(half) or int(duration >= length)
-            fitted["settle"] = max(0.0, duration - count * length) if count else duration / 2
+            settle = round(max(0.0, duration - count * length), 14)  # as one writes it
+            fitted["settle"] = settle if count else duration / 2
         # Not as what was given: another drive or duration has another default.
         known = {name: getattr(self.run, name) for name in given}
         run = Run.model_construct(given, **fitted | known)

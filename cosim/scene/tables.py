@@ -517,12 +517,12 @@ class Run(Table):
 
     duration: float = _number(2.0, "s", 1e-6, 1e5, "Simulated time")
     settle: float = _number(
-        1.0,
+        0.8,
         "s",
         0.0,
         1e5,
-        "Start of the averages; by default a multiple of 24, 12, 6 or 2 periods of the drive, about "
-        "half of the duration, before the end",
+        "Start of the averages; by default a multiple of 24, 12, 6 or 2 periods of the drive before "
+        "the end, about half of the duration",
     )
     output_step: float = _number(5e-5, "s", 1e-9, 1e3, "Time between rows of the waveforms")
     shutter: float = _number(

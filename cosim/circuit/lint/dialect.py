@@ -132,7 +132,7 @@ def in_ngspice(line: Line) -> list[Line]:
     if kind in "beg":
         text = _EQUAL.sub(_compared, text)
         text = re.sub(r"'([^']*)'", r"{\1}", text)
-        if _COMPOUND.search(text):
+        if any(map(_is_bare, _COMPOUND.finditer(text))):
             text = text.replace("{", "{(").replace("}", ")}")
     if kind in "rclvibefgh":
         *parts, own = _with_parts(text, kind)
@@ -325,6 +325,12 @@ def _without_tables(text: str) -> str:
         if call is not None and len(text) + len(call) < MAX_LINE:
             text = text[: match.start()] + call + text[end:]
     return text
+
+
+def _is_bare(match: re.Match[str]) -> bool:
+    """Not in parentheses yet."""
+    inside = match[0][1:-1]
+    return inside[0] != "(" or closing(inside, 0) < len(inside)
 
 
 def _compared(match: re.Match[str]) -> str:
