@@ -521,8 +521,8 @@ class Run(Table):
         "s",
         0.0,
         1e5,
-        "Start of the averages; by default a multiple of 24, 12, 6 or 2 periods of the drive before "
-        "the end, about half of the duration",
+        "Start of the averages; by default a multiple of 24, 12, 6 or 2 periods of the drive "
+        "before the end, about half of the duration",
     )
     output_step: float = _number(5e-5, "s", 1e-9, 1e3, "Time between rows of the waveforms")
     shutter: float = _number(

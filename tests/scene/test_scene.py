@@ -114,7 +114,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "run": {
         **{
             "duration": 2.0,
-            "settle": 2.0 - 24 * 0.05,
+            "settle": 0.8,
             "output_step": 5e-5,
             "shutter": 0.0,
             "tolerance": 1e-2,
