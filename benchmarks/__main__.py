@@ -24,7 +24,7 @@ TITLES = bench.TITLES | {
     "coupled_over_parts": "Coupled run over the sum of its parts, each alone",
     "all_in_ngspice_over_ours": "The whole machine in one netlist, over ours",
     "naive_over_ours": "PySpice's and fmpy's plain calls, over ours",
-    "naive_motor_over_ours": "The same on an H-bridge and a gearbox FMU",
+    "naive_motor_over_ours": "These calls on an H-bridge and a gearbox FMU, over ours",
     "solve_ivp_over_ours": "SciPy's solve_ivp (LSODA, events), over ours",
     "masters_over_jacobi": "Other masters with the .ssp, CPU time over our Jacobi",
     "masters_error_over_jacobi": "The same, their error over that of our Jacobi",

@@ -35,7 +35,7 @@ def headline(figure: Picture, message: str) -> None:
 
 def footnote(figure: Picture, note: str) -> None:
     """Write below a figure how to read it."""
-    width = int(12.5 * figure.get_figwidth())
+    width = int(14.0 * figure.get_figwidth())
     lines = "\n".join(fill(line, width) for line in note.splitlines())
     figure.supxlabel(lines, x=0.01, ha="left", fontsize=9, color="0.35")
 
