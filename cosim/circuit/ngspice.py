@@ -191,8 +191,7 @@ class Engine(Shared.NgSpiceShared):
         """ngspice's own words of trouble, as the end of a message."""
         words = [" ".join(word.split()) for word in (*self._stderr, *self._stdout)]
         telling = [word for word in words if _TROUBLE.search(word) and not _NOISE.search(word)]
-        said = "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
-        return said
+        return "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
 
     @property
     def too_small(self) -> bool:

@@ -6,6 +6,7 @@ Nothing is evaluated: what depends on a value stays undecided.
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import NoReturn
 
 from cosim.circuit.lint.lines import COPY, Line, refuse, shown
@@ -235,12 +236,10 @@ def _check_brackets(line: Line) -> None:
     if line.text.count("'") % 2:
         refuse(line, "a quote is not closed, so the line may be cut short")
     for opening, shutting in ("{}", "()"):
-        depth = 0
-        for char in line.text:
-            depth += (char == opening) - (char == shutting)
-            if depth < 0:
-                refuse(line, f"{shutting} closes nothing")
-        if depth:
+        depths = [*accumulate((char == opening) - (char == shutting) for char in line.text)]
+        if min(depths) < 0:
+            refuse(line, f"{shutting} closes nothing")
+        if depths[-1]:
             refuse(line, f"{opening} is not closed, so the line may be cut short")
 
 

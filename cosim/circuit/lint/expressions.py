@@ -42,9 +42,6 @@ _PLAIN = re.compile(r"\s*\{?\s*[+-]?\s*[\w.]+(?:(?<=\de)[+-]?\d+)?\s*\}?\s*", re
 _POINT = re.compile(
     r"(?:[\s(+-]*(?:\{ *\}|[\d.]\w*(?:\.\w*)?(?:(?<=\de)[+-]\d+)?)|[\s(]*[a-z_]\w*)[\s)]*", re.I
 )
-_TOKEN = re.compile(
-    r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?[a-z]*|@[\w.#]+\[\w+\]|[a-z_][\w.$#]*|.", re.S
-)
 _ASSIGNMENT = re.compile(r"([a-z_]\w*)=([a-z_]\w*)\b(?!\s*\()", re.IGNORECASE)
 _DROPPABLE = re.compile(r"\.model ([^\s(]+)|\.func (\w+)")
 _CALLED = re.compile(r"(\w+)\s*\(")
@@ -58,8 +55,8 @@ _PIECE = re.compile(
 )
 _BROKEN = re.compile(r"(?:^|[bjp])(?:[ej]|$)|[oe][ob]")
 """Of the first letters of the pieces: an operand lacks, or an operator."""
+_NAME = re.compile(r"[a-z_][\w.$#]*")
 _KEY = re.compile(r"\s*=(?!=)")
-_CALL = re.compile(r"\s*\(")
 _BODY = re.compile(r"\b[vi]\s*=(?!=)", re.IGNORECASE)
 _NEXT_KEY = re.compile(r"\b[a-z_]\w*\s*(?<![<>=!])=(?!=)", re.IGNORECASE)
 _SOURCE = re.compile(r"\b(?:value|vol|cur)\s*=?\s*$", re.IGNORECASE)
@@ -304,21 +301,18 @@ def check_circles(top: Scope, names: Names) -> None:
 def used(expression: str) -> Iterator[tuple[str, list[str] | None]]:
     """The names in an expression, each with its arguments if it is called; nodes and sources are
     left out."""
-    text = expression.lower()
-    place = 0
-    while match := _TOKEN.match(text, place):
-        token, place = match[0], match.end()
-        if not (token[0].isalpha() or token[0] == "_"):
+    text, place = expression.lower(), 0
+    while piece := _PIECE.search(text, place):
+        name, place = piece[0].rstrip("( \t"), piece.end()
+        if not _NAME.fullmatch(name):
             continue
-        if _KEY.match(text, place):
-            continue
-        call = _CALL.match(text, place)
-        if call is None:
-            yield token, None
-        elif token in ("v", "i"):
-            place = closing(text, call.end() - 1)
-        else:
-            yield token, split_arguments(text[call.end() : closing(text, call.end() - 1) - 1])
+        end = closing(text, place - 1) if piece["begin"] else place
+        if name in ("v", "i") and piece["begin"]:
+            place = end
+        elif piece["begin"]:
+            yield name, split_arguments(text[place : end - 1])
+        elif not _KEY.match(text, place):
+            yield name, None
 
 
 def sensed(text: str, kind: str) -> Iterator[str]:
@@ -335,8 +329,7 @@ def body(line: Line) -> str:
 
 def _expressions(line: Line, element: Element | None) -> Iterator[tuple[str, bool]]:
     """The expressions of a line, and whether ngspice's parser of behavioural sources evaluates
-    each: outside B sources it does where the expression varies during a run.
-    """
+    each: outside B sources it does where the expression varies during a run."""
     text = line.text
     word = text.split()[0].lower()
     if word == ".param":
