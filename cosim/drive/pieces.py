@@ -95,8 +95,7 @@ class Command(ABC):
     def lines(self, begin: float, end: float, most: int) -> tuple[Array, Array, Array] | None:
         """The pieces from the corner ``begin`` until ``end`` (s) is reached, at most ``most`` of
         them: their corners, one more than pieces, and V1 (V) where each begins and ends. None where
-        :meth:`piece` must be asked for one after the other.
-        """
+        :meth:`piece` must be asked for one after the other."""
         return None
 
     def pieces(self, begin: float, end: float, most: int | None = None) -> list[Piece]:

@@ -61,8 +61,7 @@ def knob_frequency(pot_frequency: float) -> float:
 
 def knob_offset(pot_offset: float, amplitude: float) -> float:
     """Mean of V1, V, of the third knob, which sets the offset pin, where the ramp ends (V_DAC = 0);
-    ``amplitude`` is peak-to-peak, V.
-    """
+    ``amplitude`` is peak-to-peak, V."""
     return GAIN * volts(reading(pot_offset)) - amplitude / 2
 
 

@@ -142,8 +142,7 @@ class Worker:
     def call(self, argument: Any, progress: Progress, heed: Callable[[], None]) -> Any:
         """What the function gives, while ``progress`` is told the time that it has reached and
         ``heed`` may raise. Raises EOFError where the process has died; and what the function
-        raises: then, but for BadInput, and where it hangs, the process is not to be used again.
-        """
+        raises: then, but for BadInput, and where it hangs, the process is not to be used again."""
         self.given, self.began, self.usable = self.given + 1, False, False
         self._rest()
         self._send(argument)

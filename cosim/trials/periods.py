@@ -135,8 +135,7 @@ def whole_periods(time: Array, period: float) -> int:
 
 def drift(time: Array, heights: Array, period: float | None) -> float:
     """Mean velocity over whole periods (s): the mean over all spans of that length in the
-    recording; over the whole recording where it has no whole period. NaN are left out.
-    """
+    recording; over the whole recording where it has no whole period. NaN are left out."""
     known = np.isfinite(heights)
     time, heights = time[known], heights[known]
     periods = whole_periods(time, period) if period else 0
@@ -150,8 +149,7 @@ def drift(time: Array, heights: Array, period: float | None) -> float:
 
 def one_period_later(time: Array, values: Array, period: float, gained: float = 0.0) -> Array:
     """A signal's forecast of itself: what it was a period (s) ago, and what it gains in one; NaN
-    in the first period.
-    """
+    in the first period."""
     known = np.isfinite(values)
     ago = np.interp(time - period, time[known], values[known], left=np.nan)
     return ago + gained

@@ -237,8 +237,7 @@ def _comparable(
 
 def _covered(recording: Recording, length: float) -> Recording:
     """What a run of this length (s) covers, from the first row whose velocity is known: with that
-    begins a run whose surface is a recording's.
-    """
+    begins a run whose surface is a recording's."""
     v = recording.signals.get("v_surface")
     first = 0 if v is None else int(np.argmax(np.isfinite(v)))
     time = recording.time - recording.time[first]

@@ -1,6 +1,5 @@
 """The trials of a folder, each against the built-in scene with its number: how far the whole chain,
-from the command to the part, can be trusted.
-"""
+from the command to the part, can be trusted."""
 
 from collections.abc import Sequence
 from functools import partial

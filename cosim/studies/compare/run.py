@@ -38,8 +38,7 @@ class Comparison:
     @property
     def numbers(self) -> dict[str, float | None]:
         """All numbers by name; SI but for ``_mm`` and ``_percent``. A score stands by its own name,
-        and with ``_ceiling``, ``_no_motion`` and ``_straight_line`` for what needs no model.
-        """
+        and with ``_ceiling``, ``_no_motion`` and ``_straight_line`` for what needs no model."""
         return {number.name: number.value for number in self.found.numbers}
 
     def plot(self) -> Picture:

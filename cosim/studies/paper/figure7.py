@@ -69,8 +69,7 @@ class Trial:
 
 def paper(trials: Path, *, progress: Progress = silent) -> Report:
     """The published trials of a folder, simulated in three ways. Raises BadInput where they are not
-    the published ones.
-    """
+    the published ones."""
     theirs = fit(trials, evaluate="published", solver="published").shown
     exact = fit(trials, evaluate="published", solver="exact").shown
     together = zip(theirs, exact, each(trials, progress=progress), strict=True)

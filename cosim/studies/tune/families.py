@@ -15,8 +15,7 @@ TABLES = ("steps", "pieces")
 
 def family(name: str) -> tuple[dict[str, Any], Ranges]:
     """Values of keys that give a scene the waveform ``name``, and the ranges of its shape's
-    numbers: of "steps:N" and "pieces:N" N levels at even phases, of "square" its duty. BadInput.
-    """
+    numbers: of "steps:N" and "pieces:N" N levels at even phases, of "square" its duty. BadInput."""
     shape, _, count = name.partition(":")
     sharp = {"drive.waveform": shape, "drive.reset_time": 0.0, "drive.duty": 0.5}
     few = count.isdecimal() and len(count) < 4

@@ -60,8 +60,7 @@ def write(run: Run, file: BytesIO) -> str:
 
 def laid_over(scene: Scene) -> tuple[float, float | None]:
     """The first time of a run that may be laid over a trial's first frame, s, and its period, s;
-    None where nothing drives it, or a trial's own surface does: then there is nothing to shift.
-    """
+    None where nothing drives it, or a trial's own surface does: then there is nothing to shift."""
     if scene.drive.file is not None:
         return 0.0, None
     length = scene.period
