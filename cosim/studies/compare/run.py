@@ -124,7 +124,7 @@ def compare(
     """
     if not isinstance(run, Result | Scene) and Path(run).suffix.lower() == ".csv":
         raise BadInput(
-            f"{plain(str(run))}: a table is no run; the run's folder or the scene comes first, the "
+            f"{plain(run)}: a table is no run; the run's folder or the scene comes first, the "
             "trial second."
         )
     measured = read_recording(Path(trial), columns)

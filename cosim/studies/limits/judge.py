@@ -133,9 +133,8 @@ def confirmed(
     asked = {key: point for key, point in points.items() if machines[key[0]].rung == SEARCHES}
     run = bench.evaluator.outcomes
     every: list[Settings] = []
-    for point, outcome in zip(
-        asked.values(), run([point.settings for point in asked.values()]), strict=True
-    ):
+    outcomes = run([point.settings for point in asked.values()])
+    for point, outcome in zip(asked.values(), outcomes, strict=True):
         current = max(outcome.numbers["current_max"], -outcome.numbers["current_min"])
         limit = point.settings.get("circuit.current_limit", own)
         rung = fidelity.judge(current * bench.scene.coil.count, limit)

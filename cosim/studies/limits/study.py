@@ -221,7 +221,7 @@ def ensemble(path: Path, scene: Scene) -> list[Settings]:
 
     Raises BadInput.
     """
-    name = plain(str(path))
+    name = plain(path)
     content = read(path, MOST_BYTES)
     try:
         text = content.decode("utf-8-sig")

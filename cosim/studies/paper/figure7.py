@@ -87,7 +87,7 @@ def report(found: list[Trial]) -> Report:
     return Report("figure7", "The paper's figure 7", rows, [said], {"Trials": rows}, figures)
 
 
-def _draw(found: list[Trial], rows: list[Row], path: Path) -> None:
+def _draw(found: list[Trial], rows: list[Row]) -> Picture:
     figure = Picture(13.0, 5.6, "constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
     _paths(left, next(trial for trial in found if trial.number == TRIAL))
@@ -105,7 +105,7 @@ def _draw(found: list[Trial], rows: list[Row], path: Path) -> None:
         f"Given its drive, the whole machine is {machine:.2f} mm from the measured part, on "
         f"average over the trials; the paper's model, given the surface, {theirs:.2f} mm",
     )
-    figure.write(path)
+    return figure
 
 
 def _paths(axis: Axes, trial: Trial) -> None:

@@ -71,9 +71,8 @@ def told_of_trials(trials: Sequence[Measured], best: Found) -> tuple[list[Row], 
     """A row for each trial that was fitted; and its mean velocity of the part by the search's steps
     and on the bench's rungs, mm/s."""
     rows, checks = [], []
-    for trial, own, cost, row in zip(
-        trials, best.own, best.costs.tolist(), errors_on(best, trials), strict=True
-    ):
+    every = zip(trials, best.own, best.costs.tolist(), errors_on(best, trials), strict=True)
+    for trial, own, cost, row in every:
         ends = at_bounds(trial.fine.low, trial.fine.high, trial.fine.scale, own)
         row |= repeatability(trial) | {"cost": cost, "at_bounds": ", ".join(ends)}
         rows.append(row | own_parameters(own))
