@@ -38,10 +38,8 @@ class _Layer:
 
 def list_scenes() -> list[tuple[str, str]]:
     """Name and description of every built-in scene, the paper's first."""
-    texts = {path.stem: path.read_text(encoding="utf-8") for path in _LIBRARY.glob("*.toml")}
-    found = [
-        (name, str(tomllib.loads(text).get("description", ""))) for name, text in texts.items()
-    ]
+    files = {path.stem: tomllib.loads(path.read_text("utf-8")) for path in _LIBRARY.glob("*.toml")}
+    found = [(name, str(data.get("description", ""))) for name, data in files.items()]
     return sorted(found, key=lambda scene: (not scene[0].startswith("paper"), scene[0]))
 
 

@@ -41,4 +41,4 @@ def read(path: Path) -> dict[str, Any]:
     try:
         return parse(reader.read(path, LARGEST).decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
-        raise BadInput(f"{plain(str(path))}: is no valid TOML: {error}.") from error
+        raise BadInput(f"{plain(path)}: is no valid TOML: {error}.") from error

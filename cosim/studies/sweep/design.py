@@ -147,9 +147,8 @@ def _axis(name: str, values: Sequence[Number]) -> Axis:
         raise BadInput(f"--over {name}: has no value.")
     kind = int if key.kind is int else float
     for value in values:
-        assert key.low is not None and key.high is not None
         try:
-            inside = isfinite(value) and key.low <= value <= key.high and kind(value) == value
+            inside = isfinite(value) and key.holds(value) and kind(value) == value
         except (TypeError, ValueError, OverflowError):  # no number, or one too large for a float
             raise BadInput(f"--over {name}: {shown(value)} must be {key.allowed}.") from None
         if not inside:

@@ -41,12 +41,12 @@ def most_heat(scene: Scene, limit: float | str | None) -> float:
         watts, *cycle = (float(part) for part in str(limit).split(":"))
         found = heat_limit(scene.coil, watts, *cycle) if cycle else watts
     except BadInput as error:
-        raise BadInput(f"--heat {plain(str(limit))}: {error}") from None
+        raise BadInput(f"--heat {plain(limit)}: {error}") from None
     except (ValueError, TypeError):
         found = float("nan")
     if not found > 0.0:
         raise BadInput(
-            f"--heat {plain(str(limit))}: must be a number above 0 W, or RISE:DUTY or "
+            f"--heat {plain(limit)}: must be a number above 0 W, or RISE:DUTY or "
             f"RISE:DUTY:SECONDS with a rise in K (without a time: {LIFT:g} s)."
         )
     return found

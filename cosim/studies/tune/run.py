@@ -174,8 +174,7 @@ def tune(
 def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
     for name, (low, high) in over.items():
         key = numeric_key(name)
-        assert key.low is not None and key.high is not None
-        if not (isfinite(low) and isfinite(high) and key.low <= low < high <= key.high):
+        if not (key.holds(low) and key.holds(high) and low < high):
             words = f"must be LOW:HIGH, LOW below HIGH, each {key.allowed}"
             raise BadInput(f"--over {name}={low:g}:{high:g}: {words}.")
     return dict(over)
