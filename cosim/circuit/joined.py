@@ -85,7 +85,7 @@ def deck(
     """
     lines, dropped = read_all(path)
     asks = measures(dropped)
-    name = plain(str(path))
+    name = plain(path)
     found = {element.name: element for element in parse(lines).elements}
     for source in sources:
         if source.lower() not in found or source[0].lower() not in "vi":
@@ -178,7 +178,7 @@ def check_reading(
 ) -> tuple[Scope, list[str]]:
     """The top level of a netlist with what reads the ``words`` and what the measurements need, as
     :func:`check` gives it; and all these words, each once."""
-    name = plain(str(path))
+    name = plain(path)
     for each in words:
         if not each.strip():
             what = f'{called} = "{plain(each)}" must be a vector or an expression of the netlist'

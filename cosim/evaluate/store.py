@@ -121,7 +121,7 @@ class Store:
                 if size > 1:
                     size //= 2  # there may be room for some of them
                     continue
-                self._tell(f"{plain(str(self._path))}: cannot be written ({error})", error)
+                self._tell(f"{plain(self._path)}: cannot be written ({error})", error)
                 break
             for key in batch:
                 del self._owed[key]
@@ -169,13 +169,13 @@ class Store:
             raise sqlite3.DatabaseError("its tables are others")
         elif self._base.execute("SELECT value FROM found WHERE key = ''").fetchone() != (work,):
             raise BadInput(
-                f"{plain(str(self._path))}: this belongs to other work (its scene, keys, values or "
+                f"{plain(self._path)}: this belongs to other work (its scene, keys, values or "
                 "version of cosim differ); remove it, or choose another --out."
             )
 
     def _told(self, act: Callable[..., T], *given: Any) -> T:
         """What ``act`` gives. Raises BadInput where the file or the disk is no good."""
-        name = plain(str(self._path))
+        name = plain(self._path)
         try:
             return act(*given)
         except sqlite3.OperationalError as error:
@@ -210,11 +210,11 @@ def _locked(path: Path) -> int:
     flags = os.O_RDWR | os.O_CREAT
     for more in ("O_NOFOLLOW", "O_CLOEXEC", "O_NONBLOCK", "O_BINARY"):
         flags |= getattr(os, more, 0)
-    name = plain(str(path))
+    name = plain(path)
     for each in _files(path):
         if each.is_symlink() or (each.exists() and not each.is_file()):
             what = "it is a link" if each.is_symlink() else "this is not a regular file"
-            raise BadInput(f"{plain(str(each))}: cannot be written ({what}).")
+            raise BadInput(f"{plain(each)}: cannot be written ({what}).")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(path, flags, 0o666)

@@ -48,7 +48,7 @@ class Cells:
     @property
     def name(self) -> str:
         """The file, as messages name it."""
-        return plain(str(self.path))
+        return plain(self.path)
 
     def even(self, heads: int) -> None:
         """Check that the rows are as wide as the widest of the first ``heads`` ones, which are the
@@ -115,7 +115,7 @@ class Cells:
 def read_cells(path: Path) -> Cells:
     """The cells of a text file. Raises BadInput, with the row, for what is no table."""
     text = _decoded(reader.read(path, LARGEST))
-    name = plain(str(path))
+    name = plain(path)
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if odd := _CONTROL.search(text):
         row = len(re.split("\r\n|\r|\n", text[: odd.start()]))

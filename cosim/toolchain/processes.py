@@ -278,10 +278,8 @@ def in_a_worker() -> bool:
 
 def _error(name: str, text: str) -> Exception:
     """An error of a bounded process: one of ours or of Python's, by its name."""
-    known = vars(builtins) | {
-        one.__name__: one for one in (BadInput, SimulationFailed, StepTooSmall)
-    }
-    kind: Any = known.get(name)
+    ours = (BadInput, SimulationFailed, StepTooSmall)
+    kind: Any = (vars(builtins) | {one.__name__: one for one in ours}).get(name)
     with suppress(TypeError):  # one that takes more than a text
         if issubclass(kind, Exception):
             return kind(_printable(text))

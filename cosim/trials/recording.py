@@ -83,7 +83,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
         notes += (f"No time column: read at {FRAME_RATE:g} frames/s, as the published trials are.",)
     signals = {k: table.columns[k] for k in WORDS if k in table.columns and k != "time"}
     if not signals:
-        raise BadInput(f"{plain(str(path))}: no column to compare. Understood are: {UNDERSTOOD}.")
+        raise BadInput(f"{plain(path)}: no column to compare. Understood are: {UNDERSTOOD}.")
     for body in ("surface", "part"):
         if f"z_{body}" in signals:
             central = velocities(time, signals[f"z_{body}"])
@@ -93,7 +93,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
                 signals[f"v_{body}"] = there
     for name, values in signals.items():
         if np.isfinite(values).sum() < 2:
-            where = f"{plain(str(path))}: column {plain(table.headers[name], 40)}"
+            where = f"{plain(path)}: column {plain(table.headers[name], 40)}"
             raise BadInput(f"{where}: it has fewer than two values.")
     across = table.columns.get("v_across_surface", np.full(count, np.nan))
     columns = {

@@ -164,7 +164,7 @@ class _Reader:
 
     def _top(self) -> str:
         """The text of the netlist itself."""
-        name = plain(str(self.path))
+        name = plain(self.path)
         try:
             self.path = self.path.absolute()
             text = self._opened(self.path)

@@ -101,7 +101,7 @@ def _sweep(
 ) -> xr.Dataset:
     family = folder / "points"
     if family.is_symlink() or (family.exists() and not family.is_dir()):
-        raise BadInput(f"{plain(str(family))}: this is no directory of the sweep's own; remove it.")
+        raise BadInput(f"{plain(family)}: this is no directory of the sweep's own; remove it.")
     made_by, units = {**versions(), "fmu": fmu.token()}, dataset.units_of(scene)
     total, numbers = len(design), dataset.Numbers(len(design))
     asked = [(axis.key.full, axis.values) for axis in design.axes], design.sample

@@ -39,7 +39,7 @@ def write(run: Run, file: BytesIO) -> str:
     if not FEWEST_ROWS <= n <= MOST_FRAMES:
         shortest, longest = ((rows - 1) / FRAME_RATE for rows in (FEWEST_ROWS, MOST_FRAMES))
         raise BadInput(
-            f"{plain(str(run.folder))}: tracker needs {FEWEST_ROWS} to {MOST_FRAMES} frames, and "
+            f"{plain(run.folder)}: tracker needs {FEWEST_ROWS} to {MOST_FRAMES} frames, and "
             f"the camera sees {n} of this run; run.duration must be {shortest:.4g} s to "
             f"{longest:.4g} s more than {start:g} s."
         )
