@@ -21,8 +21,7 @@ from cosim.scene.tables import Coil
 
 DRIVE_RANGE_HEAT = 5.0**2 / 7.1
 """W: the most that any drive within the Carlton's range makes of its 7.1 Ohm: a square wave of
-10 V peak-to-peak without offset. It is no rating; the authors saw the housing melt (README of their
-repository)."""
+10 V peak-to-peak, no offset. It is no rating; the authors saw the housing melt (their README)."""
 
 RATED_CURRENT = 0.125
 """A rms: what the data sheet of the Carlton names."""

@@ -102,8 +102,7 @@ def engine(callbacks: Callbacks) -> "Engine":
 
 
 class Engine(Shared.NgSpiceShared):
-    """One ngspice library. PySpice's own callbacks turn every value into Python objects; compiled
-    ones take their place."""
+    """One ngspice library, with compiled callbacks: PySpice's make an object of every value."""
 
     sent: tuple[str, ...] = ()
     """The names of all vectors of the run, as they are sent."""

@@ -83,8 +83,7 @@ def straight(piece: Piece, begin: float) -> tuple[float, float, float]:
 
 
 def _times(rate: float, begin: float, stop: float) -> Array:
-    """Where straights, ``rate`` in a second, meet from ``begin`` to ``stop``, s: equally far apart
-    but for the last ones."""
+    """Where straights, ``rate`` a second, meet from ``begin`` to ``stop``, s; the last differs."""
     step = 1.0 / rate
     count = max(1, ceil((stop - begin) / step - 1e-6))
     return np.append(begin + step * np.arange(count), stop)

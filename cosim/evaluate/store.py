@@ -2,8 +2,7 @@
 
 The file is SQLite's, in its write-ahead mode: whatever moment a kill strikes, what was written
 stays, and others may read the file while it grows. It is written every PAUSE, since a transaction
-costs as much as a short run: a kill loses at most what was added within that time. One process at a
-time may write.
+costs as much as a short run: a kill loses at most what came within it. One process may write.
 """
 
 import hashlib
@@ -100,8 +99,7 @@ class Store:
     def add(self, key: str, found: Any) -> None:
         """Keep what was found; it is written with what was found up to PAUSE before or after it.
 
-        What the disk does not take is tried again with the next one; a note tells it. Raises
-        BadInput where that is too much.
+        What the disk does not take is noted and tried again; BadInput where that is too much.
         """
         self._owed[key] = json.dumps(found)
         if monotonic() - self._written >= PAUSE:
@@ -237,8 +235,7 @@ def reported(
     make: Callable[[Store], Made], out: str | os.PathLike[str] | None, store: str, *asked: Any
 ) -> Made:
     """What ``make`` reports, which follows from ``asked``; a folder ``out`` gets what its ``save``
-    writes. The file ``store`` there keeps what is found meanwhile: an interrupted study goes on
-    from it. Raises BadInput."""
+    writes. The file ``store`` there has what is found meanwhile, to go on from. Raises BadInput."""
     with Store(None if out is None else Path(out) / store, *asked) as kept:
         made = make(kept)
         if out is not None:

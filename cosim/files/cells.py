@@ -175,9 +175,8 @@ def _width(row: list[str]) -> int:
 def read_timetable(path: Path, time: tuple[str, ...], value: tuple[str, ...]) -> Array | None:
     """The two columns as rows of (time, value); None where the header does not have them.
 
-    ``time`` and ``value`` are the names that each column may have; other columns do not matter. Two
-    rows or more, finite, and the time does not fall: at a time given twice the value jumps. Raises
-    BadInput.
+    ``time`` and ``value`` are names that each column may have; others do not matter. Two rows or
+    more, finite; the time does not fall: where it is given twice the value jumps. Raises BadInput.
     """
     cells = read_cells(path)
     columns = [_place(cells, names) for names in (time, value)]

@@ -89,8 +89,7 @@ def sampled(share: Callable[[float], float], maximum: int, frequency: float) -> 
 
 
 def period(frequency: float, loop_time: float | None) -> float:
-    """Of the staircase for a commanded ``frequency`` in Hz, s; with ``loop_time``, s, that of the
-    passes."""
+    """Of the staircase for a commanded ``frequency`` (Hz), or of passes of ``loop_time`` (s), s."""
     steps = ceil(1 / _share(frequency))
     if not loop_time:
         return steps / STEPS_PER_SECOND

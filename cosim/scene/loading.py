@@ -278,8 +278,7 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
 
 
 def _find_files(tables: dict[str, Any], folder: Path, *more: Path) -> None:
-    """Make the paths of files absolute; they are relative to ``folder``, or to the first of these
-    where the file is."""
+    """Make paths of files absolute: in the first folder that has the file, or else the first."""
 
     def found(file: str) -> str:
         there = (place / file for place in (folder, *more))

@@ -44,8 +44,7 @@ def instants(frames: Array, exposure: float) -> Array:
 
 
 def shown(heights: Array, exposure: float) -> Array:
-    """What frames show of the heights (or rows of them) at their instants: the mean of each
-    exposure (s)."""
+    """What frames show of heights (or rows of them) at their instants: means of exposures (s)."""
     n = instants_a_frame(exposure)
     return heights.reshape(-1, n, *heights.shape[1:]).mean(axis=1) if n > 1 else heights
 

@@ -12,8 +12,7 @@ ALIKE = 0.5
 """Correlation of a signal with itself a period later, below which it has no period."""
 
 NEARLY = 0.9
-"""Of the best correlation: the first lag that reaches this is the period, later ones its
-multiples."""
+"""Of the best correlation: the first lag that reaches this is the period, later ones multiples."""
 
 FINEST = 1 << 18
 """Points of the even grid on which the signal is correlated, at most."""

@@ -20,8 +20,7 @@ GAP = 1.5
 
 @dataclass(frozen=True)
 class Recording:
-    """``signals`` over ``time`` (s, from the first row on) by the names of the waveforms, SI; NaN
-    where nothing is known.
+    """``signals`` over ``time`` (s, from the first row on) by waveforms' names, SI; NaN if unknown.
 
     Where there are heights there are velocities too: Tracker's, or differences as it makes them.
     """

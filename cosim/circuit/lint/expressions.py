@@ -31,8 +31,7 @@ BEHAVIOURAL = _COMMON | dict.fromkeys(word_set("ddt eq0 ge0 gt0 le0 lt0 ne0 u u2
 """Those of its behavioural sources, except ``pwl``, which takes any number of points. ngspice
 replaces the random ones by a number as it reads the netlist."""
 MOST_CALLS, DEEPEST = 10_000, 100
-"""Calls of functions within functions, all told and one in another: ngspice 39 writes each out, so
-many in some 0.15 s."""
+"""Calls within functions, all told and one in another: ngspice 39 writes so many out in 0.15 s."""
 CONSTANTS = word_set("time temper hertz")
 BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
 
@@ -225,8 +224,7 @@ def _check_own(
     behavioural: bool | None,
     depth: int = 0,
 ) -> None:
-    """Check a call of the netlist's own function, whose body ngspice puts in its place, and once
-    what the body calls."""
+    """Check a call of the netlist's own function, once also the calls in its body."""
     function = names.only(name)
     if function is None:  # which one is meant is not known
         return
@@ -299,8 +297,7 @@ def check_circles(top: Scope, names: Names) -> None:
 
 
 def used(expression: str) -> Iterator[tuple[str, list[str] | None]]:
-    """The names in an expression, each with its arguments if it is called; nodes and sources are
-    left out."""
+    """The names in an expression but for nodes and sources, with their arguments if called."""
     text, place = expression.lower(), 0
     while piece := _PIECE.search(text, place):
         name, place = piece[0].rstrip("( \t"), piece.end()

@@ -1,7 +1,6 @@
 """Circuits that have no operating point: floating nodes and loops of ideal voltages.
 
-Subcircuits are expanded. An element whose effect is uncertain counts as one that makes the circuit
-solvable.
+Subcircuits are expanded. An element of uncertain effect counts as one that makes it solvable.
 """
 
 import re

@@ -51,8 +51,7 @@ APART = 0.05
 class Found:
     """A run laid over a recording, from ``start`` (s) of the run on.
 
-    ``recording`` is the stretch that was compared, ``simulated`` has its signals. ``numbers`` begin
-    with the scores.
+    ``recording`` is what was compared, ``simulated`` has its signals; scores lead ``numbers``.
     """
 
     recording: Recording

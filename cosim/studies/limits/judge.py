@@ -96,8 +96,7 @@ _Asked = list[tuple[Key, Array]]
 
 
 def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked) -> _Asked:
-    """Those that are settled and feasible; of a machine's best settings for a goal only the very
-    best one."""
+    """Those that are settled and feasible; of the best settings for a goal the very best alone."""
     times = (SETTLE, SPAN), (SETTLE + SPAN / 2.0, SPAN / 2.0)
     runs = [[machines[key[0]].at(point, *each) for each in times] for key, point in asked]
     found: _Asked = []

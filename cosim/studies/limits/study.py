@@ -79,8 +79,7 @@ class Study:
 
     @property
     def slips(self) -> list[Mapping[str, tuple[float, float]]]:
-        """Accelerations of the surface, m/s², beyond which a part slips on its way up or down, on
-        each rig."""
+        """Accelerations, m/s², of the surface on each rig beyond which a part slips, up or down."""
         return [budget(Bench.base(self.scene, rig.settings, "a rig")) for rig in self.rigs]
 
 
@@ -179,8 +178,7 @@ class _Work:
 
     def points(self, candidates: dict[str, Candidates], turn: int, own: bool) -> dict[Key, Point]:
         """The judged points of machines, searched for the first time or again (``turn``); where
-        they are the scene's ``own`` rig's also by the amplifier, and with those of the changes that
-        are not searched."""
+        of the scene's ``own`` rig also by the amplifier, with the changes that are not searched."""
         found = self.store.once(f"judged {self.rig} {turn}", partial(self._judge, candidates, own))
         self.told(f"rig {self.rig}: judged")
         return {(change, goal, kind): Point(**of) for (change, goal, kind), of in found}

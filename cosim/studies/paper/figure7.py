@@ -48,8 +48,7 @@ class Trial:
 
     def row(self) -> Row:
         """Mean velocities of the part over whole periods, mm/s, and mean errors of its height, mm.
-        The machine's height is off by a constant, too, since it does not begin on the part's own.
-        """
+        The machine's height is off by a constant, too, as it does not begin on the part's own."""
         numbers = self.machine.numbers
         frequency = numbers["frequency_measured"]
         period = 1.0 / frequency if frequency else None

@@ -1,8 +1,7 @@
 """A tracked trial made of a run: the header, units, sampling and digits of the published trials.
 
-The camera is that of `cosim compare`, with the shutter of the run's scene and without noise. What
-the model holds at rest is written as resting: platform and part across, and the spring-loaded
-plate.
+The camera is that of `cosim compare`, with the shutter of the run's scene, without noise. What the
+model holds at rest is written as resting: platform and part across, and the spring-loaded plate.
 """
 
 from functools import partial

@@ -106,8 +106,7 @@ def _priors(found: Solved) -> list[str]:
 
 
 def findings(numbers: dict[str, Any]) -> list[str]:
-    """Of ``identify.json``: what the ranges are worth, where the ram rests, which drives are at a
-    bound; a paragraph each."""
+    """Paragraphs: what the ranges are worth, where the ram rests, which drives are at a bound."""
     laws, agreed = numbers["laws"], numbers["converged"]
     shares = [f"{one['law']} {max(one['costs']) / min(one['costs']) - 1.0:.1%}" for one in laws]
     if agreed:

@@ -22,8 +22,7 @@ PLACES = np.linspace(-2e-3, 2e-3, 9)
 """Of the ram in the actuator (q, m), at which the suspension's force is told."""
 
 KINDS = ("surface", "surface_and_part")
-"""By what the own parameters of a trial that was held out are fitted: its surface alone; surface
-and part."""
+"""By what a held-out trial's own parameters are fitted: its surface alone; surface and part."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
