@@ -307,17 +307,11 @@ class Circuit(Table):
     open_loop_gain: float = _number(98.0, "dB", 20.0, 200.0, "Open-loop gain of the amplifier")
     slew_rate: float = _number(10e6, "V/s", 1e2, 1e12, "Slew rate of the power amplifier")
     swing_loss_high: float = _number(
-        4.0,
-        "V",
-        0.0,
-        1e3,
+        *(4.0, "V", 0.0, 1e3),
         "Supply less highest output; the data sheet's, which full takes, is 2.6 V at 1.3 A",
     )
     swing_loss_low: float = _number(
-        4.0,
-        "V",
-        0.0,
-        1e3,
+        *(4.0, "V", 0.0, 1e3),
         "Lowest output less negative supply; the data sheet's, which full takes, is 1.7 V at 1.3 A",
     )
     output_resistance: float = _number(
@@ -515,19 +509,13 @@ class Run(Table):
 
     duration: float = _number(2.0, "s", 1e-6, 1e5, "Simulated time")
     settle: float = _number(
-        0.8,
-        "s",
-        0.0,
-        1e5,
+        *(0.8, "s", 0.0, 1e5),
         "Start of the averages; by default a multiple of 24, 12, 6 or 2 periods of the drive "
         "before the end, about half of the duration",
     )
     output_step: float = _number(5e-5, "s", 1e-9, 1e3, "Time between rows of the waveforms")
     shutter: float = _number(
-        0.0,
-        "1",
-        0.0,
-        1.0,
+        *(0.0, "1", 0.0, 1.0),
         "Exposure of the camera that reads the run, as a share of the time between its frames",
     )
     average: Literal["ends", "slope"] = _choice(
@@ -536,10 +524,7 @@ class Run(Table):
         "part's heights in the frames of a camera, at settle + k/960 s, as a trial's record has it",
     )
     tolerance: float = _number(
-        0.01,
-        "1",
-        1e-6,
-        1.0,
+        *(0.01, "1", 1e-6, 1.0),
         "Relative error of v_average that a simpler circuit may make: auto, ladder",
     )
     solver: Literal["fmu", "fast"] = _choice(

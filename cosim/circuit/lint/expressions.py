@@ -367,10 +367,8 @@ def _varies(expression: str) -> bool:
 
 def _functions(line: Line) -> Iterator[_Function]:
     lower = line.text.lower()
-    if lower.startswith(".func"):
-        match = _FUNC.match(lower)
-        if match:
-            yield _Function(match[1], _formals(match[2]), match[3].strip().strip("{}'"), line)
+    if match := _FUNC.match(lower):
+        yield _Function(match[1], _formals(match[2]), match[3].strip().strip("{}'"), line)
     elif lower.startswith(".param"):
         for (name, formal), expression in definitions(lower):
             if formal is not None:
