@@ -16,14 +16,10 @@ Progress = Callable[[int, int, str], object]
 """Is told how many steps of a study are done, of how many, and which one was the last."""
 
 
-def counted(progress: Progress, total: int) -> Callable[..., None]:
+def counted(progress: Progress, total: int) -> Callable[..., object]:
     """What is to be called, with a name or without, as each of ``total`` steps is done."""
     steps = count(1)
-
-    def tick(what: str = "") -> None:
-        progress(next(steps), total, what)
-
-    return tick
+    return lambda what="": progress(next(steps), total, what)
 
 
 def silent(done: int, total: int, what: str = "") -> None:

@@ -35,10 +35,8 @@ class Efforts:
 
     def times(self, factor: float) -> "Efforts":
         """So many times as much."""
-        own, others = (
-            tuple(one.times(factor) for one in every) for every in (self.own, self.others)
-        )
-        return Efforts(own, others, self.again)
+        own = tuple(one.times(factor) for one in self.own)
+        return Efforts(own, tuple(one.times(factor) for one in self.others), self.again)
 
 
 _NONE = Effort(0, 0, 0)
