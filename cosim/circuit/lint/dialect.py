@@ -77,7 +77,7 @@ _TEMP = re.compile(r"\.(?:temp\b[\s=]*|opt\w*\s(?:.*[\s,])?temp\s*=\s*)(\{[^{}]*
 _WARMTH = re.compile(r"(?<![\w.])temp(?!\w|\s*[=(])")
 _SYNONYMS = {".params": ".param", ".define": ".param", "cap": "c", "ind": "l"}
 _COMPOUND = re.compile(r"\{([^{}]*[^\w.{}\s][^{}]*)\}")
-"""In B sources ngspice pastes what is in braces without them: ``{a+b}*2``."""
+"""In B sources ngspice pastes what is in braces without them: ``{a+b}*2``, not ``{(a+b)}*2``."""
 _EQUAL = re.compile(
     r"(?<![\w.)}\]])((?!time)[a-z_]\w*|\{\w+\})\s*([=!<]=|<>|>(?!=))\s*(\d+\.?\d*)(?![\w.*/^+-])",
     re.I,
@@ -132,7 +132,7 @@ def in_ngspice(line: Line) -> list[Line]:
     if kind in "beg":
         text = _EQUAL.sub(_compared, text)
         text = re.sub(r"'([^']*)'", r"{\1}", text)
-        if any(map(_is_bare, _COMPOUND.findall(text))):
+        if any(each[0] != "(" or closing(each, 0) < len(each) for each in _COMPOUND.findall(text)):
             text = text.replace("{", "{(").replace("}", ")}")
     if kind in "rclvibefgh":
         *parts, own = _with_parts(text, kind)
@@ -322,11 +322,6 @@ def _without_tables(text: str) -> str:
         if call is not None and len(text) + len(call) < MAX_LINE:
             text = text[: match.start()] + call + text[end:]
     return text
-
-
-def _is_bare(inside: str) -> bool:
-    """Not in parentheses yet."""
-    return inside[0] != "(" or closing(inside, 0) < len(inside)
 
 
 def _compared(match: re.Match[str]) -> str:

@@ -139,7 +139,7 @@ class _Parser:
             ".param": self._param,
             ".func": self._func,
             ".model": self._model,
-            ".global": self._global,
+            ".global": lambda line, found: self.top.globals.update(found[1:]),
         }
         element, holder = None, self.scope
         if not line.text.startswith("."):
@@ -202,9 +202,6 @@ class _Parser:
             refuse(line, f"{shown(line.text)} is no complete .model line")
         self.scope.models.setdefault(found[1], set()).add(found[2])
         self.scope.model_lines[found[1]] = line
-
-    def _global(self, line: Line, found: list[str]) -> None:
-        self.top.globals.update(found[1:])
 
     def _place_nodes(self) -> None:
         calls: list[tuple[Element, set[str], Scope]] = []
