@@ -62,7 +62,7 @@ def cluster(common: Any, address: str) -> Iterator[Pool]:
         if not count:
             raise BadInput(f"--dask {address}: this cluster has no workers.")
         # What a task gave is made again where the workers that had it die, scattered data is not.
-        there = client.submit(_same, common, pure=False)
+        there = client.submit(lambda same: same, common, pure=False)
         yield Pool(
             lambda call, *given: client.submit(call, there, *given, pure=False), AHEAD_FAR * count
         )
@@ -89,10 +89,6 @@ def each(
         except Exception as error:
             found = error
         yield item, found
-
-
-def _same(common: Any) -> Any:
-    return common
 
 
 def _client(address: str) -> Any:
