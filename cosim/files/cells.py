@@ -179,16 +179,14 @@ def read_timetable(path: Path, time: tuple[str, ...], value: tuple[str, ...]) ->
     more, finite; the time does not fall: where it is given twice the value jumps. Raises BadInput.
     """
     cells = read_cells(path)
-    columns = [_place(cells, names) for names in (time, value)]
-    if None in columns:
+    columns = [k for names in (time, value) if (k := _place(cells, names)) is not None]
+    if len(columns) < 2:
         return None
     cells.even(1)
     if len(cells.rows) < 3:
         raise BadInput(f"{cells.name}: at least two rows of {time[-1]} and {value[-1]} are needed.")
     header = cells.rows[0][1]
-    result = np.column_stack(
-        [cells.numbers(1, place, header[place]) for place in columns if place is not None]
-    )
+    result = np.column_stack([cells.numbers(1, k, header[k]) for k in columns])
     late = np.flatnonzero(np.diff(result[:, 0]) < 0)
     if len(late):
         row = cells.rows[late[0] + 2][0]

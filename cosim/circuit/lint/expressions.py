@@ -186,10 +186,7 @@ def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str |
     count = len(arguments)
     if name in ("pwl", "table") and behavioural:
         if count >= 5 and count % 2:
-            literal = (
-                _POINT.fullmatch(unbraced(each)) and not _varies(each) for each in arguments[1:]
-            )
-            if not all(literal):
+            if not all(_POINT.fullmatch(unbraced(x)) and not _varies(x) for x in arguments[1:]):
                 return f"the points of {name}() must be plain numbers, or expressions in braces"
             points = [number(argument.strip()) for argument in arguments[1::2]]
             for one, other in pairwise(points):

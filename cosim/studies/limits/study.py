@@ -175,8 +175,8 @@ class _Work:
         return {kind: [[[*one, *more] for one in some[:1]] for some in of[kind]] for kind in KINDS}
 
     def points(self, candidates: dict[str, Candidates], turn: int, own: bool) -> dict[Key, Point]:
-        """The judged points of machines, searched for the first time or again (``turn``); where
-        of the scene's ``own`` rig also by the amplifier, with the changes that are not searched."""
+        """The judged points of machines, searched for the first time or again (``turn``); those of
+        the scene's ``own`` rig also by the amplifier, with the changes that are not searched."""
         found = self.store.once(f"judged {self.rig} {turn}", partial(self._judge, candidates, own))
         self.told(f"rig {self.rig}: judged")
         return {(change, goal, kind): Point(**of) for (change, goal, kind), of in found}

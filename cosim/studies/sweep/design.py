@@ -51,11 +51,8 @@ class Design:
         if self.sample is not None:
             row = self.sample[index]
         else:
-            backwards = []
-            for axis in reversed(self.axes):
-                index, place = divmod(index, len(axis.values))
-                backwards.append(axis.values[place])
-            row = tuple(reversed(backwards))
+            places = np.unravel_index(index, self.shape)
+            row = tuple(axis.values[k] for axis, k in zip(self.axes, places, strict=True))
         return {axis.key.full: value for axis, value in zip(self.axes, row, strict=True)}
 
     def alike(self, points: Iterable[int]) -> list[int]:
