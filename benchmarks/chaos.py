@@ -10,12 +10,12 @@ ensemble's own spread leaves open.
 from collections.abc import Mapping, Sequence
 from functools import partial
 from math import hypot, sqrt
-from pathlib import Path
 from statistics import mean, stdev
 from typing import Any
 
 import numpy as np
 
+from cosim.files.picture import Picture
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.accuracy.accuracy import CHAOTIC
@@ -127,7 +127,7 @@ _STATISTICS = {
 """Labels, and factors to their units."""
 
 
-def draw(ensembles: Mapping[str, Ensemble], title: str, path: Path) -> None:
+def draw(ensembles: Mapping[str, Ensemble], title: str) -> Picture:
     """Draw each method's values of each statistic: a tick a run, and their average."""
     note = "One tick a run; dot and bar: their mean with two standard errors."
     figure, axes = panels(title, note, (11.0, 3.4), 1, len(_STATISTICS), sharey=True)
@@ -140,4 +140,4 @@ def draw(ensembles: Mapping[str, Ensemble], title: str, path: Path) -> None:
         axis.locator_params(axis="x", nbins=4)
         axis.set(xlabel=label, ylim=(len(ensembles) - 0.4, -0.6))
     axes[0].set_yticks(range(len(ensembles)), list(ensembles))
-    figure.write(path)
+    return figure

@@ -17,6 +17,7 @@ from scipy.stats import qmc
 from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator, Settings
 from cosim.evaluate.point import point
+from cosim.files.picture import Picture
 from cosim.scene import changed, load
 from cosim.simulation.checks import motion
 from cosim.simulation.fast import summaries
@@ -238,8 +239,8 @@ def report(rows: Sequence[Row], kinds: Mapping[str, Counter[str]], second: float
     )  # fmt: skip
 
 
-def draw(rows: Sequence[Row], title: str, path: Path) -> None:
-    """Draw error over cost into ``path`` (a PNG): of the solver alone, and in all."""
+def draw(rows: Sequence[Row], title: str) -> Picture:
+    """Error over cost: of the solver alone, and in all."""
     note = (
         "A line from coarse to fine steps; ring: default. Solid: the median; dotted: the worst. "
         f"What is less stands at {LEAST:g} %."
@@ -267,4 +268,4 @@ def draw(rows: Sequence[Row], title: str, path: Path) -> None:
         )
     label_ends(axes[1], [*ends.values()])
     axes[0].set_ylabel("error of v_average [%]")
-    figure.write(path)
+    return figure

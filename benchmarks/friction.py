@@ -16,7 +16,6 @@ still slips: by set-valued Coulomb friction, nothing.
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from math import cos, exp, isfinite, nan, pi, sqrt, tanh
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from scipy.optimize import brentq
 from benchmarks.peers.lsoda import Machine, U
 from benchmarks.peers.lsoda import run as run_machine
 from cosim.drive.command import Command
+from cosim.files.picture import Picture
 from cosim.scene import Scene, load
 from cosim.studies.accuracy.cases import CASES, reference
 from cosim.studies.plots import BLUE, GREEN, VERMILION, panels
@@ -205,7 +205,7 @@ def _solved(law: Law, scene: Scene) -> tuple[float, float, int]:
     return float(found.y[0][0]), float(found.y[0][1]), int(found.nfev)
 
 
-def draw(rows: Sequence[Row], title: str, path: Path) -> None:
+def draw(rows: Sequence[Row], title: str) -> Picture:
     """Draw what a held part creeps with each law, and the error in the whole machine."""
     note = "µm/s: width of the smoothed law; kN/m: stiffness of its bristle."
     figure, axes = panels(title, note, (11.0, 4.2), 1, 2, sharey=True)
@@ -224,4 +224,4 @@ def draw(rows: Sequence[Row], title: str, path: Path) -> None:
                 said = "none" if value == 0.0 else "not solvable by LSODA"
                 axis.annotate(said, (0.02, place), xycoords=axis.get_yaxis_transform(), va="center")
     axes[0].set_yticks(places, [f"{row['law']}  {row['width']}" for row in rows])
-    figure.write(path)
+    return figure

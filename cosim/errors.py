@@ -42,7 +42,7 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)
 
 
-def plain(text: str, limit: int = 200) -> str:
+def plain(name: object, limit: int = 200) -> str:
     """A name or path as a sentence holds it: on one line, printable, not too long."""
-    text = printable(json.dumps(text, ensure_ascii=False)[1:-1])
+    text = printable(json.dumps(str(name), ensure_ascii=False)[1:-1])
     return text if len(text) <= limit else text[:limit] + "…"

@@ -85,7 +85,7 @@ def deck(
     """
     lines, dropped = read_all(path)
     asks = measures(dropped)
-    name = plain(str(path))
+    name = plain(path)
     found = {element.name: element for element in parse(lines).elements}
     for source in sources:
         if source.lower() not in found or source[0].lower() not in "vi":
@@ -178,7 +178,7 @@ def check_reading(
 ) -> tuple[Scope, list[str]]:
     """The top level of a netlist with what reads the ``words`` and what the measurements need, as
     :func:`check` gives it; and all these words, each once."""
-    name = plain(str(path))
+    name = plain(path)
     for each in words:
         if not each.strip():
             what = f'{called} = "{plain(each)}" must be a vector or an expression of the netlist'
@@ -253,15 +253,15 @@ def own_parameters(top: Scope, name: str, given: Mapping[str, float]) -> dict[st
 
 
 def _pulses(top: Scope, fed: set[str]) -> Iterator[str]:
-    for path, element in _everywhere(top, top, ""):
+    for path, element in _everywhere(top, ""):
         if element.kind in "vi" and "pulse" in element.words and (path or element.name not in fed):
             yield f"{element.kind}.{path}{element.name}" if path else element.name
 
 
-def _everywhere(scope: Scope, top: Scope, path: str) -> Iterator[tuple[str, Element]]:
+def _everywhere(scope: Scope, path: str) -> Iterator[tuple[str, Element]]:
     """Each element, in calls of subcircuits too, with the path of calls that lead to it."""
     for element in scope.elements:
         yield path, element
         called: Any = scope.subcircuit(element.model or "") if element.kind == "x" else None
         if called is not None and len(called) == 1:
-            yield from _everywhere(called[0], top, f"{path}{element.name}.")
+            yield from _everywhere(called[0], f"{path}{element.name}.")

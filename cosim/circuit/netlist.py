@@ -61,8 +61,7 @@ def path_of(scene: Scene) -> Path:
 
 
 def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
-    """The deck of the scene's circuit, for ``ngSpice_Circ``, and the vectors to log: by the names
-    that the log has, ngspice's.
+    """The deck of the scene's circuit, and ngspice's names of the vectors to log, by the log's.
 
     The run goes to ``run.duration`` with steps of at most ``circuit.max_step``. Raises BadInput,
     beginning with the netlist's file and line, for what is wrong with it or might do harm.
@@ -144,8 +143,7 @@ def _carry_inertia(external: dict[Line, str], title: Line, present: set[str], em
     """Put the mechanics' local inertia in series with the coil, for the method "companion".
 
     A mass m behind the coil acts as a capacitor C = m/Bl² with e = ∫ i dt/C. Stick, slip and
-    contact change m, so the netlist has 1 F, charged by the current times 1/C, and an external
-    source gives 1/C.
+    contact change m: the netlist has 1 F, charged by the current times 1/C of an external source.
     """
     for node in ("motional", "motional_gain", "motional_emf"):
         if node in present:

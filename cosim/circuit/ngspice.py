@@ -102,8 +102,7 @@ def engine(callbacks: Callbacks) -> "Engine":
 
 
 class Engine(Shared.NgSpiceShared):
-    """One ngspice library. PySpice's own callbacks turn every value into Python objects; compiled
-    ones take their place."""
+    """One ngspice library, with compiled callbacks: PySpice's make an object of every value."""
 
     sent: tuple[str, ...] = ()
     """The names of all vectors of the run, as they are sent."""
@@ -191,8 +190,7 @@ class Engine(Shared.NgSpiceShared):
         """ngspice's own words of trouble, as the end of a message."""
         words = [" ".join(word.split()) for word in (*self._stderr, *self._stdout)]
         telling = [word for word in words if _TROUBLE.search(word) and not _NOISE.search(word)]
-        said = "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
-        return said
+        return "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
 
     @property
     def too_small(self) -> bool:

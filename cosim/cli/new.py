@@ -25,7 +25,7 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
     from cosim.scene.model import CAREFUL, to_toml
     from cosim.scene.toml import LARGEST
 
-    name = plain(str(file))
+    name = plain(file)
     if file.suffix != ".toml" or not file.stem.replace("-", "").replace("_", "").isalnum():
         raise BadInput(f"{name}: must end in .toml, its name have letters, digits, - and _ alone.")
     if kind == "fmu" and base is not None:
@@ -58,9 +58,9 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
     theirs = schema_there.is_file() and _TITLE not in read(schema_there, LARGEST)
     for path in (*texts, *fmus, *[schema_there] * theirs):
         if os.path.lexists(path):  # a link that leads nowhere, too
-            raise BadInput(f"{plain(str(path))}: is there already; choose another name.")
+            raise BadInput(f"{plain(path)}: is there already; choose another name.")
     if not file.parent.is_dir():
-        raise BadInput(f"{plain(str(file.parent))}: there is no such folder.")
+        raise BadInput(f"{plain(file.parent)}: there is no such folder.")
     texts = {path: text.replace("NAME.", f"{file.stem}.") for path, text in texts.items()}
     texts[schema_there] = as_json(schema())
     paths = [*texts, *fmus]

@@ -147,6 +147,7 @@ def _netlist(
     print(target)
 
 
+_READ = 'what the importer reads, as "v(out)" or "i(V1)*v(out)"; repeatable'
 _FMI = Option("--fmi", "version of FMI", choices=("2", "3"), default="2")
 _NETLIST = (
     Option("netlist", "a netlist of one's own", "NETLIST", Path),
@@ -155,16 +156,7 @@ _NETLIST = (
         parameter="inputs",
         many="repeat",
     ),
-    Option(
-        *(
-            "--output",
-            'what the importer reads, as "v(out)" or "i(V1)*v(out)"; repeatable',
-            "WORDS",
-        ),
-        parameter="outputs",
-        many="repeat",
-        needed=True,
-    ),
+    Option(*("--output", _READ, "WORDS"), parameter="outputs", many="repeat", needed=True),
     Option("--max-step", "longest step of ngspice", "s", float, 2e-5),
     Option("--reltol", "ngspice's relative tolerance", kind=float, default=1e-5),
     _FMI,

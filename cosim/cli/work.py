@@ -29,10 +29,10 @@ def writable(folder: Path, shared: bool = False) -> Iterator[None]:
             with TemporaryFile(dir=folder):
                 pass
         except FileExistsError as error:
-            raise BadInput(f"{plain(str(folder))}: this is a file, not a directory.") from error
+            raise BadInput(f"{plain(folder)}: this is a file, not a directory.") from error
         except OSError as error:
             reason = error.strerror
-            raise BadInput(f"{plain(str(folder))}: cannot be written to ({reason}).") from error
+            raise BadInput(f"{plain(folder)}: cannot be written to ({reason}).") from error
         if shared:
             tidy(folder)
         with nullcontext() if shared else alone(folder):

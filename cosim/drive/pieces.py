@@ -28,8 +28,7 @@ class Piece(structures("loop")["Piece"]):
 
     ``kind``, ``offset``, ``amplitude`` (V), ``origin`` (s), ``rate`` (Hz) and ``span`` make its
     value; ``end`` is V1's left limit at ``until``, ``jump`` the time of the first discontinuity of
-    V1 or of a pin after ``begin`` (inf: none), ``dac`` the voltage of the DAC on a level, ``pin``
-    that of the offset pin.
+    V1 or a pin after ``begin`` (inf: none), ``dac`` the DAC's voltage on levels, ``pin`` the pin's.
     """
 
     begin: float
@@ -95,13 +94,11 @@ class Command(ABC):
     def lines(self, begin: float, end: float, most: int) -> tuple[Array, Array, Array] | None:
         """The pieces from the corner ``begin`` until ``end`` (s) is reached, at most ``most`` of
         them: their corners, one more than pieces, and V1 (V) where each begins and ends. None where
-        :meth:`piece` must be asked for one after the other.
-        """
+        :meth:`piece` must be asked for one after the other."""
         return None
 
     def pieces(self, begin: float, end: float, most: int | None = None) -> list[Piece]:
-        """The pieces from ``begin`` until ``end`` (s) is within the last, at most ``most`` of
-        them."""
+        """The pieces from ``begin`` until ``end`` (s) is within the last; ``most`` at most."""
         found: list[Piece] = []
         while begin <= end and (most is None or len(found) < most):
             piece = self.piece(begin)
@@ -116,8 +113,7 @@ class Command(ABC):
 
     def values_before(self, times: npt.ArrayLike, into: Array | None = None) -> Array:
         """Left limits of V1 at each of ``times``, which do not fall, V; a time up to 1e-12 s after
-        a jump is on it. Written ``into`` a contiguous array of as many values, where one is given.
-        """
+        a jump is on it. Written ``into`` a contiguous array of as many values, if one is given."""
         return self._values(times, 2e-12, library("loop").command_values_before, into)
 
     def _values(

@@ -25,8 +25,7 @@ def straights(
 ) -> Iterator[tuple[Array, Array, Array]]:
     """Times (s), the first one where the last ones ended, and V1 (V, a column a command) at the
     start and the end of each interval between two of them, until ``duration``, block after block.
-    The commands are of one shape; of a sine there are ``chords`` a period.
-    """
+    The commands are of one shape; of a sine there are ``chords`` a period."""
     found = commands[0].lines(0.0, duration, _TOGETHER) if len(commands) == 1 else None
     if found is not None:
         yield from _lines(commands[0], duration, found)
@@ -84,8 +83,7 @@ def straight(piece: Piece, begin: float) -> tuple[float, float, float]:
 
 
 def _times(rate: float, begin: float, stop: float) -> Array:
-    """Where straights, ``rate`` in a second, meet from ``begin`` to ``stop``, s: equally far apart
-    but for the last ones."""
+    """Where straights, ``rate`` a second, meet from ``begin`` to ``stop``, s; the last differs."""
     step = 1.0 / rate
     count = max(1, ceil((stop - begin) / step - 1e-6))
     return np.append(begin + step * np.arange(count), stop)

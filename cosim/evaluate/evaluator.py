@@ -132,8 +132,7 @@ class Evaluator:
         return next((found for _, found in self.groups([every])), [])
 
     def groups(self, groups: Sequence[Sequence[Settings]]) -> Iterator[tuple[int, list[Outcome]]]:
-        """The outcomes of groups of settings, all run at once: a group (its number, outcomes) as
-        soon as it is complete."""
+        """Each group's number and outcomes, as soon as it is complete; all are run at once."""
         places = [(n, k) for n, group in enumerate(groups) for k in range(len(group))]
         known: list[dict[int, Outcome]] = [{} for _ in groups]
         for number, outcome in self.run(enumerate(one for group in groups for one in group)):

@@ -18,8 +18,7 @@ PATIENCE = 15.0
 """s in which the cluster must answer."""
 
 AHEAD, AHEAD_FAR = 2, 4
-"""Calls at hand for each thread: the one that runs, and the next; on a cluster enough to keep it
-busy."""
+"""Calls at hand for each thread: the one that runs and the next; on a cluster, to keep it busy."""
 
 Item = TypeVar("Item")
 
@@ -39,8 +38,7 @@ class _Ended(Exception):
 
 @contextmanager
 def threads(common: Any, count: int) -> Iterator[Pool]:
-    """So many threads. The last argument of a call is a progress, which ends what runs when nobody
-    waits for it any more."""
+    """So many threads. A call's last argument is a progress, which ends it when nobody waits."""
     ended = threading.Event()
 
     def progress(time: float) -> None:
@@ -64,7 +62,7 @@ def cluster(common: Any, address: str) -> Iterator[Pool]:
         if not count:
             raise BadInput(f"--dask {address}: this cluster has no workers.")
         # What a task gave is made again where the workers that had it die, scattered data is not.
-        there = client.submit(_same, common, pure=False)
+        there = client.submit(lambda same: same, common, pure=False)
         yield Pool(
             lambda call, *given: client.submit(call, there, *given, pure=False), AHEAD_FAR * count
         )
@@ -91,10 +89,6 @@ def each(
         except Exception as error:
             found = error
         yield item, found
-
-
-def _same(common: Any) -> Any:
-    return common
 
 
 def _client(address: str) -> Any:

@@ -132,8 +132,7 @@ def failed(error: Exception) -> Outcome:
 
 
 def outcome_of(record: Any) -> Outcome | None:
-    """The outcome of which ``record``, as JSON gives it, has the fields; None where it is none, or
-    one of the machine's."""
+    """The outcome with the fields of ``record``, of JSON; None if it is none, or the machine's."""
     try:
         numbers, failure, machine = record["numbers"], record["failure"], record["machine"]
         named = all(name.isprintable() and 0 < len(name) < 300 for name in numbers)

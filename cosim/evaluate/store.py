@@ -2,8 +2,7 @@
 
 The file is SQLite's, in its write-ahead mode: whatever moment a kill strikes, what was written
 stays, and others may read the file while it grows. It is written every PAUSE, since a transaction
-costs as much as a short run: a kill loses at most what was added within that time. One process at a
-time may write.
+costs as much as a short run: a kill loses at most what came within it. One process may write.
 """
 
 import hashlib
@@ -100,8 +99,7 @@ class Store:
     def add(self, key: str, found: Any) -> None:
         """Keep what was found; it is written with what was found up to PAUSE before or after it.
 
-        What the disk does not take is tried again with the next one; a note tells it. Raises
-        BadInput where that is too much.
+        What the disk does not take is noted and tried again; BadInput where that is too much.
         """
         self._owed[key] = json.dumps(found)
         if monotonic() - self._written >= PAUSE:
@@ -121,7 +119,7 @@ class Store:
                 if size > 1:
                     size //= 2  # there may be room for some of them
                     continue
-                self._tell(f"{plain(str(self._path))}: cannot be written ({error})", error)
+                self._tell(f"{plain(self._path)}: cannot be written ({error})", error)
                 break
             for key in batch:
                 del self._owed[key]
@@ -169,13 +167,13 @@ class Store:
             raise sqlite3.DatabaseError("its tables are others")
         elif self._base.execute("SELECT value FROM found WHERE key = ''").fetchone() != (work,):
             raise BadInput(
-                f"{plain(str(self._path))}: this belongs to other work (its scene, keys, values or "
+                f"{plain(self._path)}: this belongs to other work (its scene, keys, values or "
                 "version of cosim differ); remove it, or choose another --out."
             )
 
     def _told(self, act: Callable[..., T], *given: Any) -> T:
         """What ``act`` gives. Raises BadInput where the file or the disk is no good."""
-        name = plain(str(self._path))
+        name = plain(self._path)
         try:
             return act(*given)
         except sqlite3.OperationalError as error:
@@ -210,11 +208,11 @@ def _locked(path: Path) -> int:
     flags = os.O_RDWR | os.O_CREAT
     for more in ("O_NOFOLLOW", "O_CLOEXEC", "O_NONBLOCK", "O_BINARY"):
         flags |= getattr(os, more, 0)
-    name = plain(str(path))
+    name = plain(path)
     for each in _files(path):
         if each.is_symlink() or (each.exists() and not each.is_file()):
             what = "it is a link" if each.is_symlink() else "this is not a regular file"
-            raise BadInput(f"{plain(str(each))}: cannot be written ({what}).")
+            raise BadInput(f"{plain(each)}: cannot be written ({what}).")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(path, flags, 0o666)
@@ -237,8 +235,7 @@ def reported(
     make: Callable[[Store], Made], out: str | os.PathLike[str] | None, store: str, *asked: Any
 ) -> Made:
     """What ``make`` reports, which follows from ``asked``; a folder ``out`` gets what its ``save``
-    writes. The file ``store`` there keeps what is found meanwhile: an interrupted study goes on
-    from it. Raises BadInput."""
+    writes. The file ``store`` there has what is found meanwhile, to go on from. Raises BadInput."""
     with Store(None if out is None else Path(out) / store, *asked) as kept:
         made = make(kept)
         if out is not None:

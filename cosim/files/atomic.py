@@ -45,7 +45,7 @@ def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[l
                 mode = name.stat().st_mode  # of what a link names: root could replace it in /dev
                 if not stat.S_ISREG(mode):
                     kind = "a directory, not a file" if stat.S_ISDIR(mode) else "not a regular file"
-                    raise BadInput(f"{plain(str(name))}: this is {kind}.")
+                    raise BadInput(f"{plain(name)}: this is {kind}.")
         with ExitStack() as stack:
             pairs = []
             for path in paths:
@@ -65,13 +65,13 @@ def together(paths: Sequence[Path], outdated: Sequence[Path] = ()) -> Iterator[l
                 name = path
                 os.replace(temporary, path)
     except FileExistsError as error:  # of the folder: the files have names of their own
-        raise BadInput(f"{plain(str(name.parent))}: this is a file, not a directory.") from error
+        raise BadInput(f"{plain(name.parent)}: this is a file, not a directory.") from error
     except OSError as error:
-        raise BadInput(f"{plain(str(name))}: cannot be written ({error.strerror}).") from error
+        raise BadInput(f"{plain(name)}: cannot be written ({error.strerror}).") from error
     except ValueError as error:
         if "embedded null" not in str(error):
             raise
-        raise BadInput(f"{plain(str(name))}: it is no possible file name.") from None
+        raise BadInput(f"{plain(name)}: it is no possible file name.") from None
 
 
 def write_all(files: Mapping[Path, bytes]) -> None:
@@ -104,8 +104,7 @@ def _temporary(path: Path) -> Iterator[Path]:
     if fcntl is None:  # Windows, which replaces no open file
         os.close(handle)
     try:
-        if fcntl is not None:
-            locked(handle)
+        locked(handle)
         yield temporary
     finally:
         if fcntl is not None:
@@ -124,7 +123,7 @@ def alone(folder: Path) -> Iterator[None]:
     try:
         if not locked(handle):
             raise BadInput(
-                f"{plain(str(folder))}: another process is writing into this folder; wait for it, "
+                f"{plain(folder)}: another process is writing into this folder; wait for it, "
                 "or choose another --out."
             )
         tidy(folder, ours=True)

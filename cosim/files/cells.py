@@ -48,7 +48,7 @@ class Cells:
     @property
     def name(self) -> str:
         """The file, as messages name it."""
-        return plain(str(self.path))
+        return plain(self.path)
 
     def even(self, heads: int) -> None:
         """Check that the rows are as wide as the widest of the first ``heads`` ones, which are the
@@ -115,7 +115,7 @@ class Cells:
 def read_cells(path: Path) -> Cells:
     """The cells of a text file. Raises BadInput, with the row, for what is no table."""
     text = _decoded(reader.read(path, LARGEST))
-    name = plain(str(path))
+    name = plain(path)
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if odd := _CONTROL.search(text):
         row = len(re.split("\r\n|\r|\n", text[: odd.start()]))
@@ -175,21 +175,18 @@ def _width(row: list[str]) -> int:
 def read_timetable(path: Path, time: tuple[str, ...], value: tuple[str, ...]) -> Array | None:
     """The two columns as rows of (time, value); None where the header does not have them.
 
-    ``time`` and ``value`` are the names that each column may have; other columns do not matter. Two
-    rows or more, finite, and the time does not fall: at a time given twice the value jumps. Raises
-    BadInput.
+    ``time`` and ``value`` are names that each column may have; others do not matter. Two rows or
+    more, finite; the time does not fall: where it is given twice the value jumps. Raises BadInput.
     """
     cells = read_cells(path)
-    columns = [_place(cells, names) for names in (time, value)]
-    if None in columns:
+    columns = [k for names in (time, value) if (k := _place(cells, names)) is not None]
+    if len(columns) < 2:
         return None
     cells.even(1)
     if len(cells.rows) < 3:
         raise BadInput(f"{cells.name}: at least two rows of {time[-1]} and {value[-1]} are needed.")
     header = cells.rows[0][1]
-    result = np.column_stack(
-        [cells.numbers(1, place, header[place]) for place in columns if place is not None]
-    )
+    result = np.column_stack([cells.numbers(1, k, header[k]) for k in columns])
     late = np.flatnonzero(np.diff(result[:, 0]) < 0)
     if len(late):
         row = cells.rows[late[0] + 2][0]

@@ -77,7 +77,7 @@ def opened(path: Path, most: int) -> Iterator[IO[bytes]]:
 
 def bad(path: Path, refused: Refused) -> BadInput:
     """The sentence on a file that does not pass."""
-    return BadInput(f"{plain(str(path))}: cannot be read ({refused}).")
+    return BadInput(f"{plain(path)}: cannot be read ({refused}).")
 
 
 @contextmanager

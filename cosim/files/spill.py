@@ -83,8 +83,7 @@ def unpacked(folder: str, name: str, names: Sequence[str], rows: int) -> dict[st
 
 
 class Tape:
-    """Rows of ``columns`` numbers, written once and then read as an array; about ``rows`` of them,
-    if that is known before.
+    """Rows of ``columns`` numbers, written once, then read as an array; about ``rows``, if known.
 
     Raises BadInput where the disk is full.
     """

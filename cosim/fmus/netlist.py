@@ -1,6 +1,5 @@
 """A netlist as an FMU: the deck written anew from what was parsed of it, in a library that runs
-ngspice where the importer has it (``fmu/netlist``).
-"""
+ngspice where the importer has it (``fmu/netlist``)."""
 
 import hashlib
 import re

@@ -27,12 +27,10 @@ def pack(
         try:
             describe: Any = ctypes.CDLL(str(library.absolute())).model_describe
         except (OSError, AttributeError) as error:
-            raise BadInput(
-                f"{plain(str(library))}: this is no model's library ({error})."
-            ) from None
+            raise BadInput(f"{plain(library)}: this is no model's library ({error}).") from None
         paths = (str(folder / "resources").encode(), str(about).encode())
         if not describe(version, *paths, why):
-            raise BadInput(f"{plain(str(library))}: {plain(why.value.decode())}.")
+            raise BadInput(f"{plain(library)}: {plain(why.value.decode())}.")
         root = ElementTree.parse(about).getroot()
         place = folder / "binaries" / (platform if version == 2 else platform_tuple)
         place.mkdir(parents=True)

@@ -40,8 +40,7 @@ def scenes() -> dict[str, Scene]:
 
 
 def fits(scene: Scene) -> bool:
-    """Whether the page can run a scene: a free ram that is driven, and a drive of which it has the
-    shape."""
+    """Whether the page can run a scene: a free ram, driven, and a drive whose shape it has."""
     drive = scene.drive
     odd = drive.quantised or drive.start_time or drive.pwm_ripple or drive.phase_deg is not None
     driven = scene.rung.on_ladder and drive.waveform in COMMANDS and not scene.files

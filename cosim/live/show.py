@@ -88,10 +88,10 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
     tables = sorted(results.glob("*.csv")) if results.is_dir() else [results]
     if len(tables) != 1:
         names = f"; name one of: {', '.join(path.name for path in tables)}" if tables else ""
-        where = f"{plain(str(results))}: there is no run, sweep or comparison in this folder"
+        where = f"{plain(results)}: there is no run, sweep or comparison in this folder"
         raise BadInput(f"{where}{names}.")
     if results.suffix in (".nc", ".json", ".toml"):
-        raise BadInput(f"{plain(str(results))}: this is no table; name the folder that it is in.")
+        raise BadInput(f"{plain(results)}: this is no table; name the folder that it is in.")
     return _table(tables[0])
 
 
@@ -100,7 +100,7 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
     grid, path = data["failure"], folder / "sweep.nc"
     swept = [str(name) for name in data.coords if "key" in data[name].attrs]
     if grid.size > MOST_POINTS:
-        raise BadInput(f"{plain(str(path))}: a page shows at most {MOST_POINTS} points.")
+        raise BadInput(f"{plain(path)}: a page shows at most {MOST_POINTS} points.")
     columns = []
     others = sorted(str(name) for name in {*data.coords} - {*swept, *grid.dims})
     for name in [*swept, *others, *data.data_vars]:
@@ -109,7 +109,7 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
         columns.append(_column(str(name), unit, values.tolist(), text))
     numbers = [each["name"] for each in columns[len(swept) :] if each["most"] is not None]
     if not numbers:
-        raise BadInput(f"{plain(str(path))}: no point of this sweep has a number.")
+        raise BadInput(f"{plain(path)}: no point of this sweep has a number.")
     best = "v_average" if "v_average" in numbers else numbers[0]
     ways = [swept[0], swept[1] if len(swept) > 1 else best, best]
     axes = swept if grid.ndim > 1 else []
@@ -125,7 +125,7 @@ def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
         frequencies = [nan]
     alike = all(units == kept[0][1] for _, units, _ in kept)
     if not (alike and points[-1] < grid.size and all(map(isfinite, frequencies))):
-        raise BadInput(f"{plain(str(folder / 'points'))}: these are not the sweep's own runs.")
+        raise BadInput(f"{plain(folder / 'points')}: these are not the sweep's own runs.")
     runs = [[*columns.values()] for columns, _, _ in kept]
     shown["signals"] = _signals(kept[0][1], runs)
     for run, frequency in zip(shown["signals"]["runs"], frequencies, strict=True):
@@ -162,7 +162,7 @@ def _table(path: Path) -> tuple[dict[str, Any], list[Run]]:
             columns.append(_column(name, unit, values))
     ways = [column["name"] for column in columns if column["most"] is not None]
     if not ways:
-        raise BadInput(f"{plain(str(path))}: this table has no column of numbers.")
+        raise BadInput(f"{plain(path)}: this table has no column of numbers.")
     cloud = {"columns": columns, "keys": [], "ways": (ways * 3)[:3], "family": None, "grid": []}
     cloud["count"] = len(cells.rows) - 1
     pictures = [p for p in path.parent.glob("*.png") if f"{p.stem}-".startswith(f"{path.stem}-")]
@@ -193,7 +193,7 @@ def _whole_results(path: Path) -> Iterator[dict[str, Any]]:
     try:
         yield dict(json.loads(reader.read(path, LARGEST)))
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError, RecursionError):
-        raise BadInput(f"{plain(str(path))}: this is no whole file of results.") from None
+        raise BadInput(f"{plain(path)}: this is no whole file of results.") from None
 
 
 def _column(name: str, unit: str, values: list[Any], text: str = "") -> dict[str, Any]:

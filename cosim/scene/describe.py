@@ -32,6 +32,10 @@ class Key:
         """The key as an override spells it: ``table.key``."""
         return f"{self.table}.{self.name}"
 
+    def holds(self, value: float) -> bool:
+        """Whether a number is within its range."""
+        return self.low is not None and self.high is not None and self.low <= value <= self.high
+
     @property
     def allowed(self) -> str:
         """What may stand there, as the end of "… must be …"."""
@@ -153,7 +157,5 @@ def _property(key: Key) -> dict[str, Any]:
         return about | {"enum": [*key.choices]}
     if key.kind in _TYPES:
         about["type"] = _TYPES[key.kind]
-    for name, limit in (("minimum", key.low), ("maximum", key.high)):
-        if limit is not None:
-            about[name] = limit
-    return about
+    limits = {"minimum": key.low, "maximum": key.high}
+    return about | {name: limit for name, limit in limits.items() if limit is not None}

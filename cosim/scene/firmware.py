@@ -61,8 +61,7 @@ def knob_frequency(pot_frequency: float) -> float:
 
 def knob_offset(pot_offset: float, amplitude: float) -> float:
     """Mean of V1, V, of the third knob, which sets the offset pin, where the ramp ends (V_DAC = 0);
-    ``amplitude`` is peak-to-peak, V.
-    """
+    ``amplitude`` is peak-to-peak, V."""
     return GAIN * volts(reading(pot_offset)) - amplitude / 2
 
 
@@ -90,8 +89,7 @@ def sampled(share: Callable[[float], float], maximum: int, frequency: float) -> 
 
 
 def period(frequency: float, loop_time: float | None) -> float:
-    """Of the staircase for a commanded ``frequency`` in Hz, s; with ``loop_time``, s, that of the
-    passes."""
+    """Of the staircase for a commanded ``frequency`` (Hz), or of passes of ``loop_time`` (s), s."""
     steps = ceil(1 / _share(frequency))
     if not loop_time:
         return steps / STEPS_PER_SECOND

@@ -38,10 +38,8 @@ class _Layer:
 
 def list_scenes() -> list[tuple[str, str]]:
     """Name and description of every built-in scene, the paper's first."""
-    texts = {path.stem: path.read_text(encoding="utf-8") for path in _LIBRARY.glob("*.toml")}
-    found = [
-        (name, str(tomllib.loads(text).get("description", ""))) for name, text in texts.items()
-    ]
+    files = {path.stem: tomllib.loads(path.read_text("utf-8")) for path in _LIBRARY.glob("*.toml")}
+    found = [(name, str(data.get("description", ""))) for name, data in files.items()]
     return sorted(found, key=lambda scene: (not scene[0].startswith("paper"), scene[0]))
 
 
@@ -280,8 +278,7 @@ def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:
 
 
 def _find_files(tables: dict[str, Any], folder: Path, *more: Path) -> None:
-    """Make the paths of files absolute; they are relative to ``folder``, or to the first of these
-    where the file is."""
+    """Make paths of files absolute: in the first folder that has the file, or else the first."""
 
     def found(file: str) -> str:
         there = (place / file for place in (folder, *more))

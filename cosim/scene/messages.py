@@ -136,7 +136,7 @@ def _of_list(fault: Any, origin: str) -> str:
     allowed = extra.get("words") or "a number from {ge:g} to {le:g}".format(**limits)
     what = f"{origin}: [[{table}]] {place[0] + 1}: {place[1]}"
     if len(place) > 2:
-        what, allowed = f"{what}.{plain(str(place[2]))}", ALLOWED_START
+        what, allowed = f"{what}.{plain(place[2])}", ALLOWED_START
         if isinstance(fault["input"], dict) and fault["input"]:
             inner = next(iter(fault["input"]))
             allowed += f'; write a name with dots in quotes, "{plain(f"{place[2]}.{inner}")}"'

@@ -19,19 +19,16 @@ class CouplingMethod:
     """The keys of ``[circuit]`` that the method chooses itself."""
 
 
+_STEP = {"macro_step"}
+_SHAPE = _STEP | {"order"}
+
 _ALL = (
     CouplingMethod("step-locked", "mechanics follow each accepted step of ngspice"),
-    CouplingMethod("jacobi", "macro steps, both sides extrapolated", {"macro_step", "order"}),
-    CouplingMethod(
-        "gauss-seidel", "macro steps, mechanics take the current as a line", {"macro_step", "order"}
-    ),
-    CouplingMethod(
-        "mean-current", "macro steps, mechanics take the mean current", {"macro_step", "order"}
-    ),
-    CouplingMethod(
-        "companion", "macro steps, circuit carries the inertia of the mechanics", {"macro_step"}
-    ),
-    CouplingMethod("macro-steps", "explicit macro steps of the scene's own FMUs", {"macro_step"}),
+    CouplingMethod("jacobi", "macro steps, both sides extrapolated", _SHAPE),
+    CouplingMethod("gauss-seidel", "macro steps, mechanics take the current as a line", _SHAPE),
+    CouplingMethod("mean-current", "macro steps, mechanics take the mean current", _SHAPE),
+    CouplingMethod("companion", "macro steps, circuit carries the inertia of the mechanics", _STEP),
+    CouplingMethod("macro-steps", "explicit macro steps of the scene's own FMUs", _STEP),
     CouplingMethod("redo", "own FMUs and ngspice repeat each step until they agree"),
     CouplingMethod(
         "auto",

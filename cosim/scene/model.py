@@ -110,7 +110,18 @@ class Scene(BaseModel):
         return data
 
     @model_validator(mode="after")
-    def _fit_times(self) -> "Scene":
+    def _check(self) -> "Scene":
+        self._fit_times()
+        self._check_ports()
+        self._check_speed()
+        self._check_speed_of_circuit()
+        self._check_speed_of_mechanics()
+        self._check_phase()
+        self._check_solver()
+        self._check_reach()
+        return self
+
+    def _fit_times(self) -> None:
         """The mean over a broken period is off by per cents, so whole ones are the default, and as
         many as motion mostly repeats in."""
         given, duration = self.run.model_fields_set, self.run.duration
@@ -127,22 +138,21 @@ class Scene(BaseModel):
         known = {name: getattr(self.run, name) for name in given}
         run = Run.model_construct(given, **fitted | known)
         object.__setattr__(self, "run", run)
-        return self
 
-    @model_validator(mode="after")
-    def _check_ports(self) -> "Scene":
+    def _check_ports(self) -> None:
         """What can be known of ports before the FMUs and the netlist are read."""
         method, model = self.coupling.method, self.circuit.model
         if not self.has_ports and method in OF_PORTS[2:]:
             raise fault(f'coupling.method = "{method}" is for scenes with [[port]]')
         if not self.fmu and not self.port:
-            return self
+            return
         if not self.rung.own_netlist:
             raise fault(f'[[fmu]] and [[port]] need circuit.model = "file", not "{model}"')
         if self.run.solver != "fmu":
             raise fault('run.solver must be "fmu" with [[port]]')
         if not self.has_ports:
-            return self._check_machine()
+            self._check_machine()
+            return
         if method not in OF_PORTS:
             known = ", ".join(f'"{name}"' for name in OF_PORTS)
             raise fault(f'coupling.method = "{method}" must be one of {known} with [[fmu]]')
@@ -164,9 +174,8 @@ class Scene(BaseModel):
             for end in given:
                 if given.count(end) > 1:
                     raise fault(f'[[port]] {key} = "{end}" is given twice')
-        return self
 
-    def _check_machine(self) -> "Scene":
+    def _check_machine(self) -> None:
         """Ports of the built-in machine alone say what the netlist calls what it needs."""
         for port in self.port:
             end = port.to or port.origin
@@ -190,13 +199,11 @@ class Scene(BaseModel):
                 f'the port of machine.current must have probe = "i({emf})", the current of the '
                 "source that is the back-EMF"
             )
-        return self
 
-    @model_validator(mode="after")
-    def _check_speed(self) -> "Scene":
+    def _check_speed(self) -> None:
         """One explicit method solves coil and mechanics in the FMU: the coil must not be stiff."""
         if not self.rung.source_in_fmu:
-            return self
+            return
         coil = self.coil
         eddy = coil.eddy_resistance or 0.0
         around = coil.resistance + coil.count * self.circuit.sense_resistance + eddy
@@ -210,10 +217,8 @@ class Scene(BaseModel):
                     *("coil.resistance", "coil.eddy_resistance", "coil.count"),
                     "circuit.sense_resistance",
                 )
-        return self
 
-    @model_validator(mode="after")
-    def _check_speed_of_circuit(self) -> "Scene":
+    def _check_speed_of_circuit(self) -> None:
         """At the output's limits each step of ngspice lasts a time constant of the coil."""
         drive, circuit, coil = self.drive, self.circuit, self.coil
         peak, sense = abs(drive.offset) + drive.amplitude / 2.0, circuit.sense_resistance
@@ -230,13 +235,11 @@ class Scene(BaseModel):
                 "or the circuit is too fast to be solved",
                 *("coil.count", "circuit.supply", "drive.amplitude", "drive.offset"),
             )
-        return self
 
-    @model_validator(mode="after")
-    def _check_speed_of_mechanics(self) -> "Scene":
+    def _check_speed_of_mechanics(self) -> None:
         """The same of what acts on the bodies at every moment; for the rest see Pace."""
         if self.surface_is_given:
-            return self
+            return
         rig = self.mechanics
         surface, masses = rig.surface_mass, f"mechanics.surface_mass = {rig.surface_mass:g} kg"
         both, of_both = surface, masses
@@ -256,13 +259,11 @@ class Scene(BaseModel):
                     f"mechanics.{key} = {value:g} {unit} must be at most {most:.3g} {unit} with "
                     f"{named}, or the bodies move too fast to be solved"
                 )
-        return self
 
-    @model_validator(mode="after")
-    def _check_phase(self) -> "Scene":
+    def _check_phase(self) -> None:
         """Only the FMU solves two surfaces that move independently, and without a plate."""
         if self.drive.phase_deg is None:
-            return self
+            return
         able = sorted(name for name, rung in RUNGS.items() if rung.driven and not rung.ngspice)
         self._need(
             "drive.phase_deg lets two surfaces move by themselves",
@@ -272,7 +273,6 @@ class Scene(BaseModel):
             ("mechanics.actuator", RAMS, '"ram"'),
             ("friction.mu_plate", (0.0,), "0"),
         )
-        return self
 
     def _need(self, why: str, *needed: tuple[str, Sequence[object], str]) -> None:
         """Raise where a key has no allowed value; what is needed is a key, these, and the same in
@@ -284,12 +284,11 @@ class Scene(BaseModel):
                 shown = f"{value:g}" if type(value) in (int, float) else toml_value(value)
                 raise fault(f"{why}; with it {full} = {shown} must be {words}")
 
-    @model_validator(mode="after")
-    def _check_solver(self) -> "Scene":
+    def _check_solver(self) -> None:
         """The fast solver has the machine's common case, and takes no variable of the FMU that is
         not in its own table."""
         if self.run.solver != "fast":
-            return self
+            return
         why = 'run.solver = "fast" has fixed steps for one free ram'
         self._need(why, *_FAST_NEEDS)
         if self.mechanics.initial_lift and not self.friction.mu_plate * self.friction.normal_force:
@@ -300,10 +299,8 @@ class Scene(BaseModel):
                 f"drive.frequency = {self.drive.frequency:g} Hz must be at most {most:g} Hz with "
                 f"run.step = {self.run.step:g} s of the fast solver"
             )
-        return self
 
-    @model_validator(mode="after")
-    def _check_reach(self) -> "Scene":
+    def _check_reach(self) -> None:
         drive = self.drive
         if drive.pwm_ripple and not self.rung.firmware:
             raise fault(
@@ -321,7 +318,7 @@ class Scene(BaseModel):
                 "at a constant friction.normal_force, not at that of friction.normal_force_file"
             )
         if not self.rung.driven or not (self.rung.firmware or drive.quantised):
-            return self
+            return
         why = "with drive.quantised = true"
         if self.rung.firmware:
             why = f'with circuit.model = "{self.rung.name}"'
@@ -343,13 +340,11 @@ class Scene(BaseModel):
                 f"for its offset pin gives 0 to {firmware.V_REFERENCE} V",
                 *others,
             )
-        return self
 
     @property
     def period(self) -> float:
         """Of what drives the scene, s; infinite where nothing does, and with a surface moved by a
-        file. That of the firmware's staircase differs from 1 / ``drive.frequency``.
-        """
+        file. That of the firmware's staircase differs from 1 / ``drive.frequency``."""
         drive = self.drive
         if self.has_ports and not any(port.origin == "drive" for port in self.port):
             return inf

@@ -1,7 +1,6 @@
 """The rungs: each value of ``circuit.model``, declared once.
 
-What a rung computes is in ``cosim/simulation``; what scenes, messages and reports need to know of
-it is here.
+What a rung computes is in ``cosim/simulation``; here is what scenes, messages and reports need.
 """
 
 from collections.abc import Set

@@ -6,7 +6,7 @@ A key that is a variable of the FMU has them from ``variables.def``.
 import re
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
@@ -76,6 +76,14 @@ class Table(BaseModel):
     """A table of a scene: frozen, without unknown keys, numbers neither bool nor string."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    @model_validator(mode="after")
+    def _checked(self) -> Self:
+        self._check()
+        return self
+
+    def _check(self) -> None:
+        """Raise a :func:`fault` where keys do not go together."""
 
 
 FRAME_RATE = 960.0
@@ -215,8 +223,7 @@ class Drive(Table):
             data["offset"] = firmware.knob_offset(pots["pot_offset"], amplitude)
         return _with_levels(data)
 
-    @model_validator(mode="after")
-    def _check(self) -> "Drive":
+    def _check(self) -> None:
         # The other way round is told when it is run, so that a scene can leave the file open.
         if self.file is not None and self.waveform != "file":
             raise fault(f'drive.file is for drive.waveform = "file", not for "{self.waveform}"')
@@ -245,7 +252,6 @@ class Drive(Table):
                 f"drive.frequency = {self.frequency:g} Hz must be a number from 0.1 to 10000 Hz "
                 "with drive.quantised = true"
             )
-        return self
 
     def _check_table(self) -> None:
         if self.table is None:
@@ -301,17 +307,11 @@ class Circuit(Table):
     open_loop_gain: float = _number(98.0, "dB", 20.0, 200.0, "Open-loop gain of the amplifier")
     slew_rate: float = _number(10e6, "V/s", 1e2, 1e12, "Slew rate of the power amplifier")
     swing_loss_high: float = _number(
-        4.0,
-        "V",
-        0.0,
-        1e3,
+        *(4.0, "V", 0.0, 1e3),
         "Supply less highest output; the data sheet's, which full takes, is 2.6 V at 1.3 A",
     )
     swing_loss_low: float = _number(
-        4.0,
-        "V",
-        0.0,
-        1e3,
+        *(4.0, "V", 0.0, 1e3),
         "Lowest output less negative supply; the data sheet's, which full takes, is 1.7 V at 1.3 A",
     )
     output_resistance: float = _number(
@@ -343,8 +343,7 @@ class Circuit(Table):
         own = {name.partition(".")[2]: value for name, value in given.items()}
         return {name: data[name] for name in data if name not in given} | {"param": known | own}
 
-    @model_validator(mode="after")
-    def _check(self) -> "Circuit":
+    def _check(self) -> None:
         rung = RUNGS[self.model]
         for key in ("swing_loss_high", "swing_loss_low"):
             if key in rung.keys and (loss := getattr(self, key)) >= self.supply:
@@ -354,7 +353,6 @@ class Circuit(Table):
         _both_or_neither("circuit", self, "snubber_resistance", "snubber_capacitance")
         if rung.own_netlist != (self.netlist is not None):
             raise fault('circuit.model = "file" and circuit.netlist must be given together')
-        return self
 
 
 class Coil(Table):
@@ -384,10 +382,8 @@ class Coil(Table):
         7.8, "J/K", 1e-6, 1e6, "Heat capacity of the actuator's body; 6 to 10 by its mass"
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> "Coil":
+    def _check(self) -> None:
         _both_or_neither("coil", self, "eddy_inductance", "eddy_resistance")
-        return self
 
 
 RAMS = ("ram",)
@@ -435,8 +431,7 @@ class Mechanics(Table):
         """Whether the coil throws a ram."""
         return self.actuator in RAMS
 
-    @model_validator(mode="after")
-    def _check(self) -> "Mechanics":
+    def _check(self) -> None:
         least = 1.1 * self.travel  # nearer, the force at the lower wall has no bound
         if self.suspension == "repulsion" and self.suspension_distance < least:
             raise fault(
@@ -444,7 +439,6 @@ class Mechanics(Table):
                 f"1.1 times mechanics.travel = {self.travel:g} m with "
                 'mechanics.suspension = "repulsion"'
             )
-        return self
 
 
 class Friction(Table):
@@ -468,13 +462,11 @@ class Friction(Table):
             raise fault(said_twice(*(f"friction.{key}" for key in NORMAL_FORCES)))
         return data
 
-    @model_validator(mode="after")
-    def _check(self) -> "Friction":
+    def _check(self) -> None:
         if self.mu_k > self.mu_s:
             raise fault(
                 f"friction.mu_k = {self.mu_k:g} must be at most friction.mu_s = {self.mu_s:g}"
             )
-        return self
 
 
 class Coupling(Table):
@@ -517,19 +509,13 @@ class Run(Table):
 
     duration: float = _number(2.0, "s", 1e-6, 1e5, "Simulated time")
     settle: float = _number(
-        0.8,
-        "s",
-        0.0,
-        1e5,
+        *(0.8, "s", 0.0, 1e5),
         "Start of the averages; by default a multiple of 24, 12, 6 or 2 periods of the drive "
         "before the end, about half of the duration",
     )
     output_step: float = _number(5e-5, "s", 1e-9, 1e3, "Time between rows of the waveforms")
     shutter: float = _number(
-        0.0,
-        "1",
-        0.0,
-        1.0,
+        *(0.0, "1", 0.0, 1.0),
         "Exposure of the camera that reads the run, as a share of the time between its frames",
     )
     average: Literal["ends", "slope"] = _choice(
@@ -538,10 +524,7 @@ class Run(Table):
         "part's heights in the frames of a camera, at settle + k/960 s, as a trial's record has it",
     )
     tolerance: float = _number(
-        0.01,
-        "1",
-        1e-6,
-        1.0,
+        *(0.01, "1", 1e-6, 1.0),
         "Relative error of v_average that a simpler circuit may make: auto, ladder",
     )
     solver: Literal["fmu", "fast"] = _choice(
@@ -549,8 +532,7 @@ class Run(Table):
     )
     step: float = _number(4.3e-5, "s", 1e-7, 1e-3, "Step of the solver fast")
 
-    @model_validator(mode="after")
-    def _check(self) -> "Run":
+    def _check(self) -> None:
         for key in self.model_fields_set & {"settle", "output_step"}:
             if (value := getattr(self, key)) > self.duration - SHORTEST:
                 raise fault(
@@ -567,7 +549,6 @@ class Run(Table):
                 f"run.duration = {self.duration:g} s; it must be at least "
                 f"{self.duration / MAX_ROWS:g} s"
             )
-        return self
 
 
 class Fmu(Table):
@@ -638,8 +619,7 @@ class Port(Table):
         """Both ends, for messages."""
         return f"{self.probe or self.origin or 'nothing'} -> {self.source or self.to or 'nothing'}"
 
-    @model_validator(mode="after")
-    def _check(self) -> "Port":
+    def _check(self) -> None:
         if self.probe is not None and not self.probe.strip():
             raise fault("probe must be a vector or an expression of the netlist")
         if len(self.source or "") > LONGEST_NAME:
@@ -656,7 +636,6 @@ class Port(Table):
                 f'the port {self.words}: slope = "{self.slope}" is for ports from an output of an '
                 "FMU; leave it out"
             )
-        return self
 
 
 MACHINE = "machine"

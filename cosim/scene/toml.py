@@ -27,11 +27,8 @@ _DOTTED = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 
 def parse(text: str) -> dict[str, Any]:
     """The content of TOML. Raises ValueError or RecursionError, as tomllib does."""
-
-    def blank(found: re.Match[str]) -> str:
-        return "" if found[0].startswith("#") else "x"
-
-    if _DOTTED.search(_STRINGS.sub(blank, text)):
+    bare = _STRINGS.sub(lambda found: "" if found[0].startswith("#") else "x", text)
+    if _DOTTED.search(bare):
         raise ValueError(f"a key has more than {MOST_PARTS} parts")
     return tomllib.loads(text)
 
@@ -41,4 +38,4 @@ def read(path: Path) -> dict[str, Any]:
     try:
         return parse(reader.read(path, LARGEST).decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
-        raise BadInput(f"{plain(str(path))}: is no valid TOML: {error}.") from error
+        raise BadInput(f"{plain(path)}: is no valid TOML: {error}.") from error

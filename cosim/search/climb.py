@@ -4,8 +4,7 @@ The objective of a study jumps where a mode of motion ends, is ragged where moti
 is missing where a scene cannot be run: no method that trusts a slope finds its way there. Its
 heights are narrow ridges aslant to the keys, which the covariance of CMA-ES learns.
 
-N. Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772 (2016), as the package cmaes
-has it.
+N. Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772 (2016), by the package cmaes.
 """
 
 from math import inf

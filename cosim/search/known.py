@@ -28,8 +28,7 @@ class Known:
         self._tree: KDTree | None = None
 
     def rows(self, points: Array) -> list[int]:
-        """The rows here of the nearest points that can be set, which are run where they are not
-        known."""
+        """The rows here of the nearest points that can be set, which are run if not known."""
         points = np.round(np.clip(points, 0.0, 1.0) * self._steps) / self._steps
         # Rounded alike, equal points have equal bytes; one that is asked for twice is run once.
         keys = [point.tobytes() for point in points]

@@ -11,14 +11,8 @@ from matplotlib.axis import Axis
 
 from cosim.files.picture import Picture
 
-VERMILION, BLUE, GREEN, ORANGE, SKY, PURPLE = (
-    "#d55e00",
-    "#0072b2",
-    "#009e73",
-    "#e69f00",
-    "#56b4e9",
-    "#aa4499",
-)
+VERMILION, BLUE, GREEN = "#d55e00", "#0072b2", "#009e73"
+ORANGE, SKY, PURPLE = "#e69f00", "#56b4e9", "#aa4499"
 """Okabe and Ito's colours, which the colour-blind tell apart; a darker purple."""
 FAINT: dict[str, Any] = {"color": "0.74", "marker": ".", "ms": 4, "lw": 0.0, "zorder": 1}
 """Style of points that are there to be counted, not to be read."""

@@ -5,21 +5,21 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cosim.studies.tables import Row, write_csv, write_page
+
+if TYPE_CHECKING:
+    from cosim.files.picture import Picture
 
 Progress = Callable[[int, int, str], object]
 """Is told how many steps of a study are done, of how many, and which one was the last."""
 
 
-def counted(progress: Progress, total: int) -> Callable[..., None]:
+def counted(progress: Progress, total: int) -> Callable[..., object]:
     """What is to be called, with a name or without, as each of ``total`` steps is done."""
     steps = count(1)
-
-    def tick(what: str = "") -> None:
-        progress(next(steps), total, what)
-
-    return tick
+    return lambda what="": progress(next(steps), total, what)
 
 
 def silent(done: int, total: int, what: str = "") -> None:
@@ -39,8 +39,8 @@ class Report:
     """Paragraphs that say what it means, the most important first."""
     tables: Mapping[str, Sequence[Row]]
     """What a page shows of it, by heading."""
-    figures: Mapping[str, Callable[[Path], object]] = field(default_factory=dict)
-    """What draws each figure into a file, by what its name has after the report's."""
+    figures: Mapping[str, Callable[[], "Picture"]] = field(default_factory=dict)
+    """What draws each figure, by what its file's name has after the report's."""
     printed: str = ""
     """What is printed; the first sentence unless told otherwise."""
 
@@ -51,7 +51,7 @@ class Report:
         write_csv(out / f"{self.name}.csv", self.rows)
         write_page(out / f"{self.name}.md", self.title, self.sentences, self.tables)
         for end, draw in self.figures.items():
-            draw(out / f"{self.name}{end}.png")
+            draw().write(out / f"{self.name}{end}.png")
 
     def written(self, folder: str | os.PathLike[str]) -> str:
         """The sentence that names what ``save`` writes."""

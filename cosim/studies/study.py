@@ -32,8 +32,7 @@ class Option:
     metavar: str | None = None
     """What stands for its value; a unit where it has one."""
     kind: Callable[[str], Any] = str
-    """Makes the value of what is typed; ``bool`` of nothing more than the option's name, which is
-    False for ``--no-…``."""
+    """Makes the value of what is typed; ``bool`` of its name alone, False for ``--no-…``."""
     default: Any = None
     """The function's own where nothing is given, as the help says it; None: said in ``help``."""
     parameter: str = ""

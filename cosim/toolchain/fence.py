@@ -60,8 +60,7 @@ lacking: tuple[str, ...] = ()
 
 def close(reads: Iterable[str]) -> None:
     """Close the fence: from now on this process reads the libraries and what lies at or below the
-    paths ``reads``, and writes the working folder. Threads that run already stay outside.
-    """
+    paths ``reads``, and writes the working folder. Threads that run already stay outside."""
     global lacking
     _limit()
     if not sys.platform.startswith("linux"):

@@ -10,9 +10,7 @@ from typing import Any
 Handler = Any
 """What the module signal takes and gives for one."""
 
-SIGNALS = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-]
+SIGNALS = [each for each in signal.Signals if each.name in ("SIGINT", "SIGTERM", "SIGHUP")]
 
 
 GRACE = 30

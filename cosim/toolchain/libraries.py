@@ -53,8 +53,7 @@ def library(name: str) -> ctypes.CDLL:
 
 @cache
 def structures(name: str) -> dict[str, type[ctypes.Structure]]:
-    """The structures that the C of the library ``name`` declares; pointers are addresses in them.
-    Raises BadInput."""
+    """The structures that the library ``name`` declares, pointers as addresses. Raises BadInput."""
     known = dict(_TYPES)
     declared = _built(name)["interfaces"][name]["structures"]
     for structure, fields in declared.items():

@@ -142,8 +142,7 @@ class Worker:
     def call(self, argument: Any, progress: Progress, heed: Callable[[], None]) -> Any:
         """What the function gives, while ``progress`` is told the time that it has reached and
         ``heed`` may raise. Raises EOFError where the process has died; and what the function
-        raises: then, but for BadInput, and where it hangs, the process is not to be used again.
-        """
+        raises: then, but for BadInput, and where it hangs, the process is not to be used again."""
         self.given, self.began, self.usable = self.given + 1, False, False
         self._rest()
         self._send(argument)
@@ -279,10 +278,8 @@ def in_a_worker() -> bool:
 
 def _error(name: str, text: str) -> Exception:
     """An error of a bounded process: one of ours or of Python's, by its name."""
-    known = vars(builtins) | {
-        one.__name__: one for one in (BadInput, SimulationFailed, StepTooSmall)
-    }
-    kind: Any = known.get(name)
+    ours = (BadInput, SimulationFailed, StepTooSmall)
+    kind: Any = (vars(builtins) | {one.__name__: one for one in ours}).get(name)
     with suppress(TypeError):  # one that takes more than a text
         if issubclass(kind, Exception):
             return kind(_printable(text))

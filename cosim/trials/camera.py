@@ -44,16 +44,14 @@ def instants(frames: Array, exposure: float) -> Array:
 
 
 def shown(heights: Array, exposure: float) -> Array:
-    """What frames show of the heights (or rows of them) at their instants: the mean of each
-    exposure (s)."""
+    """What frames show of heights (or rows of them) at their instants: means of exposures (s)."""
     n = instants_a_frame(exposure)
     return heights.reshape(-1, n, *heights.shape[1:]).mean(axis=1) if n > 1 else heights
 
 
 def heights(waveforms: Mapping[str, Array], body: str, frames: Array, exposure: float) -> Array:
     """Heights (m) of a body of a run (its waveforms, SI, by name) as frames at these times (s) with
-    this exposure (s) show them. Where an exposure reaches beyond the run, it stands still there.
-    """
+    this exposure (s) show them. Where an exposure reaches beyond the run, it stands still there."""
     time = waveforms["time"]
     at = np.clip(instants(frames, exposure), time[0], time[-1])
     return shown(hermite(at, time, waveforms[f"z_{body}"], waveforms[f"v_{body}"]), exposure)
@@ -68,8 +66,7 @@ def velocities(time: Array, z: Array) -> Array:
 
 def accelerations(z: Array) -> Array:
     """Five-point differences of heights (or rows of them) at FRAME_RATE, m/s² for m; NaN in the
-    first two and the last two frames.
-    """
+    first two and the last two frames."""
     a = np.full(z.shape, np.nan)
     a[2:-2] = (2 * z[4:] - z[3:-1] - 2 * z[2:-2] - z[1:-3] + 2 * z[:-4]) * FRAME_RATE**2 / 7.0
     return a

@@ -19,8 +19,7 @@ OF_PAPER = 9
 
 def measured(scene: Scene) -> tuple[int, dict[str, float]] | None:
     """The trial's number and its statistics, by the names of a run's summary; None where a scene is
-    none of the trials', or differs in more than its circuit's model and what a run writes down.
-    """
+    none of the trials', or differs in more than its circuit's model and what a run writes down."""
     found = re.fullmatch(r"trial-(\d\d)", scene.name)
     number = OF_PAPER if scene.name == "paper" else int(found[1]) if found else None
     if number not in _table() or _moved(scene) != _moved(load(scene.name)):

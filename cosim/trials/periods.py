@@ -12,8 +12,7 @@ ALIKE = 0.5
 """Correlation of a signal with itself a period later, below which it has no period."""
 
 NEARLY = 0.9
-"""Of the best correlation: the first lag that reaches this is the period, later ones its
-multiples."""
+"""Of the best correlation: the first lag that reaches this is the period, later ones multiples."""
 
 FINEST = 1 << 18
 """Points of the even grid on which the signal is correlated, at most."""
@@ -135,8 +134,7 @@ def whole_periods(time: Array, period: float) -> int:
 
 def drift(time: Array, heights: Array, period: float | None) -> float:
     """Mean velocity over whole periods (s): the mean over all spans of that length in the
-    recording; over the whole recording where it has no whole period. NaN are left out.
-    """
+    recording; over the whole recording where it has no whole period. NaN are left out."""
     known = np.isfinite(heights)
     time, heights = time[known], heights[known]
     periods = whole_periods(time, period) if period else 0
@@ -150,8 +148,7 @@ def drift(time: Array, heights: Array, period: float | None) -> float:
 
 def one_period_later(time: Array, values: Array, period: float, gained: float = 0.0) -> Array:
     """A signal's forecast of itself: what it was a period (s) ago, and what it gains in one; NaN
-    in the first period.
-    """
+    in the first period."""
     known = np.isfinite(values)
     ago = np.interp(time - period, time[known], values[known], left=np.nan)
     return ago + gained

@@ -20,8 +20,7 @@ GAP = 1.5
 
 @dataclass(frozen=True)
 class Recording:
-    """``signals`` over ``time`` (s, from the first row on) by the names of the waveforms, SI; NaN
-    where nothing is known.
+    """``signals`` over ``time`` (s, from the first row on) by waveforms' names, SI; NaN if unknown.
 
     Where there are heights there are velocities too: Tracker's, or differences as it makes them.
     """
@@ -83,7 +82,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
         notes += (f"No time column: read at {FRAME_RATE:g} frames/s, as the published trials are.",)
     signals = {k: table.columns[k] for k in WORDS if k in table.columns and k != "time"}
     if not signals:
-        raise BadInput(f"{plain(str(path))}: no column to compare. Understood are: {UNDERSTOOD}.")
+        raise BadInput(f"{plain(path)}: no column to compare. Understood are: {UNDERSTOOD}.")
     for body in ("surface", "part"):
         if f"z_{body}" in signals:
             central = velocities(time, signals[f"z_{body}"])
@@ -93,7 +92,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
                 signals[f"v_{body}"] = there
     for name, values in signals.items():
         if np.isfinite(values).sum() < 2:
-            where = f"{plain(str(path))}: column {plain(table.headers[name], 40)}"
+            where = f"{plain(path)}: column {plain(table.headers[name], 40)}"
             raise BadInput(f"{where}: it has fewer than two values.")
     across = table.columns.get("v_across_surface", np.full(count, np.nan))
     columns = {

@@ -102,8 +102,7 @@ class Column:
 @dataclass(frozen=True)
 class Table:
     """``columns`` by the names of the waveforms, and of ``TRIALS``, SI, NaN where nothing is known;
-    ``known``: where they are from; ``notes``: what was left out.
-    """
+    ``known``: where they are from; ``notes``: what was left out."""
 
     columns: dict[str, Array]
     known: dict[str, Column]

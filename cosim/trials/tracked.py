@@ -57,7 +57,7 @@ def trial_files(folder: Path, apart: Path | None = None) -> list[Path]:
     the file ``apart``. What is no file stays, for the reader to refuse: a trial whose link leads
     nowhere must not be left out in silence.
     """
-    name = plain(str(folder))
+    name = plain(folder)
     try:
         found = sorted(folder.iterdir())
     except OSError as error:
@@ -74,7 +74,7 @@ def trial_files(folder: Path, apart: Path | None = None) -> list[Path]:
     for path in files:  # a trial's name stands in tables, figures and names of files
         if not path.name.isprintable() or len(os.fsencode(path.name)) > LONGEST_NAME:
             words = f"must be printable and have at most {LONGEST_NAME} bytes; rename it"
-            raise BadInput(f"{plain(str(path))}: the name of a trial {words}.")
+            raise BadInput(f"{plain(path)}: the name of a trial {words}.")
         if path.stem in stems:
             raise BadInput(f"{name}: two trials are called {path.stem}; rename one of them.")
         stems.add(path.stem)
@@ -88,12 +88,11 @@ def read(path: Path) -> Trial:
     for name, letters in (("time", "t"), ("z_surface", "zp"), ("z_part", "zo")):
         if name not in table.columns:
             found = ", ".join(table.headers.values())
-            raise BadInput(f"{plain(str(path))}: there is no column {letters} (found: {found}).")
+            raise BadInput(f"{plain(path)}: there is no column {letters} (found: {found}).")
     known = np.isfinite(table.columns["z_surface"] + table.columns["z_part"])
     if known.sum() < FEWEST_ROWS:
         raise BadInput(
-            f"{plain(str(path))}: {known.sum()} rows have both zp and zo, and {FEWEST_ROWS} are "
-            "needed."
+            f"{plain(path)}: {known.sum()} rows have both zp and zo, and {FEWEST_ROWS} are needed."
         )
     columns = {name: values[known] for name, values in table.columns.items()}
     platform, part = track(columns, "surface"), track(columns, "part")
@@ -103,7 +102,7 @@ def read(path: Path) -> Trial:
 
 def read_platform(path: Path) -> tuple[Array, Track]:
     """Times (s) and motion of the surface, which may be all that was tracked. Raises BadInput."""
-    table, name = read_table(path), plain(str(path))
+    table, name = read_table(path), plain(path)
     found = ", ".join(table.headers.values())
     if "time" not in table.columns:
         raise BadInput(f"{name}: there is no column with the time (found: {found}).")

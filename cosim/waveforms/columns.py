@@ -47,8 +47,7 @@ UNITS = {name: column.unit for name, column in COLUMNS.items()}
 
 
 def about(name: str, unit: str) -> dict[str, str]:
-    """The attributes of a column in a dataset; one that a scene's own FMUs gave has no more words
-    than its name."""
+    """A column's attributes in a dataset; one of a scene's own FMUs has no words but its name."""
     return {"units": unit} | ({"long_name": COLUMNS[name].long_name} if name in COLUMNS else {})
 
 

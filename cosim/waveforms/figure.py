@@ -104,8 +104,7 @@ def _last_periods(scene: Scene, time: Array) -> slice:
 
 def _outline(time: Array, values: Array) -> tuple[Array, Array]:
     """A curve of fewer points that covers the same pixels: of each of many short stretches the
-    smallest and the largest value. One of not so many points stays as it is.
-    """
+    smallest and the largest value. One of not so many points stays as it is."""
     if len(time) <= _MOST_ROWS:
         return time, values
     starts = np.linspace(0, len(time), _STRETCHES + 1).astype(int)

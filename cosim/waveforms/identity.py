@@ -50,7 +50,7 @@ def tell_strangers(folder: Path, attributes: Mapping[str, str]) -> None:
     if other:
         verb = "is" if len(other) == 1 else "are"
         warnings.warn(
-            f"{plain(str(folder))}: {', '.join(other)} {verb} not of the run in waveforms.nc, as "
+            f"{plain(folder)}: {', '.join(other)} {verb} not of the run in waveforms.nc, as "
             "after a kill; run it again to have them all of one.",
             Note,
             stacklevel=2,

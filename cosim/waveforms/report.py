@@ -61,8 +61,7 @@ def asked_for(scene: Scene) -> set[str]:
 
 
 def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str:
-    """The numbers of a scene with its own FMUs, a line for each waveform that is not 0, those that
-    are asked for first."""
+    """Numbers of a scene with own FMUs: a line for each waveform not 0, those asked for first."""
     every = [name.removesuffix(".mean") for name in summary if name.endswith(".mean")]
     asked, moving = asked_for(scene), [name for name in every if summary[f"{name}.rms"] != 0.0]
     ranked = sorted(moving, key=lambda name: name not in asked)

@@ -124,7 +124,7 @@ def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str,
         raise
     except Exception as error:  # there is little that scipy does not raise on a damaged file
         raise BadInput(
-            f"{plain(str(path))}: this is not a whole waveforms.nc ({_why(error)})."
+            f"{plain(path)}: this is not a whole waveforms.nc ({_why(error)})."
         ) from None
     return {name: np.array(v, dtype=np.float64) for name, v in columns.items()}, units, attributes
 
@@ -134,7 +134,7 @@ class _Damaged(Exception):
 
 
 def _why(error: Exception) -> str:
-    return plain(str(error)) if isinstance(error, _Damaged) else "it is damaged, or cut off"
+    return plain(error) if isinstance(error, _Damaged) else "it is damaged, or cut off"
 
 
 def _text(value: object) -> str:
@@ -167,5 +167,5 @@ def read_sweep(folder: Path) -> "xr.Dataset":
         if not grid or not all(isinstance(text, str) for text in said):
             raise _Damaged("there are no points, or no words for their numbers")
     except Exception as error:  # there is little that scipy does not raise on a damaged file
-        raise BadInput(f"{plain(str(path))}: not a whole sweep ({_why(error)}).") from None
+        raise BadInput(f"{plain(path)}: not a whole sweep ({_why(error)}).") from None
     return data

@@ -78,13 +78,10 @@ def _check_required(top: Scope, required: Sequence[Sequence[str]]) -> None:
 
 
 def _check_duplicates(scope: Scope) -> None:
-    seen: set[str] = set()
+    first: dict[str, Element] = {}
     for element in scope.elements:
-        if element.conditional:
-            continue
-        if element.name in seen:
+        if not element.conditional and first.setdefault(element.name, element) is not element:
             refuse(element.line, f"there is a second {shown(element.name)}")
-        seen.add(element.name)
 
 
 def _check_element(element: Element, scope: Scope, names: Names) -> None:

@@ -56,8 +56,7 @@ DROPPED_OPTIONS = word_set(
     "nopage numdgt opts plotabstol plotreltol plotvntol plotwinsize post probe savecurrents "
     "runlvl srcstepmethod stepgmin thev_induc topologycheck warn width wnflag"
 )
-"""Options of output, which a host sets itself (``interp`` gives wrong waveforms), and of how other
-programs compute."""
+"""Of output, which a host sets itself (``interp`` gives wrong waveforms), and of other programs."""
 
 MODELS = word_set("r res c l d npn pnp nmos pmos vdmos njf pjf nmf pmf sw csw vswitch iswitch ltra")
 """Not numd, nbjt, numos, whose cards name files, and no code models."""
@@ -164,7 +163,7 @@ class _Reader:
 
     def _top(self) -> str:
         """The text of the netlist itself."""
-        name = plain(str(self.path))
+        name = plain(self.path)
         try:
             self.path = self.path.absolute()
             text = self._opened(self.path)
@@ -180,8 +179,7 @@ class _Reader:
     def _take(
         self, lines: Iterator[Line], opened: tuple[Path, ...], section: str | None = None
     ) -> bool:
-        """Take the lines of a file, or of one section of it; whether ``.end`` or the section was
-        met."""
+        """Take the lines of a file, or of a section of it; whether ``.end`` or that was met."""
         inside = section is None
         found = False
         for line in lines:

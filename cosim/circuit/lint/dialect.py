@@ -76,8 +76,8 @@ _TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECA
 _TEMP = re.compile(r"\.(?:temp\b[\s=]*|opt\w*\s(?:.*[\s,])?temp\s*=\s*)(\{[^{}]*\}|[^\s,]+)", re.I)
 _WARMTH = re.compile(r"(?<![\w.])temp(?!\w|\s*[=(])")
 _SYNONYMS = {".params": ".param", ".define": ".param", "cap": "c", "ind": "l"}
-_COMPOUND = re.compile(r"\{[^{}]*[^\w.{}\s][^{}]*\}")
-"""In B sources ngspice pastes what is in braces without them: ``{a+b}*2``."""
+_COMPOUND = re.compile(r"\{([^{}]*[^\w.{}\s][^{}]*)\}")
+"""In B sources ngspice pastes what is in braces without them: ``{a+b}*2``, not ``{(a+b)}*2``."""
 _EQUAL = re.compile(
     r"(?<![\w.)}\]])((?!time)[a-z_]\w*|\{\w+\})\s*([=!<]=|<>|>(?!=))\s*(\d+\.?\d*)(?![\w.*/^+-])",
     re.I,
@@ -132,15 +132,13 @@ def in_ngspice(line: Line) -> list[Line]:
     if kind in "beg":
         text = _EQUAL.sub(_compared, text)
         text = re.sub(r"'([^']*)'", r"{\1}", text)
-        if any(map(_is_bare, _COMPOUND.finditer(text))):
+        if any(each[0] != "(" or closing(each, 0) < len(each) for each in _COMPOUND.findall(text)):
             text = text.replace("{", "{(").replace("}", ")}")
     if kind in "rclvibefgh":
         *parts, own = _with_parts(text, kind)
-        found = [*parts, _source(own) if kind in "efgh" else own]
-        if kind in "beg":
-            found = [*parts, *_with_memory(found[-1])]
-        elif kind in "rcl":
-            found = [*parts, *_with_law(own)]
+        own = _source(own) if kind in "efgh" else own
+        split = _with_memory if kind in "beg" else _with_law if kind in "rcl" else lambda one: [one]
+        found = [*parts, *split(own)]
     elif kind == "a":
         found = _gate(text)
     elif coils := _COILS.fullmatch(text):
@@ -196,8 +194,7 @@ def prelude(lines: Sequence[Line]) -> list[Line]:
 def in_ngspice_together(lines: Sequence[Line]) -> list[Line]:
     """What takes more than one line to read: models that are a kind of another (``ako:``), switches
     and diodes of other programs as B sources, and currents of inductors in ``.ic``. Where a model
-    is not theirs to the letter a line ``.told`` says so. Raises BadInput.
-    """
+    is not theirs to the letter a line ``.told`` says so. Raises BadInput."""
     scopes, lines = [*_scopes(lines)], [*lines]
     _complete(lines, scopes)
     known: dict[_Key, str] = {}
@@ -325,12 +322,6 @@ def _without_tables(text: str) -> str:
         if call is not None and len(text) + len(call) < MAX_LINE:
             text = text[: match.start()] + call + text[end:]
     return text
-
-
-def _is_bare(match: re.Match[str]) -> bool:
-    """Not in parentheses yet."""
-    inside = match[0][1:-1]
-    return inside[0] != "(" or closing(inside, 0) < len(inside)
 
 
 def _compared(match: re.Match[str]) -> str:

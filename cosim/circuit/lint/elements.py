@@ -6,6 +6,7 @@ Nothing is evaluated: what depends on a value stays undecided.
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import NoReturn
 
 from cosim.circuit.lint.lines import COPY, Line, refuse, shown
@@ -138,7 +139,7 @@ class _Parser:
             ".param": self._param,
             ".func": self._func,
             ".model": self._model,
-            ".global": self._global,
+            ".global": lambda line, found: self.top.globals.update(found[1:]),
         }
         element, holder = None, self.scope
         if not line.text.startswith("."):
@@ -202,9 +203,6 @@ class _Parser:
         self.scope.models.setdefault(found[1], set()).add(found[2])
         self.scope.model_lines[found[1]] = line
 
-    def _global(self, line: Line, found: list[str]) -> None:
-        self.top.globals.update(found[1:])
-
     def _place_nodes(self) -> None:
         calls: list[tuple[Element, set[str], Scope]] = []
         waiting = [self.top]
@@ -235,12 +233,10 @@ def _check_brackets(line: Line) -> None:
     if line.text.count("'") % 2:
         refuse(line, "a quote is not closed, so the line may be cut short")
     for opening, shutting in ("{}", "()"):
-        depth = 0
-        for char in line.text:
-            depth += (char == opening) - (char == shutting)
-            if depth < 0:
-                refuse(line, f"{shutting} closes nothing")
-        if depth:
+        depths = [*accumulate((char == opening) - (char == shutting) for char in line.text)]
+        if min(depths) < 0:
+            refuse(line, f"{shutting} closes nothing")
+        if depths[-1]:
             refuse(line, f"{opening} is not closed, so the line may be cut short")
 
 

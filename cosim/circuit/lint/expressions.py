@@ -31,8 +31,7 @@ BEHAVIOURAL = _COMMON | dict.fromkeys(word_set("ddt eq0 ge0 gt0 le0 lt0 ne0 u u2
 """Those of its behavioural sources, except ``pwl``, which takes any number of points. ngspice
 replaces the random ones by a number as it reads the netlist."""
 MOST_CALLS, DEEPEST = 10_000, 100
-"""Calls of functions within functions, all told and one in another: ngspice 39 writes each out, so
-many in some 0.15 s."""
+"""Calls within functions, all told and one in another: ngspice 39 writes so many out in 0.15 s."""
 CONSTANTS = word_set("time temper hertz")
 BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
 
@@ -41,9 +40,6 @@ _VARYING = re.compile(r"\b(?:[vi]\s*\(|(?:time|temper|hertz)\b)", re.IGNORECASE)
 _PLAIN = re.compile(r"\s*\{?\s*[+-]?\s*[\w.]+(?:(?<=\de)[+-]?\d+)?\s*\}?\s*", re.IGNORECASE)
 _POINT = re.compile(
     r"(?:[\s(+-]*(?:\{ *\}|[\d.]\w*(?:\.\w*)?(?:(?<=\de)[+-]\d+)?)|[\s(]*[a-z_]\w*)[\s)]*", re.I
-)
-_TOKEN = re.compile(
-    r"(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?[a-z]*|@[\w.#]+\[\w+\]|[a-z_][\w.$#]*|.", re.S
 )
 _ASSIGNMENT = re.compile(r"([a-z_]\w*)=([a-z_]\w*)\b(?!\s*\()", re.IGNORECASE)
 _DROPPABLE = re.compile(r"\.model ([^\s(]+)|\.func (\w+)")
@@ -58,8 +54,8 @@ _PIECE = re.compile(
 )
 _BROKEN = re.compile(r"(?:^|[bjp])(?:[ej]|$)|[oe][ob]")
 """Of the first letters of the pieces: an operand lacks, or an operator."""
+_NAME = re.compile(r"[a-z_][\w.$#]*")
 _KEY = re.compile(r"\s*=(?!=)")
-_CALL = re.compile(r"\s*\(")
 _BODY = re.compile(r"\b[vi]\s*=(?!=)", re.IGNORECASE)
 _NEXT_KEY = re.compile(r"\b[a-z_]\w*\s*(?<![<>=!])=(?!=)", re.IGNORECASE)
 _SOURCE = re.compile(r"\b(?:value|vol|cur)\s*=?\s*$", re.IGNORECASE)
@@ -190,10 +186,7 @@ def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str |
     count = len(arguments)
     if name in ("pwl", "table") and behavioural:
         if count >= 5 and count % 2:
-            literal = (
-                _POINT.fullmatch(unbraced(each)) and not _varies(each) for each in arguments[1:]
-            )
-            if not all(literal):
+            if not all(_POINT.fullmatch(unbraced(x)) and not _varies(x) for x in arguments[1:]):
                 return f"the points of {name}() must be plain numbers, or expressions in braces"
             points = [number(argument.strip()) for argument in arguments[1::2]]
             for one, other in pairwise(points):
@@ -228,8 +221,7 @@ def _check_own(
     behavioural: bool | None,
     depth: int = 0,
 ) -> None:
-    """Check a call of the netlist's own function, whose body ngspice puts in its place, and once
-    what the body calls."""
+    """Check a call of the netlist's own function, once also the calls in its body."""
     function = names.only(name)
     if function is None:  # which one is meant is not known
         return
@@ -302,23 +294,19 @@ def check_circles(top: Scope, names: Names) -> None:
 
 
 def used(expression: str) -> Iterator[tuple[str, list[str] | None]]:
-    """The names in an expression, each with its arguments if it is called; nodes and sources are
-    left out."""
-    text = expression.lower()
-    place = 0
-    while match := _TOKEN.match(text, place):
-        token, place = match[0], match.end()
-        if not (token[0].isalpha() or token[0] == "_"):
+    """The names in an expression but for nodes and sources, with their arguments if called."""
+    text, place = expression.lower(), 0
+    while piece := _PIECE.search(text, place):
+        name, place = piece[0].rstrip("( \t"), piece.end()
+        if not _NAME.fullmatch(name):
             continue
-        if _KEY.match(text, place):
-            continue
-        call = _CALL.match(text, place)
-        if call is None:
-            yield token, None
-        elif token in ("v", "i"):
-            place = closing(text, call.end() - 1)
-        else:
-            yield token, split_arguments(text[call.end() : closing(text, call.end() - 1) - 1])
+        end = closing(text, place - 1) if piece["begin"] else place
+        if name in ("v", "i") and piece["begin"]:
+            place = end
+        elif piece["begin"]:
+            yield name, split_arguments(text[place : end - 1])
+        elif not _KEY.match(text, place):
+            yield name, None
 
 
 def sensed(text: str, kind: str) -> Iterator[str]:
@@ -335,8 +323,7 @@ def body(line: Line) -> str:
 
 def _expressions(line: Line, element: Element | None) -> Iterator[tuple[str, bool]]:
     """The expressions of a line, and whether ngspice's parser of behavioural sources evaluates
-    each: outside B sources it does where the expression varies during a run.
-    """
+    each: outside B sources it does where the expression varies during a run."""
     text = line.text
     word = text.split()[0].lower()
     if word == ".param":
@@ -377,10 +364,8 @@ def _varies(expression: str) -> bool:
 
 def _functions(line: Line) -> Iterator[_Function]:
     lower = line.text.lower()
-    if lower.startswith(".func"):
-        match = _FUNC.match(lower)
-        if match:
-            yield _Function(match[1], _formals(match[2]), match[3].strip().strip("{}'"), line)
+    if match := _FUNC.match(lower):
+        yield _Function(match[1], _formals(match[2]), match[3].strip().strip("{}'"), line)
     elif lower.startswith(".param"):
         for (name, formal), expression in definitions(lower):
             if formal is not None:

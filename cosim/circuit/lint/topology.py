@@ -1,7 +1,6 @@
 """Circuits that have no operating point: floating nodes and loops of ideal voltages.
 
-Subcircuits are expanded. An element whose effect is uncertain counts as one that makes the circuit
-solvable.
+Subcircuits are expanded. An element of uncertain effect counts as one that makes it solvable.
 """
 
 import re
@@ -20,6 +19,8 @@ MAX_DEPTH = 50
 _VOLTAGE = "vehl"
 _LEAF = "rcd"
 """Elements of no use with a free end."""
+_SHUNT = re.compile(r"\.opt\w*\s.*\brshunt\s*=", re.IGNORECASE)
+"""An option that puts a resistor from every node to ground."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def check_topology(top: Scope) -> None:
     if GROUND not in terminals:
         refuse(top.line, "the netlist has no ground (node 0)")
     _check_ends(parts, terminals, held | used.pins)
-    if not _shunted(top):
+    if not any(_SHUNT.match(line.text) for line, _ in top.lines):
         _check_paths(parts, held)
     _check_loops(parts)
 
@@ -107,12 +108,6 @@ def _held(top: Scope) -> set[str]:
     directives = (".ic", ".nodeset")
     lines = [line.text for line, _ in top.lines if line.text.lower().startswith(directives)]
     return {name for text in lines for name in sensed(text, "v")}
-
-
-def _shunted(top: Scope) -> bool:
-    """Whether an option puts a resistor from every node to ground."""
-    option = re.compile(r"\.opt\w*\s.*\brshunt\s*=", re.IGNORECASE)
-    return any(option.match(line.text) for line, _ in top.lines)
 
 
 def _check_ends(parts: list[Part], terminals: Counter[str], held: set[str]) -> None:

@@ -58,8 +58,7 @@ _FORMS = {
 
 def written(line: Line, element: Element | None, values: Mapping[str, float]) -> str:
     """The line's text anew, with ``values`` for the parameters of these names. Raises BadInput for
-    what the reader does not know.
-    """
+    what the reader does not know."""
     text = line.text
     word = text.split()[0].lower()
     if element is not None:

@@ -72,8 +72,7 @@ class Transport:
 def average_velocity(case: Transport) -> float:
     """v_ave, the part's mean velocity, m/s, with the optimal waveform; negative downwards.
 
-    Up: (µ_s f − 1)² (A² − (µ_k f + 1)²) g T/(4 A (µ_s + µ_k)² f²) with f = F_n/(m_P g) and
-    A = a_max/g.
+    Up: (µ_s f − 1)² (A² − (µ_k f + 1)²) g T/(4 A (µ_s + µ_k)² f²), f = F_n/(m_P g), A = a_max/g.
     """
     pair = case.coefficients()
     speed = horizontal_velocity(*pair, case.a_max, case.period, case.gravity)

@@ -17,8 +17,7 @@ from cosim.drive.surface.formulas import (
 from cosim.errors import BadInput
 
 ROUNDING_MARGIN = 1e-9
-"""The ``margin`` of :func:`optimal_cycle` that rounding needs; solvers whose events are less exact
-need more."""
+"""The ``margin`` of :func:`optimal_cycle` that rounding needs; less exact solvers need more."""
 
 
 @dataclass(frozen=True)

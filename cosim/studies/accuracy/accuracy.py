@@ -10,13 +10,13 @@ from dataclasses import asdict
 from functools import partial
 from itertools import accumulate
 from math import exp, inf, isfinite, log, nan
-from pathlib import Path
 from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from cosim.evaluate.store import Store, reported
+from cosim.files.picture import Picture
 from cosim.studies.accuracy.cases import CASES, reference
 from cosim.studies.accuracy.solvers import DEFAULT, SOLVERS, Run, Solver, measure
 from cosim.studies.plots import (
@@ -207,7 +207,7 @@ def report(runs: Sequence[Run], solvers: Sequence[Solver] = SOLVERS) -> Report:
     )  # fmt: skip
 
 
-def draw(runs: Sequence[Run], strong: Mapping[str, str], title: str, path: Path) -> None:
+def draw(runs: Sequence[Run], strong: Mapping[str, str], title: str) -> Picture:
     """Draw error over CPU time, a panel a scene; ``strong`` are names of methods by label."""
     scenes = list(dict.fromkeys(run.scene for run in runs))
     wide = min(len(scenes), 2)
@@ -221,7 +221,7 @@ def draw(runs: Sequence[Run], strong: Mapping[str, str], title: str, path: Path)
         _panel(axis, [run for run in runs if run.scene == scene], strong)
         axis.set_title(CASES[scene].title, fontsize=10.5, loc="left")
         axis.set(xlabel="CPU time [s]", ylabel="error / range")
-    figure.write(path)
+    return figure
 
 
 def _panel(axis: Axes, runs: Sequence[Run], strong: Mapping[str, str]) -> None:

@@ -1,7 +1,6 @@
 """What the accuracy study compares: each solver with its ladder of settings, and how it is run.
 
-The error is the greatest over time of what a scene judges, in units of its range; the time is the
-process's CPU time.
+The error is the greatest over time of what a scene judges, over its range; the time is CPU time.
 """
 
 from collections.abc import Callable, Iterator, Sequence

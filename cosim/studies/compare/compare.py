@@ -51,8 +51,7 @@ APART = 0.05
 class Found:
     """A run laid over a recording, from ``start`` (s) of the run on.
 
-    ``recording`` is the stretch that was compared, ``simulated`` has its signals. ``numbers`` begin
-    with the scores.
+    ``recording`` is what was compared, ``simulated`` has its signals; scores lead ``numbers``.
     """
 
     recording: Recording
@@ -237,8 +236,7 @@ def _comparable(
 
 def _covered(recording: Recording, length: float) -> Recording:
     """What a run of this length (s) covers, from the first row whose velocity is known: with that
-    begins a run whose surface is a recording's.
-    """
+    begins a run whose surface is a recording's."""
     v = recording.signals.get("v_surface")
     first = 0 if v is None else int(np.argmax(np.isfinite(v)))
     time = recording.time - recording.time[first]

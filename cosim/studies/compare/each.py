@@ -1,6 +1,5 @@
 """The trials of a folder, each against the built-in scene with its number: how far the whole chain,
-from the command to the part, can be trusted.
-"""
+from the command to the part, can be trusted."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -9,6 +8,7 @@ from pathlib import Path
 from statistics import median
 
 from cosim.errors import BadInput, plain
+from cosim.files.picture import Picture
 from cosim.scene import load
 from cosim.scene.loading import Overrides, list_scenes
 from cosim.studies.compare.run import Comparison, compare
@@ -28,7 +28,7 @@ def each(
         name = f"trial-{number_of(path) or 0:02d}"
         if name not in known:
             raise BadInput(
-                f"{plain(str(path))}: there is no built-in scene {name}; the last number in the "
+                f"{plain(path)}: there is no built-in scene {name}; the last number in the "
                 "file's name must be that of one of the scenes trial-01 to trial-10."
             )
         pairs.append((load(name, overrides), path))
@@ -58,10 +58,8 @@ COLUMNS: dict[str, tuple[str, float]] = {
 
 def row(found: Comparison) -> Row:
     """A trial's row of the table."""
-    numbers, told = found.numbers, {}
-    for title, (name, scale) in COLUMNS.items():
-        value = numbers.get(name)
-        told[title] = nan if value is None else value * scale
+    numbers = {name: nan if x is None else x for name, x in found.numbers.items()}
+    told = {title: scale * numbers.get(name, nan) for title, (name, scale) in COLUMNS.items()}
     return {"scene": found.run, **told}
 
 
@@ -113,7 +111,7 @@ def message(rows: Sequence[Row]) -> str:
     )
 
 
-def draw(rows: Sequence[Row], path: Path) -> None:
+def draw(rows: Sequence[Row]) -> Picture:
     """Draw the explained shares, the part's errors and its drifts, a bar a trial."""
     figure, (shares, errors, drifts) = panels(
         message(rows),
@@ -141,4 +139,4 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     errors.margins(y=0.5)
     errors.legend(fontsize=8, loc="upper left")
     shares.set_ylim(min(0.0, *(one[first] for one in rows)), 1.25)
-    figure.write(path)
+    return figure

@@ -38,8 +38,7 @@ class Comparison:
     @property
     def numbers(self) -> dict[str, float | None]:
         """All numbers by name; SI but for ``_mm`` and ``_percent``. A score stands by its own name,
-        and with ``_ceiling``, ``_no_motion`` and ``_straight_line`` for what needs no model.
-        """
+        and with ``_ceiling``, ``_no_motion`` and ``_straight_line`` for what needs no model."""
         return {number.name: number.value for number in self.found.numbers}
 
     def plot(self) -> Picture:
@@ -125,7 +124,7 @@ def compare(
     """
     if not isinstance(run, Result | Scene) and Path(run).suffix.lower() == ".csv":
         raise BadInput(
-            f"{plain(str(run))}: a table is no run; the run's folder or the scene comes first, the "
+            f"{plain(run)}: a table is no run; the run's folder or the scene comes first, the "
             "trial second."
         )
     measured = read_recording(Path(trial), columns)

@@ -38,8 +38,7 @@ class Number:
 
 
 def explained(found: Array, wanted: Array) -> float:
-    """R²: the share of the variance of ``wanted`` that ``found`` explains; NaN where there is none
-    to be explained."""
+    """R²: the share of the variance of ``wanted`` that ``found`` explains; NaN if it has none."""
     known = np.isfinite(found) & np.isfinite(wanted)
     wanted, found = wanted[known], found[known]
     if not len(wanted) or np.ptp(wanted) == 0.0:

@@ -99,7 +99,7 @@ def fit(
     if evaluate and names != list(published.TRIALS):
         first, last = published.TRIALS[0], published.TRIALS[-1]
         raise BadInput(
-            f"{plain(str(folder))}: the published parameters belong to the trials 1…10 exactly, as "
+            f"{plain(folder)}: the published parameters belong to the trials 1…10 exactly, as "
             f"published, “{first}” to “{last}”."
         )
     read = {} if forces is None else read_forces(forces, names)
@@ -110,7 +110,7 @@ def fit(
         return _evaluated(found, known, solver)
     if mu_k != "free" and not (isinstance(mu_k, int | float) and LEAST_MU_K <= mu_k <= 10):
         words = f"must be from {LEAST_MU_K:g} to 10, or “free”, and is"
-        raise BadInput(f"mu_k {words} {plain(str(mu_k))}.")
+        raise BadInput(f"mu_k {words} {plain(mu_k)}.")
     if mu_k == "free" and not any(force.lower or force.upper for force in known):
         raise BadInput(
             "µ_k can only be fitted where bounds of normal forces are known: name a file."

@@ -66,7 +66,7 @@ def read_forces(source: str | os.PathLike[str], trials: Collection[str]) -> dict
 
 def _rows(path: Path) -> list[tuple[str, str, dict[str, Any]]]:
     """The trials of a file, where each stands, and what the file says of it."""
-    name, found = plain(str(path)), []
+    name, found = plain(path), []
     if path.suffix.lower() == ".toml":
         for trial, row in toml.read(path).items():
             if not isinstance(row, dict):
@@ -76,7 +76,7 @@ def _rows(path: Path) -> list[tuple[str, str, dict[str, Any]]]:
     cells = read_cells(path)
     (line, head), *rows = cells.rows
     if "trial" not in head:
-        said = plain(str(head))
+        said = plain(head)
         raise BadInput(f"{name}: row {line}: the column “trial” is missing (found: {said}).")
     cells.even(1)
     if twice := next((key for key in head if key and head.count(key) > 1), ""):

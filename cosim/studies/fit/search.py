@@ -34,8 +34,7 @@ LOSS = 1.353
 """Half of what Χ² with one degree of freedom exceeds in 10 % of the cases."""
 SYSTEMATIC = 0.05
 """By which intervals are wider on either side, relative: what the model of the motion before and
-after a slide may be wrong by. On trials of this bench, whose friction is known, it is 0.045 (rms
-of 16)."""
+after a slide may be wrong by. On 16 trials of this bench with known friction it is 0.045 (rms)."""
 
 
 def _laws(kinetic: Array, ratios: Array) -> tuple[Array, Array]:

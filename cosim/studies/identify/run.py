@@ -79,7 +79,7 @@ def identify(
     steady = [trial for trial in everything if trial.label not in apart and _steady(trial)]
     others = [trial for trial in everything if trial not in steady]
     if not steady:
-        raise BadInput(f"{plain(str(trials))}: no trial that repeats itself is left to be fitted.")
+        raise BadInput(f"{plain(trials)}: no trial that repeats itself is left to be fitted.")
     effort, count = QUICK if quick else FULL, workers_asked(workers)
 
     def made(store: Store) -> Identification:

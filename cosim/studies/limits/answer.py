@@ -87,8 +87,7 @@ def noise(study: Study, goal: Goal) -> float:
 
 
 def differences(study: Study, goal: Goal) -> list[float]:
-    """The relative differences between robust values of repeated searches on all rigs; one of 0
-    where nothing was repeated."""
+    """Relative differences of robust values of repeated searches on all rigs; 0 where none were."""
     found = []
     for number, points in study.repeats:
         for key, point in points.items():

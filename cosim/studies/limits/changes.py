@@ -87,8 +87,7 @@ class Change:
 
     name: str
     group: str
-    """What of the device: ``waveform``, ``heat``, ``grip``, ``circuit``, or ``coil`` with its
-    magnet."""
+    """What of the device: ``waveform``, ``heat``, ``grip``, ``circuit``, ``coil`` (and magnet)."""
     machine: Callable[[Scene], Machine]
     searched: bool = True
     """Whether the knobs are set anew for it; else it is tried at the best settings of the device as

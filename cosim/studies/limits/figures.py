@@ -1,11 +1,12 @@
 """The figures of the limits, one message each."""
 
 from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from cosim.files.picture import Picture
 from cosim.studies.limits.answer import BY_NAME, gains, in_short, noise
 from cosim.studies.limits.changes import AS_IT_IS
 from cosim.studies.limits.runs import Goal
@@ -28,16 +29,16 @@ COLORS = {
 MARKERS = dict(zip(COLORS, "D^svoP", strict=True))
 
 
-def drawn(study: Study) -> dict[str, Callable[[Path], None]]:
-    """What draws each figure into a file, by what its name has after the study's."""
+def drawn(study: Study) -> dict[str, Callable[[], Picture]]:
+    """What draws each figure, by what its file's name has after the study's."""
     return {
-        "": lambda path: changes(path, study, BY_NAME["v_up"]),
-        "-acceleration": lambda path: changes(path, study, BY_NAME["a_camera"]),
-        "-settings": lambda path: settings(path, study),
+        "": partial(changes, study, BY_NAME["v_up"]),
+        "-acceleration": partial(changes, study, BY_NAME["a_camera"]),
+        "-settings": partial(settings, study),
     }
 
 
-def changes(path: Path, study: Study, goal: Goal) -> None:
+def changes(study: Study, goal: Goal) -> Picture:
     """A row for each change, the largest gain on top: what it brings robustly, in %."""
     every = [gain for gain in gains(study, goal) if gain.every]
     note = (
@@ -68,10 +69,10 @@ def changes(path: Path, study: Study, goal: Goal) -> None:
     axis.set_ylim(-0.7, len(every) - 0.3)
     keep_ticks_inside(axis.xaxis)
     axis.set_xlabel(f"gain of the {goal.title}, robust [%]")
-    figure.write(path)
+    return figure
 
 
-def settings(path: Path, study: Study) -> None:
+def settings(study: Study) -> Picture:
     """Acceleration against velocity of every setting that was best or robust for something."""
     note = (
         "Each mark: a setting that is the best, or the most robust, for one goal with one change, "
@@ -97,4 +98,4 @@ def settings(path: Path, study: Study) -> None:
     axis.set_ylabel("largest fall, as a camera reads it [m/s²]")
     axis.legend(fontsize=8.5)
     keep_ticks_inside(axis.xaxis, axis.yaxis)
-    figure.write(path)
+    return figure

@@ -96,8 +96,7 @@ _Asked = list[tuple[Key, Array]]
 
 
 def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked) -> _Asked:
-    """Those that are settled and feasible; of a machine's best settings for a goal only the very
-    best one."""
+    """Those that are settled and feasible; of the best settings for a goal the very best alone."""
     times = (SETTLE, SPAN), (SETTLE + SPAN / 2.0, SPAN / 2.0)
     runs = [[machines[key[0]].at(point, *each) for each in times] for key, point in asked]
     found: _Asked = []
@@ -133,9 +132,8 @@ def confirmed(
     asked = {key: point for key, point in points.items() if machines[key[0]].rung == SEARCHES}
     run = bench.evaluator.outcomes
     every: list[Settings] = []
-    for point, outcome in zip(
-        asked.values(), run([point.settings for point in asked.values()]), strict=True
-    ):
+    outcomes = run([point.settings for point in asked.values()])
+    for point, outcome in zip(asked.values(), outcomes, strict=True):
         current = max(outcome.numbers["current_max"], -outcome.numbers["current_min"])
         limit = point.settings.get("circuit.current_limit", own)
         rung = fidelity.judge(current * bench.scene.coil.count, limit)

@@ -75,8 +75,7 @@ class Bench:
 
     @staticmethod
     def base(scene: Scene, rig: Settings, told: str) -> Scene:
-        """A scene as its knobs are searched, on a rig; ``told`` says where the rig is from. Raises
-        BadInput."""
+        """A scene as its knobs are searched, on a rig that is from ``told``. Raises BadInput."""
         alone = {"circuit.model": "limited", "drive.pwm_ripple": False, "drive.quantised": False}
         return changed(scene, FREE | alone | rig, told)
 

@@ -35,10 +35,8 @@ class Efforts:
 
     def times(self, factor: float) -> "Efforts":
         """So many times as much."""
-        own, others = (
-            tuple(one.times(factor) for one in every) for every in (self.own, self.others)
-        )
-        return Efforts(own, others, self.again)
+        own = tuple(one.times(factor) for one in self.own)
+        return Efforts(own, tuple(one.times(factor) for one in self.others), self.again)
 
 
 _NONE = Effort(0, 0, 0)
@@ -79,8 +77,7 @@ class Study:
 
     @property
     def slips(self) -> list[Mapping[str, tuple[float, float]]]:
-        """Accelerations of the surface, m/s², beyond which a part slips on its way up or down, on
-        each rig."""
+        """Accelerations, m/s², of the surface on each rig beyond which a part slips, up or down."""
         return [budget(Bench.base(self.scene, rig.settings, "a rig")) for rig in self.rigs]
 
 
@@ -178,9 +175,8 @@ class _Work:
         return {kind: [[[*one, *more] for one in some[:1]] for some in of[kind]] for kind in KINDS}
 
     def points(self, candidates: dict[str, Candidates], turn: int, own: bool) -> dict[Key, Point]:
-        """The judged points of machines, searched for the first time or again (``turn``); where
-        they are the scene's ``own`` rig's also by the amplifier, and with those of the changes that
-        are not searched."""
+        """The judged points of machines, searched for the first time or again (``turn``); those of
+        the scene's ``own`` rig also by the amplifier, with the changes that are not searched."""
         found = self.store.once(f"judged {self.rig} {turn}", partial(self._judge, candidates, own))
         self.told(f"rig {self.rig}: judged")
         return {(change, goal, kind): Point(**of) for (change, goal, kind), of in found}
@@ -221,7 +217,7 @@ def ensemble(path: Path, scene: Scene) -> list[Settings]:
 
     Raises BadInput.
     """
-    name = plain(str(path))
+    name = plain(path)
     content = read(path, MOST_BYTES)
     try:
         text = content.decode("utf-8-sig")

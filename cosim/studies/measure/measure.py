@@ -12,6 +12,7 @@ from cosim.errors import BadInput, plain
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import inputs
 from cosim.evaluate.store import Store, reported
+from cosim.files.picture import Picture
 from cosim.scene import Scene, load
 from cosim.scene.loading import Overrides
 from cosim.studies.limits.study import checked, ensemble
@@ -70,7 +71,7 @@ def measure(
     given = whole(base, others)
     if len(given) < LEAST:
         raise BadInput(
-            f"{plain(str(rigs))}: {len(given)} rigs are too few; it must have {LEAST} at least."
+            f"{plain(rigs)}: {len(given)} rigs are too few; it must have {LEAST} at least."
         )
     count = max(len(given), QUICK if quick else RIGS)
     more = drawn(base, given, count - len(given), np.random.default_rng(seed))
@@ -186,8 +187,8 @@ def _range(one: Candidate, values: Array) -> str:
     )
 
 
-def draw(rows: Sequence[Row], title: str, path: Path) -> None:
-    """Draw the widths after each measurement into ``path`` (a PNG)."""
+def draw(rows: Sequence[Row], title: str) -> Picture:
+    """The widths after each measurement."""
     note = (
         "Bars: expected width of the 90 % interval of the robust v_up after one measurement, ± "
         "standard error. Solid line: now; dotted: after one that tells nothing."
@@ -204,4 +205,4 @@ def draw(rows: Sequence[Row], title: str, path: Path) -> None:
         axis.set(xlabel="width of the 90 % interval [mm/s]", xlim=(0.0, None))
         axis.set_xticks([x for x in axis.get_xticks() if x <= axis.get_xlim()[1]])
     axes[0].invert_yaxis()
-    figure.write(path)
+    return figure

@@ -53,9 +53,8 @@ def errata_text() -> str:
             f"   right:   {item.right}",
             f"   proof:   {item.proof} — {verdict}.",
         )
-        blocks.append(
-            "\n".join(textwrap.fill(row, WIDTH, subsequent_indent=" " * 12) for row in rows)
-        )
+        filled = (textwrap.fill(row, WIDTH, subsequent_indent=" " * 12) for row in rows)
+        blocks.append("\n".join(filled))
     return "\n\n".join(blocks) + "\n"
 
 

@@ -76,8 +76,7 @@ def closed_cycle(
 ) -> list[Phase]:
     """Three phases, at ``first``, −``fall`` and +``rise`` (= fall), that bring velocities back.
 
-    What the part gains at ``first`` while it sticks it loses at ``slowed`` in the rest of the
-    period.
+    What the part gains at ``first`` while it sticks it loses at ``slowed`` in the other phases.
     """
     rise = fall if rise is None else rise
     stick = slowed / (first + slowed)

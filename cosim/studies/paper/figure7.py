@@ -48,8 +48,7 @@ class Trial:
 
     def row(self) -> Row:
         """Mean velocities of the part over whole periods, mm/s, and mean errors of its height, mm.
-        The machine's height is off by a constant, too, since it does not begin on the part's own.
-        """
+        The machine's height is off by a constant, too, as it does not begin on the part's own."""
         numbers = self.machine.numbers
         frequency = numbers["frequency_measured"]
         period = 1.0 / frequency if frequency else None
@@ -69,8 +68,7 @@ class Trial:
 
 def paper(trials: Path, *, progress: Progress = silent) -> Report:
     """The published trials of a folder, simulated in three ways. Raises BadInput where they are not
-    the published ones.
-    """
+    the published ones."""
     theirs = fit(trials, evaluate="published", solver="published").shown
     exact = fit(trials, evaluate="published", solver="exact").shown
     together = zip(theirs, exact, each(trials, progress=progress), strict=True)
@@ -88,7 +86,7 @@ def report(found: list[Trial]) -> Report:
     return Report("figure7", "The paper's figure 7", rows, [said], {"Trials": rows}, figures)
 
 
-def _draw(found: list[Trial], rows: list[Row], path: Path) -> None:
+def _draw(found: list[Trial], rows: list[Row]) -> Picture:
     figure = Picture(13.0, 5.6, "constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
     _paths(left, next(trial for trial in found if trial.number == TRIAL))
@@ -106,7 +104,7 @@ def _draw(found: list[Trial], rows: list[Row], path: Path) -> None:
         f"Given its drive, the whole machine is {machine:.2f} mm from the measured part, on "
         f"average over the trials; the paper's model, given the surface, {theirs:.2f} mm",
     )
-    figure.write(path)
+    return figure
 
 
 def _paths(axis: Axes, trial: Trial) -> None:

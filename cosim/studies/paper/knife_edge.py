@@ -2,8 +2,7 @@
 
 With the optimal waveform part and surface meet again exactly at the period's end. If they meet a
 little earlier, the surface overtakes the part, which then slips for the whole next phase. A solver
-that finds the end of slipping only to within its step, or to within a velocity threshold, makes
-that error by itself.
+that finds the end of slipping to within its step, or a velocity threshold, errs so by itself.
 """
 
 from collections.abc import Callable

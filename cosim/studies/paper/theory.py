@@ -42,8 +42,7 @@ class Theory:
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``theory.json``, the paper's figures 3 and 4, and what the optimum costs when it is
-        missed, ``knife_edge.csv`` and ``knife_edge.png``.
-        """
+        missed, ``knife_edge.csv`` and ``knife_edge.png``."""
         from cosim.studies.paper import figures, knife_edge
 
         out = Path(folder)

@@ -94,12 +94,10 @@ def real_time(rounds: int) -> dict[str, Any]:
         name: [scene.run.duration / seconds for seconds in taken[name]]
         for name, scene in scenes.items()
     }
-    over = {
-        name: ratios(speeds[name], speeds["amplifier"]) for name in ("full", "limited", "ideal")
-    }
+    others = ("full", "limited", "ideal")
     return {
         "real_time": {name: spread(found) for name, found in speeds.items()},
-        "over_amplifier": over,
+        "over_amplifier": {name: ratios(speeds[name], speeds["amplifier"]) for name in others},
     }
 
 

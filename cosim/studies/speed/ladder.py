@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import nan
-from pathlib import Path
 from statistics import median
 from typing import Any
 
 from cosim.errors import BadInput, SimulationFailed
 from cosim.evaluate.point import in_whole_periods
 from cosim.evaluate.store import Store, hashed, reported
+from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.simulation.fidelity import relative_error
@@ -197,7 +197,7 @@ def words(scene: Scene, rungs: list[Rung]) -> str:
     return " ".join(said)
 
 
-def draw(found: Found, path: Path) -> None:
+def draw(found: Found) -> Picture:
     """Draw error over cost, a panel a scene, and mark the cheapest rung within the tolerance."""
     wide = 2 if len(found) == 4 else min(len(found), 3)
     high = -(-len(found) // wide)
@@ -230,7 +230,7 @@ def draw(found: Found, path: Path) -> None:
         axis.set_visible(False)
     for axis in axes[::wide]:
         axis.set_ylabel("error of v_average against “full” [%]")
-    figure.write(path)
+    return figure
 
 
 def message(found: Found) -> str:

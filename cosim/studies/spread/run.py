@@ -155,9 +155,7 @@ def turns(scene: Scene) -> list[Settings]:
         size = TURN if given else TURN * abs(value)
         if name == "offset" and not size:
             size = TURN * scene.drive.amplitude
-        low, high = KEYS[full].low, KEYS[full].high
-        assert low is not None and high is not None
         for place in (value - size, value + size):
-            if size and low <= place <= high:
+            if size and KEYS[full].holds(place):
                 found.append({full: float(f"{place:.12g}")})  # a number that can be typed
     return found

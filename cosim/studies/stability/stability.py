@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from cosim.coupling.rewind.methods import variants
 from cosim.coupling.rewind.stability import largest_stable_step, observed_limit
 from cosim.drive.command import command
 from cosim.evaluate.store import Store, reported
+from cosim.files.picture import Picture
 from cosim.scene import changed
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, End, label_ends, panels
 from cosim.studies.report import Progress, Report, silent
@@ -230,8 +230,8 @@ def by_method(limits: Sequence[Limit]) -> list[Row]:
     return list(rows.values())
 
 
-def draw(limits: Sequence[Limit], free: Sequence[str], title: str, path: Path) -> None:
-    """Draw the limits of each method over the strength of the coupling into ``path`` (a PNG)."""
+def draw(limits: Sequence[Limit], free: Sequence[str], title: str) -> Picture:
+    """The limits of each method over the strength of the coupling."""
     note = "Direct drive with other force factors. Lines: predicted; dots: observed with the FMU."
     figure, (axis,) = panels(title, note, (11.0, 5.6))
     strengths = sorted({x.strength for x in limits})
@@ -267,4 +267,4 @@ def draw(limits: Sequence[Limit], free: Sequence[str], title: str, path: Path) -
         ylabel="largest stable macro step [ms]",
     )
     label_ends(axis, ends, gap=0.052)
-    figure.write(path)
+    return figure

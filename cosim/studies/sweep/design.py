@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, prod
 from numbers import Integral
+from operator import itemgetter
 
 import numpy as np
 
@@ -50,23 +51,18 @@ class Design:
         if self.sample is not None:
             row = self.sample[index]
         else:
-            backwards = []
-            for axis in reversed(self.axes):
-                index, place = divmod(index, len(axis.values))
-                backwards.append(axis.values[place])
-            row = tuple(reversed(backwards))
+            places = np.unravel_index(index, self.shape)
+            row = tuple(axis.values[k] for axis, k in zip(self.axes, places, strict=True))
         return {axis.key.full: value for axis, value in zip(self.axes, row, strict=True)}
 
     def alike(self, points: Iterable[int]) -> list[int]:
         """The points, those of one frequency together: what the fast solver runs side by side then
         jumps and turns together, which takes fewer steps."""
-        keys = [axis.key.full for axis in self.axes if axis.key.full in FREQUENCIES]
-
-        def frequencies(number: int) -> list[Number]:
-            settings = self.point(number)
-            return [settings[key] for key in keys]
-
-        return sorted(points, key=frequencies) if keys else list(points)
+        if not self.changes_frequency:
+            return list(points)
+        frequencies = [key for axis in self.axes if (key := axis.key.full) in FREQUENCIES]
+        chosen = itemgetter(*frequencies)
+        return sorted(points, key=lambda number: chosen(self.point(number)))
 
     @property
     def changes_frequency(self) -> bool:
@@ -147,9 +143,8 @@ def _axis(name: str, values: Sequence[Number]) -> Axis:
         raise BadInput(f"--over {name}: has no value.")
     kind = int if key.kind is int else float
     for value in values:
-        assert key.low is not None and key.high is not None
         try:
-            inside = isfinite(value) and key.low <= value <= key.high and kind(value) == value
+            inside = isfinite(value) and key.holds(value) and kind(value) == value
         except (TypeError, ValueError, OverflowError):  # no number, or one too large for a float
             raise BadInput(f"--over {name}: {shown(value)} must be {key.allowed}.") from None
         if not inside:

@@ -65,8 +65,7 @@ def sweep(
     In the folder ``out`` it leaves ``sweep.nc`` and ``figure.png``, and takes up what an
     interrupted sweep has left there; with ``keep``, names of waveforms, also those of every point,
     as ``points/NUMBER.nc``. ``workers`` local processes (default: one for each processor), or the
-    Dask cluster at the address ``dask``. ``progress`` is told the points done, how many of them
-    failed, and their number.
+    Dask cluster at the address ``dask``. ``progress`` is told the points done, failed, and in all.
 
     Raises BadInput for keys and values that cannot be, or where ``out`` holds another sweep.
 
@@ -101,7 +100,7 @@ def _sweep(
 ) -> xr.Dataset:
     family = folder / "points"
     if family.is_symlink() or (family.exists() and not family.is_dir()):
-        raise BadInput(f"{plain(str(family))}: this is no directory of the sweep's own; remove it.")
+        raise BadInput(f"{plain(family)}: this is no directory of the sweep's own; remove it.")
     made_by, units = {**versions(), "fmu": fmu.token()}, dataset.units_of(scene)
     total, numbers = len(design), dataset.Numbers(len(design))
     asked = [(axis.key.full, axis.values) for axis in design.axes], design.sample

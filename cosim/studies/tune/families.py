@@ -15,8 +15,7 @@ TABLES = ("steps", "pieces")
 
 def family(name: str) -> tuple[dict[str, Any], Ranges]:
     """Values of keys that give a scene the waveform ``name``, and the ranges of its shape's
-    numbers: of "steps:N" and "pieces:N" N levels at even phases, of "square" its duty. BadInput.
-    """
+    numbers: of "steps:N" and "pieces:N" N levels at even phases, of "square" its duty. BadInput."""
     shape, _, count = name.partition(":")
     sharp = {"drive.waveform": shape, "drive.reset_time": 0.0, "drive.duty": 0.5}
     few = count.isdecimal() and len(count) < 4
@@ -42,12 +41,12 @@ def most_heat(scene: Scene, limit: float | str | None) -> float:
         watts, *cycle = (float(part) for part in str(limit).split(":"))
         found = heat_limit(scene.coil, watts, *cycle) if cycle else watts
     except BadInput as error:
-        raise BadInput(f"--heat {plain(str(limit))}: {error}") from None
+        raise BadInput(f"--heat {plain(limit)}: {error}") from None
     except (ValueError, TypeError):
         found = float("nan")
     if not found > 0.0:
         raise BadInput(
-            f"--heat {plain(str(limit))}: must be a number above 0 W, or RISE:DUTY or "
+            f"--heat {plain(limit)}: must be a number above 0 W, or RISE:DUTY or "
             f"RISE:DUTY:SECONDS with a rise in K (without a time: {LIFT:g} s)."
         )
     return found

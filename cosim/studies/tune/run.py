@@ -91,11 +91,9 @@ def tune(
     over all turns of the keys of ``over``, or the worst of them where their signs differ. No
     setting counts that makes more ``heat`` in a coil than :func:`most_heat` has.
 
-    In the folder ``out`` it leaves what ``Tuning.save`` writes, and takes up what an interrupted
-    search has left there.
+    In the folder ``out`` it leaves what ``Tuning.save`` writes, and takes up an interrupted search.
 
-    Raises BadInput for keys, ranges and quantities that are none; SimulationFailed where every run
-    failed.
+    Raises BadInput for keys, ranges, quantities that are none; SimulationFailed if all runs failed.
     """
     quantity, largest = maximise or minimise, minimise is None
     if quantity is None or (maximise and minimise):
@@ -174,8 +172,7 @@ def tune(
 def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
     for name, (low, high) in over.items():
         key = numeric_key(name)
-        assert key.low is not None and key.high is not None
-        if not (isfinite(low) and isfinite(high) and key.low <= low < high <= key.high):
+        if not (key.holds(low) and key.holds(high) and low < high):
             words = f"must be LOW:HIGH, LOW below HIGH, each {key.allowed}"
             raise BadInput(f"--over {name}={low:g}:{high:g}: {words}.")
     return dict(over)
@@ -256,8 +253,7 @@ class _Trial:
         return self.runs[int(found.argmax())] if len(found) and found.max() > -inf else None
 
     def search(self, runs: int, seed: int, warm: Array | None = None) -> None:
-        """Run at most ``runs`` points; ``warm`` starts (rows) first, in place of most of the
-        exploration."""
+        """Run at most ``runs`` points; ``warm`` ones (rows) first, in place of most exploration."""
         keys, explored = len(self._aim.ranges), round(EXPLORED * runs)
         if warm is not None:
             self.known.rows(warm[:explored])

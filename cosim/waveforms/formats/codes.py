@@ -12,8 +12,7 @@ from cosim.waveforms.formats.source import Format, Run, driven
 
 def write(run: Run, file: BytesIO) -> str:
     """10-bit codes, each for 50 µs, and the offset pin's: V1 = 3.191 (V_offset - V_DAC), with
-    3.3 V for the code 1024. Those of a scene with ``drive.quantised``, which any scene is made.
-    """
+    3.3 V for the code 1024. Those of a scene with ``drive.quantised``, which any scene is made."""
     scene = driven(run, "codes")
     quantised = changed(scene, {"drive.quantised": True, "drive.loop_time": 0.0}, str(run.folder))
     made = shape(quantised)

@@ -8,8 +8,7 @@ from cosim.waveforms.formats.source import Format, Run
 
 def write(run: Run, file: BytesIO) -> str:
     """A dataset for each column with its ``units``, over the dimension scale ``time``; the root has
-    ``title`` and ``scene``.
-    """
+    ``title`` and ``scene``."""
     try:
         import h5py
     except ImportError:

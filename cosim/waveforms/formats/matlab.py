@@ -15,8 +15,7 @@ ABOUT = 116  # bytes of free text at the file's beginning
 def write(run: Run, file: BytesIO) -> str:
     """A column vector for each column, under its own name and in SI; a struct ``units`` with the
     unit of each (signs that MATLAB's names do not have are _); ``title``, ``scene`` (the text of
-    scene.toml) and ``run``.
-    """
+    scene.toml) and ``run``."""
     from scipy.io import savemat
 
     names = legal(run.waveforms, {"units", *run.attributes})

@@ -15,8 +15,7 @@ EDGE = 1e-9
 
 def write(run: Run, file: BytesIO) -> str:
     """``Vcommand v1 0 PWL(…)`` for ``.include``, in ngspice and LTspice: V1, where the netlists'
-    own source has it. A jump lasts 1 ns, and a sine is 256 straight lines a period.
-    """
+    own source has it. A jump lasts 1 ns, and a sine is 256 straight lines a period."""
     scene = driven(run, "pwl")
     points = [(0.0, 0.0)]
     for edges, start, end in straights([command(scene)], scene.run.duration, CHORDS):

@@ -42,7 +42,7 @@ def write(run: Run, file: BytesIO) -> str:
     ):
         if value > most:
             raise BadInput(
-                f"{plain(str(run.folder))}: wav needs a run.{key} of at most {most:g} s, and the "
+                f"{plain(run.folder)}: wav needs a run.{key} of at most {most:g} s, and the "
                 f"run has {value:g} s."
             )
     sound = resampled(run.waveforms["v_surface"], run.step)

@@ -47,7 +47,7 @@ class Format:
 
 def read(folder: Path) -> Run:
     """The run that ``cosim run`` wrote into ``folder``; raises BadInput."""
-    name = plain(str(folder))
+    name = plain(folder)
     if not folder.is_dir():
         raise BadInput(f"{name}: there is no such folder; name one that cosim run wrote.")
     path = folder / "waveforms.nc"
@@ -68,11 +68,11 @@ def machine(run: Run, form: str, *columns: str) -> Scene:
     scene = load(run.folder / "scene.toml")
     if scene.has_ports:
         raise BadInput(
-            f"{plain(str(run.folder))}: {form} needs a run of the built-in machine, not one of a "
+            f"{plain(run.folder)}: {form} needs a run of the built-in machine, not one of a "
             "scene with its own [[port]]."
         )
     if missing := [name for name in columns if name not in run.waveforms]:
-        path = plain(str(run.folder / "waveforms.nc"))
+        path = plain(run.folder / "waveforms.nc")
         raise BadInput(f"{path}: {form} needs the column {missing[0]}, which is not in it.")
     return scene
 
@@ -82,7 +82,7 @@ def driven(run: Run, form: str) -> Scene:
     scene = machine(run, form)
     if not scene.rung.driven:
         raise BadInput(
-            f"{plain(str(run.folder))}: {form} needs a run with a coil, not one with circuit.model "
+            f"{plain(run.folder)}: {form} needs a run with a coil, not one with circuit.model "
             f'= "{scene.circuit.model}".'
         )
     return scene

@@ -1,8 +1,7 @@
 """A tracked trial made of a run: the header, units, sampling and digits of the published trials.
 
-The camera is that of `cosim compare`, with the shutter of the run's scene and without noise. What
-the model holds at rest is written as resting: platform and part across, and the spring-loaded
-plate.
+The camera is that of `cosim compare`, with the shutter of the run's scene, without noise. What the
+model holds at rest is written as resting: platform and part across, and the spring-loaded plate.
 """
 
 from functools import partial
@@ -39,7 +38,7 @@ def write(run: Run, file: BytesIO) -> str:
     if not FEWEST_ROWS <= n <= MOST_FRAMES:
         shortest, longest = ((rows - 1) / FRAME_RATE for rows in (FEWEST_ROWS, MOST_FRAMES))
         raise BadInput(
-            f"{plain(str(run.folder))}: tracker needs {FEWEST_ROWS} to {MOST_FRAMES} frames, and "
+            f"{plain(run.folder)}: tracker needs {FEWEST_ROWS} to {MOST_FRAMES} frames, and "
             f"the camera sees {n} of this run; run.duration must be {shortest:.4g} s to "
             f"{longest:.4g} s more than {start:g} s."
         )
@@ -60,8 +59,7 @@ def write(run: Run, file: BytesIO) -> str:
 
 def laid_over(scene: Scene) -> tuple[float, float | None]:
     """The first time of a run that may be laid over a trial's first frame, s, and its period, s;
-    None where nothing drives it, or a trial's own surface does: then there is nothing to shift.
-    """
+    None where nothing drives it, or a trial's own surface does: then there is nothing to shift."""
     if scene.drive.file is not None:
         return 0.0, None
     length = scene.period

@@ -1,7 +1,6 @@
 """The compiled chain: what the machine does with given numbers, how far that is from measured
 trials, and the fit of each trial's own parameters. See ``refine.h`` and
-``cosim/stepper/stepper.h``.
-"""
+``cosim/stepper/stepper.h``."""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor

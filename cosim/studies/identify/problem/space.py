@@ -193,7 +193,7 @@ def _coordinates(values: Array, log: Array) -> Array:
 
 def read_space(own: Path | None = None) -> Space:
     """The shipped bounds, and those of a file of one's own in their place. Raises BadInput."""
-    tables, path = _tables(SHIPPED), plain(str(own or SHIPPED))
+    tables, path = _tables(SHIPPED), plain(own or SHIPPED)
     given = {} if own is None else _tables(own)
     measured = {name: _measured(path, name, x) for name, x in given.pop("measured", {}).items()}
     for name, table in given.items():
@@ -228,7 +228,7 @@ def read_space(own: Path | None = None) -> Space:
 
 
 def _tables(path: Path) -> dict[str, dict[str, Any]]:
-    content, file = toml.read(path), plain(str(path))
+    content, file = toml.read(path), plain(path)
     for name, table in content.items():
         if name not in ("rig", "trial", "measured") or not isinstance(table, dict):
             raise BadInput(
@@ -294,9 +294,8 @@ def _entry(path: str, table: str, key: str, entry: Any) -> Entry:
     if table == "trial" and key in _OTHERWISE:
         least, most, unit = _OTHERWISE[key]
         known = replace(known, low=least, high=most, unit=unit)
-    assert known.low is not None and known.high is not None
     for name in ("value",) if given else ("low", "high"):
-        if not known.low <= numbers[name] <= known.high:
+        if not known.holds(numbers[name]):
             raise BadInput(f"{where}: {name} = {numbers[name]:g} must be {known.allowed}.")
     return Entry(key, low, high, log, prior, sigma)
 

@@ -61,7 +61,7 @@ class Measured:
 def read_trials(folder: Path, space: Space) -> list[Measured]:
     """The trials of a folder, in the order of their numbers. Raises BadInput."""
     found = [measured(read_recording(path), path, space) for path in trial_files(folder)]
-    labels, name = [one.label for one in found], plain(str(folder))
+    labels, name = [one.label for one in found], plain(folder)
     for label in labels:
         if labels.count(label) > 1:
             raise BadInput(f"{name}: two trials are called {label}; number their files.")
@@ -70,7 +70,7 @@ def read_trials(folder: Path, space: Space) -> list[Measured]:
 
 def measured(recording: Recording, path: Path, space: Space) -> Measured:
     """One trial. Raises BadInput where it has no moving surface or does not repeat."""
-    file = plain(str(path))
+    file = plain(path)
     signals = {name: recording.signals[name] for name in WEIGHTS if name in recording.signals}
     if not {"z_surface", "v_surface"} & set(signals):
         raise BadInput(f"{file}: there is no height or velocity of the surface.")

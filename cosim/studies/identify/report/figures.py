@@ -111,8 +111,7 @@ COLOURS = {"cubic": SIMULATED, "knee": OTHER, "repulsion": FLOOR}
 
 
 def rigs(found: Solved) -> Picture:
-    """The suspension's force on each rig that may be meant, and their costs over each key, whose
-    range is shaded."""
+    """The suspension's force on each rig that may be meant, and costs over keys, ranges shaded."""
     units, space = {key.full: key.unit for key in keys()}, found.best.space
     verdicts = {verdict.key: verdict for verdict in found.verdicts}
     names = [name for name in space.names if name not in OF_LAWS]

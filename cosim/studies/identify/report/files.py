@@ -1,5 +1,6 @@
 """The files of an identification, and its words."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -62,10 +63,7 @@ def write(folder: Path, found: Solved) -> None:
         [{name: row.get(name) for name in names} for row in rows],
         [*NOTES, *_priors(found), *findings(numbers)],
         tables(numbers),
-        {
-            f"-{name}": lambda path, draw=draw: draw(found).write(path)
-            for name, draw in figures.FIGURES.items()
-        },
+        {f"-{name}": partial(draw, found) for name, draw in figures.FIGURES.items()},
     ).save(folder)
     write_json(folder / "identify.json", numbers)
     words = f"The rig identified from {len(found.trials)} trials"
@@ -108,8 +106,7 @@ def _priors(found: Solved) -> list[str]:
 
 
 def findings(numbers: dict[str, Any]) -> list[str]:
-    """Of ``identify.json``: what the ranges are worth, where the ram rests, which drives are at a
-    bound; a paragraph each."""
+    """Paragraphs: what the ranges are worth, where the ram rests, which drives are at a bound."""
     laws, agreed = numbers["laws"], numbers["converged"]
     shares = [f"{one['law']} {max(one['costs']) / min(one['costs']) - 1.0:.1%}" for one in laws]
     if agreed:

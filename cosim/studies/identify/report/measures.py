@@ -1,8 +1,7 @@
 """What is told of a solution, trial by trial: its errors beside the measurement's repeatability.
 
 NRMSE is the rms error over the standard deviation of what was measured; heights without their
-means, since the camera's zero is its own. The mean velocity of the part is the slope of the
-straight line through its height.
+means, as the camera's zero is its own. The part's mean velocity is the slope of its height's line.
 """
 
 from collections.abc import Sequence

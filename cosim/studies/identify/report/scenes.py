@@ -21,8 +21,7 @@ RIG_DIGITS, TRIAL_DIGITS = 6, 9
 
 
 def trial_settings(rig: Settings, trial: Measured, own: Array) -> tuple[Settings, float]:
-    """A trial on a rig (by the keys of a scene) by the keys of a scene, and when in its run (s) the
-    record's first row is.
+    """A trial on a rig, both by the keys of a scene, and when in its run (s) the record begins.
 
     The run begins at rest, with the record or with the drive, whichever is earlier.
     """

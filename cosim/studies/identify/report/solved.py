@@ -22,8 +22,7 @@ PLACES = np.linspace(-2e-3, 2e-3, 9)
 """Of the ram in the actuator (q, m), at which the suspension's force is told."""
 
 KINDS = ("surface", "surface_and_part")
-"""By what the own parameters of a trial that was held out are fitted: its surface alone; surface
-and part."""
+"""By what a held-out trial's own parameters are fitted: its surface alone; surface and part."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,9 +70,8 @@ def told_of_trials(trials: Sequence[Measured], best: Found) -> tuple[list[Row], 
     """A row for each trial that was fitted; and its mean velocity of the part by the search's steps
     and on the bench's rungs, mm/s."""
     rows, checks = [], []
-    for trial, own, cost, row in zip(
-        trials, best.own, best.costs.tolist(), errors_on(best, trials), strict=True
-    ):
+    every = zip(trials, best.own, best.costs.tolist(), errors_on(best, trials), strict=True)
+    for trial, own, cost, row in every:
         ends = at_bounds(trial.fine.low, trial.fine.high, trial.fine.scale, own)
         row |= repeatability(trial) | {"cost": cost, "at_bounds": ", ".join(ends)}
         rows.append(row | own_parameters(own))

@@ -187,8 +187,7 @@ class Searched:
         return len(self.ends) > 1 and self.scatter <= AGREED
 
     def within(self, factor: float) -> list[Found]:
-        """The candidates whose cost is at most ``factor`` times the lowest; none that was
-        finished."""
+        """The candidates whose cost is at most ``factor`` times the lowest; none finished."""
         most = factor * self.candidates[0].total
         return [one for one in self.candidates if one.total <= most and one not in self.begun]
 

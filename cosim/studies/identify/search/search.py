@@ -129,8 +129,7 @@ class Search:
     def totals(self, costs: Array, points: Array) -> Array:
         """Of rigs at points (n × free) whose trials have ``costs`` (n × trials). -2 ln L is the
         effective samples times ln cost, to which a measurement beside the trials, or a prior, adds
-        the square of its residual in standard deviations; so it weighs as much as the trials let
-        it."""
+        the square of its residual in standard deviations: it weighs what the trials let it."""
         off = (self.space.residuals(points) ** 2).sum(axis=1) / (SAMPLES * costs.shape[1])
         return costs.mean(axis=1) * (1.0 + off)
 
@@ -142,8 +141,7 @@ class Search:
     def screen(
         self, points: Array, rng: np.random.Generator, count: int, kept: int, rounds: int
     ) -> list[Found]:
-        """For each rig the best of ``count`` random own parameters, ``kept`` of which are
-        refined."""
+        """For each rig the best of ``count`` random own parameters, ``kept`` of them refined."""
         trials = len(self.targets)
         # From here on a row for each pair of rig and trial, all trials of the first rig first.
         rigs = np.repeat(self.space.rigs(points), trials, axis=0)
