@@ -12,6 +12,7 @@ Winding, assumed: the 0.9 to 3.6 g of copper that make 7.1 Ohm of wire of 0.14 t
 of a few tenths of a millimetre.
 """
 
+from functools import lru_cache
 from math import expm1, inf, isfinite, sqrt
 from typing import Any
 
@@ -21,7 +22,8 @@ from cosim.scene.tables import Coil
 
 DRIVE_RANGE_HEAT = 5.0**2 / 7.1
 """W: the most that any drive within the Carlton's range makes of its 7.1 Ohm: a square wave of
-10 V peak-to-peak, no offset. It is no rating; the authors saw the housing melt (their README)."""
+10 V peak-to-peak without offset. It is no rating; the authors saw the housing melt (README of their
+repository)."""
 
 RATED_CURRENT = 0.125
 """A rms: what the data sheet of the Carlton names."""
@@ -65,11 +67,24 @@ def modes(
 def rise(coil: Coil, on_time: float = inf, duty: float = 1.0, side: int = 0) -> float:
     """The winding's greatest rise over the air, K, for each watt that it makes while it is on: for
     ``on_time`` (s) of each of many cycles, their share ``duty``, where 0 is a single one. ``side``
-    1 and -1 take the upper and lower end of the estimate."""
-    given = {
-        name: getattr(coil, name) * factor ** (-side if name.endswith("capacity") else side)
-        for name, factor in SPREAD.items()
-    }
+    1 and -1 take the upper and lower end of the estimate.
+    """
+    return _rise(_estimate(coil), on_time, duty, side)
+
+
+def _estimate(coil: Coil) -> tuple[float, ...]:
+    return tuple(getattr(coil, name) for name in SPREAD)
+
+
+@lru_cache  # all settings of a study have one coil
+def _ends(estimate: tuple[float, ...]) -> list[list[float]]:
+    return [[_rise(estimate, *on, side) for side in (-1, 1)] for on in _CYCLES]
+
+
+def _rise(estimate: tuple[float, ...], on_time: float, duty: float, side: int) -> float:
+    given = dict(zip(SPREAD, estimate, strict=True))
+    for name, factor in SPREAD.items():
+        given[name] *= factor ** (-side if name.endswith("capacity") else side)
     cycle = on_time / duty if duty else inf
     return sum(r * expm1(-on_time / tau) / expm1(-cycle / tau) for r, tau in modes(**given))
 
@@ -100,7 +115,7 @@ def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float 
 def rises(coil: Coil, heat: float) -> list[list[float | None]]:
     """The rises, K, that a current which makes ``heat`` (W) of the cold winding brings in a LIFT
     and in continuous use: the lower and the upper end of the estimate of each, None without end."""
-    ends = [[warmed(heat, rise(coil, *on, side)) for side in (-1, 1)] for on in _CYCLES]
+    ends = [[warmed(heat, cold) for cold in both] for both in _ends(_estimate(coil))]
     return [[end if isfinite(end) else None for end in both] for both in ends]
 
 
@@ -108,7 +123,8 @@ def heats(scene: Scene, energy_copper: float) -> dict[str, Any]:
     """What a summary tells of the heat: that of one coil (W), and its rises (K), from the lower to
     the upper end of the estimate, None without end. ``energy_copper`` (J) is that of all coils and
     sense resistors; of what eddy currents make of it, a coil's share is counted as if its winding
-    did, which is on the safe side."""
+    did, which is on the safe side.
+    """
     coil = scene.coil
     # A user's netlist has the sense resistor's share to itself.
     sense = 0.0 if scene.rung.own_netlist else coil.count * scene.circuit.sense_resistance
