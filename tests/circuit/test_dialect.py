@@ -771,6 +771,14 @@ def test_parameters_in_b_sources_are_the_numbers_that_they_are(line: str, tmp_pa
     assert columns["v(x)"] == pytest.approx(PASTED[line](columns["v(in)"]), abs=2e-3)
 
 
+@needs.ngspice_library
+def test_a_resistor_may_have_a_bare_parameter(tmp_path: Path) -> None:
+    with in_place():
+        text = f"{HEAD}.param r=2k\nR8 in x r\nR9 x 0 1k\n.end\n"
+        columns = found(tmp_path, "", text, "v(x)", "v(in)").columns
+    assert columns["v(x)"] == pytest.approx(columns["v(in)"] / 3, abs=1e-6)
+
+
 def square(t: Array) -> Array:
     """V8 of the next test."""
     return np.where((t > 1e-4) & (np.mod(t - 1e-4, 0.37e-3) < 0.2e-3), 1.0, 0.0)

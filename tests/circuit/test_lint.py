@@ -240,7 +240,6 @@ MISTAKES = [
     ("Rs s 0 4", "Rs s 0 tc1=1m", ":14: rs has no value"),
     ("Rs s 0 4", "Rs s", ":14: rs has too few nodes"),
     ("Rs s 0 4", "Rs s 0 four", ":14: rs: four is neither a number nor a model"),
-    ("Rs s 0 4", "Rs s 0 k", ":14: rs: write {k}"),
     ("Rs s 0 4", "Rs s 0 2*k", ":14: rs: write {…} around its value, 2*k."),
     ("Rs s 0 4", "Rs s 0 R = 1+V(s)*{k} tc1=0", ":14: rs: write {…} around its value, 1+V(s)*{ }."),
     ("Rs s 0 4", "Rs s 0 4\nC1 s 0 Q=1u*{k}", ":15: c1: write {…} around its value, 1u*{ }."),

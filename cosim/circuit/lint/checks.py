@@ -168,7 +168,7 @@ def _check_passive(element: Element, scope: Scope, names: Names) -> None:
     elif not names.is_parameter(scope, first):
         element.refuse(f": {shown(first)} is neither a number nor a model")
     elif element.kind == "r":
-        element.refuse(f": write {{{shown(first)}}}, as ngspice takes a bare word for a model")
+        element.words[0] = f"{{{first}}}"  # ngspice takes a bare word for a model
 
 
 def _values(words: Sequence[str]) -> list[str]:
