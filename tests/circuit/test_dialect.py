@@ -34,6 +34,12 @@ def summary_of(folder: Path, text: str) -> dict[str, Any]:
         return found(folder, "", f"{text}.end\n").summary
 
 
+def columns_of(folder: Path, lines: str, *save: str) -> Any:
+    """The waveforms of a netlist of HEAD and ``lines``."""
+    with in_place():
+        return found(folder, "", f"{HEAD}{lines}\n.end\n", *save).columns
+
+
 def anew(folder: Path, *lines: str, head: str = HEAD) -> list[str]:
     """The lines that ngspice gets, of those that are used."""
     path = folder / "own.cir"
@@ -366,12 +372,17 @@ R6 in z 1k
     assert sorted(note[:11] for note in told) == ["", "between off", "epsilon has"]
 
 
+@pytest.mark.parametrize("word", [".inc", ".INC", ".Include", ".LIB"])
+def test_the_name_of_a_file_is_no_expression(word: str, tmp_path: Path) -> None:
+    (tmp_path / "a&b^3.lib").write_text(".model DX D\n")
+    anew(tmp_path, "D9 in 0 DX", f'{word} "a&b^3.lib"')
+
+
 @needs.ngspice_library
 def test_an_inductor_may_begin_with_a_current(tmp_path: Path) -> None:
     """It decays from there, whatever the circuit would give it."""
     lines = "L8 b y 10m Rser=1\nR8 y 0 {4}\nL9 b z 10m\nR9 z 0 5\n.ic I(L8)={-3} v(c)=-3"
-    with in_place():
-        columns = found(tmp_path, "", f"{HEAD}{lines}\n.end\n", "i(L8)", "i(L9)", "time").columns
+    columns = columns_of(tmp_path, lines, "i(L8)", "i(L9)", "time")
     true = 0.4 + (-3.0 - 0.4) * np.exp(-columns["time"] * 500.0)
     assert columns["i(L8)"] == pytest.approx(true, abs=1e-4)
     assert columns["i(L9)"] == pytest.approx(0.4, abs=1e-6)
@@ -699,8 +710,7 @@ SPELT = {
 @pytest.mark.parametrize("lines", SPELT)
 def test_words_of_other_programs_are_known(lines: str, tmp_path: Path) -> None:
     """4 mA through 550 Ohm, warm or held there."""
-    with in_place():
-        columns = found(tmp_path, "", f"{HEAD}I9 0 x 4m\n{lines}\n.end\n", "v(x)").columns
+    columns = columns_of(tmp_path, f"I9 0 x 4m\n{lines}", "v(x)")
     assert columns["v(x)"] == pytest.approx(SPELT[lines], rel=1e-4)
 
 
@@ -743,8 +753,7 @@ def test_integrals_delays_and_laws_of_parts_are_those_of_calculus(
     lines: str, tmp_path: Path
 ) -> None:
     """At 1 V of sine."""
-    with in_place():
-        columns = found(tmp_path, "", f"{HEAD}{lines}\nR8 x 0 1Meg\n.end\n", "v(x)").columns
+    columns = columns_of(tmp_path, f"{lines}\nR8 x 0 1Meg", "v(x)")
     true = LAWS[lines](columns["time"])
     error = np.abs(columns["v(x)"] - true)[5:] / np.abs(true).max()
     assert error.max() < 2e-3 and error.mean() < 3e-4
@@ -766,16 +775,13 @@ PASTED = {
 def test_parameters_in_b_sources_are_the_numbers_that_they_are(line: str, tmp_path: Path) -> None:
     """ngspice pastes what is in braces without them, and 3 as 3.0000000000000004."""
     lines = f".param k=3 seven=7 tiny=1e-12\n{line}\nR9 x 0 1k"
-    with in_place():
-        columns = found(tmp_path, "", f"{HEAD}{lines}\n.end\n", "v(x)", "v(in)").columns
+    columns = columns_of(tmp_path, lines, "v(x)", "v(in)")
     assert columns["v(x)"] == pytest.approx(PASTED[line](columns["v(in)"]), abs=2e-3)
 
 
 @needs.ngspice_library
 def test_a_resistor_may_have_a_bare_parameter(tmp_path: Path) -> None:
-    with in_place():
-        text = f"{HEAD}.param r=2k\nR8 in x r\nR9 x 0 1k\n.end\n"
-        columns = found(tmp_path, "", text, "v(x)", "v(in)").columns
+    columns = columns_of(tmp_path, ".param r=2k\nR8 in x r\nR9 x 0 1k", "v(x)", "v(in)")
     assert columns["v(x)"] == pytest.approx(columns["v(in)"] / 3, abs=1e-6)
 
 
@@ -814,8 +820,7 @@ GATES = {
 def test_gates_of_ltspice_are_what_their_names_say(gate: str, tmp_path: Path) -> None:
     """An input at the common node is none, as LTspice's help has it."""
     lines = f"V8 y 0 PULSE(0 1 0.1m 1n 1n 0.2m 0.37m)\nR9 y x 1Meg\n{gate}"
-    with in_place():
-        columns = found(tmp_path, "", f"{HEAD}{lines}\n.end\n", "v(x)", "v(in)").columns
+    columns = columns_of(tmp_path, lines, "v(x)", "v(in)")
     true = np.asarray(GATES[gate](columns["v(in)"], columns["time"]), dtype=float)
     error = np.abs(columns["v(x)"] - true)
     assert np.quantile(error, 0.98) < 2e-3

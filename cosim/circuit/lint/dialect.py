@@ -124,10 +124,10 @@ _LOGICAL = {"&": "&&", "|": "||", "~": "!"}
 def in_ngspice(line: Line) -> list[Line]:
     """The line as ngspice knows it, in one line or more."""
     text = _without_tables(_NOISELESS.sub("", line.text.translate(_LETTERS)))
-    kind = text[:1].lower()
-    if not text.startswith((".inc", ".lib")):
+    kind, word = text[:1].lower(), text[:4].lower()
+    if word not in (".inc", ".lib"):  # names of files
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
-    text = text if text[:4].lower() in (".mea", ".inc", ".lib") else _powers(text)
+        text = text if word == ".mea" else _powers(text)
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
     if kind in "beg":
         text = _EQUAL.sub(_compared, text)
@@ -152,8 +152,8 @@ def in_ngspice(line: Line) -> list[Line]:
         found = [re.sub(r"\)\s+(?=[{'\d.+-])", ")=", text)]
     elif model := _MODEL.match(text):
         remarks = _REMARKS["vdmos"] if model[1].lower() == "vdmos" else _MAKERS
-        kind = _SYNONYMS.get(model[1].lower(), model[1])
-        text = text[: model.start(1)] + kind + text[model.end(1) :]
+        own = _SYNONYMS.get(model[1].lower(), model[1])
+        text = text[: model.start(1)] + own + text[model.end(1) :]
         text = re.sub(r"(?i)(?<=\sako:)\s+", "", text)
         found = [_taken(text.replace("(", " ( ", 1), remarks)[0]]
     else:
