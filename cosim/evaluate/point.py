@@ -4,13 +4,14 @@ import hashlib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import ceil, isfinite, isinf, nan
+from math import isfinite, isinf, nan
 from pathlib import Path
 from typing import Any
 
 from cosim.circuit.lint.deck import named as netlist_files
 from cosim.errors import CosimError
 from cosim.scene import Scene, changed
+from cosim.scene.model import whole_periods
 from cosim.toolchain.processes import TRIES, ProcessLost
 
 Number = float | int
@@ -146,14 +147,14 @@ def outcome_of(record: Any) -> Outcome | None:
 
 
 def in_whole_periods(scene: Scene) -> Scene:
-    """The scene with ``run.settle`` and ``run.duration`` at least as long and whole periods apart.
+    """The scene with ``run.settle`` at least as long and averages over about as long, both whole
+    periods.
 
     The mean over a broken period is off by per cents, which differ from frequency to frequency.
     They stay as they are where nothing repeats.
     """
-    length = scene.period
-    if isinf(length):
+    if isinf(scene.period):
         return scene
-    times = scene.run.settle, scene.run.duration - scene.run.settle
-    settle, span = (max(1, ceil(time / length - 1e-9)) for time in times)
-    return scene.having(run={"settle": settle * length, "duration": (settle + span) * length})
+    span = scene.run.duration - scene.run.settle
+    settle, span = whole_periods(scene.period, scene.run.settle, span)
+    return scene.having(run={"settle": settle, "duration": settle + span})

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from math import inf
+from math import ceil, inf
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -75,6 +75,13 @@ def averaged(count: int) -> int:
     mean that breaks such a motion is off by up to half of it."""
     unit = next((each for each in (24, 12, 6, 2) if count >= 0.75 * each), 1)
     return (2 * count + unit) // (2 * unit) * unit
+
+
+def whole_periods(length: float, settle: float, span: float) -> tuple[float, float]:
+    """Times to settle, at least ``settle``, and to average over, about ``span``, in whole periods
+    of ``length`` (all s)."""
+    before, after = (max(1, ceil(time / length - 1e-9)) for time in (settle, span))
+    return before * length, averaged(after) * length
 
 
 class Scene(BaseModel):

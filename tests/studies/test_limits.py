@@ -78,7 +78,9 @@ def test_whole_periods_are_run() -> None:
         )
         periods = (scene.run.duration - scene.run.settle) / scene.period
         assert periods == pytest.approx(round(periods), abs=1e-6), change.name
-        assert scene.run.settle >= 0.3 and scene.run.duration - scene.run.settle >= 0.4 - 1e-9
+        assert scene.run.settle >= 0.3 and scene.run.duration - scene.run.settle >= 0.3
+        # Motion of several periods is not broken.
+        assert round(periods) < 5 or round(periods) % 6 == 0, change.name
 
 
 def test_turns() -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from math import ceil, inf
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from cosim.arrays import Array
 from cosim.circuit.heat import DRIVE_RANGE_HEAT
 from cosim.drive.command import shape
 from cosim.scene import Scene, changed, firmware
+from cosim.scene.model import whole_periods
 from cosim.scene.tables import KNOBS
 
 Settings = dict[str, Any]
@@ -52,7 +53,7 @@ class Machine:
     def at(self, point: Array, settle: float, span: float) -> Settings:
         """All that differs from the scene at a point of the cube, as the firmware maps its
         potentiometers. The third knob sets where the sawtooth's ramp ends, so the mean moves with
-        the amplitude. Whole periods are run, at least as long as ``settle`` and ``span`` (s)."""
+        the amplitude. Whole periods are run: at least ``settle``, then about ``span`` (s)."""
         amplitude, top = self.reach * RANGE * point[0], self.reach * RANGE * point[2]
         hertz = _typed(self.pace * firmware.knob_frequency(point[1] * STEPS / firmware.COUNTS))
         found: Settings = {
@@ -66,7 +67,7 @@ class Machine:
             levels = (_typed(level - 0.5) for level in point[len(KNOBS) :])
             found["drive.table"] = [[k / self.levels, level] for k, level in enumerate(levels)]
         period = firmware.period(hertz, None) if found.get("drive.quantised") else 1.0 / hertz
-        before, after = (max(1, ceil(time / period - 1e-9)) * period for time in (settle, span))
+        before, after = whole_periods(period, settle, span)
         return found | {"run.settle": before, "run.duration": before + after}
 
     def sampled(self, scene: Scene, levels: int) -> Array:
