@@ -93,16 +93,17 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
     grids = [coarse.clip(*limit) for limit in limits]
     tables = [_losses(each, grid, ratios) for each, grid in zip(slides, grids, strict=True)]
     row, best = _best(_summed(tables))
-    if plate:
-        ratios = np.unique((ratios[row] + NEAR).clip(0.0))
     middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
     around = np.geomspace(1 / AROUND, AROUND, FINE)
-    for _ in range(2):
+    for _ in range(3):
+        if plate:
+            ratios = np.unique((ratios[row] + NEAR).clip(0.0))
         grids = [(x * around).clip(*limit) for x, limit in zip(middles, limits, strict=True)]
         tables = [_losses(each, grid, ratios) for each, grid in zip(slides, grids, strict=True)]
         row, best = _best(_summed(tables))
         middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
-        if not {0, FINE - 1} & set(best):  # none is at the edge of its grid
+        inside = not plate or (row < len(ratios) - 1 and (row > 0 or ratios[0] == 0.0))
+        if inside and not {0, FINE - 1} & set(best):  # none is at the edge of its grid
             break
     # What is likely may reach far beyond the fine grids.
     grids = [np.unique([*coarse.clip(*x), *grid]) for x, grid in zip(limits, grids, strict=True)]

@@ -32,11 +32,10 @@ begins or ends slowly, its first or last interval is lost in the noise."""
 ACCELERATION = 80.0  # m/s², deviation of what the part has before and after a slide
 ROUGHNESSES = (1e4, 1e5, 1e6)  # m²/s⁵, spectral density of its change there; the likeliest is taken
 NOISES = (1.0, 10.0)  # times that of still tracks; the likeliest is taken
-LEAST_NOISE = 2e-7  # m; the digits of a table make as much
+LEAST_NOISE = 1e-6  # m; no camera tells less, and how a slide begins is modelled no truer
 LEAST_SIZE = 1.0  # (s/m)², of what the part's velocity makes of its path; it is some 1e6
 CHUNK = 32  # laws at once
 PASSES = 3  # until the instant is known at which the part's velocity passes the plate's
-FEW = 7  # of so many laws one, by which the roughness is chosen
 IMPROBABLE = 12.0  # a logarithm: instants that are so much less likely with every law are left out
 
 
@@ -236,20 +235,22 @@ def marginal(log_likelihoods: Array) -> Array:
 
 
 def slides_of(trial: Trial, kinetic: Array, plate: Array) -> list[Slide]:
-    """All slides of a trial, with the roughness and noise that make the best of the laws likeliest,
-    and with those pairs of instants that are likely with any of the laws."""
-    noise, best = noise_of(trial), (-np.inf, [])
+    """All slides of a trial, with the noise and roughness that make the best of the laws likeliest,
+    and with those pairs of instants that are likely with any of the laws.
+
+    The laws must be dense enough for that: with a low noise the likelihood is a narrow ridge, and
+    where none of them is near it a high one seems better, with which the ridge's ends are lost."""
+    noise, best = noise_of(trial), (-np.inf, [], [])
     places = spans(trial, noise)
-    few = kinetic[::FEW], plate[::FEW]
     for roughness, factor in product(ROUGHNESSES, NOISES):
         every = [slide(trial, span, factor * noise, roughness) for span in places]
         kept = [one for one in every if one is not None]
-        likelihood = sum((marginal(one.log_likelihoods(*few)) for one in kept), np.zeros(1)).max()
+        told = [one.log_likelihoods(kinetic, plate) for one in kept]
+        likelihood = sum(map(marginal, told), np.zeros(1)).max()
         if likelihood > best[0]:
-            best = float(likelihood), kept
+            best = float(likelihood), kept, told
     found = []
-    for one in best[1]:
-        told = one.log_likelihoods(kinetic, plate)
+    for one, told in zip(*best[1:], strict=True):
         likely = (told - told.max(axis=1, keepdims=True)).max(axis=0) > -IMPROBABLE
         found.append(one.only(likely))
     return found
