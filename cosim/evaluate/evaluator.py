@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
-from itertools import islice
+from itertools import groupby, islice
 from pathlib import Path
 from typing import Any, Self
 
@@ -166,17 +166,9 @@ class Evaluator:
 
     def _tasks(self, points: Iterator[_Numbered]) -> Iterator[list[_Numbered]]:
         """Points that the fast solver runs side by side together, all others one by one."""
-        together: list[_Numbered] = []
-        for one in points:
-            if not is_fast(self._scene, one[1]):
-                yield [one]
-                continue
-            together.append(one)
-            if len(together) == TOGETHER:
-                yield together
-                together = []
-        if together:
-            yield together
+        for fast, some in groupby(points, lambda one: is_fast(self._scene, one[1])):
+            while task := list(islice(some, TOGETHER if fast else 1)):
+                yield task
 
 
 def workers_asked(workers: int | None) -> int:
