@@ -16,9 +16,10 @@ from cosim.arrays import Array
 from cosim.files.picture import Picture
 from cosim.scene import firmware
 from cosim.studies.plots import headline
-from cosim.studies.sweep.dataset import FAILURE, POINT, swept
+from cosim.studies.sweep.dataset import FAILURE, POINT
 from cosim.studies.sweep.report import at, fastest, setting
 from cosim.waveforms.quantities import label
+from cosim.waveforms.storage import swept
 
 T = TypeVar("T")
 
