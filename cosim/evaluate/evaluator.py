@@ -4,7 +4,7 @@ What all studies of many runs stand on. A point that crashes or hangs costs only
 """
 
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
 from itertools import groupby, islice
@@ -14,8 +14,8 @@ from typing import Any, Self
 from cosim.errors import BadInput
 from cosim.evaluate.many import Pool, cluster, each, threads
 from cosim.evaluate.point import (
-    Number,
     Outcome,
+    Settings,
     evaluate_all,
     failed,
     inputs,
@@ -26,9 +26,6 @@ from cosim.evaluate.point import (
 from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene
 from cosim.toolchain.processes import processors
-
-Settings = Mapping[str, Number | str]
-"""``table.key`` and value, SI."""
 
 TOGETHER = 64
 """Points that are solved side by side, at most: some lanes full of runs of like duration."""
