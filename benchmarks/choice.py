@@ -15,8 +15,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from cosim.errors import BadInput
-from cosim.evaluate.evaluator import Evaluator, Settings
-from cosim.evaluate.point import point
+from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.point import Settings, point
 from cosim.files.picture import Picture
 from cosim.scene import changed, load
 from cosim.simulation.checks import motion

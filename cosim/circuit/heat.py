@@ -77,10 +77,6 @@ def _estimate(coil: Coil) -> tuple[float, ...]:
 
 
 @lru_cache  # all settings of a study have one coil
-def _ends(estimate: tuple[float, ...]) -> list[list[float]]:
-    return [[_rise(estimate, *on, side) for side in (-1, 1)] for on in _CYCLES]
-
-
 def _rise(estimate: tuple[float, ...], on_time: float, duty: float, side: int) -> float:
     given = dict(zip(SPREAD, estimate, strict=True))
     for name, factor in SPREAD.items():
@@ -115,7 +111,8 @@ def heat_limit(coil: Coil, rise_limit: float, duty: float = 1.0, on_time: float 
 def rises(coil: Coil, heat: float) -> list[list[float | None]]:
     """The rises, K, that a current which makes ``heat`` (W) of the cold winding brings in a LIFT
     and in continuous use: the lower and the upper end of the estimate of each, None without end."""
-    ends = [[warmed(heat, cold) for cold in both] for both in _ends(_estimate(coil))]
+    estimate = _estimate(coil)
+    ends = [[warmed(heat, _rise(estimate, *on, side)) for side in (-1, 1)] for on in _CYCLES]
     return [[end if isfinite(end) else None for end in both] for both in ends]
 
 

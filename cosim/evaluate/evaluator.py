@@ -4,18 +4,18 @@ What all studies of many runs stand on. A point that crashes or hangs costs only
 """
 
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
-from itertools import islice
+from itertools import groupby, islice
 from pathlib import Path
 from typing import Any, Self
 
 from cosim.errors import BadInput
 from cosim.evaluate.many import Pool, cluster, each, threads
 from cosim.evaluate.point import (
-    Number,
     Outcome,
+    Settings,
     evaluate_all,
     failed,
     inputs,
@@ -26,9 +26,6 @@ from cosim.evaluate.point import (
 from cosim.evaluate.store import Store, hashed
 from cosim.scene import Scene
 from cosim.toolchain.processes import processors
-
-Settings = Mapping[str, Number | str]
-"""``table.key`` and value, SI."""
 
 TOGETHER = 64
 """Points that are solved side by side, at most: some lanes full of runs of like duration."""
@@ -166,17 +163,9 @@ class Evaluator:
 
     def _tasks(self, points: Iterator[_Numbered]) -> Iterator[list[_Numbered]]:
         """Points that the fast solver runs side by side together, all others one by one."""
-        together: list[_Numbered] = []
-        for one in points:
-            if not is_fast(self._scene, one[1]):
-                yield [one]
-                continue
-            together.append(one)
-            if len(together) == TOGETHER:
-                yield together
-                together = []
-        if together:
-            yield together
+        for fast, some in groupby(points, lambda one: is_fast(self._scene, one[1])):
+            while task := list(islice(some, TOGETHER if fast else 1)):
+                yield task
 
 
 def workers_asked(workers: int | None) -> int:

@@ -1,7 +1,7 @@
 """One point of a study: the scene with some keys changed, run for the numbers of its summary."""
 
 import hashlib
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import isfinite, isinf, nan
@@ -12,9 +12,11 @@ from cosim.circuit.lint.deck import named as netlist_files
 from cosim.errors import CosimError
 from cosim.scene import Scene, changed
 from cosim.scene.model import whole_periods
-from cosim.toolchain.processes import TRIES, ProcessLost
+from cosim.toolchain.processes import TRIES, ProcessLost, Progress
 
 Number = float | int
+Settings = Mapping[str, Number | str]
+"""``table.key`` and value, SI."""
 
 UNREPEATABLE = ("wall_time",)
 """Numbers of a summary that differ from run to run of the same scene."""
@@ -36,12 +38,9 @@ class Outcome:
 
 
 def evaluate(
-    base: Scene,
-    values: Mapping[str, Number | str],
-    whole_periods: bool,
-    progress: Callable[[float], None] = lambda _: None,
+    base: Scene, values: Settings, whole_periods: bool, progress: Progress = lambda _: None
 ) -> Outcome:
-    """Run ``base`` with ``values`` (``table.key`` and value, SI). Whatever is wrong is an outcome.
+    """Run ``base`` with ``values``. Whatever is wrong is an outcome.
 
     Waveforms are not made: the rows of a run are communication points too, so the numbers agree
     with those of `cosim run` within rounding, and the run is several times as fast.
@@ -61,8 +60,8 @@ def evaluate(
 
 def evaluate_all(
     base: Scene,
-    points: Sequence[tuple[int, Mapping[str, Number | str]]],
-    progress: Callable[[float], None] = lambda _: None,
+    points: Sequence[tuple[int, Settings]],
+    progress: Progress = lambda _: None,
     *,
     whole_periods: bool,
 ) -> list[Outcome]:
@@ -83,12 +82,12 @@ def evaluate_all(
     return outcomes
 
 
-def is_fast(base: Scene, values: Mapping[str, Number | str]) -> bool:
+def is_fast(base: Scene, values: Settings) -> bool:
     """Whether the fast solver runs a point."""
     return values.get("run.solver", base.run.solver) == "fast"
 
 
-def point(base: Scene, values: Mapping[str, Number | str], whole_periods: bool) -> Scene:
+def point(base: Scene, values: Settings, whole_periods: bool) -> Scene:
     """The scene of a point. Raises BadInput."""
     few_rows = float(values.get("run.duration", base.run.duration)) / 2.0
     if few_rows != base.run.output_step:

@@ -41,13 +41,13 @@ def legend_above(axis: Axes, **style: Any) -> None:
 
 
 def grid(
-    count: int, columns: int, width: float, height: float, beside: float
+    count: int, columns: int, width: float, height: float, beside: float, **options: Any
 ) -> tuple[Picture, list[Axes]]:
     """A figure of ``count`` panels row by row, and their axes: ``width`` inches wide, each row
     ``height`` inches high, and ``beside`` inches for what stands above and below them."""
     rows = math.ceil(count / columns)
     figure = Picture(width, beside + height * rows, "constrained")
-    axes = [*figure.subplots(rows, columns, squeeze=False).flat]
+    axes = [*figure.subplots(rows, columns, squeeze=False, **options).flat]
     for axis in axes[:count]:
         axis.grid(alpha=0.25)
     for axis in axes[count:]:

@@ -26,7 +26,7 @@ from cosim.scene import load
 from cosim.waveforms import formats
 from cosim.waveforms.quantities import bench_unit, label
 from cosim.waveforms.report import table
-from cosim.waveforms.storage import LARGEST, read_netcdf, read_sweep
+from cosim.waveforms.storage import LARGEST, read_netcdf, read_sweep, swept
 
 BLOCK = 1 << 15
 BUCKET = 256
@@ -98,21 +98,21 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
 def _sweep(folder: Path) -> tuple[dict[str, Any], list[Run]]:
     data = read_sweep(folder)
     grid, path = data["failure"], folder / "sweep.nc"
-    swept = [str(name) for name in data.coords if "key" in data[name].attrs]
+    axes = swept(data)
     if grid.size > MOST_POINTS:
         raise BadInput(f"{plain(path)}: a page shows at most {MOST_POINTS} points.")
     columns = []
-    others = sorted(str(name) for name in {*data.coords} - {*swept, *grid.dims})
-    for name in [*swept, *others, *data.data_vars]:
+    others = sorted(str(name) for name in {*data.coords} - {*axes, *grid.dims})
+    for name in [*axes, *others, *data.data_vars]:
         values = data[name].broadcast_like(grid).transpose(*grid.dims).values.ravel()
         unit, text = (data[name].attrs.get(key, "") for key in ("units", "long_name"))
         columns.append(_column(str(name), unit, values.tolist(), text))
-    numbers = [each["name"] for each in columns[len(swept) :] if each["most"] is not None]
+    numbers = [each["name"] for each in columns[len(axes) :] if each["most"] is not None]
     if not numbers:
         raise BadInput(f"{plain(path)}: no point of this sweep has a number.")
     best = "v_average" if "v_average" in numbers else numbers[0]
-    ways = [swept[0], swept[1] if len(swept) > 1 else best, best]
-    axes = swept if grid.ndim > 1 else []
+    ways = [axes[0], axes[1] if len(axes) > 1 else best, best]
+    axes = axes if grid.ndim > 1 else []
     cloud = {"columns": columns, "keys": axes[2:], "ways": ways, "grid": axes}
     shown = {"title": data.attrs["title"], "cloud": cloud | {"count": grid.size, "family": None}}
     points = sorted(int(p.stem) for p in (folder / "points").glob("*.nc") if p.stem.isdecimal())

@@ -53,8 +53,9 @@ class Key:
         return f"{number} from {self.low:g} to {self.high:g}{unit}"
 
 
-def _key(table: str, name: str) -> Key:
-    field = TABLES[table].model_fields[name]
+def described(table: str, name: str) -> Key:
+    """What the table, or the list of tables, says of one of its keys."""
+    field = (TABLES | PORT_LISTS)[table].model_fields[name]
     kind = field.annotation
     if get_origin(kind) in (UnionType, Union):
         kind = next(arg for arg in get_args(kind) if arg is not type(None))
@@ -68,7 +69,7 @@ def _key(table: str, name: str) -> Key:
     return Key(
         table=table,
         name=name,
-        unit=str(extra["unit"]),
+        unit=str(extra.get("unit", "")),
         default=field.default,
         kind=kind if isinstance(kind, type) else list,
         choices=choices,
@@ -81,7 +82,7 @@ def _key(table: str, name: str) -> Key:
 
 
 KEYS = {
-    f"{table}.{name}": _key(table, name)
+    f"{table}.{name}": described(table, name)
     for table, model in TABLES.items()
     for name in model.model_fields
 }

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from cosim.errors import BadInput, plain
-from cosim.scene.describe import KEYS, Key, acts, keys
+from cosim.scene.describe import KEYS, Key, acts, described, keys
 from cosim.scene.methods import METHODS, CouplingMethod
 from cosim.scene.model import toml_value
 from cosim.scene.rungs import RUNGS, Rung
@@ -130,10 +130,8 @@ def _of_list(fault: Any, origin: str) -> str:
     if len(place) < 2:
         return f"{origin}: [[{table}]] is given too often."
     fields = PORT_LISTS[table].model_fields
-    field = next(each for name, each in fields.items() if place[1] in (name, each.alias))
-    extra: Any = field.json_schema_extra or {}
-    limits = {k: getattr(m, k) for m in field.metadata for k in ("ge", "le") if hasattr(m, k)}
-    allowed = extra.get("words") or "a number from {ge:g} to {le:g}".format(**limits)
+    key = next(name for name, each in fields.items() if place[1] in (name, each.alias))
+    allowed = described(table, key).allowed
     what = f"{origin}: [[{table}]] {place[0] + 1}: {place[1]}"
     if len(place) > 2:
         what, allowed = f"{what}.{plain(place[2])}", ALLOWED_START

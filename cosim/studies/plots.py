@@ -9,7 +9,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 
-from cosim.files.picture import Picture
+from cosim.files.picture import Picture, grid
 
 VERMILION, BLUE, GREEN = "#d55e00", "#0072b2", "#009e73"
 ORANGE, SKY, PURPLE = "#e69f00", "#56b4e9", "#aa4499"
@@ -46,14 +46,13 @@ def panels(
 
     ``title`` is its message; ``note``, below, tells how to read it.
     """
-    figure = Picture(*size, "constrained")
-    axes = figure.subplots(rows, columns, squeeze=False, **options)
+    width, height = size
+    figure, axes = grid(rows * columns, columns, width, height / rows, 0.0, **options)
     headline(figure, title)
     footnote(figure, note)
-    for axis in axes.flat:
-        axis.grid(alpha=0.25)
+    for axis in axes:
         axis.set_axisbelow(True)
-    return figure, list(axes.flat)
+    return figure, axes
 
 
 def keep_ticks_inside(*axes: Axis) -> None:

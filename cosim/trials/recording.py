@@ -8,8 +8,9 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
-from cosim.trials.camera import FRAME_RATE, frame_times, velocities
+from cosim.trials.camera import FRAME_RATE, frame_times
 from cosim.trials.table import UNDERSTOOD, WORDS, read_table
+from cosim.trials.tracked import track
 
 DIGITS = 6e-7, 6e-9
 """Of a published trial's times, s: seven digits, and eight places; relative and absolute."""
@@ -85,9 +86,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
         raise BadInput(f"{plain(path)}: no column to compare. Understood are: {UNDERSTOOD}.")
     for body in ("surface", "part"):
         if f"z_{body}" in signals:
-            central = velocities(time, signals[f"z_{body}"])
-            there = signals.get(f"v_{body}", central)
-            there = np.where(np.isnan(there), central, there)
+            there = track(signals | {"time": time}, body).v
             if f"v_{body}" in signals or np.isfinite(there).any():
                 signals[f"v_{body}"] = there
     for name, values in signals.items():

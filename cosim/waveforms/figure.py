@@ -20,7 +20,7 @@ from cosim.waveforms.quantities import signed
 from cosim.waveforms.report import asked_for
 
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
-GRIP, SECOND = "#7a5195", "#6fb7e9"
+GRIP, SECOND, STICKING = "#7a5195", "#6fb7e9", "#f4e3c1"
 BODIES: dict[str, dict[str, Any]] = {
     "surface": {"color": SURFACE, "lw": 1.2, "label": "surface"},
     "surface_2": {"color": SECOND, "lw": 1.1, "ls": "--", "label": "second"},
@@ -255,7 +255,7 @@ def _velocities(axis: Axes, _: Scene, time: Array, cut: dict[str, Array]) -> Non
 
 
 def _shade_sticking(axis: Axes, time: Array, sticking: Array) -> None:
-    style: dict[str, Any] = {"color": "#f4e3c1", "alpha": 0.6, "lw": 0, "zorder": 0}
+    style: dict[str, Any] = {"color": STICKING, "alpha": 0.6, "lw": 0, "zorder": 0}
     style |= {"transform": axis.get_xaxis_transform(), "label": "sticking"}
     axis.fill_between(time, 0, 1, where=sticking > 0.5, **style)
 

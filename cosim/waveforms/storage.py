@@ -162,10 +162,15 @@ def read_sweep(folder: Path) -> "xr.Dataset":
             number = each.dtype.kind in "iuf" and name != "failure"
             if not (number or all(isinstance(value, str) for value in each.values.flat)):
                 raise _Damaged(f"{name} has other values")
-        if not any("key" in axis.attrs for axis in data.coords.values()):
+        if not swept(data):
             raise _Damaged("it goes over no key")
         if not grid or not all(isinstance(text, str) for text in said):
             raise _Damaged("there are no points, or no words for their numbers")
     except Exception as error:  # there is little that scipy does not raise on a damaged file
         raise BadInput(f"{plain(path)}: not a whole sweep ({_why(error)}).") from None
     return data
+
+
+def swept(data: "xr.Dataset") -> list[str]:
+    """Names of the coordinates that a sweep went over, in order."""
+    return [str(name) for name in data.coords if "key" in data[name].attrs]

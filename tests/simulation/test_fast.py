@@ -12,7 +12,8 @@ import build_c
 import cosim
 from cosim.cli.main import main
 from cosim.errors import BadInput
-from cosim.evaluate.evaluator import Evaluator, Settings
+from cosim.evaluate.evaluator import Evaluator
+from cosim.evaluate.point import Settings
 from cosim.scene import load
 from cosim.simulation import fast
 from cosim.simulation.simulate import summary

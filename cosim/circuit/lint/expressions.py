@@ -127,6 +127,37 @@ class Names:
     def is_parameter(self, scope: Scope, name: str) -> bool:
         return name in self.parameters[id(scope)] or name in CONSTANTS
 
+    def check_own(
+        self, line: Line, name: str, arguments: list[str], behavioural: bool | None, depth: int = 0
+    ) -> None:
+        """Check a call of the netlist's own function, once also the calls in its body."""
+        function = self.only(name)
+        if function is None:  # which one is meant is not known
+            return
+        if len(arguments) != len(function.formals):
+            wanted = _counted(len(function.formals))
+            refuse(line, f"the function {shown(name)} takes {wanted}, not {len(arguments)}")
+        if (name, behavioural) in self.checked:
+            return
+        self.checked.add((name, behavioural))
+        if depth > DEEPEST:
+            refuse(line, f"the function {shown(name)} is called more than {DEEPEST} deep")
+        calls = [(inner, given) for inner, given in used(function.body) if given is not None]
+        for inner, given in calls:
+            if inner in self.definitions:
+                self.check_own(function.line, inner, given, behavioural, depth + 1)
+            elif reason := _misused(inner, given, behavioural):
+                refuse(function.line, reason)
+        # Those that it calls are counted by now; one that calls itself is not.
+        self.calls[name] = 1 + sum(self.calls.get(inner, 0) for inner, _ in calls)
+        if self.calls[name] > MOST_CALLS:
+            within = [inner for inner in dict(calls) if self.calls.get(inner, 0) > 1]
+            refuse(
+                function.line,
+                f"the function {shown(name)} makes {self.calls[name]} calls, by way of "
+                f"{', '.join(map(shown, within[:3]))}; ngspice can write out {MOST_CALLS}",
+            )
+
 
 def check_names(scope: Scope, names: Names) -> None:
     """Raise BadInput where an expression of the scope's lines uses an undefined name."""
@@ -146,7 +177,7 @@ def check_names(scope: Scope, names: Names) -> None:
                     if name not in known and not (loose and name in BEHAVIOURAL_CONSTANTS):
                         refuse(line, f"the parameter {shown(name)} is not defined")
                 elif name in own:
-                    _check_own(line, name, arguments, names, behavioural)
+                    names.check_own(line, name, arguments, behavioural)
                 elif reason := _misused(name, arguments, behavioural):
                     refuse(line, reason)
             _check_operators(line, expression)
@@ -211,45 +242,6 @@ def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str |
         plainly = f"in a B source {name}() takes plain numbers only; write it in a .param line"
         return _LIMITER if name == "limit" else plainly
     return None
-
-
-def _check_own(
-    line: Line,
-    name: str,
-    arguments: list[str],
-    names: Names,
-    behavioural: bool | None,
-    depth: int = 0,
-) -> None:
-    """Check a call of the netlist's own function, once also the calls in its body."""
-    function = names.only(name)
-    if function is None:  # which one is meant is not known
-        return
-    if len(arguments) != len(function.formals):
-        wanted = _counted(len(function.formals))
-        refuse(line, f"the function {shown(name)} takes {wanted}, not {len(arguments)}")
-    if (name, behavioural) in names.checked:
-        return
-    names.checked.add((name, behavioural))
-    if depth > DEEPEST:
-        refuse(line, f"the function {shown(name)} is called more than {DEEPEST} deep")
-    for inner, inner_arguments in used(function.body):
-        if inner_arguments is None:
-            continue
-        if inner in names.definitions:
-            _check_own(function.line, inner, inner_arguments, names, behavioural, depth + 1)
-        elif reason := _misused(inner, inner_arguments, behavioural):
-            refuse(function.line, reason)
-    # Those that it calls are counted by now; one that calls itself is not.
-    calls = [inner for inner, found in used(function.body) if found is not None]
-    names.calls[name] = 1 + sum(names.calls.get(inner, 0) for inner in calls)
-    if names.calls[name] > MOST_CALLS:
-        within = [inner for inner in dict.fromkeys(calls) if names.calls.get(inner, 0) > 1]
-        refuse(
-            function.line,
-            f"the function {shown(name)} makes {names.calls[name]} calls, by way of "
-            f"{', '.join(map(shown, within[:3]))}; ngspice can write out {MOST_CALLS}",
-        )
 
 
 def _check_blanks(line: Line, own: set[str]) -> None:

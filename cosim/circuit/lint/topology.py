@@ -33,14 +33,6 @@ class Part:
     top: bool
 
 
-@dataclass
-class _Used:
-    """What the expansion has met: elements, and nodes that are pins of subcircuits."""
-
-    elements: int = 0
-    pins: set[str] = field(default_factory=set)
-
-
 class _Groups:
     """Disjoint sets of nodes."""
 
@@ -63,44 +55,50 @@ class _Groups:
 
 def check_topology(top: Scope) -> None:
     """Raise BadInput for a circuit that has no operating point, whatever its values."""
-    used = _Used()
-    parts = list(_expanded(top, top, {}, "", 0, used))
+    circuit = _Expansion(top)
+    parts = list(circuit.parts(top, {}, "", 0))
     held = _held(top)
     terminals = Counter(name for part in parts for name in part.nodes)
     if GROUND not in terminals:
         refuse(top.line, "the netlist has no ground (node 0)")
-    _check_ends(parts, terminals, held | used.pins)
+    _check_ends(parts, terminals, held | circuit.joints)
     if not any(_SHUNT.match(line.text) for line, _ in top.lines):
         _check_paths(parts, held)
     _check_loops(parts)
 
 
-def _expanded(
-    scope: Scope, top: Scope, pins: dict[str, str], path: str, depth: int, used: "_Used"
-) -> Iterator[Part]:
-    def outer(name: str) -> str:
-        if name == GROUND or name in top.globals:
-            return name
-        return pins.get(name) or path + name
+@dataclass
+class _Expansion:
+    """The circuit with its subcircuits expanded, and what was met meanwhile."""
 
-    for element in scope.elements:
-        used.elements += 1
-        if used.elements > MAX_ELEMENTS:
-            refuse(element.line, f"the subcircuits expand to more than {MAX_ELEMENTS} elements")
-        nodes = tuple(outer(name) for name in element.nodes)
-        called = scope.subcircuit(element.model or "") if element.kind == "x" else None
-        if called is not None and len(called) == 1:
-            if depth >= MAX_DEPTH:
-                name = shown(element.model or "")
-                refuse(element.line, f"{name} is called {MAX_DEPTH} deep, perhaps by itself")
-            used.pins.update(nodes)
-            inner = dict(zip(called[0].pins, nodes, strict=True))
-            below = f"{path}{element.name}."
-            yield from _expanded(called[0], top, inner, below, depth + 1, used)
-        else:
-            read = [*element.controls, *sensed(element.line.text, "v")]
-            senses = tuple(outer(GROUND if name == "gnd" else name) for name in read)
-            yield Part(element, nodes, senses, scope is top)
+    top: Scope
+    elements: int = 0
+    joints: set[str] = field(default_factory=set)
+    """Nodes that are pins of subcircuits."""
+
+    def parts(self, scope: Scope, pins: dict[str, str], path: str, depth: int) -> Iterator[Part]:
+        def outer(name: str) -> str:
+            if name == GROUND or name in self.top.globals:
+                return name
+            return pins.get(name) or path + name
+
+        for element in scope.elements:
+            self.elements += 1
+            if self.elements > MAX_ELEMENTS:
+                refuse(element.line, f"the subcircuits expand to more than {MAX_ELEMENTS} elements")
+            nodes = tuple(outer(name) for name in element.nodes)
+            called = scope.subcircuit(element.model or "") if element.kind == "x" else None
+            if called is not None and len(called) == 1:
+                if depth >= MAX_DEPTH:
+                    name = shown(element.model or "")
+                    refuse(element.line, f"{name} is called {MAX_DEPTH} deep, perhaps by itself")
+                self.joints.update(nodes)
+                inner = dict(zip(called[0].pins, nodes, strict=True))
+                yield from self.parts(called[0], inner, f"{path}{element.name}.", depth + 1)
+            else:
+                read = [*element.controls, *sensed(element.line.text, "v")]
+                senses = tuple(outer(GROUND if name == "gnd" else name) for name in read)
+                yield Part(element, nodes, senses, scope is self.top)
 
 
 def _held(top: Scope) -> set[str]:

@@ -36,11 +36,19 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
     recording = recording.rows(slice(ROWS))
     signals = recording.signals
     laid = [observe(recording, guide, start) for start in starts]
+
+    def heights(*bodies: str) -> float:
+        """The lower R² of the heights from their means, where the columns of ``bodies`` are taken
+        for surface and part, and the run meets the first of them best."""
+        shares = [explained(run, signals[f"v_{bodies[0]}"]) for run in laid]
+        first, found = starts[int(np.argmax(shares))], []
+        for body, other in zip(("surface", "part"), bodies, strict=True):
+            run, wanted = observe(recording, f"z_{body}", first), signals[f"z_{other}"]
+            found.append(explained(run - np.nanmean(run), wanted - np.nanmean(wanted)))
+        return min(found)
+
     if {"z_surface", "v_surface", "z_part", "v_part"} <= signals.keys():
-        before, after = (
-            _heights(recording, observe, laid, starts, bodies)
-            for bodies in (("surface", "part"), ("part", "surface"))
-        )
+        before, after = heights("surface", "part"), heights("part", "surface")
         if _better(after, before):
             agree = _agree("both heights", after, before)
             yield f"{agree} with the columns of surface and part exchanged: which is which?"
@@ -90,20 +98,3 @@ def _scaled(recording: Recording, name: str, factor: float) -> str:
     asks = [f"is it in {unit}"] if abs(factor) != 1.0 else []
     asks += ["is its positive direction the run's"] if factor < 0.0 else []
     return f" with column {plain(header, 40)} times {factor:g}: {' and '.join(asks)}?"
-
-
-def _heights(
-    recording: Recording,
-    observe: Observe,
-    laid: list[Array],
-    starts: Array,
-    bodies: tuple[str, str],
-) -> float:
-    """The lower R² of the heights from their means, where the columns of ``bodies`` are taken for
-    surface and part, and the run meets the first of them best."""
-    shares = [explained(run, recording.signals[f"v_{bodies[0]}"]) for run in laid]
-    start, found = starts[int(np.argmax(shares))], []
-    for body, other in zip(("surface", "part"), bodies, strict=True):
-        run, wanted = observe(recording, f"z_{body}", start), recording.signals[f"z_{other}"]
-        found.append(explained(run - np.nanmean(run), wanted - np.nanmean(wanted)))
-    return min(found)

@@ -72,6 +72,14 @@ def scores(recording: Recording, simulated: Signals, period: float | None) -> li
     """The scores of all signals, each for all of ``LINES``; ``period`` is the measured one, s."""
     found, time = [], recording.time
 
+    def lines(measured: Array, run: Array, gained: float, score: Distance) -> list[float | None]:
+        # In the order of LINES; where the motion does not repeat it has no forecast of itself.
+        known = np.isfinite(measured)
+        line = np.polynomial.Polynomial.fit(time[known], measured[known], 1)
+        later = one_period_later(time, measured, period, gained) if period else None
+        every = run, later, np.zeros(len(time)), line(time)
+        return [None if one is None else _told(score(one, measured)) for one in every]
+
     def add(name: str, unit: str, meaning: str, values: list[float | None]) -> None:
         for (line, of), value in zip(LINES.items(), values, strict=True):
             found.append(Number(f"{name}{line}", value, unit, f"{meaning}{of}"))
@@ -90,26 +98,13 @@ def scores(recording: Recording, simulated: Signals, period: float | None) -> li
             ("mean_error_percent", "%", 100.0 / largest, mean_distance, of_height),
             ("centred_error_mm", "mm", 1e3, centred_distance, centred),
         ):
-            values = _lines(time, measured, run, period, gained, distance)
+            values = lines(measured, run, gained, distance)
             add(name, unit, words, [value and value * scale for value in values])
     for signal, (name, words) in R2.items():
         if signal in simulated:
-            values = _lines(
-                time, recording.signals[signal], simulated[signal], period, 0.0, explained
-            )
+            values = lines(recording.signals[signal], simulated[signal], 0.0, explained)
             add(name, "1", SHARE.format(words), values)
     return found
-
-
-def _lines(
-    time: Array, measured: Array, run: Array, period: float | None, gained: float, score: Distance
-) -> list[float | None]:
-    # In the order of LINES; where the motion does not repeat it has no forecast of itself.
-    known = np.isfinite(measured)
-    line = np.polynomial.Polynomial.fit(time[known], measured[known], 1)
-    later = one_period_later(time, measured, period, gained) if period else None
-    every = run, later, np.zeros(len(time)), line(time)
-    return [None if one is None else _told(score(one, measured)) for one in every]
 
 
 def _told(value: float) -> float | None:

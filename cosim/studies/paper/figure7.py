@@ -19,11 +19,12 @@ from cosim.studies.compare.each import each
 from cosim.studies.compare.run import Comparison
 from cosim.studies.fit.fit import FIRST_ROW, fit
 from cosim.studies.fit.results import Shown
-from cosim.studies.paper.figures import DASHED, PART, SURFACE
+from cosim.studies.paper.figures import DASHED
 from cosim.studies.plots import headline
 from cosim.studies.report import Progress, Report, silent
 from cosim.studies.tables import Row
 from cosim.trials.periods import drift
+from cosim.waveforms.figure import PART, SURFACE
 
 TRIAL = 5
 """The trial that the paper shows."""

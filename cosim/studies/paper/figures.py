@@ -15,9 +15,8 @@ from cosim.drive.surface.formulas import Transport
 from cosim.drive.surface.waveforms import Cycle, optimal_cycle
 from cosim.files.picture import Picture, grid, legend_above
 from cosim.studies.plots import footnote, headline
+from cosim.waveforms.figure import PART, STICKING, SURFACE
 
-# The colours of surface and part in all figures.
-SURFACE, PART, STICKING = "#1f6fb2", "#d1495b", "#f4e3c1"
 PRINTED = "0.55"
 GUIDELINE = (4.0, 16.0)
 """The paper's range for µ_s F_n, in weights of the part."""

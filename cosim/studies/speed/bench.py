@@ -8,6 +8,7 @@ these speeds, ``cosim chart ladder`` and ``accuracy`` tell.
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 from math import inf
@@ -45,11 +46,11 @@ TARGETS: Targets = {
 }
 
 
+@dataclass(frozen=True, repr=False)
 class Bench:
     """What was measured: ``numbers``, as ``bench.json`` holds them."""
 
-    def __init__(self, numbers: dict[str, Any]) -> None:
-        self.numbers = numbers
+    numbers: dict[str, Any]
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``bench.json``."""

@@ -22,6 +22,7 @@ from cosim.scene.tables import MACHINE
 from cosim.studies.sweep.design import Design
 from cosim.waveforms.columns import netcdf_name
 from cosim.waveforms.quantities import meaning
+from cosim.waveforms.storage import swept
 
 FAILURE = "failure"
 """The variable that says why a point failed; empty where it did not."""
@@ -128,11 +129,6 @@ def _names(design: Design, taken: set[str]) -> list[str]:
         else key.name
         for key in keys
     ]
-
-
-def swept(data: xr.Dataset) -> list[str]:
-    """Names of the coordinates that a sweep went over, in order."""
-    return [str(name) for name in data.coords if "key" in data[name].attrs]
 
 
 def _meant(scene: Scene, data: xr.Dataset) -> dict[str, xr.DataArray]:

@@ -16,9 +16,10 @@ from cosim.arrays import Array
 from cosim.files.picture import Picture
 from cosim.scene import firmware
 from cosim.studies.plots import headline
-from cosim.studies.sweep.dataset import FAILURE, POINT, swept
+from cosim.studies.sweep.dataset import FAILURE, POINT
 from cosim.studies.sweep.report import at, fastest, setting
 from cosim.waveforms.quantities import label
+from cosim.waveforms.storage import swept
 
 T = TypeVar("T")
 
@@ -42,9 +43,10 @@ class Quantity:
     title: str
     unit: str
     scale: float
+    colors: str = "viridis"
 
 
-V_AVERAGE = Quantity("v_average", "Mean velocity of the part", "mm/s", 1e3)
+V_AVERAGE = Quantity("v_average", "Mean velocity of the part", "mm/s", 1e3, "RdBu")
 OTHERS = (
     Quantity("stick_fraction", "Sticking, share of the time", "%", 100.0),
     Quantity("a_camera_min", "Largest fall of the surface, read by a camera", "m/s²", -1.0),
@@ -182,17 +184,16 @@ def _maps(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> str:
     hatched = dotted = False
     for k, (axis, part) in enumerate(panels):
         head = f"at {_setting(part, third)}" if third else V_AVERAGE.title
-        rugged = _rugged(_values(part, V_AVERAGE).transpose(y, x).values, norm)
-        shown = _map(axis, part, V_AVERAGE, x, y, "RdBu", norm, rugged)
+        shown, rugged = _map(axis, part, V_AVERAGE, x, y, norm)
         hatched |= _boundary(axis, part, x, y)
-        dotted |= bool(rugged.any())
+        dotted |= rugged
         axis.set_title(head, loc="left", fontsize=10.5)
         if k == len(panels) - 1:
             label = f"{V_AVERAGE.title} [mm/s]" if third else "[mm/s]"
             axis.figure.colorbar(shown, ax=[p[0] for p in panels], label=label)
     for axis, quantity in others:
         norm = _one_sided(_values(here, quantity).values, quantity.unit)
-        _head(axis, quantity, _map(axis, here, quantity, x, y, "viridis", norm))
+        _head(axis, quantity, _map(axis, here, quantity, x, y, norm)[0])
     left = f"; at {', '.join(said)} alone" if said else ""
     if third and len(slices) < data.sizes[third]:
         left += f"; drawn at {len(slices)} of {data.sizes[third]} {data[third].key}"
@@ -214,7 +215,7 @@ def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> str:
     edges: dict[str, Any] = {"edgecolors": "0.4", "linewidths": 0.3}
     top = _row(rows, 0, min(len(names), MOST_SLICES))
     for axis, name in zip(top, names, strict=False):
-        axis.scatter(data[name].values, v, c=v, cmap="RdBu", norm=norm, s=14, **edges)
+        axis.scatter(data[name].values, v, c=v, cmap=V_AVERAGE.colors, norm=norm, s=14, **edges)
         _over_key(axis, data, name)
         axis.axhline(0.0, color="0.3", lw=0.8)
     top[0].set_ylabel(f"{V_AVERAGE.title} [mm/s]")
@@ -224,10 +225,8 @@ def _scatters(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> str:
     shown_there = [V_AVERAGE, *(one for one in _others(data) if one is not OTHERS[0])]
     for axis, quantity in zip(_row(rows, 1, len(shown_there)), shown_there, strict=True):
         values = _values(data, quantity).values
-        colors, limits = "viridis", _one_sided(values, quantity.unit)
-        if quantity is V_AVERAGE:
-            colors, limits = "RdBu", norm
-        shown = axis.scatter(x, y, c=values, cmap=colors, norm=limits, s=22, **edges)
+        limits = norm if quantity is V_AVERAGE else _one_sided(values, quantity.unit)
+        shown = axis.scatter(x, y, c=values, cmap=quantity.colors, norm=limits, s=22, **edges)
         failed = data[FAILURE].values != ""
         axis.plot(x[failed], y[failed], **FAILED)
         _name_axes(axis, data, names[0], names[1])
@@ -248,20 +247,15 @@ def _over_key(axis: Axes, data: xr.Dataset, name: str) -> None:
 
 
 def _map(
-    axis: Axes,
-    data: xr.Dataset,
-    quantity: Quantity,
-    x: str,
-    y: str,
-    colors: str,
-    norm: Normalize,
-    rugged: NDArray[np.bool_] | None = None,
-) -> Any:
+    axis: Axes, data: xr.Dataset, quantity: Quantity, x: str, y: str, norm: Normalize
+) -> tuple[Any, bool]:
+    """What it shows in colours; and whether the velocity's ground is too rugged anywhere."""
     values = _values(data, quantity).transpose(y, x).values
     xs, ys = data[x].values, data[y].values
-    shown = axis.pcolormesh(xs, ys, values, cmap=colors, norm=norm, shading="nearest")
-    levels, smooth = _levels(norm), values
-    if rugged is not None:
+    shown = axis.pcolormesh(xs, ys, values, cmap=quantity.colors, norm=norm, shading="nearest")
+    levels, smooth, rugged = _levels(norm), values, np.zeros(values.shape, bool)
+    if quantity is V_AVERAGE:
+        rugged = _rugged(values, norm)
         smooth = np.where(rugged, np.nan, values)
         rows, columns = np.nonzero(rugged)
         axis.plot(xs[columns], ys[rows], ".", color="k", ms=4)
@@ -271,7 +265,7 @@ def _map(
     rows, columns = np.nonzero(data[FAILURE].transpose(y, x).values != "")
     axis.plot(xs[columns], ys[rows], **FAILED)
     _name_axes(axis, data, x, y)
-    return shown
+    return shown, bool(rugged.any())
 
 
 def _boundary(axis: Axes, data: xr.Dataset, x: str, y: str) -> bool:

@@ -7,8 +7,9 @@ import xarray as xr
 
 from cosim.errors import SimulationFailed
 from cosim.scene.tables import KNOBS
-from cosim.studies.sweep.dataset import FAILURE, JUDGED, swept
+from cosim.studies.sweep.dataset import FAILURE, JUDGED
 from cosim.waveforms.quantities import with_unit
+from cosim.waveforms.storage import swept
 
 MOST_REASONS = 5
 

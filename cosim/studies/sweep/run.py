@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 
 from cosim.errors import BadInput, Note, plain
-from cosim.evaluate.evaluator import Evaluator, Settings
+from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.keys import refuse_unknown
-from cosim.evaluate.point import Number, in_whole_periods
+from cosim.evaluate.point import Number, Settings, in_whole_periods
 from cosim.files.atomic import whole
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene, changed, load

@@ -12,9 +12,9 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.errors import BadInput, Note, SimulationFailed, plain
-from cosim.evaluate.evaluator import Evaluator, Settings
+from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.keys import FREQUENCIES, numeric_key, refuse_unknown
-from cosim.evaluate.point import Number, Outcome, in_whole_periods
+from cosim.evaluate.point import Number, Outcome, Settings, in_whole_periods
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.scene.messages import bad, suggestion

@@ -102,7 +102,7 @@ class Plan:
         def single(rng: np.random.Generator, k: int) -> list[Found]:
             alone, told = self.coarse.part([k]), self._telling(f"trial {k + 1} alone")
             start = best_of(alone.screen(rng.random((24, len(alone.space.free))), rng, 64, 4, 2))
-            return [alone.nested(start, rng, self.effort.single_generations, 0.15, told, 12)]
+            return [alone.nested(start, rng, self.effort.single_generations, 0.15, told)]
 
         return [
             self._stage(f"single {k + 1}-{n + 1}", partial(single, k=k))[0]

@@ -31,6 +31,8 @@ SOFT = 0.03
 POPULATION = 12
 REFRESH, RESCREEN = 4, 30
 """Generations after which sensitivities are found anew, and own parameters drawn anew."""
+RESCREENED = 128, 8, 3
+"""Of these: how many are drawn, how many of them refined, and the rounds for that."""
 STARTS = 15
 """Moments of the drive's start that are tried."""
 BETTER = 0.97
@@ -167,12 +169,7 @@ class Search:
         return found.reshape(own.shape), cost.reshape(n, m)
 
     def rescreened(
-        self,
-        found: Found,
-        rng: np.random.Generator,
-        count: int = 128,
-        kept: int = 8,
-        rounds: int = 3,
+        self, found: Found, rng: np.random.Generator, count: int, kept: int, rounds: int
     ) -> Found:
         """With other own parameters where random ones led to clearly less."""
         (other,) = self.screen(found.point[None], rng, count, kept, rounds)
@@ -246,7 +243,6 @@ class Search:
         generations: int,
         sigma: float,
         progress: Progress,
-        population: int = POPULATION,
     ) -> Found:
         """CMA-ES over the rig from ``start`` on."""
         space, trials = self.space, len(self.targets)
@@ -254,7 +250,7 @@ class Search:
             mean=np.clip(start.point, 1e-3, 1 - 1e-3),
             sigma=sigma,
             bounds=np.tile([0.0, 1.0], (len(start.point), 1)),
-            population_size=population,
+            population_size=POPULATION,
             seed=int(rng.integers(2**31)),
         )
         low, high = self.bounds("low"), self.bounds("high")
@@ -262,7 +258,7 @@ class Search:
         follow = self.sensitivity(here.point, here.own)
         parents, theirs = here.point[None], here.own[None]
         for generation in range(1, generations + 1):
-            asked = [search.ask() for _ in range(population)]
+            asked = [search.ask() for _ in range(POPULATION)]
             points = np.array(asked)
             # Each begins with the nearest parent's own parameters, moved by the sensitivities.
             spread = parents.std(axis=0) + 1e-6
@@ -271,21 +267,21 @@ class Search:
             moved = theirs[nearest] + np.einsum("tkd,nd->ntk", follow, points - parents[nearest])
             # One round of least squares for each pair of rig and trial.
             own, costs = refine(
-                [*self.targets] * population,
+                [*self.targets] * POPULATION,
                 np.repeat(space.rigs(points), trials, axis=0),
                 np.clip(moved, low, high).reshape(-1, len(OWN)),
                 *(1, self.workers),
             )
-            own, costs = own.reshape(population, trials, -1), costs.reshape(population, trials)
+            own, costs = own.reshape(POPULATION, trials, -1), costs.reshape(POPULATION, trials)
             totals = self.totals(costs, points)
             search.tell([*zip(asked, totals.tolist(), strict=True)])
             k = int(totals.argmin())
             here = self.made(points[k], own[k], costs[k])
             # The better half, by which CMA-ES moves on, are the parents of the next generation.
-            good = np.argsort(totals)[: population // 2]
+            good = np.argsort(totals)[: POPULATION // 2]
             parents, theirs = points[good], own[good]
             if generation % RESCREEN == 0:
-                here = self.rescreened(here, rng)
+                here = self.rescreened(here, rng, *RESCREENED)
                 parents, theirs = here.point[None], here.own[None]
             best = best_of([best, here])
             if generation % REFRESH == 0:
