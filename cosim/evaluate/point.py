@@ -11,7 +11,7 @@ from typing import Any
 from cosim.circuit.lint.deck import named as netlist_files
 from cosim.errors import CosimError
 from cosim.scene import Scene, changed
-from cosim.scene.model import whole_periods
+from cosim.scene.model import periods_for
 from cosim.toolchain.processes import TRIES, ProcessLost, Progress
 
 Number = float | int
@@ -146,14 +146,13 @@ def outcome_of(record: Any) -> Outcome | None:
 
 
 def in_whole_periods(scene: Scene) -> Scene:
-    """The scene with ``run.settle`` at least as long and averages over about as long, both whole
-    periods.
+    """The scene with ``run.settle`` and ``run.duration`` at least as long and whole periods apart.
 
     The mean over a broken period is off by per cents, which differ from frequency to frequency.
     They stay as they are where nothing repeats.
     """
-    if isinf(scene.period):
+    if isinf(length := scene.period):
         return scene
-    span = scene.run.duration - scene.run.settle
-    settle, span = whole_periods(scene.period, scene.run.settle, span)
-    return scene.having(run={"settle": settle, "duration": settle + span})
+    times = scene.run.settle, scene.run.duration - scene.run.settle
+    settle, span = periods_for(length, *times)
+    return scene.having(run={"settle": settle * length, "duration": (settle + span) * length})

@@ -77,11 +77,9 @@ def averaged(count: int) -> int:
     return (2 * count + unit) // (2 * unit) * unit
 
 
-def whole_periods(length: float, settle: float, span: float) -> tuple[float, float]:
-    """Times to settle, at least ``settle``, and to average over, about ``span``, in whole periods
-    of ``length`` (all s)."""
-    before, after = (max(1, ceil(time / length - 1e-9)) for time in (settle, span))
-    return before * length, averaged(after) * length
+def periods_for(length: float, *times: float) -> list[int]:
+    """How many periods of ``length`` (s) last at least each of ``times`` (s); one at least."""
+    return [max(1, ceil(time / length - 1e-9)) for time in times]
 
 
 class Scene(BaseModel):

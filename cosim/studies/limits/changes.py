@@ -12,7 +12,7 @@ from cosim.arrays import Array
 from cosim.circuit.heat import DRIVE_RANGE_HEAT
 from cosim.drive.command import shape
 from cosim.scene import Scene, changed, firmware
-from cosim.scene.model import whole_periods
+from cosim.scene.model import averaged, periods_for
 from cosim.scene.tables import KNOBS
 
 Settings = dict[str, Any]
@@ -67,8 +67,9 @@ class Machine:
             levels = (_typed(level - 0.5) for level in point[len(KNOBS) :])
             found["drive.table"] = [[k / self.levels, level] for k, level in enumerate(levels)]
         period = firmware.period(hertz, None) if found.get("drive.quantised") else 1.0 / hertz
-        before, after = whole_periods(period, settle, span)
-        return found | {"run.settle": before, "run.duration": before + after}
+        before, after = periods_for(period, settle, span)
+        settle, span = before * period, averaged(after) * period
+        return found | {"run.settle": settle, "run.duration": settle + span}
 
     def sampled(self, scene: Scene, levels: int) -> Array:
         """The command's own shape at ``levels`` even phases, as that many further coordinates of a
