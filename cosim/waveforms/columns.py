@@ -52,5 +52,6 @@ def about(name: str, unit: str) -> dict[str, str]:
 
 
 def netcdf_name(name: str) -> str:
-    """A name as netCDF can have it: without a slash, and with a letter, digit or _ first."""
-    return ("" if name[:1].isalnum() else "_") + name.replace("/", "|")
+    """A name as netCDF can have it: without a slash, without a space at its end, and with a letter,
+    digit or _ first."""
+    return ("" if name[:1].isalnum() else "_") + name.replace("/", "|").rstrip(" ")

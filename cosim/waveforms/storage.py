@@ -1,6 +1,6 @@
 """Waveforms as files: CSV and netCDF, each written whole or not at all."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
 from struct import pack
@@ -108,11 +108,13 @@ def read_netcdf(path: Path) -> tuple[dict[str, Array], dict[str, str], dict[str,
 
     try:
         with opened(path, LARGEST) as content, netcdf_file(content, mmap=False) as file:
-            columns = {name: variable[:] for name, variable in file.variables.items()}
-            units = {name: _text(variable.units) for name, variable in file.variables.items()}
+            # scipy takes a name's bytes for Latin-1.
+            found = {_text(name.encode("latin-1")): each for name, each in file.variables.items()}
+            columns = {name: variable[:] for name, variable in found.items()}
+            units = {name: _text(variable.units) for name, variable in found.items()}
             attributes = {name: _text(value) for name, value in file._attributes.items()}
         for name, values in columns.items():
-            if not ((name + units[name]).isascii() and (name + units[name]).isprintable()):
+            if not (name + units[name]).isprintable():
                 raise _Damaged(f"{name!r} in {units[name]!r} is not a name and a unit")
             if values.dtype != ">f8" or values.ndim != 1:
                 raise _Damaged(f"{name!r} is not a column")
@@ -146,6 +148,11 @@ def _text(value: object) -> str:
     return text
 
 
+def renamed(data: "xr.Dataset", change: Callable[[str], str]) -> "xr.Dataset":
+    """All names of a dataset changed: scipy takes the UTF-8 of netCDF's names for Latin-1."""
+    return data.rename({name: change(str(name)) for name in {*data.variables, *data.dims}})
+
+
 def read_sweep(folder: Path) -> "xr.Dataset":
     """The dataset in a folder that ``cosim sweep`` wrote. Raises BadInput."""
     import xarray as xr
@@ -154,6 +161,7 @@ def read_sweep(folder: Path) -> "xr.Dataset":
     content = BytesIO(reader.read(path, LARGEST))
     try:
         data = xr.load_dataset(content, engine="scipy")
+        data = renamed(data, lambda name: name.encode("latin-1").decode())
         grid, said = {*data["failure"].dims}, [data.attrs["title"]]
         for name, each in data.variables.items():
             said += [each.attrs.get(key, "") for key in ("units", "long_name")]

@@ -54,6 +54,19 @@ def build(
     return path
 
 
+def reworded(path: Path, *changes: tuple[str, str]) -> None:
+    """Change what an FMU says of itself."""
+    with zipfile.ZipFile(path) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    about = files["modelDescription.xml"].decode()
+    for old, new in changes:
+        assert old in about
+        about = about.replace(old, new)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in (files | {"modelDescription.xml": about}).items():
+            archive.writestr(name, content)
+
+
 @cache
 def _library() -> bytes:
     """Compiled once for all tests of a process."""

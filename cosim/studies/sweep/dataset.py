@@ -22,7 +22,7 @@ from cosim.scene.tables import MACHINE
 from cosim.studies.sweep.design import Design
 from cosim.waveforms.columns import netcdf_name
 from cosim.waveforms.quantities import meaning
-from cosim.waveforms.storage import swept
+from cosim.waveforms.storage import renamed, swept
 
 FAILURE = "failure"
 """The variable that says why a point failed; empty where it did not."""
@@ -124,9 +124,11 @@ def _names(design: Design, taken: set[str]) -> list[str]:
     keys = [axis.key for axis in design.axes]
     bare = Counter(key.name for key in keys)
     return [
-        f"{key.table}_{key.name}"
-        if bare[key.name] > 1 or key.name in taken or hasattr(xr.Dataset, key.name)
-        else key.name
+        netcdf_name(
+            f"{key.table}_{key.name}"
+            if bare[key.name] > 1 or key.name in taken or hasattr(xr.Dataset, key.name)
+            else key.name
+        )
         for key in keys
     ]
 
@@ -152,6 +154,7 @@ def _meant(scene: Scene, data: xr.Dataset) -> dict[str, xr.DataArray]:
 
 def write(path: Path, data: xr.Dataset, figure: Path) -> None:
     """NetCDF (classic format): equal data give equal bytes. The ``figure`` of older ones goes."""
-    content = data.to_netcdf(engine="scipy")
+    written = renamed(data, lambda name: name.encode().decode("latin-1"))
+    content = written.to_netcdf(engine="scipy")
     with together([path], outdated=[figure]) as (temporary,):
         temporary.write_bytes(bytes(content))

@@ -1,0 +1,62 @@
+"""Names and units that others give to what is in their FMUs, in all that cosim writes."""
+
+import csv
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+
+import cosim
+from cosim.cli.main import main
+from cosim.toolchain.processes import in_place
+from tests.ports.foreign import reworded
+from tests.ports.test_coupled import motor
+
+OUTPUT, UNIT = 'der(ω_"1", é) <&>', "°/µs"
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = motor(tmp_path)
+    name = 'name="der(ω_&quot;1&quot;, é) &lt;&amp;&gt;"'
+    parameter = ('name="J"', 'name="J/ζ "'), ("J = 2e-4", '"J/ζ " = 2e-4')
+    reworded(
+        tmp_path / "Rotor.fmu", ('name="alpha"', name), ('"rad/s2"', f'"{UNIT}"'), parameter[0]
+    )
+    path.write_text(path.read_text().replace(*parameter[1]), encoding="utf-8")
+    return path
+
+
+def test_a_run_is_exported_and_shown(tmp_path: Path, scene: Path) -> None:
+    out = tmp_path / "out"
+    with in_place():
+        assert main(["run", str(scene), "--set", "run.duration=2e-3", "--out", str(out)]) == 0
+    with open(out / "waveforms.csv", encoding="utf-8", newline="") as file:
+        (*names,), *rows = csv.reader(file)
+    place = names.index(f"rotor.{OUTPUT} [{UNIT}]")
+    values = np.array([float(row[place]) for row in rows])
+    with netCDF4.Dataset(out / "waveforms.nc") as file:
+        assert np.asarray(file[f"rotor.{OUTPUT}"][:]) == pytest.approx(values)
+        assert file[f"rotor.{OUTPUT}"].units == UNIT
+    assert (
+        main(["export", str(out), "--as", "mat,hdf5,raw,csv", "--out", str(tmp_path / "to")]) == 0
+    )
+    exported = (tmp_path / "to" / "waveforms.csv").read_bytes()
+    assert exported == (out / "waveforms.csv").read_bytes()
+    assert main(["show", str(out)]) == 0
+
+
+def test_a_sweep_is_written_and_read(tmp_path: Path, scene: Path) -> None:
+    over = {"fmu.rotor.J/ζ ": [1e-4, 2e-4]}
+    with in_place():
+        data = cosim.sweep(scene, over, {"run.duration": 1e-3}, out=tmp_path / "out")
+    name = f"rotor.{OUTPUT}.greatest"
+    assert (data["failure"] == "").all() and data[name].dims == ("rotor.J|ζ",)
+    with netCDF4.Dataset(tmp_path / "out" / "sweep.nc") as file:
+        assert np.asarray(file[name][:]) == pytest.approx(data[name].values)
+        assert np.asarray(file["rotor.J|ζ"][:]) == pytest.approx([1e-4, 2e-4])
+    again = main(["export", str(tmp_path / "out"), "--as", "csv"])
+    assert again == 0 and f"rotor.{OUTPUT}".split('"')[0] in (
+        (tmp_path / "out" / "sweep.csv").read_text(encoding="utf-8")
+    )
