@@ -11,6 +11,7 @@ from cosim import run
 from cosim.cli.main import main
 from cosim.errors import SimulationFailed
 from cosim.toolchain.processes import in_place
+from tests.ports.foreign import reworded
 from tests.ports.test_coupled import motor
 
 WRONG = {
@@ -155,19 +156,14 @@ OMEGA = '"omega" valueReference="1"'
         ('start="2e-4"', 'start="x"', "B=1e-4", r"start, min or max of J is no number"),
         (OMEGA, OMEGA.replace("1", "-1"), "B=1e-4", r"valueReference of omega must be from 0 to"),
         (OMEGA, OMEGA.replace("1", f"{1 << 32}"), "B=1e-4", r"valueReference of omega must be"),
+        ('"alpha"', '"al&#10;pha"', "B=1e-4", r"name and unit of al pha must be printable"),
     ],
 )
 def test_what_an_fmu_says_of_its_variables_holds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, given: str, said: str
 ) -> None:
-    scene, path = motor(tmp_path), tmp_path / "Rotor.fmu"
-    with zipfile.ZipFile(path) as archive:
-        files = {name: archive.read(name) for name in archive.namelist()}
-    about = files["modelDescription.xml"].decode()
-    assert old in about
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, content in (files | {"modelDescription.xml": about.replace(old, new)}).items():
-            archive.writestr(name, content)
+    scene = motor(tmp_path)
+    reworded(tmp_path / "Rotor.fmu", (old, new))
     with in_place():
         assert main(["run", str(scene), "--set", f"fmu.rotor.{given}"]) == 2
     assert re.search(said, capsys.readouterr().err)

@@ -133,6 +133,8 @@ class Stranger:
                 start if len(start) == size else (0.0,) * size,
                 *(derivatives.get(each.name, ""), low, high, items),
             )
+            if each.causality == "output" and not (each.name + unit(each)).isprintable():
+                raise self.bad(f"name and unit of {each.name} must be printable")
         outputs = [each for each in known.values() if each.causality == "output"]
         if sum(each.size for each in outputs) > MOST_VALUES:
             raise self.bad(f"its outputs have more than {MOST_VALUES} values")
