@@ -68,11 +68,14 @@ _STEP_ENDS: dict[int, tuple[Any, ...]] = {
 class Interface:
     """One instance of the FMU. Places and values are ctypes arrays of equal length."""
 
-    def __init__(self, version: int, loaded: Any = None) -> None:
-        """Of an FMU that fmpy has ``loaded``; by default the project's own."""
+    def __init__(
+        self, version: int, loaded: Any = None, messages: deque[str] | None = None
+    ) -> None:
+        """Of an FMU that fmpy has ``loaded``; by default the project's own. What it says goes into
+        ``messages``, also where it cannot be made."""
         self.version = version
         """Of FMI."""
-        self.messages: deque[str] = deque(maxlen=100)
+        self.messages: deque[str] = deque(maxlen=100) if messages is None else messages
         """What the FMU has said, the newest last."""
         self._running = False
         self._fmu = copy(load(version) if loaded is None else loaded)

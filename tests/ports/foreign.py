@@ -70,13 +70,22 @@ def reworded(path: Path, *changes: tuple[str, str]) -> None:
 @cache
 def _library() -> bytes:
     """Compiled once for all tests of a process."""
-    source = Path(__file__).with_name("foreign.c")
     with TemporaryDirectory() as folder:
-        library = Path(folder, f"foreign{sharedLibraryExtension}")
-        subprocess.run(
-            ["cc", "-shared", "-fPIC", "-O2", "-w", "-o", library, source, "-lm"], check=True
-        )
-        return library.read_bytes()
+        return recompiled(Path(folder)).read_bytes()
+
+
+def recompiled(folder: Path, *changes: tuple[str, str]) -> Path:
+    """The library with a changed source, in the folder in which an FMU is built of it later."""
+    text = Path(__file__).with_name("foreign.c").read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    source, library = folder / "foreign.c", folder / f"foreign{sharedLibraryExtension}"
+    source.write_text(text)
+    subprocess.run(
+        ["cc", "-shared", "-fPIC", "-O2", "-w", "-o", library, source, "-lm"], check=True
+    )
+    return library
 
 
 def _abilities(saves: bool, fixed: bool, word: str) -> str:

@@ -11,7 +11,7 @@ from cosim import run
 from cosim.cli.main import main
 from cosim.errors import SimulationFailed
 from cosim.toolchain.processes import in_place
-from tests.ports.foreign import reworded
+from tests.ports.foreign import recompiled, reworded
 from tests.ports.test_coupled import motor
 
 WRONG = {
@@ -200,6 +200,28 @@ def test_a_crash_is_exit_code_three(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert main(["run", str(scene), *given, "--out", str(tmp_path / "out")]) == 3
     told = capsys.readouterr().err.strip()
     assert told.count("\n") == 0 and "died after t = " in told
+
+
+LOG_2, LOG_3 = (f'm->log{n}({z}0, 3, 0, "no licence\\n here")' for n, z in ((2, "0, "), (3, "")))
+ENTER_2 = "int fmi2EnterInitializationMode(void *m) { return !m; }"
+
+
+@pytest.mark.parametrize(
+    ("version", "old", "new"),
+    [
+        (2, "calls->logger;", f"calls->logger; {LOG_2}; return NULL;"),
+        (3, "m->log3 = log;", f"m->log3 = log; {LOG_3}; return NULL;"),
+        (2, ENTER_2, f"int fmi2EnterInitializationMode(Model *m) {{ return {LOG_2}, 3; }}"),
+    ],
+)
+def test_why_an_fmu_cannot_begin_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], version: int, old: str, new: str
+) -> None:
+    recompiled(tmp_path, (old, new))
+    with in_place():
+        assert main(["run", str(motor(tmp_path, version=version))]) == 2
+    told = capsys.readouterr().err
+    assert re.search(r"Rotor\.fmu: the FMU cannot be initialised: no licence\s+here\.$", told), told
 
 
 @pytest.mark.parametrize("command", ["sweep", "tune"])

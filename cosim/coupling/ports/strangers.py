@@ -6,6 +6,7 @@ import math
 import re
 import tempfile
 import zipfile
+from collections import deque
 from collections.abc import Mapping
 from ctypes import c_void_p, cast
 from dataclasses import dataclass
@@ -176,9 +177,9 @@ class Stranger:
 
     def instance(self, parameters: Mapping[str, Any]) -> Interface:
         """A new instance with these start values of parameters, initialised."""
-        made = None
+        messages: deque[str] = deque(maxlen=100)
         try:
-            made = Interface(self.version, self.loaded)
+            made = Interface(self.version, self.loaded, messages)
             arrays: dict[str, list[Any]] = {}
             for name, value in parameters.items():
                 self._set(made, name, value, arrays)
@@ -186,7 +187,7 @@ class Stranger:
         except BadInput:
             raise
         except Exception as error:
-            said = f": {made.messages[-1]}" if made and made.messages else f" ({error})"
+            said = f": {messages[-1]}" if messages else f" ({error})"
             raise self.bad(f"the FMU cannot be initialised{said}") from error
         return made
 
