@@ -224,6 +224,18 @@ def test_why_an_fmu_cannot_begin_is_told(
     assert re.search(r"Rotor\.fmu: the FMU cannot be initialised: no licence\s+here\.$", told), told
 
 
+@pytest.mark.parametrize(
+    ("status", "said"), [(2, "it discards the step"), (3, "an error"), (4, "a fatal error")]
+)
+def test_an_fmu_that_fails_without_a_word(tmp_path: Path, status: int, said: str) -> None:
+    recompiled(tmp_path, ("m->time = time + h;", f"if (time > 1e-4) return {status};"))
+    with (
+        in_place(),
+        pytest.raises(SimulationFailed, match=rf"FMU rotor failed at t = .*: .*{said}"),
+    ):
+        run(motor(tmp_path))
+
+
 @pytest.mark.parametrize("command", ["sweep", "tune"])
 @pytest.mark.parametrize(
     ("key", "said"),

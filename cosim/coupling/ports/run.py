@@ -39,6 +39,13 @@ ORDINARY = 1000
 _AGREEMENT = 2.0
 """Of ``circuit.reltol``: how far an FMU and ngspice may be apart where steps are repeated."""
 
+_STATUSES = {
+    2: "it discards the step, or asks to end the run",
+    3: "it has an error, and does not say which",
+    4: "it has a fatal error, and does not say which",
+}
+"""What an FMU tells by the status of a call alone."""
+
 
 class Run:
     """A run under way, and its logs."""
@@ -148,7 +155,8 @@ class Run:
 
     def _fmu_failure(self) -> SimulationFailed:
         side = self.plan.sides[self.state.failed]
-        said = side.instance.messages or [f"status {side.fmu.status}"]
+        status = side.fmu.status
+        said = side.instance.messages or [_STATUSES.get(status, f"status {status}")]
         return SimulationFailed(
             f"The FMU {side.name} failed at t = {self.state.told:.6g} s: {plain(said[-1], 400)}"
         )
