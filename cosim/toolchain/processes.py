@@ -175,9 +175,9 @@ class Worker:
                 raise value
         hangs = self._spent >= PATIENCE
         raise (SimulationFailed if hangs else ProcessLost)(
-            f"The simulation hangs at t = {self.reached:.6g} s: no step was finished in "
+            f"The simulation hangs after t = {self.reached:.6g} s: no step was finished in "
             f"{f'{PATIENCE:g} s of CPU time' if hangs else f'{STALLED:g} s'}. A netlist without a "
-            "solution can do this to ngspice."
+            "solution can do this to ngspice, and an FMU can do it itself."
         )
 
     def _heard(self) -> tuple[str, Any]:

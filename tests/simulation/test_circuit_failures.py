@@ -123,7 +123,7 @@ def test_dying_process(harm: str) -> None:
 )
 def test_hanging_process(limit: str, harm: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, limit, 2.0)
-    with pytest.raises(SimulationFailed, match=r"hangs.* 2 s"):
+    with pytest.raises(SimulationFailed, match=r"hangs.* 2 s.* an FMU can"):
         processes.isolated(_harmful, harm, lambda _: None)
 
 
