@@ -33,7 +33,7 @@ from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import changed, load, to_toml
 from cosim.toolchain.processes import in_place
 from tests.helpers import spice
-from tests.ports.foreign import build
+from tests.ports.foreign import build, recompiled, reworded
 
 BRIDGE = """
 .param vdd=24
@@ -502,6 +502,29 @@ settle = 0.005
     assert result.summary["a.omega.greatest"] == pytest.approx(
         float(waves["a.omega"][settled][0]), rel=1e-3
     )
+
+
+@pytest.mark.parametrize("bits", [8, 16, 32])
+@pytest.mark.parametrize("sign", ["", "U"])
+def test_a_whole_number_beyond_its_type_is_the_limit(tmp_path: Path, bits: int, sign: str) -> None:
+    """It has wrapped around: 200 was -56. What the FMU was given comes back as an output."""
+    kind, of = f"{sign}Int{bits}", f"{sign.lower()}int{bits}_t"
+    known = f"int fmi3Set{kind}(Model *m, void *p, size_t n, {of} *x, size_t k)"
+    recompiled(
+        tmp_path,
+        (f"STUB(fmi3Set{kind})", f"{known} {{ if (n) m->r[DROP] = *x; return 0; }}"),
+        ("case Y: return", "case Y: return m->r[DROP]; case DROP: return"),
+    )
+    scene = motor(tmp_path, version=3)
+    boolean = '<Boolean name="off" valueReference="20" causality="input" start="false"/>'
+    changed = boolean.replace("Boolean", kind).replace("false", "0")
+    reworded(tmp_path / "Rotor.fmu", (boolean, changed))
+    port = '[[port]]\nprobe = "v(gp)"\nto = "rotor.off"\nscale = 1e11\noffset = -5e10\n'
+    scene.write_text(scene.read_text().replace("[coupling]", f"{port}[coupling]"))
+    given = here(scene, {"run.duration": 1e-3, "run.output_step": 1e-5}).columns["rotor.y"]
+    least = 0 if sign else -(2 ** (bits - 1))
+    most = 2 ** (bits if sign else bits - 1) - 1
+    assert given[[15, 25]] == pytest.approx([least, most], rel=1e-12)
 
 
 def test_fixed_steps_take_macro_steps(tmp_path: Path) -> None:

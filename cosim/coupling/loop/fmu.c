@@ -102,23 +102,29 @@ static int exchange(Fmu *f, const Group *g)
     return good(f, status, g->call);
 }
 
-/* Each type of whole numbers: by its name in the enum. A value between two is rounded. */
+/* Each type of whole numbers: by its name in the enum, with its least and greatest value. A value
+   between two is rounded, and one beyond them is that limit, as in a converter. */
 #define WHOLE_TYPES(TYPE)                                                                          \
-    TYPE(INT8S, int8_t)                                                                            \
-    TYPE(UINT8S, uint8_t)                                                                          \
-    TYPE(INT16S, int16_t)                                                                          \
-    TYPE(UINT16S, uint16_t)                                                                        \
-    TYPE(INT32S, int32_t)                                                                          \
-    TYPE(UINT32S, uint32_t)                                                                        \
-    TYPE(INT64S, int64_t)                                                                          \
-    TYPE(UINT64S, uint64_t)
+    TYPE(INT8S, int8_t, INT8_MIN, INT8_MAX)                                                        \
+    TYPE(UINT8S, uint8_t, 0, UINT8_MAX)                                                            \
+    TYPE(INT16S, int16_t, INT16_MIN, INT16_MAX)                                                    \
+    TYPE(UINT16S, uint16_t, 0, UINT16_MAX)                                                         \
+    TYPE(INT32S, int32_t, INT32_MIN, INT32_MAX)                                                    \
+    TYPE(UINT32S, uint32_t, 0, UINT32_MAX)                                                         \
+    TYPE(INT64S, int64_t, INT64_MIN, INT64_MAX)                                                    \
+    TYPE(UINT64S, uint64_t, 0, UINT64_MAX)
 
 int fmu_set_group(Fmu *f, const Group *g)
 {
-#define SET(KIND, TYPE)                                                                            \
+#define SET(KIND, TYPE, LEAST, MOST)                                                               \
     if (g->kind == KIND)                                                                           \
-        ((TYPE *)g->raw)[k] = (TYPE)nearbyint(g->values[k]);
+        ((TYPE *)g->raw)[k] = whole <= (double)LEAST  ? LEAST                                      \
+                              : whole >= (double)MOST ? MOST                                       \
+                                                      : (TYPE)whole;
+    if (g->kind == DOUBLES)
+        return exchange(f, g);
     for (int64_t k = 0; k < g->size; k++) {
+        const double whole = nearbyint(g->values[k]);
         WHOLE_TYPES(SET)
         if (g->kind == FLOATS)
             ((float *)g->raw)[k] = (float)g->values[k];
@@ -134,14 +140,14 @@ int fmu_get_group(Fmu *f, const Group *g)
 {
     if (!exchange(f, g))
         return 0;
-#define GET(KIND, TYPE)                                                                            \
+#define GET(KIND, TYPE, ...)                                                                       \
     if (g->kind == KIND)                                                                           \
         g->values[k] = (double)((TYPE *)g->raw)[k];
     for (int64_t k = 0; k < g->size; k++) {
         WHOLE_TYPES(GET)
-        GET(FLOATS, float)
-        GET(BOOLS, bool)
-        GET(INT_BOOLS, int32_t)
+        GET(FLOATS, float, )
+        GET(BOOLS, bool, )
+        GET(INT_BOOLS, int32_t, )
     }
     return 1;
 }
