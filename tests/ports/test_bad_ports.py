@@ -156,6 +156,13 @@ OMEGA = '"omega" valueReference="1"'
         ('start="2e-4"', 'start="x"', "B=1e-4", r"start, min or max of J is no number"),
         (OMEGA, OMEGA.replace("1", "-1"), "B=1e-4", r"valueReference of omega must be from 0 to"),
         (OMEGA, OMEGA.replace("1", f"{1 << 32}"), "B=1e-4", r"valueReference of omega must be"),
+        ('index="13"', 'index="99"', "B=1e-4", r"cannot be read \(it does not follow the stand"),
+        (
+            'modelIdentifier="foreign"',
+            'maxOutputDerivativeOrder="x"',
+            "B=1e-4",
+            r"'x' is not a val",
+        ),
         ('"alpha"', '"al&#10;pha"', "B=1e-4", r"name and unit of al pha must be printable"),
     ],
 )

@@ -15,6 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import fmpy
+from fmpy.model_description import ValidationError
 
 from cosim.errors import BadInput, plain
 from cosim.files import reader
@@ -82,12 +83,13 @@ class Stranger:
         try:
             found: Any = fmpy.read_model_description(folder, validate=False)
         except Exception as error:
-            raise self.bad(f"its modelDescription.xml cannot be read ({error})") from error
+            why = f"its modelDescription.xml cannot be read ({_why(folder)})"
+            raise self.bad(why) from error
         self.version = int(str(found.fmiVersion).partition(".")[0])
         if self.version not in SLAVES:
             raise self.bad(f"it is of FMI {found.fmiVersion}; it must be of FMI 2.0 or 3.0")
         if found.coSimulation is None:
-            raise self.bad("it must be for co-simulation; it has model exchange alone")
+            raise self.bad("it must be for co-simulation, and is not")
         self.abilities: Any = found.coSimulation
         self.token = found.instantiationToken
         self.variables = self._variables(found)
@@ -248,6 +250,18 @@ def _allowed(found: Variable, value: Any, where: str, of: Stranger) -> Any:
     if not found.low <= value <= found.high:
         raise of.bad(f"{where} must be from {found.low:g} to {found.high:g}")
     return value
+
+
+def _why(folder: str) -> str:
+    """What is wrong with a model description: rather what its schema tells than words of Python's
+    that tell a user nothing."""
+    try:
+        fmpy.read_model_description(folder)
+    except Exception as error:
+        told = isinstance(error, (ValidationError, SyntaxError, OSError))
+        if told or type(error) is Exception:
+            return str(error).replace(folder, "…")
+    return "it does not follow the standard"
 
 
 def _number(text: str) -> float:
