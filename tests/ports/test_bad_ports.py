@@ -176,6 +176,25 @@ def test_what_an_fmu_says_of_its_variables_holds(
     assert re.search(said, capsys.readouterr().err)
 
 
+def test_an_fmu_for_one_instance_is_not_that_of_two(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two would be one: what it computes may lie in static variables."""
+    scene = motor(tmp_path)
+    reworded(
+        tmp_path / "Rotor.fmu",
+        ("<CoSimulation ", '<CoSimulation canBeInstantiatedOnlyOncePerProcess="true" '),
+    )
+    with in_place():
+        run(scene, {"run.duration": 1e-4})
+        second = '[[fmu]]\nname = "other"\nfile = "Rotor.fmu"\n[[port]]'
+        scene.write_text(scene.read_text().replace("[[port]]", second, 1))
+        port = '[[port]]\nfrom = "rotor.omega"\nto = "other.u"\n[coupling]'
+        scene.write_text(scene.read_text().replace("[coupling]", port))
+        assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == 2
+    assert re.search(r"Rotor\.fmu: \[\[fmu\]\] rotor, other .*Once", capsys.readouterr().err)
+
+
 @pytest.mark.parametrize("kind", ["deflated", "lzma", "a pipe", "a NUL", "too long"])
 def test_what_is_no_file_of_an_fmu_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str

@@ -25,6 +25,13 @@ class Plan:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         sides = {each.name: Side(each, stranger(each.file)) for each in scene.fmu}
+        for side in sides.values():
+            same = [other.name for other in sides.values() if other.of is side.of]
+            if len(same) > 1 and side.of.abilities.canBeInstantiatedOnlyOncePerProcess:
+                raise side.of.bad(
+                    f"[[fmu]] {', '.join(same)} cannot all be of it: it says of itself "
+                    "canBeInstantiatedOnlyOncePerProcess = true"
+                )
         # As an FMU like others the machine asks for no voltage of its coil.
         ports = [port for port in scene.port if port.to not in MACHINE_ENDS[3:]]
         ends = [port.origin or port.to or "" for port in ports]
