@@ -176,6 +176,21 @@ def test_what_an_fmu_says_of_its_variables_holds(
     assert re.search(said, capsys.readouterr().err)
 
 
+@pytest.mark.parametrize("size", ["-2", "1048577", "100000000000"])
+def test_an_array_that_no_memory_holds_is_refused_where_it_is_needed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], size: str
+) -> None:
+    scene = motor(tmp_path, version=3)
+    extra = f'start="0"><Dimension start="{size}"/></Float64></ModelVariables>'
+    local = f'<Float64 name="map" valueReference="99" causality="local" {extra}'
+    reworded(tmp_path / "Rotor.fmu", ("</ModelVariables>", local))
+    with in_place():
+        run(scene, {"run.duration": 1e-4})
+        reworded(tmp_path / "Rotor.fmu", ('"local"', '"input"'))
+        assert main(["run", str(scene)]) == 2
+    assert "Rotor.fmu: map must have from 0 to 1048576 values" in capsys.readouterr().err
+
+
 def test_an_fmu_for_one_instance_is_not_that_of_two(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

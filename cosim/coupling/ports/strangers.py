@@ -25,8 +25,11 @@ from cosim.scene.messages import PLAIN_NUMBER, ended, shown, suggestion
 MOST_FILES, LARGEST = 10_000, 1 << 30
 """Of an FMU: files in it, and bytes once unpacked."""
 
-MOST_VALUES = 4096
-"""Numbers in the outputs of an FMU: arrays count with all of theirs."""
+MOST_VALUES, MOST_ELEMENTS = 4096, 1 << 20
+"""Numbers in the outputs of an FMU, where arrays count with all of theirs; and in one array."""
+
+_JOINED = ("input", "output", "parameter")
+"""What a scene can join or set; any other array may have any size."""
 
 _KINDS_2 = {"Real": 0, "Integer": 6, "Enumeration": 6, "Boolean": 11}
 _KINDS_3 = {
@@ -117,7 +120,9 @@ class Stranger:
         for each in found.modelVariables:
             if each.type not in kinds:
                 continue
-            size = math.prod(each.shape or (1,))
+            size = math.prod(each.shape or (1,)) if each.causality in _JOINED else 1
+            if not 0 <= size <= MOST_ELEMENTS:
+                raise self.bad(f"{each.name} must have from 0 to {MOST_ELEMENTS} values")
             if not 0 <= each.valueReference < 1 << 32:
                 raise self.bad(f"the valueReference of {each.name} must be from 0 to 4294967295")
             of: Any = each.declaredType or each
