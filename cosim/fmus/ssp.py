@@ -44,7 +44,7 @@ def ssp(scene: Scene, target: Path, fmi: int = 2) -> None:
     if scene.has_ports or not scene.rung.ngspice:
         raise BadInput(
             f"scene {scene.name}: an .ssp is of the built-in machine with a circuit in ngspice: "
-            'circuit.model must be "amplifier", "full" or "file".'
+            'circuit.model must be "amplifier", "full" or "file", without an [[fmu]].'
         )
     if scene.renamed or scene.coupling.method == "companion":
         raise BadInput(

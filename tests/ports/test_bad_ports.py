@@ -191,6 +191,12 @@ def test_an_array_that_no_memory_holds_is_refused_where_it_is_needed(
     assert "Rotor.fmu: map must have from 0 to 1048576 values" in capsys.readouterr().err
 
 
+def test_an_ssp_of_own_fmus_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fmu", "ssp", str(motor(tmp_path)), "--out", str(tmp_path / "m.ssp")]) == 2
+    assert "without an [[fmu]]" in capsys.readouterr().err
+    assert not (tmp_path / "m.ssp").exists()
+
+
 def test_an_fmu_for_one_instance_is_not_that_of_two(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
