@@ -31,7 +31,8 @@ def meaning(name: str, units: Mapping[str, str] | None = None) -> dict[str, str]
     the signals of a scene with ports."""
     if name not in SUMMARY:  # of a scene with ports
         signal, _, what = name.rpartition(".")
-        unit = OF_SOURCES.get(what) or (units or {}).get(signal, "?")
+        known, array = units or {}, signal.rpartition("[")[0]
+        unit = OF_SOURCES.get(what) or known.get(signal) or known.get(array, "?")
         return {"units": unit, "long_name": f"{what} of {signal}"}
     found = SUMMARY[name]
     return {"units": found.unit, "long_name": found.text}

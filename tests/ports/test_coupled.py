@@ -553,6 +553,21 @@ def test_a_sweep_goes_over_parameters_of_fmus_and_circuit(tmp_path: Path) -> Non
     assert (units["Vemf.mean"], units["Vemf.power"], units["v(a)*i(Vemf).rms"]) == ("V", "W", "W")
 
 
+def test_a_sweep_goes_over_truth_values_and_elements_of_arrays(tmp_path: Path) -> None:
+    """What is switched off has no torque: the speed stays 0."""
+    over = {"fmu.rotor.off": [0, 1], "fmu.rotor.x[1]": [0.1, 0.2]}
+    scene = motor(tmp_path, version=3)
+    reworded(tmp_path / "Rotor.fmu", ('name="xs"', 'name="xs" unit="rad/s"'))
+    with in_place():
+        data = cosim.sweep(scene, over, {"run.duration": 1e-3})
+        with pytest.raises(BadInput, match=r"off = 0\.5 must be true or false"):
+            cosim.run(scene, {"fmu.rotor.off": 0.5})
+    speeds = data["rotor.xs[0].greatest"]
+    assert speeds.attrs["units"] == "rad/s"
+    on, off = speeds.values
+    assert on[1] > on[0] and on.all() and not off.any()
+
+
 def test_an_fmu_that_ends_its_process_or_fails_is_told(tmp_path: Path) -> None:
     scene = motor(tmp_path)
     with pytest.raises(SimulationFailed, match=r"died after t = .*SIGABRT"):

@@ -238,8 +238,9 @@ _AS_2 = {"Enumeration": "Integer"}
 
 def _allowed(found: Variable, value: Any, where: str, of: Stranger) -> Any:
     if found.type == "Boolean":
-        if not isinstance(value, bool):
+        if value not in (0, 1):  # a sweep has numbers alone
             raise of.bad(f"{where} must be true or false")
+        value = bool(value)
     elif isinstance(value, bool):
         raise of.bad(f"{where} must be a number")
     elif not found.real:
