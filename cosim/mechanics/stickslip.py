@@ -182,6 +182,13 @@ class Mechanics:
         """The failure to raise for a call of the FMU at ``time`` (s) that gave ``error``, in the
         FMU's words."""
         said = self.instance.messages[-1] if self.instance.messages else str(error)
+        current, beyond, _ = said.partition(": current = ")[2].partition(" is outside")
+        if beyond:  # the mechanics refuse it; the circuit, or the steps, drove it there
+            return SimulationFailed(
+                f"The run diverges: the coil's current has grown to {current} by t = {time:.6g} s; "
+                "look for signs and positive feedback in the netlist, if it is your own, or take "
+                "a smaller coupling.macro_step or circuit.max_step."
+            )
         return SimulationFailed(f"The mechanics failed at t = {time:.6g} s: {said}")
 
 

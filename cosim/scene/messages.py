@@ -55,7 +55,11 @@ def bad(sentence: str) -> BadInput:
 
 def unknown_table(name: str) -> str:
     """A sentence on an unknown table, or on a key outside its table."""
-    hint = full_name(name) or suggestion(name, TABLES) or f" (tables: {', '.join(TABLES)})"
+    hint = (
+        full_name(name)
+        or suggestion(name, (*TABLES, "base", "description"))
+        or f" (tables: {', '.join(TABLES)}; above them: base, description)"
+    )
     return f'there is no table "{plain(name)}"{hint}'
 
 

@@ -78,6 +78,11 @@ SIMULATIONS = {
         edited(SENSE, f"{SENSE}\nB9 x 0 V=time>1m ? (V(x)>0.5 ? 0 : 1) : 0\nR9 x 0 1"),
         r"stopped at t = 0\.00[01]\d*.*s of 0\.01 s|range of numbers|hangs",
     ),
+    # More is fed back than the coil's 7.1 ohm take: the current grows by e in 93 us.
+    "positive feedback": (
+        edited(SENSE, "Bsense sense 0 V=-20*I(Vemf)"),
+        r"diverges: the coil's current",
+    ),
 }
 
 
