@@ -9,6 +9,7 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.trials.camera import FRAME_RATE, frame_times
+from cosim.trials.flaws import flaws
 from cosim.trials.table import UNDERSTOOD, WORDS, read_table
 from cosim.trials.tracked import track
 
@@ -17,6 +18,9 @@ DIGITS = 6e-7, 6e-9
 
 GAP = 1.5
 """Of the median step, from which on a step is a gap."""
+
+EVEN = 1.1
+"""The longest step over the shortest, up to which times count as even."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,8 @@ def read_recording(path: Path, asked: str = "") -> Recording:
         if np.isfinite(values).sum() < 2:
             where = f"{plain(path)}: column {plain(table.headers[name], 40)}"
             raise BadInput(f"{where}: it has fewer than two values.")
+    heights = {z: signals[z] for z in ("z_surface", "z_part") if z in signals}
+    notes += (*flaws(time, {plain(table.headers[z], 40): heights[z] for z in heights}),)
     across = table.columns.get("v_across_surface", np.full(count, np.nan))
     columns = {
         name: {"header": column.header, "unit": column.unit, "assumed": column.assumed}
@@ -114,6 +120,9 @@ def _gaps(time: Array) -> list[str]:
     steps = np.diff(time)
     usual = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP * usual)
+    if not len(gaps) and steps.max() > EVEN * steps.min():
+        apart = f"{steps.min() * 1e3:.3g} to {steps.max() * 1e3:.3g} ms apart"
+        return [f"Rows are {apart}: if these times are rounded, so are the velocities."]
     if not len(gaps):
         return []
     longest = int(np.argmax(steps))

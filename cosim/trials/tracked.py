@@ -5,14 +5,16 @@ A velocity that is missing, or its whole column, is made by central differences,
 
 import os
 import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput, plain
+from cosim.errors import BadInput, Note, plain
 from cosim.trials.camera import velocities
+from cosim.trials.flaws import flaws
 from cosim.trials.table import FEWEST_ROWS, read_table
 
 LONGEST_NAME = 100
@@ -83,7 +85,8 @@ def trial_files(folder: Path, apart: Path | None = None) -> list[Path]:
 
 def read(path: Path) -> Trial:
     """One trial, of the rows in which surface and part are known; times need not be even. Raises
-    BadInput, with file, row and column, for what is wrong with it."""
+    BadInput, with file, row and column, for what is wrong with it, and warns by a ``Note`` of what
+    may be."""
     table = read_table(path)
     for name, letters in (("time", "t"), ("z_surface", "zp"), ("z_part", "zo")):
         if name not in table.columns:
@@ -95,6 +98,9 @@ def read(path: Path) -> Trial:
             f"{plain(path)}: {known.sum()} rows have both zp and zo, and {FEWEST_ROWS} are needed."
         )
     columns = {name: values[known] for name, values in table.columns.items()}
+    heights = {table.headers[name]: columns[name] for name in ("z_surface", "z_part")}
+    for sentence in (*table.notes, *flaws(columns["time"], heights)):
+        warnings.warn(f"{plain(path)}: {sentence}", Note, stacklevel=2)
     platform, part = track(columns, "surface"), track(columns, "part")
     plate = track(columns, "plate") if "z_plate" in columns else None
     return Trial(path.stem, number_of(path), columns["time"], platform, part, plate)

@@ -107,6 +107,24 @@ def beside_velocities(columns: list[Array]) -> list[Array]:
     return [time, *(1e3 * z for z in heights), *(np.gradient(z, time) for z in heights)]
 
 
+def with_rows(rows: slice, of: int, value: float) -> Spoil:
+    """A value in the place of what was measured there."""
+
+    def spoil(columns: list[Array]) -> list[Array]:
+        columns = [c.copy() for c in columns]
+        columns[of][rows] = value
+        return columns
+
+    return spoil
+
+
+def mixed_up(columns: list[Array]) -> list[Array]:
+    """The marks of surface and part exchanged from the middle on."""
+    time, surface, part = columns
+    late = time > time[150]
+    return [time, np.where(late, part, surface), np.where(late, surface, part)]
+
+
 EXCHANGED = "the columns of surface and part exchanged"
 TOLD = {
     "mm as m": (HEADER.replace("mm", "m"), same, ["surface [m] times 0.001", "part [m] times"]),
@@ -135,6 +153,38 @@ TOLD = {
         ["Gaps in time: 2, the longest of 4.17 ms"],
     ),
     "no times": ("surface [mm],part [mm]", lambda c: c[1:], ["No time column: read at 960"]),
+    "zeros for lost frames": (HEADER, with_rows(slice(100, 110), 2, 0.0), ["part [mm] jumps 2"]),
+    "two wild values": (HEADER, with_rows(slice(50, 200, 80), 1, 9.0), ["surface [mm] jumps 4"]),
+    "mixed up midway": (HEADER, mixed_up, ["surface [mm] jumps once", "part [mm] jumps once"]),
+    "doubled frames": (
+        *(HEADER, lambda c: [c[0], *(z[np.arange(300) // 2 * 2] for z in c[1:])]),
+        ["150 of 300 rows repeat the heights of the row before"],
+    ),
+    "out of the picture": (
+        *(HEADER, lambda c: [c[0], np.minimum(c[1], np.quantile(c[1], 0.8)), c[2]]),
+        ["surface [mm] has its greatest value, -0.35", "in 60 of 300 rows"],
+    ),
+    "rounded heights": (
+        *(HEADER, lambda c: [c[0], *(np.round(4.0 * z) / 4.0 for z in c[1:])]),
+        ["surface [mm] has 4 different values", "part [mm] has 16 different"],
+    ),
+    "rounded times": (
+        *(HEADER, lambda c: [np.round(2.0 * c[0], 3), *c[1:]]),
+        ["Rows are 2 to 3 ms apart: if these times are rounded"],
+    ),
+    "one body's heights twice": (HEADER, lambda c: [*c[:2], c[1]], ["hold the same values"]),
+    "the part seen from the surface": (
+        *(HEADER, lambda c: [*c[:2], c[2] - c[1]]),
+        ["with the surface's height added to it: is it measured from the surface?"],
+    ),
+    "velocities as heights": (
+        *(HEADER, lambda c: [c[0], *(np.gradient(z, c[0]) for z in c[1:])]),
+        ["column surface [mm] would agree much better", "as a velocity, in mm/s: is it one?"],
+    ),
+    "the surface 4 rows late": (
+        *(HEADER, lambda c: [c[0][4:], c[1][:-4], c[2][4:]]),
+        ["height of the part would agree", "4 rows later: were both filmed at once?"],
+    ),
     "a column of something else": (
         *(HEADER + ",foo", lambda c: [*c, c[0]]),
         ["Left out, not understood: foo."],
@@ -153,7 +203,7 @@ def test_what_may_be_wrong_is_told(spoilt: str, run: cosim.Result, tmp_path: Pat
     for sentence in words:
         assert sentence in repr(compared)
     numbers = compared.numbers
-    if "cell" in spoilt or "frames" in spoilt:  # what is missing spoils nothing
+    if "cell" in spoilt or spoilt == "dropped frames":  # what is missing spoils nothing
         assert numbers["velocity_r2"] == pytest.approx(1.0, abs=0.01)
         assert numbers["mean_error_mm"] == pytest.approx(0.0, abs=0.01)
         assert numbers["drift_simulated"] == pytest.approx(numbers["drift_measured"], rel=0.02)

@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import cosim
 from cosim.errors import BadInput
 from cosim.trials.recording import read_recording
-from cosim.trials.tracked import read_platform
+from cosim.trials.tracked import read_platform, trial_files
+from cosim.waveforms import formats
 
 ROWS = np.arange(12)
 
@@ -115,3 +117,18 @@ def test_a_surface_alone(tmp_path: Path) -> None:
         read_platform(write(tmp_path / "b.csv", "velocity [mm/s]", ROWS))
     with pytest.raises(BadInput, match="no column with the surface's motion"):
         read_platform(write(tmp_path / "c.csv", "time [s],current [A]", ROWS, ROWS))
+
+
+def test_no_published_trial_is_told_a_flaw(trials: Path) -> None:
+    for path in trial_files(trials):
+        found = read_recording(path)
+        assert not found.notes and not found.understood["gaps"], path
+
+
+@pytest.mark.parametrize("scene", ["trial-06", "quaid", "held"])
+def test_no_run_is_told_a_flaw(scene: str, tmp_path: Path) -> None:
+    """One that rests on a wall in the end, one that repeats from frame to frame, one at rest."""
+    cosim.run(scene).save(tmp_path)
+    formats.export(formats.read(tmp_path), ["tracker"], tmp_path)
+    found = read_recording(tmp_path / "tracker.csv")
+    assert not found.notes and not found.understood["gaps"]

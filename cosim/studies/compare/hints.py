@@ -1,7 +1,8 @@
 """What a user may have written wrong in a recording's file: told, never applied.
 
-Each guess is one change of the file: a power of ten, a sign, exchanged columns, a clock. It is
-worth a sentence where it leaves at most half of what the run does not explain without it.
+Each guess is one change of the file: a power of ten, a sign, exchanged columns, a velocity in the
+place of a height, a part measured from the surface or at another time, a clock. It is worth a
+sentence where it leaves at most half of what the run does not explain without it.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,6 +23,9 @@ CLOCKS = np.linspace(0.988, 1.012, 25)
 
 ROWS = 4000
 """Of a recording, as many as are looked at."""
+
+LAGS = range(-12, 13)
+"""Rows by which the part's column may be late."""
 
 WELL = 0.5
 """R² that a guess must reach at least."""
@@ -68,6 +72,9 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
             fine = False
             start = starts[int(np.argmax(shares[factor]))] if name == guide else start
             yield _agree(COLUMNS[name].long_name, after, before) + _scaled(recording, name, factor)
+    for sentence in _of_other_motion(recording, observe, laid, guide, start) if fine else ():
+        fine = False
+        yield sentence
     if fine:
         near = starts[np.argsort(np.abs(starts - start))[:17]]
         clocks = {}
@@ -79,6 +86,42 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
         if _better(clocks[clock], clocks[1.0]) and clocks[clock] - clocks[1.0] > 0.02:
             agree = _agree(COLUMNS[guide].long_name, clocks[clock], clocks[1.0])
             yield f"{agree} with times multiplied by {clock:.3f}: is its frame rate right?"
+
+
+def _of_other_motion(
+    recording: Recording, observe: Observe, laid: list[Array], guide: str, start: float
+) -> Iterator[str]:
+    """Hints at heights that are something else than they say. ``laid``: the run's ``guide`` as it
+    may meet the recording; ``start`` (s) as in :class:`Seen`."""
+    signals, headers = recording.signals, recording.understood.get("columns", {})
+    for body in ("surface", "part"):
+        z, v = f"z_{body}", f"v_{body}"
+        if z not in headers or not {z, v} <= signals.keys():
+            continue
+        runs = laid if v == guide else [observe(recording, v, start)]
+        before = max(explained(run, signals[v]) for run in runs)
+        after = max(explained(run, signals[z]) for run in runs)
+        if _better(after, before):
+            header = plain(headers[z]["header"], 40)
+            agree = _agree(f"column {header}", after, before)
+            yield f"{agree} as a velocity, in {headers[z]['unit']}/s: is it one?"
+            return
+    if not {"z_surface", "v_surface", "z_part", "v_part"} <= signals.keys():
+        return
+    row, part = float(np.median(np.diff(recording.time))), signals["v_part"]
+    lifted = "with the surface's height added to it: is it measured from the surface?"
+    guesses = {lifted: (part + signals["v_surface"], 0)}
+    for lag in LAGS:
+        where = f"{abs(lag)} rows {'later' if lag > 0 else 'earlier'}"
+        guesses[f"{where}: were both filmed at once?"] = part, lag
+    shares = {
+        words: explained(observe(recording, "v_part", start + lag * row), values)
+        for words, (values, lag) in guesses.items()
+    }
+    words = max(shares, key=lambda words: shares[words])
+    before = explained(observe(recording, "v_part", start), part)
+    if _better(shares[words], before):
+        yield f"{_agree('height of the part', shares[words], before)} {words}"
 
 
 def _better(after: float, before: float) -> bool:

@@ -6,6 +6,7 @@ directly. The cost of a trial is the weighted sum of its signals' squared NRMSE 
 standard deviation). Missing values have no residual.
 """
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.errors import BadInput, plain
+from cosim.errors import BadInput, Note, plain
 from cosim.stepper.stepper import OWN
 from cosim.studies.identify.chain.chain import Target
 from cosim.studies.identify.problem.space import Space, own_bounds
@@ -71,6 +72,8 @@ def read_trials(folder: Path, space: Space) -> list[Measured]:
 def measured(recording: Recording, path: Path, space: Space) -> Measured:
     """One trial. Raises BadInput where it has no moving surface or does not repeat."""
     file = plain(path)
+    for sentence in (*recording.notes, *recording.understood.get("gaps", ())):
+        warnings.warn(f"{file}: {sentence}", Note, stacklevel=2)
     signals = {name: recording.signals[name] for name in WEIGHTS if name in recording.signals}
     if not {"z_surface", "v_surface"} & set(signals):
         raise BadInput(f"{file}: there is no height or velocity of the surface.")
