@@ -163,7 +163,8 @@ def motion(scene: Scene, progress: Progress) -> dict[str, Any]:
 
     ``motion`` is "regular", "no transport" (below LEAST), "several answers", "chaotic" or
     "unsettled": not periodic by then. ``motion_periods`` are those of the drive after which it
-    repeats, and ``motion_settled`` is from when on it does so, s. ``v_average_answers`` are the
+    repeats, ``motion_settled`` is from when on it does so, s, and ``v_average_settled`` the mean
+    velocity, m/s, that it then has, of the same simple circuit. ``v_average_answers`` are the
     mean velocities, m/s, that several starts come to; ``v_average_range`` holds the least and the
     greatest one of chaotic motion in stretches as long as the average.
     """
@@ -222,6 +223,7 @@ def _kind(ways: Iterator[Array], length: float, averaged: int, chaos: bool) -> d
     if repeats[0] is not None:
         found["motion_periods"] = repeats[0]
         found["motion_settled"] = _settled(two[0], repeats[0]) * length
+        found["v_average_settled"] = answers[0]
     return found
 
 

@@ -21,6 +21,7 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
         ("  off by its own steps", _own_error(summary)),
         ("  averaged over", _periods(scene, summary)),
         ("motion", motion_in_words(summary)),
+        ("", _of_the_start(scene, summary)),
         ("transport per cycle", _scaled(summary["transport_per_cycle"], 1e6, "µm", "+.1f")),
         ("sticking", _scaled(summary["stick_fraction"], 100, "% of the time", ".1f")),
         ("surface, peak-to-peak", _scaled(summary["z_surface_pp"], 1e3, "mm", ".3f")),
@@ -49,6 +50,10 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
     rows = [(name, value + beside.get(name.strip(), "")) for name, value in rows if value]
     return "\n".join(f"  {name:<24}{value}" for name, value in rows)
 
+
+OFF, LEAST = 0.01, 1e-4
+"""By how much a mean velocity may be off the settled one before that is told: relative, and m/s
+where nothing is transported."""
 
 MOST_ROWS = 20
 """Of a scene with its own FMUs, beyond what is asked for."""
@@ -175,6 +180,18 @@ def motion_in_words(summary: Mapping[str, Any]) -> str:
         return f"chaotic: means over as many periods lie between {low:+.3f} and {high:+.3f} mm/s"
     answers = " or ".join(f"{1e3 * value:+.3f}" for value in summary["v_average_answers"])
     return f"the start decides: {answers} mm/s"
+
+
+def _of_the_start(scene: Scene, summary: dict[str, Any]) -> str:
+    """That the mean velocity is not the one that the motion settles to, where it is not."""
+    settle, still = scene.run.settle, summary.get("motion") == "no transport"
+    late = summary.get("motion_settled", 0.0) > settle + 0.01 * scene.period
+    later = 0.0 if still else summary.get("v_average_settled", 0.0)
+    off = abs(summary["v_average"] - later)
+    if not (still or late) or off < (LEAST if still else OFF * abs(later)):
+        return ""
+    words = f"the mean above, from {settle:.3g} s on, reads the start"
+    return f"{words}; later it is {1e3 * later:+.3f} mm/s"
 
 
 def _error(summary: dict[str, Any]) -> str:

@@ -9,7 +9,14 @@ from cosim.waveforms.quantities import SUMMARY
 from docs.programs.reference import files
 
 BRIEF = {"run.duration": 0.06, "run.settle": 0.03}
-KINDS = {"motion", "motion_periods", "motion_settled", "v_average_answers", "v_average_range"}
+KINDS = {
+    "motion",
+    "motion_periods",
+    "motion_settled",
+    "v_average_settled",
+    "v_average_answers",
+    "v_average_range",
+}
 """For which these runs have too few periods."""
 OTHERS = {"spread", "steps_repeated", "v_average_other_starts", *KINDS}
 """Entries that options of `cosim run` add to the file, and those of longer runs and of own FMUs."""

@@ -11,6 +11,7 @@ import cosim
 from cosim.scene import load
 from cosim.simulation.checks import motion
 from cosim.simulation.simulate import simulate
+from cosim.waveforms.report import table
 from tests.simulation.test_against_reference import CASES, scene_of
 
 pytestmark = pytest.mark.physics
@@ -180,3 +181,17 @@ def test_the_strict_error_is_from_other_runs_of_the_same_circuit(tmp_path: Path)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert 0.0 < summary["v_average_error"] < 1e-4 * abs(summary["v_average"]) + 1e-6
     assert len(summary["v_average_other_starts"]) == 3
+
+
+def test_a_mean_that_reads_the_start_is_told_with_the_settled_one() -> None:
+    """Flexures that ring for seconds: a run of 32 s has what one of 1 s is told to come to."""
+    settings = {"drive.quantised": False, "drive.frequency": 45.0, "drive.amplitude": 10.0}
+    settings |= {"drive.offset": -1.76, "circuit.model": "ideal"}
+    brief = cosim.run("gripper", settings | {"run.settle": 23 / 45.0, "run.duration": 46 / 45.0})
+    long = cosim.run("gripper", settings | {"run.settle": 720 / 45.0, "run.duration": 1440 / 45.0})
+    settled = long.summary["v_average"]
+    assert abs(brief.summary["v_average"] - settled) > 0.02 * abs(settled)
+    assert brief.summary["v_average_settled"] == pytest.approx(settled, rel=2e-3)
+    words = f"reads the start; later it is {1e3 * brief.summary['v_average_settled']:+.3f} mm/s"
+    assert words in table(brief.scene, brief.summary, {})
+    assert "reads the start" not in table(long.scene, long.summary, {})

@@ -51,7 +51,14 @@ LIMITS = {
 }
 WORDS = ["method", "notes", "rests", "run", "versions"]
 HEAT = {"coil_heat", "coil_rise_continuous", "coil_rise_lift"}
-TOLD = {"v_average_error", "motion", "motion_periods", "motion_settled", "v_average_range"}
+TOLD = {
+    "v_average_error",
+    "motion",
+    "motion_periods",
+    "motion_settled",
+    "v_average_settled",
+    "v_average_range",
+}
 
 RUNS = {
     "reference": ("reference", "run.duration=0.4", "run.settle=0.1"),
