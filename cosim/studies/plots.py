@@ -22,7 +22,7 @@ TIE = "\N{NO-BREAK SPACE}"
 def headline(figure: Picture, message: str) -> None:
     """Write the message of a figure above it."""
     width = round(10.0 * figure.get_figwidth())
-    tied = re.sub(r"(?<=\d) (?=[^\W\d])", TIE, message)  # a number and its unit
+    tied = re.sub(r"(?<=\d) (?=[^\W\d]|%)", TIE, message)  # a number and its unit
     lines = "\n".join(fill(line, width) for line in tied.splitlines())
     figure.suptitle(lines.replace(TIE, " "), x=0.01, ha="left", fontsize=12, fontweight="bold")
 
