@@ -142,6 +142,9 @@ TOLD = {
     "E9 x 0 TABLE {V(in)} = (1,0) (0,1)": "TABLE takes an expression in braces",
     "E9 x 0 AND(2) in 0 b 0 0 1": "gates are not known here",
     "E9 x 0 in 0 Laplace=1/(1+s)": "write the filter with R and C",
+    "E9 x 0 VCVS in 0 2 max=1": "leave out this word of HSPICE; with MAX and MIN write a B source",
+    ".func int(x) {idt(x)}\nB9 x 0 V=int(V(in))": "write it there instead of in a .func",
+    ".control": "leave it out, and all up to .endc",
     "E9 x 0 FREQ {V(in)} = (0,0,0)": "FREQ is not known here",
     "V9 x 0 PULSE(0 1 0 1n 1n 1u 2u 3)": "PULSE takes 7 values; one more means a number of periods",
     "V9 x 0 SINE(0 1 1k 0 0 0 5)": "SIN takes 6 values",
@@ -158,7 +161,7 @@ TOLD = {
     "Q9 x in 0 W\n.model W ako:V\n.model V ako:W NPN": "is defined here; copy its .model",
     "S9 x 0 in 0 W\n.model W SW(Vh=-1)\n.model W SW(Vh=1)": "there is a second model w, so this",
     ".ic i(R8)=1\nR9 x 0 1": "i(r8)=1 is not v(node)=value",
-    "A9 in 0 0 0 0 x 0 0 COUNTER": "that a netlist may have; write it with R, C and B",
+    "A9 in 0 0 0 0 x 0 0 COUNTER": "SRFLOP and DFLOP of LTspice with Vhigh, Vlow",
     "V9 x 0 PWL file=stimulus.txt": "was not found in the netlist's folder: copy it there",
     "V9 x 0 PWL file=own.cir": "own.cir must hold pairs of numbers",
     "V9 x 0 PWL time_scale_factor=2 file=own.cir": "write the values of this one into the line",
@@ -169,8 +172,8 @@ TOLD = {
     "XU9 in x level2 Avol=1Meg": "include the file with its .subckt",
     ".lib UniversalOpamps2.sub": "was not found in the netlist's folder: copy it there",
     ".lib C:\\models\\mine.lib": "was not found in the netlist's folder: copy it there",
-    "B9 x 0 V=idt(V(in),0,V(b))": "the function idt is not defined",
-    "B9 x 0 V=delay(V(in),V(b)*1m)": "the function delay is not defined",
+    "B9 x 0 V=idt(V(in),0,V(b))": "idt() is read as idt(x), idt(x,start) or delay(x,constant)",
+    "B9 x 0 V=delay(V(in),V(b)*1m)": "delay() is read as idt(x), idt(x,start) or",
     "R9 x 0 RM 5\n.model RM RES(R=2 TC1=1m)": "r=2 of rm multiplies its value in PSpice",
     "K9 L1 L2 L3 1": "there is no inductor l1 here",
     "K9 L1 L2 0.9 core": "must name two inductors and their coupling; write K pair by pair",
@@ -473,6 +476,24 @@ def test_what_is_not_used_is_not_refused(tmp_path: Path) -> None:
     assert not [line for line in lines if "aplace" in line]
 
 
+STRANGE = ["A1 2 1 0 0 0 0 3 0 OTA g=1m", "U1 inv $G_DPWR a b D0 IO", ".model D0 ugate (ty=9ns)",
+           "N1 a b m", "P1 a b 0 m", "Y1 a 0 b 0 m"]  # fmt: skip
+
+
+@pytest.mark.parametrize("strange", STRANGE)
+def test_what_no_netlist_may_have_is_refused_where_its_subcircuit_is_used(
+    strange: str, tmp_path: Path
+) -> None:
+    """Libraries hold much that one of their parts alone needs."""
+    library = f".subckt odd a b\n{strange}\n.subckt within a\n{strange}\n.ends\n.ends\n"
+    library += ".subckt fine a b\nR1 a b 1k\n.ends\nX1 in b fine\n"
+    assert strange.split()[0] not in "\n".join(anew(tmp_path, library)).replace("R1", "")
+    with pytest.raises(BadInput, match=r"^own\.cir:9: (A1|[UNPY]1 is no|models of type ugate)"):
+        anew(tmp_path, f"{library}X2 in b odd")
+    with pytest.raises(BadInput, match=r"^own\.cir:8: "):
+        anew(tmp_path, strange)
+
+
 MEASURES = {
     # of V(in), one volt at 1 kHz, and V(b), its absolute value: three periods
     "m1 AVG V(b) from=0 to=3m": 2 / np.pi,
@@ -737,6 +758,7 @@ LAWS = {
     "B9 x 0 V=delay(idt(6k*V(in)),100u)": lambda t: (
         6e3 * (1 - np.cos(OMEGA * np.maximum(t - 1e-4, 0))) / OMEGA
     ),
+    "E9 x 0 VALUE {SDT(6k*V(in))}": lambda t: 6e3 * (1 - np.cos(OMEGA * t)) / OMEGA,
     "G9 0 x in 0 1\nL9 x 0 Flux=0.2m*tanh(2*x)": lambda t: (
         0.4e-3 * OMEGA * np.cos(OMEGA * t) / np.cosh(2 * np.sin(OMEGA * t)) ** 2
     ),
@@ -798,6 +820,11 @@ def remembered(on: Array, off: Array) -> Array:
     return state[np.maximum.accumulate(places)]
 
 
+def last_edge(t: Array) -> Any:
+    """s; when that source rose last, before 0 if it did not."""
+    return 1e-4 + 0.37e-3 * np.floor((t - 1e-4) / 0.37e-3)
+
+
 GATES = {
     "A9 in 0 0 0 0 0 x 0 BUF Vhigh=5 Vlow=-1 Ref=.2": lambda v, t: np.where(v > 0.2, 5, -1),
     "A9 in 0 0 0 0 x 0 0 BUF Vhigh={2+3}": lambda v, t: 0 * t + 5,
@@ -811,6 +838,22 @@ GATES = {
     "A9 b in c c c c x c SCHMITT Vt=2 Vh=.5": lambda v, t: remembered(v < -0.5, v > 0.5) - 3,
     "A9 in y 0 0 0 0 x 0 SRFLOP": lambda v, t: remembered(
         (v > 0.5) & (square(t) < 0.5), (v < 0.5) & (square(t) > 0.5)
+    ),
+    "A9 in 0 y 0 0 0 x 0 DFLOP": lambda v, t: (t > 1e-4) & (np.sin(OMEGA * last_edge(t)) > 0.5),
+    "A9 q 0 y 0 0 q x 0 DFLOP": lambda v, t: np.round(last_edge(t) / 3.7e-4 + 0.73) % 2,
+    "A9 c 0 y in 0 0 x 0 DFLOP Vhigh=2": lambda v, t: (
+        2 * remembered(v > 1, np.diff(last_edge(t), prepend=-2.7e-4) > 1e-4)
+    ),
+    "A9 b 0 y 0 in x 0 0 DFLOP": lambda v, t: (
+        1 - remembered((np.diff(last_edge(t), prepend=-2.7e-4) > 1e-4) & (v < 0.5), v > 0.5)
+    ),
+    "A9 y 0 0 0 0 0 x 0 BUF Tau=20u": lambda v, t: (
+        np.where(
+            t - last_edge(t) < 2e-4,
+            1 - np.exp(-(t - last_edge(t)) / 2e-5),
+            np.exp(-(t - last_edge(t) - 2e-4) / 2e-5),
+        )
+        * (t > 1e-4)
     ),
 }
 
@@ -826,7 +869,7 @@ def test_gates_of_ltspice_are_what_their_names_say(gate: str, tmp_path: Path) ->
     assert np.quantile(error, 0.98) < 2e-3
 
 
-@pytest.mark.parametrize("what", ["DFLOP", "OTA g=1m", "AND Rhigh=2", "SCHMITT", "XOR"])
+@pytest.mark.parametrize("what", ["DFLOP Rhigh=2", "OTA g=1m", "AND Rhigh=2", "SCHMITT", "XOR"])
 def test_other_gates_are_refused(what: str, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"own\.cir:8: A9 is no element that a netlist may have"):
         anew(tmp_path, f"A9 in b c 0 0 0 x 0 {what}")

@@ -15,7 +15,7 @@ from pathlib import Path
 from unicodedata import category
 
 from cosim.circuit.lint.dialect import in_ngspice, in_ngspice_together, prelude, since_the_start
-from cosim.circuit.lint.lines import MAX_LINE, Line, refuse, shown
+from cosim.circuit.lint.lines import MAX_LINE, UNKNOWN, Line, refuse, shown
 from cosim.circuit.lint.words import number, word_set
 from cosim.errors import BadInput, plain
 from cosim.files import reader
@@ -63,6 +63,10 @@ MODELS = word_set("r res c l d npn pnp nmos pmos vdmos njf pjf nmf pmf sw csw vs
 MOS_LEVELS = frozenset("123469")
 """The BSIM models write a log into the working folder."""
 
+_GATES = (
+    "BUF, AND, OR, XOR of two, SCHMITT, SRFLOP and DFLOP of LTspice with Vhigh, Vlow, Ref, Vt, Vh, "
+    "Td, Trise, Tfall, Tau, Rout, Cout"
+)
 _INLINED = (".include", ".inc", ".lib")
 _END = re.compile(r"^[ \t]*\.end\b(?![.\w])", re.IGNORECASE | re.MULTILINE)
 _SCHEMATIC = re.compile(r"Version 4\S*\s+SHEET ")
@@ -143,6 +147,8 @@ class _Reader:
     dropped: list[Line] = field(default_factory=list)
     bytes_read: int = 0
     includes: int = 0
+    depth: int = 0
+    """Of subcircuits about the line."""
 
     def deck(self) -> list[Line]:
         name = shown(self.path.name)
@@ -199,6 +205,9 @@ class _Reader:
                     refuse(after, "there is text after .end, which must come last")
                 return True
             elif (text := passed(self._with_points(line, opened[-1]))) is not None:
+                self.depth += (word == ".subckt") - (word == ".ends")
+                if text.startswith(UNKNOWN) and self.depth < 1:
+                    refuse(line, text.removeprefix(UNKNOWN))
                 self._add(self.lines, Line(text, line.file, line.number))
             else:
                 self._add(self.dropped, line)
@@ -364,14 +373,16 @@ def _directive(line: Line) -> tuple[str, str]:
 
 
 def passed(line: Line) -> str | None:
-    """The text of a logical line if ngspice may see it, None if it is dropped. Raises BadInput."""
+    """The text of a logical line if ngspice may see it, None if it is dropped, a line ``UNKNOWN``
+    with the reason if it is to be refused where its subcircuit is used. Raises BadInput."""
     word, rest = _directive(line)
     if "ng_script" in line.text.lower():
         refuse(line, "ng_script would make the netlist a script of commands")
     if word in DROPPED:
         return None
     if word and word not in KEPT:
-        refuse(line, f"{shown(word)} is not allowed in a netlist; leave it out")
+        till = ", and all up to .endc: a scene tells what is run" if word == ".control" else ""
+        refuse(line, f"{shown(word)} is not allowed in a netlist; leave it out{till}")
     if not _TEXT.fullmatch(line.text) or _UNSAFE.search(line.text):
         odd = next(c for c in line.text if not " " <= c <= "~" or c in '"`\\')
         refuse(line, f"the character {shown(odd)} cannot stand in a netlist outside comments")
@@ -383,11 +394,12 @@ def passed(line: Line) -> str | None:
     if word in (".options", ".option", ".opt"):
         return _options(line, word, rest)
     if word == ".model":
-        _check_model(line)
-    elif not word and line.text[0].lower() not in ELEMENTS:
-        letter = line.text.split()[0]
+        return _model(line)
+    if not word and line.text[0].lower() not in ELEMENTS:
+        name = line.text.split()[0]
+        known = f" but {_GATES}" if name[0] in "aA" else ""
         cure = "write it with R, C and B sources"
-        refuse(line, f"{shown(letter)} is no element that a netlist may have; {cure}")
+        return f"{UNKNOWN}{shown(name)} is no element that a netlist may have{known}; {cure}"
     return line.text
 
 
@@ -407,15 +419,16 @@ def _options(line: Line, word: str, rest: str) -> str | None:
     return f"{word} {' '.join(kept)}" if kept else None
 
 
-def _check_model(line: Line) -> None:
+def _model(line: Line) -> str:
     match = _MODEL.match(line.text)
     if match is None:
         refuse(line, f"{shown(line.text)} is no complete .model line")
     kind = match[1].lower().split()[-1]  # of a kind of another model it may not be told
     if kind not in MODELS and not kind.startswith("ako:"):
-        refuse(line, f"models of type {shown(kind)} are not allowed in a netlist")
+        return f"{UNKNOWN}models of type {shown(kind)} are not allowed in a netlist"
     if kind in MODELS - {"nmos", "pmos"}:
-        return
+        return line.text
     for equals, level in _LEVEL.findall(line.text):
         if not equals or level not in MOS_LEVELS:
             refuse(line, f"MOS models of level {shown(level)} are not allowed: some write files")
+    return line.text

@@ -72,6 +72,7 @@ _SPLIT_NUMBER = re.compile(r"^(\d+)(meg|[tgkmunpf])(\d+)(?!\S)", re.IGNORECASE)
 _GLUED = re.compile(r"(?<==)\s*(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE)
 """4k7 for 4.7k, as a value and behind a name."""
 _POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)
+_VALUED = re.compile(r"(?<=\s)value\s*=?\s*(?={)", re.IGNORECASE)
 _TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECASE)
 _TEMP = re.compile(r"\.(?:temp\b[\s=]*|opt\w*\s(?:.*[\s,])?temp\s*=\s*)(\{[^{}]*\}|[^\s,]+)", re.I)
 _WARMTH = re.compile(r"(?<![\w.])temp(?!\w|\s*[=(])")
@@ -110,7 +111,7 @@ _CARDS = {
 """What these models have if it is not given."""
 _GATE = {
     "vhigh": "1", "vlow": "0", "ref": "0.5*(vhigh+vlow)", "vt": "0.5", "vh": "0.01", "td": "0",
-    "trise": "0", "tfall": "0", "rout": "1", "cout": "0", "tripdt": "", "tripv": "",
+    "trise": "0", "tfall": "0", "tau": "0", "rout": "1", "cout": "0", "tripdt": "", "tripv": "",
 }  # fmt: skip
 _CURRENT = re.compile(rf"\bi\s*\(\s*(l[^\s()]*)\s*\)\s*=\s*{_VALUE}[\s,]*", re.IGNORECASE)
 _UNSIGNED = ("", *"0123456789.")  # no base, or a number, perhaps behind an exponent
@@ -125,13 +126,14 @@ def in_ngspice(line: Line) -> list[Line]:
     """The line as ngspice knows it, in one line or more."""
     text = _without_tables(_NOISELESS.sub("", line.text.translate(_LETTERS)))
     kind, word = text[:1].lower(), text[:4].lower()
+    if kind in "beg":
+        text = _VALUED.sub("value=", re.sub(r"'([^']*)'", r"{\1}", text))
     if word not in (".inc", ".lib"):  # names of files
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
         text = text if word == ".mea" else _powers(text)
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
     if kind in "beg":
         text = _EQUAL.sub(_compared, text)
-        text = re.sub(r"'([^']*)'", r"{\1}", text)
         if any(each[0] != "(" or closing(each, 0) < len(each) for each in _COMPOUND.findall(text)):
             text = text.replace("{", "{(").replace("}", ")}")
     if kind in "rclvibefgh":
@@ -437,9 +439,10 @@ def _with_memory(text: str) -> Iterator[str]:
 
 
 def _gate(text: str) -> list[str]:
-    """LTspice's gate, Schmitt trigger or set-reset flip-flop: a switch whose control is above the
-    middle of a hysteresis (an AND's its least input), a delay, an edge of 1 ns or more, and for
-    each output a source. Inputs at the common node are none."""
+    """LTspice's gate, Schmitt trigger or flip-flop: a switch whose control is above the middle of a
+    hysteresis (an AND's its least input), a delay, an edge of 1 ns or more, and for each output a
+    source. One with a clock has two capacitors: the data's, and what follows that while the clock
+    is high. Inputs at the common node are none."""
     less, given = _taken(text, _GATE)
     name, *nodes = less.lower().split()
     if len(nodes) != 9:
@@ -449,6 +452,7 @@ def _gate(text: str) -> list[str]:
     ref = re.sub("v(?:high|low)", lambda match: law[match[0]], law["ref"])
     x = [f"v({each},{common})" for each in inputs if each != common]
     middle, half, y = ref, "0", x[0] if x else ""
+    first: list[str] = []
     if kind in ("and", "or") and x:
         y = reduce(lambda a, b: f"{'min' if kind == 'and' else 'max'}({a},{b})", x)
     elif kind == "xor" and len(x) == 2:
@@ -457,19 +461,29 @@ def _gate(text: str) -> list[str]:
         y, middle, half = "-".join(x), law["vt"], law["vh"]
     elif kind == "srflop" and len(x) == 2 and common not in inputs[:2]:
         y, middle, half = "-".join(x), "0", ref
+    elif kind == "dflop" and inputs[1] == common not in (inputs[0], inputs[2]):
+        data, preset, clear = (
+            f"v({inputs[place]},{common})>{ref}" if inputs[place] != common else "0>1"
+            for place in (0, 3, 4)
+        )
+        up, one, two = f"v({name}_c_p)>0.5", f"v({name}_w)", f"v({name}_s)"
+        clocked = f"{up} ? {one}>0.5 : {data}", f"({up} ? {one} : {two})>0.5"
+        first = _held(f"{name}_c", f"v({inputs[2]},{common})", ref, "0")
+        for each, follows in zip("ws", clocked, strict=True):
+            aim = f"({clear} ? 0 : ({preset} ? 1 : (({follows}) ? 1 : 0)))"
+            first.append(f"b{name}_{each} 0 {name}_{each} i={aim}-v({name}_{each})")
+            first.append(f"c{name}_{each} {name}_{each} 0 1n")
+        y, middle = two, "0.5"
     elif kind != "buf" or len(x) != 1:
         return [text]
     state, td = f"1.001*v({name}_p)", law["td"][1:-1]
     state = state if number(td) == 0.0 else f"delay({state},{{{td}}})"
     found = [
-        f"b{name}_x {name}_x 0 v={y}",
-        f"s{name} {name}_1 {name}_p {name}_x 0 {name}_m",
-        f".model {name}_m sw vt={{{middle}}} vh={{{half}}} ron=1 roff=1e9",
-        f"v{name}_1 {name}_1 0 1",
-        f"r{name}_p {name}_p 0 1k",
+        *first,
+        *_held(name, y, middle, half),
         *_with_memory(f"b{name}_d {name}_d 0 v={state}"),
         f"r{name}_q {name}_d {name}_q 1",
-        f"c{name}_q {name}_q 0 {{max(1n,{law['trise']})/2.2}}",
+        f"c{name}_q {name}_q 0 {{max(max(1n,{law['trise']})/2.2,{law['tau']})}}",
     ]
     for pin, out, share in ((6, below, f"(1-v({name}_q))"), (7, above, f"v({name}_q)")):
         if out != common:
@@ -478,6 +492,18 @@ def _gate(text: str) -> list[str]:
             found.append(f"r{name}_{pin} {name}_{pin} {out} {{{law['rout']}}}")
             found.append(f"c{name}_{pin} {out} {common} {{{law['cout']}}}")
     return found
+
+
+def _held(name: str, y: str, middle: str, half: str) -> list[str]:
+    """A node that is 1 from where y rises through the middle and a half of a hysteresis, and 0 from
+    where it falls through the other end."""
+    return [
+        f"b{name}_x {name}_x 0 v={y}",
+        f"s{name} {name}_1 {name}_p {name}_x 0 {name}_m",
+        f".model {name}_m sw vt={{{middle}}} vh={{{half}}} ron=1 roff=1e9",
+        f"v{name}_1 {name}_1 0 1",
+        f"r{name}_p {name}_p 0 1k",
+    ]
 
 
 def since_the_start(points: list[str]) -> str:

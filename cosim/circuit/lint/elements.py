@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import NoReturn
 
-from cosim.circuit.lint.lines import COPY, Line, refuse, shown
+from cosim.circuit.lint.lines import COPY, UNKNOWN, Line, refuse, shown
 from cosim.circuit.lint.words import definitions, split_assignments, words
 
 GROUND = "0"
@@ -32,7 +32,8 @@ MODEL_TYPES = {
     "o": {"ltra"},
 }
 
-_SPECIAL = {"poly", "table", "laplace", "freq", "value", "vol", "cur", "and", "nand", "or", "nor"}
+_SPECIAL = {"poly", "table", "laplace", "freq", "value", "vol", "cur", "and", "nand", "or", "nor",
+            "vcvs", "vccs"}  # fmt: skip
 """First words of controlled sources that have no controlling nodes."""
 
 _FLAG = re.compile("=|^(?:off|thermal)$")
@@ -211,6 +212,9 @@ class _Parser:
             if scope.used:
                 continue
             scope.used = True
+            for line, _ in scope.lines:
+                if line.text.startswith(UNKNOWN):
+                    refuse(line, line.text.removeprefix(UNKNOWN))
             for element in scope.elements:
                 _place(element, scope)
                 if element.kind == "x":

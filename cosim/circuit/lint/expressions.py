@@ -36,6 +36,10 @@ CONSTANTS = word_set("time temper hertz")
 BEHAVIOURAL_CONSTANTS = word_set("pi e i s")
 
 _LIMITER = "limit() is no limiter in ngspice; write max(low, min(high, x))"
+_MEMORY = (
+    "as idt(x), idt(x,start) or delay(x,constant) in a B, E or G source itself; write it there "
+    "instead of in a .func"
+)
 _VARYING = re.compile(r"\b(?:[vi]\s*\(|(?:time|temper|hertz)\b)", re.IGNORECASE)
 _PLAIN = re.compile(r"\s*\{?\s*[+-]?\s*[\w.]+(?:(?<=\de)[+-]?\d+)?\s*\}?\s*", re.IGNORECASE)
 _POINT = re.compile(
@@ -234,6 +238,8 @@ def _misused(name: str, arguments: list[str], behavioural: bool | None) -> str |
         if name in other or name in ("pwl", "table"):
             where = "where all is known before the run" if behavioural else "in B sources"
             return f"the function {name} works only {where}"
+        if name in ("idt", "sdt", "delay"):
+            return f"{name}() is read {_MEMORY}"
         return f"the function {shown(name)} is not defined"
     if count != known[name]:
         return f"the function {name} takes {_counted(known[name])}, not {count}"

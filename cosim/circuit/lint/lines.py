@@ -6,6 +6,8 @@ from typing import NoReturn
 from cosim.errors import BadInput, printable
 
 MAX_LINE = 200_000
+UNKNOWN = ".unknown "
+"""Begins a line in place of one that ngspice must not see, with what is wrong with it."""
 COPY = "; copy its .model line into the netlist"
 
 

@@ -52,6 +52,8 @@ _FORMS = {
     "table": "TABLE takes an expression in braces, then two points or more that rise in x",
     "laplace": "LAPLACE is not known here; write the filter with R and C",
     "freq": "FREQ is not known here; write the filter with R and C",
+    "vcvs": "leave out this word of HSPICE; with MAX and MIN write a B source",
+    "vccs": "leave out this word of HSPICE; with MAX and MIN write a B source",
 } | dict.fromkeys(("and", "nand", "or", "nor"), "gates are not known here; write a B source")
 """What ngspice would need code models for, where it could not be rewritten."""
 
