@@ -14,9 +14,9 @@ from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import Line, passed, read_all, refuse
 from cosim.circuit.lint.elements import Element, Scope, node, parse
 from cosim.circuit.lint.expressions import sensed
-from cosim.circuit.lint.outputs import Measure, measures, without_effect
 from cosim.circuit.lint.words import definitions
 from cosim.circuit.lint.write import written
+from cosim.circuit.outputs import Measure, measures, without_effect
 from cosim.errors import BadInput, plain
 from cosim.scene.messages import ended, suggestion
 

@@ -14,7 +14,7 @@ from cosim.circuit.joined import check_reading, own_parameters, reading, text_of
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.deck import Line, read_all, refuse
 from cosim.circuit.lint.elements import Element, Scope
-from cosim.circuit.lint.outputs import Measure, measures, without_effect
+from cosim.circuit.outputs import Measure, measures, without_effect
 from cosim.files.resources import circuits
 from cosim.scene import Scene
 

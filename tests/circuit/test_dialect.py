@@ -10,14 +10,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import cosim
 from cosim.arrays import Array
 from cosim.circuit.joined import deck
 from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import named, read, read_all
-from cosim.circuit.lint.outputs import measured, measures
 from cosim.circuit.lint.write import written
+from cosim.circuit.outputs import measured, measures
 from cosim.errors import BadInput, BeyondModel
 from cosim.files.resources import circuits
 from cosim.toolchain.processes import in_place
@@ -141,7 +142,8 @@ TOLD = {
     "E9 x 0 POLY(3) in 0 2": "POLY(n) takes its controls",
     "E9 x 0 TABLE {V(in)} = (1,0) (0,1)": "TABLE takes an expression in braces",
     "E9 x 0 AND(2) in 0 b 0 0 1": "gates are not known here",
-    "E9 x 0 in 0 Laplace=1/(1+s)": "write the filter with R and C",
+    "E9 x 0 in 0 Laplace=(1+s)": "LAPLACE takes a ratio of polynomials in s, the upper one of no",
+    "E9 x 0 LAPLACE {V(in)} {exp(-s*1u)}": "write another filter with R and C",
     "E9 x 0 VCVS in 0 2 max=1": "leave out this word of HSPICE; with MAX and MIN write a B source",
     ".func int(x) {idt(x)}\nB9 x 0 V=int(V(in))": "write it there instead of in a .func",
     ".control": "leave it out, and all up to .endc",
@@ -471,7 +473,7 @@ B1 4 0 V=v(2)*2+v(5V)
 
 
 def test_what_is_not_used_is_not_refused(tmp_path: Path) -> None:
-    library = ".subckt filter a b\nE1 b 0 LAPLACE {V(a)} = {1/(1+s)}\nE2 c 0 POLY(1) a 0 1\n.ends"
+    library = ".subckt filter a b\nE1 b 0 LAPLACE {V(a)} = {s}\nE2 c 0 POLY(1) a 0 1\n.ends"
     lines = anew(tmp_path, library, ".model W D(Vfwd=.5)", ".lib C:\\x\\standard.bjt")
     assert not [line for line in lines if "aplace" in line]
 
@@ -779,6 +781,35 @@ def test_integrals_delays_and_laws_of_parts_are_those_of_calculus(
     true = LAWS[lines](columns["time"])
     error = np.abs(columns["v(x)"] - true)[5:] / np.abs(true).max()
     assert error.max() < 2e-3 and error.mean() < 3e-4
+
+
+TAU, W = 40e-6, 2e4
+LAPLACES = {
+    "E9 x 0 in 0 Laplace=1/(1+s*{tau}) window=1": ([1], [TAU, 1]),
+    "E9 x 0 LAPLACE {2*V(in)} = {w**2/(s^2+0.6*w*s+w^2)}": ([2 * W**2], [1, 0.6 * W, W**2]),
+    "G9 0 x in 0 Laplace=3+2k/s+50u*s/(1+s*tau)\nR9 x 0 1": (
+        [3 * TAU + 50e-6, 3 + 2e3 * TAU, 2e3], [TAU, 1, 0],
+    ),
+    "B9 x 0 V=2*V(in) Laplace=1k/s": ([2e3], [1, 0]),
+    "E9 x 0 LAPLACE {V(in)} {((1-s*tau)/(1+s*tau))**3}": (
+        np.poly1d([-TAU, 1]) ** 3, np.poly1d([TAU, 1]) ** 3,
+    ),
+    "E9 x 0 (in,0) LAPLACE=1+none/s": ([1], [1]),
+    "E9 x 0 in 0 laplace={s*tau/(1+s*tau)/sqrt(4)}": ([TAU / 2, 0], [TAU, 1]),
+    "E9 x 0 in x Laplace=1e5/(1+s/(20*pi))": ([1e5], [1 / (20 * np.pi), 1e5 + 1]),
+}  # fmt: skip
+
+
+@needs.ngspice_library
+@pytest.mark.parametrize("lines", LAPLACES)
+def test_filters_in_s_answer_as_their_transfer_function(lines: str, tmp_path: Path) -> None:
+    """As scipy has it, from rest."""
+    parameters = f".param tau={TAU} w={W} none=0\n"
+    columns = columns_of(tmp_path, f"{parameters}{lines}\nR8 x 0 1Meg", "v(x)", "v(in)")
+    time = np.linspace(0, 3e-3, len(columns["time"]))
+    _, true, _ = scipy.signal.lsim(LAPLACES[lines], np.sin(OMEGA * time), time)
+    error = np.abs(columns["v(x)"] - np.interp(columns["time"], time, true))
+    assert error[5:].max() < 2e-3 * np.abs(true).max()
 
 
 PASTED = {

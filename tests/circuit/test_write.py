@@ -92,7 +92,7 @@ def test_no_spelling_of_a_level_passes(parameters: str, tmp_path: Path) -> None:
     [
         ("C9 v1 0 1u Rser=1 m=2", "write a resistor in series"),
         ("R9 v1 0 1 Rpar=1k", "write a resistor in parallel"),
-        ("E9 x9 0 v1 0 laplace=1", "write the filter"),
+        ("E9 x9 0 v1 0 laplace=s", "write another filter"),
         ("L9 v1 x9 1m ruler=3", "nothing that ngspice knows"),
     ],
 )

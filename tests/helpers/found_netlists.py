@@ -203,8 +203,8 @@ REFUSED = {
         r"own\.cir:3: A1 is no element that a netlist may have but .*; write it with R, C and B",
     ),
     "a filter in s": (
-        "t\nV1 in 0 1\nE1 out 0 LAPLACE {V(in)} = {1/(1+s/6283)}\nR1 out 0 1k\n.end\n",
-        r"own\.cir:3: e1: LAPLACE is not known here; write the filter with R and C\.",
+        "t\nV1 in 0 1\nE1 out 0 LAPLACE {V(in)} = {exp(-s*1u)}\nR1 out 0 1k\n.end\n",
+        r"own\.cir:3: e1: LAPLACE takes a ratio of .*; write another filter with R and C\.",
     ),
     "an ideal diode": (
         "* x\nV1 in 0 1\nD1 in out DI\nR1 out 0 1k\n.model DI D(Ron=.1 Vfwd=.4 Ilimit=2)\n.end\n",

@@ -15,6 +15,7 @@ from itertools import chain, combinations, combinations_with_replacement, count,
 from math import pi
 from typing import Any
 
+from cosim.circuit.lint.laplace import without_laplace
 from cosim.circuit.lint.lines import COPY, MAX_LINE, Line, refuse, shown
 from cosim.circuit.lint.words import closing, number, split_arguments, word_set, words
 
@@ -128,6 +129,8 @@ def in_ngspice(line: Line) -> list[Line]:
     kind, word = text[:1].lower(), text[:4].lower()
     if kind in "beg":
         text = _VALUED.sub("value=", re.sub(r"'([^']*)'", r"{\1}", text))
+        if len(parts := [*without_laplace(text)]) > 1:
+            return [each for part in parts for each in in_ngspice(replace(line, text=part))]
     if word not in (".inc", ".lib"):  # names of files
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
         text = text if word == ".mea" else _powers(text)

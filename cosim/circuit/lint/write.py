@@ -50,7 +50,8 @@ _ELSEWHERE = {
 _FORMS = {
     "poly": "POLY(n) takes its controls, then 2 to 50 numbers if n is 1, else 1 to 50",
     "table": "TABLE takes an expression in braces, then two points or more that rise in x",
-    "laplace": "LAPLACE is not known here; write the filter with R and C",
+    "laplace": "LAPLACE takes a ratio of polynomials in s, the upper one of no higher power; "
+    "write another filter with R and C",
     "freq": "FREQ is not known here; write the filter with R and C",
     "vcvs": "leave out this word of HSPICE; with MAX and MIN write a B source",
     "vccs": "leave out this word of HSPICE; with MAX and MIN write a B source",

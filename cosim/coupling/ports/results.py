@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.arrays import Array
 from cosim.circuit.joined import unit
-from cosim.circuit.lint.outputs import measured
+from cosim.circuit.outputs import measured
 from cosim.coupling.loop.agenda import count
 from cosim.coupling.loop.lead import engine
 from cosim.coupling.loop.structures import loop

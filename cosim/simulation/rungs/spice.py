@@ -20,8 +20,8 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
     """The coupling method of the scene joins ngspice and the mechanics."""
     # Only those who run a circuit load PySpice, which takes a while.
     from cosim.circuit.false_cycles import refuse_false
-    from cosim.circuit.lint.outputs import measured
     from cosim.circuit.netlist import asked_for
+    from cosim.circuit.outputs import measured
     from cosim.coupling.loop.macro_steps import coupled
 
     lead = coupled(scene, recorder)
