@@ -198,6 +198,9 @@ class _Reader:
                     continue
             if not inside:
                 continue
+            if word.startswith(".opt") and re.search(r"\bmaxstep\b", rest, re.IGNORECASE):
+                told = ".told maxstep has no effect; circuit.max_step is a run's longest step"
+                self._add(self.dropped, replace(line, text=told))
             if word in _INLINED:
                 self._inline(line, rest, opened)
             elif word == ".end" and section is None:
