@@ -21,7 +21,7 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
         ("  off by its own steps", _own_error(summary)),
         ("  averaged over", _periods(scene, summary)),
         ("motion", motion_in_words(summary)),
-        ("", _of_the_start(scene, summary)),
+        ("", of_the_start(scene, summary)),
         ("transport per cycle", _scaled(summary["transport_per_cycle"], 1e6, "µm", "+.1f")),
         ("sticking", _scaled(summary["stick_fraction"], 100, "% of the time", ".1f")),
         ("surface, peak-to-peak", _scaled(summary["z_surface_pp"], 1e3, "mm", ".3f")),
@@ -182,7 +182,7 @@ def motion_in_words(summary: Mapping[str, Any]) -> str:
     return f"the start decides: {answers} mm/s"
 
 
-def _of_the_start(scene: Scene, summary: dict[str, Any]) -> str:
+def of_the_start(scene: Scene, summary: Mapping[str, Any]) -> str:
     """That the mean velocity is not the one that the motion settles to, where it is not."""
     settle, still = scene.run.settle, summary.get("motion") == "no transport"
     late = summary.get("motion_settled", 0.0) > settle + 0.01 * scene.period

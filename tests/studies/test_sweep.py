@@ -26,6 +26,7 @@ from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.sweep import figure
 from cosim.studies.sweep.design import Design, grid, sample
+from cosim.studies.sweep.report import table
 from cosim.studies.sweep.run import sweep
 from cosim.toolchain import processes
 from cosim.toolchain.processes import in_place
@@ -319,6 +320,24 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out
     assert "6 points, 0 failed" in said and "fastest up" in said
     assert {path.name for path in tmp_path.iterdir()} == {"sweep.nc", "sweep.sqlite", "figure.png"}
+
+
+def test_motion_at_the_fastest_and_at_random_points_is_told() -> None:
+    """The gripper's flexures ring for seconds: means over the first one are not the later ones. The
+    rig of the trials has settled by then."""
+    over = {"drive.amplitude": [5.0, 7.0, 9.0, 10.0], "drive.frequency": [30.0, 48.0, 60.0]}
+    settings = {"circuit.model": "limited", "run.duration": 1.0, "run.settle": 0.5}
+    rings, later = (
+        sweep("gripper", over, settings | times)
+        for times in ({}, {"run.duration": 24.0, "run.settle": 12.0})
+    )
+    off = np.abs(rings.v_average - later.v_average) > 0.02 * np.abs(later.v_average)
+    assert off.mean() > 0.3
+    assert "reads the start at 3 of them" in rings.attrs["motion_at_random"]
+    assert "  motion at points at random: " in table(rings)
+    settled = sweep("paper-limited", {"drive.amplitude": [6.4, 6.5, 6.6, 6.7]})
+    assert settled.attrs["motion_fastest_up"].startswith("repeats every period, to 0.1 % from 0.")
+    assert settled.attrs["motion_at_random"] == "regular 1; the mean reads the start at 0 of them"
 
 
 def test_no_point_could_be_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

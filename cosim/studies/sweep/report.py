@@ -13,6 +13,11 @@ from cosim.waveforms.storage import swept
 
 MOST_REASONS = 5
 
+MOTION = "motion_fastest_{}"
+"""Attribute of a sweep's dataset with the kind of motion at the fastest point "up" or "down"."""
+MOTIONS = "motion_at_random"
+"""That with how often each kind is met."""
+
 LEAST = 1e-3
 """m/s: errors of v_average are relative to no less than this."""
 
@@ -31,6 +36,10 @@ def table(data: xr.Dataset) -> str:
         if JUDGED in data:
             judged = f" (by the FMU {data[JUDGED].values.ravel()[place] * 1e3:+.3f})"
         lines.append(f"  fastest {way:<5}{speed * 1e3:+10.3f} mm/s{judged} at {at(data, place)}")
+        if motion := data.attrs.get(MOTION.format(way)):
+            lines.append(f"    its motion   {motion}")
+    if MOTIONS in data.attrs:
+        lines.append(f"  motion at points at random: {data.attrs[MOTIONS]}")
     lines += _judgement(data) if JUDGED in data else []
     lines += [f"  {n} failed: {reason}" for reason, n in reasons.most_common(MOST_REASONS)]
     if len(reasons) > MOST_REASONS:

@@ -3,6 +3,7 @@
 import os
 import time
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -19,10 +20,13 @@ from cosim.files.atomic import whole
 from cosim.mechanics import package as fmu
 from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
+from cosim.simulation.checks import motion
 from cosim.studies.sweep import dataset
 from cosim.studies.sweep.design import Design, grid, sample
+from cosim.studies.sweep.report import MOTION, MOTIONS, fastest
 from cosim.toolchain.processes import Progress
 from cosim.toolchain.versions import versions
+from cosim.waveforms.report import motion_in_words, of_the_start
 from cosim.waveforms.storage import netcdf
 
 STORE = "sweep.sqlite"
@@ -31,6 +35,9 @@ FIGURE = "figure.png"
 
 JUDGED = 50
 """Random points of a sweep with the fast solver that the FMU runs again."""
+
+LOOKED_AT = 20
+"""Random points at most, and a quarter of all, of which the kind of motion is told."""
 
 _REFRESH = 10.0
 """s between two writings of the dataset, and at least _RARELY times as long as one takes."""
@@ -106,8 +113,9 @@ def _sweep(
     asked = [(axis.key.full, axis.values) for axis in design.axes], design.sample
     whole_periods = design.changes_frequency
 
-    def refreshed() -> xr.Dataset:
+    def refreshed(last: bool = False) -> xr.Dataset:
         data = dataset.dataset(scene, design, numbers, made_by, units)
+        data.attrs |= _motions(scene, design, data) if last else {}
         dataset.write(folder / RESULT, data, folder / FIGURE)
         return data
 
@@ -141,7 +149,7 @@ def _sweep(
         if scene.run.solver == "fast":
             for number, outcome in bench.run(_judged(design, numbers)):
                 numbers.judge(number, outcome)
-        data = refreshed()
+        data = refreshed(last=True)
         if keep:
             points = [n for n in range(total) if not numbers.failures[n]]
             _keep(family, scene, design, keep, points, bench)
@@ -176,6 +184,32 @@ def _keep(
     for _, failed in bench.apply(kept, points):
         if isinstance(failed, Exception):
             raise failed
+
+
+def _motions(scene: Scene, design: Design, data: xr.Dataset) -> dict[str, str]:
+    """The kind of motion at the fastest points, and how often each kind is met at random ones, in
+    words, by names of attributes; nothing where it is not known."""
+
+    def at(number: int) -> tuple[str, str, str]:
+        """The kind of a point, what it means, and whether the mean reads the start."""
+        of = changed(scene, {**design.point(number), "run.solver": "fmu"}, "--over")
+        of = in_whole_periods(of) if design.changes_frequency else of
+        summary = motion(of, lambda _: None)
+        summary["v_average"] = float(v[number])
+        return summary.get("motion", ""), motion_in_words(summary), of_the_start(of, summary)
+
+    found, v = {}, data["v_average"].values.ravel() if "v_average" in data else np.empty(0)
+    for way, place in fastest(data):
+        words = "; ".join(filter(None, at(int(place))[1:]))
+        found |= {MOTION.format(way): words} if words else {}
+    known = np.flatnonzero(np.isfinite(v))
+    some = np.random.default_rng(1).permutation(known)[: min(LOOKED_AT, len(v) // 4)].tolist()
+    if found and some:
+        kinds, _, early = zip(*map(at, some), strict=True)
+        met = ", ".join(f"{kind or 'not known'} {count}" for kind, count in Counter(kinds).items())
+        late = sum(map(bool, early))
+        found[MOTIONS] = f"{met}; the mean reads the start at {late} of them"
+    return found
 
 
 def _judged(design: Design, numbers: dataset.Numbers) -> Iterator[tuple[int, Settings]]:
