@@ -6,6 +6,7 @@ from typing import Any
 from cosim.errors import BadInput, plain
 from cosim.scene import Key, Scene, changed
 from cosim.scene.describe import KEYS
+from cosim.scene.loading import parted
 from cosim.scene.messages import ended, suggestion
 from cosim.scene.tables import KNOBS, LEVEL_KEY, PARAM_KEY, said_twice
 
@@ -36,7 +37,7 @@ def split(options: Sequence[str], form: str) -> Iterator[tuple[str, str, str]]:
     """Each option of this form, its key, which no other one has, and its values; BadInput."""
     names: set[str] = set()
     for text in options:
-        name, _, right = (part.strip() for part in text.partition("="))
+        name, _, right = (part.strip() for part in parted(text))
         if not (name and right):
             raise BadInput(f"--over {plain(text)}: must be {form}.")
         if name in names:

@@ -246,8 +246,7 @@ def _parsed(overrides: Iterable[str]) -> Iterator[tuple[str, Any]]:
     for text in overrides:
         if not isinstance(text, str):
             raise BadInput(f"overrides: {messages.shown(text)} must be a text, table.key=value.")
-        left, equals, right = text.partition("=")
-        full = left.strip()
+        full, equals, right = parted(text)
         table, _, key = full.partition(".")
         if not (equals and table and key):
             hint = messages.full_name(full)
@@ -255,6 +254,17 @@ def _parsed(overrides: Iterable[str]) -> Iterator[tuple[str, Any]]:
         if not right.strip():
             raise BadInput(f"--set {plain(text)}: has no value.")
         yield full, _value(right.strip())
+
+
+_QUOTED = re.compile(r'\s*(fmu\.\w+\.)("(?:[^"\\]|\\.)*")\s*=(.*)', re.DOTALL)
+
+
+def parted(text: str) -> tuple[str, str, str]:
+    """``table.key=value`` at its sign. A name with that sign in it is quoted, as in a scene."""
+    if match := _QUOTED.fullmatch(text):
+        return match[1] + str(_value(match[2])), "=", match[3]
+    key, equals, value = text.partition("=")
+    return key.strip(), equals, value
 
 
 def _tables(values: Iterable[tuple[str, Any]], origin: str) -> dict[str, Any]:

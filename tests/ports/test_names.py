@@ -9,8 +9,10 @@ import pytest
 
 import cosim
 from cosim.cli.main import main
+from cosim.errors import BadInput
+from cosim.studies.sweep.design import parse
 from cosim.toolchain.processes import in_place
-from tests.ports.foreign import reworded
+from tests.ports.foreign import recompiled, reworded
 from tests.ports.test_coupled import motor
 
 OUTPUT, UNIT = 'der(ω_"1", é) <&>', "°/µs"
@@ -60,3 +62,33 @@ def test_a_sweep_is_written_and_read(tmp_path: Path, scene: Path) -> None:
     assert again == 0 and f"rotor.{OUTPUT}".split('"')[0] in (
         (tmp_path / "out" / "sweep.csv").read_text(encoding="utf-8")
     )
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_text_is_set_and_a_name_may_have_a_sign_in_it(tmp_path: Path, version: int) -> None:
+    """What the FMU is given comes back as the gain D: the number of letters."""
+    known = f"int fmi{version}SetString(Model *m, void *p, size_t n, const char **x)"
+    recompiled(
+        tmp_path,
+        (f"STUB(fmi{version}SetString)", f"{known} {{ m->r[D] = strlen(*x); return 0; }}"),
+        ("case Y: return m->r[D] * m->r[U];", "case Y: return m->r[D];"),
+    )
+    scene = motor(tmp_path, version=version)
+    one = (
+        '<ScalarVariable name="a=b" valueReference="50" causality="parameter" '
+        'variability="fixed"><String start=""/></ScalarVariable></ModelVariables>'
+        if version == 2
+        else '<String name="a=b" valueReference="50" causality="parameter" variability="fixed">'
+        '<Start value=""/></String></ModelVariables>'
+    )
+    reworded(tmp_path / "Rotor.fmu", ("</ModelVariables>", one), ('name="J"', 'name="J=1"'))
+    scene.write_text(scene.read_text().replace("J = 2e-4", '"J=1" = 2e-4'))
+    given = ['fmu.rotor."a=b"=c=d.csv', "run.duration=1e-4", 'fmu.rotor."J=1"=3e-4']
+    with in_place():
+        result = cosim.run(scene, given)
+        assert (result.columns["rotor.y"] == 7).all()
+        assert result.scene.fmu[0].parameters == {"J=1": 3e-4, "B": 1e-4, "a=b": "c=d.csv"}
+        with pytest.raises(BadInput, match=r'a=b = 5 must be a text, "5"'):
+            cosim.run(scene, ['fmu.rotor."a=b"=5'])
+        data = cosim.sweep(scene, dict(parse(['fmu.rotor."J=1"=1e-4,2e-4'])), given[:2])
+    assert (data["failure"] == "").all()

@@ -31,6 +31,9 @@ MOST_VALUES, MOST_ELEMENTS = 4096, 1 << 20
 _JOINED = ("input", "output", "parameter")
 """What a scene can join or set; any other array may have any size."""
 
+_SET = ("input", "parameter")
+"""What may have a start value."""
+
 _KINDS_2 = {"Real": 0, "Integer": 6, "Enumeration": 6, "Boolean": 11}
 _KINDS_3 = {
     **{"Float64": 0, "Float32": 1, "Int8": 2, "UInt8": 3, "Int16": 4, "UInt16": 5, "Int32": 6},
@@ -96,6 +99,12 @@ class Stranger:
         self.abilities: Any = found.coSimulation
         self.token = found.instantiationToken
         self.variables = self._variables(found)
+        self._texts = {
+            each.name: each.valueReference
+            for each in found.modelVariables
+            if each.type == "String" and each.causality in _SET and not each.shape
+        }
+        """References of parameters and inputs that are texts."""
         self.feedthrough = {
             each.variable.name: {v.name for v in each.dependencies}
             for each in found.outputs
@@ -211,8 +220,13 @@ class Stranger:
     def _set(self, made: Interface, name: str, value: Any, arrays: dict[str, list[Any]]) -> None:
         """Set one, or an element of an array; ``arrays`` has those that were set before."""
         where = f"[[fmu]] parameters {name} = {shown(value)}"
-        text = isinstance(value, str)
-        if text:
+        if name in self._texts:
+            if not isinstance(value, str):
+                raise self.bad(f'{where} must be a text, "{value}"')
+            made.raw.setString([self._texts[name]], [value])
+            return
+        if isinstance(value, str):
+            self.settable(name, where)
             raise self.bad(f"{where} must be {PLAIN_NUMBER}, or true or false")
         found, place = self.settable(name, where)
         values = arrays.setdefault(found.name, [*found.start])
