@@ -1,5 +1,6 @@
 """The columns of the waveforms: the one place where each is named and described."""
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 
@@ -55,3 +56,15 @@ def netcdf_name(name: str) -> str:
     """A name as netCDF can have it: without a slash, without a space at its end, and with a letter,
     digit or _ first."""
     return ("" if name[:1].isalnum() else "_") + name.replace("/", "|").rstrip(" ")
+
+
+def netcdf_names(names: Iterable[str]) -> dict[str, str]:
+    """For each name one of :func:`netcdf_name`, none of them twice; whose own it is keeps it."""
+    every = [*names]
+    found = {name: name for name in every if netcdf_name(name) == name}
+    for name in every:
+        one, k = netcdf_name(name), 2
+        while name not in found and one in found.values():
+            one, k = f"{netcdf_name(name)}_{k}", k + 1
+        found.setdefault(name, one)
+    return found

@@ -5,7 +5,7 @@ from typing import Any
 
 from cosim.scene import Scene
 from cosim.trials.measured import measured
-from cosim.waveforms.columns import netcdf_name
+from cosim.waveforms.columns import netcdf_names
 from cosim.waveforms.quantities import label, signed
 
 
@@ -72,7 +72,8 @@ def _own(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> str
     ranked = sorted(moving, key=lambda name: name not in asked)
     names = ranked[: max(MOST_ROWS, len(asked.intersection(moving)))]
     # A waveforms.nc has them by names that netCDF can have.
-    shown = [label(name, units.get(name) or units[netcdf_name(name)]) for name in names]
+    files = netcdf_names(every)
+    shown = [label(name, units.get(name) or units[files[name]]) for name in names]
     width = max([20, *map(len, shown)])
     whats = ["mean", "rms", "least", "greatest"]
     told = any(name.endswith(".mean_error") for name in summary)

@@ -14,7 +14,7 @@ from cosim.files import reader
 from cosim.files.atomic import whole
 from cosim.files.reader import opened
 from cosim.files.spill import blocks
-from cosim.waveforms.columns import about, netcdf_name
+from cosim.waveforms.columns import about, netcdf_names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,9 +70,10 @@ def netcdf(
     head = b"CDF\x02" + pack(">i", 0)
     head += pack(">ii", _DIMENSIONS, 1) + _name("time") + pack(">i", count)
     head += _attributes(attributes) + pack(">ii", _VARIABLES, len(waveforms))
+    names = netcdf_names(waveforms)
     heads = [
         # One dimension, the first; the type; the size; then the offset.
-        _name(netcdf_name(name)) + pack(">ii", 1, 0) + _attributes(about(name, units[name]))
+        _name(names[name]) + pack(">ii", 1, 0) + _attributes(about(name, units[name]))
         + pack(">ii", _DOUBLES, 8 * count)
         for name in waveforms
     ]  # fmt: skip

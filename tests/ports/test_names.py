@@ -64,6 +64,23 @@ def test_a_sweep_is_written_and_read(tmp_path: Path, scene: Path) -> None:
     )
 
 
+def test_names_that_netcdf_makes_one_stay_two(tmp_path: Path) -> None:
+    scene, out = motor(tmp_path), tmp_path / "out"
+    names = ('name="alpha"', 'name="a/b"'), ('name="y"', 'name="a|b"')
+    reworded(tmp_path / "Rotor.fmu", *names)
+    with in_place():
+        result = cosim.run(scene, {"run.duration": 1e-3, "run.output_step": 1e-5})
+        data = cosim.sweep(scene, {"fmu.rotor.B": [1e-4, 1e-3]}, {"run.duration": 1e-3})
+    result.save(out)
+    with netCDF4.Dataset(out / "waveforms.nc") as file:
+        for name, there in (("a/b", "a|b_2"), ("a|b", "a|b")):
+            found = np.asarray(file[f"rotor.{there}"][:])
+            assert found == pytest.approx(result.columns[f"rotor.{name}"]) and found.any()
+        assert file["rotor.a|b_2"].units == "rad/s2"
+    assert data["rotor.a|b.rms"].values[0] == pytest.approx(result.summary["rotor.a|b.rms"])
+    assert data["rotor.a|b.rms_2"].values[0] == pytest.approx(result.summary["rotor.a/b.rms"])
+
+
 @pytest.mark.parametrize("version", [2, 3])
 def test_a_text_is_set_and_a_name_may_have_a_sign_in_it(tmp_path: Path, version: int) -> None:
     """What the FMU is given comes back as the gain D: the number of letters."""

@@ -20,7 +20,7 @@ from cosim.scene import Scene, firmware, to_toml
 from cosim.scene.describe import KEYS
 from cosim.scene.tables import MACHINE
 from cosim.studies.sweep.design import Design
-from cosim.waveforms.columns import netcdf_name
+from cosim.waveforms.columns import netcdf_name, netcdf_names
 from cosim.waveforms.quantities import meaning
 from cosim.waveforms.storage import renamed, swept
 
@@ -88,9 +88,10 @@ def dataset(
     for name, column, axis in zip(axes, columns, design.axes, strict=True):
         about = {"units": axis.key.unit, "long_name": axis.key.text, "key": axis.key.full}
         coordinates[name] = (name if design.sample is None else POINT, column, about)
+    names = netcdf_names(numbers)
     for name, values in numbers.items():
         about = _JUDGED if name == JUDGED else meaning(name, units)
-        variables[netcdf_name(name)] = (dims, values.reshape(design.shape), about)
+        variables[names[name]] = (dims, values.reshape(design.shape), about)
     about = {"long_name": "Why the point failed; empty where it did not"}
     variables[FAILURE] = (dims, found.failures.astype(str).reshape(design.shape), about)
     attributes = {
