@@ -15,6 +15,7 @@ which could call anything here.
 
 import builtins
 import json
+import math
 import os
 import signal
 import subprocess
@@ -144,6 +145,7 @@ class Worker:
         ``heed`` may raise. Raises EOFError where the process has died; and what the function
         raises: then, but for BadInput, and where it hangs, the process is not to be used again."""
         self.given, self.began, self.usable = self.given + 1, False, False
+        self._steps = False
         self._rest()
         self._send(argument)
         while self._spent < PATIENCE and self._waited < STALLED:
@@ -162,7 +164,7 @@ class Worker:
             self.began = True
             if kind == "progress":
                 self._rest()
-                self.reached = value
+                self.reached, self._steps = value, True
             elif kind == "spent":
                 self._spent = value
             elif kind == "retires":
@@ -175,7 +177,7 @@ class Worker:
                 raise value
         hangs = self._spent >= PATIENCE
         raise (SimulationFailed if hangs else ProcessLost)(
-            f"The simulation hangs after t = {self.reached:.6g} s: no step was finished in "
+            f"The simulation hangs {self.when}: no step was finished in "
             f"{f'{PATIENCE:g} s of CPU time' if hangs else f'{STALLED:g} s'}. A netlist without a "
             "solution can do this to ngspice, and an FMU can do it itself."
         )
@@ -202,6 +204,11 @@ class Worker:
         self._spent = self._waited = 0.0
         """s of its CPU time, and s of this process awake, since then."""
         self.rested = time.monotonic()
+
+    @property
+    def when(self) -> str:
+        """How far the call at hand has come, in words."""
+        return f"after t = {self.reached:.6g} s" if self._steps else "before its first step"
 
     @property
     def alive(self) -> bool:
@@ -326,8 +333,7 @@ def isolated(
             except EOFError:
                 how = worker.end(ENDING)
                 if worker.began or tried == TRIES - 1:
-                    when = f"died after t = {worker.reached:g} s"
-                    what = when if worker.began else "cannot start"
+                    what = f"died {worker.when}" if worker.began else "cannot start"
                     words = f"The simulation's process {what} ({how})."
                     raise ProcessLost(words) from None
             finally:
@@ -436,8 +442,7 @@ def serve(pipe: Connection) -> None:
             argument = pipe.recv()
         except (EOFError, OSError):
             return
-        reports.send("progress", 0.0)
-        reports.at_work.set()
+        reports.begin()
         try:
             if unfit is not None:
                 raise unfit
@@ -475,6 +480,12 @@ class _Reports:
     def send(self, kind: str, value: Any) -> None:
         with self._alone:
             self._tell((kind, value))
+
+    def begin(self) -> None:
+        """A call is at hand; its first progress is told at once."""
+        self._told = -math.inf
+        self.send("spent", 0.0)
+        self.at_work.set()
 
     def progress(self, reached: float) -> None:
         self._steps += 1

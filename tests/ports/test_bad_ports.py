@@ -249,6 +249,34 @@ def test_a_crash_is_exit_code_three(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert told.count("\n") == 0 and "died after t = " in told
 
 
+def test_a_crash_before_the_first_step_is_told_as_that(tmp_path: Path) -> None:
+    recompiled(tmp_path, ("    m->r[J] = 2e-4", "    abort(); m->r[J] = 2e-4"))
+    with pytest.raises(SimulationFailed, match=r"died before its first step \(SIGABRT"):
+        run(motor(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("target", "said"), [("own", ""), ("../../../own", "leads outside"), ("/etc", "leads outside")]
+)
+def test_a_link_within_an_fmu_is_a_link(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], target: str, said: str
+) -> None:
+    scene, path = motor(tmp_path), tmp_path / "Rotor.fmu"
+    with zipfile.ZipFile(path) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    (library,) = (name for name in files if name.startswith("binaries"))
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", files["modelDescription.xml"])
+        archive.writestr(f"{library.rpartition('/')[0]}/own", files[library])
+        link = zipfile.ZipInfo(library)
+        link.create_system, link.external_attr = 3, 0o120777 << 16
+        archive.writestr(link, target)
+    with in_place():
+        given = ["--set", "run.duration=1e-4", "--out", str(tmp_path / "out")]
+        assert main(["run", str(scene), *given]) == (2 if said else 0)
+    assert said in capsys.readouterr().err
+
+
 LOG_2, LOG_3 = (f'm->log{n}({z}0, 3, 0, "no licence\\n here")' for n, z in ((2, "0, "), (3, "")))
 ENTER_2 = "int fmi2EnterInitializationMode(void *m) { return !m; }"
 

@@ -115,6 +115,7 @@ class Run:
     def run(self) -> None:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         state, duration = self.state, self._scene.run.duration
+        self._progress(0.0)  # the FMUs are there
         try:
             engine().transient(self.deck.text, self.deck.vectors, self)
         finally:

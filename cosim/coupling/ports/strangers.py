@@ -12,6 +12,7 @@ from ctypes import c_void_p, cast
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path, PurePosixPath
+from stat import S_ISLNK
 from typing import Any
 
 import fmpy
@@ -300,10 +301,22 @@ def _unpack(path: Path, folder: str, name: str) -> None:
                 if place.is_absolute() or ".." in place.parts:
                     raise BadInput(f"{name}: it has a file outside itself, {plain(str(place))}.")
             archive.extractall(folder)
+            _link(folder, [each.filename for each in files if S_ISLNK(each.external_attr >> 16)])
     except BadInput:
         raise
     except Exception as error:  # of zipfile, and of all that it unpacks with
         raise BadInput(f"{name}: this is no FMU ({plain(str(error))}).") from None
+
+
+def _link(folder: str, names: list[str]) -> None:
+    """Make links of what zipfile has unpacked as texts that say where they lead."""
+    for path in [Path(folder, name) for name in names]:
+        place = path.read_text("utf-8")
+        path.unlink()
+        path.symlink_to(place)
+    for path in [Path(folder, name) for name in names]:
+        if not path.resolve().is_relative_to(Path(folder).resolve()):
+            raise ValueError(f"the link {path.name} leads outside")
 
 
 def stranger(path: str) -> Stranger:
