@@ -4,6 +4,7 @@ The FMUs are strangers, compiled by the test (foreign.c); ngspice runs by itself
 """
 
 import ctypes
+import re
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
@@ -578,6 +579,24 @@ def test_an_fmu_that_ends_its_process_or_fails_is_told(tmp_path: Path) -> None:
         given = {"run.duration": 2e-3, "fmu.rotor.B": 0.0, "coupling.method": method}
         with pytest.raises(SimulationFailed, match=r"output rotor\.\w+ is not a finite number"):
             cosim.run(scene, given)
+
+
+def test_what_is_no_number_ends_a_run_only_where_it_is_read(tmp_path: Path) -> None:
+    recompiled(
+        tmp_path,
+        ("case ALPHA: return", "case ALPHA: return m->steps == 5 ? NAN :"),
+        ("case Y: return m->r[D] * m->r[U];", "case Y: return INFINITY;"),
+    )
+    scene = motor(tmp_path)
+    given = {"run.duration": 1e-3, "coupling.method": "step-locked"}
+    result = here(scene, given)
+    (note,) = result.summary["notes"]
+    assert re.search(r"nothing reads them: rotor\.alpha \(first at t = [1-9]\S+ s\)", note)
+    assert "rotor.y (first at t = 0 s)" in note
+    assert {"rotor.alpha", "rotor.y", "rotor.omega"} & {*result.columns} == {"rotor.omega"}
+    scene.write_text(scene.read_text().replace("rotor.omega", "rotor.alpha"))
+    with pytest.raises(SimulationFailed, match=r"output rotor\.alpha is not a finite number at"):
+        here(scene, given)
 
 
 def test_ground_may_be_kept(tmp_path: Path) -> None:

@@ -346,15 +346,25 @@ static double *log_row(const Ports *c)
     return c->log + c->n_log * (1 + c->n_sources + c->n_saved);
 }
 
-static double accepted(Ports *c, double time, double next_step)
+/* Of what the circuit and the FMUs are given; no number where one of them is none. */
+static double sum_of_read(const Ports *c)
 {
     double sum = 0.0;
     for (int64_t k = 0; k < c->n_saved; k++)
         sum += c->now[k];
+    for (const Source *s = c->sources; s < c->sources + c->n_sources; s++)
+        if (s->origin.kind == FROM_OUTPUT)
+            sum += c->outputs[s->origin.place];
     for (const Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
-        for (int64_t k = 0; k < s->width - s->n_output_slopes; k++)
-            sum += s->row[k];
-    if (!isfinite(sum)) {
+        for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
+            if (f->origin.kind == FROM_OUTPUT)
+                sum += c->outputs[f->origin.place];
+    return sum;
+}
+
+static double accepted(Ports *c, double time, double next_step)
+{
+    if (!isfinite(sum_of_read(c))) {
         c->told = time;
         c->status = NOT_FINITE;
         return next_step;

@@ -75,6 +75,15 @@ class Plan:
             through=[(self.names[t.source], self.words[t.probe]) for t, _ in self.throughs],
         )
 
+    def read(self) -> Iterator[tuple[str, int]]:
+        """The outputs of FMUs that ports lead on: names, and places in the row of all."""
+        places, first = {origin.place for _, origin in self._from}, 0
+        for side in self.sides:
+            for k, (name, *_) in enumerate(side.columns):
+                if first + k in places:
+                    yield name, first + k
+            first += side.width
+
     @property
     def driven(self) -> bool:
         """Whether the command of ``[drive]`` leads to something."""

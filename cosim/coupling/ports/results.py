@@ -27,7 +27,9 @@ def joined(
     began = time.perf_counter()
     run = Run(scene, progress)
     run.run()
-    signals = [*_signals(run)]
+    every = [*_signals(run)]
+    odd = {each[0]: at for each in every if (at := _first_odd(each)) is not None}
+    signals = [each for each in every if each[0] not in odd]
     _refuse_divergence(scene, signals)
     waves = Tape(1 + len(signals))
     step, rows = scene.run.output_step, count(scene.run.output_step, scene.run.duration)
@@ -58,13 +60,29 @@ def joined(
         "wall_time": time.perf_counter() - began,
         "method": run.plan.method,
         "versions": {**versions(), **run.versions},
-        "notes": [*run.deck.notes, *run.plan.notes, *_notes(run), *without],
+        "notes": [*run.deck.notes, *run.plan.notes, *_notes(run), *_odd(odd), *without],
     }
     return columns, summary, units
 
 
 Signal = tuple[str, str, Array, Array, bool]
 """Name, unit, times (s), values, and whether it is continuous."""
+
+
+def _first_odd(signal: Signal) -> float | None:
+    """When it is no finite number for the first time, s."""
+    _, _, times, values, _ = signal
+    for part in blocks(len(times)):
+        finite = np.isfinite(values[part])
+        if not finite.all():
+            return float(times[part][finite.argmin()])
+    return None
+
+
+def _odd(odd: dict[str, float]) -> Iterator[str]:
+    if odd:
+        told = ", ".join(f"{plain(name)} (first at t = {at:.6g} s)" for name, at in odd.items())
+        yield f"left out, as they are no finite numbers, and nothing reads them: {told}."
 
 
 DIVERGED, BEYOND = 1e15, 1e150
@@ -179,7 +197,9 @@ def _notes(run: Run) -> Iterator[str]:
         )
     points, place = run.points.array(), 1
     for side in run.plan.sides:
-        own = points[:, [place + k for k, (*_, goes_on) in enumerate(side.columns) if goes_on]]
+        own = np.nan_to_num(
+            points[:, [place + k for k, (*_, goes_on) in enumerate(side.columns) if goes_on]]
+        )
         place += side.width
         changed = np.flatnonzero((own[1:] != own[:-1]).any(axis=1)) + 1
         # What has settled, or has not begun yet, does not move in steps.

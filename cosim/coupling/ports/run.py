@@ -144,15 +144,11 @@ class Run:
 
     def _refuse_what_is_no_number(self) -> None:
         """ngspice would end at it, and tell of its own steps. Raises SimulationFailed."""
-        time, place = self.state.time, 0
-        for side in self.plan.sides:
-            for name, *_ in side.columns:
-                if not np.isfinite(self._rows[0][place]):
-                    raise SimulationFailed(
-                        f"The output {name} is not a finite number at t = {time:.6g} s."
-                    )
-                place += 1
-            place += side.width - len(side.columns)
+        for name, place in self.plan.read():
+            if not np.isfinite(self._rows[0][place]):
+                raise SimulationFailed(
+                    f"The output {name} is not a finite number at t = {self.state.time:.6g} s."
+                )
 
     def _fmu_failure(self) -> SimulationFailed:
         side = self.plan.sides[self.state.failed]
