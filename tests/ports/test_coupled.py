@@ -22,6 +22,7 @@ from cosim.coupling.loop.structures import (
     Group,
     PortsState,
     Pulse,
+    Slope,
     Source,
     StrangerState,
     Through,
@@ -224,6 +225,34 @@ def test_slopes_that_an_fmu_tells_only_after_its_first_step_are_taken(tmp_path: 
     assert off(here(scene, {}), true) < 5e-5
 
 
+TELLS = "places[k] == OMEGA ? value(m, ALPHA) : 0.0;"
+
+
+@pytest.mark.parametrize("wrong", ["-value(m, ALPHA)", "3.0 * value(m, ALPHA)", "value(m, OMEGA)"])
+def test_a_slope_by_which_nothing_changes_is_refused(tmp_path: Path, wrong: str) -> None:
+    recompiled(tmp_path, (TELLS, f"places[k] == OMEGA ? {wrong} : 0.0;"))
+    scene, true = motor(tmp_path, slopes=True), plain(tmp_path, 0.02)
+    macro = {"coupling.method": "macro-steps", "coupling.macro_step": 1e-4}
+    for given in ({}, {"coupling.method": "redo"}, macro):
+        with pytest.raises(BadInput, match=r'Rotor\.fmu: rotor\.omega .*slope = "difference"'):
+            here(scene, given)
+    scene.write_text(scene.read_text().replace("scale", 'slope = "difference"\nscale', 1))
+    assert off(here(scene, {}), true) < 5e-5
+
+
+@pytest.mark.parametrize("tells", ["-9.81", "0.0"])
+def test_slopes_of_what_jumps_or_is_held_are_not_refused(tmp_path: Path, tells: str) -> None:
+    """A ball that jumps each third step; and what has no slope at all, as a sampled value."""
+    recompiled(tmp_path, (TELLS, f"places[k] == V ? {tells} : 0.0;"), ("*= -0.5", "*= -1.0"))
+    build(tmp_path, "Load", slopes=True)
+    (tmp_path / "rl.cir").write_text("* r\nVf y 0 0\nR1 y 0 1\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD.replace("load.y", "load.v"))
+    given = {"run.duration": 0.02, "fmu.load.drop": 2e-8, "coupling.method": "macro-steps"}
+    for macro in (2e-5, 5e-5):
+        speed = here(tmp_path / "load.toml", given | {"coupling.macro_step": macro})
+        assert np.ptp(speed.columns["load.v"]) > 1e-3
+
+
 LOAD = """
 [circuit]
 model = "file"
@@ -285,6 +314,21 @@ def test_feedthrough_needs_an_fmu_that_saves_its_state(tmp_path: Path) -> None:
     build(tmp_path, "Load", through=True)
     (note,) = here(tmp_path / "load.toml", {"coupling.method": "step-locked"}).summary["notes"]
     assert 'coupling.method = "redo" is' in note
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_an_fmu_that_does_not_go_back_is_not_repeated(tmp_path: Path, version: int) -> None:
+    """It says that it can. What no port leads on is told; its steps agree."""
+    restore = "int fmi2SetFMUstate(void *m, void *state) { return "
+    recompiled(tmp_path, (f"{restore}!memcpy(m, state, sizeof(Model)); }}", f"{restore}0; }}"))
+    redo = {"coupling.method": "redo", "run.duration": 1e-3}
+    with pytest.raises(BadInput, match=r"Rotor\.fmu: .*another rotor\.omega: .* not restore"):
+        here(motor(tmp_path, version=version), redo)
+    build(tmp_path, "Load", version=version, through=True)
+    (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD)
+    (note,) = here(tmp_path / "load.toml", {}).summary["notes"]
+    assert re.match(r"repeated steps change load.omega, load.v, .*load.steps,", note)
 
 
 def test_an_fmu_of_fixed_steps_that_feeds_through_is_not_repeated(tmp_path: Path) -> None:
@@ -607,7 +651,7 @@ def test_ground_may_be_kept(tmp_path: Path) -> None:
 
 
 def test_structures_have_the_sizes_that_the_compiled_ones_have() -> None:
-    kinds = (Group, Source, Feed, StrangerState, Pulse, Through, PortsState)
+    kinds = (Group, Source, Feed, StrangerState, Pulse, Through, Slope, PortsState)
     assert [ctypes.sizeof(kind) for kind in kinds] == [
         loop().loop_size(k) for k in range(5, 5 + len(kinds))
     ]

@@ -346,6 +346,7 @@ int64_t loop_size(int which)
 {
     const size_t sizes[] = {sizeof(Fmu), sizeof(Schedule), sizeof(Recorder), sizeof(Lead),
                             sizeof(Piece), sizeof(Group),    sizeof(Source),   sizeof(Feed),
-                            sizeof(Stranger), sizeof(Pulse), sizeof(Through), sizeof(Ports)};
+                            sizeof(Stranger), sizeof(Pulse), sizeof(Through), sizeof(Slope),
+                            sizeof(Ports)};
     return (int64_t)sizes[which];
 }

@@ -272,6 +272,13 @@ typedef struct {
     double gain;               /* as seen last */
 } Through;
 
+/* An output whose FMU tells its slope, and how far it changes by it; see judge_slopes(). */
+typedef struct {
+    int64_t place, slope;
+    double change, least, most; /* since it was judged last: its own, and by the slope */
+    int64_t wrong;
+} Slope;
+
 /* The edges of a PULSE, which ngspice can lose; see announce(). */
 typedef struct {
     double delay, period, corners[4]; /* s; corners since the beginning of a period */
@@ -287,6 +294,7 @@ typedef struct Ports {
     Source *sources;
     int64_t n_sources;
     double *outputs, *before, *rates; /* now; at the communication point; and their differences */
+    double *odd;               /* which of them a step from a restored state has had otherwise */
     int64_t n_outputs;
     double *now, *last, *start, *charges; /* saved values: sent last; at the last accepted point; at
                                       the communication point, and their integrals since then */
@@ -299,6 +307,8 @@ typedef struct Ports {
     int64_t n_pulses;
     Through *throughs;
     int64_t n_throughs;
+    Slope *slopes;
+    int64_t n_slopes;
     int64_t learn;             /* whether their gains are to be looked at */
     double macro_step;         /* s; 0: each accepted step ends on a communication point */
     int64_t fixed;             /* whether an FMU takes no other step than that one */
@@ -336,6 +346,6 @@ int ports_step(double time, double *delta, double old_delta, int redo, int locat
 
 EXPORT int64_t loop_size(int which); /* bytes of Fmu, Schedule, Recorder, Lead,
                                                  Piece, Group, Source, Feed, Stranger, Pulse, Through,
-                                                 Ports */
+                                                 Slope, Ports */
 
 #endif

@@ -47,6 +47,8 @@ class Plan:
         self.names: list[str] = []
         """Of the sources that ports feed, as the scene spells them."""
         self._from: list[tuple[Side, Any]] = []
+        self.told: list[tuple[Side, str, Any]] = []
+        """Outputs whose slopes the FMU tells by itself, their names, and the ports' origins."""
         self._fed: list[tuple[int, Side, Variable]] = []  # sources that FMUs feed
         for port in ports:
             self._join(port, sides)
@@ -75,13 +77,12 @@ class Plan:
             through=[(self.names[t.source], self.words[t.probe]) for t, _ in self.throughs],
         )
 
-    def read(self) -> Iterator[tuple[str, int]]:
-        """The outputs of FMUs that ports lead on: names, and places in the row of all."""
+    def outputs(self) -> Iterator[tuple[Side, str, int, bool]]:
+        """Each output's FMU, name, place in the row of all, and whether a port leads it on."""
         places, first = {origin.place for _, origin in self._from}, 0
         for side in self.sides:
             for k, (name, *_) in enumerate(side.columns):
-                if first + k in places:
-                    yield name, first + k
+                yield side, name, first + k, first + k in places
             first += side.width
 
     @property
@@ -134,6 +135,8 @@ class Plan:
             kept = feed.origin
         if side is not None:
             self._from.append((side, kept))
+            if port.slope == "auto" and kept.slope == _KNOWN:
+                self.told.append((side, str(port.origin), kept))
 
 
 def _machine(scene: Scene) -> Fmu:

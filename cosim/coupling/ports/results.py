@@ -195,6 +195,11 @@ def _notes(run: Run) -> Iterator[str]:
             f"asks for. It turned most often, {turns[node]} times, at node {node}: if it rings "
             "there, damp it, say by a resistor and a capacitor to ground."
         )
+    if run.not_restored:
+        yield (
+            f"repeated steps change {', '.join(map(plain, run.not_restored))}, which the FMU does "
+            "not restore: these values are not those of one run."
+        )
     points, place = run.points.array(), 1
     for side in run.plan.sides:
         own = np.nan_to_num(

@@ -14,6 +14,7 @@ from cosim.coupling.loop.structures import (
     NO_AGREEMENT,
     PortsState,
     Pulse,
+    Slope,
     Source,
     StrangerState,
     Through,
@@ -38,6 +39,9 @@ ORDINARY = 1000
 
 _AGREEMENT = 2.0
 """Of ``circuit.reltol``: how far an FMU and ngspice may be apart where steps are repeated."""
+
+_WRONG = 12
+"""As in ports.c: of so many changes that are not by the slopes that an FMU tells."""
 
 _STATUSES = {
     2: "it discards the step, or asks to end the run",
@@ -79,6 +83,9 @@ class Run:
             through.input = feed.input
         count_through = len(plan.throughs)
         self._throughs = (Through * max(count_through, 1))(*(t for t, _ in plan.throughs))
+        self._odd = (c_double * max(2 * width, 1))()
+        slopes = [Slope(place=of.place, slope=of.slope_place) for *_, of in plan.told]
+        self._slopes = (Slope * max(len(slopes), 1))(*slopes)
         macro = scene.coupling.macro_step if plan.method == "macro-steps" else 0.0
         self.state = PortsState(
             fmus=ctypes.addressof(self.fmus),
@@ -99,6 +106,9 @@ class Run:
             repeats=int(repeats),
             throughs=ctypes.addressof(self._throughs),
             n_throughs=count_through,
+            slopes=ctypes.addressof(self._slopes),
+            n_slopes=len(slopes),
+            odd=ctypes.addressof(self._odd),
             tolerance=_AGREEMENT * scene.circuit.reltol,
             asked=ctypes.addressof(self._asked),
             n_probed=len(plan.probes),
@@ -124,6 +134,7 @@ class Run:
                 side.close(state_of.state)
         if state.status == FMU_FAILED:
             raise self._fmu_failure()
+        self._refuse_what_is_said_wrongly()
         self._refuse_what_is_no_number()
         if state.status == NO_AGREEMENT:
             raise SimulationFailed(
@@ -144,10 +155,32 @@ class Run:
 
     def _refuse_what_is_no_number(self) -> None:
         """ngspice would end at it, and tell of its own steps. Raises SimulationFailed."""
-        for name, place in self.plan.read():
-            if not np.isfinite(self._rows[0][place]):
+        for _, name, place, read in self.plan.outputs():
+            if read and not np.isfinite(self._rows[0][place]):
                 raise SimulationFailed(
                     f"The output {name} is not a finite number at t = {self.state.time:.6g} s."
+                )
+
+    @property
+    def not_restored(self) -> list[str]:
+        """Outputs that a repeated step had otherwise; no port leads them on."""
+        return [name for _, name, place, _ in self.plan.outputs() if self._odd[place]]
+
+    def _refuse_what_is_said_wrongly(self) -> None:
+        """Raises BadInput for an FMU that does not do what it says of itself."""
+        for side, name, place, read in self.plan.outputs():
+            if read and self._odd[place]:
+                raise side.of.bad(
+                    f"a step that is repeated from the state that it saved gives another {name}: "
+                    "it does not restore its state, although canGetAndSetFMUstate = true, and "
+                    'coupling.method = "redo" needs that; take "step-locked" with small '
+                    "circuit.max_step"
+                )
+        for (side, name, _), told in zip(self.plan.told, self._slopes, strict=False):
+            if told.wrong >= _WRONG:
+                raise side.of.bad(
+                    f"{name} does not change by the slope that it tells of it; write slope = "
+                    '"difference" in the [[port]] of it'
                 )
 
     def _fmu_failure(self) -> SimulationFailed:
@@ -197,6 +230,7 @@ class Run:
         """Also end a run whose steps have become so short that it has no end, as those of `redo` do
         about an FMU whose outputs never come to rest."""
         self._attend()
+        self._refuse_what_is_said_wrongly()
         steps, time, duration = self.steps, self.state.time, self._scene.run.duration
         often = steps * self._scene.circuit.max_step > ORDINARY * time
         if often and ENOUGH < steps < BEGINNING and steps * duration > BUDGET * time:
