@@ -27,8 +27,10 @@ def one_run(scene: Scene, progress: Progress, fmi_version: int = 3, alone: bool 
         from cosim.simulation.here import simulate_here
 
         return simulate_here(scene, progress, fmi_version, alone)
+    ends: list[str] = []
     try:
-        ran = isolated(_worked, (scene, fmi_version, alone), progress, bounds(scene))
+        given = scene, fmi_version, alone
+        ran = isolated(_worked, given, progress, bounds(scene), ends.append)
     except ProcessLost as lost:
         if not scene.fmu:
             raise
@@ -36,6 +38,11 @@ def one_run(scene: Scene, progress: Progress, fmi_version: int = 3, alone: bool 
         raise ProcessLost(
             f"{str(lost).rstrip('.')}; of its FMUs ({names}) one may be why."
         ) from None
+    for how in ends:
+        ran[1].setdefault("notes", []).append(
+            f"all was computed when the simulation's process was lost ({how}): one of its "
+            "FMUs may not stand its own end."
+        )
     progress(scene.run.duration)
     return Result(scene, *ran)
 

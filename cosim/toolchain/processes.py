@@ -146,6 +146,9 @@ class Worker:
         raises: then, but for BadInput, and where it hangs, the process is not to be used again."""
         self.given, self.began, self.usable = self.given + 1, False, False
         self._steps = False
+        said: tuple[str, Any] | None = None
+        self.lost = True
+        """It has given its answer, but not come to an end after it."""
         self._rest()
         self._send(argument)
         while self._spent < PATIENCE and self._waited < STALLED:
@@ -158,9 +161,11 @@ class Worker:
                 continue
             try:
                 kind, value = self._heard()
-            except OSError as error:  # whoever talks nonsense need not die of it
+            except (OSError, EOFError) as error:  # whoever talks nonsense need not die of it
                 self._process.kill()
-                raise EOFError from error
+                if said is None:
+                    raise EOFError from error
+                break
             self.began = True
             if kind == "progress":
                 self._rest()
@@ -169,12 +174,18 @@ class Worker:
                 self._spent = value
             elif kind == "retires":
                 self.given = CALLS
+            elif kind == "rests":
+                self.lost = False
+                break
             else:
-                good = kind == "result"
-                self.usable = self.given < CALLS and (good or isinstance(value, BadInput))
-                if good:
-                    return value
-                raise value
+                said = kind, value
+        if said is not None:
+            good, value = said[0] == "result", said[1]
+            fit = self.given < CALLS and not self.lost
+            self.usable = fit and (good or isinstance(value, BadInput))
+            if good:
+                return value
+            raise value
         hangs = self._spent >= PATIENCE
         raise (SimulationFailed if hangs else ProcessLost)(
             f"The simulation hangs {self.when}: no step was finished in "
@@ -309,13 +320,14 @@ def isolated(
     argument: Any,
     progress: Progress,
     bounds: Bounds | None = None,
+    lost: Callable[[str], None] = lambda _: None,
 ) -> Any:
     """What ``function(argument, progress)`` gives, from another process: a fresh one, or, with
     ``bounds``, one that is kept, and then what JSON can hold, and :class:`Packed` columns; no more
     than there are processors at once.
 
     Any thread may call it. Raises what the function raises, or SimulationFailed where the process
-    hangs or dies.
+    hangs or dies; where it does so after its answer, ``lost`` is told how.
     """
     told: list[BaseException] = []
     answer = None
@@ -329,6 +341,8 @@ def isolated(
             worker = _taken(function, bounds)
             try:
                 answer = worker.call(argument, progress, heed)
+                if worker.lost:
+                    lost(worker.end())
                 break
             except EOFError:
                 how = worker.end(ENDING)
@@ -425,6 +439,8 @@ def _start(pipe: Connection, folder: str, lock: int, library: str) -> "subproces
 
 def serve(pipe: Connection) -> None:
     """What the process does until its parent ends: it calls the function, and tells."""
+    global _used
+    _used = []
     function, bounds = pipe.recv(), pipe.recv()
     unfit: Exception | None = None
     if bounds is not None:
@@ -451,10 +467,28 @@ def serve(pipe: Connection) -> None:
         except Exception as failure:
             told = (type(failure).__name__, str(failure))
             answer = ("failure", failure if bounds is None else told)
-        reports.at_work.clear()
         if _retires:
             reports.send("retires", None)
         reports.send(*answer)
+        end_used()
+        reports.at_work.clear()
+        reports.send("rests", None)
+
+
+_used: list[Callable[[], object]] | None = None
+"""What ends the use of something, once the call at hand has been answered."""
+
+
+def when_answered(end: Callable[[], object]) -> None:
+    """Call ``end`` once the call at hand has been answered, since what is a stranger's may end the
+    process in it; where there is no such call, now."""
+    end() if _used is None else _used.append(end)
+
+
+def end_used() -> None:
+    """Call what waits for that now."""
+    while _used:
+        _used.pop(0)()
 
 
 _retires = False

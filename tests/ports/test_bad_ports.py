@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from cosim import run
+from cosim import run, sweep
 from cosim.cli.main import main
-from cosim.errors import SimulationFailed
+from cosim.errors import BeyondModel, SimulationFailed
 from cosim.toolchain.processes import in_place
 from tests.ports.foreign import recompiled, reworded
 from tests.ports.test_coupled import motor
@@ -253,6 +253,22 @@ def test_a_crash_before_the_first_step_is_told_as_that(tmp_path: Path) -> None:
     recompiled(tmp_path, ("    m->r[J] = 2e-4", "    abort(); m->r[J] = 2e-4"))
     with pytest.raises(SimulationFailed, match=r"died before its first step \(SIGABRT"):
         run(motor(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("function", "end"),
+    [("int fmi2Terminate", "{ abort(); }"), ("void fmi2FreeInstance", "{ exit(5); }")],
+)
+def test_a_crash_at_its_end_costs_no_results(tmp_path: Path, function: str, end: str) -> None:
+    body = "{ free(m); }" if "Free" in function else "{ return !m; }"
+    recompiled(tmp_path, (f"{function}(void *m) {body}", f"{function}(void *m) {end}"))
+    with pytest.warns(BeyondModel, match="all was computed when .* was lost"):
+        result = run(motor(tmp_path), {"run.duration": 1e-3})
+    (note,) = result.summary["notes"]
+    assert ("SIGABRT" if "abort" in end else "exit code 5") in note
+    assert "rotor.omega.mean_error" in result.summary and len(result.columns["time"]) == 21
+    data = sweep(tmp_path / "motor.toml", {"fmu.rotor.J": [1e-4, 2e-4]}, {"run.duration": 1e-3})
+    assert (data["failure"] == "").all()
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import ctypes
 from collections.abc import Callable
 from ctypes import c_char_p, c_double, c_int64
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from cosim.drive.pieces import Ahead
 from cosim.errors import SimulationFailed, plain
 from cosim.files.spill import Tape
 from cosim.scene import Scene
+from cosim.toolchain.processes import end_used, when_answered
 
 _POINTS = 2048
 """Places of the logs between two emptyings."""
@@ -56,6 +58,7 @@ class Run:
 
     def __init__(self, scene: Scene, progress: Callable[[float], None]) -> None:
         self._scene, self._progress = scene, progress
+        end_used()  # an FMU may be for one instance at a time
         self.plan = plan = Plan(scene)
         self.deck = plan.deck()
         self._failure: BaseException | None = None
@@ -131,7 +134,7 @@ class Run:
         finally:
             self._attend()
             for side, state_of in zip(self.plan.sides, self.fmus, strict=False):
-                side.close(state_of.state)
+                when_answered(partial(side.close, state_of.state))
         if state.status == FMU_FAILED:
             raise self._fmu_failure()
         self._refuse_what_is_said_wrongly()
