@@ -577,6 +577,24 @@ def test_fixed_steps_take_macro_steps(tmp_path: Path) -> None:
     assert result.summary["method"] == "macro-steps" and result.summary["fmu_steps"] == 10
 
 
+FIXED = 'canHandleVariableCommunicationStepSize="false"'
+
+
+@pytest.mark.parametrize(("version", "own"), [(2, "2e-3"), (2, "x"), (3, "3e-5")])
+def test_steps_that_an_fmu_tells_are_told(tmp_path: Path, version: int, own: str) -> None:
+    scene = motor(tmp_path, version=version, fixed=True)
+    usual = ("<ModelVariables>", f'<DefaultExperiment stepSize="{own}"/><ModelVariables>')
+    internal = (FIXED, f'{FIXED} fixedInternalStepSize="{own}"')
+    reworded(tmp_path / "Rotor.fmu", usual if version == 2 else internal)
+    taken = {"2e-3": 2e-3, "x": 1e-4, "3e-5": 9e-5}[own]
+    notes = here(scene, {}).summary["notes"]
+    told = re.search(r"steps are of \S+ s, .*macro_step = 0\.0001 s .*; (\S+) s is", "".join(notes))
+    assert told is None if own == "x" else float(told[1]) == pytest.approx(taken)
+    assert here(scene, {"coupling.macro_step": taken}).summary["notes"] == []
+    (note,) = here(scene, {"coupling.method": "step-locked"}).summary["notes"]
+    assert "rotor says that it takes steps of one length alone" in note
+
+
 def test_a_scene_with_ports_is_written_and_read(tmp_path: Path) -> None:
     scene = load(motor(tmp_path), {"fmu.rotor.J": 3e-4, "circuit.param.vdd": 12.0})
     path = tmp_path / "again.toml"

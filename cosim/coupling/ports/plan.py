@@ -224,6 +224,20 @@ def _notes(scene: Scene, sides: list[Side], method: str) -> Iterator[str]:
             f"an FMU feeds {through} through at once, of which the circuit learns a step late with "
             f'coupling.method = "{method}"; {cure}.'
         )
+    macro = scene.coupling.macro_step
+    for side in sides:
+        step = side.of.step or macro
+        near = max(round(macro / step), 1) * step
+        if method != "macro-steps" and not side.varies:
+            yield (
+                f'{side.name} says that it takes steps of one length alone, and coupling.method = "'
+                f'{method}" has others; "macro-steps" has not.'
+            )
+        elif method == "macro-steps" and abs(near - macro) > 1e-6 * macro:
+            yield (
+                f"{side.name} says that its steps are of {step:g} s, of which "
+                f"coupling.macro_step = {macro:g} s is no whole multiple; {near:g} s is one."
+            )
     if circle := _circle(scene, sides):
         yield (
             f"the FMUs feed each other at once ({circle}); this algebraic loop is not iterated: "

@@ -98,6 +98,10 @@ class Stranger:
         if found.coSimulation is None:
             raise self.bad("it must be for co-simulation, and is not")
         self.abilities: Any = found.coSimulation
+        usual = found.defaultExperiment and found.defaultExperiment.stepSize
+        varies = self.abilities.canHandleVariableCommunicationStepSize
+        self.step = _length(self.abilities.fixedInternalStepSize or (not varies and usual))
+        """Of its own, s, of which others are to be multiples; 0 where it tells none."""
         self.token = found.instantiationToken
         self.variables = self._variables(found)
         self._texts = {
@@ -283,6 +287,13 @@ def _why(folder: str) -> str:
         if told or type(error) is Exception:
             return str(error).replace(folder, "…")
     return "it does not follow the standard"
+
+
+def _length(text: Any) -> float:
+    try:
+        return max(float(text or 0.0), 0.0)
+    except ValueError:
+        return 0.0
 
 
 def _number(text: str) -> float:
