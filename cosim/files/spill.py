@@ -50,11 +50,11 @@ def place() -> Path | None:
 
 class Packed:
     """Columns of equal length, on their way to another process in a file of this one's working
-    folder. Raises BadInput where the disk is full."""
+    folder, whichever a stranger's code works in by now. Raises BadInput where the disk is full."""
 
     def __init__(self, columns: Mapping[str, Array]) -> None:
         rows = len(next(iter(columns.values())))
-        handle, path = tempfile.mkstemp(dir=os.getcwd())
+        handle, path = tempfile.mkstemp()
         self.told = os.path.basename(path), tuple(columns), rows
         """What :func:`unpacked` is to be given."""
         with open(handle, "wb", buffering=0) as file:

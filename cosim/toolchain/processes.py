@@ -439,8 +439,6 @@ def _start(pipe: Connection, folder: str, lock: int, library: str) -> "subproces
 
 def serve(pipe: Connection) -> None:
     """What the process does until its parent ends: it calls the function, and tells."""
-    global _used
-    _used = []
     function, bounds = pipe.recv(), pipe.recv()
     unfit: Exception | None = None
     if bounds is not None:
@@ -475,20 +473,14 @@ def serve(pipe: Connection) -> None:
         reports.send("rests", None)
 
 
-_used: list[Callable[[], object]] | None = None
-"""What ends the use of something, once the call at hand has been answered."""
-
-
-def when_answered(end: Callable[[], object]) -> None:
-    """Call ``end`` once the call at hand has been answered, since what is a stranger's may end the
-    process in it; where there is no such call, now."""
-    end() if _used is None else _used.append(end)
+used: "deque[Callable[[], object]]" = deque()
+"""What ends the use of something once a call is answered: a stranger's code may end the process."""
 
 
 def end_used() -> None:
-    """Call what waits for that now."""
-    while _used:
-        _used.pop(0)()
+    """End the use of all that calls have left."""
+    while used:
+        used.popleft()()
 
 
 _retires = False

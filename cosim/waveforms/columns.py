@@ -60,11 +60,10 @@ def netcdf_name(name: str) -> str:
 
 def netcdf_names(names: Iterable[str]) -> dict[str, str]:
     """For each name one of :func:`netcdf_name`, none of them twice; whose own it is keeps it."""
-    every = [*names]
-    found = {name: name for name in every if netcdf_name(name) == name}
-    for name in every:
-        one, k = netcdf_name(name), 2
-        while name not in found and one in found.values():
-            one, k = f"{netcdf_name(name)}_{k}", k + 1
-        found.setdefault(name, one)
-    return found
+    taken: dict[str, str] = {}
+    for name in sorted(names, key=lambda each: netcdf_name(each) != each):
+        one = netcdf_name(name)
+        while one in taken:
+            one += "_2"
+        taken[one] = name
+    return {name: one for one, name in taken.items()}

@@ -176,6 +176,44 @@ def test_what_an_fmu_says_of_its_variables_holds(
     assert re.search(said, capsys.readouterr().err)
 
 
+ALSO = '<Float64 name="also" valueReference="{}" causality="{}" variability="{}" start="0"/>'
+
+
+@pytest.mark.parametrize(
+    ("place", "causality", "said"),
+    [
+        (0, "input", "also and u are one input, and have two ports"),
+        (2, "parameter", r"parameters also = 1e-05: it is J, which has a value"),
+        (6, "output", "two of its outputs have one name"),
+    ],
+)
+def test_two_names_of_one_and_one_name_of_two(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], place: int, causality: str, said: str
+) -> None:
+    """The last one has replaced the first without a word."""
+    scene, varies = motor(tmp_path, version=3), "fixed" if place == 2 else "continuous"
+    one = ALSO.format(place, causality, varies)
+    one = one.replace('"also"', '"xs[1]"').replace('start="0"', "") if place == 6 else one
+    reworded(tmp_path / "Rotor.fmu", ("</ModelVariables>", f"{one}</ModelVariables>"))
+    port = '[[port]]\nprobe = "v(gp)"\nto = "rotor.also"\n[coupling]'
+    text = scene.read_text()
+    text = text.replace("[coupling]", port) if place == 0 else text
+    scene.write_text(text.replace("J = 2e-4", "J = 2e-4, also = 1e-5") if place == 2 else text)
+    with in_place():
+        assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == 2
+    assert re.search(said, capsys.readouterr().err)
+
+
+def test_an_fmu_may_work_in_another_folder(tmp_path: Path) -> None:
+    """Its resources, say; the results are where they were."""
+    recompiled(
+        tmp_path,
+        ("    m->r[J] = 2e-4", '    chdir("/");\n    m->r[J] = 2e-4'),
+        ("#include <math.h>", "#include <math.h>\n#include <unistd.h>"),
+    )
+    assert len(run(motor(tmp_path), {"run.duration": 1e-3}).columns["time"]) == 21
+
+
 @pytest.mark.parametrize("size", ["-2", "1048577", "100000000000"])
 def test_an_array_that_no_memory_holds_is_refused_where_it_is_needed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], size: str
@@ -315,8 +353,20 @@ def test_why_an_fmu_cannot_begin_is_told(
     assert re.search(r"Rotor\.fmu: the FMU cannot be initialised: no licence\s+here\.$", told), told
 
 
+def test_an_fmu_that_needs_its_tool_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recompiled(tmp_path, ("m->log2 = calls->logger;", "return NULL;"))
+    scene, tool = motor(tmp_path), 'needsExecutionTool="true"'
+    reworded(tmp_path / "Rotor.fmu", ("<CoSimulation ", f"<CoSimulation {tool} "))
+    with in_place():
+        assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == 2
+    assert "Failed to instantiate model); it needs its tool, which" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
-    ("status", "said"), [(2, "it discards the step"), (3, "an error"), (4, "a fatal error")]
+    ("status", "said"),
+    [(2, "it discards the step"), (3, "an error"), (4, "a fatal error"), (5, "background")],
 )
 def test_an_fmu_that_fails_without_a_word(tmp_path: Path, status: int, said: str) -> None:
     recompiled(tmp_path, ("m->time = time + h;", f"if (time > 1e-4) return {status};"))

@@ -226,18 +226,14 @@ def _notes(scene: Scene, sides: list[Side], method: str) -> Iterator[str]:
         )
     macro = scene.coupling.macro_step
     for side in sides:
-        step = side.of.step or macro
+        step = side.of.step if side.of.step > 0.0 else macro
         near = max(round(macro / step), 1) * step
         if method != "macro-steps" and not side.varies:
-            yield (
-                f'{side.name} says that it takes steps of one length alone, and coupling.method = "'
-                f'{method}" has others; "macro-steps" has not.'
-            )
+            told = f'coupling.method = "{method}" has others'
+            yield f"{side.name} says that it takes steps of one length alone, and {told}."
         elif method == "macro-steps" and abs(near - macro) > 1e-6 * macro:
-            yield (
-                f"{side.name} says that its steps are of {step:g} s, of which "
-                f"coupling.macro_step = {macro:g} s is no whole multiple; {near:g} s is one."
-            )
+            told = f"coupling.macro_step = {macro:g} s is no whole multiple; {near:g} s is one"
+            yield f"{side.name} says that its steps are of {step:g} s, of which {told}."
     if circle := _circle(scene, sides):
         yield (
             f"the FMUs feed each other at once ({circle}); this algebraic loop is not iterated: "

@@ -27,9 +27,13 @@ def joined(
     began = time.perf_counter()
     run = Run(scene, progress)
     run.run()
-    every = [*_signals(run)]
-    odd = {each[0]: at for each in every if (at := _first_odd(each)) is not None}
-    signals = [each for each in every if each[0] not in odd]
+    signals: list[Signal] = []
+    odd: list[str] = []
+    for each in _signals(run):
+        if (beyond := ~np.isfinite(each[3])).any():
+            odd.append(f"{plain(each[0])} (first at t = {each[2][beyond.argmax()]:.6g} s)")
+        else:
+            signals.append(each)
     _refuse_divergence(scene, signals)
     waves = Tape(1 + len(signals))
     step, rows = scene.run.output_step, count(scene.run.output_step, scene.run.duration)
@@ -60,29 +64,13 @@ def joined(
         "wall_time": time.perf_counter() - began,
         "method": run.plan.method,
         "versions": {**versions(), **run.versions},
-        "notes": [*run.deck.notes, *run.plan.notes, *_notes(run), *_odd(odd), *without],
+        "notes": [*run.deck.notes, *run.plan.notes, *_notes(run, odd), *without],
     }
     return columns, summary, units
 
 
 Signal = tuple[str, str, Array, Array, bool]
 """Name, unit, times (s), values, and whether it is continuous."""
-
-
-def _first_odd(signal: Signal) -> float | None:
-    """When it is no finite number for the first time, s."""
-    _, _, times, values, _ = signal
-    for part in blocks(len(times)):
-        finite = np.isfinite(values[part])
-        if not finite.all():
-            return float(times[part][finite.argmin()])
-    return None
-
-
-def _odd(odd: dict[str, float]) -> Iterator[str]:
-    if odd:
-        told = ", ".join(f"{plain(name)} (first at t = {at:.6g} s)" for name, at in odd.items())
-        yield f"left out, as they are no finite numbers, and nothing reads them: {told}."
 
 
 DIVERGED, BEYOND = 1e15, 1e150
@@ -178,7 +166,7 @@ _SELDOM, _MANY = 2, 10
 """Every how manieth step at most an FMU's outputs are to change; after so many changes."""
 
 
-def _notes(run: Run) -> Iterator[str]:
+def _notes(run: Run, odd: list[str]) -> Iterator[str]:
     if ignored := engine().ignored():
         yield f"ngspice knows no {', '.join(ignored)} of a model, and ignored it."
     often = run.steps * run.plan.scene.circuit.max_step / run.state.duration
@@ -195,11 +183,10 @@ def _notes(run: Run) -> Iterator[str]:
             f"asks for. It turned most often, {turns[node]} times, at node {node}: if it rings "
             "there, damp it, say by a resistor and a capacitor to ground."
         )
-    if run.not_restored:
-        yield (
-            f"repeated steps change {', '.join(map(plain, run.not_restored))}, which the FMU does "
-            "not restore: these values are not those of one run."
-        )
+    if odd:
+        yield f"left out, as they are no finite numbers, and nothing reads them: {', '.join(odd)}."
+    if names := ", ".join(name for _, name, at, _ in run.plan.outputs() if run.odd[at]):
+        yield f"repeated steps change {names}, which the FMU does not restore, so they are off."
     points, place = run.points.array(), 1
     for side in run.plan.sides:
         own = np.nan_to_num(

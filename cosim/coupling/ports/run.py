@@ -28,7 +28,7 @@ from cosim.drive.pieces import Ahead
 from cosim.errors import SimulationFailed, plain
 from cosim.files.spill import Tape
 from cosim.scene import Scene
-from cosim.toolchain.processes import end_used, when_answered
+from cosim.toolchain.processes import end_used, used
 
 _POINTS = 2048
 """Places of the logs between two emptyings."""
@@ -49,6 +49,7 @@ _STATUSES = {
     2: "it discards the step, or asks to end the run",
     3: "it has an error, and does not say which",
     4: "it has a fatal error, and does not say which",
+    5: "it goes on with the step in the background, for which nobody waits",
 }
 """What an FMU tells by the status of a call alone."""
 
@@ -58,7 +59,7 @@ class Run:
 
     def __init__(self, scene: Scene, progress: Callable[[float], None]) -> None:
         self._scene, self._progress = scene, progress
-        end_used()  # an FMU may be for one instance at a time
+        end_used()  # of a run before: an FMU may be for one instance at a time
         self.plan = plan = Plan(scene)
         self.deck = plan.deck()
         self._failure: BaseException | None = None
@@ -86,7 +87,8 @@ class Run:
             through.input = feed.input
         count_through = len(plan.throughs)
         self._throughs = (Through * max(count_through, 1))(*(t for t, _ in plan.throughs))
-        self._odd = (c_double * max(2 * width, 1))()
+        self.odd = (c_double * max(2 * width, 1))()
+        """Not 0 where a repeated step gave another output; then room for the first ones."""
         slopes = [Slope(place=of.place, slope=of.slope_place) for *_, of in plan.told]
         self._slopes = (Slope * max(len(slopes), 1))(*slopes)
         macro = scene.coupling.macro_step if plan.method == "macro-steps" else 0.0
@@ -111,7 +113,7 @@ class Run:
             n_throughs=count_through,
             slopes=ctypes.addressof(self._slopes),
             n_slopes=len(slopes),
-            odd=ctypes.addressof(self._odd),
+            odd=ctypes.addressof(self.odd),
             tolerance=_AGREEMENT * scene.circuit.reltol,
             asked=ctypes.addressof(self._asked),
             n_probed=len(plan.probes),
@@ -134,7 +136,7 @@ class Run:
         finally:
             self._attend()
             for side, state_of in zip(self.plan.sides, self.fmus, strict=False):
-                when_answered(partial(side.close, state_of.state))
+                used.append(partial(side.close, state_of.state))
         if state.status == FMU_FAILED:
             raise self._fmu_failure()
         self._refuse_what_is_said_wrongly()
@@ -164,27 +166,18 @@ class Run:
                     f"The output {name} is not a finite number at t = {self.state.time:.6g} s."
                 )
 
-    @property
-    def not_restored(self) -> list[str]:
-        """Outputs that a repeated step had otherwise; no port leads them on."""
-        return [name for _, name, place, _ in self.plan.outputs() if self._odd[place]]
-
     def _refuse_what_is_said_wrongly(self) -> None:
         """Raises BadInput for an FMU that does not do what it says of itself."""
         for side, name, place, read in self.plan.outputs():
-            if read and self._odd[place]:
+            if read and self.odd[place]:
                 raise side.of.bad(
-                    f"a step that is repeated from the state that it saved gives another {name}: "
-                    "it does not restore its state, although canGetAndSetFMUstate = true, and "
-                    'coupling.method = "redo" needs that; take "step-locked" with small '
-                    "circuit.max_step"
+                    f"a step repeated from a saved state gives another {name}, so it does not "
+                    'restore its state; take coupling.method = "step-locked"'
                 )
         for (side, name, _), told in zip(self.plan.told, self._slopes, strict=False):
             if told.wrong >= _WRONG:
-                raise side.of.bad(
-                    f"{name} does not change by the slope that it tells of it; write slope = "
-                    '"difference" in the [[port]] of it'
-                )
+                words = 'does not change by the slope that it tells; take slope = "difference"'
+                raise side.of.bad(f'[[port]] from = "{name}": it {words}')
 
     def _fmu_failure(self) -> SimulationFailed:
         side = self.plan.sides[self.state.failed]

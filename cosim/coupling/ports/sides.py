@@ -5,17 +5,12 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from ctypes import c_double, c_uint32, c_void_p
+from itertools import accumulate
 from typing import Any
 
 from cosim.coupling.loop.structures import PROBE, Feed, Fmu, Group, StrangerState, loop
-from cosim.coupling.ports.strangers import Stranger, Variable
+from cosim.coupling.ports.strangers import FUNCTIONS, Stranger, Variable
 from cosim.scene import tables
-
-_FUNCTIONS = {
-    2: {"Real": "Real", "Boolean": "Boolean", "Integer": "Integer", "Enumeration": "Integer"},
-    3: {"Enumeration": "Int64"},
-}
-"""What sets and reads a type, where it is not of the same name."""
 
 _ERROR = 3
 """The status of a call, in both versions, from which on an instance is not to be used."""
@@ -33,14 +28,12 @@ class Side:
             for v in self.outputs
             for k in range(v.size)
         ]
+        if len(dict(each[:2] for each in self.columns)) < len(self.columns):
+            raise of.bad("two of its outputs have one name")
         """Name, unit, and whether it is continuous, of each number of the row."""
         self.slopes: list[Variable] = []
         """Outputs whose derivative the FMU itself tells; they follow in the row."""
-        self.places: dict[str, int] = {}
-        place = 0
-        for each in self.outputs:
-            self.places[each.name] = place
-            place += each.size
+        self.places = _places(self.outputs)
         self.inputs: list[Variable] = []
         self._feeds: list[tuple[Variable, int, Any]] = []
         self._kept: list[Any] = []
@@ -63,6 +56,9 @@ class Side:
 
     def feed(self, into: Variable, place: int, feed: Any) -> None:
         """Lead ``feed`` into an input, or an element of it."""
+        for other in self.inputs:
+            if into is not other and into.one == other.one:
+                raise self.of.bad(f"{into.name} and {other.name} are one input, and have two ports")
         if into not in self.inputs:
             self.inputs.append(into)
         self._feeds.append((into, place, feed))
@@ -90,19 +86,16 @@ class Side:
             for k, value in enumerate(each.start)
         ]
         self._values = (c_double * max(len(starts), 1))(*starts)
-        at, base = {}, 0
-        for each in inputs:
-            at[each.name] = ctypes.addressof(self._values) + 8 * base
-            base += each.size
+        at, first = _places(inputs), ctypes.addressof(self._values)
         lines = [each for each in self._feeds if each[2].feed == 1]
         rates = self._keep((c_double * max(len(lines), 1))())
         for into, place, feed in self._feeds:
-            feed.input = at[into.name] + 8 * place
+            feed.input = first + 8 * (at[into.name] + place)
         for k, (_, _, feed) in enumerate(lines):
             feed.slope = ctypes.addressof(rates) + 8 * k
         feeds = self._keep((Feed * max(len(self._feeds), 1))(*(f for _, _, f in self._feeds)))
         sets, gets = (
-            self._groups("Set", inputs, ctypes.addressof(self._values)),
+            self._groups("Set", inputs, first),
             self._groups("Get", self.outputs, row),
         )
         state = StrangerState(
@@ -146,7 +139,7 @@ class Side:
             raw = self._keep((c_double * size)())  # no type is longer
             groups.append(
                 Group(
-                    call=self.of.address(do + _FUNCTIONS[self.of.version].get(kind, kind)),
+                    call=self.of.address(do + FUNCTIONS[self.of.version].get(kind, kind)),
                     places=self._references(those),
                     **{"n": len(those), "size": size, "kind": those[0].kind},
                     **{"values": values, "raw": ctypes.addressof(raw)},
@@ -165,6 +158,12 @@ class Side:
                 if state:
                     self.instance.free_state(c_void_p(state))
                 self.instance.close()
+
+
+def _places(variables: Sequence[Variable]) -> dict[str, int]:
+    """Of the first value of each, which lie one after another."""
+    names, sizes = [each.name for each in variables], [each.size for each in variables]
+    return dict(zip(names, accumulate(sizes, initial=0), strict=False))
 
 
 def _grouped(variables: Sequence[Variable]) -> list[Variable]:

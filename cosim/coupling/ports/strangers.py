@@ -8,6 +8,7 @@ import tempfile
 import zipfile
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from ctypes import c_void_p, cast
 from dataclasses import dataclass
 from functools import cache
@@ -32,15 +33,15 @@ MOST_VALUES, MOST_ELEMENTS = 4096, 1 << 20
 _JOINED = ("input", "output", "parameter")
 """What a scene can join or set; any other array may have any size."""
 
-_SET = ("input", "parameter")
-"""What may have a start value."""
-
 _KINDS_2 = {"Real": 0, "Integer": 6, "Enumeration": 6, "Boolean": 11}
 _KINDS_3 = {
     **{"Float64": 0, "Float32": 1, "Int8": 2, "UInt8": 3, "Int16": 4, "UInt16": 5, "Int32": 6},
     **{"UInt32": 7, "Int64": 8, "Enumeration": 8, "UInt64": 9, "Boolean": 10},
 }
 """Types of values as ``loop.h`` numbers them."""
+
+FUNCTIONS = {2: {"Enumeration": "Integer"}, 3: {"Enumeration": "Int64"}}
+"""What sets and reads a type, where it is not of the same name."""
 
 _LONGEST = 600  # characters of a message
 
@@ -66,6 +67,11 @@ class Variable:
     high: float
     items: tuple[int, ...]
     """The values of an enumeration."""
+
+    @property
+    def one(self) -> tuple[int, int]:
+        """What it is, whatever it is called: a variable may have several names."""
+        return self.kind, self.reference
 
     @property
     def real(self) -> bool:
@@ -100,14 +106,16 @@ class Stranger:
         self.abilities: Any = found.coSimulation
         usual = found.defaultExperiment and found.defaultExperiment.stepSize
         varies = self.abilities.canHandleVariableCommunicationStepSize
-        self.step = _length(self.abilities.fixedInternalStepSize or (not varies and usual))
+        self.step = 0.0
         """Of its own, s, of which others are to be multiples; 0 where it tells none."""
+        with suppress(TypeError, ValueError):
+            self.step = float(self.abilities.fixedInternalStepSize or (None if varies else usual))
         self.token = found.instantiationToken
         self.variables = self._variables(found)
         self._texts = {
             each.name: each.valueReference
             for each in found.modelVariables
-            if each.type == "String" and each.causality in _SET and not each.shape
+            if each.type == "String" and each.causality in ("input", "parameter") and not each.shape
         }
         """References of parameters and inputs that are texts."""
         self.feedthrough = {
@@ -208,7 +216,9 @@ class Stranger:
         except BadInput:
             raise
         except Exception as error:
-            said = f": {messages[-1]}" if messages else f" ({error})"
+            said = f": {messages[-1]}" if messages else f" ({str(error).rstrip('.')})"
+            needs = "; it needs its tool, which cannot be started here"
+            said += needs * bool(self.abilities.needsExecutionTool)
             raise self.bad(f"the FMU cannot be initialised{said}") from error
         return made
 
@@ -234,10 +244,12 @@ class Stranger:
             self.settable(name, where)
             raise self.bad(f"{where} must be {PLAIN_NUMBER}, or true or false")
         found, place = self.settable(name, where)
+        for other in arrays:
+            if other != found.name and self.variables[other].one == found.one:
+                raise self.bad(f"{where}: it is {other}, which has a value")
         values = arrays.setdefault(found.name, [*found.start])
         values[place] = _allowed(found, value, where, self)
-        kind = found.type if self.version == 3 else _AS_2.get(found.type, found.type)
-        kind = "Int64" if kind == "Enumeration" else kind
+        kind = FUNCTIONS[self.version].get(found.type, found.type)
         getattr(made.raw, f"set{kind}")([found.reference], values)
 
     def address(self, name: str) -> Any:
@@ -251,8 +263,6 @@ class Stranger:
 
 _WHOLE = {f"{'' if s else 'U'}Int{n}": (n, s) for n in (8, 16, 32, 64) for s in (True, False)}
 """Bits of a type, and whether it has a sign; FMI 2.0's has 32."""
-
-_AS_2 = {"Enumeration": "Integer"}
 
 
 def _allowed(found: Variable, value: Any, where: str, of: Stranger) -> Any:
@@ -287,13 +297,6 @@ def _why(folder: str) -> str:
         if told or type(error) is Exception:
             return str(error).replace(folder, "…")
     return "it does not follow the standard"
-
-
-def _length(text: Any) -> float:
-    try:
-        return max(float(text or 0.0), 0.0)
-    except ValueError:
-        return 0.0
 
 
 def _number(text: str) -> float:
