@@ -104,12 +104,12 @@ class Stranger:
         if found.coSimulation is None:
             raise self.bad("it must be for co-simulation, and is not")
         self.abilities: Any = found.coSimulation
-        usual = found.defaultExperiment and found.defaultExperiment.stepSize
         varies = self.abilities.canHandleVariableCommunicationStepSize
+        usual = found.defaultExperiment and not varies and found.defaultExperiment.stepSize
         self.step = 0.0
         """Of its own, s, of which others are to be multiples; 0 where it tells none."""
-        with suppress(TypeError, ValueError):
-            self.step = float(self.abilities.fixedInternalStepSize or (None if varies else usual))
+        with suppress(ValueError):
+            self.step = float(self.abilities.fixedInternalStepSize or usual or 0.0)
         self.token = found.instantiationToken
         self.variables = self._variables(found)
         self._texts = {
