@@ -1,6 +1,8 @@
 """Ctrl-C, and what ends a command as it does: SIGTERM, and SIGHUP of a terminal that closes."""
 
+import _thread
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,14 +18,18 @@ SIGNALS = [each for each in signal.Signals if each.name in ("SIGINT", "SIGTERM",
 GRACE = 30
 """s; a command that has not ended so long after a signal is ended by the system."""
 
+AGAIN = 0.02
+"""s after which a signal is raised again that was lost."""
+
 
 @contextmanager
 def ended_alike() -> Iterator[None]:
     """Within this context all of SIGNALS raise KeyboardInterrupt, but for those that whoever
     started this process has had ignored, as nohup does.
 
-    Where memory has run out Python may lose an exception, and what tidies up may hang: GRACE later
-    the system ends the process.
+    Python ignores what is raised where it frees an object, so a signal that strikes there is raised
+    again. Where memory has run out it may lose one all the same, and what tidies up may hang: GRACE
+    later the system ends the process.
     """
     alarm = getattr(signal, "alarm", lambda seconds: None)
     armed = False
@@ -34,13 +40,29 @@ def ended_alike() -> Iterator[None]:
         alarm(GRACE)
         raise KeyboardInterrupt
 
+    def ignored(what: "sys.UnraisableHookArgs") -> None:
+        if isinstance(what.exc_value, KeyboardInterrupt):  # here it would be ignored once more
+            threading.Timer(AGAIN, _strike).start()
+        else:
+            told(what)
+
+    told, sys.unraisablehook = sys.unraisablehook, ignored
     known = (signal.SIG_DFL, signal.default_int_handler)
     try:
         with _handled(lambda before: interrupt if before in known else None):
             yield
     finally:
+        sys.unraisablehook = told
         if armed:
             alarm(0)
+
+
+def _strike() -> None:
+    """Send SIGINT to the main thread, whatever it waits for; Windows has no such signal."""
+    if sys.platform == "win32":
+        _thread.interrupt_main()
+    else:
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
 
 
 @contextmanager

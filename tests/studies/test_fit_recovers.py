@@ -257,7 +257,7 @@ def test_what_is_wrong_with_a_file_of_forces(
     name: str, text: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One sentence, before anything is fitted, and nothing written."""
-    rows = [f"{i / 960},{i},{i}" for i in range(12)]
+    rows = [f"{i / 960},{i},{2 * i}" for i in range(12)]
     (tmp_path / "a.csv").write_text("\n".join(["t [s],zp [mm],zo [mm]", *rows]), encoding="utf-8")
     (tmp_path / name).write_text(text, encoding="utf-8")
     out = tmp_path / "out"
