@@ -36,8 +36,9 @@ FIGURE = "figure.png"
 JUDGED = 50
 """Random points of a sweep with the fast solver that the FMU runs again."""
 
-LOOKED_AT = 20
-"""Random points at most, and a quarter of all, of which the kind of motion is told."""
+LOOKED_AT = {"fmu": 20, "fast": 5}
+"""Random points at most, by the solver of the scene, and a quarter of all, of which the kind of
+motion is told: each costs as much as a hundred points of the fast one."""
 
 _REFRESH = 10.0
 """s between two writings of the dataset, and at least _RARELY times as long as one takes."""
@@ -202,8 +203,8 @@ def _motions(scene: Scene, design: Design, data: xr.Dataset) -> dict[str, str]:
     for way, place in fastest(data):
         words = "; ".join(filter(None, at(int(place))[1:]))
         found |= {MOTION.format(way): words} if words else {}
-    known = np.flatnonzero(np.isfinite(v))
-    some = np.random.default_rng(1).permutation(known)[: min(LOOKED_AT, len(v) // 4)].tolist()
+    known = np.random.default_rng(1).permutation(np.flatnonzero(np.isfinite(v)))
+    some = known[: min(LOOKED_AT[scene.run.solver], len(v) // 4)].tolist()
     if found and some:
         kinds, _, early = zip(*map(at, some), strict=True)
         met = ", ".join(f"{kind or 'not known'} {count}" for kind, count in Counter(kinds).items())
