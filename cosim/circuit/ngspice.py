@@ -44,6 +44,8 @@ _NOISE = re.compile(
 """What it says of itself, and what only follows from an earlier word."""
 
 
+_SINGULAR = re.compile(r"singular matrix: check (nodes? \S+(?: and \S+)?)", re.IGNORECASE)
+
 LOOSER = "abstol=1e-8 vntol=1e-5 chgtol=1e-11"
 """A, V, C. ngspice's own 1 pA, 1 uV and 10 fC are made for integrated circuits: where amperes are
 switched, no step is small enough for them."""
@@ -189,6 +191,11 @@ class Engine(Shared.NgSpiceShared):
     def said(self) -> str:
         """ngspice's own words of trouble, as the end of a message."""
         words = [" ".join(word.split()) for word in (*self._stderr, *self._stdout)]
+        if match := next(filter(None, map(_SINGULAR.search, words)), None):
+            return (
+                f"nothing determines the voltage at {match[1]} (its matrix is singular); "
+                "look for a missing connection, or give it a resistor to ground, 1e9 ohm say"
+            )
         telling = [word for word in words if _TROUBLE.search(word) and not _NOISE.search(word)]
         return "; ".join(dict.fromkeys(telling[:4])).rstrip(".!") or "it gave no reason"
 

@@ -78,6 +78,10 @@ SIMULATIONS = {
         edited(SENSE, f"{SENSE}\nB9 x 0 V=time>1m ? (V(x)>0.5 ? 0 : 1) : 0\nR9 x 0 1"),
         r"stopped at t = 0\.00[01]\d*.*s of 0\.01 s|range of numbers|hangs",
     ),
+    "a node between current sources": (
+        edited(SENSE, f"{SENSE}\nG9 0 adrift v1 0 1m\nE9 far 0 adrift 0 1\nR9 far 0 1k"),
+        r"nothing determines the voltage at node adrift \(its matrix is singular\); .* ground",
+    ),
     # More is fed back than the coil's 7.1 ohm take: the current grows by e in 93 us.
     "positive feedback": (
         edited(SENSE, "Bsense sense 0 V=-20*I(Vemf)"),
