@@ -4,11 +4,12 @@ The limits are such that none of the ten published trials, nor one exported by a
 that the package has, is told anything.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from cosim.arrays import Array
+from cosim.errors import plain
 
 JUMP = 5.0
 """How many times as far as all but 5 % of the steps between rows a step goes that is a jump."""
@@ -23,9 +24,10 @@ OFTEN = 0.03
 """Share of the rows from which on what should be rare is told."""
 
 
-def flaws(time: Array, heights: dict[str, Array]) -> Iterator[str]:
-    """A sentence on each; ``heights`` (m, NaN where unknown) over ``time`` (s), by the words that
-    the reader knows them by."""
+def flaws(time: Array, columns: Mapping[str, Array], headers: Mapping[str, str]) -> Iterator[str]:
+    """A sentence on each; heights (m, NaN where unknown) over ``time`` (s), told by the headers of
+    their columns."""
+    heights = {plain(headers[z], 40): columns[z] for z in ("z_surface", "z_part") if z in columns}
     moving = {name: z for name, z in heights.items() if np.ptp(z[np.isfinite(z)]) > 0.0}
     if len(moving) == 2:
         (one, a), (other, b) = moving.items()

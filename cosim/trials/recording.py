@@ -97,8 +97,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
         if np.isfinite(values).sum() < 2:
             where = f"{plain(path)}: column {plain(table.headers[name], 40)}"
             raise BadInput(f"{where}: it has fewer than two values.")
-    heights = {z: signals[z] for z in ("z_surface", "z_part") if z in signals}
-    notes += (*flaws(time, {plain(table.headers[z], 40): heights[z] for z in heights}),)
+    notes += (*flaws(time, signals, table.headers),)
     across = table.columns.get("v_across_surface", np.full(count, np.nan))
     columns = {
         name: {"header": column.header, "unit": column.unit, "assumed": column.assumed}
@@ -120,11 +119,10 @@ def _gaps(time: Array) -> list[str]:
     steps = np.diff(time)
     usual = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP * usual)
-    if not len(gaps) and steps.max() > EVEN * steps.min():
-        apart = f"{steps.min() * 1e3:.3g} to {steps.max() * 1e3:.3g} ms apart"
-        return [f"Rows are {apart}: if these times are rounded, so are the velocities."]
     if not len(gaps):
-        return []
+        apart = f"{steps.min() * 1e3:.3g} to {steps.max() * 1e3:.3g} ms apart"
+        told = f"Rows are {apart}: if these times are rounded, so are the velocities."
+        return [told] if steps.max() > EVEN * steps.min() else []
     longest = int(np.argmax(steps))
     return [
         f"Gaps in time: {len(gaps)}, the longest of {steps[longest] * 1e3:.3g} ms at "

@@ -98,8 +98,7 @@ def read(path: Path) -> Trial:
             f"{plain(path)}: {known.sum()} rows have both zp and zo, and {FEWEST_ROWS} are needed."
         )
     columns = {name: values[known] for name, values in table.columns.items()}
-    heights = {table.headers[name]: columns[name] for name in ("z_surface", "z_part")}
-    for sentence in (*table.notes, *flaws(columns["time"], heights)):
+    for sentence in (*table.notes, *flaws(columns["time"], columns, table.headers)):
         warnings.warn(f"{plain(path)}: {sentence}", Note, stacklevel=2)
     platform, part = track(columns, "surface"), track(columns, "part")
     plate = track(columns, "plate") if "z_plate" in columns else None

@@ -110,16 +110,16 @@ def _of_other_motion(
         return
     row, part = float(np.median(np.diff(recording.time))), signals["v_part"]
     lifted = "with the surface's height added to it: is it measured from the surface?"
-    guesses = {lifted: (part + signals["v_surface"], 0)}
-    for lag in LAGS:
+    as_it_is = "as it is"
+    guesses = {as_it_is: (part, 0), lifted: (part + signals["v_surface"], 0)}
+    for lag in filter(None, LAGS):
         where = f"{abs(lag)} rows {'later' if lag > 0 else 'earlier'}"
         guesses[f"{where}: were both filmed at once?"] = part, lag
     shares = {
         words: explained(observe(recording, "v_part", start + lag * row), values)
         for words, (values, lag) in guesses.items()
     }
-    words = max(shares, key=lambda words: shares[words])
-    before = explained(observe(recording, "v_part", start), part)
+    words, before = max(shares, key=lambda words: shares[words]), shares[as_it_is]
     if _better(shares[words], before):
         yield f"{_agree('height of the part', shares[words], before)} {words}"
 
