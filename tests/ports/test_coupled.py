@@ -275,31 +275,73 @@ settle = 0
 RL = "V1 in 0 PULSE(0 1 5u 2u 2u 40u 90u)\nR1 in x 1\nL1 x y 10u\n"
 
 
+def against_one_netlist(
+    folder: Path, load_of_it: str, overrides: dict[str, float]
+) -> tuple[Run, dict[str, Array], dict[str, Array]]:
+    """The run of load.toml, which repeats steps; ngspice alone with this element instead, in steps as
+    long, and in short ones."""
+    decks = [
+        f"* load\n{RL}Vf y z 0\n{load_of_it}\n.options reltol={reltol}\n"
+        f".tran {step} 2e-4 0 {step}\n.end\n"
+        for reltol, step in (("1e-5", "1u"), ("1e-7", "5n"))
+    ]
+    plain, fine = spice.run_all(folder, *decks)
+    with in_place():
+        run = Run(load(folder / "load.toml", overrides), lambda _: None)
+        run.run()
+    assert run.plan.method == "redo"
+    return run, plain, fine
+
+
+def apart(time: Array, current: Array, fine: dict[str, Array]) -> float:
+    """At the solvers' own points, since straight lines between them err more than either."""
+    return float(np.abs(current - np.interp(time, fine["time"], fine["vf#branch"])).max())
+
+
+def error(run: Run, fine: dict[str, Array]) -> float:
+    time, _, current = run.log.array().T
+    return apart(time, current, fine)
+
+
 @pytest.mark.parametrize("gain", [0.5, 2.0, 10.0, 100.0])
 @pytest.mark.parametrize("version", [2, 3])
 def test_feedthrough_is_as_exact_as_one_netlist(tmp_path: Path, gain: float, version: int) -> None:
     build(tmp_path, "Load", version, through=True)
     (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
     (tmp_path / "load.toml").write_text(LOAD)
-    decks = [
-        f"* load\n{RL}Vf y z 0\nR2 z 0 {gain}\n.options reltol={reltol}\n"
-        f".tran {step} 2e-4 0 {step}\n.end\n"
-        for reltol, step in (("1e-5", "1u"), ("1e-7", "5n"))
-    ]
-    plain, fine = spice.run_all(tmp_path, *decks)
-    with in_place():
-        run = Run(load(tmp_path / "load.toml", {"fmu.load.D": gain}), lambda _: None)
-        run.run()
-    assert run.plan.method == "redo"
+    run, plain, fine = against_one_netlist(tmp_path, f"R2 z 0 {gain}", {"fmu.load.D": gain})
     # The circuit itself carries what is fed through, so that no more steps are tried than alone.
     assert run.state.attempts < 1.5 * len(plain["time"])
-    # At the solvers' own points, since straight lines between them err more than either.
-    time, _, current = run.log.array().T
+    assert error(run, fine) <= 1.5 * apart(plain["time"], plain["vf#branch"], fine)
 
-    def error(time: Array, current: Array) -> float:
-        return float(np.abs(current - np.interp(time, fine["time"], fine["vf#branch"])).max())
 
-    assert error(time, current) <= 1.5 * error(plain["time"], plain["vf#branch"])
+@pytest.mark.parametrize("gain", [0.5, 10.0])
+def test_feedthrough_by_way_of_another_fmu_is_as_exact(tmp_path: Path, gain: float) -> None:
+    """The source is from the second FMU, of which the scene tells first."""
+    build(tmp_path, "Load", through=True)
+    (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
+    two = LOAD.replace('name = "load"', 'name = "second"').replace('"load.y"', '"second.y"')
+    first = '[[fmu]]\nname = "load"\nfile = "Load.fmu"\n[[port]]\nfrom = "load.y"\nto = "second.u"'
+    (tmp_path / "load.toml").write_text(two.replace("[run]", f"{first}\n[run]"))
+    run, plain, fine = against_one_netlist(
+        tmp_path, f"R2 z 0 {gain**2}", {"fmu.load.D": gain, "fmu.second.D": gain}
+    )
+    assert run.state.attempts < 1.5 * len(plain["time"])
+    assert error(run, fine) <= 1.5 * apart(plain["time"], plain["vf#branch"], fine)
+
+
+@pytest.mark.parametrize("gain", [1.0, 100.0])
+def test_feedthrough_that_is_no_line_is_as_exact(tmp_path: Path, gain: float) -> None:
+    """Its steps leave the line without an event."""
+    recompiled(tmp_path, ("m->r[D] * m->r[U]", "m->r[D] * m->r[U] * m->r[U] * m->r[U]"))
+    build(tmp_path, "Load", through=True)
+    (tmp_path / "rl.cir").write_text(f"* load\n{RL}Vf y 0 0\n.end\n")
+    (tmp_path / "load.toml").write_text(LOAD)
+    run, plain, fine = against_one_netlist(
+        tmp_path, f"B2 z 0 V={gain}*i(B2)^3", {"fmu.load.D": gain}
+    )
+    assert run.state.attempts < 3.0 * len(plain["time"])
+    assert error(run, fine) <= 1.5 * apart(plain["time"], plain["vf#branch"], fine)
 
 
 def test_feedthrough_needs_an_fmu_that_saves_its_state(tmp_path: Path) -> None:

@@ -236,6 +236,7 @@ typedef struct {
     double owed;               /* of the FMU's integral, as in Lead */
     double guess, off;         /* of the last attempt: its line at the end, and what it lacked */
     double response;           /* d off / d guess, as last seen */
+    double bend;               /* in a second squared; how the FMU left its line in the last step */
     double largest;            /* magnitude of its value so far */
 } Source;
 
@@ -263,13 +264,13 @@ typedef struct {
     int64_t width;
 } Stranger;
 
-/* Where an FMU feeds a probe through to a source, the circuit itself carries that share: it adds the
+/* Where FMUs feed a probe through to a source, the circuit itself carries that share: it adds the
    gain times the probe to the source. */
 typedef struct {
-    int64_t source, probe, fmu, output; /* places */
-    double *input;             /* of the FMU */
+    int64_t source, probe, first, last, output; /* places; from the first FMU through to the last */
+    double *input;             /* of the first */
     double scale;              /* of both ports */
-    double gain;               /* as seen last */
+    double gain, next_gain;    /* as seen at the communication point before, and at this one */
 } Through;
 
 /* An output whose FMU tells its slope, and how far it changes by it; see judge_slopes(). */

@@ -34,6 +34,10 @@ static const double EVENT = 3e-3, EVENT_WITHIN = 1e-9;
 /* Of a source's largest value: by how much it leaves its line at an event of an FMU; s: the length
    of a step within which the event then lies. */
 
+static const double BENT = 8.0, TELLING = 0.01;
+/* Of how much it left its line in the last step, for the length of this one: so much is no event, since
+   motion may bend; and of EVENT: what tells so. */
+
 static const double GROWTH = 0.07;
 /* Of the time since the last jump: the longest step. By its truncation error ngspice would double its
    steps, and lose of what answers the jump, however fast that is. */
@@ -116,6 +120,16 @@ static double carried(const Ports *c, const Source *s, const double *probes)
     return sum;
 }
 
+/* In a second, over the last step, of `h` (s). Where gains change along the step, their mean tells it. */
+static double carried_rate(const Ports *c, const Source *s, double h)
+{
+    double sum = 0.0;
+    for (const Through *t = c->throughs; t < c->throughs + c->n_throughs; t++)
+        if (c->sources + t->source == s)
+            sum += 0.5 * (t->gain + t->next_gain) * (c->now[t->probe] - c->start[t->probe]);
+    return sum / h;
+}
+
 /* With what the circuit adds, at the time of the values that it has computed last. */
 static double source_value(Ports *c, const Source *s, double t)
 {
@@ -157,7 +171,7 @@ static void set_lines(Ports *c)
             continue;
         const double value = s->origin.scale * c->outputs[s->origin.place] + s->origin.offset;
         if (is_telling(c, h))
-            s->through_rate = (carried(c, s, c->now) - carried(c, s, c->start)) / h;
+            s->through_rate = carried_rate(c, s, h);
         const double rate = s->origin.scale * rate_of(c, &s->origin) - s->through_rate;
         s->correction = correction(c, s, value, rate, source_value(c, s, c->time));
         s->plain = value;
@@ -224,8 +238,8 @@ static int set_inputs(Stranger *s)
                                             s->n_input_slopes, s->input_rates);
 }
 
-/* What an FMU puts out for the values that its inputs have at the end of a step. */
-static int refresh(Ports *c, Stranger *s, double time)
+/* Gives the inputs of an FMU the values that they have at the end of a step. */
+static void take_ends(Ports *c, Stranger *s, double time)
 {
     for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++) {
         const int64_t k = f->origin.place;
@@ -236,6 +250,12 @@ static int refresh(Ports *c, Stranger *s, double time)
         if (f->origin.kind == FROM_DRIVE)
             *f->input = f->origin.scale * drive_before(c, time) + f->origin.offset;
     }
+}
+
+/* What it then puts out. */
+static int refresh(Ports *c, Stranger *s, double time)
+{
+    take_ends(c, s, time);
     return set_inputs(s) && get_outputs(s);
 }
 
@@ -326,25 +346,29 @@ static void write_point(Ports *c, double time)
     memcpy(row, c->outputs, (size_t)c->n_outputs * sizeof *row);
 }
 
-/* How much each FMU feeds through, by what it answers to a nudge. */
-static void learn(Ports *c)
+/* How much the FMUs feed through, by what they answer to a nudge, one after another. */
+static int learn(Ports *c)
 {
     c->learn = 0;
     for (Through *t = c->throughs; t < c->throughs + c->n_throughs; t++) {
-        Stranger *const s = &c->fmus[t->fmu];
+        Stranger *const first = &c->fmus[t->first], *const last = &c->fmus[t->last];
         const double given = *t->input, nudge = NUDGE * fmax(fabs(given), 1.0);
         *t->input = given + nudge;
-        if (!set_inputs(s) || !get_outputs(s)) {
-            fmu_failed(c, s);
-            return;
-        }
+        for (Stranger *s = first; s <= last; s++)
+            if (s == first ? !set_inputs(s) || !get_outputs(s) : !refresh(c, s, c->time))
+                return fmu_failed(c, s);
         const double gain = t->scale * (c->outputs[t->output] - c->before[t->output]) / nudge;
-        t->gain = isfinite(gain) ? gain : 0.0;
+        t->next_gain = isfinite(gain) ? gain : 0.0;
         *t->input = given;
         memcpy(c->outputs, c->before, (size_t)c->n_outputs * sizeof *c->outputs);
-        if (!fmu_restore(s->fmu, s->restore, s->state))
-            fmu_failed(c, s);
+        for (Stranger *s = first; s <= last; s++) {
+            if (s > first)
+                take_ends(c, s, c->time);
+            if (!fmu_restore(s->fmu, s->restore, s->state))
+                return fmu_failed(c, s);
+        }
     }
+    return 1;
 }
 
 /* A communication point at the time of the last accepted one: from here on a new one begins. */
@@ -356,7 +380,11 @@ static void begin_exchange(Ports *c)
         for (int64_t k = 0; k < c->n_outputs; k++)
             c->rates[k] = (c->outputs[k] - c->before[k]) / h;
     memcpy(c->before, c->outputs, (size_t)c->n_outputs * sizeof *c->before);
+    if (!save_all(c) || (c->learn && !learn(c)))
+        return;
     set_lines(c);
+    for (Through *t = c->throughs; t < c->throughs + c->n_throughs; t++)
+        t->gain = t->next_gain;
     memcpy(c->start, c->now, (size_t)c->n_saved * sizeof *c->start);
     memset(c->charges, 0, (size_t)c->n_saved * sizeof *c->charges);
     c->drive_charge = 0.0;
@@ -371,8 +399,6 @@ static void begin_exchange(Ports *c)
     }
     c->exchanged++;
     write_point(c, time);
-    if (save_all(c) && c->learn)
-        learn(c);
 }
 
 /* ngspice sets the next edge of a PULSE only if a step was cut to end on this one. A step that ends
@@ -511,16 +537,29 @@ static int ask(Ports *c)
     return going(c);
 }
 
-/* Whether an FMU's output ends far from where its line from the communication point leads. */
-static int leaves_line(const Ports *c, double time)
+/* How far an FMU's output ends from where its line from the communication point leads. */
+static double off_line(const Ports *c, const Source *s, double h)
 {
-    for (const Source *s = c->sources; s < c->sources + c->n_sources; s++) {
-        const double ahead = s->value + s->line * (time - c->origin);
-        const int known = s->origin.slope != DIFFERENCE || c->exchanged > 1;
-        if (s->origin.kind == FROM_OUTPUT && known && fabs(s->guess - ahead) > EVENT * s->largest)
+    const int known = s->origin.slope != DIFFERENCE || c->exchanged > 1;
+    return s->origin.kind == FROM_OUTPUT && known ? fabs(s->guess - (s->value + s->line * h)) : 0.0;
+}
+
+/* Whether an output does that by an event within a step of `h` (s). */
+static int leaves_line(const Ports *c, double h)
+{
+    for (const Source *s = c->sources; s < c->sources + c->n_sources; s++)
+        if (off_line(c, s, h) > EVENT * s->largest + BENT * s->bend * h * h)
             return 1;
-    }
     return 0;
+}
+
+/* Keeps how the outputs bend, once a step of `h` (s) is done. */
+static void keep_bends(Ports *c, double h)
+{
+    for (Source *s = c->sources; s < c->sources + c->n_sources; s++) {
+        const double off = off_line(c, s, h);
+        s->bend = !c->met && off > TELLING * EVENT * s->largest ? off / (h * h) : 0.0;
+    }
 }
 
 /* Whether the attempt that has converged at `time` is to be repeated. */
@@ -554,8 +593,9 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
         s->guess = line;
         s->off = off;
     }
-    if (agree && leaves_line(c, time)) {
-        c->met = time - c->origin <= EVENT_WITHIN;
+    const double h = time - c->origin;
+    if (agree && leaves_line(c, h)) {
+        c->met = h <= EVENT_WITHIN;
         if (c->met) {
             c->jumped = time;
         } else { /* a shorter step, to find when */
@@ -563,19 +603,21 @@ static int to_repeat(Ports *c, double time, double *delta, double old_delta)
             c->redone++;
             for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
                 s->rate = s->origin.kind == FROM_OUTPUT ? s->line : s->rate;
-            *delta = 0.5 * (time - c->origin);
+            *delta = 0.5 * h;
             return 1;
         }
     }
-    if (agree)
+    if (agree) {
+        keep_bends(c, h);
         return 0;
+    }
     if (++c->tries > MOST_TRIES) {
         c->status = NO_AGREEMENT;
         return 0;
     }
     for (Source *s = c->sources; s < c->sources + c->n_sources; s++)
         if (s->origin.kind == FROM_OUTPUT)
-            s->rate = (s->guess - s->off / s->response - s->value) / (time - c->origin);
+            s->rate = (s->guess - s->off / s->response - s->value) / h;
     c->redone++;
     *delta = old_delta;
     return 1;

@@ -18,6 +18,9 @@ from cosim.scene.tables import MACHINE, MACHINE_ENDS, Fmu, Port
 _HELD, _DIFFERENCE, _KNOWN = range(3)
 _FEEDS = {"mean": 0, "line": 1, "end": 2}
 
+_Of = tuple[str, str]
+"""The names of an FMU and of a variable of it."""
+
 
 class Plan:
     """What is joined to what. Raises BadInput, naming file, key and value."""
@@ -50,6 +53,11 @@ class Plan:
         self.told: list[tuple[Side, str, Any]] = []
         """Outputs whose slopes the FMU tells by itself, their names, and the ports' origins."""
         self._fed: list[tuple[int, Side, Variable]] = []  # sources that FMUs feed
+        self._needs: dict[_Of, set[_Of]] = {}
+        """What each variable of an FMU depends on at once: as the FMUs say, and as ports lead."""
+        for side in sides.values():
+            for output, inputs in side.of.feedthrough.items():
+                self._needs[side.name, output] = {(side.name, name) for name in inputs}
         for port in ports:
             self._join(port, sides)
         # Slopes of outputs make rows longer, so places in the row of all are known only now.
@@ -61,8 +69,9 @@ class Plan:
             first += side.width
         self.width = first
         """Of the row of all outputs."""
-        self.method = _method(scene, self.sides)
-        self.notes = [*_notes(scene, self.sides, self.method)]
+        through = self._feedthrough()
+        self.method = _method(scene, self.sides, through)
+        self.notes = [*_notes(scene, self.sides, self.method, through, _circle(self._needs))]
         self.throughs = [*self._throughs()] if self.method == "redo" else []
         """What the circuit itself carries of the FMUs' feedthrough, and what leads to it."""
 
@@ -90,17 +99,32 @@ class Plan:
         """Whether the command of ``[drive]`` leads to something."""
         return any(port.origin == "drive" for port in self.scene.port)
 
+    def _feedthrough(self) -> str:
+        """Inputs from the circuit that an output to it depends on at once, directly or through other
+        FMUs, as these say; or nothing."""
+        probed = {(side.name, into.name) for side in self.sides for into, _ in side.probed()}
+        for _, side, output in self._fed:
+            for name, variable in sorted(_behind(self._needs, (side.name, output.name)) & probed):
+                return f"{name}.{variable} to {side.name}.{output.name}"
+        return ""
+
     def _throughs(self) -> Iterator[tuple[Any, Any]]:
-        for at, side, output in self._fed:
-            origin, known = self.sources[at].origin, side.of.feedthrough.get(output.name)
-            for into, feed in side.probed():
-                if known is None or into.name in known:
-                    scale = origin.scale * feed.origin.scale
-                    fmu = self.sides.index(side)
-                    yield (
-                        Through(at, feed.origin.place, fmu, origin.place, scale=scale),
-                        feed,
-                    )
+        """What an FMU does not say it may do: an output of which it tells no dependency may depend on
+        all its inputs."""
+        needs = dict(self._needs)
+        for side in self.sides:
+            every = {(side.name, into.name) for into in side.inputs}
+            for output in side.outputs:
+                needs.setdefault((side.name, output.name), every)
+        for at, last, output in self._fed:
+            origin, behind = self.sources[at].origin, _behind(needs, (last.name, output.name))
+            end = self.sides.index(last)
+            for first, side in enumerate(self.sides[: end + 1]):
+                for into, feed in side.probed():
+                    if (side.name, into.name) in behind:
+                        scale = origin.scale * feed.origin.scale
+                        places = (at, feed.origin.place, first, end, origin.place)
+                        yield Through(*places, scale=scale), feed
 
     def _join(self, port: Port, sides: dict[str, Side]) -> None:
         origin = Origin(scale=port.scale, offset=port.offset)
@@ -133,6 +157,9 @@ class Plan:
             feed = Feed(origin=origin, feed=_FEEDS[kind if variable.real else "end"])
             into.feed(variable, place, feed)
             kept = feed.origin
+            if side is not None and output is not None:
+                needs = self._needs.setdefault((into.name, variable.name), set())
+                needs.add((side.name, output.name))
         if side is not None:
             self._from.append((side, kept))
             if port.slope == "auto" and kept.slope == _KNOWN:
@@ -192,12 +219,11 @@ def _fixed(side: Side) -> bool:
     return not side.varies or bool(side.of.abilities.fixedInternalStepSize)
 
 
-def _method(scene: Scene, sides: list[Side]) -> str:
+def _method(scene: Scene, sides: list[Side], through: str) -> str:
     """``coupling.method``, with the choice of "auto" made."""
     asked = scene.coupling.method
     if asked == "auto" and any(map(_fixed, sides)):
         return "macro-steps"
-    through = _feedthrough(scene, sides)
     if asked == "redo" or (asked == "auto" and through):
         for side in sides:
             if not side.of.abilities.canGetAndSetFMUstate:
@@ -210,9 +236,10 @@ def _method(scene: Scene, sides: list[Side]) -> str:
     return "step-locked" if asked == "auto" else asked
 
 
-def _notes(scene: Scene, sides: list[Side], method: str) -> Iterator[str]:
+def _notes(
+    scene: Scene, sides: list[Side], method: str, through: str, circle: str
+) -> Iterator[str]:
     """What the coupling errs in."""
-    through = _feedthrough(scene, sides)
     if through and method != "redo":
         able = all(side.of.abilities.canGetAndSetFMUstate and not _fixed(side) for side in sides)
         cure = (
@@ -234,38 +261,28 @@ def _notes(scene: Scene, sides: list[Side], method: str) -> Iterator[str]:
         elif method == "macro-steps" and abs(near - macro) > 1e-6 * macro:
             told = f"coupling.macro_step = {macro:g} s is no whole multiple; {near:g} s is one"
             yield f"{side.name} says that its steps are of {step:g} s, of which {told}."
-    if circle := _circle(scene, sides):
+    if circle:
         yield (
             f"the FMUs feed each other at once ({circle}); this algebraic loop is not iterated: "
             "one of them is given a value extrapolated from earlier steps."
         )
 
 
-def _circle(scene: Scene, sides: list[Side]) -> str:
-    """Of variables of FMUs that depend on each other at once, as the FMUs say, or nothing."""
-    needs: dict[str, set[str]] = {}
-    for port in scene.port:
-        if port.to is not None and port.origin not in (None, "drive"):
-            needs.setdefault(port.to, set()).add(str(port.origin))
-    for side in sides:
-        for output, inputs in side.of.feedthrough.items():
-            needs[f"{side.name}.{output}"] = {f"{side.name}.{name}" for name in inputs}
+def _circle(needs: dict[_Of, set[_Of]]) -> str:
+    """Of variables of FMUs that depend on each other at once, or nothing."""
     try:
         TopologicalSorter(needs).prepare()
     except CycleError as error:
-        return ", ".join(dict.fromkeys(error.args[1]))
+        return ", ".join(dict.fromkeys(map(".".join, error.args[1])))
     return ""
 
 
-def _feedthrough(scene: Scene, sides: list[Side]) -> str:
-    """An input from the circuit that an output to it depends on at once, as the FMUs say; or
-    nothing."""
-    probed = {str(port.to) for port in scene.port if port.probe is not None}
-    fed = {str(port.origin) for port in scene.port if port.source is not None}
-    for side in sides:
-        for output, inputs in side.of.feedthrough.items():
-            if f"{side.name}.{output}" in fed:
-                for name in sorted(inputs):
-                    if f"{side.name}.{name}" in probed:
-                        return f"{side.name}.{name} to {side.name}.{output}"
-    return ""
+def _behind(needs: dict[_Of, set[_Of]], start: _Of) -> set[_Of]:
+    """All that a variable depends on at once."""
+    found: set[_Of] = set()
+    rest = [start]
+    while rest:
+        new = needs.get(rest.pop(), set()) - found
+        found |= new
+        rest += new
+    return found
