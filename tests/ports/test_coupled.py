@@ -278,8 +278,8 @@ RL = "V1 in 0 PULSE(0 1 5u 2u 2u 40u 90u)\nR1 in x 1\nL1 x y 10u\n"
 def against_one_netlist(
     folder: Path, load_of_it: str, overrides: dict[str, float]
 ) -> tuple[Run, dict[str, Array], dict[str, Array]]:
-    """The run of load.toml, which repeats steps; ngspice alone with this element instead, in steps as
-    long, and in short ones."""
+    """The run of load.toml, which repeats steps; ngspice alone with this element instead, in steps
+    as long, and in short ones."""
     decks = [
         f"* load\n{RL}Vf y z 0\n{load_of_it}\n.options reltol={reltol}\n"
         f".tran {step} 2e-4 0 {step}\n.end\n"

@@ -100,7 +100,7 @@ class Plan:
         return any(port.origin == "drive" for port in self.scene.port)
 
     def _feedthrough(self) -> str:
-        """Inputs from the circuit that an output to it depends on at once, directly or through other
+        """An input from the circuit that an output to it depends on at once, also by way of other
         FMUs, as these say; or nothing."""
         probed = {(side.name, into.name) for side in self.sides for into, _ in side.probed()}
         for _, side, output in self._fed:
@@ -109,8 +109,7 @@ class Plan:
         return ""
 
     def _throughs(self) -> Iterator[tuple[Any, Any]]:
-        """What an FMU does not say it may do: an output of which it tells no dependency may depend on
-        all its inputs."""
+        """Also of what no FMU says: an output may depend on all inputs where none are told."""
         needs = dict(self._needs)
         for side in self.sides:
             every = {(side.name, into.name) for into in side.inputs}
