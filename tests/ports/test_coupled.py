@@ -193,7 +193,22 @@ def test_a_run_that_diverges_fails(tmp_path: Path) -> None:
         here(tmp_path / "circle.toml", {"coupling.method": "step-locked"})
     quiet = {"fmu.b.D": -0.5, "coupling.method": "step-locked"}
     (note,) = here(tmp_path / "circle.toml", quiet).summary["notes"]
-    assert all(name in note for name in ("a.y", "b.u", "b.y", "a.u", "not iterated"))
+    assert all(name in note for name in ("a.y", "b.u", "b.y", "a.u", "not iterated", '"redo"'))
+
+
+@pytest.mark.parametrize("gain", [-100.0, -4.0, -0.5, 0.5, 0.99, 3.0])
+def test_fmus_that_feed_each_other_agree(tmp_path: Path, gain: float) -> None:
+    """a = b + 0.1 and b = gain a."""
+    build(tmp_path, "Load", through=True)
+    (tmp_path / "rc.cir").write_text("* rc\nV1 in 0 1\nR1 in out 1k\nC1 out 0 1u\n.end\n")
+    (tmp_path / "circle.toml").write_text(CIRCLE)
+    result = here(tmp_path / "circle.toml", {"fmu.b.D": gain})
+    assert result.summary["method"] == "redo"
+    assert not result.summary["notes"]
+    assert result.columns["a.y"][1:] == pytest.approx(0.1 / (1.0 - gain), rel=1e-4)
+    build(tmp_path, "Load", through=True, saves=False)
+    (note,) = here(tmp_path / "circle.toml", {"fmu.b.D": 0.5}).summary["notes"]
+    assert "not iterated" in note and '"redo"' not in note
 
 
 def test_a_run_without_end_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -273,6 +273,14 @@ typedef struct {
     double gain, next_gain;    /* as seen at the communication point before, and at this one */
 } Through;
 
+/* An output that leads to an FMU which steps before its own does; see step_all(). */
+typedef struct {
+    int64_t is_one;
+    double guess, last_guess;  /* of this attempt and the last one: its value at the end */
+    double off, response;      /* what that lacked; d off / d guess, as last seen */
+    double largest;            /* magnitude of its value so far */
+} Back;
+
 /* An output whose FMU tells its slope, and how far it changes by it; see judge_slopes(). */
 typedef struct {
     int64_t place, slope;
@@ -296,6 +304,7 @@ typedef struct Ports {
     int64_t n_sources;
     double *outputs, *before, *rates; /* now; at the communication point; and their differences */
     double *odd;               /* which of them a step from a restored state has had otherwise */
+    Back *backs;               /* for each of them */
     int64_t n_outputs;
     double *now, *last, *start, *charges; /* saved values: sent last; at the last accepted point; at
                                       the communication point, and their integrals since then */

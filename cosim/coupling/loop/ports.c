@@ -259,16 +259,18 @@ static int refresh(Ports *c, Stranger *s, double time)
     return set_inputs(s) && get_outputs(s);
 }
 
-/* All FMUs from the communication point to `time`. */
-static int step_all(Ports *c, double time)
+static int restore_all(Ports *c)
+{
+    for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
+        if (!fmu_restore(s->fmu, s->restore, s->state))
+            return fmu_failed(c, s);
+    return 1;
+}
+
+/* One after another, what comes back from a later one being known. */
+static int step_once(Ports *c, double time)
 {
     const double h = time - c->origin;
-    /* What has not stepped yet is taken to go on along its line. */
-    for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
-        for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
-            if (f->origin.kind == FROM_OUTPUT)
-                c->outputs[f->origin.place] =
-                    c->before[f->origin.place] + h * rate_of(c, &f->origin);
     for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++) {
         for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
             feed(c, f, time, h);
@@ -277,17 +279,60 @@ static int step_all(Ports *c, double time)
             (c->repeats && !refresh(c, s, time)))
             return fmu_failed(c, s);
         s->fmu->time = time;
-        s->fmu->steps++;
     }
     return 1;
 }
 
-static int restore_all(Ports *c)
+/* Whether what has come back is what was taken for it; else what to take next, by the secant. */
+static int comes_back(Ports *c, int tries)
+{
+    int agree = 1;
+    for (int64_t k = 0; k < c->n_outputs; k++) {
+        Back *const b = &c->backs[k];
+        if (!b->is_one)
+            continue;
+        const double off = c->outputs[k] - b->guess, more = b->guess - b->last_guess;
+        const double response = (off - b->off) / more;
+        if (tries == 0)
+            b->response = -1.0;
+        else if (isfinite(response) && fabs(response) > 1e-3)
+            b->response = response;
+        b->off = off;
+        b->last_guess = b->guess;
+        agree &= fabs(off) <= c->tolerance * fmax(b->largest, fabs(b->guess));
+    }
+    for (Back *b = c->backs; b < c->backs + c->n_outputs; b++) {
+        if (b->is_one && agree)
+            b->largest = fmax(b->largest, fabs(b->guess));
+        else if (b->is_one)
+            b->guess -= b->off / b->response;
+    }
+    return agree;
+}
+
+/* All FMUs from the communication point to `time`. What an FMU takes from one that steps after it goes
+   on along its line; where steps are repeated, they are until it does what was taken. */
+static int step_all(Ports *c, double time)
 {
     for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
-        if (!fmu_restore(s->fmu, s->restore, s->state))
-            return fmu_failed(c, s);
-    return 1;
+        for (const Feed *f = s->feeds; f < s->feeds + s->n_feeds; f++)
+            if (f->origin.kind == FROM_OUTPUT)
+                c->backs[f->origin.place].guess =
+                    c->before[f->origin.place] + (time - c->origin) * rate_of(c, &f->origin);
+    for (int tries = 0; tries <= MOST_TRIES; tries++) {
+        for (int64_t k = 0; k < c->n_outputs; k++)
+            if (c->backs[k].is_one)
+                c->outputs[k] = c->backs[k].guess;
+        if ((tries > 0 && !restore_all(c)) || !step_once(c, time))
+            return 0;
+        if (!c->repeats || comes_back(c, tries)) {
+            for (Stranger *s = c->fmus; s < c->fmus + c->n_fmus; s++)
+                s->fmu->steps++;
+            return 1;
+        }
+    }
+    c->status = NO_AGREEMENT;
+    return 0;
 }
 
 /* The step once more from the saved states: what is other now was not restored. */

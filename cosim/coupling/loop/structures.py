@@ -11,9 +11,9 @@ from cosim.toolchain.libraries import library, structures
 Fmu, Schedule, RecorderState, LeadState = (
     structures("loop")[name] for name in ("Fmu", "Schedule", "Recorder", "Lead")
 )
-Group, Origin, Source, Feed, StrangerState, Pulse, Through, Slope, PortsState = map(
+Group, Origin, Source, Feed, StrangerState, Pulse, Through, Back, Slope, PortsState = map(
     structures("loop").__getitem__,
-    ("Group", "Origin", "Source", "Feed", "Stranger", "Pulse", "Through", "Slope", "Ports"),
+    ("Group", "Origin", "Source", "Feed", "Stranger", "Pulse", "Through", "Back", "Slope", "Ports"),
 )
 
 PROBE, OUTPUT, DRIVE = range(3)

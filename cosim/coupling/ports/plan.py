@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -61,17 +62,23 @@ class Plan:
         for port in ports:
             self._join(port, sides)
         # Slopes of outputs make rows longer, so places in the row of all are known only now.
-        first = 0
-        for side in self.sides:
+        firsts = [0, *accumulate(side.width for side in self.sides)]
+        for side, first in zip(self.sides, firsts, strict=False):
             for origin in (origin for of, origin in self._from if of is side):
                 origin.place += first
                 origin.slope_place += first
-            first += side.width
-        self.width = first
+        self.width = firsts[-1]
         """Of the row of all outputs."""
-        through = self._feedthrough()
-        self.method = _method(scene, self.sides, through)
-        self.notes = [*_notes(scene, self.sides, self.method, through, _circle(self._needs))]
+        self.backs = {
+            origin.place
+            for side, first in zip(self.sides, firsts, strict=False)
+            for origin in side.origins()
+            if origin.kind == OUTPUT and origin.place >= first
+        }
+        """Outputs that lead to an FMU which steps before their own does."""
+        through, circle = self._feedthrough(), _circle(self._needs)
+        self.method = _method(scene, self.sides, through, circle)
+        self.notes = [*_notes(scene, self.sides, self.method, through, circle)]
         self.throughs = [*self._throughs()] if self.method == "redo" else []
         """What the circuit itself carries of the FMUs' feedthrough, and what leads to it."""
 
@@ -218,7 +225,12 @@ def _fixed(side: Side) -> bool:
     return not side.varies or bool(side.of.abilities.fixedInternalStepSize)
 
 
-def _method(scene: Scene, sides: list[Side], through: str) -> str:
+def _able(sides: list[Side]) -> bool:
+    """Whether their steps can be repeated, of any length."""
+    return all(side.of.abilities.canGetAndSetFMUstate and not _fixed(side) for side in sides)
+
+
+def _method(scene: Scene, sides: list[Side], through: str, circle: str) -> str:
     """``coupling.method``, with the choice of "auto" made."""
     asked = scene.coupling.method
     if asked == "auto" and any(map(_fixed, sides)):
@@ -232,20 +244,19 @@ def _method(scene: Scene, sides: list[Side], through: str) -> str:
                     'canGetAndSetFMUstate = true; take "step-locked" with small circuit.max_step'
                 )
         return "redo"
-    return "step-locked" if asked == "auto" else asked
+    if asked == "auto":
+        return "redo" if circle and _able(sides) else "step-locked"
+    return asked
 
 
 def _notes(
     scene: Scene, sides: list[Side], method: str, through: str, circle: str
 ) -> Iterator[str]:
     """What the coupling errs in."""
+    cure = "smaller steps err less"
+    if _able(sides):
+        cure = 'coupling.method = "redo" is as exact as one netlist'
     if through and method != "redo":
-        able = all(side.of.abilities.canGetAndSetFMUstate and not _fixed(side) for side in sides)
-        cure = (
-            'coupling.method = "redo" is as exact as one netlist'
-            if able
-            else "smaller steps err less"
-        )
         yield (
             f"an FMU feeds {through} through at once, of which the circuit learns a step late with "
             f'coupling.method = "{method}"; {cure}.'
@@ -260,10 +271,11 @@ def _notes(
         elif method == "macro-steps" and abs(near - macro) > 1e-6 * macro:
             told = f"coupling.macro_step = {macro:g} s is no whole multiple; {near:g} s is one"
             yield f"{side.name} says that its steps are of {step:g} s, of which {told}."
-    if circle:
+    if circle and method != "redo":
         yield (
-            f"the FMUs feed each other at once ({circle}); this algebraic loop is not iterated: "
-            "one of them is given a value extrapolated from earlier steps."
+            f"the FMUs feed each other at once ({circle}); this algebraic loop is not iterated "
+            f'with coupling.method = "{method}": one of them is given a value extrapolated from '
+            f"earlier steps; {cure}."
         )
 
 

@@ -13,6 +13,7 @@ from cosim.coupling.loop.lead import after_jump, engine, finished
 from cosim.coupling.loop.structures import (
     FMU_FAILED,
     NO_AGREEMENT,
+    Back,
     PortsState,
     Pulse,
     Slope,
@@ -89,6 +90,9 @@ class Run:
         self._throughs = (Through * max(count_through, 1))(*(t for t, _ in plan.throughs))
         self.odd = (c_double * max(2 * width, 1))()
         """Not 0 where a repeated step gave another output; then room for the first ones."""
+        self._backs = (Back * max(width, 1))()
+        for place in plan.backs:
+            self._backs[place].is_one = 1
         slopes = [Slope(place=of.place, slope=of.slope_place) for *_, of in plan.told]
         self._slopes = (Slope * max(len(slopes), 1))(*slopes)
         macro = scene.coupling.macro_step if plan.method == "macro-steps" else 0.0
@@ -114,6 +118,7 @@ class Run:
             slopes=ctypes.addressof(self._slopes),
             n_slopes=len(slopes),
             odd=ctypes.addressof(self.odd),
+            backs=ctypes.addressof(self._backs),
             tolerance=_AGREEMENT * scene.circuit.reltol,
             asked=ctypes.addressof(self._asked),
             n_probed=len(plan.probes),

@@ -63,6 +63,11 @@ class Side:
             self.inputs.append(into)
         self._feeds.append((into, place, feed))
 
+    def origins(self) -> Iterator[Any]:
+        """Of what leads into it."""
+        for *_, feed in self._feeds:
+            yield feed.origin
+
     def probed(self) -> Iterator[tuple[Variable, Any]]:
         """What leads from the circuit into real inputs."""
         for into, _, feed in self._feeds:
