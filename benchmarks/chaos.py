@@ -20,8 +20,7 @@ from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.accuracy.accuracy import CHAOTIC
 from cosim.studies.plots import BLUE, panels
-from cosim.studies.report import Report
-from cosim.studies.tables import Row
+from cosim.studies.report import Report, Row
 from cosim.waveforms.result import Result
 
 NUDGE, APART = 1e-9, 1e-6

@@ -25,9 +25,8 @@ from cosim.simulation.fidelity import COMPLETE, JUDGES, SEARCHES, relative_error
 from cosim.simulation.simulate import summary
 from cosim.stepper.stepper import LANES
 from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, End, label_ends, panels
-from cosim.studies.report import Report
+from cosim.studies.report import Report, Row, brief, markdown
 from cosim.studies.speed.bench import take_turns
-from cosim.studies.tables import Row, brief, markdown
 from cosim.toolchain.processes import in_place
 from cosim.version import __version__
 

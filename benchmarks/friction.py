@@ -29,8 +29,7 @@ from cosim.files.picture import Picture
 from cosim.scene import Scene, load
 from cosim.studies.accuracy.cases import CASES, reference
 from cosim.studies.plots import BLUE, GREEN, VERMILION, panels
-from cosim.studies.report import Report
-from cosim.studies.tables import Row, span
+from cosim.studies.report import Report, Row, span
 
 CREEP, ERROR = "creep of a held part [µm/s]", "error in the machine / range"
 """Columns, and the labels of the figure's axes."""

@@ -17,7 +17,7 @@ from scipy.optimize import differential_evolution
 from cosim.arrays import Array
 from cosim.evaluate.evaluator import Evaluator
 from cosim.scene import load
-from cosim.search.protocol import apart
+from cosim.search.known import apart
 from cosim.studies.limits.changes import CHANGES, STEPS, Change
 from cosim.studies.limits.judge import judged
 from cosim.studies.limits.runs import GOALS, NEEDED, Bench

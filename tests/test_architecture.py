@@ -150,7 +150,7 @@ def test_one_class_each_runs_keeps_searches_and_judges() -> None:
     assert classes["Evaluator"] == ["cosim.evaluate.evaluator"]
     assert classes["Store"] == ["cosim.evaluate.store"]
     assert classes["Fidelity"] == ["cosim.simulation.fidelity"]
-    assert interfaces == {"cosim.search.protocol.Search"}
+    assert interfaces == {"cosim.search.known.Search"}
     assert {module.rpartition(".")[0] for module in searches} == {"cosim.search"}
     alone = {
         "sqlite3": "cosim.evaluate.store",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.search.protocol import Feasible, apart
+from cosim.search.known import Feasible, apart
 
 if TYPE_CHECKING:
     from cmaes import CMA

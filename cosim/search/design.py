@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from cosim.arrays import Array
-from cosim.search.protocol import Feasible
+from cosim.search.known import Feasible
 
 SCREENED = 64
 """Batches of the sequence that are screened, at most."""

@@ -1,19 +1,49 @@
-"""The points of a search that were run, for several quantities at once."""
+"""The points that searches of the unit cube have run, for several quantities at once."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from cosim.arrays import Array
-from cosim.search.protocol import Evaluate, Feasible, Search, apart
 from cosim.search.turns import TURN
+
+Feasible = NDArray[np.bool_]
+"""Of points (rows): whether they are allowed."""
+
+Evaluate = Callable[[Array], tuple[Array, Feasible]]
+"""The scores (a row for each point, a column for each quantity) of points (rows) that are to be
+run, and which of these are feasible."""
 
 NEAR, FEWEST, MOST = 1.5 * TURN, 5, 100
 """What is known of a point's surroundings: how far they reach, from how many points at least, and
 of how many of the best points they are looked at."""
+
+
+class Search(Protocol):
+    """A search for the largest score. The same for the same seed and scores."""
+
+    def ask(self) -> Array:
+        """The next points (rows) of the unit cube; none where the search has ended."""
+        ...
+
+    def tell(self, points: Array, scores: Array, feasible: Feasible) -> None:
+        """The scores of points (rows), asked for or not; -inf where there is none."""
+        ...
+
+
+def apart(points: Array, distance: float, count: int) -> list[int]:
+    """The first of ``points`` (rows), and those after it that are ``distance`` from all before them
+    that count, as the greatest difference: ``count`` numbers of rows at most, all for -1."""
+    kept: list[int] = []
+    left = np.ones(len(points), bool)
+    while left.any() and len(kept) != count:
+        kept.append(int(left.argmax()))
+        left &= np.abs(points - points[kept[-1]]).max(axis=1) >= distance
+    return kept
 
 
 class Known:

@@ -13,7 +13,7 @@ from cosim.scene import Scene
 from cosim.studies.accuracy.accuracy import error_in, order, time_to
 from cosim.studies.accuracy.cases import CASES, Case, reference
 from cosim.studies.accuracy.solvers import FALSE_CYCLE, Outcome, Run, Solver, measure
-from cosim.studies.tables import write_csv, write_page
+from cosim.studies.report import write_csv, write_page
 
 REFERENCE = CASES["reference"]
 STEPS = [1e-3 / 2**k for k in range(6)]

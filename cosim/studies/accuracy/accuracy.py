@@ -31,8 +31,7 @@ from cosim.studies.plots import (
     label_ends,
     panels,
 )
-from cosim.studies.report import Progress, Report, silent
-from cosim.studies.tables import Row, brief, span
+from cosim.studies.report import Progress, Report, Row, brief, silent, span
 
 EQUAL_TIME, EQUAL_ERROR = 0.5, 1e-3
 """CPU seconds, and error over range, at which methods are compared."""

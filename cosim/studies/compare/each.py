@@ -13,8 +13,7 @@ from cosim.scene import load
 from cosim.scene.loading import Overrides, list_scenes
 from cosim.studies.compare.run import Comparison, compare
 from cosim.studies.plots import BLUE, VERMILION, panels
-from cosim.studies.report import Progress, Report, silent
-from cosim.studies.tables import Row
+from cosim.studies.report import Progress, Report, Row, silent
 from cosim.trials.tracked import number_of, trial_files
 
 

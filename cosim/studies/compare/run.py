@@ -17,7 +17,7 @@ from cosim.simulation.simulate import simulate
 from cosim.studies.compare import figure
 from cosim.studies.compare.compare import Found, measure
 from cosim.studies.compare.scores import LINES
-from cosim.studies.tables import write_csv as write_rows
+from cosim.studies.report import write_csv as write_rows
 from cosim.trials.recording import Recording, read_recording
 from cosim.waveforms import formats
 from cosim.waveforms.columns import UNITS

@@ -22,7 +22,7 @@ from cosim.studies.fit.forces import Force, read_forces
 from cosim.studies.fit.results import Shown, change, together, told
 from cosim.studies.fit.search import FRICTIONS, Fit, Found, Interval, search
 from cosim.studies.fit.slides import Slide, noise_of
-from cosim.studies.tables import Row, write_csv
+from cosim.studies.report import Row, write_csv
 from cosim.trials import published
 from cosim.trials.tracked import Trial, read_folder
 

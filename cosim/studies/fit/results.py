@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.studies.tables import Row
+from cosim.studies.report import Row
 
 
 @dataclass(frozen=True)

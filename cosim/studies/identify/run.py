@@ -20,7 +20,7 @@ from cosim.studies.identify.report import figures, files, measures, solved
 from cosim.studies.identify.report.verdicts import judge, rigs_meant
 from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds, searched
 from cosim.studies.identify.search.search import Found, Progress, Search, best_of, deviations
-from cosim.studies.tables import Row
+from cosim.studies.report import Row
 
 UNSTEADY = 0.5
 """Repeatability of a velocity (NRMSE of its cycles) beyond which no steady drive explains it."""

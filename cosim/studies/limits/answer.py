@@ -10,7 +10,7 @@ from cosim.circuit.heat import DRIVE_RANGE_HEAT, LIFT, RATED_CURRENT, rises
 from cosim.studies.limits.changes import AS_IT_IS, Change
 from cosim.studies.limits.runs import GOALS, Goal
 from cosim.studies.limits.study import REPEATED, Rig, Study
-from cosim.studies.tables import brief, span
+from cosim.studies.report import brief, span
 from cosim.waveforms.report import warmer
 
 BY_NAME = {goal.name: goal for goal in GOALS}

@@ -17,8 +17,7 @@ from cosim.studies.limits.changes import AS_IT_IS, CHANGES, Settings
 from cosim.studies.limits.judge import Key, Point
 from cosim.studies.limits.runs import GOALS, NEEDED, Goal, command
 from cosim.studies.limits.study import FULL, QUICK, Study, checked, ensemble, steps, study
-from cosim.studies.report import Progress, Report, counted, silent
-from cosim.studies.tables import Row
+from cosim.studies.report import Progress, Report, Row, counted, silent
 
 STORE = "limits.sqlite"
 

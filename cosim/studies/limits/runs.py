@@ -11,7 +11,7 @@ from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import Outcome
 from cosim.scene import Scene, changed
 from cosim.scene.tables import KNOBS
-from cosim.search.protocol import Evaluate, Feasible
+from cosim.search.known import Evaluate, Feasible
 from cosim.search.turns import turned
 from cosim.studies.limits.changes import FREE, Machine, Settings
 

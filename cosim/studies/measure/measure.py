@@ -29,8 +29,7 @@ from cosim.studies.measure.sample import (
 )
 from cosim.studies.measure.worth import FEWEST, Worth, chance, worth
 from cosim.studies.plots import BLUE, ORANGE, panels
-from cosim.studies.report import Progress, Report, counted, silent
-from cosim.studies.tables import Row, brief
+from cosim.studies.report import Progress, Report, Row, brief, counted, silent
 from cosim.waveforms.quantities import signed
 
 RIGS, QUICK, LEAST = 48, 24, 4

@@ -21,8 +21,7 @@ from cosim.studies.fit.fit import FIRST_ROW, fit
 from cosim.studies.fit.results import Shown
 from cosim.studies.paper.figures import DASHED
 from cosim.studies.plots import headline
-from cosim.studies.report import Progress, Report, silent
-from cosim.studies.tables import Row
+from cosim.studies.report import Progress, Report, Row, silent
 from cosim.trials.periods import drift
 from cosim.waveforms.figure import PART, SURFACE
 

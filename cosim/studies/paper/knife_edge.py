@@ -17,7 +17,7 @@ from cosim.drive.surface.formulas import Transport, average_velocity, largest_fo
 from cosim.drive.surface.waveforms import Cycle, closed_cycle, optimal_cycle
 from cosim.files.picture import grid
 from cosim.mechanics import part
-from cosim.studies.tables import write_csv
+from cosim.studies.report import write_csv
 
 PERIODS = 20
 STEP, V_MIN = part.PUBLISHED_STEP, part.PUBLISHED_V_MIN

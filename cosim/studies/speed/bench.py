@@ -20,7 +20,7 @@ from typing import Any
 from cosim.files.atomic import write_json
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.tables import machine
+from cosim.studies.report import machine
 from cosim.toolchain.libraries import compiled
 from cosim.toolchain.processes import in_place
 

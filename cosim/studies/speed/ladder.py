@@ -18,8 +18,7 @@ from cosim.scene.loading import Overrides
 from cosim.simulation.fidelity import relative_error
 from cosim.simulation.simulate import simulate
 from cosim.studies.plots import GREEN, panels
-from cosim.studies.report import Progress, Report, counted, silent
-from cosim.studies.tables import Row, brief, markdown
+from cosim.studies.report import Progress, Report, Row, brief, counted, markdown, silent
 
 RUNGS = ("ideal", "limited", "amplifier", "full")
 """Cheapest first. "full" has the data sheet's output stage and the firmware's staircase besides."""

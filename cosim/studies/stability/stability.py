@@ -23,7 +23,7 @@ from cosim.evaluate.store import Store, reported
 from cosim.files.picture import Picture
 from cosim.scene import changed
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, End, label_ends, panels
-from cosim.studies.report import Progress, Report, silent
+from cosim.studies.report import Progress, Report, Row, silent, span
 from cosim.studies.stability.machines import (
     DIRECT,
     REFERENCE,
@@ -33,7 +33,6 @@ from cosim.studies.stability.machines import (
     circuit_of,
     linear_sides,
 )
-from cosim.studies.tables import Row, span
 
 STORE = "stability.sqlite"
 

@@ -18,7 +18,7 @@ from cosim.scene import Scene, to_toml
 from cosim.scene.tables import COMMANDS, KNOBS
 from cosim.search.turns import TURN
 from cosim.studies.plots import headline
-from cosim.studies.tables import write_csv
+from cosim.studies.report import write_csv
 from cosim.waveforms.quantities import bench_unit, label, meaning, with_unit
 from cosim.waveforms.report import motion_in_words
 

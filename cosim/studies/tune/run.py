@@ -21,8 +21,7 @@ from cosim.scene.messages import bad, suggestion
 from cosim.scene.tables import COMMANDS
 from cosim.search.climb import POPULATION, Climb
 from cosim.search.design import Design
-from cosim.search.known import Known
-from cosim.search.protocol import Feasible
+from cosim.search.known import Feasible, Known
 from cosim.search.turns import TURN, faces, turned
 from cosim.simulation.checks import motion
 from cosim.simulation.fidelity import Fidelity

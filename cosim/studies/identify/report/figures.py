@@ -14,7 +14,7 @@ from cosim.studies.identify.report.measures import shown
 from cosim.studies.identify.report.solved import KINDS, Solved
 from cosim.studies.identify.report.verdicts import TRUSTED, forces
 from cosim.studies.plots import headline
-from cosim.studies.tables import Row
+from cosim.studies.report import Row
 from cosim.waveforms import quantities
 from cosim.waveforms.columns import COLUMNS
 

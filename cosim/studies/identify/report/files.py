@@ -10,8 +10,7 @@ from cosim.studies.identify.problem.gauges import GAUGES
 from cosim.studies.identify.report import figures
 from cosim.studies.identify.report.scenes import rounded, scene_file, trial_settings
 from cosim.studies.identify.report.solved import Solved
-from cosim.studies.report import Report
-from cosim.studies.tables import Row
+from cosim.studies.report import Report, Row
 from cosim.waveforms.quantities import label
 
 COLUMNS = {

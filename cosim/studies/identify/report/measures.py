@@ -14,7 +14,7 @@ from cosim.stepper.stepper import OWN
 from cosim.studies.identify.chain.chain import simulate
 from cosim.studies.identify.problem.targets import Measured
 from cosim.studies.identify.search.search import Found
-from cosim.studies.tables import Row
+from cosim.studies.report import Row
 from cosim.trials.camera import velocities
 
 LATE = 5

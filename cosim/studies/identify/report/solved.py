@@ -16,7 +16,7 @@ from cosim.studies.identify.report.scenes import exact, trial_settings
 from cosim.studies.identify.report.verdicts import Verdict, at_bounds, forces
 from cosim.studies.identify.search.plan import Searched
 from cosim.studies.identify.search.search import Found
-from cosim.studies.tables import Row
+from cosim.studies.report import Row
 
 PLACES = np.linspace(-2e-3, 2e-3, 9)
 """Of the ram in the actuator (q, m), at which the suspension's force is told."""
