@@ -16,7 +16,7 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import Any, NoReturn
 
-from cosim.cli import live, new, simulation, studies
+from cosim.cli import new, simulation, studies
 from cosim.cli.command import Command, add_commands
 from cosim.errors import BadInput, CosimError, Note, SimulationFailed, plain, printable
 from cosim.files.reader import watched
@@ -70,7 +70,7 @@ def _parser(arguments: list[str] | None) -> argparse.ArgumentParser:
         description="Runs a vibrating gripper: its circuit in ngspice, its mechanics in an FMU.",
     )
     parser.add_argument("--version", action="version", version=f"cosim {__version__}")
-    commands = [*simulation.COMMANDS, *live.COMMANDS, *new.COMMANDS, _COMPLETION]
+    commands = [*simulation.COMMANDS, *new.COMMANDS, _COMPLETION]
     commands += studies.commands()
     add_commands(parser, sorted(commands, key=lambda one: one.name), arguments, "COMMAND")
     return parser
@@ -185,7 +185,7 @@ class _Reading:
                 self._bar.close()
             self._path, self._began, self._bar = path, time.monotonic(), None
         if self._bar is None and share < 1.0 and time.monotonic() - self._began > _LONG:
-            from cosim.cli.work import progress_bar
+            from cosim.cli.command import progress_bar
 
             name = os.path.basename(path)
             self._bar = progress_bar(f"reading {plain(name, 40)}", 1.0, "", bar_format=_BAR)

@@ -1,12 +1,11 @@
-"""The commands that simulate a scene, and what goes with that."""
+"""The commands that simulate a scene and show what it does, and what goes with that."""
 
 import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from cosim.cli.command import Command
-from cosim.cli.work import print_page, progress_bar, writable
+from cosim.cli.command import Command, print_page, progress_bar, writable
 from cosim.studies.study import OVERRIDES, SCENE, SHOW, Option
 
 _BAR = "{desc} {percentage:3.0f}% |{bar}| {n:.2f} of {total:g} s, {remaining} left"
@@ -188,6 +187,33 @@ def _pack(library: Path, fmi: str = "2", out: Path = Path(_FMU)) -> None:
 _LIBRARY = Option("library", "a library of a model in C and of fmu/thin", "LIBRARY", Path)
 _FILE = Option("--out", f"the file (default: {_FMU}/<scene>.ssp)", "FILE.ssp", Path)
 
+
+def _live(
+    scene: str = "paper-limited",
+    overrides: Sequence[str] = (),
+    trial: Path | None = None,
+    out: Path | None = None,
+) -> None:
+    from cosim.live.page import html, opened
+
+    link, circuits = opened(scene, overrides)
+    if out is not None:
+        from cosim.files.atomic import tidy, write_text
+
+        tidy(out.parent)
+        write_text(out, html(link, record=trial))
+        print(f"Written to {out}; with another setting: {out}#scene=…")
+        return
+    import webbrowser
+
+    from cosim.live.server import Server
+
+    with Server(link, circuits, trial) as server:
+        print(f"{server.address}/{link}\nFor this machine alone; Ctrl-C ends it.", flush=True)
+        webbrowser.open(f"{server.address}/{link}")
+        server.serve_forever(poll_interval=0.2)
+
+
 COMMANDS = (
     Command(
         "export",
@@ -212,6 +238,17 @@ COMMANDS = (
                 _ssp,
                 (SCENE, OVERRIDES, _FMI, _FILE),
             ),
+        ),
+    ),
+    Command(
+        "live",
+        "open the machine in the browser, moving, with knobs to turn",
+        _live,
+        (
+            Option("scene", "scene or link (default: paper-limited)", "SCENE", many="optional"),
+            OVERRIDES,
+            Option("--trial", "measurements to lay over the curves", "TRIAL.csv", Path),
+            Option("--out", "write the page as one HTML file instead", "FILE.html", Path),
         ),
     ),
     Command(
@@ -249,5 +286,14 @@ COMMANDS = (
         "list the built-in scenes, or what is in one",
         _scenes,
         [Option("scene", "tell what of it is not as by default", "SCENE", many="optional")],
+    ),
+    Command(
+        "show",
+        "write a page to look into results: curves, maps, cursors; one file, to be mailed",
+        print_page,
+        (
+            Option("results", "what run, sweep, compare or a chart wrote", "DIR|TABLE.csv", Path),
+            Option("--out", "where to write (default: show.html beside it)", "FILE.html", Path),
+        ),
     ),
 )

@@ -7,8 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cosim.cli.command import Command
-from cosim.cli.work import print_page, progress_bar, writable
+from cosim.cli.command import Command, print_page, progress_bar, writable
 from cosim.errors import BadInput
 from cosim.studies.study import Study, Told, loaded, studies
 

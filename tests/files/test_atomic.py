@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.cli.work import writable
+from cosim.cli.command import writable
 from cosim.errors import BadInput
 from cosim.files.atomic import alone, together, whole
 from tests.helpers import needs
