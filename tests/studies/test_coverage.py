@@ -19,8 +19,8 @@ from cosim.simulation.simulate import simulate
 from cosim.stepper.stepper import OWN, RIG
 from cosim.studies.identify.problem.space import Space, read_space
 from cosim.studies.identify.problem.targets import Measured, read_trials
-from cosim.studies.identify.report.measures import samples, shown
 from cosim.studies.identify.report.scenes import scene, trial_settings
+from cosim.studies.identify.report.solved import samples, shown
 from cosim.studies.identify.report.verdicts import Verdict, judge, rigs_meant
 from cosim.studies.identify.search.plan import Effort, Plan, searched
 from cosim.studies.identify.search.search import Search, deviations

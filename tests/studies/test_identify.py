@@ -28,8 +28,8 @@ from cosim.studies.identify.problem.targets import (
     read_trials,
 )
 from cosim.studies.identify.report.figures import FIGURES
-from cosim.studies.identify.report.measures import bands, errors, nrmse, samples, shown
 from cosim.studies.identify.report.scenes import Settings, scene, trial_settings
+from cosim.studies.identify.report.solved import bands, errors, nrmse, samples, shown
 from cosim.studies.identify.report.verdicts import judge, rigs_meant
 from cosim.studies.identify.run import identify
 from cosim.studies.identify.search import plan

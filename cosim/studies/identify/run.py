@@ -15,8 +15,8 @@ from cosim.evaluate.store import Store, reported
 from cosim.files.picture import Picture
 from cosim.scene import keys
 from cosim.studies.identify.problem.space import Space, read_space
-from cosim.studies.identify.problem.targets import WEIGHTS, Measured, read_trials
-from cosim.studies.identify.report import figures, files, measures, solved
+from cosim.studies.identify.problem.targets import WEIGHTS, Measured, own_parameters, read_trials
+from cosim.studies.identify.report import figures, files, solved
 from cosim.studies.identify.report.verdicts import judge, rigs_meant
 from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds, searched
 from cosim.studies.identify.search.search import Found, Progress, Search, best_of, deviations
@@ -109,7 +109,7 @@ def _identified(
     laws = [searched(several) for several in plans]
     best = best_of([law.best for law in laws])
     plan = plans[[law.best for law in laws].index(best)][0]
-    effective = measures.samples(trials, best)
+    effective = solved.samples(trials, best)
     meant = rigs_meant(laws, effective)
     agreed = any(law.converged for law in laws)
     apart_by = [deviations(plan.fine, one, effective) for one in meant] if agreed else None
@@ -127,9 +127,7 @@ def _identified(
         "overall": solved.overall(rows),
         "trials": rows,
         "apart": [
-            measures.errors(trial, best.rig, one)
-            | measures.repeatability(trial)
-            | measures.own_parameters(one)
+            solved.errors(trial, best.rig, one) | solved.repeatability(trial) | own_parameters(one)
             for trial, one in zip(apart, own, strict=True)
         ],
         "held_out": held_out,
@@ -143,7 +141,7 @@ def _identified(
         "bands": [
             row
             for trial, one in zip(trials, best.own, strict=True)
-            for row in measures.bands(trial, best.rig, one)
+            for row in solved.bands(trial, best.rig, one)
         ],
         "converged": [law["law"] for law in told if law["converged"]],
         "effective_samples": effective,
@@ -156,7 +154,7 @@ def _identified(
 
 
 def _steady(trial: Measured) -> bool:
-    found = measures.repeatability(trial)["floor_late"]
+    found = solved.repeatability(trial)["floor_late"]
     return found is None or found <= UNSTEADY
 
 
@@ -181,7 +179,7 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[Ro
         both = plan.drives(f"{name}: surface and part", rig.point, plan.fine.part(left))
         for k, *owns in zip(left, alone.own, both.own, strict=True):
             held_out[k] = {"trial": trials[k].label, "fold": number} | {
-                kind: measures.errors(trials[k], rig.rig, own) | measures.own_parameters(own)
+                kind: solved.errors(trials[k], rig.rig, own) | own_parameters(own)
                 for kind, own in zip(solved.KINDS, owns, strict=True)
             }
     return rigs, [held_out[k] for k in sorted(held_out)]

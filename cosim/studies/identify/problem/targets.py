@@ -133,3 +133,8 @@ def draws(target: Target, count: int, rng: np.random.Generator) -> Array:
     middle = 0.5 * (low[lift] + high[lift])
     found[:, lift] = middle + 0.5 * (found[:, lift] - middle)  # the middle half of its bounds
     return found
+
+
+def own_parameters(own: Array) -> dict[str, float]:
+    """A trial's own parameters by name, SI."""
+    return dict(zip(OWN, own.tolist(), strict=True))

@@ -10,8 +10,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from cosim.files.picture import Picture, grid
 from cosim.scene import keys
 from cosim.studies.identify.problem.space import OF_LAWS
-from cosim.studies.identify.report.measures import shown
-from cosim.studies.identify.report.solved import KINDS, Solved
+from cosim.studies.identify.report.solved import KINDS, Solved, shown
 from cosim.studies.identify.report.verdicts import TRUSTED, forces
 from cosim.studies.plots import headline
 from cosim.studies.report import Row

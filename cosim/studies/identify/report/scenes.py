@@ -10,8 +10,7 @@ from cosim.errors import BadInput, Note, SimulationFailed
 from cosim.scene import Scene, keys, load
 from cosim.scene.model import toml_value
 from cosim.simulation.simulate import simulate
-from cosim.studies.identify.problem.targets import Measured
-from cosim.studies.identify.report.measures import own_parameters
+from cosim.studies.identify.problem.targets import Measured, own_parameters
 from cosim.trials.camera import hermite
 
 Settings = dict[str, float | str]
