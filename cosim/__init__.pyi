@@ -12,10 +12,10 @@ from cosim.studies.measure.measure import measure as measure
 from cosim.studies.paper.theory import theory as theory
 from cosim.studies.speed.bench import bench as bench
 from cosim.studies.speed.ladder import ladder as ladder
-from cosim.studies.spread.run import spread as spread
 from cosim.studies.stability.stability import stability as stability
 from cosim.studies.sweep.run import sweep as sweep
 from cosim.studies.tune.run import tune as tune
+from cosim.studies.tune.spread import spread as spread
 from cosim.version import __version__ as __version__
 from cosim.waveforms.result import Result as Result
 

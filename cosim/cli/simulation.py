@@ -28,7 +28,7 @@ def _run(
         return
     folder = out or Path("results") / base.name
     if spread:
-        from cosim.studies.spread.run import turns
+        from cosim.studies.tune.spread import turns
 
         turns(base)  # refuses a scene without knobs before it is run
     with writable(folder):

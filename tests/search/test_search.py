@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from cosim.arrays import Array
-from cosim.search.climb import Climb
-from cosim.search.design import Design
 from cosim.search.known import Feasible, Known, apart
+from cosim.search.searches import Climb, Design
 from cosim.search.turns import TURN, corners, faces
 
 RIDGE = np.array([0.83, 0.21, 0.57])

@@ -10,7 +10,7 @@ import cosim
 from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.scene import firmware, load
-from cosim.studies.spread.run import turns
+from cosim.studies.tune.spread import turns
 
 SHORT = {"run.duration": 0.3, "run.settle": 0.15}
 

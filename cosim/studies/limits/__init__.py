@@ -10,12 +10,13 @@ RIGS = (
     "values, such as identify.json"
 )
 
+RIG = replace(SCENE, help=f"the rig: {SCENE.help}", default="paper", many="optional")
+
 STUDIES = (
     chart(
         "limits.report.limits",
         "what is achievable, and what would change it",
-        replace(SCENE, help=f"the rig: {SCENE.help}", default="paper", many="optional"),
-        OVERRIDES,
+        *(RIG, OVERRIDES),
         Option("--rigs", RIGS, "FILE", Path),
         *(SEED, WORKERS, DASK),
         Option("--effort", "times the runs that each search may make", "X", float, 1.0),

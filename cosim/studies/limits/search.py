@@ -11,9 +11,8 @@ from math import ceil
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.search.climb import Climb
-from cosim.search.design import Design
 from cosim.search.known import Known
+from cosim.search.searches import Climb, Design
 from cosim.studies.limits.changes import STEPS, Machine
 from cosim.studies.limits.runs import GOALS, Bench
 

@@ -1,4 +1,5 @@
-"""Finds the settings that transport best, as the operator does by ear."""
+"""Finds the settings that transport best, as the operator does by ear; and what a small turn of a
+knob makes of a run, which ``cosim run --spread`` tells with it."""
 
 from cosim.studies.study import DASK, OVERRIDES, SCENE, SEED, WORKERS, Option, Study
 
@@ -55,4 +56,5 @@ STUDIES = (
             ),
         },
     ),
+    Study("tune.spread.spread"),
 )

@@ -19,9 +19,8 @@ from cosim.scene import Scene, changed, load
 from cosim.scene.loading import Overrides
 from cosim.scene.messages import bad, suggestion
 from cosim.scene.tables import COMMANDS
-from cosim.search.climb import POPULATION, Climb
-from cosim.search.design import Design
 from cosim.search.known import Feasible, Known
+from cosim.search.searches import POPULATION, Climb, Design
 from cosim.search.turns import TURN, faces, turned
 from cosim.simulation.checks import motion
 from cosim.simulation.fidelity import Fidelity
