@@ -30,7 +30,8 @@ from cosim.toolchain.processes import processors
 TOGETHER = 64
 """Points that are solved side by side, at most: some lanes full of runs of like duration."""
 
-_Numbered = tuple[int, Settings]
+_Keyed = tuple[str, Settings]
+"""Settings behind their hash."""
 
 
 class Evaluator:
@@ -75,17 +76,15 @@ class Evaluator:
         because the machine was the reason of their failure."""
         return outcome_of(self._store.get(hashed(settings)))
 
-    def run(self, points: Iterable[_Numbered]) -> Iterator[tuple[int, Outcome]]:
+    def run(self, points: Iterable[tuple[int, Settings]]) -> Iterator[tuple[int, Outcome]]:
         """The outcome of each point (number, settings), in the order in which they are known."""
         waiting: dict[str, list[int]] = {}
         """The points that wait for the same settings, by their key."""
         known: deque[tuple[int, Outcome]] = deque()
-        keys: dict[int, str] = {}
-
         stored: dict[str, Any] = {}
         """What the store has of the points at hand, and what was found meanwhile."""
 
-        def new() -> Iterator[_Numbered]:
+        def new() -> Iterator[_Keyed]:
             rest = iter(points)
             while some := list(islice(rest, TOGETHER)):
                 hashes = [hashed(settings) for _, settings in some]
@@ -98,16 +97,15 @@ class Evaluator:
                     elif key in waiting:
                         waiting[key].append(number)
                     else:
-                        waiting[key], keys[number] = [number], key
-                        yield number, settings
+                        waiting[key] = [number]
+                        yield key, settings
 
-        for number, outcome in self._run(new()):
-            key = keys.pop(number)
+        for key, outcome in self._run(new()):
             if self._kept:
                 outcome = outcome.only(self._kept)
             stored[key] = vars(outcome)
             self._store.add(key, stored[key])
-            known.extend((other, outcome) for other in waiting.pop(key))
+            known.extend((number, outcome) for number in waiting.pop(key))
             while known:
                 yield known.popleft()
         yield from known
@@ -138,13 +136,13 @@ class Evaluator:
             if len(known[n]) == len(groups[n]):
                 yield n, [known[n][k] for k in range(len(groups[n]))]
 
-    def _run(self, points: Iterator[_Numbered]) -> Iterator[tuple[int, Outcome]]:
+    def _run(self, points: Iterator[_Keyed]) -> Iterator[tuple[str, Outcome]]:
         call = partial(evaluate_all, whole_periods=self._whole_periods)
         with self._pool() as pool:
             for task, found in each(pool, call, self._tasks(points)):
                 if isinstance(found, Exception):
                     found = [self._given_up(found)] * len(task)
-                yield from zip((number for number, _ in task), found, strict=True)
+                yield from zip((key for key, _ in task), found, strict=True)
 
     def _given_up(self, error: Exception) -> Outcome:
         outcome = failed(error)
@@ -161,7 +159,7 @@ class Evaluator:
             self._far = self._stack.enter_context(cluster(self._scene, self._dask))
         return nullcontext(self._far)
 
-    def _tasks(self, points: Iterator[_Numbered]) -> Iterator[list[_Numbered]]:
+    def _tasks(self, points: Iterator[_Keyed]) -> Iterator[list[_Keyed]]:
         """Points that the fast solver runs side by side together, all others one by one."""
         for fast, some in groupby(points, lambda one: is_fast(self._scene, one[1])):
             while task := list(islice(some, TOGETHER if fast else 1)):

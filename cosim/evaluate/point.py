@@ -60,12 +60,12 @@ def evaluate(
 
 def evaluate_all(
     base: Scene,
-    points: Sequence[tuple[int, Settings]],
+    points: Sequence[tuple[str, Settings]],
     progress: Progress = lambda _: None,
     *,
     whole_periods: bool,
 ) -> list[Outcome]:
-    """The same of several numbered points, side by side where the fast solver runs them all."""
+    """The same of several points behind their keys, side by side where the fast solver runs all."""
     if not all(is_fast(base, values) for _, values in points):
         return [evaluate(base, values, whole_periods, progress) for _, values in points]
     from cosim.simulation.fast import LOST, summaries

@@ -1,5 +1,5 @@
-"""Searches of the unit cube: a design that fills what is feasible of it, and CMA-ES from the best of
-what is known, again and again.
+"""Searches of the unit cube: a design that fills what is feasible, and CMA-ES from the best of what
+is known, again and again.
 
 The objective of a study jumps where a mode of motion ends, is ragged where motion is chaotic, and
 is missing where a scene cannot be run: no method that trusts a slope finds its way there. Its

@@ -34,8 +34,8 @@ from cosim.drive.surface.waveforms import (
     quaid_velocity,
 )
 from cosim.errors import BadInput
-from cosim.studies.paper import exact, figure7, figures, knife_edge
-from cosim.studies.paper.errata import errata, errata_text
+from cosim.studies.paper import figure7, figures, knife_edge
+from cosim.studies.paper.errata import Contact, errata, errata_text, simulate, start_velocity
 from cosim.studies.paper.theory import theory
 from tests.helpers import needs
 from tests.helpers.examples import examples
@@ -425,9 +425,9 @@ def test_the_exact_simulation_agrees_with_this_one(f_n, peak):
     phases = [(Fraction(1, 2), peak / 3), (Fraction(1, 5), -peak), (Fraction(3, 10), peak / 9)]
     # At the very limit of sticking rounding decides, and there is no rounding in rational numbers.
     assume(all(abs(a + 1) != mu_s * f_n for _, a in phases))
-    periods = exact.simulate(phases, exact.Contact.coulomb(mu_s, mu_k, f_n), 4)
+    periods = simulate(phases, Contact.coulomb(mu_s, mu_k, f_n), 4)
     times = [0.0, 0.5, 0.7, 1.0]
-    start = exact.start_velocity(phases)
+    start = start_velocity(phases)
     velocities = [float(start + v) * G for v in (0, peak / 6, peak / 6 - peak / 5, 0)]
     part = Part(0.7, 0.6, float(f_n))
     ways = part.travel(times, velocities, periods=4)

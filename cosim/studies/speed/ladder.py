@@ -23,9 +23,8 @@ from cosim.studies.report import Progress, Report, Row, brief, counted, markdown
 RUNGS = ("ideal", "limited", "amplifier", "full")
 """Cheapest first. "full" has the data sheet's output stage and the firmware's staircase besides."""
 
-MOST, REPEATS = 3, {"full": 1}
-"""Runs of a rung, for the median of its cost, and of those that take long."""
-
+RUNS = [(model, k) for k in range(3) for model in RUNGS if not (k and model == "full")]
+"""Of each scene, in turn: a rung, again for the median of its cost unless it takes long."""
 
 STORE = "ladder.sqlite"
 
@@ -42,10 +41,6 @@ class Rung:
     fall: float
     off_top: float
     off_amplifier: float
-
-
-def runs_in_all() -> int:
-    return sum(REPEATS.get(model, MOST) for model in RUNGS)
 
 
 def each_rung(
@@ -71,12 +66,11 @@ def each_rung(
         seconds = time.perf_counter() - began
         return seconds, {name: summary[name] for name in ("v_average", "a_surface_min")}
 
-    for repeat in range(MOST):
-        for model in (model for model in RUNGS if repeat < REPEATS.get(model, MOST)):
-            name = f"{own}, {model}, {repeat}"
-            seconds, numbers[model] = store.once(name, lambda model=model: once(model))
-            spent[model].append(seconds / runs[model].run.duration)
-            progress()
+    for model, repeat in RUNS:
+        name = f"{own}, {model}, {repeat}"
+        seconds, numbers[model] = store.once(name, lambda model=model: once(model))
+        spent[model].append(seconds / runs[model].run.duration)
+        progress()
     averages = {model: found["v_average"] for model, found in numbers.items()}
     return [
         Rung(
@@ -134,7 +128,7 @@ def ladder(
     study has left there. Raises BadInput and SimulationFailed.
     """
     every = [load(scene, overrides) for scene in scenes]
-    tick = counted(progress, runs_in_all() * len(every))
+    tick = counted(progress, len(RUNS) * len(every))
     return reported(
         lambda store: report([(scene, each_rung(scene, store, tick)) for scene in every]),
         *(out, STORE, [scene.as_dict() for scene in every]),

@@ -74,19 +74,17 @@ def resonance(rig: Numbers, current: float) -> float:
     return sqrt(max(below - above, 0.0) / (2.0 * _NUDGE) / rig["ram_mass"]) / (2.0 * pi)
 
 
-_CURRENT = (
-    "hold the ram at its {} wall by a current, let that go slowly, a small tone on it: the current "
-    "at which a back-EMF sets in"
-)
 _RING = "hold the ram at a wall by a current, no part; pluck the platform, film its ring-down: its "
 
 GAUGES = {
-    "click up": Gauge(
-        _CURRENT.format("upper"), "A", 1.0, 0.02, 0.0, lambda rig: leaves(rig, "up")
-    ),
-    "click down": Gauge(
-        _CURRENT.format("lower"), "A", 1.0, 0.02, 0.0, lambda rig: leaves(rig, "down")
-    ),
+    **{
+        f"click {end}": Gauge(
+            f"hold the ram at its {wall} wall by a current, let that go slowly, a small tone on "
+            "it: the current at which a back-EMF sets in",
+            "A", 1.0, 0.02, 0.0, partial(leaves, wall=end),
+        )
+        for end, wall in (("up", "upper"), ("down", "lower"))
+    },
     "force factor": Gauge(
         "the coil's impedance for small tones above the ram's resonance, housing held: what the "
         "free ram adds is Bl² over its known mass",
