@@ -120,7 +120,12 @@ def tune(
                 f"{MOST_RUNS}."
             )
         families[name] = changed(scene, changes, "--waveform"), ranges
-    tunings, benches = [], []
+    tunings, benches, made = [], [], list[Run]()
+
+    def told(run: Run, best: Run | None) -> None:
+        made.append(run)
+        progress(run, best)
+
     with ExitStack() as stack:
         for name, (base, ranges) in families.items():
             store = f"{name.replace(':', '-')}-{STORE}" if name else STORE
@@ -128,10 +133,12 @@ def tune(
             path = None if out is None else Path(out) / store
             bench = Evaluator(base, path, whole_periods=whole, workers=workers, dask=dask)
             benches.append(stack.enter_context(bench))
-            count, made = len(keys) if robust else 0, [run for one in tunings for run in one.runs]
-            aim = _Aim(bench, base, quantity, largest, ranges, count, most, made)
+            judge = {"run.solver": "fmu"} if base.run.solver == "fast" else {}
+            made = [run for one in tunings for run in one.runs]
+            aim = bench, base, quantity, largest, ranges, len(keys) if robust else 0, most
+            trial = _Trial(*aim, judge, told)
             try:
-                best, neighbours, runs, ahead = _searched(aim, budget, seed, progress, scouting)
+                best, neighbours, ahead = _searched(trial, budget, seed, scouting)
             except SimulationFailed as error:
                 if name == [*families][-1] and not tunings:
                     raise
@@ -139,22 +146,19 @@ def tune(
                 continue
             except KeyboardInterrupt:
                 if out is not None:
-                    write_runs(Path(out) / "tune.csv", aim.made, quantity)
+                    write_runs(Path(out) / "tune.csv", made, quantity)
                 raise
             except BadInput:
                 if not bench.resumed:
                     bench.forget()  # there is nothing to go on with
                 raise
-            tuned = changed(base, {**best.values, **aim.judge}, "tune")
-            if whole:
-                tuned = in_whole_periods(tuned)
-            by_fast = None
-            if aim.judge:
-                by_fast = next((run.value for run in ahead if run.values == best.values), None)
+            tuned = changed(base, {**best.values, **judge}, "tune")
+            tuned = in_whole_periods(tuned) if whole else tuned
+            ran_ahead = (run.value for run in ahead if judge and run.values == best.values)
             tunings.append(
                 Tuning(
-                    *(quantity, largest, ranges, runs, best, neighbours, tuned, len(ahead), seed),
-                    *(by_fast, name, robust, most),
+                    *(quantity, largest, ranges, trial.runs, best, neighbours, tuned, len(ahead)),
+                    *(seed, next(ran_ahead, None), name, robust, most),
                 )
             )
         tunings.sort(key=lambda one: one.best.value or 0.0, reverse=largest)
@@ -176,9 +180,12 @@ def _checked(over: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, 
     return dict(over)
 
 
-@dataclass(frozen=True)
-class _Aim:
-    """What is run, and what for."""
+Progress = Callable[[Run, Run | None], None]
+
+
+@dataclass(eq=False)
+class _Trial:
+    """A search for what is wanted, on one circuit model."""
 
     bench: Evaluator
     scene: Scene
@@ -189,60 +196,14 @@ class _Aim:
     """How many keys, the first ones, are turned about each setting."""
     heat: float
     """W: the most in a coil."""
-    made: list[Run]
-    """All runs but those ahead, as they finish."""
+    circuit: Settings
+    """Makes that model of the scene; of a fast one whose numbers count, the FMU."""
+    progress: Progress
 
-    @property
-    def judge(self) -> Settings:
-        """What makes the scene the one whose numbers count: the FMU judges the fast solver."""
-        return {"run.solver": "fmu"} if self.scene.run.solver == "fast" else {}
-
-
-Progress = Callable[[Run, Run | None], None]
-
-
-def _searched(
-    aim: _Aim, budget: int, seed: int, progress: Progress, scouting: Progress
-) -> tuple[Run, dict[str, list[float | None]], list[Run], list[Run]]:
-    """The best run, its neighbours, all runs, and those of the scouts that went ahead."""
-    faces_each = 2 * len(aim.ranges)
-    searched = min(round(SEARCHED * budget), budget - faces_each)
-    ahead: list[Run] = []
-    warm = np.empty((0, len(aim.ranges)))
-    circuit = {} if aim.judge else Fidelity.of(aim.scene).simple
-    if circuit is not None:
-        # Quantities that only the scene's own rung has find no scouts.
-        with nullcontext() if aim.judge else suppress(BadInput):
-            scouts = _Trial(aim, circuit, scouting)
-            scouts.search((1 if aim.judge else SCOUTS) * searched, seed)
-            ahead, warm = scouts.runs, scouts.known.ranked(0, WARM_APART, WARM)
-
-    def told(run: Run, best: Run | None) -> None:
-        aim.made.append(run)
-        progress(run, best)
-
-    trial = _Trial(aim, aim.judge, told)
-    if aim.judge:
-        trial.known.rows(warm)  # the search is over
-    else:
-        trial.search(searched, seed, warm)
-    if trial.best is None:
-        first = (trial.runs or ahead)[0]
-        raise SimulationFailed(f"No setting could be run; the first one: {first.outcome.failure}")
-    best, neighbours = trial.best, trial.neighbours()
-    while trial.best is not best and len(trial.runs) + faces_each <= budget:
-        best, neighbours = trial.best, trial.neighbours()
-    return trial.best, neighbours if trial.best is best else {}, trial.runs, ahead
-
-
-class _Trial:
-    """A search on one circuit model, which ``circuit`` makes of the scene."""
-
-    def __init__(self, aim: _Aim, circuit: Settings, progress: Progress) -> None:
-        self._aim, self._circuit, self._progress = aim, circuit, progress
+    def __post_init__(self) -> None:
         self.runs: list[Run] = []
         """In the order of the points that are known."""
-        self.known = Known(len(aim.ranges), 1, FINE, self._run)
+        self.known = Known(len(self.ranges), 1, FINE, self._run)
 
     @property
     def best(self) -> Run | None:
@@ -252,7 +213,7 @@ class _Trial:
 
     def search(self, runs: int, seed: int, warm: Array | None = None) -> None:
         """Run at most ``runs`` points; ``warm`` ones (rows) first, in place of most exploration."""
-        keys, explored = len(self._aim.ranges), round(EXPLORED * runs)
+        keys, explored = len(self.ranges), round(EXPLORED * runs)
         if warm is not None:
             self.known.rows(warm[:explored])
             explored = max(explored, len(self.runs) + POPULATION)
@@ -262,7 +223,7 @@ class _Trial:
 
     def neighbours(self) -> dict[str, list[float | None]]:
         """The value asked for with each key turned down and up from the best."""
-        keys = list(self._aim.ranges)
+        keys = list(self.ranges)
         best = self.known.points[int(self.known.scores[:, 0].argmax())]
         every = faces(best)
         off = np.abs(every - best).max(axis=1)
@@ -273,14 +234,14 @@ class _Trial:
 
     def _run(self, points: Array) -> tuple[Array, Feasible]:
         each = [
-            [self._settings(near.tolist()) for near in turned(point, self._aim.turned)]
+            [self._settings(near.tolist()) for near in turned(point, self.turned)]
             for point in points
         ]
-        asked = [[{**self._circuit, **values} for values in around] for around in each]
+        asked = [[{**self.circuit, **values} for values in around] for around in each]
         found: dict[int, Run] = {}
-        for number, outcomes in self._aim.bench.groups(asked):
+        for number, outcomes in self.bench.groups(asked):
             found[number] = self._judged(each[number][0], outcomes)
-            self._progress(found[number], self.best)
+            self.progress(found[number], self.best)
         runs = [found[number] for number in range(len(points))]
         self.runs += runs
         scores = np.array([[self._score(run.value)] for run in runs])
@@ -289,7 +250,7 @@ class _Trial:
     def _judged(self, settings: dict[str, Number], outcomes: Sequence[Outcome]) -> Run:
         """A setting with its own outcome, the first, and those of its turns, which are judged by
         their motion alone: a hand that is off turns back."""
-        own, most = outcomes[0], self._aim.heat
+        own, most = outcomes[0], self.heat
         if (heat := own.numbers.get("coil_heat", 0.0)) > most:
             own = replace(own, failure=f"the heat of {heat:.3g} W in a coil is above {most:.3g} W")
             return Run(settings, own, None)
@@ -303,7 +264,7 @@ class _Trial:
     def _settings(self, point: Sequence[float]) -> dict[str, Number]:
         """The keys' values at a point of the unit cube."""
         settings: dict[str, Number] = {}
-        for (name, (low, high)), share in zip(self._aim.ranges.items(), point, strict=True):
+        for (name, (low, high)), share in zip(self.ranges.items(), point, strict=True):
             value = min(max(low + share * (high - low), low), high)
             key = numeric_key(name)
             if key.choices:
@@ -314,14 +275,43 @@ class _Trial:
     def _value(self, outcome: Outcome) -> float | None:
         if outcome.failure:
             return None
-        if self._aim.quantity not in outcome.numbers:
-            asked, names = self._aim.quantity, ", ".join(outcome.numbers)
+        if self.quantity not in outcome.numbers:
+            asked, names = self.quantity, ", ".join(outcome.numbers)
             hint = suggestion(asked, outcome.numbers) or f" ({names})"
             raise bad(f"{plain(asked)} is not a number of this scene's summary{hint}")
-        value = outcome.numbers[self._aim.quantity]
+        value = outcome.numbers[self.quantity]
         return value if isfinite(value) else None
 
     def _score(self, value: float | None) -> float:
         if value is None:
             return -inf
-        return value if self._aim.largest else -value
+        return value if self.largest else -value
+
+
+def _searched(
+    trial: _Trial, budget: int, seed: int, scouting: Progress
+) -> tuple[Run, dict[str, list[float | None]], list[Run]]:
+    """The best run, its neighbours, and the runs of the scouts that went ahead."""
+    faces_each = 2 * len(trial.ranges)
+    searched = min(round(SEARCHED * budget), budget - faces_each)
+    ahead: list[Run] = []
+    warm = np.empty((0, len(trial.ranges)))
+    fast = trial.scene.run.solver == "fast"
+    circuit = {} if fast else Fidelity.of(trial.scene).simple
+    if circuit is not None:
+        # Quantities that only the scene's own rung has find no scouts.
+        with nullcontext() if fast else suppress(BadInput):
+            scouts = replace(trial, circuit=circuit, progress=scouting)
+            scouts.search((1 if fast else SCOUTS) * searched, seed)
+            ahead, warm = scouts.runs, scouts.known.ranked(0, WARM_APART, WARM)
+    if fast:
+        trial.known.rows(warm)  # the search is over
+    else:
+        trial.search(searched, seed, warm)
+    if trial.best is None:
+        first = (trial.runs or ahead)[0]
+        raise SimulationFailed(f"No setting could be run; the first one: {first.outcome.failure}")
+    best, neighbours = trial.best, trial.neighbours()
+    while trial.best is not best and len(trial.runs) + faces_each <= budget:
+        best, neighbours = trial.best, trial.neighbours()
+    return trial.best, neighbours if trial.best is best else {}, ahead

@@ -37,6 +37,7 @@ LINE = {
 
 WORST = "nrmse_v_surface_worst"
 WIDTH = 17
+MEAN = {"trial": "mean"}
 
 NOTES = (
     "One rig for all trials; amplitude, offset, phase, start, frequency, height at rest and normal "
@@ -145,7 +146,7 @@ def summary(found: Solved) -> str:
     lines += ["", "".join(f"{head:>{WIDTH}}" for head in LINE.values())]
     lines += [_line(row) for row in numbers["trials"]]
     lines += [f"{_line(row)}   (not fitted)" for row in numbers["apart"]]
-    lines += [_line(numbers["overall"] | {"trial": "mean"})]
+    lines += [_line(numbers["overall"] | MEAN)]
     lines += [f"worst velocity {_brief(numbers['overall'], WORST)}, cost {numbers['cost']:.4f}"]
     if held := numbers["held_out_overall"]:
         mean, worst = (_brief(held["surface"], name) for name in ("nrmse_v_surface", WORST))
@@ -170,7 +171,7 @@ def _between(row: Row, unit: str) -> str:
 def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
     """Of ``identify.json``: the tables of the page, by heading."""
     agreed = "" if numbers["converged"] else " (not converged: the search's own scatter)"
-    rig, whole = numbers["rig"], _whole(numbers["overall"]) | {"floor": "", "late": ""}
+    rig, whole = numbers["rig"], _told(numbers["overall"] | MEAN) | {"floor": "", "late": ""}
     tables: dict[str, list[Row]] = {
         "The rig": [
             {"key": label(key, numeric_key(key).unit), "value": rig[key], "verdict": one["words"]}
@@ -201,10 +202,10 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
         if numbers["held_out"]:
             heading = f"Held out: rig from the other folds, own numbers from the trial's {words}"
             rows = [_told(one[kind]) for one in numbers["held_out"]]
-            tables[heading] = [*rows, _whole(numbers["held_out_overall"][kind])]
+            tables[heading] = [*rows, _told(numbers["held_out_overall"][kind] | MEAN)]
     made_up = numbers["made_up_rig"]
     heading = "The rig of the scenes' defaults with its best drives"
-    tables[heading] = [*map(_told, made_up["trials"]), _whole(made_up["overall"])]
+    tables[heading] = [*map(_told, made_up["trials"]), _told(made_up["overall"] | MEAN)]
     if checks := numbers["exact_rungs_v_average_mm_per_s"]:
         names = ("trial", "steps", "limited", "amplifier")
         tables["v_average [mm/s] by the search's steps and on the bench's rungs"] = [
@@ -221,7 +222,3 @@ def _told(row: Row) -> Row:
         | {words: row[name] for name, words in COLUMNS.items() if name in row}
         | {words: row[name] or "-" for words, name in floors.items() if name in row}
     )
-
-
-def _whole(overall: Row) -> Row:
-    return _told({name: overall[name] for name in COLUMNS if name in overall} | {"trial": "mean"})
