@@ -5,9 +5,9 @@ The whole machine knows neither: of a trial it has the drive, the start and the 
 identified scenes, and makes the surface's motion itself.
 """
 
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -37,59 +37,46 @@ SIDES = (
 )
 
 
-@dataclass(frozen=True)
-class Trial:
-    """A trial on all sides. ``theirs`` and ``exact`` begin FIRST_ROW rows after ``machine``."""
-
-    number: int
-    theirs: Shown
-    exact: Shown
-    machine: Comparison
-
-    def row(self) -> Row:
-        """Mean velocities of the part over whole periods, mm/s, and mean errors of its height, mm.
-        The machine's height is off by a constant, too, as it does not begin on the part's own."""
-        numbers = self.machine.numbers
-        frequency = numbers["frequency_measured"]
-        period = 1.0 / frequency if frequency else None
-        solved = {"theirs": self.theirs, "exact": self.exact}
-        velocities = {
-            "measured": numbers["drift_measured"],
-            **{side: drift(*one.simulated, period) for side, one in solved.items()},
-            "machine": numbers["drift_simulated"],
-        }
-        return {
-            "trial": self.number,
-            **{f"v_{side} [mm/s]": (v or 0.0) * 1e3 for side, v in velocities.items()},
-            **{f"error_{side} [mm]": one.error * 1e3 for side, one in solved.items()},
-            "error_machine [mm]": numbers["mean_error_mm"],
-        }
-
-
 def paper(trials: Path, *, progress: Progress = silent) -> Report:
     """The published trials of a folder, simulated in three ways. Raises BadInput where they are not
     the published ones."""
     theirs = fit(trials, evaluate="published", solver="published").shown
     exact = fit(trials, evaluate="published", solver="exact").shown
-    together = zip(theirs, exact, each(trials, progress=progress), strict=True)
-    return report([Trial(number, *sides) for number, sides in enumerate(together, start=1)])
-
-
-def report(found: list[Trial]) -> Report:
-    """The paths of one trial, and the mean velocities of all."""
-    rows = [trial.row() for trial in found]
+    every = [*zip(theirs, exact, each(trials, progress=progress), strict=True)]
+    rows = [_row(number, *sides) for number, sides in enumerate(every, start=1)]
     said = (
         "The ten published trials as they were measured, by the authors' solver and by the exact "
         "one on the tracked surface, and by the whole chain from the command to the part."
     )
-    figures = {"": partial(_draw, found, rows)}
+    figures = {"": partial(_draw, rows, *every[TRIAL - 1])}
     return Report("figure7", "The paper's figure 7", rows, [said], {"Trials": rows}, figures)
 
 
-def _draw(found: list[Trial], rows: list[Row]) -> Picture:
+def _row(number: int, theirs: Shown, exact: Shown, machine: Comparison) -> Row:
+    """A trial's mean velocities of the part over whole periods, mm/s, and mean errors of its
+    height, mm. The machine's height is off by a constant, too, as it does not begin on the part's
+    own. ``theirs`` and ``exact`` begin FIRST_ROW rows after ``machine``."""
+    numbers, solved = machine.numbers, {"theirs": theirs, "exact": exact}
+    frequency = numbers["frequency_measured"]
+    period = 1.0 / frequency if frequency else None
+    velocities = {
+        "measured": numbers["drift_measured"],
+        **{side: drift(*one.simulated, period) for side, one in solved.items()},
+        "machine": numbers["drift_simulated"],
+    }
+    return {
+        "trial": number,
+        **{f"v_{side} [mm/s]": (v or 0.0) * 1e3 for side, v in velocities.items()},
+        **{f"error_{side} [mm]": one.error * 1e3 for side, one in solved.items()},
+        "error_machine [mm]": numbers["mean_error_mm"],
+    }
+
+
+def _draw(rows: list[Row], *sides: Any) -> Picture:
+    """All trials, and one of them on all ``sides``."""
     figure = Picture(13.0, 5.6, "constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
-    _paths(left, next(trial for trial in found if trial.number == TRIAL))
+    _paths(left, rows[TRIAL - 1], *sides)
     _velocities(right, rows)
     handles = [line for line in left.get_lines() if line.get_label() in OWN]
     handles += [
@@ -107,9 +94,9 @@ def _draw(found: list[Trial], rows: list[Row]) -> Picture:
     return figure
 
 
-def _paths(axis: Axes, trial: Trial) -> None:
+def _paths(axis: Axes, row: Row, theirs: Shown, exact: Shown, machine: Comparison) -> None:
     """Heights from the first row that the authors keep."""
-    seen, made = trial.machine.found.recording, trial.machine.found.simulated
+    seen, made = machine.found.recording, machine.found.simulated
     time = (seen.time - seen.time[FIRST_ROW])[FIRST_ROW:]
 
     def rise(heights: Array) -> Array:
@@ -121,19 +108,14 @@ def _paths(axis: Axes, trial: Trial) -> None:
         (seen.signals["z_part"], OWN[2], {"color": MEASURED, "lw": 1.8}),
     ):
         axis.plot(time * 1e3, rise(heights) * 1e3, label=label, **style)
-    simulated = (trial.theirs.simulated, trial.exact.simulated, (time, rise(made["z_part"])))
+    simulated = (theirs.simulated, exact.simulated, (time, rise(made["z_part"])))
     for (at, height), (_, color, *_) in zip(simulated, SIDES, strict=True):
         axis.plot(at * 1e3, height * 1e3, color=color, lw=1.3)
     axis.grid(alpha=0.25)
     axis.set(xlabel="time [ms]", ylabel="height [mm]", xlim=(0.0, time[-1] * 1e3))
-    row = trial.row()
-    theirs, exact, machine = (row[f"error_{side} [mm]"] for side, *_ in SIDES)
-    axis.set_title(
-        f"Trial {trial.number}: {theirs:.2f} mm as published, {exact:.2f} mm solved exactly, "
-        f"{machine:.2f} mm the machine",
-        loc="left",
-        fontsize=11,
-    )
+    errors = tuple(row[f"error_{side} [mm]"] for side, *_ in SIDES)
+    words = "Trial {}: {:.2f} mm as published, {:.2f} mm solved exactly, {:.2f} mm the machine"
+    axis.set_title(words.format(TRIAL, *errors), loc="left", fontsize=11)
 
 
 def _velocities(axis: Axes, rows: list[Row]) -> None:
