@@ -158,17 +158,14 @@ def _steps(case: Case) -> list[float]:
     return _halvings(5e-5, 7) if case.smooth else _halvings(1.25e-3, 8)
 
 
-def _rewound() -> Iterator[Solver]:
-    for name, variant in variants().items():
-        if name != "iterated, plain":  # it has the solution of the accelerated ones
-            run = rewinding(variant.make, _equal_steps)
-            yield Solver(name, "macro step [s]", run, _steps, variant.order)
-
-
 DEFAULT = "step-locked (default), both"
 
 SOLVERS = (
-    *_rewound(),
+    *(
+        Solver(name, "macro step [s]", rewinding(one.make, _equal_steps), _steps, one.order)
+        for name, one in variants().items()
+        if name != "iterated, plain"  # it has the solution of the accelerated ones
+    ),
     Solver(
         "step-locked (default), max_step",
         "circuit.max_step [s]",

@@ -55,26 +55,21 @@ COLUMNS: dict[str, tuple[str, float]] = {
 """What is told of each trial: names of ``Comparison.numbers``, and the factor from their units."""
 
 
-def row(found: Comparison) -> Row:
+def trials(
+    trials: Path, overrides: Overrides | None = None, *, progress: Progress = silent
+) -> Report:
+    """Compare the published trials of a folder with their scenes: how well one machine repeats
+    them. Raises BadInput."""
+    rows = [_row(one) for one in each(trials, overrides, progress)]
+    said, tables, figures = [message(rows), *NOTES], {"Trials": rows}, {"": partial(draw, rows)}
+    return Report("trials", "The whole chain against the trials", rows, said, tables, figures)
+
+
+def _row(found: Comparison) -> Row:
     """A trial's row of the table."""
     numbers = {name: nan if x is None else x for name, x in found.numbers.items()}
     told = {title: scale * numbers.get(name, nan) for title, (name, scale) in COLUMNS.items()}
     return {"scene": found.run, **told}
-
-
-def trials(
-    trials: Path, overrides: Overrides | None = None, *, progress: Progress = silent
-) -> Report:
-    """Compare the published trials of a folder with their scenes. Raises BadInput."""
-    return report(each(trials, overrides, progress))
-
-
-def report(found: Sequence[Comparison]) -> Report:
-    """How well one machine repeats the trials."""
-    rows = [row(one) for one in found]
-    said, tables = [message(rows), *NOTES], {"Trials": rows}
-    figures = {"": partial(draw, rows)}
-    return Report("trials", "The whole chain against the trials", rows, said, tables, figures)
 
 
 NOTES = (

@@ -127,10 +127,6 @@ def _sense(value: float, scene: Scene) -> Machine:
     return Machine({key: value}, reach=value / scene.circuit.sense_resistance)
 
 
-def _own_command(waveform: str, levels: int) -> Callable[[Scene], Machine]:
-    return lambda scene: Machine({"drive.waveform": waveform}, levels=levels)
-
-
 AS_IT_IS = Change("as it is", "", lambda scene: Machine())
 
 _SWING = ("circuit.swing_loss_high", "circuit.swing_loss_low")
@@ -142,8 +138,10 @@ CHANGES: Sequence[Change] = (
     Change("coil's wires exchanged", "waveform", _set("coil.polarity", value=-1)),
     Change("sine", "waveform", _set("drive.waveform", value="sine")),
     Change("square wave", "waveform", _set("drive.waveform", value="square")),
-    Change("six levels, joined by lines", "waveform", _own_command("pieces", 6)),
-    Change("six levels, held", "waveform", _own_command("steps", 6)),
+    *(
+        Change(f"six levels, {how}", "waveform", _set("drive.waveform", value=name, levels=6))
+        for how, name in (("joined by lines", "pieces"), ("held", "steps"))
+    ),
     Change("heat 0.9 W", "heat", lambda _: Machine(heat=0.9)),
     Change("heat 1.8 W", "heat", lambda _: Machine(heat=1.8)),
     Change("heat 7 W", "heat", lambda _: Machine(heat=7.0)),
