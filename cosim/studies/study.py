@@ -5,7 +5,7 @@ time: ``cosim --help`` and ``import cosim`` read all of them. So functions are n
 ``module.function`` below this package, and loaded when they are needed.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
@@ -140,10 +140,6 @@ def chart(
 @cache
 def studies() -> tuple[Study, ...]:
     """All studies that a folder beside this file declares, by name."""
-    return tuple(sorted(_declared(), key=lambda study: study.name))
-
-
-def _declared() -> Iterator[Study]:
-    for found in iter_modules([str(Path(__file__).parent)]):
-        if found.ispkg:
-            yield from getattr(import_module(f"{_PACKAGE}.{found.name}"), "STUDIES", ())
+    folders = (one.name for one in iter_modules([str(Path(__file__).parent)]) if one.ispkg)
+    found = (one for name in folders for one in import_module(f"{_PACKAGE}.{name}").STUDIES)
+    return tuple(sorted(found, key=lambda study: study.name))

@@ -91,16 +91,14 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
     slides = [slides_of(trial, *_laws(coarse, RATIOS)) for trial in trials]
     ratios = RATIOS if plate else np.zeros(1)
     grids = [coarse.clip(*limit) for limit in limits]
-    tables = [_losses(each, grid, ratios) for each, grid in zip(slides, grids, strict=True)]
-    row, best = _best(_summed(tables))
+    *_, row, best = _looked_at(slides, grids, ratios)
     middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
     around = np.geomspace(1 / AROUND, AROUND, FINE)
     for _ in range(3):
         if plate:
             ratios = np.unique((ratios[row] + NEAR).clip(0.0))
         grids = [(x * around).clip(*limit) for x, limit in zip(middles, limits, strict=True)]
-        tables = [_losses(each, grid, ratios) for each, grid in zip(slides, grids, strict=True)]
-        row, best = _best(_summed(tables))
+        *_, row, best = _looked_at(slides, grids, ratios)
         middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
         inside = not plate or (row < len(ratios) - 1 and (row > 0 or ratios[0] == 0.0))
         if inside and not {0, FINE - 1} & set(best):  # none is at the edge of its grid
@@ -109,11 +107,8 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
     grids = [np.unique([*coarse.clip(*x), *grid]) for x, grid in zip(limits, grids, strict=True)]
     if plate:
         ratios = np.unique([*RATIOS, *ratios])
-    tables = [_losses(each, grid, ratios) for each, grid in zip(slides, grids, strict=True)]
-    row, best = _best(_summed(tables))
+    tables, sums, whole, row, best = _looked_at(slides, grids, ratios)
     rows, drawn = _drawn(tables)
-    sums = _summed(tables)
-    whole = np.sum([one.min(axis=0) for one in sums], axis=0)
     count = [len(table) for table in tables]
     found, profiles = [], []
     for k, (grid, limit) in enumerate(zip(grids, limits, strict=True)):
@@ -132,15 +127,16 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
     return Fit(ratio, found, slides, profiles)
 
 
-def _summed(tables: Sequence[Array]) -> list[Array]:
-    """The slides of each trial together: frictions by ratios."""
-    return [table.sum(axis=0) for table in tables]
-
-
-def _best(sums: Sequence[Array]) -> tuple[int, list[int]]:
-    """The likeliest ratio, and with it the likeliest friction of each trial; their numbers."""
-    row = int(np.sum([one.min(axis=0) for one in sums], axis=0).argmin())
-    return row, [int(one[:, row].argmin()) for one in sums]
+def _looked_at(
+    slides: Sequence[list[Slide]], grids: Sequence[Array], ratios: Array
+) -> tuple[list[Array], list[Array], Array, int, list[int]]:
+    """The losses of each trial's slides by its frictions and the ratios; of its slides together; of
+    all trials by the ratios; the likeliest ratio, and with it each trial's friction, by number."""
+    tables = [_losses(each, grid, ratios) for each, grid in zip(slides, grids, strict=True)]
+    sums = [table.sum(axis=0) for table in tables]
+    whole: Array = np.sum([one.min(axis=0) for one in sums], axis=0)
+    row = int(whole.argmin())
+    return tables, sums, whole, row, [int(one[:, row].argmin()) for one in sums]
 
 
 def _drawn(tables: Sequence[Array]) -> tuple[Rows, Rows]:

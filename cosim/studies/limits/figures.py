@@ -1,13 +1,11 @@
 """The figures of the limits, one message each."""
 
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from cosim.files.picture import Picture
-from cosim.studies.limits.answer import BY_NAME, gains, in_short, noise
+from cosim.studies.limits.answer import gains, in_short, noise
 from cosim.studies.limits.changes import AS_IT_IS
 from cosim.studies.limits.runs import Goal
 from cosim.studies.limits.study import Study
@@ -27,15 +25,6 @@ COLORS = {
 }
 """By what of the device is changed; the device as it is stands on top of the others."""
 MARKERS = dict(zip(COLORS, "D^svoP", strict=True))
-
-
-def drawn(study: Study) -> dict[str, Callable[[], Picture]]:
-    """What draws each figure, by what its file's name has after the study's."""
-    return {
-        "": partial(changes, study, BY_NAME["v_up"]),
-        "-acceleration": partial(changes, study, BY_NAME["a_camera"]),
-        "-settings": partial(settings, study),
-    }
 
 
 def changes(study: Study, goal: Goal) -> Picture:

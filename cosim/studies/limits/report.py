@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from math import isfinite, nan
 from pathlib import Path
 
@@ -44,9 +45,14 @@ def report(found: Study, asked: str) -> Report:
         for number, rig in enumerate(found.rigs)
         for key, point in rig.points.items()
     ]
+    drawn = {
+        "": partial(figures.changes, found, BY_NAME["v_up"]),
+        "-acceleration": partial(figures.changes, found, BY_NAME["a_camera"]),
+        "-settings": partial(figures.settings, found),
+    }
     return Report(
         *("limits", "What is achievable, and what would change it"),
-        *(rows, said, tables, figures.drawn(found), "\n\n".join(said)),
+        *(rows, said, tables, drawn, "\n\n".join(said)),
     )
 
 

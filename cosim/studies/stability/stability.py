@@ -93,8 +93,8 @@ class Limit:
 
 def predicted(method: str, regime: Regime) -> float:
     """Largest stable macro step, s; LONGEST where there is no limit below it."""
-    sides = lambda: METHODS[method].make(*linear_sides(regime))  # noqa: E731
-    return largest_stable_step(sides, _SHORTEST[regime.cut], LONGEST, leap=1.1)
+    make, shortest = METHODS[method].make, _SHORTEST[regime.cut]
+    return largest_stable_step(lambda: make(*linear_sides(regime)), shortest, LONGEST, leap=1.1)
 
 
 def observed(method: str, regime: Regime, expected: float) -> float:
