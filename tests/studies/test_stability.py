@@ -2,8 +2,14 @@
 
 import pytest
 
-from cosim.studies.stability.machines import DIRECT, REFERENCE, Regime
-from cosim.studies.stability.stability import LONGEST, observed, predicted
+from cosim.studies.stability.stability import (
+    DIRECT,
+    LONGEST,
+    REFERENCE,
+    Regime,
+    observed,
+    predicted,
+)
 
 pytestmark = pytest.mark.physics
 
