@@ -85,8 +85,9 @@ class Comparison:
         self.scenes = list(dict.fromkeys(run.scene for run in runs))
         self.strong = {"step-locked\n(default)": DEFAULT}
         """Names of the methods that are compared, by their labels."""
-        self._stepping = [solver for solver in solvers if solver.takes_macro_steps]
-        for p in sorted({solver.order or 0 for solver in self._stepping}):
+        self._stepping = [one for one in solvers if "macro" in one.setting and one.order]
+        """Those whose setting is the length of a macro step."""
+        for p in sorted({solver.order for solver in self._stepping if solver.order}):
             best = min((s for s in self._stepping if s.order == p), key=self._mean)
             self.strong[f"order {p}:\n{best.name}"] = best.name
         self.strong |= {fill(one.name, 14): one.name for one in solvers if one.peer}

@@ -65,11 +65,6 @@ class Solver:
     limits: str = ""
     """Why some scenes have no ``values``."""
 
-    @property
-    def takes_macro_steps(self) -> bool:
-        """Whether its setting is the length of a macro step."""
-        return "macro" in self.setting and self.order is not None
-
 
 class Jumps:
     """The jumps of a scene's command, which are known beforehand, in turn."""

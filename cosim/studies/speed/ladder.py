@@ -18,7 +18,7 @@ from cosim.scene.loading import Overrides
 from cosim.simulation.fidelity import relative_error
 from cosim.simulation.simulate import simulate
 from cosim.studies.plots import GREEN, panels
-from cosim.studies.report import Progress, Report, Row, brief, counted, markdown, silent
+from cosim.studies.report import Progress, Report, brief, counted, markdown, silent
 
 RUNGS = ("ideal", "limited", "amplifier", "full")
 """Cheapest first. "full" has the data sheet's output stage and the firmware's staircase besides."""
@@ -138,16 +138,7 @@ def ladder(
 def report(found: Found) -> Report:
     """Which circuit each scene needs, and what it costs."""
     said = [words(scene, rungs) for scene, rungs in found]
-    table = [row for pair in found for row in rows(*pair)]
-    notes, figures = [f"{message(found)}.", *said, TOP], {"": partial(draw, found)}
-    return Report(
-        "ladder", "The ladder of circuits", table, notes, {"Each rung": table}, figures,
-        "\n".join([*said, TOP, "", *markdown(table)]),
-    )  # fmt: skip
-
-
-def rows(scene: Scene, rungs: list[Rung]) -> list[Row]:
-    return [
+    table = [
         {
             "scene": scene.name,
             "circuit.model": rung.model,
@@ -159,8 +150,14 @@ def rows(scene: Scene, rungs: list[Rung]) -> list[Row]:
             "off the top [%]": 100.0 * rung.off_top,
             "peak downward acceleration [m/s²]": rung.fall,
         }
+        for scene, rungs in found
         for rung in rungs
     ]
+    notes, figures = [f"{message(found)}.", *said, TOP], {"": partial(draw, found)}
+    return Report(
+        "ladder", "The ladder of circuits", table, notes, {"Each rung": table}, figures,
+        "\n".join([*said, TOP, "", *markdown(table)]),
+    )  # fmt: skip
 
 
 def words(scene: Scene, rungs: list[Rung]) -> str:
