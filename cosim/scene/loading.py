@@ -172,10 +172,10 @@ def _spelt(value: Any) -> str:
 def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
     """The content of a scene file."""
     try:
-        raw = reader.contents(source, MAX_BYTES)
+        raw = reader.read(source, MAX_BYTES)
     except reader.Refused as refused:
         if not isinstance(refused.__cause__, FileNotFoundError):
-            raise BadInput(f"{origin}: cannot be read ({refused}).") from refused.__cause__
+            raise
         hint = messages.suggestion(Path(source).stem, builtin, "the built-in scene ")
         if source.endswith(".toml") or os.sep in source:
             raise messages.bad(f"{origin}: there is no such file{hint}") from None

@@ -37,6 +37,7 @@ from weakref import finalize, ref
 
 from cosim.errors import BadInput, SimulationFailed, StepTooSmall, plain, printable
 from cosim.files.atomic import folder_of_ones_own
+from cosim.files.reader import Refused
 from cosim.files.spill import Packed, unpacked
 from cosim.toolchain import fence
 from cosim.toolchain.interrupts import caught_signals
@@ -296,7 +297,7 @@ def in_a_worker() -> bool:
 
 def _error(name: str, text: str) -> Exception:
     """An error of a bounded process: one of ours or of Python's, by its name."""
-    ours = (BadInput, SimulationFailed, StepTooSmall)
+    ours = (BadInput, Refused, SimulationFailed, StepTooSmall)
     kind: Any = (vars(builtins) | {one.__name__: one for one in ours}).get(name)
     with suppress(TypeError):  # one that takes more than a text
         if issubclass(kind, Exception):

@@ -60,12 +60,12 @@ def tell_strangers(folder: Path, attributes: Mapping[str, str]) -> None:
 def _named(path: Path, scene: str, run: str) -> str | None:
     """The run that a file is of; None where it does not say."""
     if path.name == "waveforms.csv":
-        return hashlib.sha256(reader.contents(path, _MOST)).hexdigest()[:_DIGITS]
+        return hashlib.sha256(reader.read(path, _MOST)).hexdigest()[:_DIGITS]
     if path.name == "summary.json":
-        return json.loads(reader.contents(path, _SMALL)).get("run")
+        return json.loads(reader.read(path, _SMALL)).get("run")
     if path.name == "scene.toml":
-        return run if reader.contents(path, _SMALL).decode() == scene else "another"
+        return run if reader.read(path, _SMALL).decode() == scene else "another"
     if path.name == "figure.png":
-        found = _IN_FIGURE.search(reader.contents(path, _SMALL)[:4096])
+        found = _IN_FIGURE.search(reader.read(path, _SMALL)[:4096])
         return found[1].decode() if found else None
     return None

@@ -78,7 +78,7 @@ def test_one_that_takes_the_place_of_a_regular_file(
     os.mkfifo(path)
     monkeypatch.setattr(os, "stat", lambda *_, **__: seen)
     with pytest.raises(reader.Refused, match="not a regular file"):
-        reader.contents(path, 100)
+        reader.read(path, 100)
 
 
 def test_one_that_grows(tmp_path: Path) -> None:
@@ -90,7 +90,7 @@ def test_one_that_grows(tmp_path: Path) -> None:
             file.write(bytes(1 << 20))
 
     with reader.watched(grow), pytest.raises(reader.Refused, match="larger than"):
-        reader.contents(path, 20 << 20)
+        reader.read(path, 20 << 20)
 
 
 def test_long_reading_is_told(tmp_path: Path) -> None:
@@ -115,6 +115,6 @@ def test_readers_meet_no_lock(tmp_path: Path) -> None:
     writer = threading.Thread(target=write)
     writer.start()
     with pytest.raises(reader.Refused, match="not a regular file"):
-        reader.contents(tmp_path / "pipe", 100)
+        reader.read(tmp_path / "pipe", 100)
     writer.join(10)
     assert not writer.is_alive()

@@ -107,7 +107,7 @@ def named(path: Path) -> list[Path]:
     folder, found, size = path.parent.resolve(), [path], 0
     for one in found:
         try:
-            data = reader.contents(one, MAX_BYTES - size)
+            data = reader.read(one, MAX_BYTES - size)
             text = _text(data)
         except (reader.Refused, OSError, ValueError):  # a NUL in its name
             continue
@@ -177,7 +177,7 @@ class _Reader:
             return text
         except reader.Refused as refused:
             missing = isinstance(refused.__cause__, FileNotFoundError | NotADirectoryError)
-            reason = "there is no such file" if missing else f"cannot be read ({refused})"
+            reason = "there is no such file" if missing else f"cannot be read ({refused.why})"
             raise BadInput(f"{name}: {reason}.") from refused.__cause__
         except OSError as error:
             raise BadInput(f"{name}: cannot be read ({error.strerror}).") from error
@@ -280,10 +280,10 @@ class _Reader:
         try:
             return self._opened(path)
         except reader.Refused as refused:
-            refuse(line, f"{shown(path.name)} cannot be read ({refused})")
+            refuse(line, f"{shown(path.name)} cannot be read ({refused.why})")
 
     def _opened(self, path: Path) -> str:
-        data = reader.contents(path, MAX_BYTES - self.bytes_read)
+        data = reader.read(path, MAX_BYTES - self.bytes_read)
         self.bytes_read += len(data)
         return _decoded(data, path.name)
 
