@@ -111,16 +111,14 @@ class Command(ABC):
         """V1 at each of ``times``, which do not fall, V; at a jump the value after it."""
         return self._values(times, 0.0, library("loop").command_values)
 
-    def values_before(self, times: npt.ArrayLike, into: Array | None = None) -> Array:
+    def values_before(self, times: npt.ArrayLike) -> Array:
         """Left limits of V1 at each of ``times``, which do not fall, V; a time up to 1e-12 s after
-        a jump is on it. Written ``into`` a contiguous array of as many values, if one is given."""
-        return self._values(times, 2e-12, library("loop").command_values_before, into)
+        a jump is on it."""
+        return self._values(times, 2e-12, library("loop").command_values_before)
 
-    def _values(
-        self, times: npt.ArrayLike, earlier: float, formula: Any, into: Array | None = None
-    ) -> Array:
+    def _values(self, times: npt.ArrayLike, earlier: float, formula: Any) -> Array:
         at = np.ascontiguousarray(times, np.float64)
-        values = np.empty_like(at) if into is None else into
+        values = np.empty_like(at)
         if at.size:
             before = at[0] - earlier
             pieces = self.pieces(float(before), float(at[-1])) if earlier else self._at(at)

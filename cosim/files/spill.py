@@ -6,7 +6,7 @@ The file has no name, so it vanishes however the process ends.
 import mmap
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -114,27 +114,6 @@ class Tape:
             more[:before] = self._kept[:before]
             self._kept = more
         self._kept[before : self._rows] = block
-
-    def add(self, rows: int, write: Callable[[Array], object]) -> None:
-        """Add as many rows, which ``write`` writes into the array that it is given."""
-        room = self.room(rows)
-        block = np.empty((rows, self._columns)) if room is None else room
-        write(block)
-        if room is None:
-            self.append(block)
-        else:
-            self.fill(rows)
-
-    def room(self, rows: int) -> Array | None:
-        """Where as many rows that come next can be written down in place, of which ``fill`` then
-        tells; None where they are to be appended."""
-        end = self._rows + rows
-        return self._kept[self._rows : end] if end <= len(self._kept) else None
-
-    def fill(self, rows: int) -> None:
-        """So many rows stand in the last ``room`` now."""
-        self._rows += rows
-        self._array = None
 
     def _spill(self, before: int, block: Array) -> None:
         if self._file is None:

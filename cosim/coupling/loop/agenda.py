@@ -38,8 +38,6 @@ class Agenda:
     def __init__(self, times: Array, what: npt.NDArray[np.int32]) -> None:
         self.times, self.what = times, what
         # Asked for once, since many runs have the same agenda.
-        self.rows = int(np.count_nonzero(what & _ROW))
-        """How many rows are to be written down."""
         self.addresses = times.ctypes.data, what.ctypes.data
         """Where compiled code finds both arrays."""
 

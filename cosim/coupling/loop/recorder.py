@@ -45,10 +45,9 @@ class Recorder:
         self._width = width = len(mechanics.columns)
         self._step_of_rows = run.output_step
         rows = agenda.count(run.output_step, run.duration)
-        # One row more, since a frame's sample goes behind the last row.
-        self._rows, self._time = Tape(width, rows + 1), Tape(1, rows)
+        self._rows, self._time = Tape(width, rows), Tape(1, rows)
         self._frames, self._parts = Tape(1), Tape(1)
-        # What is not on the tapes yet; rows only where their tape has no room for them.
+        # What is not on the tapes yet.
         self._new_rows = np.empty((0, width))
         self._new_frames, self._new_parts = np.empty(0), np.empty(0)
         self._totals = (c_double * len(mechanics.total_names))()
@@ -175,28 +174,19 @@ class Recorder:
             self._reached = float(self._agenda.times[state.next - 1])
         self._agenda = next(self._agendas)
         entries = len(self._agenda.times)
-        room = self._rows.room(self._agenda.rows + 1)
-        self._in_place = room is not None
-        if room is None and len(self._new_rows) <= entries:
+        if len(self._new_rows) <= entries:  # a frame's sample goes behind the last row
             self._new_rows = np.empty((entries + 1, self._width))
-        if len(self._new_frames) <= entries:
-            self._new_frames, self._new_parts = np.empty(entries + 1), np.empty(entries + 1)
-        state.rows = (self._new_rows if room is None else room).ctypes.data
-        state.frames, state.parts = self._new_frames.ctypes.data, self._new_parts.ctypes.data
+            self._new_frames, self._new_parts = np.empty((2, entries + 1))
+            state.rows = self._new_rows.ctypes.data
+            state.frames, state.parts = self._new_frames.ctypes.data, self._new_parts.ctypes.data
         state.times, state.what = self._agenda.addresses
         state.n_times, state.next = entries, 0
 
     def _take(self) -> None:
         state = self.state
-        if state.n_rows and self._in_place:
-            self._rows.fill(state.n_rows)
-            state.rows += state.n_rows * self._width * 8
-        elif state.n_rows:
-            self._rows.append(self._new_rows[: state.n_rows])
-        if state.n_frames:
-            self._frames.append(self._new_frames[: state.n_frames])
-        if state.n_parts:
-            self._parts.append(self._new_parts[: state.n_parts])
+        self._rows.append(self._new_rows[: state.n_rows])
+        self._frames.append(self._new_frames[: state.n_frames])
+        self._parts.append(self._new_parts[: state.n_parts])
         state.n_rows = state.n_frames = state.n_parts = 0
 
     @property
@@ -239,8 +229,7 @@ class Recorder:
         self._take()
         for start in range(len(self._time), len(self._rows), BLOCK):
             stop = min(start + BLOCK, len(self._rows))
-            steps = np.arange(start, stop, dtype=np.float64)[:, np.newaxis]
-            self._time.add(stop - start, partial(np.multiply, self._step_of_rows, steps))
+            self._time.append(self._step_of_rows * np.arange(start, stop, dtype=np.float64))
         return self._time.column()
 
     def column(self, name: str) -> Array:

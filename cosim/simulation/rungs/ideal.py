@@ -1,7 +1,6 @@
 """Rung ``ideal``: the coil's current is the command's, whatever voltage it takes."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -72,21 +71,20 @@ class _Coil:
         stop = min(count(step, edges[-1] + SAME_TIME), self._rows)
         edges, start, end = (np.ascontiguousarray(values) for values in (edges, start, end))
         for few in blocks(stop - first):
-            write = partial(
-                library("loop").coil_rows,
+            rows = np.empty((few.stop - few.start, 2))
+            library("loop").coil_rows(
                 *(len(h), edges.ctypes.data, start.ctypes.data, end.ctypes.data),
                 None if branch is None else branch.ctypes.data,
                 *(scene.coil.resistance, scene.coil.inductance, eddy.resistance, eddy.tau),
-                *(step, first + few.start, first + few.stop),
+                *(step, first + few.start, first + few.stop, rows.ctypes.data),
             )
-            self._waves.add(few.stop - few.start, lambda rows, write=write: write(rows.ctypes.data))
+            self._waves.append(rows)
 
     def waves(self, back_emf: Array) -> tuple[Array, Array]:
         """Current (A) and voltage (V) in the rows, in which the back-EMF (V) is known."""
         waves, voltage = self._waves.array(), Tape(1, self._rows)
         for few in blocks(len(waves)):
-            both = (waves[few, 1, np.newaxis], back_emf[few, np.newaxis])
-            voltage.add(len(both[0]), partial(np.add, *both))
+            voltage.append(waves[few, 1] + back_emf[few])
         return self._waves.column(0), voltage.column()
 
     def electrics(self, motion: float) -> Electrics:

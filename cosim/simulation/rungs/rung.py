@@ -8,7 +8,6 @@ voltages those of one coil.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -106,13 +105,9 @@ def commanded(command: Command, rows: Array) -> Array:
     """V1 (V) at the times of the rows (s), at a jump the value before it; 0 in the first row, where
     the command has not begun."""
     made = Tape(1, len(rows))
-
-    def write(at: Array, values: Array) -> None:
-        command.values_before(at, values)
-        values[: at.searchsorted(0.0, "right")] = 0.0
-
     for part in blocks(len(rows)):
-        made.add(part.stop - part.start, partial(write, rows[part]))
+        at = rows[part]
+        made.append(np.where(at > 0.0, command.values_before(at), 0.0))
     return made.column()
 
 
