@@ -14,7 +14,7 @@ from benchmarks.errors import BRIEF
 from cosim.arrays import Array
 from cosim.coupling.loop.lead import Lead
 from cosim.coupling.loop.recorder import Recorder
-from cosim.coupling.loop.structures import loop
+from cosim.coupling.loop.structures import address, loop
 from cosim.drive.command import command
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, load
@@ -35,16 +35,16 @@ def measure(rounds: int) -> dict[str, Any]:
 def coupled_over_parts(scene: Scene, rounds: int) -> dict[str, Any]:
     """Spread of the ratio, and how many steps both circuits took."""
     log = _coupled(scene).log()
-    replay = _replay(scene)
+    told = _replay(scene)
     # Each call makes its own instance, as both sides of the ratio need one.
     calls = {
         "coupled": lambda: _coupled(scene),
-        "circuit": lambda: _coupled(scene, replay),
+        "circuit": lambda: _coupled(scene, told),
         "mechanics": lambda: _mechanics(scene, log),
     }
     taken = take_turns(calls, rounds)
     parts = [a + b for a, b in zip(taken["circuit"], taken["mechanics"], strict=True)]
-    replayed = _coupled(scene, replay).steps
+    replayed = _coupled(scene, told).steps
     return {
         **ratios(taken["coupled"], parts),
         "steps": len(log["time"]) - 1,
@@ -52,12 +52,20 @@ def coupled_over_parts(scene: Scene, rounds: int) -> dict[str, Any]:
     }
 
 
-def _coupled(scene: Scene, replay: Array | None = None) -> Lead:
+def _coupled(scene: Scene, told: Array | None = None) -> Lead:
     with closing(Mechanics(scene)) as mechanics:
-        recorder = Recorder(scene, mechanics, lambda _: None)
-        circuit = Lead(scene, command(scene), recorder, replay=replay)
+        circuit = Lead(scene, command(scene), Recorder(scene, mechanics, lambda _: None))
+        if told is not None:
+            replay(circuit, told)
         circuit.run()
         return circuit
+
+
+def replay(circuit: Lead, told: Array) -> None:
+    """Run a circuit without mechanics: with back-EMF (V), slope (V/s) and next impact (s) after
+    each of its steps, a row each, which must outlive the run."""
+    circuit.state.macro_point = address("macro_point_replayed")
+    circuit.state.replay = told.ctypes.data
 
 
 def _mechanics(scene: Scene, log: Log) -> None:

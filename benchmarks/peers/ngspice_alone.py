@@ -8,12 +8,14 @@ the same compiled log takes what ngspice sends, so only the mechanics differ.
 from collections.abc import Sequence
 from contextlib import closing
 from time import process_time
+from unittest.mock import patch
 
 import numpy as np
 
+from benchmarks.parts import replay
 from cosim.arrays import Array
 from cosim.circuit.netlist import prepare
-from cosim.coupling.loop.lead import Lead
+from cosim.coupling.loop import lead
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import command
 from cosim.mechanics.stickslip import Mechanics
@@ -69,7 +71,9 @@ def run(scene: Scene, times: Sequence[float]) -> tuple[float, Array]:
         recorder = Recorder(scene, mechanics, lambda _: None)
         still = np.tile((0.0, 0.0, np.inf), (_MOST_STEPS, 1))
         deck = _netlist(scene, mechanics.sample())
-        circuit = Lead(scene, command(scene), recorder, deck=deck, replay=still)
+        with patch.object(lead, "prepare", lambda _: deck):
+            circuit = lead.Lead(scene, command(scene), recorder)
+        replay(circuit, still)
         circuit.run()
     log = circuit.log()
     path = np.interp(times, log["time"], 1e-3 * log["v(p)"])

@@ -15,7 +15,6 @@ import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, Protocol
 
@@ -51,18 +50,6 @@ LOOSER = "abstol=1e-8 vntol=1e-5 chgtol=1e-11"
 switched, no step is small enough for them."""
 
 
-@dataclass(frozen=True)
-class Callbacks:
-    """Addresses of the compiled functions that ngspice calls: SendData, GetVSRCData, GetSyncData.
-
-    Python would take longer than ngspice itself.
-    """
-
-    data: int
-    source: int
-    step: int
-
-
 class Leader(Protocol):
     """What the compiled callbacks act for, during a run."""
 
@@ -83,8 +70,10 @@ class Leader(Protocol):
 
 
 @cache
-def engine(callbacks: Callbacks) -> "Engine":
-    """The process's one ngspice, which calls back. Raises BadInput where the library is missing.
+def engine(data: int, source: int, step: int) -> "Engine":
+    """The process's one ngspice, which calls compiled functions at these addresses: SendData,
+    GetVSRCData, GetSyncData. Python would take longer than ngspice itself. Raises BadInput where
+    the library is missing.
 
     It loads no code models: ``lint/dialect.py`` writes what would need them otherwise, and each
     step looks at all kinds of elements, so they would cost 5 % of a run.
@@ -94,7 +83,7 @@ def engine(callbacks: Callbacks) -> "Engine":
     try:
         if os.sep in name and not os.path.isfile(name):  # to open a pipe would wait for ever
             raise OSError("there is no such file")
-        return Engine(name, callbacks)
+        return Engine(name, data, source, step)
     except (OSError, AttributeError) as error:  # the latter where it lacks ngspice's functions
         reason = str(error).partition("Additionally")[0].strip(" .")
         raise BadInput(
@@ -112,19 +101,19 @@ class Engine(Shared.NgSpiceShared):
     poisoned = False
     """ngspice has given up for good: nothing runs in this process's library any more."""
 
-    def __init__(self, library: str, callbacks: Callbacks) -> None:
+    def __init__(self, library: str, data: int, source: int, step: int) -> None:
         self.LIBRARY_PATH = library
         self._leader: Leader | None = None
         self._failure: BaseException | None = None
         self._save: tuple[str, ...] = ()
-        self._data = callbacks.data
+        self._data = data
         super().__init__(ngspice_id=0, send_data=True)
         self._library: Any = self._ngspice_shared
         # PySpice leaves GetSyncData out; a second call puts it in, and a faster GetVSRCData.
         self._library.ngSpice_Init_Sync(
-            _ffi.cast("GetVSRCData *", callbacks.source),
-            _ffi.cast("GetISRCData *", callbacks.source),  # which has the same arguments
-            _ffi.cast("GetSyncData *", callbacks.step),
+            _ffi.cast("GetVSRCData *", source),
+            _ffi.cast("GetISRCData *", source),  # which has the same arguments
+            _ffi.cast("GetSyncData *", step),
             _ffi.NULL,
             self._self_c,
         )

@@ -58,22 +58,10 @@ _POINTS = 4096
 class Lead:
     """ngspice leads; the mechanics follow each of its accepted steps, or as ``use`` says."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        command: Command,
-        recorder: Recorder,
-        deck: tuple[str, dict[str, str]] | None = None,
-        replay: npt.NDArray[np.float64] | None = None,
-    ) -> None:
-        """``deck`` and its saved vectors replace the scene's. With ``replay``, back-EMF (V),
-        slope (V/s) and next impact (s) after each step, there are no mechanics: the circuit takes
-        the steps of the run that these are from.
-        """
+    def __init__(self, scene: Scene, command: Command, recorder: Recorder) -> None:
         self._duration = scene.run.duration
         self._recorder = recorder
-        self._replay = replay
-        self._deck, vectors = deck or prepare(scene)
+        self._deck, vectors = prepare(scene)
         self._saved, self._vectors = tuple(vectors), tuple(vectors.values())
         width = len(LOG) + len(self._saved)
         self._log = Tape(width)
@@ -86,8 +74,7 @@ class Lead:
         swing = self._saved.index("v(swing)") if "v(swing)" in self._saved else -1
         self.state = LeadState(
             recorder=ctypes.addressof(recorder.state),
-            macro_point=address(f"macro_point_{'step_locked' if replay is None else 'replayed'}"),
-            replay=None if replay is None else replay.ctypes.data,
+            macro_point=address("macro_point_step_locked"),
             gain=GAIN,
             v_offset=command.v_offset,
             count=coil.count,
@@ -187,8 +174,7 @@ def _fineness(scene: Scene) -> float:
 
 def engine() -> ngspice.Engine:
     """This process's ngspice, which calls the loop. Raises BadInput."""
-    names = ("lead_data", "lead_source", "lead_step")
-    return ngspice.engine(ngspice.Callbacks(*map(address, names)))
+    return ngspice.engine(*map(address, ("lead_data", "lead_source", "lead_step")))
 
 
 def finished(state: Any, reached: float, duration: float) -> None:
