@@ -5,11 +5,10 @@ their value at its start and their slope are set before it. An input is the curr
 or, where the FMU has the current source too (circuit.model "limited"), the command (V).
 """
 
-from collections import deque
 from collections.abc import Mapping
 from ctypes import c_double, c_int
 from functools import cache
-from operator import attrgetter, is_
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -67,6 +66,9 @@ _VARIABLES = [
 ]
 """The FMU's variables that are keys of a scene, real and whole ones; what finds their values."""
 
+FMI = 3
+"""The version by which the FMU is called; by the other it gives the same bits."""
+
 CONTACT_LAWS = {"compliant": 1, "rigid": 2}
 SUSPENSIONS = {"cubic": 1, "knee": 2, "repulsion": 3}
 """Choices of a scene, as the FMU numbers them."""
@@ -109,7 +111,7 @@ class Mechanics:
     It tells which variables have which role; who steps it knows them by these alone.
     """
 
-    def __init__(self, scene: Scene, fmi_version: int = 3) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.normal_force = normal_force(scene)
         """The normal force where it changes in time: an input that follows the time alone."""
         self.has_source = scene.rung.source_in_fmu
@@ -119,7 +121,7 @@ class Mechanics:
         self.columns, self.total_names = names["reals"] + names["wholes"], names["totals"]
         """Names of the inputs that are led from outside; of what a row holds: reals, then whole
         numbers; and of the totals."""
-        self.instance = borrow(fmi_version)
+        self.instance = borrow(FMI)
         places = self.instance.places
         self.places: dict[str, Any] = {role: places(of) for role, of in names.items()}
         """Value references by role."""
@@ -129,10 +131,12 @@ class Mechanics:
         """Values of STEP_OUTPUTS, and SOURCE_STEP_OUTPUTS, as read last."""
         self._slope_place, self._current_place = places(("back_emf_slope",)), places(("current",))
         self._gain = (c_double * 1)()
-        reals, integers = _settings(scene)
+        reals, integers = parameters(scene)
         try:
-            self.instance.set_reals(places(reals[0]), reals[1])
-            self.instance.set_integers(places(integers[0]), integers[1])
+            self.instance.set_reals(places(reals), (c_double * len(reals))(*reals.values()))
+            self.instance.set_integers(
+                places(integers), (c_int * len(integers))(*integers.values())
+            )
             if self.normal_force is not None:
                 force = (c_double * 1)(self.normal_force.value(0.0))
                 self.instance.set_reals(places(("normal_force",)), force)
@@ -190,28 +194,6 @@ class Mechanics:
                 "a smaller coupling.macro_step or circuit.max_step."
             )
         return SimulationFailed(f"The mechanics failed at t = {time:.6g} s: {said}")
-
-
-_Settings = tuple[tuple[tuple[str, ...], Any], tuple[tuple[str, ...], Any]]
-
-_last: deque[tuple[tuple[object, ...], _Settings]] = deque(maxlen=1)
-
-
-def _settings(scene: Scene) -> _Settings:
-    """:func:`parameters` as names and arrays. Those of the last scene are kept: what is swept is
-    often the drive alone, and then the other tables are the same objects."""
-    tables = (scene.circuit, scene.coil, scene.mechanics, scene.friction)
-    of = (*tables, scene.drive.phase_deg is None)
-    for known, settings in tuple(_last):  # another thread may put its own there meanwhile
-        if all(map(is_, known, of)):
-            return settings
-    reals, integers = parameters(scene)
-    settings = (
-        (tuple(reals), (c_double * len(reals))(*reals.values())),
-        (tuple(integers), (c_int * len(integers))(*integers.values())),
-    )
-    _last.append((of, settings))
-    return settings
 
 
 def parameters(scene: Scene) -> tuple[dict[str, float], dict[str, int]]:

@@ -20,17 +20,16 @@ from cosim.toolchain.processes import Bounds, ProcessLost, Progress, end_idle, i
 from cosim.waveforms.result import Result
 
 
-def one_run(scene: Scene, progress: Progress, fmi_version: int = 3, alone: bool = False) -> Result:
+def one_run(scene: Scene, progress: Progress, alone: bool = False) -> Result:
     """What :func:`cosim.simulation.here.simulate_here` gives, from where it may run. Raises also
     SimulationFailed where the process dies or hangs."""
     if in_a_worker() or not scene.rung.ngspice:
         from cosim.simulation.here import simulate_here
 
-        return simulate_here(scene, progress, fmi_version, alone)
+        return simulate_here(scene, progress, alone)
     ends: list[str] = []
     try:
-        given = scene, fmi_version, alone
-        ran = isolated(_worked, given, progress, bounds(scene), ends.append)
+        ran = isolated(_worked, (scene, alone), progress, bounds(scene), ends.append)
     except ProcessLost as lost:
         if not scene.fmu:
             raise
@@ -65,7 +64,7 @@ def bounds(scene: Scene) -> Bounds:
     netlist = files.pop("netlist", None)
     circuit = named(Path(netlist)) if netlist else [circuits()]
     reads = *map(str, circuit), *filter(_is_meant, files.values())
-    return Bounds(reads, place(), ngspice_library(), (_load, None))
+    return Bounds(reads, place(), ngspice_library(), _load)
 
 
 def _is_meant(path: str) -> bool:
@@ -73,7 +72,7 @@ def _is_meant(path: str) -> bool:
     return Path(path).is_file() or Path(path, "modelDescription.xml").is_file()
 
 
-def _load(_: None) -> None:
+def _load() -> None:
     """Load what the run will: ngspice looks up whose process this is, which the fence forbids."""
     from cosim.circuit import false_cycles  # noqa: F401
     from cosim.coupling.loop.lead import engine
@@ -83,13 +82,13 @@ def _load(_: None) -> None:
 
 
 def _worked(
-    given: tuple[Scene, int, bool], progress: Progress
+    given: tuple[Scene, bool], progress: Progress
 ) -> tuple[Packed | dict[str, Array], dict[str, Any], Mapping[str, str]]:
     """A run in a worker: waveforms, summary, units."""
     from cosim.simulation.here import simulate_here
 
-    scene, fmi_version, alone = given
-    result = simulate_here(scene, progress, fmi_version, alone)
+    scene, alone = given
+    result = simulate_here(scene, progress, alone)
     if scene.rung.own_netlist and fence.lacking and not alone:
         result.summary["notes"].append(
             f"this system has no {' and no '.join(fence.lacking)}: nothing but the reader's own "

@@ -22,13 +22,11 @@ _MORE = 100.0
 """Times ``circuit.reltol``, for a netlist that ngspice cannot run with less."""
 
 
-def simulate_here(
-    scene: Scene, progress: Progress, fmi_version: int = 3, alone: bool = False
-) -> Result:
+def simulate_here(scene: Scene, progress: Progress, alone: bool = False) -> Result:
     """The run of a scene whose circuit and coupling are chosen; ``alone``: its summary alone,
     without waveforms and notes. Raises as :func:`cosim.simulation.simulate.simulate` does."""
     try:
-        return _simulated(scene, progress, fmi_version, alone)
+        return _simulated(scene, progress, alone)
     except StepTooSmall:
         if not scene.rung.own_netlist:
             raise
@@ -39,10 +37,10 @@ def simulate_here(
     looser = min(_MORE * own, 1e-2)
     with engine().looser():
         try:
-            result, reltol = _simulated(scene, progress, fmi_version, alone), own
+            result, reltol = _simulated(scene, progress, alone), own
         except StepTooSmall:
             loose = scene.having(circuit={"reltol": looser})
-            result, reltol = _simulated(loose, progress, fmi_version, alone), looser
+            result, reltol = _simulated(loose, progress, alone), looser
     if not alone:
         result.summary["notes"].append(
             "no step was small enough for the circuit's tolerances; the run is with .options "
@@ -51,7 +49,7 @@ def simulate_here(
     return replace(result, scene=scene)
 
 
-def _simulated(scene: Scene, progress: Progress, fmi_version: int, alone: bool) -> Result:
+def _simulated(scene: Scene, progress: Progress, alone: bool) -> Result:
     began = time.perf_counter()
     if scene.has_ports:
         from cosim.coupling.ports.results import joined
@@ -62,7 +60,7 @@ def _simulated(scene: Scene, progress: Progress, fmi_version: int, alone: bool) 
         summary = numbers(scene, moved, driven, 0, began)
         progress(scene.run.duration)
     else:
-        with closing(Mechanics(scene, fmi_version)) as mechanics:
+        with closing(Mechanics(scene)) as mechanics:
             recorder = Recorder(scene, mechanics, progress)
             driven = drive(scene, recorder)
             summary = numbers(scene, motion(scene, recorder), driven, recorder.steps, began)

@@ -51,7 +51,6 @@ def run(
 def simulate(
     scene: Scene,
     progress: Progress = lambda _: None,
-    fmi_version: int = 3,
     checks: Literal["none", "usual", "strict"] = "none",
 ) -> Result:
     """Run a scene. ``progress`` is told the simulated time (s) now and then. With ``checks`` the
@@ -66,13 +65,13 @@ def simulate(
         if checks == "usual":
             from cosim.simulation.checks import checked_ports
 
-            return checked_ports(scene, lambda: one_run(scene, progress, fmi_version))
-        return one_run(scene, progress, fmi_version)
+            return checked_ports(scene, lambda: one_run(scene, progress))
+        return one_run(scene, progress)
     if scene.run.solver == "fast":
         from cosim.simulation.fast import simulate_fast
 
         return simulate_fast(scene, progress)
-    again = partial(simulate, progress=progress, fmi_version=fmi_version)
+    again = partial(simulate, progress=progress)
     if scene.rung.automatic:
         return _cheapest(scene, partial(again, checks=checks))
     if checks != "none":
@@ -83,7 +82,7 @@ def simulate(
         from cosim.simulation.choose_steps import simulate_within_tolerance
 
         return simulate_within_tolerance(scene, again)
-    return one_run(scene, progress, fmi_version)
+    return one_run(scene, progress)
 
 
 def summary(scene: Scene, progress: Progress = lambda _: None) -> dict[str, Any]:

@@ -100,8 +100,8 @@ class Bounds:
     """Where its own folder lies: with the tapes of long runs. None: with the system's."""
     library: str = ""
     """libngspice, which a process may not know where to find."""
-    first: tuple[Callable[[Any], object], Any] | None = None
-    """What is called with an argument before the fence closes: it loads what reads more."""
+    first: Callable[[], object] | None = None
+    """What is called before the fence closes: it loads what reads more."""
 
 
 def processors() -> int:
@@ -445,8 +445,7 @@ def serve(pipe: Connection) -> None:
     if bounds is not None:
         try:
             if bounds.first is not None:
-                load, argument = bounds.first
-                load(argument)
+                bounds.first()
             fence.close(bounds.reads)  # before there are threads, which would stay outside
         except Exception as failure:
             unfit = failure

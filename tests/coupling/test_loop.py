@@ -22,12 +22,13 @@ from cosim.drive.periodic import Lines
 from cosim.drive.pieces import Piece
 from cosim.errors import SimulationFailed
 from cosim.files.resources import circuits
-from cosim.mechanics import fmi
+from cosim.mechanics import fmi, stickslip
 from cosim.mechanics.fmi import Interface
 from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, load
 from cosim.simulation.simulate import simulate
 from cosim.studies.accuracy.cases import participants
+from cosim.toolchain.processes import in_place
 from cosim.waveforms.result import Result
 
 pytestmark = pytest.mark.usefixtures("in_place")
@@ -87,9 +88,12 @@ def test_blocks_change_nothing(name: str, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.parametrize("method", ["step-locked", *METHODS])
-def test_same_bits_through_fmi_2(method: str) -> None:
+def test_same_bits_through_fmi_2(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = load("reference", [*BRIEF, f"coupling.method={method}"])
-    assert_same(simulate(scene), simulate(scene, fmi_version=2))
+    third = simulate(scene)
+    monkeypatch.setattr(stickslip, "FMI", 2)
+    with in_place():
+        assert_same(third, simulate(scene))
 
 
 def test_same_bits_with_a_netlist_of_ones_own(tmp_path: Path) -> None:
@@ -234,8 +238,8 @@ def test_a_source_that_nothing_feeds(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_values_out_of_range(monkeypatch: pytest.MonkeyPatch) -> None:
     original = Mechanics.__init__
 
-    def poisoned(self: Mechanics, scene: Scene, fmi_version: int = 3) -> None:
-        original(self, scene, fmi_version)
+    def poisoned(self: Mechanics, scene: Scene) -> None:
+        original(self, scene)
         self.step_outputs[0] = np.nan
 
     monkeypatch.setattr(Mechanics, "__init__", poisoned)

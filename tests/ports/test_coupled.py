@@ -513,7 +513,7 @@ def test_a_jump_of_the_drive_on_an_edge_of_the_circuit_is_one_time(
             run = Run(load(scene, {**given, "circuit.max_step": step}), lambda _: None)
             run.run()
             alone = load("paper-limited", {**given, **own, "circuit.max_step": step})
-            with closing(Mechanics(alone, 3)) as mechanics:
+            with closing(Mechanics(alone)) as mechanics:
                 lead = coupled(alone, Recorder(alone, mechanics, lambda _: None))
                 lead.run()
         for times in (run.log.column(), lead.log()["time"]):

@@ -204,7 +204,7 @@ class _Nobody:
     def stop(self) -> None: ...
 
 
-def _load(_: None) -> None:
+def _load() -> None:
     lead.engine()
 
 
@@ -236,7 +236,7 @@ def _parts(some: bool) -> object:
 @pytest.mark.parametrize("some", [_parts(True), _parts(False)], ids=["some", "all"])
 def test_netlists_that_nobody_has_checked(some: bool, folder: Path) -> None:
     """Those that would do harm do none: without the reader, behind the fence alone."""
-    bounds = Bounds(library=ngspice_library(), first=(_load, None))
+    bounds = Bounds(library=ngspice_library(), first=_load)
     if isinstance(lacking := isolated(_acts, "0", lambda _: None, Bounds()), list):
         pytest.skip(f"this system has no {' and no '.join(lacking)}")
     every = decks(folder)

@@ -5,6 +5,7 @@ import random
 import subprocess
 import sys
 import threading
+from functools import partial
 from pathlib import Path
 
 import psutil
@@ -132,10 +133,10 @@ def test_one_that_dies_as_it_starts_is_tried_again(tmp_path: Path) -> None:
     """Whatever kills it: memory that others have, a hand."""
     marker = tmp_path / "tried"
     marker.write_text("")
-    bounds = processes.Bounds((str(tmp_path),), first=(_die_once, str(marker)))
+    bounds = processes.Bounds((str(tmp_path),), first=partial(_die_once, str(marker)))
     assert processes.isolated(_is_alive, None, lambda _: None, bounds) == "alive"
     marker.write_text("always")
-    bounds = processes.Bounds(first=(_die_once, str(marker)))
+    bounds = processes.Bounds(first=partial(_die_once, str(marker)))
     with pytest.raises(cosim.SimulationFailed, match=r"cannot start \(exit code 9"):
         processes.isolated(_is_alive, None, lambda _: None, bounds)
 

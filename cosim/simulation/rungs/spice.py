@@ -27,8 +27,7 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
     lead = coupled(scene, recorder)
     lead.run()
     log = lead.log()
-    version = recorder.mechanics.instance.version
-    refuse_false(scene, log, lambda finer: _log_alone(finer, version))
+    refuse_false(scene, log, _log_alone)
     values, notes = {}, []
     if scene.circuit.netlist is not None:
         _refuse_foreign_coil(scene, log)
@@ -48,11 +47,11 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
     )
 
 
-def _log_alone(scene: Scene, fmi_version: int) -> dict[str, Array]:
+def _log_alone(scene: Scene) -> dict[str, Array]:
     """The circuit's waveforms of a run of which nothing else is wanted."""
     from cosim.coupling.loop.macro_steps import coupled
 
-    with closing(Mechanics(scene, fmi_version)) as mechanics:
+    with closing(Mechanics(scene)) as mechanics:
         lead = coupled(scene, Recorder(scene, mechanics, lambda _: None))
         lead.run()
         return lead.log()
