@@ -5,6 +5,6 @@ accepted step and gives the back-EMF as a pure function of time, so that a step 
 rejects needs nothing undone in the mechanics.
 
 Between participants that can all go back to a moment before, methods are written once against
-:mod:`cosim.coupling.participant`: Jacobi, Gauss-Seidel, companion, iterated and event-aware; their
+:mod:`cosim.coupling.rewind.joint`: Jacobi, Gauss-Seidel, companion, iterated and event-aware; their
 stability and their orders are studied there.
 """

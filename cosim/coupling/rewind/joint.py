@@ -7,15 +7,60 @@ without this, events leave first order or less (measured 0.5 to 1.6 at stick-sli
 across an event does harm). Handling of events by step localisation: Gomes et al., "Co-simulation:
 a survey", ACM Comput. Surv. 51 (2018) 49, section on hybrid co-simulation. Known limits: ngspice
 cannot take part, since it cannot repeat a step; costs some 20 repeated steps an event.
+
+A side may be a linear system solved exactly, the FMU, or a behavioural circuit.
 """
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from cosim.coupling.method import Method, Past
-from cosim.coupling.participant import Follower, Participant
-from cosim.coupling.polynomials import Array, Polynomial
+from cosim.coupling.polynomials import Array, Polynomial, Signal
+
+
+class Participant(Protocol):
+    """One side of a coupling, at a time of its own; signals are arrays, SI."""
+
+    mean: Array
+    """Mean of the output over the last advance."""
+
+    def advance(self, h: float, inputs: Array, gain: float = 0.0) -> None:
+        """Go on by ``h`` (s) with an input polynomial about the present time.
+
+        With ``gain`` the input is the polynomial plus ``gain`` times the integral of the own output
+        since the start of the step: a capacitor 1/gain in series with a circuit whose output is its
+        current.
+        """
+        ...
+
+    def outputs(self, inputs: Signal | None = None) -> Signal:
+        """Value and slope of the output now.
+
+        With ``inputs`` they are *refreshed*: calculated after that input is set. Without, they are
+        *stale*: those of the input that the last step ended with.
+        """
+        ...
+
+    def save(self) -> Any:
+        """Everything that ``restore`` needs to come back to this moment."""
+        ...
+
+    def restore(self, saved: Any) -> None:
+        """Back to a saved moment."""
+        ...
+
+
+class Follower(Participant, Protocol):
+    """The mechanical side, with what only some methods ask for."""
+
+    def gain(self) -> float:
+        """Derivative of the output's slope with respect to the input, now: Bl²/m_eff in V/(A s)."""
+        ...
+
+    def events(self) -> int:
+        """Number of events (stick, slip, impact) so far."""
+        ...
 
 
 class Joint:

@@ -28,9 +28,8 @@ import numpy as np
 
 from cosim.coupling.methods import methods
 from cosim.coupling.methods.gauss_seidel import GaussSeidel
-from cosim.coupling.participant import Follower, Participant
 from cosim.coupling.polynomials import Array
-from cosim.coupling.rewind.joint import EventAware, Joint
+from cosim.coupling.rewind.joint import EventAware, Follower, Joint, Participant
 from cosim.errors import SimulationFailed
 
 Acceleration = Literal["plain", "Aitken", "Anderson", "Newton"]
