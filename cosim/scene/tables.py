@@ -1,20 +1,38 @@
 """The tables of a scene: every key with its SI unit, default, range and meaning.
 
-A key that is a variable of the FMU has them from ``variables.def``.
+A key that is a variable of the FMU has them from ``variables.def``, of which the FMU's
+``modelDescription.xml`` is made too.
 """
 
 import re
 from collections.abc import Mapping
+from functools import cache
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from cosim.files.resources import fmu_sources
 from cosim.scene import firmware
 from cosim.scene.methods import METHODS, CouplingMethod
 from cosim.scene.rungs import RUNGS, Rung
-from cosim.scene.variables import variables
+
+_ROW = re.compile(
+    r'^(INT_)?(?:PARAMETER|TUNABLE|INPUT)\((\w+), (?:"(.*?)", )?(.*?), (.*?), (.*?), "(.*)"\)$',
+    re.MULTILINE,
+)
+
+
+@cache
+def _variables() -> dict[str, tuple[float | int, str, float, float, str]]:
+    """Start value (an int where the variable is one), unit, least and greatest value, and meaning,
+    of the FMU's parameters and inputs. Raises BadInput where its sources are missing."""
+    source = next((fmu_sources() / "src").rglob("variables.def")).read_text(encoding="utf-8")
+    return {
+        name: (int(start) if whole else float(start), unit or "1", float(low), float(high), text)
+        for whole, name, unit, start, low, high, text in _ROW.findall(source)
+    }
 
 
 def _number(default: Any, unit: str, low: float, high: float, text: str, variable: str = "") -> Any:
@@ -28,9 +46,10 @@ def _of_fmu(name: str, least: float | None = None) -> Any:
 
     Where ``least`` is given, the key is absent or at least that; the FMU takes 0 for absent.
     """
-    known = variables()[name]
-    start, low = (known.start, known.low) if least is None else (None, least)
-    return _number(start, known.unit, low, known.high, known.text, name)
+    start, unit, low, high, text = _variables()[name]
+    if least is not None:
+        return _number(None, unit, least, high, text, name)
+    return _number(start, unit, low, high, text, name)
 
 
 def _choice(default: Any, text: str, unit: str = "", words: str = "") -> Any:
