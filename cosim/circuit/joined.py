@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.circuit.lint.checks import check
-from cosim.circuit.lint.deck import Line, passed, read_all, refuse
+from cosim.circuit.lint.deck import Line, passed, read, refuse
 from cosim.circuit.lint.elements import Element, Scope, node, parse
 from cosim.circuit.lint.expressions import sensed
 from cosim.circuit.lint.words import definitions
@@ -83,7 +83,7 @@ def deck(
 
     Raises BadInput: for the netlist with its line, for the rest with what is wrong in the scene.
     """
-    lines, dropped = read_all(path)
+    lines, dropped = read(path)
     asks = measures(dropped)
     name = plain(path)
     found = {element.name: element for element in parse(lines).elements}

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from cosim.circuit.joined import check_reading, own_parameters, reading, text_of
 from cosim.circuit.lint.checks import REQUIRED as AGREED
-from cosim.circuit.lint.deck import Line, read_all, refuse
+from cosim.circuit.lint.deck import Line, read, refuse
 from cosim.circuit.lint.elements import Element, Scope
 from cosim.circuit.outputs import Measure, measures, without_effect
 from cosim.files.resources import circuits
@@ -90,8 +90,8 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
     saved |= {f"v({name})": f"v({name})" for name in OPTIONAL if name in present}
     if companion:
         saved[MOTIONAL] = MOTIONAL
-    read = dict(zip(every, reading(every), strict=True))
-    saved |= {name: read[word][0] for name, word in words.items()}
+    vectors = dict(zip(every, reading(every), strict=True))
+    saved |= {name: vectors[word][0] for name, word in words.items()}
     return text, saved
 
 
@@ -105,7 +105,7 @@ def _words(scene: Scene) -> dict[str, str]:
 def _checked(
     path: Path, renamed: Mapping[str, str], words: tuple[str, ...]
 ) -> tuple[Line, Scope, list[str]]:
-    lines, dropped = read_all(path)
+    lines, dropped = read(path)
     required = [[renamed[end].lower() for end in _SOURCES]] if renamed else AGREED
     return lines[0], *check_reading(path, lines, words, measures(dropped), required)
 
@@ -119,7 +119,7 @@ def _packaged(path: Path) -> tuple[Line, Scope]:
 def asked_for(scene: Scene) -> tuple[list[Measure], list[str]]:
     """What a netlist of one's own measures, in words that the log has, and a sentence for each of
     its lines that has no effect."""
-    _, dropped = read_all(path_of(scene))
+    _, dropped = read(path_of(scene))
     return measures(dropped), [*without_effect(dropped)]
 
 

@@ -73,7 +73,7 @@ def refuse_unknown(scene: Scene, names: Iterable[str]) -> None:
         )
     if scene.circuit.param:
         path = path_of(scene)
-        own_parameters(parse(read(path)), plain(path), scene.circuit.param)
+        own_parameters(parse(read(path)[0]), plain(path), scene.circuit.param)
     files = {fmu.name: fmu.file for fmu in scene.fmu}
     asked = [(files[name.split(".")[1]], name) for name in own if name.startswith("fmu.")]
     if asked:

@@ -16,7 +16,8 @@ import cosim
 from cosim.arrays import Array
 from cosim.circuit.joined import deck
 from cosim.circuit.lint.checks import check
-from cosim.circuit.lint.deck import named, read, read_all
+from cosim.circuit.lint.deck import named
+from cosim.circuit.lint.deck import read as read_all
 from cosim.circuit.lint.write import written
 from cosim.circuit.outputs import measured, measures
 from cosim.errors import BadInput, BeyondModel
@@ -24,6 +25,7 @@ from cosim.files.resources import circuits
 from cosim.toolchain.processes import in_place
 from tests.circuit.test_found_netlists import SCENE, found
 from tests.helpers import needs, spice
+from tests.helpers.netlists import read
 
 pytestmark = pytest.mark.filterwarnings(f"ignore::{BeyondModel.__module__}.{BeyondModel.__name__}")
 

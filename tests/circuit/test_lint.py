@@ -9,13 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.circuit.lint.checks import check
-from cosim.circuit.lint.deck import Line, read
+from cosim.circuit.lint.deck import Line
 from cosim.circuit.lint.expressions import BEHAVIOURAL, PARAMETRIC
 from cosim.circuit.lint.write import written
 from cosim.errors import BadInput, plain
 from cosim.files.resources import circuits
 from tests.helpers import needs
 from tests.helpers.examples import examples
+from tests.helpers.netlists import read
 from tests.helpers.ngspice_alone import run
 from tests.helpers.ordinary_netlists import ORDINARY
 

@@ -13,12 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.circuit.joined import deck
-from cosim.circuit.lint.deck import MAX_BYTES, read
+from cosim.circuit.lint.deck import MAX_BYTES
 from cosim.errors import BadInput
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from tests.helpers import needs
 from tests.helpers.examples import examples
+from tests.helpers.netlists import read
 from tests.helpers.ngspice_alone import run
 
 pytestmark = pytest.mark.reliability

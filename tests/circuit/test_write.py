@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from cosim.circuit.lint.checks import check
-from cosim.circuit.lint.deck import read
 from cosim.circuit.lint.write import written
 from cosim.circuit.netlist import prepare
 from cosim.errors import BadInput
 from cosim.files.resources import circuits
 from cosim.scene import Scene, load
+from tests.helpers.netlists import read
 from tests.helpers.ordinary_netlists import ORDINARY
 
 AMPLIFIER = (circuits() / "amplifier.cir").read_text(encoding="utf-8")

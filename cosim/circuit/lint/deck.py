@@ -123,17 +123,13 @@ def named(path: Path) -> list[Path]:
     return found
 
 
-def read(path: Path) -> list[Line]:
-    """The netlist with its includes inlined: a harmless title, then the lines that ngspice needs.
+def read(path: Path) -> tuple[list[Line], list[Line]]:
+    """The netlist with its includes inlined, a harmless title, then the lines that ngspice needs;
+    and the lines that were left out.
 
     The text ends at ``.end``, which is not among the lines. Raises BadInput, beginning with
     ``file:line:``, for anything that is not plainly part of a circuit.
     """
-    return read_all(path)[0]
-
-
-def read_all(path: Path) -> tuple[list[Line], list[Line]]:
-    """What :func:`read` gives, and the lines that were left out."""
     reading = _Reader(path)
     return reading.deck(), reading.dropped
 
