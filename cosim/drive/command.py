@@ -16,14 +16,16 @@ from cosim.scene.tables import Drive
 
 
 class Lagging(Command):
-    """Another command, later by ``lag`` (s)."""
+    """Another command, later by ``lag`` (s); 0 V before ``start`` (s)."""
 
-    def __init__(self, command: Command, lag: float) -> None:
+    def __init__(self, command: Command, lag: float, start: float = -inf) -> None:
         self._command = command
-        self._lag = lag
+        self._lag, self._start = lag, start
         self.v_offset, self.period = command.v_offset, command.period
 
     def piece(self, t: float) -> Piece:
+        if t < self._start:
+            return level(self._start, 0.0, self.v_offset)
         piece = self._command.piece(self._own(t))
         # Behind t, whatever rounding makes of the sum.
         piece.until = max(piece.until + self._lag, nextafter(t, inf))
@@ -41,21 +43,6 @@ class Lagging(Command):
         return min(own, nextafter(corner, -inf)) if t < edge else max(own, nextafter(corner, inf))
 
 
-class Switched(Command):
-    """Another command from ``start`` (s) on, where a share ``phase`` of its period has gone by; 0 V
-    before."""
-
-    def __init__(self, command: Command, start: float, phase: float) -> None:
-        self._command = Lagging(command, start - phase * command.period)
-        self._start = start
-        self.v_offset, self.period = command.v_offset, command.period
-
-    def piece(self, t: float) -> Piece:
-        if t < self._start:
-            return level(self._start, 0.0, self.v_offset)
-        return self._command.piece(t)
-
-
 def commands(scene: Scene) -> list[Command]:
     """The commands of a scene's surfaces: one, or two where they move by themselves."""
     first = command(scene)
@@ -70,7 +57,8 @@ def command(scene: Scene) -> Command:
         return Constant()
     made, drive = shape(scene), scene.drive
     if drive.start_time or drive.start_phase:
-        made = Switched(made, drive.start_time, drive.start_phase)
+        lag = drive.start_time - drive.start_phase * made.period
+        made = Lagging(made, lag, drive.start_time)
     return WithPwm(made) if drive.pwm_ripple else made
 
 
