@@ -1,32 +1,25 @@
 """The columns of the waveforms: the one place where each is named and described."""
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
-
-class Column(NamedTuple):
-    """What a column holds: its SI unit, and its name in words."""
-
-    unit: str
-    long_name: str
-
+from cosim.waveforms.quantities import Quantity
 
 _FIRST = {
-    "time": Column("s", "time"),
-    "command": Column("V", "command voltage V1"),
-    "current": Column("A", "current of one coil"),
-    "coil_voltage": Column("V", "voltage of the coil"),
-    "back_emf": Column("V", "back-EMF of the coil"),
-    "z_surface": Column("m", "height of the surface"),
-    "v_surface": Column("m/s", "velocity of the surface"),
-    "a_surface": Column("m/s2", "acceleration of the surface"),
-    "z_ram": Column("m", "height of the ram"),
-    "v_ram": Column("m/s", "velocity of the ram"),
-    "z_part": Column("m", "height of the part"),
-    "v_part": Column("m/s", "velocity of the part"),
-    "friction_force": Column("N", "friction force of the surface on the part"),
-    "sticking": Column("1", "whether the part sticks to the surface"),
-    "normal_force": Column("N", "normal force of the surface on the part"),
+    "time": Quantity("s", "time"),
+    "command": Quantity("V", "command voltage V1"),
+    "current": Quantity("A", "current of one coil"),
+    "coil_voltage": Quantity("V", "voltage of the coil"),
+    "back_emf": Quantity("V", "back-EMF of the coil"),
+    "z_surface": Quantity("m", "height of the surface"),
+    "v_surface": Quantity("m/s", "velocity of the surface"),
+    "a_surface": Quantity("m/s2", "acceleration of the surface"),
+    "z_ram": Quantity("m", "height of the ram"),
+    "v_ram": Quantity("m/s", "velocity of the ram"),
+    "z_part": Quantity("m", "height of the part"),
+    "v_part": Quantity("m/s", "velocity of the part"),
+    "friction_force": Quantity("N", "friction force of the surface on the part"),
+    "sticking": Quantity("1", "whether the part sticks to the surface"),
+    "normal_force": Quantity("N", "normal force of the surface on the part"),
 }
 
 _SECOND = (
@@ -34,8 +27,8 @@ _SECOND = (
     "z_ram", "v_ram", "friction_force", "sticking",
 )  # fmt: skip
 
-COLUMNS: dict[str, Column] = _FIRST | {
-    f"{name}_2": Column(_FIRST[name].unit, f"{_FIRST[name].long_name}, second surface")
+COLUMNS: dict[str, Quantity] = _FIRST | {
+    f"{name}_2": Quantity(_FIRST[name].unit, f"{_FIRST[name].text}, second surface")
     for name in _SECOND
 }
 """Every column by its name, in the order of the files. Absent participants have none.
@@ -49,7 +42,7 @@ UNITS = {name: column.unit for name, column in COLUMNS.items()}
 
 def about(name: str, unit: str) -> dict[str, str]:
     """A column's attributes in a dataset; one of a scene's own FMUs has no words but its name."""
-    return {"units": unit} | ({"long_name": COLUMNS[name].long_name} if name in COLUMNS else {})
+    return {"units": unit} | ({"long_name": COLUMNS[name].text} if name in COLUMNS else {})
 
 
 def netcdf_name(name: str) -> str:

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 
 class Quantity(NamedTuple):
-    """What an entry of the summary is: its SI unit, ``""`` for words and lists, and its meaning."""
+    """What a column of the waveforms or an entry of the summary is: its SI unit, ``""`` for words
+    and lists, and its meaning."""
 
     unit: str
     text: str

@@ -166,7 +166,7 @@ def scenes() -> str:
 
 
 def waveforms() -> str:
-    rows = [[code(name), pretty(c.unit), sentence(c.long_name)] for name, c in COLUMNS.items()]
+    rows = [[code(name), pretty(c.unit), sentence(c.text)] for name, c in COLUMNS.items()]
     return "\n\n".join(
         [
             "# Waveforms",

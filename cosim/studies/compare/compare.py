@@ -222,14 +222,14 @@ def _comparable(
     """The recording with those of its signals that the run has, and its notes."""
     notes, name = list(recording.notes), plain(recording.name)
     kept = {name: values for name, values in recording.signals.items() if name in waveforms}
-    others = ", ".join(COLUMNS[one].long_name for one in recording.signals if one not in kept)
+    others = ", ".join(COLUMNS[one].text for one in recording.signals if one not in kept)
     if not kept:
         raise BadInput(f"{name}: the run has no {others} to compare it with.")
     if others:
         notes.append(f"Left out, since the run has none: {others}.")
     for signal, values in kept.items():
         if np.ptp(values[np.isfinite(values)]) == 0.0:
-            words = f"the {COLUMNS[signal].long_name} does not change"
+            words = f"the {COLUMNS[signal].text} does not change"
             raise BadInput(f"{name}: {words}: there is nothing to compare.")
     return replace(recording, signals=kept), notes
 

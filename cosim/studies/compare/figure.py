@@ -68,7 +68,7 @@ def _panel(axis: Axes, name: str, color: str, found: Found) -> None:
         first = values[np.isfinite(measured)][0] if name.startswith("z") else 0.0
         axis.plot(time, (values - first) * scale, **style)
     axis.grid(alpha=0.25)
-    axis.set_ylabel(f"{COLUMNS[name].long_name} [{unit}]")
+    axis.set_ylabel(f"{COLUMNS[name].text} [{unit}]")
     axis.set_title(_words(name, found), fontsize=10, loc="left")
 
 

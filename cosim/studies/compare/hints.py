@@ -71,7 +71,7 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
         if factor != 1.0 and _better(after, before):
             fine = False
             start = starts[int(np.argmax(shares[factor]))] if name == guide else start
-            yield _agree(COLUMNS[name].long_name, after, before) + _scaled(recording, name, factor)
+            yield _agree(COLUMNS[name].text, after, before) + _scaled(recording, name, factor)
     for sentence in _of_other_motion(recording, observe, laid, guide, start) if fine else ():
         fine = False
         yield sentence
@@ -84,7 +84,7 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
             clocks[clock] = max(explained(run, signals[guide]) for run in runs)
         clock = max(clocks, key=lambda clock: clocks[clock])
         if _better(clocks[clock], clocks[1.0]) and clocks[clock] - clocks[1.0] > 0.02:
-            agree = _agree(COLUMNS[guide].long_name, clocks[clock], clocks[1.0])
+            agree = _agree(COLUMNS[guide].text, clocks[clock], clocks[1.0])
             yield f"{agree} with times multiplied by {clock:.3f}: is its frame rate right?"
 
 

@@ -56,7 +56,7 @@ def overlays(found: Solved) -> Picture:
                 (simulated[name], {"color": SIMULATED, "lw": 0.9, "label": "identified rig"}),
             ):
                 axis.plot(time, values * scale, **style)
-            what = f"{whose}: {COLUMNS[name].long_name} [{unit}], {of.format(row[error])}"
+            what = f"{whose}: {COLUMNS[name].text} [{unit}], {of.format(row[error])}"
             axis.set_title(what, loc="left", fontsize=9)
     for axis in axes[-3:]:
         axis.set_xlabel("time [ms]")
