@@ -33,6 +33,7 @@ from cosim.scene import Scene, changed
 from cosim.simulation.elsewhere import one_run
 from cosim.simulation.fidelity import LEAST, Fidelity, relative_error
 from cosim.simulation.here import few_rows, simulate_here
+from cosim.toolchain.processes import Progress
 from cosim.waveforms.result import Result
 
 COARSER = 3.5
@@ -76,9 +77,6 @@ MOST_PERIODS = 8
 
 class _Stopped(CosimError):
     """Nobody waits for this run any more."""
-
-
-Progress = Callable[[float], None]
 
 
 @contextmanager
