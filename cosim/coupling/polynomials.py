@@ -5,6 +5,7 @@ of the signal's own shape, belongs to (t - t_n)^k. Plain arithmetic serves both:
 asks for a polynomial at each of its macro points, where arrays would cost more than the step.
 """
 
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -61,20 +62,7 @@ def projected(coefficients: Any, h: float, degree: int) -> Polynomial:
 
 
 class History:
-    """The last values of a signal at communication points, newest last, and the newest slope."""
-
-    __slots__ = (
-        "_most",
-        "_number",
-        "_slopes",
-        "_t1",
-        "_t2",
-        "_v1",
-        "_v2",
-        "slope",
-        "time",
-        "value",
-    )
+    """The last values of a signal at communication points, the newest first, and its slope."""
 
     def __init__(self, degree: int, slopes: bool) -> None:
         """Polynomials up to ``degree``; with ``slopes`` the newest slope counts as a known value.
@@ -82,45 +70,43 @@ class History:
         Without it older values are used instead, and the slope only fills in while there are not
         yet enough of them, so that a method begins with its own order.
         """
-        self._most = max(degree, 1) + 1
+        self._points: deque[tuple[float, Any]] = deque(maxlen=max(degree, 1) + 1)
         self._slopes = slopes
-        self._number = 0
-        self.time = self._t1 = self._t2 = 0.0
-        """Of the newest point, s."""
-        self.value: Any = None
-        """The newest value; older ones stay apart from it, for speed."""
-        self._v1 = self._v2 = self.value
         self.slope: Any = None
         """The newest slope, per second; None where it is not known."""
 
+    @property
+    def value(self) -> Any:
+        """The newest value."""
+        return self._points[0][1]
+
     def add(self, time: float, value: Any, slope: Any) -> None:
         """A new communication point at ``time`` (s)."""
-        self._t2, self._t1, self.time = self._t1, self.time, time
-        self._v2, self._v1, self.value = self._v1, self.value, value
+        self._points.appendleft((time, value))
         self.slope = slope
-        if self._number < self._most:
-            self._number += 1
 
     def restart(self) -> None:
         """Forget all but the newest point: what is older lies before an event."""
-        self._number = 1
+        while len(self._points) > 1:
+            self._points.pop()
 
     def polynomial(self, degree: int) -> Polynomial:
         """The polynomial of ``degree`` 0, 1 or 2 through the newest points, about the newest; of a
         lower degree while there are too few."""
-        newest, slope = self.value, self.slope
+        (time, newest), *older = self._points
+        slope = self.slope
         if degree == 0:
             return (newest,)
-        slopes = slope is not None and (self._slopes or self._number <= degree)
-        points = min(degree + 1 - slopes, self._number)
-        if points == 1:
+        slopes = slope is not None and (self._slopes or len(older) < degree)
+        points = min(degree - slopes, len(older))
+        if points == 0:
             return (newest, slope) if slopes else (newest,)
-        back = self._t1 - self.time
-        rise = (self._v1 - newest) / back
-        if points == 2:
+        back = older[0][0] - time
+        rise = (older[0][1] - newest) / back
+        if points == 1:
             return (newest, slope, (rise - slope) / back) if slopes else (newest, rise)
-        further = self._t2 - self.time
-        bend = ((self._v2 - newest) / further - rise) / (further - back)
+        further = older[1][0] - time
+        bend = ((older[1][1] - newest) / further - rise) / (further - back)
         return (newest, rise - bend * back, bend)
 
     def polynomial_to(self, h: float, end: Any, degree: int) -> Polynomial:
@@ -128,19 +114,18 @@ class History:
         and the newest points, about the newest."""
         if degree == 0:
             return (end,)
-        newest = self.value
+        (time, newest), *older = self._points
         rise = (end - newest) / h
-        if degree == 1 or self._number == 1:
+        if degree == 1 or not older:
             return (newest, rise)
-        back = self._t1 - self.time
-        bend = (rise - (self._v1 - newest) / back) / (h - back)
+        back = older[0][0] - time
+        bend = (rise - (older[0][1] - newest) / back) / (h - back)
         return (newest, rise - bend * h, bend)
 
     def save(self) -> tuple[Any, ...]:
-        times, values = (self.time, self._t1, self._t2), (self.value, self._v1, self._v2)
-        return (self._number, times, values[: self._number], self.slope)
+        return (tuple(self._points), self.slope)
 
     def restore(self, saved: tuple[Any, ...]) -> None:
-        self._number, times, values, self.slope = saved
-        self.time, self._t1, self._t2 = times
-        self.value, self._v1, self._v2 = (*values, None, None, None)[:3]
+        points, self.slope = saved
+        self._points.clear()
+        self._points.extend(points)

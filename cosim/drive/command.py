@@ -7,7 +7,7 @@ where the highest command needs V_DAC = 0. In truth it is a PWM, of which ``v_of
 
 from math import inf, nextafter
 
-from cosim.drive.periodic import Constant, Corners, Lines, Sine, held
+from cosim.drive.periodic import Corners, Lines, Sine, held
 from cosim.drive.pieces import Command, Piece, level
 from cosim.drive.staircase import Staircase, WithPwm
 from cosim.scene import Scene
@@ -52,9 +52,7 @@ def commands(scene: Scene) -> list[Command]:
 
 
 def command(scene: Scene) -> Command:
-    """The command of a scene; 0 V for ever where nothing drives the coil."""
-    if not scene.rung.driven:
-        return Constant()
+    """The command of a scene with a coil."""
     made, drive = shape(scene), scene.drive
     if drive.start_time or drive.start_phase:
         lag = drive.start_time - drive.start_phase * made.period

@@ -1,4 +1,4 @@
-"""Commands with a shape of their own: constant, sine, and straight lines between corners."""
+"""Commands with a shape of their own: sine, and straight lines between corners."""
 
 from bisect import bisect_right
 from collections.abc import Sequence
@@ -10,15 +10,6 @@ import numpy as np
 from cosim.arrays import Array
 from cosim.drive.pieces import RAMP, SINE, Command, Piece, edge_before, level
 from cosim.scene.firmware import offset_pin
-
-
-class Constant(Command):
-    """0 V for ever."""
-
-    v_offset, period = 0.0, inf
-
-    def piece(self, t: float) -> Piece:
-        return level(inf, 0.0, 0.0)
 
 
 class _Periodic(Command):

@@ -26,9 +26,8 @@ def straights(
     """Times (s), the first one where the last ones ended, and V1 (V, a column a command) at the
     start and the end of each interval between two of them, until ``duration``, block after block.
     The commands are of one shape; of a sine there are ``chords`` a period."""
-    found = commands[0].lines(0.0, duration, _TOGETHER) if len(commands) == 1 else None
-    if found is not None:
-        yield from _lines(commands[0], duration, found)
+    if len(commands) == 1 and commands[0].lines(0.0, duration, 1):
+        yield from _lines(commands[0], duration)
         return
     edges = [0.0]
     pieces = [command.piece(0.0) for command in commands]
@@ -54,13 +53,10 @@ def straights(
             edges, rows = edges[-1:], []
 
 
-def _lines(
-    command: Command, duration: float, found: tuple[Array, Array, Array] | None
-) -> Iterator[tuple[Array, Array, Array]]:
-    """The straights of a command that knows them at once, from the first ones, ``found``, on."""
+def _lines(command: Command, duration: float) -> Iterator[tuple[Array, Array, Array]]:
+    """The straights of a command that knows them at once."""
     begin = 0.0
-    while begin < duration:
-        assert found is not None
+    while begin < duration and (found := command.lines(begin, duration, _TOGETHER)):
         corners, start, end = found
         count = int(corners.searchsorted(duration))
         if count < len(corners):
@@ -70,7 +66,6 @@ def _lines(
                 corners, end = np.append(corners[:count], duration), np.append(end[:-1], last)
         yield corners, start[:, np.newaxis], end[:, np.newaxis]
         begin = float(corners[-1])
-        found = command.lines(begin, duration, _TOGETHER) if begin < duration else None
 
 
 def straight(piece: Piece, begin: float) -> tuple[float, float, float]:

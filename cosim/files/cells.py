@@ -29,7 +29,6 @@ _TOLD = 10_000  # rows between two words on how far it is
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029]")
 _DIGITS = r"[+-]?(?:[0-9]++{0}?[0-9]*+|{0}[0-9]++)(?:[eE][+-]?[0-9]++)?"
 _NUMBER = {sign: re.compile(_DIGITS.format(re.escape(sign))) for sign in ".,"}
-_NUMBERS = re.compile(f"(?:{_DIGITS.format(re.escape('.'))}\n)*+")
 _QUOTED = re.compile(r' *"((?:[^"]|"")*+)" *')
 
 
@@ -69,18 +68,10 @@ class Cells:
         Raises BadInput, with row and ``column``, for what is no finite number.
         """
         texts = [row[place] for _, row in self.rows[heads:]]
-        if _NUMBERS.fullmatch("".join(f"{text}\n" for text in texts)):
-            if self.separator != ",":
-                for (line, _), text in zip(self.rows[heads:], texts, strict=True):
-                    if "." in text:
-                        self._signed(".", line, column)
-                        break
-            values = np.array([float(text) for text in texts])
-        else:
-            values = np.full(len(texts), np.nan)
-            for k, text in enumerate(texts):
-                if text.strip("\ufffd").lower() not in missing:
-                    values[k] = self._number(text, self.rows[heads + k][0], column)
+        values = np.full(len(texts), np.nan)
+        for k, text in enumerate(texts):
+            if text.strip("\ufffd").lower() not in missing:
+                values[k] = self._number(text, self.rows[heads + k][0], column)
         if np.isinf(values).any():
             k = int(np.isinf(values).argmax())
             self._refuse(self.rows[heads + k][0], column, texts[k], "is not finite")

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from copy import copy
 from ctypes import byref, c_double, c_uint, c_void_p, cast
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from itertools import count
 from threading import Lock
 from typing import Any
@@ -95,12 +95,6 @@ class Interface:
             self._logger = fmi3.fmi3LogMessageCallback(lambda *a: self.messages.append(_text(a[3])))
             self._fmu.instantiate(logMessage=self._logger)
         self._begin()
-        self._names = {name: names[version - 2] for name, names in _FUNCTIONS.items()}
-        self._call = {
-            name: partial(getattr(self._fmu, function), self._fmu.component)
-            for name, function in self._names.items()
-            if hasattr(self._fmu, function)  # a stranger may lack what it does not need
-        }
 
     def _begin(self) -> None:
         """Enter the initialisation."""
@@ -108,15 +102,20 @@ class Interface:
             self._fmu.setupExperiment()
         self._fmu.enterInitializationMode()
 
+    def _call(self, name: str, *arguments: Any) -> None:
+        """One of _FUNCTIONS, which a stranger may lack if it does not need it."""
+        function = getattr(self._fmu, _FUNCTIONS[name][self.version - 2])
+        function(self._fmu.component, *arguments)
+
     def _exchange(self, name: str, places: Any, values: Any) -> None:
         count = (len(values),) if self.version == 3 else ()
-        self._call[name](places, len(places), values, *count)
+        self._call(name, places, len(places), values, *count)
 
     def derivative(self, unknown: Any, known: Any, result: Any) -> None:
         """Put d(outputs ``unknown``)/d(input ``known``) into ``result``; ``known`` is one place."""
         n = len(unknown)
         rest = (_ONE, 1, result, n) if self.version == 3 else (_ONE, result)
-        self._call["derivative"](unknown, n, known, 1, *rest)
+        self._call("derivative", unknown, n, known, 1, *rest)
 
     def places(self, names: Iterable[str]) -> Any:
         """The value references of variables, as an array for the calls."""
@@ -141,7 +140,7 @@ class Interface:
 
     def do_step(self, time: float, step: float) -> None:
         """Advance by ``step`` from ``time``, s."""
-        self._call["do_step"](time, step, *_STEP_ENDS[self.version])
+        self._call("do_step", time, step, *_STEP_ENDS[self.version])
 
     def set_reals(self, places: Any, values: Any) -> None:
         self._exchange("set_reals", places, values)
@@ -157,20 +156,21 @@ class Interface:
 
     def get_state(self, handle: c_void_p) -> None:
         """Save the state into ``handle``: a null one is given memory, a used one is overwritten."""
-        self._call["get_state"](byref(handle))
+        self._call("get_state", byref(handle))
 
     def set_state(self, handle: c_void_p) -> None:
         """Go back to a saved state."""
-        self._call["set_state"](handle)
+        self._call("set_state", handle)
 
     def free_state(self, handle: c_void_p) -> None:
         """Free the memory of a saved state."""
-        self._call["free_state"](byref(handle))
+        self._call("free_state", byref(handle))
 
     @cached_property
     def addresses(self) -> dict[str, int]:
         """Where compiled code finds the instance and four functions, by their names here."""
-        found = {name: getattr(self._fmu.dll, self._names[name]) for name in _COMPILED}
+        names = {name: _FUNCTIONS[name][self.version - 2] for name in _COMPILED}
+        found = {name: getattr(self._fmu.dll, function) for name, function in names.items()}
         where = {name: cast(function, c_void_p).value or 0 for name, function in found.items()}
         return {"instance": self._fmu.component, **where}
 
@@ -178,7 +178,7 @@ class Interface:
         """Free the instance; fmpy's own way to do so unloads the library, too."""
         if self._running:
             self._fmu.terminate()
-        self._call["free_instance"]()
+        self._call("free_instance")
 
 
 _ONE = (c_double * 1)(1.0)

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 import cosim
 from cosim.drive.command import (
     Command,
-    Constant,
     Lagging,
     Lines,
     Sine,
@@ -255,12 +254,6 @@ def test_a_level_is_a_key() -> None:
     assert changed(base, {"drive.table.2": 0.25}, "test").drive.table == [[0, 0.5], [0.5, 0.25]]
     array = np.array([[0.0, 0.5], [0.5, 0.25]])
     assert load(base, {"drive.table": array}).drive.table == array.tolist()
-
-
-def test_no_drive() -> None:
-    drive = made(scene="held")
-    assert isinstance(drive, Constant)
-    assert (drive.value(0.3), drive.next_jump(0.0)) == (0.0, inf)
 
 
 @pytest.mark.parametrize("waveform", ["sawtooth", "square"])
