@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cosim.drive.command import Constant, Staircase, WithPwm
+from cosim.drive.command import Staircase, WithPwm
+from cosim.drive.periodic import Lines
 from cosim.scene.firmware import staircase, volts
 from tests.helpers import needs
 from tests.helpers.datasheet import ROWS, check, missing, write
@@ -198,7 +199,7 @@ def test_pwm_ripple(tmp_path, code):
 
 
 def _offset_at(mean):
-    command = Constant()
+    command = Lines(1.0, 0.0, 0.0, [(0.0, 0.0)])
     command.v_offset = mean
     return command
 
