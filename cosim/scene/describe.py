@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
-from cosim.scene.methods import CouplingMethod
-from cosim.scene.rungs import Rung
+from cosim.scene.rungs import CouplingMethod, Rung
 from cosim.scene.tables import GIVEN_SURFACES, PORT_LISTS, TABLES
 
 

@@ -18,8 +18,8 @@ from cosim.files import link, reader
 from cosim.files.resources import circuits, compiled_fmus
 from cosim.scene import messages, toml
 from cosim.scene.describe import KEYS, acts, keys
-from cosim.scene.methods import METHODS
 from cosim.scene.model import Scene, toml_value
+from cosim.scene.rungs import METHODS
 from cosim.scene.tables import KNOBS, LEVEL_KEY, NORMAL_FORCES, PARAM_KEY, PATHS, PORT_LISTS, TABLES
 
 _LIBRARY = Path(__file__).with_name("library")

@@ -8,9 +8,8 @@ from pydantic import ValidationError
 
 from cosim.errors import BadInput, plain
 from cosim.scene.describe import KEYS, Key, acts, described, keys
-from cosim.scene.methods import METHODS, CouplingMethod
 from cosim.scene.model import toml_value
-from cosim.scene.rungs import RUNGS, Rung
+from cosim.scene.rungs import METHODS, RUNGS, CouplingMethod, Rung
 from cosim.scene.tables import GIVEN_SURFACES, PORT_LISTS, TABLES
 
 ALLOWED_TOP = {

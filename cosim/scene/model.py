@@ -9,8 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cosim.scene import firmware
 from cosim.scene.describe import KEYS, Key, keys
-from cosim.scene.methods import OF_PORTS
-from cosim.scene.rungs import RUNGS, Rung
+from cosim.scene.rungs import OF_PORTS, RUNGS, Rung
 from cosim.scene.tables import (
     COMMANDS,
     GIVEN_SURFACES,

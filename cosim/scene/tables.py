@@ -15,8 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from cosim.files.resources import fmu_sources
 from cosim.scene import firmware
-from cosim.scene.methods import METHODS, CouplingMethod
-from cosim.scene.rungs import RUNGS, Rung
+from cosim.scene.rungs import METHODS, RUNGS, CouplingMethod, Rung
 
 _ROW = re.compile(
     r'^(INT_)?(?:PARAMETER|TUNABLE|INPUT)\((\w+), (?:"(.*?)", )?(.*?), (.*?), (.*?), "(.*)"\)$',

@@ -17,8 +17,7 @@ import cosim
 from cosim.cli.main import _parser
 from cosim.scene.describe import Key, keys
 from cosim.scene.loading import list_scenes
-from cosim.scene.methods import METHODS
-from cosim.scene.rungs import RUNGS
+from cosim.scene.rungs import METHODS, RUNGS
 from cosim.scene.tables import PORT_LISTS, TABLES
 from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.formats import formats

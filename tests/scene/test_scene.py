@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from cosim.errors import BadInput, NoEffect, Note
 from cosim.mechanics import package
 from cosim.scene import RUNGS, Key, Scene, changed, keys, list_scenes, load, to_toml
-from cosim.scene.methods import METHODS
+from cosim.scene.rungs import METHODS
 from cosim.scene.tables import Circuit, Coupling
 from tests.helpers.examples import examples
 

@@ -16,7 +16,7 @@ from cosim.coupling.methods import methods
 from cosim.coupling.polynomials import projected
 from cosim.drive.command import command
 from cosim.scene import Scene
-from cosim.scene.methods import METHODS
+from cosim.scene.rungs import METHODS
 
 _ON_TIME = 1e-13
 """s; times of the circuit this close to a macro point are on it."""
