@@ -42,6 +42,17 @@ class Agenda:
         """Where compiled code finds both arrays."""
 
 
+@lru_cache(4)
+def _all(*given: Any) -> tuple[Agenda, ...]:
+    return tuple(agendas(*given))
+
+
+def kept(row_step: float, duration: float, *more: Any) -> Iterator[Agenda]:
+    """What :func:`agendas` gives; that of a run which is not long is kept, as others have it."""
+    make = _all if count(row_step, duration) <= KEPT else agendas
+    return iter(make(row_step, duration, *more))
+
+
 def agendas(
     row_step: float,
     duration: float,
@@ -56,27 +67,6 @@ def agendas(
     Of frames, which are exposed for a share ``shutter`` of their interval, the instants. With
     ``slope`` also the part's heights at :func:`part_times`.
     """
-    given = (row_step, duration, settle, stops, shutter, slope)
-    return iter(_kept(*given)) if count(row_step, duration) <= KEPT else _agendas(*given)
-
-
-@lru_cache(4)
-def _kept(*given: Any) -> tuple[Agenda, ...]:
-    """Those of a run, as many other runs have them."""
-    made = tuple(_agendas(*given))
-    for agenda in made:
-        agenda.times.flags.writeable = agenda.what.flags.writeable = False
-    return made
-
-
-def _agendas(
-    row_step: float,
-    duration: float,
-    settle: float,
-    stops: tuple[float, ...],
-    shutter: float,
-    slope: bool,
-) -> Iterator[Agenda]:
     frame_step = 1.0 / FRAME_RATE
     parts = part_times(duration, settle) if slope else np.empty(0)
     extra = np.concatenate([[settle, *stops], parts])

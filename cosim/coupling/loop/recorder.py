@@ -62,9 +62,9 @@ class Recorder:
         self._library.fmu_bind(byref(self._fmu), mechanics.instance.version)
         grip = mechanics.normal_force
         corners = [t for t in grip.corners if 0.0 < t < run.duration] if grip else []
-        self._agendas = agenda.agendas(
+        self._agendas = agenda.kept(
             *(run.output_step, run.duration, run.settle, (*corners, run.duration), run.shutter),
-            slope=run.average == "slope",
+            run.average == "slope",
         )
         self._corners = np.array([grip.corners, grip.forces] if grip else [])
         self._schedule = None
