@@ -23,10 +23,6 @@ class Past:
     Signals are numbers or arrays, SI; polynomials are about the communication point.
     """
 
-    __slots__ = (
-        *("time", "current", "emf", "h", "end", "mean", "gain", "carried", "carried_slope"),
-    )
-
     def __init__(self, method: "Method") -> None:
         self.time = 0.0
         """s; of the communication point."""

@@ -78,7 +78,8 @@ class Interface:
         self.messages: deque[str] = deque(maxlen=100) if messages is None else messages
         """What the FMU has said, the newest last."""
         self._running = False
-        self._fmu = copy(load(version) if loaded is None else loaded)
+        self.raw = copy(load(version) if loaded is None else loaded)
+        """fmpy's own object."""
         if version == 2:
             callbacks = fmi2.fmi2CallbackFunctions()
             callbacks.logger = _logger_2
@@ -90,22 +91,22 @@ class Interface:
                 addLoggerProxy(byref(callbacks))
             callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
             callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
-            self._fmu.instantiate(callbacks=callbacks)
+            self.raw.instantiate(callbacks=callbacks)
         else:
             self._logger = fmi3.fmi3LogMessageCallback(lambda *a: self.messages.append(_text(a[3])))
-            self._fmu.instantiate(logMessage=self._logger)
+            self.raw.instantiate(logMessage=self._logger)
         self._begin()
 
     def _begin(self) -> None:
         """Enter the initialisation."""
         if self.version == 2:
-            self._fmu.setupExperiment()
-        self._fmu.enterInitializationMode()
+            self.raw.setupExperiment()
+        self.raw.enterInitializationMode()
 
     def _call(self, name: str, *arguments: Any) -> None:
         """One of _FUNCTIONS, which a stranger may lack if it does not need it."""
-        function = getattr(self._fmu, _FUNCTIONS[name][self.version - 2])
-        function(self._fmu.component, *arguments)
+        function = getattr(self.raw, _FUNCTIONS[name][self.version - 2])
+        function(self.raw.component, *arguments)
 
     def _exchange(self, name: str, places: Any, values: Any) -> None:
         count = (len(values),) if self.version == 3 else ()
@@ -123,19 +124,14 @@ class Interface:
 
     def restart(self) -> None:
         """Back to the state after the making: parameters can be set again."""
-        self._fmu.reset()
+        self.raw.reset()
         self._running = False
         self.messages.clear()
         self._begin()
 
-    @property
-    def raw(self) -> Any:
-        """fmpy's own object."""
-        return self._fmu
-
     def initialise(self) -> None:
         """End the initialisation, in which parameters could be set."""
-        self._fmu.exitInitializationMode()
+        self.raw.exitInitializationMode()
         self._running = True
 
     def do_step(self, time: float, step: float) -> None:
@@ -170,14 +166,14 @@ class Interface:
     def addresses(self) -> dict[str, int]:
         """Where compiled code finds the instance and four functions, by their names here."""
         names = {name: _FUNCTIONS[name][self.version - 2] for name in _COMPILED}
-        found = {name: getattr(self._fmu.dll, function) for name, function in names.items()}
+        found = {name: getattr(self.raw.dll, function) for name, function in names.items()}
         where = {name: cast(function, c_void_p).value or 0 for name, function in found.items()}
-        return {"instance": self._fmu.component, **where}
+        return {"instance": self.raw.component, **where}
 
     def close(self) -> None:
         """Free the instance; fmpy's own way to do so unloads the library, too."""
         if self._running:
-            self._fmu.terminate()
+            self.raw.terminate()
         self._call("free_instance")
 
 

@@ -1,6 +1,7 @@
 """The normal force of a grip that changes in time, as a file gives it."""
 
 from bisect import bisect_left, bisect_right
+from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.errors import BadInput, plain
@@ -10,15 +11,15 @@ from cosim.scene import Scene
 _SAME_TIME = 1e-12  # s; times closer than this are one, as in the recorder
 
 
+@dataclass(frozen=True)
 class NormalForce:
     """Normal force of one surface, N, linear between its ``corners`` (s), where it may jump.
 
     Before the first corner and after the last it keeps their value.
     """
 
-    def __init__(self, times: list[float], forces: list[float]) -> None:
-        self.corners = times
-        self.forces = forces
+    corners: list[float]
+    forces: list[float]
 
     def value(self, time: float) -> float:
         """The force at ``time`` (s), N; at a jump the one after it."""

@@ -34,13 +34,13 @@ class Fidelity:
     @classmethod
     def of(cls, scene: Scene) -> "Fidelity":
         """The policy for a scene: its ``run.tolerance``."""
-        simple = {"circuit.model": SEARCHES, "drive.pwm_ripple": False}
-        if not scene.rung.ngspice or scene.rung.own_netlist:
-            return cls(scene.run.tolerance, None)
-        try:
-            changed(scene, simple, "limited")
-        except BadInput:
-            return cls(scene.run.tolerance, None)
+        simple = None
+        if scene.rung.ngspice and not scene.rung.own_netlist:
+            simple = {"circuit.model": SEARCHES, "drive.pwm_ripple": False}
+            try:
+                changed(scene, simple, "limited")
+            except BadInput:
+                simple = None
         return cls(scene.run.tolerance, simple)
 
     def agrees(self, value: float | None, judged: float | None) -> bool:

@@ -166,16 +166,9 @@ def motion(scene: Scene, recorder: Recorder) -> Motion:
     if scene.mechanics.free_ram:
         last = dict(zip(recorder.mechanics.columns, recorder.rows[-1].tolist(), strict=True))
         ram = last["z_ram"] - last["z_surface"]
-    return Motion(
-        *(recorder.at_end, recorder.at_settle, _extremes(scene, recorder), recorder.frames),
-        average_slope(scene.run, recorder.parts),
-        ram,
-    )
-
-
-def _extremes(scene: Scene, recorder: Recorder) -> dict[str, float]:
     names = (f"{what}_surface_{end}" for what in "avz" for end in ("max", "min"))
-    found = dict(zip(names, recorder.extremes, strict=False))  # the current's follow
+    extremes = dict(zip(names, recorder.extremes, strict=False))  # the current's follow
     if scene.mechanics.contact == "rigid":  # an impact changes velocities in no time
-        found |= {"a_surface_max": math.inf, "a_surface_min": -math.inf}
-    return found
+        extremes |= {"a_surface_max": math.inf, "a_surface_min": -math.inf}
+    slope = average_slope(scene.run, recorder.parts)
+    return Motion(recorder.at_end, recorder.at_settle, extremes, recorder.frames, slope, ram)

@@ -44,16 +44,16 @@ class LinearParticipant:
         self._input, self._input_slope = value(inputs, h), slope(inputs, h)
         if gain:
             self._input = self._input + gain * total
-            self._input_slope = self._input_slope + gain * self._output(self._input)
+            self._input_slope = self._input_slope + gain * self._output()
 
-    def _output(self, inputs: Array) -> Array:
-        return self._c @ self.state + self._d @ inputs
+    def _output(self) -> Array:
+        return self._c @ self.state + self._d @ self._input
 
     def outputs(self, inputs: Signal | None = None) -> Signal:
         if inputs is not None:
             self._input, self._input_slope = inputs
         rate = self._a @ self.state + self._b @ self._input
-        return self._output(self._input), self._c @ rate + self._d @ self._input_slope
+        return self._output(), self._c @ rate + self._d @ self._input_slope
 
     def gain(self) -> float:
         """Derivative of the (first) output's slope with respect to the (first) input, now."""

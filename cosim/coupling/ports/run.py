@@ -79,7 +79,8 @@ class Run:
         self._blocks = [np.zeros((_POINTS, 1 + len(plan.sources) + count))]
         self._blocks.append(np.zeros((_POINTS, 1 + width)))
         repeats = plan.method == "redo"
-        states, row = [], ctypes.addressof(self._rows[0])
+        rows, saved = (list(map(ctypes.addressof, each)) for each in (self._rows, self._saved))
+        states, row = [], rows[0]
         for side in plan.sides:
             states.append(side.state(row, repeats))
             row += 8 * side.width
@@ -101,9 +102,9 @@ class Run:
             n_fmus=len(states),
             sources=ctypes.addressof(self._sources),
             n_sources=len(plan.sources),
-            **_named(("outputs", "before", "rates"), self._rows),
+            **dict(zip(("outputs", "before", "rates"), rows, strict=True)),
             n_outputs=width,
-            **_named(("now", "last", "start", "charges"), self._saved),
+            **dict(zip(("now", "last", "start", "charges"), saved, strict=True)),
             places=ctypes.addressof(self.places),
             n_saved=count,
             driven=int(plan.driven),
@@ -240,10 +241,6 @@ class Run:
                 f"{duration:g} s. A node may ring undamped; where coupling.method is "
                 '"redo", an FMU\'s outputs may jump without end.'
             )
-
-
-def _named(names: tuple[str, ...], arrays: list[Any]) -> dict[str, int]:
-    return dict(zip(names, map(ctypes.addressof, arrays), strict=True))
 
 
 def _pulse(values: list[float], duration: float, step: float) -> Any:

@@ -118,23 +118,22 @@ def _limited(scene: Scene, log: dict[str, Array]) -> dict[str, float]:
     least = AT_WORK_HERE if scene.circuit.netlist is None else AT_WORK
     spent: dict[str, float] = {}
     whole = 0.0
-    for steps in blocks(len(log["time"]) - 1):
-        # One step more, for what leads to the first.
-        lead = min(steps.start, 1)
-        reach = slice(steps.start - lead, steps.stop + 1)
-        part = {name: np.ascontiguousarray(values[reach]) for name, values in log.items()}
+    lead = 0
+    for part in _points(log, lead=1):
         h = np.diff(part["time"])[lead:]
         h = h * (part["time"][1 + lead :] > scene.run.settle)
         whole += float(h.sum())
         for name, shares in shares_of_steps(part, least).items():
             spent[name] = spent.get(name, 0.0) + total(h, shares[lead:])
+        lead = 1  # what leads to the first step of a part is a step of the last one
     return {name: time / whole for name, time in spent.items()}
 
 
-def _points(log: dict[str, Array]) -> Iterator[dict[str, Array]]:
-    """The log in parts, each with the first point of the next one as its last."""
+def _points(log: dict[str, Array], lead: int = 0) -> Iterator[dict[str, Array]]:
+    """The log in parts, each with the first point of the next one as its last, and so many points
+    of the one before as its first."""
     for part in blocks(len(log["time"]) - 1):
-        reach = slice(part.start, part.stop + 1)
+        reach = slice(max(part.start - lead, 0), part.stop + 1)
         yield {name: np.ascontiguousarray(values[reach]) for name, values in log.items()}
 
 
