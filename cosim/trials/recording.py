@@ -10,7 +10,7 @@ from cosim.arrays import Array
 from cosim.errors import BadInput, plain
 from cosim.trials.camera import FRAME_RATE, frame_times
 from cosim.trials.flaws import flaws
-from cosim.trials.table import UNDERSTOOD, WORDS, read_table
+from cosim.trials.table import HOW, WORDS, read_table
 from cosim.trials.tracked import track
 
 DIGITS = 6e-7, 6e-9
@@ -87,7 +87,7 @@ def read_recording(path: Path, asked: str = "") -> Recording:
         notes += (f"No time column: read at {FRAME_RATE:g} frames/s, as the published trials are.",)
     signals = {k: table.columns[k] for k in WORDS if k in table.columns and k != "time"}
     if not signals:
-        raise BadInput(f"{plain(path)}: no column to compare. Understood are: {UNDERSTOOD}.")
+        raise BadInput(" ".join([f"{plain(path)}: no column to compare: {HOW}.", *table.notes]))
     for body in ("surface", "part"):
         if f"z_{body}" in signals:
             there = track(signals | {"time": time}, body).v

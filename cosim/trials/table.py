@@ -55,7 +55,7 @@ UNDERSTOOD = "; ".join(" or ".join(words) for words in WORDS.values()) + (
 MAP = "surface=NAME[:unit],part=NAME[:unit],time=NAME[:unit]"
 """Which column of a table is what; the unit may stand in the header instead."""
 HOW = (
-    "write what it is and its unit, such as time [s], surface [mm], part [mm], or, to compare, "
+    "write what each is and its unit, such as time [s], surface [mm], part [mm], or, to compare, "
     "name the columns, such as --columns time=t:s,surface=top:mm,part=cube:mm"
 )
 BODIES = {"p": "surface", "o": "part", "s": "plate"}
@@ -203,11 +203,13 @@ def _header(cells: Cells, tracker: bool, asked: str) -> tuple[dict[str, Column],
         table_like = numeric and all(re.match(r"[+-]?[.,]?\d", cell) for cell in numeric)
         found = left_out if table_like and left_out else "none"
         raise BadInput(
-            f"{where}: no column is understood (found: {found}). Understood are: {UNDERSTOOD}."
+            f"{where}: no column is understood (found: {found}): {HOW}. "
+            f"Understood are: {UNDERSTOOD}."
         )
     if unknown and "time" not in known:
         raise BadInput(f"{where}: which column is the time is not clear ({left_out}): {HOW}.")
-    note = f"Left out, not understood: {left_out}. Understood are: {UNDERSTOOD}."
+    note = f"Left out{'' if asked else ', not understood'}: {left_out}."
+    note += "" if asked else f" Understood are: {UNDERSTOOD}."
     return known, heads, (note,) if unknown else ()
 
 
@@ -252,13 +254,13 @@ def _split(cell: str) -> tuple[str, str]:
 
 
 def _factor(where: str, unit: str, kind: str) -> float:
-    """What brings a unit to SI."""
+    """What brings a unit to SI; ``-mm`` is mm of a column that is positive downwards."""
     spelt = unit.translate(str.maketrans({"µ": "u", "μ": "u", "²": "2", "^": "", " ": ""}))
-    found, factor = UNITS.get(spelt, ("", 0.0))
+    found, factor = UNITS.get(spelt.removeprefix("-"), ("", 0.0))
     if found != kind:
         told = f"the unit {plain(unit, 40)} is not {kind}, m{kind}, µ{kind} or the like"
         raise BadInput(f"{where}: {told}.")
-    return factor
+    return -factor if spelt.startswith("-") else factor
 
 
 def _tracker_names(path: str, line: int, tracks: list[str], head: list[str]) -> list[str]:

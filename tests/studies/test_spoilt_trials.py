@@ -291,6 +291,21 @@ def test_a_map_names_the_columns_and_all_that_was_understood_is_written(
     }
 
 
+def test_a_camera_counts_downwards(run: cosim.Result, tmp_path: Path) -> None:
+    """Rows of a picture count down: -mm turns a column, by --columns or in the header."""
+    t, surface, part = table(run)
+    down = [t, -surface, -part]
+    asked = "time=t:s,surface=top:-mm,part=cube:-mm"
+    named = cosim.compare(run, write(tmp_path / "a.csv", "t,top,cube,n", [*down, t]), columns=asked)
+    head = "time [s],surface [-mm],part [-mm]"
+    headed = cosim.compare(run, write(tmp_path / "b.csv", head, down))
+    up = cosim.compare(run, write(tmp_path / "c.csv", head.replace("-", ""), [t, surface, part]))
+    assert named.numbers == headed.numbers == up.numbers
+    turned = cosim.compare(run, write(tmp_path / "d.csv", head.replace("-", ""), down))
+    assert any("(-mm as its unit turns it)" in note for note in turned.found.notes)
+    assert "Left out: n." in named.found.notes  # what the user has named needs no list of names
+
+
 @pytest.mark.parametrize(
     ("asked", "words"),
     [

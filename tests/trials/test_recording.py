@@ -75,8 +75,11 @@ def test_rounded_times_of_a_trial_are_made_even(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("header", "words"),
     [
-        ("time [s],foo [V]", "no column to compare. Understood are: time; z_surface or surface"),
-        ("when,foo", "no column is understood (found: when, foo). Understood are: time; z_surface"),
+        ("time [s],foo [V]", "no column to compare: write what each is and its unit"),
+        ("time [s],foo [V]", "--columns time=t:s,surface=top:mm,part=cube:mm. Left out, not"),
+        ("time [s],foo [V]", "not understood: foo [V]. Understood are: time; z_surface or surface"),
+        ("when,foo", "no column is understood (found: when, foo): write what each is"),
+        ("when,foo", "part=cube:mm. Understood are: time; z_surface"),
         ("time [s],velocity [mm]", "column velocity [mm]: the unit mm is not m/s, mm/s, µm/s"),
         ("time [furlong],velocity [mm/s]", "column time [furlong]: the unit furlong is not s"),
         ("velocity [m/s],v_surface [m/s]", "velocity [m/s] and v_surface [m/s] are the same"),

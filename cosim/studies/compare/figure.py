@@ -47,13 +47,17 @@ def _message(found: Found) -> str:
     """How far the run repeats what was measured."""
     numbers = {number.name: number.value for number in found.numbers}
     said = [
-        f"explains {100.0 * share:.0f} % of the variance of the {words}"
+        f"explains {_share(share)} of the variance of the {words}"
         for name, words in R2.values()
         if (share := numbers.get(name)) is not None
     ][:1]
     if (error := numbers.get("drift_error")) is not None:
         said.append(f"misses the part's mean velocity by {signed(1e3 * error, '+.1f')} mm/s")
     return f"the run {' and '.join(said)}" if said else "nothing to be told"
+
+
+def _share(share: float) -> str:
+    return f"{100.0 * share:.0f} %" if share > 0.0 else "nothing"
 
 
 def _panel(axis: Axes, name: str, color: str, found: Found) -> None:
