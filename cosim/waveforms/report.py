@@ -14,7 +14,7 @@ def table(scene: Scene, summary: dict[str, Any], units: Mapping[str, str]) -> st
     if scene.has_ports:
         return _own(scene, summary, units)
     lost = summary.get("energy_residual")
-    warning = ": too much, take finer steps" if lost and lost > SUSPICIOUS else ""
+    warning = ": too much, take a smaller circuit.max_step" if lost and lost > SUSPICIOUS else ""
     taken = "{circuit_model}: {circuit_model_why}" if "circuit_model" in summary else ""
     rows = [
         ("part's mean velocity", _scaled(summary["v_average"], 1e3, "mm/s", "+.3f")),

@@ -157,3 +157,29 @@ def test_what_is_wrong_is_told(folder: Path, capsys: pytest.CaptureFixture[str],
         assert main(["run", str(folder / "own.toml"), "--out", str(folder / "o")]) == 2
     told = [line for line in capsys.readouterr().err.splitlines() if "note" not in line]
     assert len(told) == 1 and said in told[0], told
+
+
+BRIDGE = """A class-D bridge with a carrier of 20 kHz
+Vcommand v1 0 0
+Vtri tri 0 PULSE(-5 5 0 24u 24u 1u 50u)
+Bout out 0 V=max(-12, min(12, 60*(V(v1)-V(tri))))
+Rcoil out c1 7.1
+Lcoil c1 c2 1.2m
+Vemf c2 sense 0
+Rsense sense 0 0.1
+.end
+"""
+
+
+def test_a_carrier_as_fast_as_the_rows_is_told(tmp_path: Path) -> None:
+    """Rows as far apart as its period show the voltage as if it stood; and its bridge is on when
+    the run starts, so the coil has a current, whose energy 1/2 L i^2 the balance knows."""
+    (tmp_path / "agreed.cir").write_text(BRIDGE)
+    quick = agreed(tmp_path, run_duration=0.05, run_output_step=5e-5)
+    (told,) = [note for note in quick.summary["notes"] if "run.output_step" in note]
+    assert told.startswith("coil_voltage changes faster than the rows of the waveforms, which are")
+    assert quick.columns["current"][0] == pytest.approx(12.0 / 7.2, rel=1e-6)
+    assert quick.summary["energy_residual"] < 1e-5
+    fine = agreed(tmp_path, run_duration=0.05, run_output_step=2e-6)
+    assert not any("run.output_step" in note for note in fine.summary["notes"])
+    assert fine.summary["v_average"] == pytest.approx(quick.summary["v_average"], rel=1e-3)

@@ -34,6 +34,7 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
         asks, notes = asked_for(scene)
         values, without = measured(asks, log["time"], log)
         notes += without
+        notes += _folded(scene, log, recorder.time)
     electric, waves = _electrics(scene, command(scene), log, recorder.time)
     return Driven(
         electric,
@@ -71,6 +72,8 @@ def _electrics(
         copper += circuit.sense_resistance
     made = "v(v1)" in log and circuit.model != "amplifier"  # by the circuit, not given to it
     delivered, squares, eddy = 0.0, 0.0, Eddy(scene)
+    # A netlist's operating point may have a current.
+    first = eddy.current = float(log["i(vemf)"][0] / coil.count)
     most, least = -np.inf, np.inf
     saved = circuit.save or []
     waves, done = Tape(2 + len(saved) + made), 0
@@ -97,7 +100,8 @@ def _electrics(
     electric = Electrics(
         energy_in=delivered,
         energy_copper=copper * squares + coil.count * eddy.heat,
-        energy_magnetic=magnetic(scene, float(log["i(vemf)"][-1] / coil.count), eddy.current),
+        energy_magnetic=magnetic(scene, float(log["i(vemf)"][-1] / coil.count), eddy.current)
+        - magnetic(scene, first, first),
         current_max=float(most),
         current_min=float(least),
         limited=_limited(scene, log),
@@ -108,6 +112,33 @@ def _electrics(
         "coil_voltage": waves.column(1),
         **{name: waves.column(2 + k) for k, name in enumerate(saved)},
     }
+
+
+FOLDED = 0.2
+"""Share of a waveform, rms, that its rows may miss before that is told."""
+
+
+def _folded(scene: Scene, log: dict[str, Array], rows: Array) -> Iterator[str]:
+    """Tell of what is faster than the rows, as a PWM is: a carrier of their rate looks constant."""
+    names = {"coil_voltage": ("v(out)", "v(sense)")} | {v: (v,) for v in scene.circuit.save or []}
+    missed, whole = np.zeros((2, len(names)))
+    for part in _points(log):
+        time = part["time"]
+        inside = rows[(rows >= time[0]) & (rows <= time[-1])]
+        if len(inside) < 2:
+            continue
+        h = np.where(time[1:] > scene.run.settle, np.diff(time), 0.0)
+        for k, (one, *less) in enumerate(names.values()):
+            y = part[one] - sum(part[other] for other in less)
+            back = np.interp(time, inside, np.interp(inside, time, y))
+            missed[k] += total(h, (y - back)[1:] ** 2)
+            whole[k] += total(h, y[1:] ** 2)
+    if odd := [name for k, name in enumerate(names) if missed[k] > FOLDED**2 * whole[k]]:
+        yield (
+            f"{', '.join(odd)} changes faster than the rows of the waveforms, which are "
+            f"{scene.run.output_step:g} s apart (run.output_step): a PWM looks slow there and in "
+            "the figure. The numbers of the summary are of every step."
+        )
 
 
 def _limited(scene: Scene, log: dict[str, Array]) -> dict[str, float]:
