@@ -28,10 +28,11 @@ MOST_ROWS = 1_000_000
 CIRCUITS: dict[str, dict[str, Any]] = {
     model: {"circuit.model": model} for model in ("amplifier", "full")
 }
-"""What the server runs with ngspice, by the page's names, as values of a scene's keys."""
+"""What the server runs with ngspice, by the page's names, as values of a scene's keys, and the
+ports of a netlist that has them."""
 
 
-def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, dict[str, str]]]:
+def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, dict[str, Any]]]:
     """The link of a scene, as the page takes it, and the circuits that the server runs it with: a
     netlist of the user's own is one of them. Raises BadInput for one that the page cannot run."""
     found, circuits = load(scene, list(overrides)), dict(CIRCUITS)
@@ -40,9 +41,10 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
         own = {key: kept.pop(key, None) for key in ("netlist", "reltol", "max_step")}
         own["netlist"] = str(Path(own["netlist"]).absolute())
         own |= {f"param.{key}": x for key, x in (kept.pop("param", None) or {}).items()}
-        circuits["own"] = {"circuit.model": "file"} | {f"circuit.{k}": x for k, x in own.items()}
+        own = {"circuit.model": "file"} | {f"circuit.{k}": x for k, x in own.items()}
+        circuits = {"own": own | ({"port": found.port} if found.port else {})} | circuits
         simple = type(found.circuit).model_validate(kept | {"model": "amplifier"})
-        found = found.model_copy(update={"circuit": simple})
+        found = found.model_copy(update={"circuit": simple, "port": []})
     if not rigs.fits(found):
         known = ", ".join(rigs.scenes())
         raise BadInput(
@@ -114,13 +116,15 @@ def _record(path: Path) -> dict[str, Any]:
     return {"name": found.name, "step": step, "waveforms": signals}
 
 
-def answer(link: str, circuit: dict[str, str], progress: Progress) -> dict[str, Any]:
+def answer(link: str, circuit: dict[str, Any], progress: Progress) -> dict[str, Any]:
     """What ngspice has for a link of the page: mean velocity (m/s) of a second, and the waveforms
     of its last 0.3 s or two periods, from ``begin`` on, s after the drive's phase was 0.
     ``progress`` is told the simulated time, s, and may end the run. Raises CosimError."""
     from cosim.simulation.simulate import simulate
 
-    scene = load(link, circuit)
+    values = {key: x for key, x in circuit.items() if key != "port"}
+    ported = {"port": circuit.get("port")}
+    scene = load(load(link).model_copy(update=ported) if ported["port"] else link, values)
     frequency, settle = scene.drive.frequency, 0.7
     if frequency < 0.5:
         raise BadInput("The server runs frequencies of 0.5 Hz and more.")

@@ -80,7 +80,7 @@ class Server(ThreadingHTTPServer):
             super().handle_error(request, client_address)
 
     def __init__(
-        self, link: str, circuits: dict[str, dict[str, str]], record: Path | None = None
+        self, link: str, circuits: dict[str, dict[str, Any]], record: Path | None = None
     ) -> None:
         self.page = html(link, circuits, record).encode()
         self.circuits = circuits
@@ -90,7 +90,7 @@ class Server(ThreadingHTTPServer):
         self.asked = 0
         Thread(target=self._warm, args=(link,), daemon=True).start()
 
-    def run(self, link: str, circuit: dict[str, str]) -> dict[str, Any]:
+    def run(self, link: str, circuit: dict[str, Any]) -> dict[str, Any]:
         """One at a time. Raises CosimError, also where the run takes too long."""
         self.asked = own = self.asked + 1
         with self.one_run, warnings.catch_warnings():
