@@ -65,7 +65,7 @@ def _read(results: Path) -> tuple[dict[str, Any], list[Run]]:
         found, scene = formats.read(results), load(results / "scene.toml")
         runs = [[*found.waveforms.values()]]
         with _whole_results(results / "summary.json") as summary:
-            words = table(scene, summary, found.units)
+            words = "\n\n".join([table(scene, summary, found.units), *summary.get("notes", [])])
         told = {"title": scene.name, "about": scene.description, "words": words}
         return told | {"signals": _signals(found.units, runs)}, runs
     if (results / "sweep.nc").exists():
@@ -224,11 +224,13 @@ def _head(run: Run) -> dict[str, Any]:
     time, count = run[0], len(run[0])
     step = float(time[-1] - time[0]) / max(1, count - 1)
     even = np.abs(time - (time[0] + step * np.arange(count))) <= 1e-6 * step
-    found = {"count": count, "begin": float(time[0]), "step": step if even.all() else None}
+    # Rows that are no even steps apart come after the script that asks for these.
+    ends = {"begin": float(time[0]), "end": float(time[-1])}
+    found = ends | {"count": count, "step": step if even.all() else None}
     if count > 4 * BLOCK:
         starts = np.arange(0, count, BUCKET)
-        ends = [(np.fmin.reduceat(x, starts), np.fmax.reduceat(x, starts)) for x in run]
-        found["peaks"] = [_coded(np.stack(pair, axis=1)) for pair in ends]
+        pairs = [(np.fmin.reduceat(x, starts), np.fmax.reduceat(x, starts)) for x in run]
+        found["peaks"] = [_coded(np.stack(pair, axis=1)) for pair in pairs]
     return found
 
 

@@ -376,14 +376,15 @@ def test_a_figure_of_ones_own_circuit_says_which_mean_changes_most() -> None:
     )
     means = {
         "rotor.omega.mean": ("R", [100.0, 90.0, np.nan]),
-        "Vemf.mean": ("R", [5.0, 1.0, np.nan]),
+        "Vemf.mean": ("R", [5.0, 1.0, np.nan], {"units": "V"}),
     }
     failure = {"failure": ("R", ["", "", "no such circuit"])}
     drawn = figure.draw(xr.Dataset(means | failure, {"R": resistance}), "motor")
-    message = "motor: Vemf.mean from 1 to 5 over circuit.param.R, 3 points, 1 failed (×)"
+    message = "motor: Vemf.mean from 1 to 5 V over circuit.param.R, 3 points, 1 failed (×)"
     assert drawn.get_suptitle() == message
     first = drawn.axes[0]
     assert first.get_xlabel() == "circuit.param.R"
+    assert [axis.get_title("left") for axis in drawn.axes] == ["rotor.omega.mean", "Vemf.mean [V]"]
     assert [line.get_marker() for line in first.lines] == [".", "x"]  # one failed
 
 

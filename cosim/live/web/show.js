@@ -10,7 +10,7 @@ function readable({ name, unit, most }) {
   if (unit === "m/s") return { factor: 1e3, unit: "mm/s", words: `${name}, mm/s` };
   const scaled = ["m", "A", "V", "s", "N", "W", "J"].includes(unit) && most > 0 && most < 0.5;
   const [factor, prefix] = !scaled ? [1, ""] : most < 5e-4 ? [1e6, "µ"] : [1e3, "m"];
-  const shown = prefix + (unit === "1" ? "" : unit).replace(/s2/g, "s²");
+  const shown = prefix + (["1", "?"].includes(unit) ? "" : unit).replace(/s2/g, "s²");
   return { factor, unit: shown, words: name + (shown && `, ${shown}`) };
 }
 
@@ -96,7 +96,7 @@ class Signals {
   }
 
   all(first = 1) {
-    const [from, to] = this.whole = extent(this.runs.flatMap((run) => [run.x(0), run.x(run.count - 1)]));
+    const [from, to] = this.whole = extent(this.runs.flatMap((run) => [run.begin, run.end].map((x) => x * run.per)));
     this.cursors.at = [0.25, 0.75].map((share) => from + share * first * (to - from));
     this.look([from, from + first * (to - from)]);
   }

@@ -18,7 +18,7 @@ from cosim.scene import firmware
 from cosim.studies.plots import headline
 from cosim.studies.sweep.dataset import FAILURE, POINT
 from cosim.studies.sweep.report import at, fastest, setting
-from cosim.waveforms.quantities import label
+from cosim.waveforms.quantities import UNITLESS, label, printed
 from cosim.waveforms.storage import swept
 
 T = TypeVar("T")
@@ -95,12 +95,14 @@ def _own(figure: Figure, data: xr.Dataset, names: Sequence[str]) -> str:
         axis.plot(over, values, ".", color="#1f6fb2")
         axis.ticklabel_format(useOffset=False)
         _over_key(axis, data, names[0])
-        axis.set_title(name.replace("$", "\\$"), loc="left", fontsize=10.5)
+        told = label(name, unit := data[name].attrs.get("units", ""))
+        axis.set_title(told.replace("$", "\\$"), loc="left", fontsize=10.5)
         known = values[np.isfinite(values)]
         if known.size:
             low, high = known.min(), known.max()
             share = (high - low) / (max(abs(low), abs(high)) or 1.0)
-            changes.append((share, f"{name} from {low:.4g} to {high:.4g}"))
+            said = "" if unit in UNITLESS else f" {printed(unit)}"
+            changes.append((share, f"{name} from {low:.4g} to {high:.4g}{said}"))
     ways = ", ".join(data[name].key for name in names)
     most = max(changes, default=(0.0, "all failed"))[1].replace("$", "\\$")
     return f"{most} over {ways}"
