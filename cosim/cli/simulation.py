@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli.command import Command, print_page, progress_bar, writable
-from cosim.studies.study import OVERRIDES, SCENE, SHOW, Option
+from cosim.studies.study import COLUMNS, OVERRIDES, SCENE, SHOW, Option
 
 _BAR = "{desc} {percentage:3.0f}% |{bar}| {n:.2f} of {total:g} s, {remaining} left"
 
@@ -192,23 +192,26 @@ def _live(
     scene: str = "paper-limited",
     overrides: Sequence[str] = (),
     trial: Path | None = None,
+    columns: str = "",
     out: Path | None = None,
 ) -> None:
     from cosim.live.page import html, opened
+    from cosim.trials.recording import read_recording
 
     link, circuits = opened(scene, overrides)
+    record = None if trial is None else read_recording(trial, columns)
     if out is not None:
         from cosim.files.atomic import tidy, write_text
 
         tidy(out.parent)
-        write_text(out, html(link, record=trial))
+        write_text(out, html(link, record=record))
         print(f"Written to {out}; with another setting: {out}#scene=…")
         return
     import webbrowser
 
     from cosim.live.server import Server
 
-    with Server(link, circuits, trial) as server:
+    with Server(link, circuits, record) as server:
         print(f"{server.address}/{link}\nFor this machine alone; Ctrl-C ends it.", flush=True)
         webbrowser.open(f"{server.address}/{link}")
         server.serve_forever(poll_interval=0.2)
@@ -248,6 +251,7 @@ COMMANDS = (
             Option("scene", "scene or link (default: paper-limited)", "SCENE", many="optional"),
             OVERRIDES,
             Option("--trial", "measurements to lay over the curves", "TRIAL.csv", Path),
+            COLUMNS,
             Option("--out", "write the page as one HTML file instead", "FILE.html", Path),
         ),
     ),

@@ -16,7 +16,7 @@ from cosim.live import rigs
 from cosim.scene import load, to_link
 from cosim.scene.tables import FRAME_RATE
 from cosim.toolchain.processes import Progress
-from cosim.trials.recording import GAP, read_recording
+from cosim.trials.recording import GAP, Recording
 
 _WEB = Path(__file__).with_name("web")
 _CORE = ("machine.js", "hosts.js")
@@ -59,7 +59,7 @@ def opened(scene: str, overrides: Iterable[str] = ()) -> tuple[str, dict[str, di
     return link, circuits
 
 
-def html(link: str, models: Iterable[str] = (), record: Path | None = None) -> str:
+def html(link: str, models: Iterable[str] = (), record: Recording | None = None) -> str:
     """The page, which begins with the setting of ``link`` unless its address has another.
 
     It may ask its own server for runs with the circuits ``models``. ``record``, measurements of a
@@ -101,9 +101,8 @@ def script(names: tuple[str, ...]) -> str:
     return "\n".join((_WEB / name).read_text(encoding="utf-8") for name in names)
 
 
-def _record(path: Path) -> dict[str, Any]:
+def _record(found: Recording) -> dict[str, Any]:
     """Measurements as the page takes them: in even steps, s; None where nothing is known."""
-    found = read_recording(path)
     step = float(np.median(np.diff(found.time)))
     even = np.arange(min(round(found.time[-1] / step) + 1, MOST_ROWS)) * step
     after = np.searchsorted(found.time, even).clip(1, len(found.time) - 1)

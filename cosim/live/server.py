@@ -6,13 +6,13 @@ import time
 import warnings
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
 
 from cosim.errors import BadInput, CosimError
 from cosim.files.link import LONGEST, is_link
 from cosim.live.page import CIRCUITS, answer, html
+from cosim.trials.recording import Recording
 
 HOST = "127.0.0.1"
 
@@ -80,7 +80,7 @@ class Server(ThreadingHTTPServer):
             super().handle_error(request, client_address)
 
     def __init__(
-        self, link: str, circuits: dict[str, dict[str, Any]], record: Path | None = None
+        self, link: str, circuits: dict[str, dict[str, Any]], record: Recording | None = None
     ) -> None:
         self.page = html(link, circuits, record).encode()
         self.circuits = circuits

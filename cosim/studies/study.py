@@ -63,6 +63,12 @@ OVERRIDES = Option(
 )
 SEED = Option("--seed", "of the search", "N", int, 0)
 WORKERS = Option("--workers", "runs at once (default: one for each processor)", "N", int)
+COLUMNS = Option(
+    "--columns",
+    "which column of TRIAL.csv is what: time, surface, part, v_surface, v_part, current, voltage "
+    "or command",
+    "surface=NAME[:unit],…",
+)
 SHOW = Option("--show", "also write show.html, a page to look into the results", kind=bool)
 DASK = Option("--dask", "run on the Dask cluster at this address", "ADDRESS")
 

@@ -1,6 +1,8 @@
 """A setting goes from the page to the command and back without loss; a bad link is refused."""
 
+import json
 import random
+import re
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from cosim.files.resources import circuits
 from cosim.live import rigs
 from cosim.live.page import _record, opened
 from cosim.scene import load, to_link
+from cosim.trials.recording import read_recording
 from tests.live.page_in_node import needs_node, run
 
 LINKED = "return given.map((setting) => linkOf(setting));"
@@ -131,7 +134,7 @@ def test_a_record_with_a_gap_keeps_its_times(tmp_path: Path) -> None:
     rows = [k for k in range(300) if not 40 <= k < 140]
     text = "time [s],z_surface [m]\n" + "".join(f"{k / 1000},{k * k}e-9\n" for k in rows)
     (tmp_path / "gap.csv").write_text(text, encoding="utf-8")
-    shown = _record(tmp_path / "gap.csv")
+    shown = _record(read_recording(tmp_path / "gap.csv"))
     heights = shown["waveforms"]["z_surface"]
     assert shown["step"] == pytest.approx(1e-3) and len(heights) == 300
     assert heights[41:139] == [None] * 98
@@ -161,3 +164,15 @@ def test_scene_that_the_page_cannot_run(tmp_path: Path) -> None:
     for scene in ("optimal", "two-surfaces"):
         with pytest.raises(BadInput, match="the page runs"):
             opened(scene)
+
+
+def test_a_record_whose_columns_the_user_names(tmp_path: Path) -> None:
+    """As `cosim compare` takes them: a camera's rows count down."""
+    rows = [f"{k / 1000},{k * k}" for k in range(20)]
+    trial, page = tmp_path / "cam.csv", tmp_path / "page.html"
+    trial.write_text("\n".join(["t,top", *rows]), encoding="utf-8")
+    names = ["--columns", "time=t:s,surface=top:-mm"]
+    assert main(["live", "--trial", str(trial), "--out", str(page)]) == 2
+    assert main(["live", "--trial", str(trial), *names, "--out", str(page)]) == 0
+    record = re.search(r'"record":(\{.*?\}\})', page.read_text("utf-8"))
+    assert record and json.loads(record[1])["waveforms"]["z_surface"][3] == pytest.approx(-9e-3)

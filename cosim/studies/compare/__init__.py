@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from cosim.studies.study import OVERRIDES, Option, Study, chart, folder_of_trials
+from cosim.studies.study import COLUMNS, OVERRIDES, Option, Study, chart, folder_of_trials
 
 STUDIES = (
     Study(
@@ -11,12 +11,7 @@ STUDIES = (
         (
             Option("run", "a folder that cosim run wrote or a scene", "RUN|SCENE"),
             Option("trial", "a tracked trial, or other measurements", "TRIAL.csv", Path),
-            Option(
-                "--columns",
-                "which column of TRIAL.csv is what: time, surface, part, v_surface, v_part, "
-                "current, voltage or command",
-                "surface=NAME[:unit],…",
-            ),
+            COLUMNS,
             OVERRIDES,
         ),
         command="compare",
