@@ -208,8 +208,9 @@ def _refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
         raise BadInput(
             f"{scene.circuit.netlist}: the coil between {out} and {sense} has "
             f"{resistance / count:.4g} Ohm and {inductance / count * 1e3:.4g} mH, that of [coil] "
-            f"{coil.resistance / count:.4g} Ohm and {coil.inductance / count * 1e3:.4g} mH; they "
-            "must be the same, as .param coil_resistance, coil_inductance and count make them."
+            f"{coil.resistance / count:.4g} Ohm and {coil.inductance / count * 1e3:.4g} mH: set "
+            f"coil.resistance = {resistance:.4g} and coil.inductance = {inductance:.4g}, or take "
+            "the scene's by .param coil_resistance, coil_inductance and count."
         )
 
 
