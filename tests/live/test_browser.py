@@ -90,6 +90,14 @@ def test_link_of_a_stranger(tab: Any, tmp_path: Path) -> None:
     assert "no scene" in tab.inner_text("#fault") and not tab.faults
     assert tab.locator("img").count() == 0
 
+    tab.goto(f"{path.as_uri()}#scene=paper&drive.amplitude=500")  # in the open page
+    tab.wait_for_timeout(300)
+    assert "must be a number from 0 to 100" in tab.inner_text("#fault")
+    tab.goto(f"{path.as_uri()}#scene=paper&drive.amplitude=5")
+    tab.wait_for_timeout(300)
+    assert not tab.inner_text("#fault")
+    assert tab.evaluate("() => state.values['drive.amplitude']") == 5
+
     tab.evaluate("() => { location.hash = '#scene=paper&friction.mu_s=0.1'; }")
     tab.wait_for_function("() => document.getElementById('fault').textContent.includes('refused')")
 

@@ -287,7 +287,7 @@ options($("model"), DATA.models);
 $("compare").onclick = compare;
 $("record").hidden = !record;
 $("record").onclick = layRecord;
-addEventListener("hashchange", () => take(opened(), true));
+addEventListener("hashchange", () => { fault(""); const next = opened(), wrong = $("fault").textContent; take(next, true); if (wrong) fault(wrong); });
 
 change(false);
 show();
