@@ -171,6 +171,9 @@ def _spelt(value: Any) -> str:
 
 def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
     """The content of a scene file."""
+    if kind := {".cir": "circuit", ".net": "circuit", ".fmu": "fmu"}.get(Path(source).suffix):
+        how = f"a scene names it; cosim new --kind {kind} makes one to begin with"
+        raise BadInput(f"{origin}: must be a scene, a .toml: {how}.")
     try:
         raw = reader.read(source, MAX_BYTES)
     except reader.Refused as refused:

@@ -229,6 +229,12 @@ def test_no_circuit_has_the_staircase_unless_asked() -> None:
     assert load("paper-full", ["drive.quantised=true"]).drive.quantised
 
 
+@pytest.mark.parametrize(("file", "kind"), [("mine.cir", "circuit"), ("mine.fmu", "fmu")])
+def test_what_a_scene_names_is_no_scene(file: str, kind: str) -> None:
+    with pytest.raises(BadInput, match=rf"^{file}: must be a scene, .* cosim new --kind {kind} "):
+        load(file)
+
+
 def test_file_changes_only_its_keys(tmp_path: Path) -> None:
     path = written(tmp_path, "[mechanics]\ntravel = 2e-3\n[coil]\nforce_factor = 1\n")
     scene = load(str(path))
