@@ -5,7 +5,6 @@ of the signal's own shape, belongs to (t - t_n)^k. Plain arithmetic serves both:
 asks for a polynomial at each of its macro points, where arrays would cost more than the step.
 """
 
-from collections import deque
 from typing import Any
 
 import numpy as np
@@ -70,33 +69,30 @@ class History:
         Without it older values are used instead, and the slope only fills in while there are not
         yet enough of them, so that a method begins with its own order.
         """
-        self._points: deque[tuple[float, Any]] = deque(maxlen=max(degree, 1) + 1)
+        self._points: tuple[tuple[float, Any], ...] = ()
+        self._older = max(degree, 1)
         self._slopes = slopes
+        self.value: Any = None
+        """The newest value."""
         self.slope: Any = None
         """The newest slope, per second; None where it is not known."""
 
-    @property
-    def value(self) -> Any:
-        """The newest value."""
-        return self._points[0][1]
-
     def add(self, time: float, value: Any, slope: Any) -> None:
         """A new communication point at ``time`` (s)."""
-        self._points.appendleft((time, value))
-        self.slope = slope
+        self._points = ((time, value), *self._points[: self._older])
+        self.value, self.slope = value, slope
 
     def restart(self) -> None:
         """Forget all but the newest point: what is older lies before an event."""
-        while len(self._points) > 1:
-            self._points.pop()
+        self._points = self._points[:1]
 
     def polynomial(self, degree: int) -> Polynomial:
         """The polynomial of ``degree`` 0, 1 or 2 through the newest points, about the newest; of a
         lower degree while there are too few."""
+        if degree == 0:
+            return (self.value,)
         (time, newest), *older = self._points
         slope = self.slope
-        if degree == 0:
-            return (newest,)
         slopes = slope is not None and (self._slopes or len(older) < degree)
         points = min(degree - slopes, len(older))
         if points == 0:
@@ -123,9 +119,7 @@ class History:
         return (newest, rise - bend * h, bend)
 
     def save(self) -> tuple[Any, ...]:
-        return (tuple(self._points), self.slope)
+        return (self._points, self.value, self.slope)
 
     def restore(self, saved: tuple[Any, ...]) -> None:
-        points, self.slope = saved
-        self._points.clear()
-        self._points.extend(points)
+        self._points, self.value, self.slope = saved
