@@ -64,21 +64,16 @@ function linkOf({ scene, changes }) {
 }
 
 /* A setting with some keys changed; a knob replaces its value and the other way round. */
-function changed(setting, values) {
-  const changes = { ...setting.changes };
-  for (const [key, value] of Object.entries(values)) {
-    if (has(TWINS, key)) delete changes[TWINS[key]];
-    changes[key] = value;
-  }
-  return { scene: setting.scene, changes };
+function changed({ scene, changes }, values) {
+  const kept = Object.entries(changes).filter(([key]) => !has(values, TWINS[key]));
+  return { scene, changes: { ...Object.fromEntries(kept), ...values } };
 }
 
 const reading = (pot) => Math.min(DATA.knobs.amplitude.length - 1, Math.floor(pot * DATA.knobs.amplitude.length));
 
 /* All values of a setting, with what its knobs stand for. */
 function valuesOf({ scene, changes }) {
-  const values = {};
-  for (const [key, known] of Object.entries(DATA.keys)) values[key] = known.default;
+  const values = Object.fromEntries(Object.entries(DATA.keys).map(([key, known]) => [key, known.default]));
   for (const layer of [DATA.scenes[scene].values, changes]) {
     for (const [key, value] of Object.entries(layer)) {
       if (!has(DATA.keys, key)) continue;

@@ -56,9 +56,7 @@ class Rows {
       for (let k = Math.floor(from / bucket); k * bucket <= to; k++) {
         for (const peak of [peaks[2 * k], peaks[2 * k + 1]]) found.put(place(Math.min(to, k * bucket + bucket / 2)), factor * peak);
       }
-    } else {
-      for (let row = from; row <= to; row++) found.put(place(row), factor * this.value(column, row));
-    }
+    } else for (let row = from; row <= to; row++) found.put(place(row), factor * this.value(column, row));
     return found;
   }
 
