@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from cosim.cli.command import Command
+from cosim.cli.command import Command, writable
 from cosim.studies.study import Option
 
 _KINDS = ("machine", "circuit", "fmu")
@@ -16,7 +16,7 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
     import re
 
     from cosim.errors import BadInput, plain
-    from cosim.files.atomic import as_json, tidy, together
+    from cosim.files.atomic import as_json, together
     from cosim.files.reader import read
     from cosim.files.resources import circuits
     from cosim.scene.describe import schema
@@ -59,13 +59,10 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
     for path in (*texts, *fmus, *[schema_there] * theirs):
         if os.path.lexists(path):  # a link that leads nowhere, too
             raise BadInput(f"{plain(path)}: is there already; choose another name.")
-    if not file.parent.is_dir():
-        raise BadInput(f"{plain(file.parent)}: there is no such folder.")
     texts = {path: text.replace("NAME.", f"{file.stem}.") for path, text in texts.items()}
     texts[schema_there] = as_json(schema())
     paths = [*texts, *fmus]
-    tidy(file.parent)
-    with together(paths) as temporary:
+    with writable(file.parent, shared=True), together(paths) as temporary:
         for target, text in zip(temporary, texts.values(), strict=False):
             target.write_text(text, encoding="utf-8")
         for target in temporary[len(texts) :]:

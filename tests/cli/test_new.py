@@ -21,10 +21,10 @@ SHORT = ["--set=run.duration=0.06", "--set=run.settle=0.01"]
 
 @pytest.mark.parametrize("kind", ["machine", "circuit", "fmu"])
 def test_a_new_scene_runs_as_it_is(kind: str, tmp_path: Path) -> None:
-    scene = tmp_path / "my-own.toml"
+    scene = tmp_path / "own" / "my-own.toml"
     assert main(["new", str(scene), "--kind", kind]) == 0
     text = scene.read_text(encoding="utf-8")
-    told = json.loads((tmp_path / "scene.schema.json").read_text(encoding="utf-8"))
+    told = json.loads((scene.parent / "scene.schema.json").read_text(encoding="utf-8"))
     jsonschema.validate(tomllib.loads(text), told)
     with in_place():
         assert main(["run", str(scene), *SHORT, "--out", str(tmp_path / "out")]) == 0
@@ -53,7 +53,7 @@ def test_a_new_machine_is_the_scene_that_it_starts_from(tmp_path: Path) -> None:
         (["x.toml", "--base", "papr"], "did you mean paper"),
         (["there.toml"], "is there already"),
         (["link.toml"], "link.toml: is there already"),
-        (["no/x.toml"], "there is no such folder"),
+        (["there.toml/x.toml"], "there.toml: this is a file, not a directory"),
     ],
 )
 def test_what_cannot_be_made_is_told(

@@ -253,7 +253,7 @@ def _notes(
     scene: Scene, sides: list[Side], method: str, through: str, circle: str
 ) -> Iterator[str]:
     """What the coupling errs in."""
-    cure = "smaller steps err less"
+    cure = f"{'FMUs with ' * any(map(_fixed, sides))}smaller steps err less"
     if _able(sides):
         cure = 'coupling.method = "redo" is as exact as one netlist'
     if through and method != "redo":

@@ -131,7 +131,7 @@ function makeKnob(knob) {
     turn(knob.at(state.values) - Math.sign(event.deltaY) * 4 * step);
   }, { passive: false });
   knob.show = () => {
-    const at = knob.at(state.values), words = `${state.values[knob.key].toFixed(knob.digits)} ${knob.unit}`;
+    const at = knob.at(state.values), words = `${state.values[knob.key].toFixed(knob.digits).replace("-", "−")} ${knob.unit}`;
     place.style.setProperty("--at", at);
     text.textContent = words;
     place.setAttribute("aria-valuenow", at.toFixed(4));
