@@ -211,6 +211,22 @@ def test_fmus_that_feed_each_other_agree(tmp_path: Path, gain: float) -> None:
     assert "not iterated" in note and '"redo"' not in note
 
 
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("m->r[D] * m->r[U] + 0.1", r"Circuit and FMUs do not agree at t = \S+ s"),
+        ("m->steps == 5 ? NAN : 0.5 * m->r[U]", "a.y is not a finite number at t = "),
+    ],
+)
+def test_a_circle_without_a_solution_fails(tmp_path: Path, source: str, said: str) -> None:
+    recompiled(tmp_path, ("m->r[D] * m->r[U]", source))
+    build(tmp_path, "Load", through=True)
+    (tmp_path / "rc.cir").write_text("* rc\nV1 in 0 1\nR1 in out 1k\nC1 out 0 1u\n.end\n")
+    (tmp_path / "circle.toml").write_text(CIRCLE)
+    with pytest.raises(SimulationFailed, match=said):
+        here(tmp_path / "circle.toml", {"fmu.b.D": 1.0})
+
+
 def test_a_run_without_end_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An hour of an undamped tank circuit of 500 MHz; of an ordinary one any length may be run."""
     scene = motor(tmp_path)

@@ -293,6 +293,8 @@ static int comes_back(Ports *c, int tries)
             continue;
         const double off = c->outputs[k] - b->guess, more = b->guess - b->last_guess;
         const double response = (off - b->off) / more;
+        if (!isfinite(off)) /* which ends the run */
+            return 1;
         if (tries == 0)
             b->response = -1.0;
         else if (isfinite(response) && fabs(response) > 1e-3)
