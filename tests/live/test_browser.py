@@ -1,7 +1,6 @@
 """The page in a browser: it runs, asks nobody, and what is turned turns."""
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -25,6 +24,7 @@ from cosim.live.page import CIRCUITS, opened
 from cosim.live.server import Server
 from cosim.scene import load
 from tests.helpers import needs
+from tests.ports.test_machine import UNSAVED, renamed
 
 AMPLITUDE = """() => {
   let low = Infinity, high = -Infinity;
@@ -245,29 +245,6 @@ def test_a_record_is_laid_over(tab: Any, tmp_path: Path) -> None:
     assert not tab.faults and tab.locator("img").count() == 0
 
 
-OWN_NAMES = """
-base = "paper"
-[circuit]
-model = "file"
-netlist = "own.cir"
-[[port]]
-from = "drive"
-source = "Vin"
-[[port]]
-from = "machine.back_emf"
-source = "Vmot"
-[[port]]
-probe = "i(Vmot)"
-to = "machine.current"
-[[port]]
-probe = "v(plus)"
-to = "machine.out"
-[[port]]
-probe = "v(shunt)"
-to = "machine.sense"
-"""
-
-
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("ported", [False, True])
 def test_an_own_circuit_is_run_by_the_server(tmp_path: Path, ported: bool) -> None:
@@ -275,12 +252,8 @@ def test_an_own_circuit_is_run_by_the_server(tmp_path: Path, ported: bool) -> No
     netlist = circuits() / "examples" / "audio_amplifier.cir"
     own = {"circuit.model": "file", "circuit.netlist": str(netlist)}
     if ported:
-        text = netlist.read_text()
-        new = {"Vemf": "Vmot", "Vcommand": "Vin", "out": "plus", "sense": "shunt"}
-        for old, name in new.items():
-            text = re.sub(rf"\b{old}\b", name, text, flags=re.IGNORECASE)
-        (tmp_path / "own.cir").write_text(text)
-        (tmp_path / "own.toml").write_text(OWN_NAMES)
+        (tmp_path / "own.cir").write_text(renamed(netlist))
+        (tmp_path / "own.toml").write_text(UNSAVED)
         link, known = opened(str(tmp_path / "own.toml"))
     else:
         link, known = opened("paper", [f"{key}={value}" for key, value in own.items()])

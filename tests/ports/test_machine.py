@@ -13,7 +13,7 @@ from cosim.files.resources import circuits
 from cosim.toolchain.processes import in_place
 from tests.ports.foreign import build
 
-NAMES = {"Vemf": "Vmot", "Vcommand": "Vin", "out": "amp", "sense": "shunt", "v1": "inp"}
+NAMES = {"Vemf": "Vmot", "Vcommand": "Vin", "out": "hot", "sense": "shunt", "v1": "inp"}
 """Of the example with half-bridges, and others."""
 
 OWN = """
@@ -21,7 +21,7 @@ base = "paper"
 [circuit]
 model = "file"
 netlist = "own.cir"
-save = ["v(left)", "v(amp,shunt)*i(Vmot)"]
+save = ["v(left)", "v(hot,shunt)*i(Vmot)"]
 [[port]]
 from = "drive"
 source = "Vin"
@@ -34,12 +34,13 @@ to = "machine.current"
 """
 ENDS = """
 [[port]]
-probe = "v(amp)"
+probe = "v(hot)"
 to = "machine.out"
 [[port]]
 probe = "v(shunt)"
 to = "machine.sense"
 """
+UNSAVED = "".join(line for line in (OWN + ENDS).splitlines(True) if "save" not in line)
 RUN = """
 [run]
 duration = 0.1
@@ -47,14 +48,20 @@ output_step = 1e-4
 """
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    text = (circuits() / "examples" / "h_bridge.cir").read_text()
-    (tmp_path / "agreed.cir").write_text(text)
-    own = "\n".join(line for line in text.splitlines() if not line.startswith("*"))
+def renamed(example: Path) -> str:
+    """A netlist with names of its own."""
+    lines = example.read_text().splitlines()
+    own = "\n".join(line for line in lines if not line.startswith("*"))
     for old, new in NAMES.items():
         own = re.sub(rf"\b{old}\b", new, own, flags=re.IGNORECASE)
-    (tmp_path / "own.cir").write_text(own)
+    return own
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    example = circuits() / "examples" / "h_bridge.cir"
+    (tmp_path / "agreed.cir").write_text(example.read_text())
+    (tmp_path / "own.cir").write_text(renamed(example))
     return tmp_path
 
 
@@ -71,8 +78,7 @@ def agreed(folder: Path, base: str = "paper", **given: Any) -> cosim.Result:
 
 
 def test_a_netlist_with_names_of_its_own_is_the_same_circuit(folder: Path) -> None:
-    text = OWN + ENDS + RUN
-    (folder / "own.toml").write_text("".join(x for x in text.splitlines(True) if "save" not in x))
+    (folder / "own.toml").write_text(UNSAVED + RUN)
     with in_place():
         result = cosim.run(folder / "own.toml")
     expected = agreed(folder)
@@ -88,10 +94,10 @@ def test_what_is_saved_of_it_is_in_the_waveforms(folder: Path) -> None:
     (folder / "own.toml").write_text(OWN + ENDS + RUN)
     with in_place():
         result = cosim.run(folder / "own.toml")
-    power = result.columns["v(amp,shunt)*i(Vmot)"]
+    power = result.columns["v(hot,shunt)*i(Vmot)"]
     alone = result.columns["coil_voltage"] * result.columns["current"]
     assert power == pytest.approx(alone, abs=1e-3 * np.abs(alone).max())
-    assert (result.units["v(left)"], result.units["v(amp,shunt)*i(Vmot)"]) == ("V", "W")
+    assert (result.units["v(left)"], result.units["v(hot,shunt)*i(Vmot)"]) == ("V", "W")
 
 
 @pytest.mark.parametrize(
@@ -143,7 +149,7 @@ WRONG = {
     "an unknown end": ("machine.current", "machine.force", "must be one of from"),
     "no source": ('"Vin"', '"Vout"', "the sources Vmot and Vout"),
     "a resistor": ('"Vin"', '"Rleft"', "must be a V source"),
-    "no node": ('"v(amp)"', '"v(ampp)"', "no node ampp"),
+    "no node": ('"v(hot)"', '"v(hott)"', "no node hott"),
 }
 
 
