@@ -8,14 +8,13 @@ the same compiled log takes what ngspice sends, so only the mechanics differ.
 from collections.abc import Sequence
 from contextlib import closing
 from time import process_time
-from unittest.mock import patch
 
 import numpy as np
 
 from benchmarks.parts import replay
 from cosim.arrays import Array
 from cosim.circuit.netlist import prepare
-from cosim.coupling.loop import lead
+from cosim.coupling.loop.lead import Lead
 from cosim.coupling.loop.recorder import Recorder
 from cosim.drive.command import command
 from cosim.mechanics.stickslip import Mechanics
@@ -71,8 +70,7 @@ def run(scene: Scene, times: Sequence[float]) -> tuple[float, Array]:
         recorder = Recorder(scene, mechanics, lambda _: None)
         still = np.tile((0.0, 0.0, np.inf), (_MOST_STEPS, 1))
         deck = _netlist(scene, mechanics.sample())
-        with patch.object(lead, "prepare", lambda _: deck):
-            circuit = lead.Lead(scene, command(scene), recorder)
+        circuit = Lead(scene, command(scene), recorder, deck)
         replay(circuit, still)
         circuit.run()
     log = circuit.log()

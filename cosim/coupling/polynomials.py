@@ -72,15 +72,18 @@ class History:
         self._points: tuple[tuple[float, Any], ...] = ()
         self._older = max(degree, 1)
         self._slopes = slopes
-        self.value: Any = None
-        """The newest value."""
         self.slope: Any = None
         """The newest slope, per second; None where it is not known."""
+
+    @property
+    def value(self) -> Any:
+        """The newest value."""
+        return self._points[0][1]
 
     def add(self, time: float, value: Any, slope: Any) -> None:
         """A new communication point at ``time`` (s)."""
         self._points = ((time, value), *self._points[: self._older])
-        self.value, self.slope = value, slope
+        self.slope = slope
 
     def restart(self) -> None:
         """Forget all but the newest point: what is older lies before an event."""
@@ -119,7 +122,7 @@ class History:
         return (newest, rise - bend * h, bend)
 
     def save(self) -> tuple[Any, ...]:
-        return (self._points, self.value, self.slope)
+        return (self._points, self.slope)
 
     def restore(self, saved: tuple[Any, ...]) -> None:
-        self._points, self.value, self.slope = saved
+        self._points, self.slope = saved

@@ -37,6 +37,7 @@ class Agenda:
 
     def __init__(self, times: Array, what: npt.NDArray[np.int32]) -> None:
         self.times, self.what = times, what
+        times.flags.writeable = what.flags.writeable = False
         # Asked for once, since many runs have the same agenda.
         self.addresses = times.ctypes.data, what.ctypes.data
         """Where compiled code finds both arrays."""

@@ -58,10 +58,17 @@ _POINTS = 4096
 class Lead:
     """ngspice leads; the mechanics follow each of its accepted steps, or as ``use`` says."""
 
-    def __init__(self, scene: Scene, command: Command, recorder: Recorder) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        command: Command,
+        recorder: Recorder,
+        deck: tuple[str, dict[str, str]] | None = None,
+    ) -> None:
+        """``deck`` and its saved vectors replace the scene's."""
         self._duration = scene.run.duration
         self._recorder = recorder
-        self._deck, vectors = prepare(scene)
+        self._deck, vectors = deck or prepare(scene)
         self._saved, self._vectors = tuple(vectors), tuple(vectors.values())
         width = len(LOG) + len(self._saved)
         self._log = Tape(width)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import closing
+from itertools import chain
 
 import numpy as np
 
@@ -122,9 +123,9 @@ def _folded(scene: Scene, log: dict[str, Array], rows: Array) -> Iterator[str]:
     """Tell of what is faster than the rows, as a PWM is: a carrier of their rate looks constant."""
     names = {"coil_voltage": ("v(out)", "v(sense)")} | {v: (v,) for v in scene.circuit.save or []}
     missed, whole = np.zeros((2, len(names)))
-    for part in _points(log):
+    for part in _points({x: log[x] for x in {"time", *chain(*names.values())}}):
         time = part["time"]
-        inside = rows[(rows >= time[0]) & (rows <= time[-1])]
+        inside = rows[rows.searchsorted(time[0]) : rows.searchsorted(time[-1], "right")]
         if len(inside) < 2:
             continue
         h = np.where(time[1:] > scene.run.settle, np.diff(time), 0.0)

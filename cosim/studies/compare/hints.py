@@ -139,10 +139,7 @@ def _scaled(recording: Recording, name: str, factor: float) -> str:
     column = columns.get(name) or columns.get(name.replace("v_", "z_", 1))
     header, unit = (column["header"], column["unit"]) if column else (name, "SI")
     asks = [f"is it in {unit}"] if abs(factor) != 1.0 else []
-    turned = f"-{unit}".removeprefix("--")
-    asks += (
-        [f"is its positive direction the run's ({turned} as its unit turns it)"]
-        if factor < 0.0
-        else []
-    )
+    if factor < 0.0:
+        turned = f"-{unit}".removeprefix("--")
+        asks.append(f"is its positive direction the run's ({turned} as its unit turns it)")
     return f" with column {plain(header, 40)} times {factor:g}: {' and '.join(asks)}?"
