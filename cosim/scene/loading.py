@@ -38,9 +38,18 @@ class _Layer:
 
 def list_scenes() -> list[tuple[str, str]]:
     """Name and description of every built-in scene, the paper's first."""
-    files = {path.stem: tomllib.loads(path.read_text("utf-8")) for path in _LIBRARY.glob("*.toml")}
-    found = [(name, str(data.get("description", ""))) for name, data in files.items()]
-    return sorted(found, key=lambda scene: (not scene[0].startswith("paper"), scene[0]))
+    return [(name, str(_builtin(name).get("description", ""))) for name in _names()]
+
+
+def _names() -> list[str]:
+    """Of the built-in scenes, the paper's first."""
+    found = [path.stem for path in _LIBRARY.glob("*.toml")]
+    return sorted(found, key=lambda name: (not name.startswith("paper"), name))
+
+
+def _builtin(name: str) -> dict[str, Any]:
+    """What the file of a built-in scene holds."""
+    return tomllib.loads((_LIBRARY / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def groups() -> dict[str, list[str]]:
@@ -98,12 +107,11 @@ def changed(scene: Scene, values: Mapping[str, float | int | str | None], origin
 
 def _layers(source: str) -> list[_Layer]:
     """The file of ``source`` on top of the built-in scenes that it starts from."""
-    builtin = [name for name, _ in list_scenes()]
+    builtin = _names()
     if link.is_link(source):
         return _linked(source, builtin)
     if source in builtin:
-        origin, path = f"scene {source}", _LIBRARY / f"{source}.toml"
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        origin, path, data = f"scene {source}", _LIBRARY / f"{source}.toml", _builtin(source)
     else:
         origin, path = plain(source), Path(source)
         data = _read(source, origin, builtin)
@@ -143,7 +151,7 @@ def to_link(scene: Scene) -> str:
     """The shortest link that loads to an equal scene, but for its name and description. Raises
     BadInput where no built-in scene with some keys changed is equal."""
     wanted, found = _plain_values(scene), []
-    for name, _ in list_scenes():
+    for name in _names():
         there = _plain_values(load(name))
         changes = {key: value for key, value in wanted.items() if there.get(key) != value}
         made = link.write(name, [(key, _spelt(changes[key])) for key in sorted(changes)])
