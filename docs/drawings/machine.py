@@ -104,7 +104,7 @@ def machine(axes: Axes) -> None:
     ground(axes, 10.9, 4.5, 6.6, 1)
     arrow(axes, (10.7, 5.1), (9.35, 5.1), FORCE)
     axes.text(10.0, 4.72, "$F_n$", color=FORCE, ha="center", va="center", fontsize=14)
-    note(axes, "spring-loaded plate\n$\\mu_p$", (10.7, 8.1), (9.2, 6.5))
+    note(axes, "spring-loaded plate\n$\\mu_p$", (10.9, 8.55), (9.2, 6.5))
     note(axes, "friction\n$\\mu_s$, $\\mu_k$", (10.2, 2.6), (8.3, 4.0))
 
     # Heights are absolute and grow upwards.
