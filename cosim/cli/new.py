@@ -60,6 +60,7 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
         if os.path.lexists(path):  # a link that leads nowhere, too
             raise BadInput(f"{plain(path)}: is there already; choose another name.")
     texts = {path: text.replace("NAME.", f"{file.stem}.") for path, text in texts.items()}
+    texts[file] = f"#:schema ./{_SCHEMA}\n{texts[file]}"  # by which editors find it
     texts[schema_there] = as_json(schema())
     paths = [*texts, *fmus]
     with writable(file.parent, shared=True), together(paths) as temporary:

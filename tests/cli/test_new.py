@@ -26,6 +26,7 @@ def test_a_new_scene_runs_as_it_is(kind: str, tmp_path: Path) -> None:
     text = scene.read_text(encoding="utf-8")
     told = json.loads((scene.parent / "scene.schema.json").read_text(encoding="utf-8"))
     jsonschema.validate(tomllib.loads(text), told)
+    assert text.startswith("#:schema ./scene.schema.json\n")  # where editors look for it
     with in_place():
         assert main(["run", str(scene), *SHORT, "--out", str(tmp_path / "out")]) == 0
     assert (tmp_path / "out" / "waveforms.csv").exists()
