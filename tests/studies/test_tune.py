@@ -86,6 +86,7 @@ BAD = [
     (["--maximise", "speed"], "speed is not a number of this scene's summary"),
     (["--maximise", "v_averge"], "v_averge is not a number of this scene's summary; did you mean"),
     (["--maximise", "v_average", "--budget", "20"], "--budget 20"),
+    (["--maximise", "v_average", "--waveform=sine,pieces:6", "--budget=9"], "from 38, for"),
     (["--maximise", "v_average", "--budget", "3.5"], "must be a whole number, not '3.5'"),
     (["--maxmise", "v_average"], "--maximise --minimise is required (see cosim tune --help)"),
     (["--maximise", "v_average", "--robst"], "--robst; did you mean --robust? (see cosim tune"),

@@ -116,14 +116,13 @@ def tune(
     asked = [*filter(None, [waveform])] if isinstance(waveform, str) else waveform
     for name in asked or [""]:
         changes, shape = family(name) if asked else ({}, {})
-        ranges = {**keys, **both, **shape}
-        least = FEWEST_RUNS + 2 * len(ranges)
-        if not least <= budget <= MOST_RUNS:
-            raise BadInput(
-                f"--budget {budget}: must be a whole number from {least}, for these keys, to "
-                f"{MOST_RUNS}."
-            )
-        families[name] = changed(scene, changes, "--waveform"), ranges
+        families[name] = changed(scene, changes, "--waveform"), {**keys, **both, **shape}
+    least = FEWEST_RUNS + 2 * max(len(ranges) for _, ranges in families.values())
+    if not least <= budget <= MOST_RUNS:
+        raise BadInput(
+            f"--budget {budget}: must be a whole number from {least}, for these keys, to "
+            f"{MOST_RUNS}."
+        )
     tunings, benches, made = [], [], list[Run]()
 
     def told(run: Run, best: Run | None) -> None:
