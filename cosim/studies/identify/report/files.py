@@ -171,6 +171,7 @@ def _between(row: Row, unit: str) -> str:
 def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
     """Of ``identify.json``: the tables of the page, by heading."""
     agreed = "" if numbers["converged"] else " (not converged: the search's own scatter)"
+    count = len(numbers["ensemble"])
     rig, whole = numbers["rig"], _told(numbers["overall"] | MEAN) | {"floor": "", "late": ""}
     tables: dict[str, list[Row]] = {
         "The rig": [
@@ -189,7 +190,7 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
             }
             for one in numbers["laws"]
         ],
-        f"The suspension's force F(q) - F(0) on {len(numbers['ensemble'])} rigs{agreed}": [
+        f"The suspension's force F(q) - F(0) on {count} rig{'s' * (count > 1)}{agreed}": [
             {"q [mm]": row["q_mm"]}
             | {"force [N]": _between(row, "N"), "force/Bl [A]": _between(row, "A")}
             for row in numbers["force"]
