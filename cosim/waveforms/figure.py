@@ -16,7 +16,7 @@ from cosim.files.spill import release
 from cosim.scene import Scene
 from cosim.trials.camera import FRAME_RATE, accelerations, heights
 from cosim.trials.measured import measured
-from cosim.waveforms.quantities import signed
+from cosim.waveforms.quantities import printed, signed
 from cosim.waveforms.report import asked_for
 
 SURFACE, PART, RAM, DRIVE, EMF = "#1f6fb2", "#d1495b", "#8d99ae", "#2a9d8f", "#e9a03b"
@@ -81,7 +81,9 @@ def draw_own(scene: Scene, waves: dict[str, Array], units: Mapping[str, str]) ->
         axis.plot(*_outline(waves["time"], waves[name]), color=SURFACE, lw=0.8)
         if scene.run.settle > 0:
             axis.axvspan(0, scene.run.settle, color="0.93", zorder=0)
-        axis.set(xlim=(0, scene.run.duration), xlabel="time [s]", ylabel=f"[{units[name]}]")
+        axis.set(
+            xlim=(0, scene.run.duration), xlabel="time [s]", ylabel=f"[{printed(units[name])}]"
+        )
         axis.set_title(name.replace("$", "\\$"), loc="left", fontsize=10.5)
     words = [scene.description or scene.name]
     words += [f"{len(names)} of {len(every)} waveforms"] * (len(names) < len(every))
@@ -178,6 +180,8 @@ def _head(axis: Axes, title: str, handles: Sequence[Artist] | None = None) -> No
         handles, _ = axis.get_legend_handles_labels()
     if handles:
         spacing = {"borderpad": 0.1, "columnspacing": 1.2}
+        if any(one.get_label() == "second" for one in handles):  # one more, beside the title
+            spacing |= {"columnspacing": 0.7, "handlelength": 1.0, "handletextpad": 0.4}
         legend_above(axis, handles=handles, ncols=len(handles), fontsize=8, **spacing)
 
 

@@ -1,5 +1,6 @@
 """The numbers of a run: ``summary.csv`` names and describes each entry of ``summary.json``."""
 
+import re
 from collections.abc import Mapping
 from csv import DictReader
 from pathlib import Path
@@ -39,15 +40,12 @@ def meaning(name: str, units: Mapping[str, str] | None = None) -> dict[str, str]
     return {"units": found.unit, "long_name": found.text}
 
 
-_PRINTED = {
-    **{"m/s2": "m/s²", "1/m2": "1/m²", "N/m2": "N/m²", "N/m3": "N/m³"},
-    **{"N/m1.5": "N/m^1.5", "N.s/m": "N·s/m", "Ohm": "Ω"},
-}
+_PRINTED = {"N/m1.5": "N/m^1.5", "N.s/m": "N·s/m", "Ohm": "Ω"}
 
 
 def printed(unit: str) -> str:
     """A unit of a file, as people write it."""
-    return _PRINTED.get(unit, unit)
+    return _PRINTED.get(unit) or re.sub(r"(?<=[a-z])2\b", "²", re.sub(r"(?<=[a-z])3\b", "³", unit))
 
 
 def with_unit(value: float, unit: str, digits: int = 6) -> str:

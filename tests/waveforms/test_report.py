@@ -11,6 +11,7 @@ from cosim.simulation.simulate import simulate
 from cosim.waveforms.columns import UNITS
 from cosim.waveforms.figure import draw_own
 from cosim.waveforms.formats.tracker import laid_over
+from cosim.waveforms.quantities import printed
 from cosim.waveforms.report import LIMITS, table
 
 SHORT = ["run.duration=0.1", "run.settle=0.05"]
@@ -161,8 +162,17 @@ def test_of_many_waveforms_those_come_first_that_are_asked_for() -> None:
     assert "mean" in first and [row.split()[0] for row in rows[:20]] == shown
     assert rows[20].strip() == "24 more in summary.json; 1 other is 0 after settling"
     waves = {name: np.array([0.0, 1.0]) for name in ("time", *names)}
-    figure = draw_own(scene, waves, dict.fromkeys(names, "1"))
+    figure = draw_own(scene, waves, dict.fromkeys(names, "rad/s2"))
     assert [axis.get_title("left") for axis in figure.axes] == shown[:12]
+    assert {axis.get_ylabel() for axis in figure.axes} == {"[rad/s²]"}
+
+
+@pytest.mark.parametrize(
+    ("unit", "words"),
+    [("m/s2", "m/s²"), ("kg.m2", "kg.m²"), ("N/m3", "N/m³"), ("N/m1.5", "N/m^1.5"), ("H", "H")],
+)
+def test_units_are_printed_as_people_write_them(unit: str, words: str) -> None:
+    assert printed(unit) == words
 
 
 def test_heat_that_goes_on_is_told_in_plain_words() -> None:
