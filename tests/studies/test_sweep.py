@@ -76,6 +76,7 @@ def test_read_by_others(tmp_path: Path) -> None:
     with netCDF4.Dataset(tmp_path / "sweep.nc") as file:
         assert file["v_average"].dimensions == ("frequency", "amplitude")
         assert file["v_average"].units == "m/s" and file["frequency"].units == "Hz"
+        assert file["frequency"].long_name == "Frequency"  # what stands beside an axis
         np.testing.assert_array_equal(file["v_average"][:].filled(np.nan), data["v_average"])
         assert file["failure"][:].tolist() == data["failure"].values.tolist()
     assert np.isnan(data.v_average.sel(amplitude=99.0)).all()
