@@ -314,12 +314,16 @@ def _find_files(tables: dict[str, Any], folder: Path, *more: Path) -> None:
             fmu["file"] = found(fmu["file"])
 
 
+_POINT = re.compile(r"[+-]?(\.\d+|\d+\.)(e[+-]?\d+)?", re.IGNORECASE)
+"""A number with a point at its beginning or end, as people write it but TOML does not."""
+
+
 def _value(text: str) -> Any:
     """The TOML value of ``text``; a string where it is none, such as a bare word."""
     try:
         data = toml.parse(f"value = {text}")
     except (ValueError, RecursionError):
-        return text
+        return float(text) if _POINT.fullmatch(text) else text
     return data["value"] if data.keys() == {"value"} else text
 
 

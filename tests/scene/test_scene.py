@@ -264,6 +264,8 @@ def test_file_on_a_base(tmp_path: Path) -> None:
         ("mechanics.contact='rigid'", "mechanics", "contact", "rigid"),
         ("drive.quantised=true", "drive", "quantised", True),
         ("drive.offset=-0.5", "drive", "offset", -0.5),
+        ("drive.offset=-.5", "drive", "offset", -0.5),
+        ("drive.offset=2.", "drive", "offset", 2.0),
         ("coil.count=2", "coil", "count", 2),
         ("mechanics.suspension_k3=1_000_000", "mechanics", "suspension_k3", 1e6),
     ],
