@@ -54,7 +54,7 @@ def hints(recording: Recording, observe: Observe, guide: str, starts: Array) -> 
     if {"z_surface", "v_surface", "z_part", "v_part"} <= signals.keys():
         before, after = heights("surface", "part"), heights("part", "surface")
         if _better(after, before):
-            agree = _agree("both heights", after, before)
+            agree = _agree("two heights", after, before)
             yield f"{agree} with the columns of surface and part exchanged: which is which?"
             return
     start, fine = starts[0], True
