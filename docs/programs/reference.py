@@ -125,8 +125,9 @@ def scene() -> str:
         '`description = "…"` is printed with each run.',
         "All numbers are in SI units. Another value for one run: "
         "`cosim run SCENE --set table.key=value`.",
-        "A key that has no effect in a scene is told as a note. A value out of range is refused "
-        "before anything runs.",
+        "A key that has no effect with the scene's `circuit.model`, `drive.waveform` or "
+        "`coupling.method` is told as a note, but not where ports join a circuit to FMUs. A value "
+        "out of range is refused before anything runs.",
     ]
     for name, model in TABLES.items():
         parts += [f"## [{name}]", sentence((model.__doc__ or "").partition("\n")[0])]
