@@ -2,9 +2,7 @@
 
 import cProfile
 import pstats
-from functools import partial
 
-from cosim.evaluate.many import each, threads
 from cosim.evaluate.point import point
 from cosim.scene import load
 from cosim.simulation.simulate import summary
@@ -16,13 +14,12 @@ def test_python_calls_few_functions_for_a_point() -> None:
     knobs = [{"drive.amplitude": 5.0 + 0.02 * k, "drive.offset": -0.01 * k} for k in range(100)]
 
     def run() -> None:
-        tasks = [partial(point, base, at, False) for at in knobs]
-        with threads(None, 1) as pool:
-            for _, found in each(pool, lambda _, make, told: summary(make(), told), tasks):
-                assert isinstance(found, dict)
+        # In this thread: before Python 3.12 a profile holds no other.
+        for at in knobs:
+            assert isinstance(summary(point(base, at, False)), dict)
 
     run()  # what is kept from run to run is made
     profile = cProfile.Profile()
     profile.runcall(run)
     calls = pstats.Stats(profile).total_calls / len(knobs)  # pyright: ignore[reportAttributeAccessIssue]
-    assert calls < 550, f"{calls:.0f} calls a point"
+    assert calls < 1050, f"{calls:.0f} calls a point"
