@@ -45,6 +45,9 @@ LOOSER = 1e-6
 LEAST_TOLD = 5e-5
 """Of v_average, with ngspice: two runs may err alike by chance, and this much was seen."""
 
+LONGEST_STEP = 1e-2
+"""s, of ``circuit.max_step``; the greatest ``circuit.reltol``, too."""
+
 STRICT = 2.4
 """How much shorter they are for an error in the strict sense, of both runs."""
 
@@ -136,11 +139,12 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
 
 def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
     """The result of ``run``, which runs a scene with ports, and as ``NAME.mean_error`` how far each
-    mean is from that of a run with all steps COARSER times as long; nothing where that one fails.
-    Raises what ``run`` raises.
+    mean is from that of a run with all steps COARSER times as long, or as short where a scene may
+    not have such long ones; nothing where that one fails. Raises what ``run`` raises.
     """
-    longer = min(scene.coupling.macro_step * COARSER, 1e-2)
-    coarse = _longer(scene, COARSER).having(coupling={"macro_step": longer})
+    coarse = _longer(scene, COARSER)
+    macro_step = scene.coupling.macro_step * coarse.circuit.max_step / scene.circuit.max_step
+    coarse = coarse.having(coupling={"macro_step": min(macro_step, LONGEST_STEP)})
     told: dict[str, Any] = {}
     with _beside(1) as (threads, going):
         other = threads.submit(one_run, few_rows(coarse), going, alone=True)
@@ -277,9 +281,13 @@ def _steps(scene: Scene, longer: float) -> Scene | None:
 
 
 def _longer(scene: Scene, longer: float) -> Scene:
+    """With as much shorter ones where longer ones would be beyond what a scene may have: two runs
+    with the longest steps err alike."""
     circuit = scene.circuit
+    if max(circuit.reltol * longer**3, circuit.max_step * longer) > LONGEST_STEP:
+        longer = 1.0 / longer
     steps = {"reltol": circuit.reltol * longer**3, "max_step": circuit.max_step * longer}
-    return scene.having(circuit={name: min(value, 1e-2) for name, value in steps.items()})
+    return scene.having(circuit=steps)
 
 
 def _looser(scene: Scene) -> Scene:
