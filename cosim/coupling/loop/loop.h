@@ -284,6 +284,7 @@ typedef struct {
 /* An output whose FMU tells its slope, and how far it changes by it; see judge_slopes(). */
 typedef struct {
     int64_t place, slope;
+    double largest;             /* magnitude of its value so far */
     double change, least, most; /* since it was judged last: its own, and by the slope */
     int64_t wrong;
 } Slope;

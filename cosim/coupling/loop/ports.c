@@ -53,7 +53,8 @@ static const double OTHER = 0.1, ROUNDING = 1e-9;
 /* Of a step's change and of the value: by how much an output of the same step is another one. */
 
 static const double NOISE = 1e-6, FAR = 0.3;
-/* Of an output: a change that tells of its slope; of that: how far from it a slope is wrong. */
+/* Of an output's largest value: a change that tells of its slope; of that: how far from it a slope is
+   wrong. */
 
 enum { WRONG = 12, RIGHT = 4 }; /* so many wrong changes tell; so many of them a right one outweighs */
 
@@ -374,10 +375,11 @@ static void judge_slopes(Ports *c, double h)
         const double start = h * c->before[t->slope], end = h * c->outputs[t->slope];
         if (t->wrong >= WRONG || !isfinite(start + end) || (start == 0.0 && end == 0.0))
             continue;
+        t->largest = fmax(t->largest, fabs(value));
         t->change += value - c->before[t->place];
         t->least += fmin(start, end);
         t->most += fmax(start, end);
-        if (!(fabs(t->change) > NOISE * fabs(value)))
+        if (!(fabs(t->change) > NOISE * t->largest))
             continue;
         const double off = fmax(t->change - t->most, t->least - t->change);
         t->wrong += off > FAR * fabs(t->change) ? 1 : -RIGHT;
