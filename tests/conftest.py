@@ -4,6 +4,7 @@ import gc
 import json
 import os
 from collections.abc import Iterator
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,14 @@ def pytest_configure() -> None:
 def pytest_xdist_auto_num_workers() -> int:
     """One more than there are processors: the tests of processes wait for them."""
     return processes.processors() + 1
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _own_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Each worker stands in a folder of its own: what goes to `results` by default meets nobody
+    else's there, and nothing of the checkout."""
+    with chdir(tmp_path_factory.mktemp("here")):
+        yield
 
 
 LONG = (

@@ -107,7 +107,7 @@ def test_frequencies_last_whole_periods() -> None:
 def test_failures_cost_only_themselves(tmp_path: Path) -> None:
     """Scenes that cannot be, mechanics that give up and a circuit without a solution."""
     netlist = tmp_path / "floating.cir"
-    good = Path("circuits/examples/h_bridge.cir").resolve()
+    good = Path(__file__).parents[2] / "circuits/examples/h_bridge.cir"
     text = good.read_text(encoding="utf-8")
     netlist.write_text(text.replace("\n.end", "\nBno nowhere 0 I = v(nowhere)**2 + 1\n.end"))
     for source, over, lost in (

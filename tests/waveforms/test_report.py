@@ -100,7 +100,8 @@ def test_limits_that_a_netlist_does_not_tell_of_are_not_known(
     climit: int | None, home: Path
 ) -> None:
     """Not 0, nor never."""
-    bridge = Path("circuits/examples/h_bridge.cir").read_text(encoding="utf-8")
+    path = Path(__file__).parents[2] / "circuits/examples/h_bridge.cir"
+    bridge = path.read_text(encoding="utf-8")
     told = re.sub(r"(?m)^Bswing.*\n", "" if climit is None else f"Vc climit 0 {climit}\n", bridge)
     netlist = home / "silent.cir"
     netlist.write_text(told, encoding="utf-8")
