@@ -412,7 +412,8 @@ def _clear(owner: int, processes: "list[subprocess.Popen[Any]]", folder: str) ->
         return
     for process in processes:
         process.kill()
-        process.wait()
+        with suppress(KeyboardInterrupt):  # a second one, while the first one ends all this
+            process.wait()
     rmtree(folder, ignore_errors=True)
 
 
