@@ -27,6 +27,11 @@ class Key:
     """What may stand there, where neither kind nor choices say it."""
 
     @property
+    def title(self) -> str:
+        """What it is, for an axis: ``text`` without what it says after that."""
+        return self.text.partition(";")[0]
+
+    @property
     def full(self) -> str:
         """The key as an override spells it: ``table.key``."""
         return f"{self.table}.{self.name}"

@@ -30,6 +30,7 @@ from cosim.errors import BadInput, CosimError
 from cosim.mechanics.fmi import load
 from cosim.mechanics.normal_force import normal_force
 from cosim.scene import Scene, changed
+from cosim.scene.describe import KEYS
 from cosim.simulation.elsewhere import one_run
 from cosim.simulation.fidelity import LEAST, Fidelity, relative_error
 from cosim.simulation.here import few_rows, simulate_here
@@ -44,9 +45,6 @@ LOOSER = 1e-6
 
 LEAST_TOLD = 5e-5
 """Of v_average, with ngspice: two runs may err alike by chance, and this much was seen."""
-
-LONGEST_STEP = 1e-2
-"""s, of ``circuit.max_step``; the greatest ``circuit.reltol``, too."""
 
 STRICT = 2.4
 """How much shorter they are for an error in the strict sense, of both runs."""
@@ -142,12 +140,9 @@ def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
     mean is from that of a run with all steps COARSER times as long, or as short where a scene may
     not have such long ones; nothing where that one fails. Raises what ``run`` raises.
     """
-    coarse = _longer(scene, COARSER)
-    macro_step = scene.coupling.macro_step * coarse.circuit.max_step / scene.circuit.max_step
-    coarse = coarse.having(coupling={"macro_step": min(macro_step, LONGEST_STEP)})
     told: dict[str, Any] = {}
     with _beside(1) as (threads, going):
-        other = threads.submit(one_run, few_rows(coarse), going, alone=True)
+        other = threads.submit(one_run, few_rows(_longer(scene, COARSER)), going, alone=True)
         result = run()
         with suppress(CosimError):
             told = other.result().summary
@@ -284,10 +279,14 @@ def _longer(scene: Scene, longer: float) -> Scene:
     """With as much shorter ones where longer ones would be beyond what a scene may have: two runs
     with the longest steps err alike."""
     circuit = scene.circuit
-    if max(circuit.reltol * longer**3, circuit.max_step * longer) > LONGEST_STEP:
-        longer = 1.0 / longer
-    steps = {"reltol": circuit.reltol * longer**3, "max_step": circuit.max_step * longer}
-    return scene.having(circuit=steps)
+    tables = {
+        "circuit": {"reltol": circuit.reltol * longer**3, "max_step": circuit.max_step * longer},
+        "coupling": {"macro_step": scene.coupling.macro_step * longer},
+    }
+    every = ((KEYS[f"{table}.{name}"], x) for table in tables for name, x in tables[table].items())
+    if longer > 1.0 and not all(key.holds(x) for key, x in every):
+        return _longer(scene, 1.0 / longer)
+    return scene.having(**tables)
 
 
 def _looser(scene: Scene) -> Scene:

@@ -246,8 +246,7 @@ def test_nine_trials_and_the_travel_give_the_rig_back(nine: Path, tmp_path: Path
     its back-EMF's, and the search ends beside the best (at 0.00065 and 14 % off on one processor,
     where the true rig costs 0.00037; 5 % off on another, which rounds otherwise). Without the
     travel none need be: a ram that goes farther, in a heavier surface on stiffer flexures, moves
-    that nearly alike, and such ends had the mass 11 % and the force
-    factor 37 % off."""
+    that nearly alike, and such ends had the mass 11 % and the force factor 37 % off."""
     bounds = tmp_path / "bounds.toml"
     bounds.write_text(f'[rig."mechanics.travel"]\nvalue = {KNOWN["rig"]["mechanics.travel"]}\n')
     space = read_space(bounds)

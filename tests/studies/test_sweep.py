@@ -22,6 +22,7 @@ from cosim.cli.main import main
 from cosim.errors import BadInput
 from cosim.evaluate.evaluator import Evaluator
 from cosim.evaluate.point import Outcome, evaluate
+from cosim.files.resources import circuits
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.studies.sweep import figure
@@ -107,7 +108,7 @@ def test_frequencies_last_whole_periods() -> None:
 def test_failures_cost_only_themselves(tmp_path: Path) -> None:
     """Scenes that cannot be, mechanics that give up and a circuit without a solution."""
     netlist = tmp_path / "floating.cir"
-    good = Path(__file__).parents[2] / "circuits/examples/h_bridge.cir"
+    good = circuits() / "examples" / "h_bridge.cir"
     text = good.read_text(encoding="utf-8")
     netlist.write_text(text.replace("\n.end", "\nBno nowhere 0 I = v(nowhere)**2 + 1\n.end"))
     for source, over, lost in (

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.files.resources import circuits
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
 from cosim.waveforms.columns import UNITS
@@ -100,7 +101,7 @@ def test_limits_that_a_netlist_does_not_tell_of_are_not_known(
     climit: int | None, home: Path
 ) -> None:
     """Not 0, nor never."""
-    path = Path(__file__).parents[2] / "circuits/examples/h_bridge.cir"
+    path = circuits() / "examples" / "h_bridge.cir"
     bridge = path.read_text(encoding="utf-8")
     told = re.sub(r"(?m)^Bswing.*\n", "" if climit is None else f"Vc climit 0 {climit}\n", bridge)
     netlist = home / "silent.cir"

@@ -86,11 +86,7 @@ def dataset(
         columns = [list(column) for column in zip(*design.sample, strict=True)]
     coordinates, variables = {}, {}
     for name, column, axis in zip(axes, columns, design.axes, strict=True):
-        about = {
-            "units": axis.key.unit,
-            "long_name": axis.key.text.partition(";")[0],
-            "key": axis.key.full,
-        }
+        about = {"units": axis.key.unit, "long_name": axis.key.title, "key": axis.key.full}
         coordinates[name] = (name if design.sample is None else POINT, column, about)
     names = netcdf_names(numbers)
     for name, values in numbers.items():
@@ -153,7 +149,7 @@ def _meant(scene: Scene, data: xr.Dataset) -> dict[str, xr.DataArray]:
     add("offset", firmware.knob_offset, "pot_offset", amplitude)
     for name, values in found.items():
         key = KEYS[f"drive.{name}"]
-        values.attrs = {"units": key.unit, "long_name": key.text.partition(";")[0]}
+        values.attrs = {"units": key.unit, "long_name": key.title}
     return {name: values for name, values in found.items() if name not in axes}
 
 
