@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from math import isfinite
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,16 @@ from cosim.scene import messages, toml
 from cosim.scene.describe import KEYS, acts, keys
 from cosim.scene.model import Scene, toml_value
 from cosim.scene.rungs import METHODS
-from cosim.scene.tables import KNOBS, LEVEL_KEY, NORMAL_FORCES, PARAM_KEY, PATHS, PORT_LISTS, TABLES
+from cosim.scene.tables import (
+    ACT_WITH,
+    KNOBS,
+    LEVEL_KEY,
+    NORMAL_FORCES,
+    PARAM_KEY,
+    PATHS,
+    PORT_LISTS,
+    TABLES,
+)
 
 _LIBRARY = Path(__file__).with_name("library")
 
@@ -421,12 +431,20 @@ def _tell_doubts(scene: Scene, layers: list[_Layer]) -> None:
         if 0.0 < FAR * usual <= values[-1]:
             words = f"{key.full} = {values[-1]:g} {key.unit} is far from the usual {usual:g}"
             warnings.warn(f"{origin}: {words}; keys are in SI units.", Note, stacklevel=3)
-        choices = ["circuit.model"]
+        choice, acting = ACT_WITH.get(key.full, ("circuit.model", None))
+        choices = [choice]
         choices += ["drive.waveform"] * (key.table == "drive")
         steered = key.table == "circuit" and key.name in METHODS[scene.coupling.method].chooses
         choices += ["coupling.method"] * (steered or key.table == "coupling")
         latest = max(origins.get(choice, (-1, ""))[0] for choice in choices)
-        ported = scene.has_ports  # whose keys are of another machine
-        if rank >= latest and not ported and not acts(key, *chosen):
-            sentence = f"{origin}: {messages.idle(key, *chosen)}."
-            warnings.warn(sentence, NoEffect, stacklevel=3)
+        if rank < latest or scene.has_ports:  # whose keys are of another machine
+            continue
+        chosen_law = attrgetter(choice)(scene) if acting else None
+        if acting != chosen_law:
+            idle = f'{key.full} has no effect with {choice} = "{chosen_law}"'
+            idle += f'; it acts with "{acting}"'
+        elif not acts(key, *chosen):
+            idle = messages.idle(key, *chosen)
+        else:
+            continue
+        warnings.warn(f"{origin}: {idle}.", NoEffect, stacklevel=3)

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -446,6 +447,29 @@ def test_keys_of_no_effect_are_told(tmp_path: Path, scene: str, change: str, why
         (said,) = [str(warning.message) for warning in caught]
         assert said.startswith(f"{origin}: {full} has no effect with circuit.model = ")
         assert said.endswith(why)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "with_it"),
+    [
+        ("mechanics.restitution", "0.5", 'mechanics.contact = "rigid"'),
+        ("mechanics.suspension_knee", "-1e-4", 'mechanics.suspension = "knee"'),
+        ("mechanics.suspension_distance", "4e-3", 'mechanics.suspension = "repulsion"'),
+        ("run.step", "1e-5", 'run.solver = "fast"'),
+    ],
+)
+def test_a_key_of_another_law_is_told_and_acts_with_its_own(
+    key: str, value: str, with_it: str
+) -> None:
+    choice, _, acting = with_it.partition(" = ")
+    with pytest.warns(NoEffect) as caught:
+        load("paper-limited", [f"{key}={value}"])
+    (said,) = [str(warning.message) for warning in caught]
+    assert said.startswith(f"--set: {key} has no effect with {choice} = ")
+    assert said.endswith(f"; it acts with {acting}.")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", NoEffect)
+        load("paper-limited", [f"{choice}={acting}", f"{key}={value}"])
 
 
 @pytest.mark.parametrize("change", ["coil.inductance=1.3", "mechanics.travel=1.9"])
