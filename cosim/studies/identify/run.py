@@ -21,6 +21,7 @@ from cosim.studies.identify.report.verdicts import judge, rigs_meant
 from cosim.studies.identify.search.plan import FULL, QUICK, Plan, folds, searched
 from cosim.studies.identify.search.search import Found, Progress, Search, best_of, deviations
 from cosim.studies.report import Row
+from cosim.studies.study import check_seed
 
 UNSTEADY = 0.5
 """Repeatability of a velocity (NRMSE of its cycles) beyond which no steady drive explains it."""
@@ -66,8 +67,7 @@ def identify(
 
     The method: :mod:`cosim.studies.identify.search.plan`. Raises BadInput.
     """
-    if seed < 0:
-        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
+    check_seed(seed)
     space = read_space(Path(bounds) if bounds is not None else None)
     everything = read_trials(Path(trials), space)
     labels = [trial.label for trial in everything]

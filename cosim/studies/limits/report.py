@@ -19,6 +19,7 @@ from cosim.studies.limits.judge import Key, Point
 from cosim.studies.limits.runs import GOALS, NEEDED, Goal, command
 from cosim.studies.limits.study import FULL, QUICK, Study, checked, ensemble, steps, study
 from cosim.studies.report import Progress, Report, Row, counted, silent
+from cosim.studies.study import check_seed
 
 STORE = "limits.sqlite"
 
@@ -126,8 +127,7 @@ def limits(
     In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
     study has left there. Raises BadInput.
     """
-    if seed < 0:
-        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
+    check_seed(seed)
     if not LEAST_EFFORT <= effort <= MOST_EFFORT:
         raise BadInput(f"--effort {effort:g}: must be from {LEAST_EFFORT:g} to {MOST_EFFORT:g}.")
     words = [scene.name if isinstance(scene, Scene) else str(scene)]

@@ -30,6 +30,7 @@ from cosim.studies.measure.sample import (
 from cosim.studies.measure.worth import FEWEST, Worth, chance, worth
 from cosim.studies.plots import BLUE, ORANGE, panels
 from cosim.studies.report import Progress, Report, Row, brief, counted, silent
+from cosim.studies.study import check_seed
 from cosim.waveforms.quantities import signed
 
 RIGS, QUICK, LEAST = 48, 24, 4
@@ -62,8 +63,7 @@ def measure(
     In the folder ``out`` it leaves what ``Report.save`` writes, and takes up what an interrupted
     study has left there. Raises BadInput.
     """
-    if seed < 0:
-        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
+    check_seed(seed)
     base = load(scene, overrides)
     checked(base)
     others = ensemble(Path(rigs), base)

@@ -12,6 +12,7 @@ from cosim.evaluate.keys import FREQUENCIES, numeric_key, split
 from cosim.evaluate.point import Number
 from cosim.scene import Key
 from cosim.scene.messages import shown
+from cosim.studies.study import check_seed
 
 MOST_POINTS = 1_000_000
 """Their numbers take 2.3 GB when the dataset is written."""
@@ -95,8 +96,7 @@ def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: 
     axes = grid(over).axes
     if not (isinstance(count, Integral) and 1 <= count <= MOST_POINTS):
         raise BadInput(f"--samples {shown(count)}: must be a whole number from 1 to {MOST_POINTS}.")
-    if not (isinstance(seed, Integral) and seed >= 0):
-        raise BadInput(f"--seed {shown(seed)}: must be a whole number from 0.")
+    check_seed(seed)
     for axis in axes:
         if len(set(axis.values)) < 2:
             raise BadInput(

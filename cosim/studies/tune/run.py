@@ -26,6 +26,7 @@ from cosim.search.searches import POPULATION, Climb, Design
 from cosim.search.turns import TURN, faces, turned
 from cosim.simulation.checks import motion
 from cosim.simulation.fidelity import Fidelity
+from cosim.studies.study import check_seed
 from cosim.studies.tune.found import Run, Tuning, write_runs
 
 KNOBS: dict[str, tuple[float, float]] = {
@@ -101,8 +102,7 @@ def tune(
     if quantity is None or (maximise and minimise):
         raise BadInput("tune: either maximise or minimise must name a number of the summary.")
     scene = load(scene, overrides)
-    if seed < 0:
-        raise BadInput(f"--seed {seed}: must be a whole number from 0.")
+    check_seed(seed)
     if not over and not waveform and scene.drive.waveform not in COMMANDS:
         raise BadInput(
             f'scene {scene.name}: drive.waveform = "{scene.drive.waveform}" has no knobs; name '
