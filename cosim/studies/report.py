@@ -112,11 +112,11 @@ def write_page(
 
 
 def markdown(rows: Sequence[Row]) -> list[str]:
-    """The lines of a table."""
-    head = list(rows[0])
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    lines += ["| " + " | ".join(_short(cell) for cell in row.values()) + " |" for row in rows]
-    return lines
+    """The lines of a table, its columns aligned for a terminal."""
+    head, *body = list(rows[0]), *([_short(cell) for cell in row.values()] for row in rows)
+    widths = [max(map(len, column)) for column in zip(head, *body, strict=True)]
+    rule = ["-" * width for width in widths]
+    return [f"| {' | '.join(map(str.ljust, row, widths))} |" for row in (head, rule, *body)]
 
 
 def brief(number: float) -> str:
@@ -132,6 +132,7 @@ def span(numbers: Collection[float]) -> str:
 
 
 def _short(cell: Any) -> str:
+    """Four digits of a number, a dash for what is not known."""
     if isinstance(cell, float):
         return f"{cell:.4g}" if isfinite(cell) else "-"
-    return str(cell)
+    return "-" if cell is None else str(cell)

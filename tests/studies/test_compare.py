@@ -350,7 +350,7 @@ def test_command_prints_and_writes_units_and_meanings(
         rows = {row["name"]: row for row in csv.DictReader(file)}
     assert set(rows) == set(numbers) - {"run", "trial", "understood", "notes"}
     said = capsys.readouterr().out
-    assert re.search(r"drift \[mm/s\] +10 ", said)
+    assert re.search(r"drift \[mm/s\] +\| 10 ", said)
     for name, row in rows.items():
         assert float(row["value"]) == numbers[name]
         assert row["unit"] in ("mm", "%", "1", "Hz", "m/s", "1/s", "s")

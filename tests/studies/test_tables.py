@@ -1,6 +1,7 @@
 """What the accuracy study makes of its runs, on runs with known errors."""
 
 import csv
+import re
 from math import isnan, nan
 from pathlib import Path
 
@@ -98,5 +99,6 @@ def test_tables(tmp_path: Path) -> None:
         read = list(csv.DictReader(file))
     assert float(read[0]["error [1]"]) == 1.0 / 3.0
     text = (tmp_path / "study.md").read_text(encoding="utf-8")
-    assert "| a | 0.3333 |" in text and "| b | - |" in text and "A note." in text
+    assert re.search(r"\| a +\| 0.3333 +\|", text) and re.search(r"\| b +\| - +\|", text)
+    assert "A note." in text
     assert "cores" in text

@@ -1,6 +1,7 @@
 """A run and a recording side by side, as a user asks for it."""
 
 import os
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -16,7 +17,8 @@ from cosim.simulation.rungs.given_surface import surface
 from cosim.simulation.simulate import simulate
 from cosim.studies.compare import figure
 from cosim.studies.compare.compare import Found, measure
-from cosim.studies.compare.scores import LINES
+from cosim.studies.compare.scores import LINES, Number
+from cosim.studies.report import Row, markdown
 from cosim.studies.report import write_csv as write_rows
 from cosim.trials.recording import Recording, read_recording
 from cosim.waveforms import formats
@@ -61,44 +63,44 @@ class Comparison:
         self.plot().write(out / "compare.png")
 
     def __repr__(self) -> str:
-        found, read = self.found, self.found.recording.told()
-        numbers = {number.name: number for number in found.numbers}
-        scores, pairs, alone = [], [], []
-        while numbers:
-            name, one = next(iter(numbers.items()))
-            quantity, _, side = name.rpartition("_")
-            title, names, rows = name, [name], alone
-            if f"{name}_ceiling" in numbers:
-                names, rows = [f"{name}{line}" for line in LINES], scores
-            elif side == "measured":
-                title, names, rows = quantity, [name, f"{quantity}_simulated"], pairs
-            values = [numbers.pop(each).value for each in names]
-            rows.append((title, one.unit, values, one.meaning))
-        heads = [line.replace("_", " ").strip() or "run" for line in LINES]
-        lines = [*read, *[""] * bool(read), *_table(heads, scores), *LEGEND, ""]
-        lines += [*_table(["measured", "simulated"], pairs), "", *_table([], alone)]
-        return "\n".join(lines + [""] * bool(found.notes) + found.notes)
+        numbers = {number.name: number for number in self.found.numbers}
+        scores, pairs, alone = (_table(numbers, ends) for ends in TABLES)
+        parts = self.found.recording.told(), scores, LEGEND, pairs, alone, self.found.notes
+        return "\n\n".join("\n".join(lines) for lines in parts if lines)
 
 
 FEWEST_ROWS = 2.1
 """In a period of the run."""
 
+TABLES = (
+    {end: end.replace("_", " ").strip() or "run" for end in LINES},
+    {"_measured": "measured", "_simulated": "simulated"},
+    {"": "value"},
+)
+"""What the names of the numbers in a row end with, and the heads of their columns; the last table
+takes all that are left."""
+
 LEGEND = (
-    "  ceiling: the measured motion's forecast of itself one period later",
-    "  no motion: of a signal that stays 0, or a height that stays the first",
-    "  straight line: of the best one through the measured values",
+    "ceiling: the measured motion's forecast of itself one period later",
+    "no motion: of a signal that stays 0, or a height that stays the first",
+    "straight line: of the best one through the measured values",
 )
 
 
-def _table(heads: list[str], rows: list[tuple[str, str, list[float | None], str]]) -> list[str]:
-    """Lines of names, values in the units of the bench and, below each, its meaning."""
-    lines = [" " * 29 + "".join(f"{head:>14}" for head in heads)] if heads else []
-    for name, si, values, meaning in rows:
-        unit, scale = bench_unit(si)
-        told = ("none" if value is None else f"{value * scale:.4g}" for value in values)
-        line = f"  {f'{name} [{unit}]':<27}" + "".join(f"{value:>14}" for value in told)
-        lines += [line, f"      {meaning}"]
-    return lines
+def _table(numbers: dict[str, Number], ends: Mapping[str, str]) -> list[str]:
+    """A table of those that have all these ends, which are taken out, in the units of the bench,
+    and what its rows mean."""
+    rows: list[Row] = []
+    meanings: list[str] = []
+    first = next(iter(ends))
+    for name in [each.removesuffix(first) for each in numbers if each.endswith(first)]:
+        if all(name + end in numbers for end in ends):
+            found = [numbers.pop(name + end) for end in ends]
+            unit, scale = bench_unit(found[0].unit)
+            values = [one.value and one.value * scale for one in found]
+            rows.append({"": f"{name} [{unit}]", **dict(zip(ends.values(), values, strict=True))})
+            meanings.append(f"{name}: {found[0].meaning}")
+    return [*markdown(rows), "", *meanings] if rows else []
 
 
 def compare(

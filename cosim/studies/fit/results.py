@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cosim.arrays import Array
-from cosim.studies.report import Row
+from cosim.studies.report import Row, markdown
 
 
 @dataclass(frozen=True)
@@ -79,21 +79,13 @@ def change(found: float | None, measured: float | None) -> Row:
 def told(numbers: dict[str, Any]) -> str:
     """Fitted or published parameters, trial by trial and together."""
     fitted = numbers["parameters"] == "fitted"
-    table: list[tuple[str, ...]] = [
-        ("trial", "force [m·g]", "measured", *(FITTED if fitted else EVALUATED))
+    columns = FITTED if fitted else EVALUATED
+    rows = [
+        {head: row[name] for head, name in (FORCES | columns).items()}
+        | ({FRICTION: _friction(row)} if fitted else {})
+        for row in numbers["trials"]
     ]
-    for row in numbers["trials"]:
-        forces = (row["normal_force_weights"], row["normal_force_measured_weights"])
-        if fitted:
-            cells = (_friction(row), str(row["slides"]))
-            cells += (_or_dash(row["misfit_um"], ".1f"), f"{row['noise_um']:.1f}")
-        else:
-            cells = (f"{row['mean_error_mm']:.3f}", f"{row['stick_fraction']:.0%}")
-            cells += (f"{row['mean_error_percent']:.2f}",)
-        table.append((row["trial"], *(_or_dash(force, ".2f") for force in forces), *cells))
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = ["  ".join(map(str.rjust, row, widths)) for row in table]
-    lines += _shared(numbers) if fitted else _whole_paths(numbers)
+    lines = [*markdown(rows), "", *(_shared(numbers) if fitted else _whole_paths(numbers))]
     if numbers["normal_force_change_mean_percent"] is not None:
         mean, median = (numbers[f"normal_force_change_{x}_percent"] for x in ("mean", "median"))
         lines.append(
@@ -102,8 +94,18 @@ def told(numbers: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-FITTED = ("µ_k F_n [m·g], 90 %", "slides", "misfit [µm]", "noise [µm]")
-EVALUATED = ("error [mm]", "sticks", "error [%]")
+FORCES = {
+    "trial": "trial",
+    "force [m·g]": "normal_force_weights",
+    "measured": "normal_force_measured_weights",
+}
+FITTED = {"slides": "slides", "misfit [µm]": "misfit_um", "noise [µm]": "noise_um"}
+EVALUATED = {
+    "error [mm]": "mean_error_mm",
+    "error [%]": "mean_error_percent",
+    "sticks, share": "stick_fraction",
+}
+FRICTION = "µ_k F_n [m·g], 90 %"
 
 
 def _whole_paths(numbers: dict[str, Any]) -> list[str]:
@@ -138,10 +140,6 @@ def headline(numbers: dict[str, Any]) -> str:
         f"Slides are predicted to {numbers['misfit_um']:.1f} µm rms, noise of the tracks "
         f"{numbers['noise_um']:.1f} µm: means over the {count} of {len(rows)} trials determined"
     )
-
-
-def _or_dash(value: float | None, form: str) -> str:
-    return "–" if value is None else f"{value:{form}}"
 
 
 def _interval(interval: list[float], form: str) -> str:

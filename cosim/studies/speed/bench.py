@@ -20,7 +20,7 @@ from typing import Any
 from cosim.files.atomic import write_json
 from cosim.scene import load
 from cosim.simulation.simulate import simulate
-from cosim.studies.report import machine
+from cosim.studies.report import Row, machine, markdown
 from cosim.toolchain.libraries import compiled
 from cosim.toolchain.processes import in_place
 
@@ -142,12 +142,12 @@ def judged(numbers: dict[str, Any], targets: Targets) -> dict[str, Any]:
 
 
 def table(numbers: dict[str, Any], titles: Mapping[str, str]) -> str:
-    """All numbers for people: median, low, high, error, target, and whether it holds."""
+    """All numbers for people, a table of each group."""
     host = numbers["machine"]
     lines = [f"{host['processor']}, {host['cores']} cores, Python {host['python']}"]
     for group, entries in groupby(_spreads(numbers), lambda entry: entry[0].partition(".")[0]):
-        lines.append(f"{titles[group]}:")
-        lines += [f"  {name.partition('.')[2]:<10}{_cells(found)}" for name, found in entries]
+        rows = [_row(name.partition(".")[2], found) for name, found in entries]
+        lines += ["", f"{titles[group]}:", *markdown(rows)]
     return "\n".join(lines)
 
 
@@ -160,12 +160,9 @@ def _spreads(numbers: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
             yield from ((f"{name}.{key}", found) for key, found in _spreads(value))
 
 
-def _cells(found: dict[str, Any]) -> str:
-    told = f"{found['median']:.4g} ({found['low']:.4g} ... {found['high']:.4g})"
-    if "error" in found:
-        told += f"  error {found['error']:.1e}"
-    if "error_of_peer" in found:
-        told += f", theirs {found['error_of_peer']:.1e}"
+def _row(name: str, found: dict[str, Any]) -> Row:
+    row: Row = {"": name} | {head: found[head] for head in ("median", "low", "high")}
+    row |= {"error": found.get("error"), "theirs": found.get("error_of_peer"), "target": None}
     if "target" in found:
-        told += f"  target {found['target']}: {'holds' if found['holds'] else 'MISSED'}"
-    return told
+        row["target"] = f"{found['target']}: {'holds' if found['holds'] else 'MISSED'}"
+    return row

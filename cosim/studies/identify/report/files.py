@@ -10,7 +10,7 @@ from cosim.studies.identify.problem.gauges import GAUGES
 from cosim.studies.identify.report import figures
 from cosim.studies.identify.report.scenes import rounded, scene_file, trial_settings
 from cosim.studies.identify.report.solved import Solved
-from cosim.studies.report import Report, Row
+from cosim.studies.report import Report, Row, markdown
 from cosim.waveforms.quantities import label
 
 COLUMNS = {
@@ -35,8 +35,6 @@ LINE = {
 }
 """Of a trial's line in the summary, by the same."""
 
-WORST = "nrmse_v_surface_worst"
-WIDTH = 17
 MEAN = {"trial": "mean"}
 
 NOTES = (
@@ -140,27 +138,22 @@ def findings(numbers: dict[str, Any]) -> list[str]:
 def summary(found: Solved) -> str:
     """The rig with its verdicts, and the errors trial by trial."""
     numbers = found.numbers
-    rig = numbers["rig"]
-    lines = [f"{one.key:<32}{rig[one.key]:>10.4g}  {one.words}" for one in found.verdicts]
-    lines += ["", *findings(numbers)]
-    lines += ["", "".join(f"{head:>{WIDTH}}" for head in LINE.values())]
-    lines += [_line(row) for row in numbers["trials"]]
-    lines += [f"{_line(row)}   (not fitted)" for row in numbers["apart"]]
-    lines += [_line(numbers["overall"] | MEAN)]
-    lines += [f"worst velocity {_brief(numbers['overall'], WORST)}, cost {numbers['cost']:.4f}"]
-    if held := numbers["held_out_overall"]:
-        mean, worst = (_brief(held["surface"], name) for name in ("nrmse_v_surface", WORST))
-        lines += [f"held out, with the rig of the other folds: velocity {mean}, worst {worst}"]
-    return "\n".join(lines)
+    every = [*numbers["trials"]]
+    every += [row | {"trial": f"{row['trial']} (not fitted)"} for row in numbers["apart"]]
+    every += _mean_and_worst(numbers["overall"])
+    if held := numbers["held_out_overall"]:  # with the rig of the other folds
+        every += _mean_and_worst(held["surface"], "held out, ")
+    table = [{words: row.get(name) for name, words in LINE.items()} for row in every]
+    lines = [*markdown(tables(numbers)["The rig"]), "", *findings(numbers), ""]
+    return "\n".join([*lines, *markdown(table), "", f"cost {numbers['cost']:.4f}"])
 
 
-def _line(row: Row) -> str:
-    return "".join(f"{_brief(row, name):>{WIDTH}}" for name in LINE)
-
-
-def _brief(row: Row, name: str) -> str:
-    value = row.get(name)
-    return "–" if value is None else value if isinstance(value, str) else f"{value:.3f}"
+def _mean_and_worst(overall: Row, of: str = "") -> list[Row]:
+    worst = overall["nrmse_v_surface_worst"]
+    return [
+        overall | {"trial": f"{of}mean"},
+        {"trial": f"{of}worst", "nrmse_v_surface": worst},
+    ]
 
 
 def _between(row: Row, unit: str) -> str:
