@@ -19,10 +19,9 @@ def _new(file: Path, kind: str = "machine", base: str | None = None) -> None:
     from cosim.files.atomic import as_json, together
     from cosim.files.reader import read
     from cosim.files.resources import circuits
-    from cosim.scene.describe import schema
     from cosim.scene.loading import list_scenes, load
     from cosim.scene.messages import suggestion
-    from cosim.scene.model import CAREFUL, to_toml
+    from cosim.scene.model import CAREFUL, schema, to_toml
     from cosim.scene.toml import LARGEST
 
     name = plain(file)

@@ -65,7 +65,7 @@ def described(table: str, name: str) -> Key:
         kind = next(arg for arg in get_args(kind) if arg is not type(None))
     limits = {k: getattr(m, k) for m in field.metadata for k in ("ge", "le") if hasattr(m, k)}
     extra: Any = field.json_schema_extra
-    choices = get_args(kind) if get_origin(kind) is Literal else extra.get("choices")
+    choices = get_args(kind) if get_origin(kind) is Literal else tuple(extra.get("enum", ()))
     if choices and isinstance(choices[0], int):
         kind, limits = int, {"ge": min(choices), "le": max(choices)}
     elif choices:
@@ -76,7 +76,7 @@ def described(table: str, name: str) -> Key:
         unit=str(extra.get("unit", "")),
         default=field.default,
         kind=kind if isinstance(kind, type) else list,
-        choices=choices,
+        choices=choices or None,
         low=limits.get("ge"),
         high=limits.get("le"),
         text=field.description or "",
@@ -115,52 +115,3 @@ def acts(key: Key, rung: Rung, waveform: str, method: CouplingMethod) -> bool:
             return key.name in GIVEN_SURFACES.get(waveform, ())
         return key.name not in set().union(*GIVEN_SURFACES.values()) - {"frequency"}
     return True
-
-
-_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
-
-
-def schema() -> dict[str, Any]:
-    """The scene file's keys as a JSON schema (draft 2020-12), by which editors complete and check
-    TOML; units stand in the descriptions. A scene is checked further as it is loaded."""
-    tables: dict[str, Any] = {
-        name: {
-            "type": "object",
-            "description": (model.__doc__ or "").partition("\n")[0],
-            "properties": {key.name: _property(key) for key in keys() if key.table == name},
-            "additionalProperties": False,
-        }
-        for name, model in TABLES.items()
-    }
-    defined: dict[str, Any] = {}
-    for name, model in PORT_LISTS.items():
-        items = model.model_json_schema(by_alias=True)
-        defined |= items.pop("$defs", {})
-        tables[name] = {"type": "array", "items": items}
-    text = {"type": "string"}
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "Scene of cosim",
-        "type": "object",
-        "properties": {
-            "base": text | {"description": "Built-in scene whose values hold where none stand"},
-            "name": text | {"description": "Of the scene; its file's without one"},
-            "description": text | {"description": "Printed with each run"},
-            **tables,
-        },
-        "additionalProperties": False,
-        **({"$defs": defined} if defined else {}),
-    }
-
-
-def _property(key: Key) -> dict[str, Any]:
-    unit = "" if key.unit in ("", "1") else f" [{key.unit}]"
-    about: dict[str, Any] = {"description": f"{key.text}{unit}"}
-    if key.default is not None:
-        about["default"] = key.default
-    if key.choices:
-        return about | {"enum": [*key.choices]}
-    if key.kind in _TYPES:
-        about["type"] = _TYPES[key.kind]
-    limits = {"minimum": key.low, "maximum": key.high}
-    return about | {name: limit for name, limit in limits.items() if limit is not None}

@@ -430,6 +430,21 @@ def toml_value(value: bool | float | int | str | list[Any] | dict[str, Any]) -> 
     return repr(value)
 
 
+def schema() -> dict[str, Any]:
+    """The scene file's keys as a JSON schema (draft 2020-12), by which editors complete and check
+    TOML; units stand in the descriptions. A scene is checked further as it is loaded."""
+    found = Scene.model_json_schema()
+    base = "Built-in scene whose values hold where none stand"
+    found["properties"]["base"] = {"type": "string", "description": base}
+    for table in found["$defs"].values():
+        for key in table["properties"].values():
+            unit = key.pop("unit", "")
+            if unit not in ("", "1"):
+                key["description"] += f" [{unit}]"
+    title = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Scene of cosim"}
+    return found | title
+
+
 def to_toml(scene: Scene, base: str = "") -> str:
     """The resolved scene as TOML: every key with its unit and meaning; loads to an equal scene.
 

@@ -59,7 +59,7 @@ def _choice(default: Any, text: str, unit: str = "", words: str = "") -> Any:
 def _declared(default: str, lead: str, registry: Mapping[str, Rung | CouplingMethod]) -> Any:
     """A name out of a registry."""
     text = "; ".join(f"{name}: {one.text}" for name, one in registry.items())
-    extra: dict[str, Any] = {"unit": "", "choices": tuple(registry)}
+    extra: dict[str, Any] = {"unit": "", "enum": [*registry]}
     pattern = f"^({'|'.join(map(re.escape, registry))})$"
     return Field(default, pattern=pattern, description=f"{lead}; {text}", json_schema_extra=extra)
 

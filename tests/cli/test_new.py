@@ -11,8 +11,8 @@ import pytest
 from cosim.cli.main import main
 from cosim.mechanics import package
 from cosim.scene import list_scenes, load
-from cosim.scene.describe import schema
 from cosim.scene.loading import groups
+from cosim.scene.model import schema
 from cosim.toolchain.processes import in_place
 
 LIBRARY = Path(load.__code__.co_filename).with_name("library")
@@ -103,7 +103,14 @@ def test_the_schema_takes_every_built_in_scene(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["[drive]\nfrequncy = 1", "[drive]\nfrequency = -1", '[run]\nduration = "1"']
+    "text",
+    [
+        "[drive]\nfrequncy = 1",
+        "[drive]\nfrequency = -1",
+        '[run]\nduration = "1"',
+        "[drive]\ntable = [[0.5]]",
+        '[circuit]\nmodel = "ful"',
+    ],
 )
 def test_the_schema_tells_what_is_wrong(text: str) -> None:
     with pytest.raises(jsonschema.ValidationError):
