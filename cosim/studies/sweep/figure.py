@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.colors import TwoSlopeNorm
 from matplotlib.ticker import MaxNLocator
 
 from cosim.arrays import Array
@@ -151,8 +152,9 @@ def _maps(data: xr.Dataset, y: str, x: str) -> Picture:
         values = _values(data, quantity).values
         shown = axis.pcolormesh(xs, ys, values, shading="nearest")
         if quantity is V_AVERAGE:
-            most = float(np.abs(values[np.isfinite(values)]).max(initial=STAYS))
-            shown.set(cmap="RdBu", clim=(-most, most))
+            known = values[np.isfinite(values)]
+            ends = known.min(initial=-STAYS), known.max(initial=STAYS)
+            shown.set(cmap="RdBu", norm=TwoSlopeNorm(0.0, *map(float, ends)))
             _boundary(axis, xs, ys, values / quantity.scale)
         figure.colorbar(shown, ax=axis, label=f"[{quantity.unit}]")
         axis.plot(xs[columns], ys[rows], **FAILED)
