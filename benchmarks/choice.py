@@ -24,7 +24,7 @@ from cosim.simulation.fast import summaries
 from cosim.simulation.fidelity import COMPLETE, JUDGES, SEARCHES, relative_error
 from cosim.simulation.simulate import summary
 from cosim.stepper.stepper import LANES
-from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, End, label_ends, panels
+from cosim.studies.plots import BLUE, GREEN, ORANGE, PURPLE, VERMILION, panels
 from cosim.studies.report import Report, Row, brief, markdown
 from cosim.studies.speed.bench import take_turns
 from cosim.toolchain.processes import in_place
@@ -246,11 +246,11 @@ def draw(rows: Sequence[Row], title: str) -> Picture:
     )
     figure, axes = panels(title, note, (11.0, 5.2), 1, 2, sharex=True, sharey=True)
     lines = dict.fromkeys(row["line"] for row in rows)
-    colors = dict(zip(lines, (ORANGE, GREEN, BLUE, PURPLE, VERMILION), strict=True))
+    looks = zip((ORANGE, GREEN, BLUE, PURPLE, VERMILION), "osD^v", strict=True)
+    styles = dict(zip(lines, looks, strict=True))
     panel = {OWN: "Solver, against its own model", COMPLETE: "All, against the schematic"}
-    ends: dict[str, End] = {}
     for axis, (against, words) in zip(axes, panel.items(), strict=True):
-        for line, color in colors.items():
+        for line, (color, marker) in styles.items():
             mine = [row for row in rows if row["line"] == line]
             rings = [k for k, row in enumerate(mine) if row["steps"] == "default"]
             x = [row[COST] for row in mine]
@@ -258,13 +258,12 @@ def draw(rows: Sequence[Row], title: str) -> Picture:
                 [max(row[_column(against, s)], LEAST) for row in mine] for s in ("worst", "median")
             )
             axis.plot(x, worst, ":", color=color, marker=".")
-            axis.plot(x, y, color=color, marker=".")
-            axis.plot(x, y, "o", ms=9, mfc="none", color=color, markevery=rings)
-            ends[line] = End(x[-1], y[-1], line, color)
+            axis.plot(x, y, color=color, marker=marker, ms=4, label=line)
+            axis.plot(x, y, "o", ms=10, mfc="none", color=color, markevery=rings)
         axis.set_title(words, loc="left")
         axis.set(
             xscale="log", yscale="log", ylim=(LEAST / 2.0, MOST), xlabel="CPU time over amplifier's"
         )
-    label_ends(axes[1], [*ends.values()])
+    axes[0].legend(fontsize=9)
     axes[0].set_ylabel("error of v_average [%]")
     return figure

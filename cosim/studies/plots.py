@@ -1,8 +1,6 @@
-"""What the figures of the studies share: size, colours, labels at the ends of lines, saving."""
+"""What the figures of the studies share: size, colours, titles and notes."""
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
 
@@ -60,38 +58,3 @@ def keep_ticks_inside(*axes: Axis) -> None:
     for one in axes:
         low, high = one.get_view_interval()
         one.set_ticks([tick for tick in one.get_ticklocs() if low <= tick <= high])
-
-
-@dataclass(frozen=True)
-class End:
-    """A label for the line that ends at ``x``, ``y``."""
-
-    x: float
-    y: float
-    text: str
-    color: str
-
-
-def label_ends(axis: Axes, ends: Sequence[End], gap: float = 0.07) -> None:
-    """Name lines, all drawn by now, right of the axes; ``gap``, a share of these, keeps apart."""
-    axis.autoscale_view()
-    to_share = axis.transData + axis.transAxes.inverted()
-    upward = sorted(ends, key=lambda end: end.y)
-    placed: list[float] = []
-    for end in upward:
-        height = float(to_share.transform((end.x, end.y))[1])
-        placed.append(max(height, placed[-1] + gap if placed else 0.0))
-    for k in range(len(placed)):
-        placed[k] = min(placed[k], 1.0 - gap * (len(placed) - 1 - k))
-    for end, height in zip(upward, placed, strict=True):
-        axis.annotate(
-            end.text,
-            (end.x, end.y),
-            (1.02, height),
-            textcoords="axes fraction",
-            color=end.color,
-            fontsize=9,
-            va="center",
-            arrowprops={"arrowstyle": "-", "color": end.color, "lw": 0.6, "relpos": (0.0, 0.5)},
-            annotation_clip=False,
-        )

@@ -27,8 +27,6 @@ from cosim.studies.plots import (
     PURPLE,
     SKY,
     VERMILION,
-    End,
-    label_ends,
     panels,
 )
 from cosim.studies.report import Progress, Report, Row, brief, silent, span
@@ -221,12 +219,14 @@ def draw(runs: Sequence[Run], strong: Mapping[str, str], title: str) -> Picture:
         _panel(axis, [run for run in runs if run.scene == scene], strong)
         axis.set_title(CASES[scene].title, fontsize=10.5, loc="left")
         axis.set(xlabel="CPU time [s]", ylabel="error / range")
+    named = {line.get_label(): line for axis in axes for line in axis.lines}
+    shown = [line for label, line in named.items() if not str(label).startswith("_")]
+    figure.legend(handles=shown, loc="outside right center", frameon=False, fontsize=9)
     return figure
 
 
 def _panel(axis: Axes, runs: Sequence[Run], strong: Mapping[str, str]) -> None:
     axis.set(xscale="log", yscale="log")
-    ends: list[End] = []
     styles = dict(zip(strong.values(), zip(strong, _STYLES, strict=False), strict=True))
     for method in dict.fromkeys(run.method for run in runs):
         own = [run for run in runs if run.method == method]
@@ -234,8 +234,7 @@ def _panel(axis: Axes, runs: Sequence[Run], strong: Mapping[str, str]) -> None:
         known = [run for run in own if run.counts]
         x, y = [run.seconds for run in known], [run.error for run in known]
         if label and known:
-            axis.plot(x, y, color=color, marker=marker, ms=4.5, lw=2.0)
-            ends.append(End(x[-1], y[-1], label, color))
+            axis.plot(x, y, color=color, marker=marker, ms=4.5, lw=2.0, label=label)
         else:
             axis.plot(x, y, **FAINT)
         for run in own:
@@ -244,4 +243,3 @@ def _panel(axis: Axes, runs: Sequence[Run], strong: Mapping[str, str]) -> None:
                 across = axis.transData if finite else axis.get_xaxis_transform()
                 place = (run.seconds, run.error if finite else 0.97)
                 axis.plot(*place, "x", color=color, ms=7, mew=1.8, transform=across)
-    label_ends(axis, ends, gap=0.11)

@@ -16,17 +16,15 @@ from typing import Literal
 
 import numpy as np
 
-from cosim.coupling.participants.amplifier import Amplifier
 from cosim.coupling.participants.linear import LinearParticipant, coil, regulated_coil
 from cosim.coupling.participants.stickslip import FmuMechanics
 from cosim.coupling.rewind.joint import Joint
 from cosim.coupling.rewind.methods import variants
 from cosim.coupling.rewind.stability import largest_stable_step, observed_limit
-from cosim.drive.command import command
 from cosim.evaluate.store import Store, reported
 from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
-from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, End, label_ends, panels
+from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, panels
 from cosim.studies.report import Progress, Report, Row, silent, span
 
 Output = Literal["saturated", "regulated"]
@@ -156,13 +154,13 @@ STORE = "stability.sqlite"
 
 _COLORS = {1: ORANGE, 2: BLUE, 3: GREEN}
 """By the order of a method."""
+_MARKERS = "osD^v<>PX*hd"
 
 LONGEST = 0.1
 """s; a method that is stable up to here counts as one without a limit."""
 _SHORTEST = {"coil in circuit": 1e-5, "coil in mechanics": 1e-8}
 _SEEN, _MOST_STEPS = 0.15, 6000
 """s, and macro steps, that a run is watched for."""
-_WATCHED = 120  # macro steps behind the limit
 
 METHODS = {
     # An error that dies away sooner lies below the noise of the FMU's own solver.
@@ -250,31 +248,6 @@ def limits(regimes: Sequence[Regime], store: Store) -> Iterator[Limit]:
             yield Limit(*given, method, *store.once(f"{method}, {given}", both))
 
 
-def with_limits(steps: Sequence[float]) -> Iterator[Row]:
-    """Gauss-Seidel k = 1 on ``STRONG`` behind an amplifier that a steady command keeps at its
-    swing limit: what becomes of the current after macro steps of these lengths, s."""
-    strong, method = Regime(STRONG, "saturated"), "Gauss-Seidel k = 1"
-    drive = {"waveform": "square", "offset": 8.0, "amplitude": 1e-6, "frequency": 0.2}
-    scene = changed(
-        strong.scene, {f"drive.{key}": value for key, value in drive.items()}, "stability"
-    )
-    limit = predicted(method, strong)
-    for h in steps:
-        with closing(FmuMechanics(scene)) as mechanics:
-            joint = METHODS[method].make(Amplifier(scene, command(scene)), mechanics)
-            currents = np.empty(_WATCHED)
-            for k in range(_WATCHED):
-                joint.step(h)
-                currents[k] = joint.past.current.value[0]
-        late = currents[_WATCHED // 2 :]
-        yield {
-            "macro step [s]": h,
-            "of the clamped state's limit": h / limit,
-            "least current [A]": float(late.min()),
-            "greatest current [A]": float(late.max()),
-        }
-
-
 def stability(
     *,
     quick: bool = False,
@@ -294,16 +267,13 @@ def stability(
         for limit in limits(regimes, store):
             found.append(limit)
             progress(len(found), len(METHODS) * len(regimes), limit.method)
-        return report(found, list(with_limits((4e-3, 5e-3, 6e-3))))
+        return report(found)
 
     return reported(made, out, STORE, quick)
 
 
-def report(found: Sequence[Limit], clamped: Sequence[Row]) -> Report:
-    """What the limits show.
-
-    ``clamped`` is the table of what becomes of the current behind an amplifier's limits.
-    """
+def report(found: Sequence[Limit]) -> Report:
+    """What the limits show."""
     driven = [x for x in found if x.machine == DIRECT.name and x.cut == "coil in circuit"]
     free = [m for m in METHODS if all(x.predicted >= LONGEST for x in driven if x.method == m)]
     message = "The stronger the coil couples, the shorter the macro step must be"
@@ -319,11 +289,6 @@ def report(found: Sequence[Limit], clamped: Sequence[Row]) -> Report:
         "mechanics where the coil is in the circuit). The greatest difference between the two is "
         f"{worst:.1%}. Both are in stability.csv, over a strength of the coupling Bl²/(m R) of "
         f"{span([x.strength for x in swept])} 1/s.",
-        "An amplifier's limits add what no linear map knows: where its clamped output makes an "
-        "unstable coupling, the growing oscillation ends as soon as the output leaves the limit, "
-        "and what remains is bounded but false (last table; steady, it would be 1.26 A). In the "
-        "scene reference the output is clamped for less than a macro step after each fall of the "
-        "command, so the limit of the clamped state is never met there.",
     ]
     tables: dict[str, Sequence[Row]] = {
         f"Predicted limits in ms, {cut}; - is none below {LONGEST * 1e3:g} ms": by_method(
@@ -331,7 +296,6 @@ def report(found: Sequence[Limit], clamped: Sequence[Row]) -> Report:
         )
         for cut in dict.fromkeys(x.cut for x in found)
     }
-    tables["Gauss-Seidel k = 1 on Bl 3 N/A, behind the limit of a clamped amplifier"] = clamped
     return Report(
         "stability", "Stability of the coupling methods", [asdict(limit) for limit in found],
         notes, tables, {"": partial(draw, driven, free, message)}, message,
@@ -349,26 +313,22 @@ def by_method(limits: Sequence[Limit]) -> list[Row]:
 
 def draw(limits: Sequence[Limit], free: Sequence[str], title: str) -> Picture:
     """The limits of each method over the strength of the coupling."""
-    note = "Direct drive with other force factors. Lines: predicted; dots: observed with the FMU."
+    note = "Direct drive with other force factors. Lines: predicted; marks: observed with the FMU."
     figure, (axis,) = panels(title, note, (11.0, 5.6))
     strengths = sorted({x.strength for x in limits})
     none = LONGEST * 1e3
-    axis.plot(strengths, [none] * len(strengths), color=VERMILION, lw=2.0, marker="o", ms=4)
-    axis.plot(strengths, [1e3 / s for s in strengths], color="0.4", lw=1.0, ls="--")
-    ends = [
-        End(strengths[-1], none, "\n".join([*free, "(none below 100 ms)"]), VERMILION),
-        End(strengths[-1], 1e3 / strengths[-1], "m R/Bl²", "0.3"),
-    ]
-    for method in METHODS:
+    without = f"{' and '.join(free)} (none below {none:g} ms)"
+    axis.axhline(none, color=VERMILION, lw=2.0, label=without)
+    axis.plot(strengths, [1e3 / s for s in strengths], "--", color="0.4", lw=1.0, label="m R/Bl²")
+    limited = [method for method in METHODS if method not in free]
+    for marker, method in zip(_MARKERS, limited, strict=False):
         own = sorted((x for x in limits if x.method == method), key=lambda x: x.strength)
         known = [x for x in own if x.predicted < LONGEST]
-        if method in free:
-            continue
         p = METHODS[method].order
         x, color = [limit.strength for limit in known], _COLORS[p]
         axis.plot(x, [limit.predicted * 1e3 for limit in known], color=color, lw=1.6)
-        axis.plot(x, [limit.observed * 1e3 for limit in known], "o", color=color, ms=4)
-        ends.append(End(x[-1], known[-1].predicted * 1e3, f"{method} (order {p})", color))
+        observed = [limit.observed * 1e3 for limit in known]
+        axis.plot(x, observed, marker, color=color, ms=5, label=f"{method} (order {p})")
     axis.axvline(DIRECT.strength, color="0.4", lw=0.9, ls=":")
     axis.annotate(
         f"direct drive, {DIRECT.scene.coil.force_factor:g} N/A",
@@ -383,5 +343,5 @@ def draw(limits: Sequence[Limit], free: Sequence[str], title: str) -> Picture:
         xlabel="strength of the coupling Bl²/(m R) [1/s]",
         ylabel="largest stable macro step [ms]",
     )
-    label_ends(axis, ends, gap=0.052)
+    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=9)
     return figure
