@@ -1,7 +1,6 @@
 """The paper's figures 3 and 4 from the corrected closed forms, with what it prints beside."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -17,7 +16,6 @@ from cosim.files.picture import Picture, grid, legend_above
 from cosim.studies.plots import footnote, headline
 from cosim.waveforms.figure import PART, STICKING, SURFACE
 
-PRINTED = "0.55"
 GUIDELINE = (4.0, 16.0)
 """The paper's range for µ_s F_n, in weights of the part."""
 CURVES = ("#8d99ae", "#1f6fb2", "#2a9d8f", "#e9a03b")
@@ -33,14 +31,16 @@ def draw_cycle(case: Transport) -> Picture:
     figure = Picture(8.4, 8.6, "constrained")
     axes = figure.subplots(3, 1, sharex=True)
     _motion(axes, cycle, slowed, gravity)
-    _as_printed(axes, cycle, case)
     sticking = (0.0, cycle.times[1] * 1e3)
     for axis in axes:
         axis.axvspan(*sticking, color=STICKING, alpha=0.6, lw=0, zorder=0, label="sticking")
         for time in cycle.times[1:3]:
             axis.axvline(time * 1e3, color="0.35", lw=0.9, ls=":")
         axis.grid(alpha=0.25)
-    _name_phases(axes[0], axes[1], cycle)
+    first, second = (time * 1e3 for time in cycle.times[1:3])
+    title = f"T$_1$ = {first:.5g} ms, T$_2$ = {second:.5g} ms (dotted)"
+    axes[0].set_title(title, loc="left", fontsize=10.5)
+    legend_above(axes[0], ncols=3, columnspacing=1.1, handlelength=1.6, fontsize=9)
     axes[2].set(xlabel="time [ms]", xlim=(0.0, case.period * 1e3))
     headline(
         figure,
@@ -75,36 +75,6 @@ def _motion(axes: Sequence[Axes], cycle: Cycle, slowed: float, gravity: float) -
         axis.plot(at * 1e3, surface, color=SURFACE, lw=1.4, label="surface")
         axis.plot(at * 1e3, part, color=PART, lw=1.8, ls=DASHED, label="part")
         axis.set_ylabel(name)
-
-
-def _as_printed(axes: Sequence[Axes], cycle: Cycle, case: Transport) -> None:
-    """The surface with the misprinted acceleration of the first phase, from the same start."""
-    first, *others = cycle.accelerations
-    printed = formulas.slipping_acceleration(case.mu_k, case.f_n, 1.0, case.gravity)
-    times, velocities = cycle.knots()
-    less = (printed - first) * cycle.times[1]
-    style: dict[str, Any] = {"color": PRINTED, "lw": 1.1, "ls": BEYOND}
-    edges = np.repeat(cycle.times, 2)[1:-1]
-    accelerations = np.repeat([printed, *others], 2) / case.gravity
-    axes[0].plot(
-        edges * 1e3, accelerations, zorder=1, label="surface, as printed: not closed", **style
-    )
-    axes[1].plot(
-        times * 1e3, (velocities + np.array([0.0, less, less, less])) * 1e3, zorder=1, **style
-    )
-
-
-def _name_phases(above: Axes, between: Axes, cycle: Cycle) -> None:
-    """The values of T1 and T2 with the legend, and their names above the lines."""
-    first, second = (time * 1e3 for time in cycle.times[1:3])
-    title = f"T$_1$ = {first:.5g} ms, T$_2$ = {second:.5g} ms"
-    above.set_title(title, loc="left", fontsize=10.5)
-    legend_above(above, ncols=4, columnspacing=1.1, handlelength=1.6, fontsize=9)
-    near = second - first < 0.05e3 * cycle.times[3]
-    axis = between.get_xaxis_transform()
-    for name, time, side in (("1", first, "right"), ("2", second, "left")):
-        place = side if near else "center"
-        between.text(time, 1.015, f"T$_{name}$", transform=axis, ha=place, fontsize=10)
 
 
 def draw_velocities(case: Transport, peaks: Sequence[float]) -> Picture:
