@@ -72,8 +72,8 @@ def _first_phase() -> Erratum:
         printed="(µ_k F_n/m_P − g) on [0, T1]",
         right="(µ_s F_n/m_P − g) on [0, T1]",
         proof=f"at f = 5, A = 10 the printed waveform does not close: the surface's velocity gains "
-        f"{gain:.6f} g T a period; the right one gains {abs(closed):.6f} g T, and the part moves at "
-        f"{moved:.6f} g T",
+        f"{gain:.6f} g T a period; the right one gains {abs(closed):.6f} g T, and the part moves "
+        f"at {moved:.6f} g T",
         numbers={"printed_gain": gain, "right_gain": closed, "right_velocity": moved},
         confirmed=abs(gain) > 0.1 and abs(closed) < 1e-12 and moved > 0.3,
     )

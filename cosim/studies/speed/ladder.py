@@ -161,30 +161,13 @@ def report(found: Found) -> Report:
 
 
 def words(scene: Scene, rungs: list[Rung]) -> str:
-    """The cheapest rung within the scene's tolerance, and why."""
-    tolerance = scene.run.tolerance
-    by_model = {rung.model: rung for rung in rungs}
-    top, amplifier, limited = (by_model[name] for name in ("full", "amplifier", "limited"))
+    """The cheapest rung within the scene's tolerance."""
+    tolerance, top = scene.run.tolerance, rungs[-1]
     taken = cheapest(rungs, tolerance)
-    said = [
+    return (
         f"{scene.name}: within {tolerance:.2g} of the top the cheapest rung is {taken.model}, at "
         f"{taken.cost[0]:.2g} s a simulated second where the top takes {top.cost[0]:.2g} s."
-    ]
-    if amplifier.off_top > tolerance:
-        said.append(
-            f"The behavioural amplifier is {amplifier.off_top:.2%} off: it has neither the data "
-            "sheet's output stage, whose swing loss grows with the current, nor the firmware's "
-            "staircase."
-        )
-    near = [rung for rung in rungs[:2] if rung.off_amplifier <= tolerance]
-    if near:
-        said.append(
-            f"Against the amplifier, {near[0].model} is {near[0].off_amplifier:.2%} off, at "
-            f"{amplifier.cost[0] / near[0].cost[0]:.3g} times less cost."
-        )
-    else:
-        said.append(f"Against the amplifier, limited is {limited.off_amplifier:.2%} off: too far.")
-    return " ".join(said)
+    )
 
 
 def draw(found: Found) -> Picture:
