@@ -73,20 +73,14 @@ def add_options(parser: ArgumentParser, command: Command) -> None:
     options = [*(command.options() if callable(command.options) else command.options)]
     if command.out:
         options.append(Option("--out", "where to write", "DIR", Path, command.out))
-    groups: dict[str, Any] = {}
     for option in options:
-        place: Any = parser
-        if option.one_of:
-            if option.one_of not in groups:
-                groups[option.one_of] = parser.add_mutually_exclusive_group(required=True)
-            place = groups[option.one_of]
         default = "" if option.default is None else f" (default: {option.default})"
         how: dict[str, Any] = {"help": (option.help + default).replace("%", "%%")}
         if option.name.startswith("-"):
             how |= {"dest": option.argument, "required": option.needed}
         if option.kind is bool:
             how["const"] = not option.name.startswith("--no-")
-            place.add_argument(option.name, action="store_const", **how)
+            parser.add_argument(option.name, action="store_const", **how)
             continue
         kind = option.kind
         if option.name == "--out":
@@ -95,8 +89,8 @@ def add_options(parser: ArgumentParser, command: Command) -> None:
         if option.many == "repeat":
             how["action"] = "append"
         elif option.many:
-            how["nargs"] = {"optional": "?", "any": "*", "some": "+"}[option.many]
-        place.add_argument(option.name, **how)
+            how["nargs"] = {"optional": "?", "any": "*"}[option.many]
+        parser.add_argument(option.name, **how)
 
 
 @contextmanager

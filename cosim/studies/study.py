@@ -40,13 +40,11 @@ class Option:
     """The function's own where nothing is given, as the help says it; None: said in ``help``."""
     parameter: str = ""
     """The function's, where it has another name."""
-    many: Literal["", "repeat", "optional", "any", "some"] = ""
-    """A list, by repeating the option, or of any number of words, or of at least one; or one word
-    that may be left out."""
+    many: Literal["", "repeat", "optional", "any"] = ""
+    """A list, by repeating the option, or of any number of words; or one word that may be left
+    out."""
     choices: tuple[str, ...] = ()
     needed: bool = False
-    one_of: str = ""
-    """Exactly one of the options with the same word must be given."""
     read: str = ""
     """Names what makes the argument of the value, a list where ``many``; it raises BadInput."""
     prints: str = ""

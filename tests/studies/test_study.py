@@ -71,7 +71,7 @@ def test_a_declaration_is_a_command(
         return Found()
 
     options = (
-        Option("many", "words", "WORD", many="some"),
+        Option("many", "words", "WORD", many="any"),
         Option("--times", "how often", "N", int, 3),
         Option("--far", "in the distance", kind=bool),
         Option("--no-near", "not what is close", kind=bool, parameter="near"),

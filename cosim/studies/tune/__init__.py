@@ -17,8 +17,8 @@ STUDIES = (
         "find the settings that transport best",
         (
             *(SCENE, OVERRIDES),
-            Option("--maximise", "a number of the summary: v_average, …", "NAME", one_of="goal"),
-            Option("--minimise", "the same, downwards", "NAME", one_of="goal"),
+            Option("--maximise", "a number of the summary: v_average, …", "NAME"),
+            Option("--minimise", "the same, downwards; one of the two is needed", "NAME"),
             OVER,
             Option("--budget", "settings run in all, of each waveform", "N", int, 200),
             Option(
