@@ -112,6 +112,37 @@ def test_bad_netlist(name: str, home: Path, before: np.ndarray) -> None:
     assert np.array_equal(good_run(), before)
 
 
+JUMPING = """* a voltage amplifier behind 10 ns of line
+.param coil_resistance=7.1
+.param coil_inductance=1.2e-3
+.param count=1
+Vcommand v1 0 0
+Bline start 0 V=2*V(v1)
+Rsource start near 50
+T1 near 0 far 0 Z0=50 TD=10n
+Rload far 0 50
+Bout behind 0 V=2*V(far)
+Rout behind out 0.5
+Rcoil out c1 {coil_resistance/count}
+Lcoil c1 c2 {coil_inductance/count}
+Vemf c2 sense 0
+Rsense sense 0 0.1
+.tran 10u 0.2 0 20u
+.end
+"""
+
+
+def test_steps_shorter_than_the_times_digits_tell_nothing_of_the_coil(home: Path) -> None:
+    """ngspice takes some of 2e-16 s where the edge of the command arrives, 10 ns later."""
+    path = home / "jumping.cir"
+    path.write_text(JUMPING, encoding="utf-8")
+    changes = ["circuit.model=file", f"circuit.netlist={path}", "run.duration=0.1"]
+    assert simulate(load("paper-limited", [*changes, "run.settle=0.05"])).summary["v_average"]
+    path.write_text(JUMPING.replace("{coil_inductance/count}", "1.3m"), encoding="utf-8")
+    with pytest.raises(BadInput, match=r"1\.3 mH, .* 1\.2 mH"):
+        simulate(load("paper-limited", changes))
+
+
 @pytest.mark.parametrize("name", SIMULATIONS)
 def test_failing_circuit(name: str, home: Path, before: np.ndarray) -> None:
     text, told = SIMULATIONS[name]

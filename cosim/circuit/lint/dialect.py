@@ -72,6 +72,8 @@ _PAIR = re.compile(rf"""(?<!\S)([a-z]\w*)\s*=\s*("[^"]*"|{_VALUE[1:-1]})""", re.
 _SPLIT_NUMBER = re.compile(r"^(\d+)(meg|[tgkmunpf])(\d+)(?!\S)", re.IGNORECASE)
 _GLUED = re.compile(r"(?<==)\s*(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE)
 """4k7 for 4.7k, as a value and behind a name."""
+_WITHIN = re.compile(r"(?<![\w.$#])(?<!v\()(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE)
+"""The same in an expression; a node may have such a name."""
 _POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)
 _VALUED = re.compile(r"(?<=\s)value\s*=?\s*(?={)", re.IGNORECASE)
 _TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECASE)
@@ -135,6 +137,11 @@ def in_ngspice(line: Line) -> list[Line]:
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
         text = text if word == ".mea" else _powers(text)
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
+    if kind == "b" or word in (".par", ".def"):
+        head, equals, rest = text.partition("=")
+        text = head + equals + _WITHIN.sub(r"\1.\3\2", rest)
+    else:
+        text = re.sub(r"\{[^{}]*\}", lambda braced: _WITHIN.sub(r"\1.\3\2", braced[0]), text)
     if kind in "beg":
         text = _EQUAL.sub(_compared, text)
         if any(each[0] != "(" or closing(each, 0) < len(each) for each in _COMPOUND.findall(text)):
