@@ -146,7 +146,7 @@ TOLD = {
     "E9 x 0 AND(2) in 0 b 0 0 1": "gates are not known here",
     "E9 x 0 in 0 Laplace=(1+s)": "LAPLACE takes a ratio of polynomials in s, the upper one of no",
     "E9 x 0 LAPLACE {V(in)} {exp(-s*1u)}": "write another filter with R and C",
-    "E9 x 0 VCVS in 0 2 max=1": "leave out this word of HSPICE; with MAX and MIN write a B source",
+    "E9 x 0 VCVS in 0 2 max=1": "with MAX and MIN write a B source",
     ".func int(x) {idt(x)}\nB9 x 0 V=int(V(in))": "write it there instead of in a .func",
     ".control": "leave it out, and all up to .endc",
     "E9 x 0 FREQ {V(in)} = (0,0,0)": "FREQ is not known here",
@@ -247,6 +247,13 @@ def test_numbers_are_those_that_people_write(tmp_path: Path) -> None:
     for wanted in (".param r1=4.7k", ".param g=2.2k/1.1k", "r7 x 0 {2*r1+1.5k}"):
         assert wanted in found
     assert {"b7 0 2k2 I=V(2k2)/4.7k", "r6 2k2 0 1"} <= {*found}
+
+
+def test_hspices_words_for_controlled_sources_are_left_out(tmp_path: Path) -> None:
+    lines = ["E7 x 0 VCVS in 0 2", "G7 x 0 vccs in 0 2", "F7 x 0 CCCS V1 2", "H7 y 0 ccvs V1 2"]
+    found = anew(tmp_path, *lines, "R7 x 0 1", "R8 y vcvs 1", "E8 vcvs 0 in 0 3")
+    assert found[6:10] == ["e7 x 0 in 0 2", "g7 x 0 in 0 2", "f7 x 0 V1 2", "h7 y 0 V1 2"]
+    assert found[-1] == "e8 vcvs 0 in 0 3"
 
 
 @needs.ngspice_library

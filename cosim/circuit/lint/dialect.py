@@ -88,6 +88,8 @@ _EQUAL = re.compile(
 )
 _NEAR = {"==": "(abs({}-{})<1e-9*{})", "<=": "({}-{}<1e-9*{})", ">": "({}-{}>1e-9*{})"}
 """There it reads a parameter 3 as 3.0000000000000004, which is not 3; 0 is 0."""
+_KIND = re.compile(r"^([efgh]\S*(?:\s+\S+){2}\s+)[vc]c[vc]s\s+(?!.*\b(?:max|min)\s*=)", re.I)
+"""HSPICE's word for what the first letter of a source says."""
 _NOISELESS = re.compile(r"\s+noiseless\b", re.IGNORECASE)
 _LAW = re.compile(
     r"([rclq]|flux)\s*=\s*(?:\{([^{}]*)\}|([^={}']*[*/^()][^={}']*?))(?=\s+\w+\s*=(?!=)|$)", re.I
@@ -127,7 +129,8 @@ _LOGICAL = {"&": "&&", "|": "||", "~": "!"}
 
 def in_ngspice(line: Line) -> list[Line]:
     """The line as ngspice knows it, in one line or more."""
-    text = _without_tables(_NOISELESS.sub("", line.text.translate(_LETTERS)))
+    text = _KIND.sub(r"\1", _NOISELESS.sub("", line.text.translate(_LETTERS)))
+    text = _without_tables(text)
     kind, word = text[:1].lower(), text[:4].lower()
     if kind in "beg":
         text = _VALUED.sub("value=", re.sub(r"'([^']*)'", r"{\1}", text))

@@ -53,8 +53,8 @@ _FORMS = {
     "laplace": "LAPLACE takes a ratio of polynomials in s, the upper one of no higher power; "
     "write another filter with R and C",
     "freq": "FREQ is not known here; write the filter with R and C",
-    "vcvs": "leave out this word of HSPICE; with MAX and MIN write a B source",
-    "vccs": "leave out this word of HSPICE; with MAX and MIN write a B source",
+    "vcvs": "with MAX and MIN write a B source",
+    "vccs": "with MAX and MIN write a B source",
 } | dict.fromkeys(("and", "nand", "or", "nor"), "gates are not known here; write a B source")
 """What ngspice would need code models for, where it could not be rewritten."""
 
