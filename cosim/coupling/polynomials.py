@@ -94,6 +94,7 @@ class History:
         lower degree while there are too few."""
         if degree == 0:
             return (self.value,)
+        # Newton's divided differences; a known slope counts as a second point at the newest time.
         (time, newest), *older = self._points
         slope = self.slope
         slopes = slope is not None and (self._slopes or len(older) < degree)

@@ -39,7 +39,7 @@ def apart(points: Array, distance: float, count: int) -> list[int]:
     """The first of ``points`` (rows), and those after it that are ``distance`` from all before them
     that count, as the greatest difference: ``count`` numbers of rows at most, all for -1."""
     kept: list[int] = []
-    left = np.ones(len(points), bool)
+    left = np.ones(len(points), bool)  # those that are far enough from all that are kept
     while left.any() and len(kept) != count:
         kept.append(int(left.argmax()))
         left &= np.abs(points - points[kept[-1]]).max(axis=1) >= distance
@@ -87,6 +87,7 @@ class Known:
         }:
             rows = self.rows(np.vstack([*asked.values()]))
             for quantity, points in asked.items():
+                # The rows stand in the order in which the searches were asked.
                 mine, rows = rows[: len(points)], rows[len(points) :]
                 left[quantity] -= len(points)
                 searches[quantity].tell(points, self.scores[mine, quantity], self.feasible[mine])

@@ -197,6 +197,7 @@ def _kind(ways: Iterator[Array], length: float, averaged: int, chaos: bool) -> d
     """The kind of a motion whose part goes ``ways`` (m) in the periods of ``length`` (s): from the
     scene's own start, from one ASIDE, and from others, which are not asked for where these two
     tell it. The average is over ``averaged`` periods; ``chaos``: it would be seen by now."""
+    # The own start and that aside alone may tell chaos; only else are the others run.
     two = next(ways), next(ways)
     repeats = [_repeats(way) for way in two]
     own, aside = (_mean(way) / length for way in two)
@@ -205,7 +206,7 @@ def _kind(ways: Iterator[Array], length: float, averaged: int, chaos: bool) -> d
             return {"motion": "unsettled"}
         every = np.concatenate([_stretches(way, averaged) for way in (*two, *ways)]) / length
         return {"motion": "chaotic", "v_average_range": [float(every.min()), float(every.max())]}
-    answers: list[float] = []
+    answers: list[float] = []  # those that differ
     for way in (*two, *ways):
         answer = _answer(way, length)
         if answer is None:

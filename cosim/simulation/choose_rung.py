@@ -85,6 +85,7 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
         limited = few_rows(changed(scene, {"circuit.model": SEARCHES}, "auto"))
     except BadInput:  # too fast a coil
         return Choice(JUDGES, "the rung limited cannot solve this coil", {})
+    # Chaos, or another motion near by: what a ten-thousandth moves, another rung moves as well.
     force = scene.coil.force_factor
     near = [{"coil.force_factor": force * (1.0 + change)} for change in (-TREMBLE, TREMBLE)]
     own, *others = _v_averages(limited, [{}, *near])
@@ -92,6 +93,7 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
     if moved > tolerance:
         why = f"a ten-thousandth of the coil's force moves v_average by {moved:.2%}"
         return Choice(JUDGES, why, {"limited": moved, "ideal": moved})
+    # The amplifier and "limited" over the first part, "ideal" and "limited" over the whole run.
     part = _part(limited)
     top = changed(limited, {**part, "circuit.model": JUDGES}, "auto")
     judged = run(top).summary["v_average"]

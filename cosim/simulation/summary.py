@@ -94,6 +94,7 @@ def slips(scene: Scene, read: Mapping[str, Any]) -> dict[str, Any]:
     and by instants where these are known. Nothing where the normal force changes in time."""
     if scene.friction.normal_force_file is not None:
         return {}
+    # By way of the part: the surface's accelerations, downwards and upwards, at which it slips.
     ways = budget(scene)
     found: dict[str, Any] = {f"slip_{way}": [*ends] for way, ends in ways.items()}
     for by in ("a_surface", "a_camera"):

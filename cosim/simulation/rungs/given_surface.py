@@ -114,6 +114,8 @@ def move_part(scene: Scene) -> tuple[dict[str, Array], Motion]:
     rows = grid(run.output_step, run.duration)
     frames = exposures(run.duration, run.settle, run.shutter)
     parts = part_times(run.duration, run.settle) if run.average == "slope" else rows[:0]
+    # The motion is asked for once, at all times that rows, camera and averages need; the rows, the
+    # frames and the averages are taken out of it by their places.
     wanted = np.unique(np.concatenate([rows, frames, parts, [run.settle, run.duration]]))
     friction, gravity = scene.friction, scene.mechanics.gravity
     found = part.account(

@@ -91,8 +91,10 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
     slides = [slides_of(trial, *_laws(coarse, RATIOS)) for trial in trials]
     ratios = RATIOS if plate else np.zeros(1)
     grids = [coarse.clip(*limit) for limit in limits]
+    # ``row`` is the likeliest ratio and ``best`` each trial's friction with it, by their numbers.
     *_, row, best = _looked_at(slides, grids, ratios)
     middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
+    # Finer grids about the likeliest law, moved while it lies at the edge of one of them.
     around = np.geomspace(1 / AROUND, AROUND, FINE)
     for _ in range(3):
         if plate:
@@ -112,6 +114,8 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
     count = [len(table) for table in tables]
     found, profiles = [], []
     for k, (grid, limit) in enumerate(zip(grids, limits, strict=True)):
+        # The profile of this trial's friction: at each ratio the other trials take their own best
+        # frictions, and of all ratios the likeliest counts.
         others = whole - sums[k].min(axis=0)
         profile = (sums[k] + others).min(axis=1) - whole.min()
         profiles.append((grid, profile))
@@ -145,8 +149,11 @@ def _drawn(tables: Sequence[Array]) -> tuple[Rows, Rows]:
     sums = []
     for table in tables:
         n = max(1, len(table))
+        # How often each slide is drawn (draws × slides), and with that the losses of each draw
+        # (draws × frictions × ratios).
         weights = rng.multinomial(n, np.full(n, 1 / n), DRAWS)[:, : len(table)]
         sums.append(np.tensordot(weights, table, 1))
+    # Of each draw: the ratio that is likeliest over all trials, then each trial's friction with it.
     rows = np.sum([one.min(axis=1) for one in sums], axis=0).argmin(axis=1)
     return rows, np.stack([one[np.arange(DRAWS), :, rows].argmin(axis=1) for one in sums], 1)
 
@@ -164,10 +171,12 @@ def _likely(grid: Array, loss: Array) -> Interval:
 
 def _interval(value: float, likely: Interval, drawn: Array, count: int, limit: Interval) -> Found:
     """From what is likely and what was drawn; few slides scatter less than many would."""
+    # Student's quantile over the normal one.
     few = float(student.ppf((1 + LEVEL) / 2, max(1, count - 1)) / student.ppf((1 + LEVEL) / 2, 1e9))
     ends = []
     for end, share, side in ((likely[0], (1 - LEVEL) / 2, -1), (likely[1], (1 + LEVEL) / 2, 1)):
         scatter = few * (float(np.quantile(drawn, share)) - value)
+        # The wider of the two counts, with the model's own error added as the root of squares.
         far = max(side * scatter, side * (end - value), 0.0)
         ends.append(value + side * float(np.hypot(far, SYSTEMATIC * value)))
     return Found(value, max(ends[0], limit[0]), min(ends[1], limit[1]))

@@ -92,11 +92,17 @@ class Slide:
     def _path(
         self, since: Array, lasts: Array, faster: Array, pull: Array, rub: Array
     ) -> tuple[Array, Array]:
-        """The way at times ``since`` the begin, and what of it a faster begin adds, s."""
+        """The way at times ``since`` the begin, and what of it a faster begin adds, s.
+
+        It has four pieces: with the velocity of the begin before it (``early``), slowed by friction
+        until the part has the plate's velocity (``one``), from there to the slide's end (``two``),
+        and with the velocity of the end after that (``beyond``).
+        """
         early, within = np.minimum(since, 0.0), since.clip(0.0, lasts[..., None])
         beyond = (since - lasts[..., None]).clip(0.0)
         v, way = self.v_plate + faster, np.where(faster >= 0.0, 1.0, -1.0)
         first = pull - way * rub
+        # The part has the plate's velocity after -faster/first, if friction takes it there at all.
         turns = np.broadcast_to(lasts, faster.shape).copy()
         np.divide(-faster, first, out=turns, where=first * faster < 0.0)
         turns = np.minimum(turns, lasts)
@@ -193,6 +199,9 @@ def slide(trial: Trial, span: Span, noise: float, roughness: float) -> Slide | N
     if len(begin) == 0:
         return None
     at, z = time[span.frames], trial.part.z[span.frames]
+    # The covariance of the frames about the path (pairs × n × n): their noise, and outside the
+    # slide that of a free acceleration a, whose way is a x²/2, and of its change. The times ``x``
+    # away from the slide are 0 within it.
     covariance = np.repeat(noise**2 * np.eye(len(at))[None], len(begin), axis=0)
     for away in (begin[:, None] - at, at - end[:, None]):
         x = np.clip(away, 0.0, None)
@@ -200,6 +209,9 @@ def slide(trial: Trial, span: Span, noise: float, roughness: float) -> Slide | N
         covariance += ACCELERATION**2 * (x * y) ** 2 / 4 + roughness * _walk(x, y)
     factor = np.linalg.cholesky(covariance)
     whiten = np.linalg.inv(factor)
+    # Height and velocity at the begin are free: a flat prior, integrated out. The likelihood keeps
+    # the determinant, and the lengths of their whitened columns, the second less its share of the
+    # first.
     level = whiten.sum(axis=2)
     length = np.linalg.norm(level, axis=1, keepdims=True)
     level /= length
@@ -251,6 +263,7 @@ def slides_of(trial: Trial, kinetic: Array, plate: Array) -> list[Slide]:
             best = float(likelihood), kept, told
     found = []
     for one, told in zip(*best[1:], strict=True):
+        # Of each pair of instants: how near it comes, with any law, to that law's likeliest pair.
         likely = (told - told.max(axis=1, keepdims=True)).max(axis=0) > -IMPROBABLE
         found.append(one.only(likely))
     return found

@@ -82,10 +82,11 @@ def judged(
         for point in some
     ]
     good = _settled(bench, machines, asked)
+    # A list for each candidate: the setting itself, then all turns of its knobs.
     runs = [[machines[key[0]].at(one, SETTLE, SPAN) for one in around(p)] for key, p in good]
     found: dict[Key, Point] = {}
-    for (key, middle), each, turns in zip(good, runs, bench.outcomes(runs), strict=True):
-        point = _point(key[1], middle.tolist(), turns, each[0])
+    for (key, middle), settings, outcomes in zip(good, runs, bench.outcomes(runs), strict=True):
+        point = _point(key[1], middle.tolist(), outcomes, settings[0])
         best = found.get(key)
         if point.rank(key[2]) > (best.rank(key[2]) if best else 0.0):
             found[key] = point
@@ -96,7 +97,9 @@ _Asked = list[tuple[Key, Array]]
 
 
 def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked) -> _Asked:
-    """Those that are settled and feasible; of the best settings for a goal the very best alone."""
+    """The candidates that are settled and feasible; of the kind "best" only the best one of each
+    machine and goal, as the turns of the others would be run for nothing."""
+    # Averages over the last half and over the last quarter of the same run.
     times = (SETTLE, SPAN), (SETTLE + SPAN / 2.0, SPAN / 2.0)
     runs = [[machines[key[0]].at(point, *each) for each in times] for key, point in asked]
     found: _Asked = []
@@ -109,7 +112,7 @@ def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked) -> _A
             found.append((key, point))
         elif values[0] > top.get(key, 0.0):
             top[key] = values[0]
-            found = [one for one in found if one[0] != key] + [(key, point)]
+            found = [kept for kept in found if kept[0] != key] + [(key, point)]
     return found
 
 

@@ -57,6 +57,7 @@ def searched(
     starts, those of others whose cubes have the same dimensions. What is robust there need not show
     it here by single runs: the turns of the best of it are run in any case."""
     keys = machine.keys
+    # ``once`` keeps scores of single runs, ``over_turns`` the medians over all turns of the knobs.
     once = Known(keys, len(GOALS), STEPS, bench.once(machine))
     over_turns = Known(keys, len(GOALS), STEPS, bench.over_turns(machine))
     for one in [own, *warm] if own else warm:
@@ -66,6 +67,8 @@ def searched(
     if effort.design:
         once.search({0: Design(keys, effort.design, [*seed, 0], ends=True)}, effort.design)
     once.search({n: Climb(keys, [*seed, 1, n]) for n in _within_reach(once)}, effort.climb)
+    # The robust search begins where single runs are best, where they show good surroundings, and
+    # where other machines were robust.
     starts = [_points(own["robust"], keys)] if own else []
     for n in range(len(GOALS)):
         starts += [once.ranked(n, APART, KEPT), once.steady(n, CLOSE, 2 * KEPT)]

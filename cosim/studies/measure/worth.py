@@ -34,6 +34,7 @@ class Worth:
 
 def likely(values: Array, shown: Array, sd: Array) -> Array:
     """Weights of rigs with ``values`` (n × numbers) where ``shown`` was measured to ``sd``."""
+    # -2 ln L of each rig.
     square = (((values - shown) / sd) ** 2).sum(axis=1)
     # Rigs are few: where next to none is as likely as the truth, the weights are made flatter until
     # the effective number of rigs, (Σ w)² / Σ w², suffices.
@@ -61,6 +62,7 @@ def interval(targets: Array, weights: Array) -> Array:
 def worth(values: Array, sd: Array, targets: Array, rng: np.random.Generator) -> list[Worth]:
     """Of a measurement whose ``values`` and ``sd`` are rigs × numbers, for each target (rigs ×
     targets); of none where there are no numbers."""
+    # Each rig in turn is the truth, and the others are what is known before the measurement.
     n = len(targets)
     widths, held = (np.empty((n, DRAWS, targets.shape[1])) for _ in range(2))
     for truth in range(n):
