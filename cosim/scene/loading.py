@@ -34,9 +34,6 @@ from cosim.scene.tables import (
 
 _LIBRARY = Path(__file__).with_name("library")
 
-MAX_BYTES = 1 << 20
-"""Largest scene file; far above any honest one."""
-
 
 @dataclass(frozen=True)
 class _Layer:
@@ -193,7 +190,7 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
         how = f"a scene names it; cosim new --kind {kind} makes one to begin with"
         raise BadInput(f"{origin}: must be a scene, a .toml: {how}.")
     try:
-        raw = reader.read(source, MAX_BYTES)
+        return toml.read(source)
     except reader.Refused as refused:
         if not isinstance(refused.__cause__, FileNotFoundError):
             raise
@@ -204,31 +201,6 @@ def _read(source: str, origin: str, builtin: list[str]) -> dict[str, Any]:
             hint = f"; did you mean {plain(near)}?"
         hint = hint or f" (built-in: {', '.join(builtin)})"
         raise messages.bad(f'there is no built-in scene and no file "{origin}"{hint}') from None
-    try:
-        text = raw.decode("utf-8-sig")  # editors on Windows like to add the mark
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        raise BadInput(f"{origin}, line {line}: this is not UTF-8 text.") from None
-    try:
-        return toml.parse(text)
-    except (ValueError, RecursionError) as error:
-        raise BadInput(_syntax(error, text, origin)) from None
-
-
-def _syntax(error: Exception, text: str, origin: str) -> str:
-    """A sentence on broken TOML: file, line, column."""
-    message = "too deeply nested" if isinstance(error, RecursionError) else str(error)
-    if message.startswith("Exceeds the limit"):  # Python's words for who programs in it
-        message = "a whole number in it has thousands of digits"
-    place = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", message)
-    if place is None:
-        return f"{origin}: this is not TOML: {plain(message)}."
-    line, column = place[1], place[2]
-    if line is None:
-        lines = text.splitlines() or [""]
-        line, column = len(lines), len(lines[-1]) + 1
-    message = plain(message[: place.start()])
-    return f"{origin}, line {line}, column {column}: this is not TOML: {message}."
 
 
 def _check_names(data: dict[str, Any], origin: str) -> None:

@@ -12,7 +12,7 @@ MOST_PARTS = 8
 """Of a dotted key: a scene's have two. tomllib takes the square of their number: hours for 1 MB."""
 
 LARGEST = 1 << 20
-"""Bytes of a file of one's own bounds or forces."""
+"""Bytes of a file; far above any honest one."""
 
 _STRINGS = re.compile(
     r'"""(?:[^\\]|\\.)*?(?:"{3,5}|\Z)'
@@ -33,9 +33,18 @@ def parse(text: str) -> dict[str, Any]:
     return tomllib.loads(text)
 
 
-def read(path: Path) -> dict[str, Any]:
-    """The content of a TOML file. Raises BadInput."""
+def read(path: Path | str) -> dict[str, Any]:
+    """The content of a TOML file. Raises BadInput, Refused where it cannot be read."""
+    raw, name = reader.read(path, LARGEST), plain(path)
     try:
-        return parse(reader.read(path, LARGEST).decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise BadInput(f"{plain(path)}: is no valid TOML: {error}.") from error
+        return parse(raw.decode("utf-8-sig"))  # editors on Windows like to add the mark
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise BadInput(f"{name}: line {line}: this is not UTF-8 text.") from None
+    except RecursionError:
+        raise BadInput(f"{name}: this is not TOML: too deeply nested.") from None
+    except ValueError as error:
+        why = plain(error)
+        if why.startswith("Exceeds the limit"):  # Python's words for who programs in it
+            why = "a whole number in it has thousands of digits"
+        raise BadInput(f"{name}: this is not TOML: {why}.") from None

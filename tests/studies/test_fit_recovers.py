@@ -250,7 +250,7 @@ def test_forces_from_a_file(ending: str, tmp_path: Path) -> None:
         ("f.csv", "trial,lower,upper\na,3,2\n", "lower must not be above upper, and is 3"),
         ("f.csv", "trial,force\n", "holds no forces"),
         ("f.toml", "a = 1", "“a” must be the table of a trial"),
-        ("f.toml", "[a", "is no valid TOML"),
+        ("f.toml", "[a", "this is not TOML"),
     ],
 )
 def test_what_is_wrong_with_a_file_of_forces(

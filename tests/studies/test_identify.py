@@ -568,7 +568,7 @@ def test_missing_frames_have_no_residual(folder: Path, tmp_path: Path) -> None:
         ('[rig."mechanics.suspension"]\nlaws = ["square"]\n', 'a list of some of "cubic", "knee"'),
         ('[rig."mechanics.suspension"]\nlaws = ["knee"]\nlow = 3\n', "and stand alone"),
         ("[ring]\n", "ring: there are the tables rig, trial and measured only"),
-        ("[rig\n", "is no valid TOML"),
+        ("[rig\n", "this is not TOML"),
     ],
 )
 def test_bounds_are_refused_in_a_sentence(text: str, told: str | None, tmp_path: Path) -> None:
