@@ -14,7 +14,7 @@ from cosim.circuit.lint.checks import check
 from cosim.circuit.lint.deck import Line, passed, read, refuse
 from cosim.circuit.lint.elements import Element, Scope, node, parse
 from cosim.circuit.lint.expressions import sensed
-from cosim.circuit.lint.words import definitions
+from cosim.circuit.lint.words import definitions, number
 from cosim.circuit.lint.write import written
 from cosim.circuit.outputs import Measure, measures, without_effect
 from cosim.errors import BadInput, plain
@@ -26,6 +26,7 @@ _SUM = re.compile(r"[-+](?![^()]*\))")
 _FACTOR = re.compile(r"[vi]\s*\([^()]*\)", re.IGNORECASE)
 _UNITS = {"v": "V", "i": "A", "iv": "W", "vv": "V2", "ii": "A2"}
 _CURRENTS = "vleh"  # elements whose current ngspice computes as an unknown
+_READ = f"{_CURRENTS}rcdgfbi"  # elements whose current a B source may read
 _NODE = "cosim_read"
 
 
@@ -105,7 +106,7 @@ def deck(
     }
     read_as = reading(every, len(words) if asked else 0)
     return Deck(
-        text_of(lines[0], top, external, values, duration, reltol, max_step),
+        text_of(lines[0], top, external, values, duration, reltol, max_step, own_step(dropped)),
         {source.lower(): source[0].lower() for source in sources},
         tuple(vector for vector, _ in read_as),
         tuple(every),
@@ -122,6 +123,17 @@ first, less than the rounding of its times in a long run with short steps: then 
 edge and the same edge, which two sources round differently, makes noise of amperes."""
 
 
+def own_step(dropped: Sequence[Line]) -> float | None:
+    """The step, s, of the netlist's own .tran line; None where it has none, as LTspice's lines of
+    a stop time alone, or 0 for a step."""
+    for line in dropped:
+        word, *times = line.text.lower().split()
+        if word == ".tran":
+            step, stop = ([number(time) for time in times] + [None, None])[:2]
+            return step if step and stop else None
+    return None
+
+
 def text_of(
     title: Line,
     top: Scope,
@@ -130,9 +142,11 @@ def text_of(
     duration: float,
     reltol: float,
     max_step: float,
+    own: float | None = None,
 ) -> str:
     """What ngspice gets of a netlist: other lines for ``external`` sources, ``values`` for the top
-    level's parameters, and the analysis."""
+    level's parameters, and the analysis. The netlist's ``own`` step, s, is what the edges of its
+    PULSE and EXP sources take that are given no time."""
     text = [title.text]
     for line, element, holder in top.order:
         if holder is top and line in external:
@@ -140,13 +154,15 @@ def text_of(
         elif all(each.used for each in holder.chain()):  # something calls the subcircuit
             free = (f" {key}=0" for key in sorted(holder.free) if line is holder.line)
             text.append("".join([written(line, element, values if holder is top else {}), *free]))
+    edges = any(set(element.words) & {"pulse", "exp"} for _, element, _ in top.order if element)
+    step = min(own, duration) if own and edges else max_step
     one = max(_ONE_BREAK * max_step, _ONE_TIME * duration)
     text += [
         # Without norefvalue it asks for the CPU time at each step, to print how far it is.
         f".options norefvalue reltol={reltol!r} minbreak={one!r}",
         # All vectors are sent step by step; ngspice is to keep none, which would take memory.
         ".save none",
-        f".tran {max_step!r} {duration!r} 0 {max_step!r}",
+        f".tran {step!r} {duration!r} 0 {max_step!r}",
         ".end",
     ]
     return "\n".join(text)
@@ -208,10 +224,13 @@ def reading(words: Sequence[str], asked: int = 0) -> list[tuple[str, str]]:
 
 def _direct(words: Sequence[str], asked: int) -> list[re.Match[str] | None]:
     # Within a step a node's voltage is not to be had: a source that copies it is.
-    return [
-        _VECTOR.fullmatch(each) if k >= asked or each[:1].lower() == "i" else None
-        for k, each in enumerate(words)
-    ]
+    # Nor has ngspice a vector for every current, but a source may read each.
+    found = []
+    for k, each in enumerate(words):
+        match, current = _VECTOR.fullmatch(each), each[:1].lower() == "i"
+        able = match and match[2][:1].lower() in _CURRENTS if current else k >= asked
+        found.append(match if able else None)
+    return found
 
 
 def _source_of(place: int, words: Line) -> Line:
@@ -225,7 +244,7 @@ def _check_vectors(top: Scope, wanted: Iterable[Line]) -> None:
     """What is wanted must be there, as far as that can be known without subcircuits."""
     known: dict[str, set[str]] = {
         "v": {node for element in top.elements for node in element.nodes} | {"0"},
-        "i": {each.name for each in top.elements if each.kind in _CURRENTS},
+        "i": {each.name for each in top.elements if each.kind in _READ},
     }
     for each in wanted:
         if "@" in each.text:
@@ -234,7 +253,7 @@ def _check_vectors(top: Scope, wanted: Iterable[Line]) -> None:
                 "what is within a device is not read; for its current put a source of 0 V in "
                 "series, and ask for i of that",
             )
-        for kind, what in (("v", "node"), ("i", "V, L, E or H element")):
+        for kind, what in (("v", "node"), ("i", "element of two ends")):
             for inner in sensed(f"b 1 0 v={each.text}", kind):
                 if not re.search(r"[.:]", inner) and node(inner) not in known[kind]:
                     hint = suggestion(inner, known[kind])

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from cosim.circuit.joined import check_reading, own_parameters, reading, text_of
+from cosim.circuit.joined import check_reading, own_parameters, own_step, reading, text_of
 from cosim.circuit.lint.checks import REQUIRED as AGREED
 from cosim.circuit.lint.deck import Line, read, refuse
 from cosim.circuit.lint.elements import Element, Scope
@@ -68,9 +68,9 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
     """
     path, words = path_of(scene), _words(scene)
     if scene.circuit.netlist is None:
-        (title, top), every = _packaged(path), [*dict.fromkeys(words.values())]
+        (title, top), every, own = _packaged(path), [*dict.fromkeys(words.values())], None
     else:  # may have changed since it was read last
-        title, top, every = _checked(path, scene.renamed, tuple(words.values()))
+        title, top, every, own = _checked(path, scene.renamed, tuple(words.values()))
         words |= {each: each for each in every if each not in words}
     elements = top.elements
     external = _external_sources(elements, scene.renamed)
@@ -81,7 +81,7 @@ def prepare(scene: Scene) -> tuple[str, dict[str, str]]:
         _carry_inertia(external, title, present, emf)
     values = parameters(scene) | own_parameters(top, str(path), scene.circuit.param or {})
     steps = scene.circuit.reltol, scene.circuit.max_step
-    text = text_of(title, top, external, values, scene.run.duration, *steps)
+    text = text_of(title, top, external, values, scene.run.duration, *steps, own)
     for node in ("out", "sense"):
         if f"v({node})" not in words and node not in present:
             port = f', or a [[port]] to "machine.{node}"' if scene.renamed else ""
@@ -104,10 +104,11 @@ def _words(scene: Scene) -> dict[str, str]:
 
 def _checked(
     path: Path, renamed: Mapping[str, str], words: tuple[str, ...]
-) -> tuple[Line, Scope, list[str]]:
+) -> tuple[Line, Scope, list[str], float | None]:
     lines, dropped = read(path)
     required = [[renamed[end].lower() for end in _SOURCES]] if renamed else AGREED
-    return lines[0], *check_reading(path, lines, words, measures(dropped), required)
+    top, every = check_reading(path, lines, words, measures(dropped), required)
+    return lines[0], top, every, own_step(dropped)
 
 
 @cache

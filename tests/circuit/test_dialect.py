@@ -238,7 +238,7 @@ def test_numbers_are_those_that_people_write(tmp_path: Path) -> None:
     atto."""
     lines = ["R8 in x R=4k7", "R9 x 0 4R7", "X9 in 0 part r=1n5", "I9 in 0 0.5A", ".param i0 1A"]
     lines += [".param r1=4k7 g=2k2/1.1k", "R7 x 0 {2*r1+1k5}"]
-    lines += ["B7 0 2k2 I=V(2k2)/4k7", "R6 2k2 0 1"]
+    lines += ["B7 0 2k2 I=V(2k2,1k5)/4k7", "R6 2k2 0 1", "R5 1k5 0 1"]
     library = ".subckt part a b params: r=1\nR1 a b {r}\n.ends"
     found = anew(tmp_path, *lines, library)
     for wanted in ("r8 in x r=4.7k", "r9 x 0 4.7", "x9 in 0 part r=1.5n", "i9 in 0 0.5"):
@@ -246,7 +246,7 @@ def test_numbers_are_those_that_people_write(tmp_path: Path) -> None:
     assert ".param i0=1" in found
     for wanted in (".param r1=4.7k", ".param g=2.2k/1.1k", "r7 x 0 {2*r1+1.5k}"):
         assert wanted in found
-    assert {"b7 0 2k2 I=V(2k2)/4.7k", "r6 2k2 0 1"} <= {*found}
+    assert {"b7 0 2k2 I=V(2k2,1k5)/4.7k", "r6 2k2 0 1", "r5 1k5 0 1"} <= {*found}
 
 
 def test_hspices_words_for_controlled_sources_are_left_out(tmp_path: Path) -> None:

@@ -176,3 +176,45 @@ def test_what_cannot_be_read_is_refused_with_its_cure(name: str, tmp_path: Path)
 
 def test_they_are_ten() -> None:
     assert len(RUNS) == 7 and len(REFUSED) == 3
+
+
+def test_edges_without_times_currents_and_truth_are_as_the_netlist_has_them(
+    tmp_path: Path,
+) -> None:
+    """An edge of PULSE without a length takes the netlist's .tran step, as in ngspice alone, not
+    the scene's; a resistor's current is read in save and .meas; 0.2 is false to LTspice."""
+    text = """own step
+V1 in 0 SIN(0 1 1k)
+R1 in 0 1k
+V2 p 0 PULSE(0 5 0 0 0 25u 50u)
+RLoad p 0 1k
+V3 low 0 0.2
+R3 low N/C_01 1k
+B1 high 0 V={if(V(low),5,unit)}
+.step param unit list 1 2
+.meas tran most MAX V(p)*I(RLoad)
+.tran 5u 3m
+.end
+"""
+    result = found(tmp_path, "", text, "v(p)", "i(RLoad)", "v(high)")
+    time, pulse = result.columns["time"], result.columns["v(p)"]
+    phase = time % 50e-6
+    rising = (phase > 0.5e-6) & (phase < 4.5e-6)
+    assert pulse[rising] == pytest.approx(phase[rising] * 1e6, abs=1e-6)  # 5 V in 5 us
+    assert result.columns["i(RLoad)"] == pytest.approx(pulse / 1e3, abs=1e-9)
+    assert np.all(result.columns["v(high)"] == 1.0)
+    assert result.summary["meas.most"] == pytest.approx(25e-3, rel=1e-6)
+
+
+@pytest.mark.parametrize("step", ["1e-7", "5e-6", "2e-5"])
+def test_a_flip_flop_divides_its_clock_by_two_with_any_step(step: str, tmp_path: Path) -> None:
+    (tmp_path / "own.cir").write_text(
+        "divider\nV1 in 0 0\nR1 in 0 1k\nV2 clk 0 PULSE(0 1 50u 1u 1u 50u 100u)\n"
+        "A1 qn 0 clk 0 0 qn q 0 DFLOP\n.tran 1u 3m\n.end\n"
+    )
+    scene = SCENE.format('"v(q)"').replace("max_step = 1e-6", f"max_step = {step}")
+    (tmp_path / "own.toml").write_text(scene)
+    columns = cosim.run(tmp_path / "own.toml").columns
+    edges = columns["time"][1:][np.diff(columns["v(q)"] > 0.5)]
+    assert np.arange(len(edges)) * 1e-4 + 50e-6 == pytest.approx(edges, abs=2.5e-6)
+    assert len(edges) == 30

@@ -39,7 +39,7 @@ WRONG = {
     "two in one": ('"v(gp)"', '"v(gp), v(a)"', r"bridge\.cir: .* is no expression"),
     "nothing": ('"v(gp)"', '""', r"save = \"\" must be a vector or an expression"),
     "within a device": ('"v(gp)"', '"@d1[id]"', r"\"@d1\[id\]\": .*source of 0 V in series"),
-    "no such current": ('"i(Vemf)"', '"i(Rm)"', r"bridge\.cir: .*no V, L, E or H element rm"),
+    "no such current": ('"i(Vemf)"', '"i(Rlost)"', r"bridge\.cir: .*no element of two ends rlost"),
     "a command as probe": ('"v(gp)"', '"v(gp)\\n.control"', r"cannot stand in a netlist"),
     "a parameter": ("J = 2e-4", "K = 2e-4", r"Rotor\.fmu: .*parameters K = 0\.0002"),
     "a parameter's type": ("J = 2e-4", 'J = "x"', r"Rotor\.fmu: .*must be a number"),

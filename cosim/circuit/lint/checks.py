@@ -181,8 +181,8 @@ def _check_source(element: Element, scope: Scope, names: Names) -> None:
         after = element.words[element.words.index(wave) + 1 :] if wave in element.words else []
         if len(_values(after)) > most:
             element.refuse(
-                f": {wave.upper()} takes {most} values; one more means a number of periods to "
-                "LTspice and a phase to ngspice"
+                f": {wave.upper()} takes {most} values; leave out the next, a number of periods to "
+                "LTspice and a phase to ngspice, or write that many as PWL"
             )
     if "pwl" in element.words:
         after = element.words[element.words.index("pwl") + 1 :]

@@ -68,6 +68,9 @@ _GATES = (
     "Td, Trise, Tfall, Tau, Rout, Cout"
 )
 _INLINED = (".include", ".inc", ".lib")
+_STEP = re.compile(
+    r"\.step\s+(?:(?:oct|dec|lin)\s+)?param\s+([a-z_]\w*)\s+(?:list\s+)?([^\s{}'=]+)", re.IGNORECASE
+)
 _END = re.compile(r"^[ \t]*\.end\b(?![.\w])", re.IGNORECASE | re.MULTILINE)
 _SCHEMATIC = re.compile(r"Version 4\S*\s+SHEET ")
 _TEXT = re.compile(r"[ -~]*")
@@ -153,6 +156,7 @@ class _Reader:
             title, _, rest = text.partition("\n")
             self.lines.append(Line(_title(Line(title, name, 1)), name, 1))
             if self._take(_logical(rest, name, 2), (self.path,)):
+                self.lines += self._stepped()
                 every = in_ngspice_together(self.lines)
                 self.dropped += [line for line in every if line.text.startswith(".told")]
                 title, *lines = [line for line in every if not line.text.startswith(".told")]
@@ -162,6 +166,14 @@ class _Reader:
             refuse(Line("", name, 1), f"this is a drawing of LTspice and no netlist: {cure}")
         last = Line("", name, text.rstrip().count("\n") + 1)
         refuse(last, "the netlist does not end with .end, so it may be cut short")
+
+    def _stepped(self) -> Iterator[Line]:
+        """For parameters that only a .step has values for: .param lines with the first ones."""
+        known = "\n".join(line.text for line in self.lines if line.text.startswith(".param"))
+        for line in self.dropped:
+            step = _STEP.match(line.text)
+            if step and not re.search(rf"(?<!\w){step[1]}\s*=", known, re.IGNORECASE):
+                yield replace(line, text=f".param {step[1]}={step[2]}")
 
     def _top(self) -> str:
         """The text of the netlist itself."""
@@ -300,7 +312,7 @@ def _text(data: bytes) -> str:
 def _decoded(data: bytes, name: str) -> str:
     """The text, lines ended by line feeds; any other sign that some program takes for a line's end
     or does not show is refused."""
-    text = _text(data)
+    text = _text(data).rstrip("\x1a").replace("\f", " ")  # printers' and DOS's ends
     for place, char in enumerate(text):
         if char not in "\n\t" and category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
             line = Line("", shown(name), text.count("\n", 0, place) + 1)

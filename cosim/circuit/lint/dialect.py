@@ -31,7 +31,7 @@ _MOST = 50
 
 _WAY = "min(max((c-0.5*(n+f))/(n-f),-0.5),0.5)"
 FUNCTIONS = {
-    "if": ("c,x,y", "ternary_fcn(c,x,y)"),
+    "if": ("c,x,y", "ternary_fcn((c)>0.5,x,y)"),
     "limit": ("x,y,z", "min(max(x,min(y,z)),max(y,z))"),
     "uplim": ("x,y,z", "min(x,y-z)+min(max(x-y+z,0),2*z)-min(max(x-y+z,0),2*z)**2/(4*z)"),
     "dnlim": ("x,y,z", "max(x,y+z)-min(max(y+z-x,0),2*z)+min(max(y+z-x,0),2*z)**2/(4*z)"),
@@ -72,8 +72,10 @@ _PAIR = re.compile(rf"""(?<!\S)([a-z]\w*)\s*=\s*("[^"]*"|{_VALUE[1:-1]})""", re.
 _SPLIT_NUMBER = re.compile(r"^(\d+)(meg|[tgkmunpf])(\d+)(?!\S)", re.IGNORECASE)
 _GLUED = re.compile(r"(?<==)\s*(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE)
 """4k7 for 4.7k, as a value and behind a name."""
-_WITHIN = re.compile(r"(?<![\w.$#])(?<!v\()(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE)
-"""The same in an expression; a node may have such a name."""
+_WITHIN = re.compile(
+    r"v\s*\([^()]*\)|(?<![\w.$#])(\d+)(meg|[tgkmunpf])(\d+)(?![\w.])", re.IGNORECASE
+)
+"""The same in an expression, but for nodes of such a name."""
 _POINT = re.compile(r"^(\d+)r(\d+)(?!\S)", re.IGNORECASE)
 _VALUED = re.compile(r"(?<=\s)value\s*=?\s*(?={)", re.IGNORECASE)
 _TC = re.compile(rf"\btc\s*=\s*{_VALUE}(?:[\s,]+{_VALUE}(?!\s*=))?", re.IGNORECASE)
@@ -127,6 +129,10 @@ _LOGICAL = {"&": "&&", "|": "||", "~": "!"}
 """LTspice's and, or, not."""
 
 
+def _pointed(expression: str) -> str:
+    return _WITHIN.sub(lambda m: f"{m[1]}.{m[3]}{m[2]}" if m[1] else m[0], expression)
+
+
 def in_ngspice(line: Line) -> list[Line]:
     """The line as ngspice knows it, in one line or more."""
     text = _KIND.sub(r"\1", _NOISELESS.sub("", line.text.translate(_LETTERS)))
@@ -142,9 +148,9 @@ def in_ngspice(line: Line) -> list[Line]:
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
     if kind == "b" or word in (".par", ".def"):
         head, equals, rest = text.partition("=")
-        text = head + equals + _WITHIN.sub(r"\1.\3\2", rest)
+        text = head + equals + _pointed(rest)
     else:
-        text = re.sub(r"\{[^{}]*\}", lambda braced: _WITHIN.sub(r"\1.\3\2", braced[0]), text)
+        text = re.sub(r"\{[^{}]*\}", lambda braced: _pointed(braced[0]), text)
     if kind in "beg":
         text = _EQUAL.sub(_compared, text)
         if any(each[0] != "(" or closing(each, 0) < len(each) for each in _COMPOUND.findall(text)):
@@ -479,14 +485,17 @@ def _gate(text: str) -> list[str]:
             f"v({inputs[place]},{common})>{ref}" if inputs[place] != common else "0>1"
             for place in (0, 3, 4)
         )
-        up, one, two = f"v({name}_c_p)>0.5", f"v({name}_w)", f"v({name}_s)"
-        clocked = f"{up} ? {one}>0.5 : {data}", f"({up} ? {one} : {two})>0.5"
+        # Two capacitors: w takes the data while the clock is low, s takes w while it is high. Each
+        # holds its voltage by no current: to compare it with a half instead has two solutions.
+        up, one, y = f"v({name}_c_p)>0.5", f"v({name}_w)>0.5", f"v({name}_s)"
         first = _held(f"{name}_c", f"v({inputs[2]},{common})", ref, "0")
-        for each, follows in zip("ws", clocked, strict=True):
-            aim = f"({clear} ? 0 : ({preset} ? 1 : (({follows}) ? 1 : 0)))"
-            first.append(f"b{name}_{each} 0 {name}_{each} i={aim}-v({name}_{each})")
-            first.append(f"c{name}_{each} {name}_{each} 0 1n")
-        y, middle = two, "0.5"
+        for each, taken, follows in (("w", f"1-({up})", data), ("s", up, one)):
+            own = f"v({name}_{each})"
+            aim = f"({taken}) ? (({follows}) ? 1 : 0)-{own} : 0"
+            aim = f"{clear} ? 0-{own} : ({preset} ? 1-{own} : ({aim}))"
+            first.append(f"b{name}_{each} 0 {name}_{each} i={aim}")
+            first += [f"c{name}_{each} {name}_{each} 0 1n", f"r{name}_{each} {name}_{each} 0 1e12"]
+        middle = "0.5"
     elif kind != "buf" or len(x) != 1:
         return [text]
     state, td = f"1.001*v({name}_p)", law["td"][1:-1]

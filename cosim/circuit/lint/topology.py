@@ -117,7 +117,9 @@ def _check_ends(parts: list[Part], terminals: Counter[str], held: set[str]) -> N
                 refuse(line, f"nothing is connected to the node {shown(name)}")
         for name in part.nodes:
             leaf = part.top and part.element.kind in _LEAF
-            excused = name in seen or name in held or name == GROUND or name.startswith("nc")
+            excused = (
+                name in seen or name in held or name == GROUND or name.startswith(("nc", "n/c"))
+            )
             if leaf and terminals[name] == 1 and not excused:
                 refuse(line, f"the node {shown(name)} has no other connection")
 
