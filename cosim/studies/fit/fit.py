@@ -1,7 +1,7 @@
-"""Friction and normal forces from tracked trials, or what the published parameters make of them.
+"""Friction and normal forces from tracked trials, or the trials by the published parameters.
 
-Tracks know no force, only accelerations: what they tell is µ_k F_n/m of each trial and µ_p/µ_k of
-all. With a given µ_k that is each trial's normal force; with known forces it is µ_k.
+Tracks hold accelerations, no forces: they determine µ_k F_n/m of each trial, and one µ_p/µ_k for
+all. With a given µ_k each trial's normal force follows; with known normal forces, µ_k.
 """
 
 import os
@@ -28,10 +28,10 @@ from cosim.trials.tracked import Trial, read_folder
 
 Solver = Literal["exact", "published"]
 
-POINTS = 100  # of the line that is drawn for a slide
+POINTS = 100  # of the line that is drawn for each slide
 
 FIRST_ROW, LAST_ROWS = 3, 2
-"""Rows of a trial that the authors' procedure leaves out before and behind."""
+"""Rows that the authors' procedure leaves out at the begin and at the end of a trial."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,7 +63,7 @@ class TrialResults:
 
 
 LEAST_MU_K = 1e-3
-"""Less than any dry pair has; normal forces, the friction over µ_k, would be beyond all sense."""
+"""Below any dry pair of surfaces; a smaller µ_k would give absurd normal forces, µ_k F_n/µ_k."""
 
 
 def fit(
@@ -123,19 +123,20 @@ def _fitted(
 ) -> TrialResults:
     lowest, highest = FRICTIONS
     limits = [FRICTIONS] * len(trials)
-    if given:  # bounds of the force are such of the friction
+    if given:  # times µ_k, bounds of the normal force are bounds of the friction
         limits = [
             ((force.lower or lowest / given) * given, (force.upper or highest / given) * given)
             for force in known
         ]
     law = search(trials, limits, plate)
-    told = [x.determined(limit) for x, limit in zip(law.kinetic, limits, strict=True)]
-    mu_k, mu_k_range = (given, (given, given)) if given else _from_forces(law, known, told)
+    verdicts = [x.determined(limit) for x, limit in zip(law.kinetic, limits, strict=True)]
+    mu_k, mu_k_range = (given, (given, given)) if given else _from_forces(law, known, verdicts)
     shown, rows = [], []
-    every = zip(trials, known, law.kinetic, law.slides, told, strict=True)
-    for trial, force, kinetic, made, how in every:
-        here, misfit = _predicted(trial, made if how == "yes" else [], kinetic, law.ratio)
-        shown.append(here)
+    each = zip(trials, known, law.kinetic, law.slides, verdicts, strict=True)
+    for trial, force, kinetic, slides, how in each:
+        panel, misfit = _predicted(trial, slides if how == "yes" else [], kinetic, law.ratio)
+        shown.append(panel)
+        # A number that the slides do not determine is None, and so is what is calculated of it.
         value = kinetic.value if how == "yes" else None
         low = kinetic.low if how in ("yes", "at least") else None
         high = kinetic.high if how in ("yes", "at most") else None
@@ -149,13 +150,14 @@ def _fitted(
                 "kinetic_friction_weights": value,
                 "kinetic_friction_90_percent": [low, high],
                 "kinetic_friction_determined": how,
-                "slides": len(made),
+                "slides": len(slides),
                 **change(weights, force.measured),
                 "misfit_um": misfit and misfit * 1e6,
                 "noise_um": noise_of(trial) * 1e6,
             }
         )
-    untold = plate and "yes" not in told  # no trial determines its friction, let alone the plate's
+    # Where no trial determines its kinetic friction, none determines the plate's.
+    untold = plate and "yes" not in verdicts
     ratio = law.ratio
     numbers: dict[str, Any] = {
         "parameters": "fitted",
@@ -175,29 +177,32 @@ def _fitted(
 
 
 def _predicted(
-    trial: Trial, made: Sequence[Slide], kinetic: Found, ratio: Found
+    trial: Trial, slides: Sequence[Slide], kinetic: Found, ratio: Found
 ) -> tuple[Shown, float | None]:
-    """A trial with each of its slides as the law predicts it, and the rms misfit [m] of the frames
+    """A trial with the law's prediction of its ``slides``, and the rms misfit [m] of the frames
     within them; None without slides."""
     law = kinetic.value * published.GRAVITY, kinetic.value * ratio.value * published.GRAVITY
-    # A time that is not a number ends each slide's line.
-    times = [np.append(np.linspace(one.time[0], one.time[-1], POINTS), np.nan) for one in made]
-    heights = [one.predicted(*law, time) for one, time in zip(made, times, strict=True)]
-    misfits = [one.z - one.predicted(*law, one.time) for one in made]
+    # A NaN at the end of each slide's times interrupts the drawn line.
+    times = [np.append(np.linspace(x.time[0], x.time[-1], POINTS), np.nan) for x in slides]
+    heights = [x.predicted(*law, time) for x, time in zip(slides, times, strict=True)]
+    misfits = [x.z - x.predicted(*law, x.time) for x in slides]
     path = (np.concatenate([*times, []]), np.concatenate([*heights, []]) - trial.part.z[0])
     surface, part = (x.z - x.z[0] for x in (trial.platform, trial.part))
     shown = Shown(trial.name, trial.time - trial.time[0], surface, part, path)
-    return shown, float(np.sqrt(np.nanmean(np.concatenate(misfits) ** 2))) if made else None
+    return shown, float(np.sqrt(np.nanmean(np.concatenate(misfits) ** 2))) if slides else None
 
 
-def _from_forces(law: Fit, known: Sequence[Force], told: Sequence[str]) -> tuple[float, Interval]:
+def _from_forces(
+    law: Fit, known: Sequence[Force], verdicts: Sequence[str]
+) -> tuple[float, Interval]:
     """µ_k and its interval, from bounds of the normal forces of trials that determine µ_k F_n.
 
-    It is the geometric middle of what all bounds leave, or, where they contradict each other, of
-    what lies between the two that do so most. Raises BadInput where no such bounds are known.
+    Each trial gives µ_k F_n/upper ≤ µ_k ≤ µ_k F_n/lower. µ_k is the geometric mean of the largest
+    lower and the least upper bound, also where these two contradict each other. Raises BadInput
+    where no bounds are known.
     """
-    every = zip(law.kinetic, known, told, strict=True)
-    pairs = [(found, force) for found, force, how in every if how == "yes"]
+    each = zip(law.kinetic, known, verdicts, strict=True)
+    pairs = [(found, force) for found, force, how in each if how == "yes"]
     if not any(force.lower or force.upper for _, force in pairs):
         raise BadInput(
             "µ_k cannot be fitted: no trial whose forces are known has slides enough to determine "
@@ -209,24 +214,25 @@ def _from_forces(law: Fit, known: Sequence[Force], told: Sequence[str]) -> tuple
         most = [getattr(x, end) / force.lower for x, force in pairs if force.lower]
         return max(least, default=0.01), min(most, default=10.0)
 
+    # 3 × 2: bounds of µ_k, for µ_k F_n at the low end of its interval, its value, the high end.
     ends: Array = np.array([least_and_most(end) for end in ("low", "value", "high")])
     return float(np.sqrt(ends[1].prod())), (float(ends.min()), float(ends.max()))
 
 
 def _evaluated(trials: list[Trial], known: Sequence[Force], solver: Solver) -> TrialResults:
-    """The whole paths by the published parameters and their authors' procedure: times and heights
-    count from the first row that is kept, the surface's tracked velocity is joined by straight
-    lines, the part starts with its own tracked velocity, and the error is the mean of |z measured −
-    z simulated| every 0.1 ms. Source: see `cosim.trials.published`."""
+    """Each trial's whole path by the published parameters and the authors' procedure: times and
+    heights count from the first row that is used, the surface's tracked velocity is interpolated
+    linearly, the part starts with its own tracked velocity, and the error is the mean of
+    |z measured − z simulated| every 0.1 ms. Source: see `cosim.trials.published`."""
     shown: list[Shown] = []
     rows: list[Row] = []
     for trial, known_force, force in zip(trials, known, published.FORCES_FITTED, strict=True):
-        kept = slice(FIRST_ROW, len(trial.time) - LAST_ROWS)
-        time = np.ascontiguousarray(trial.time[kept] - trial.time[FIRST_ROW])
+        used = slice(FIRST_ROW, len(trial.time) - LAST_ROWS)
+        time = np.ascontiguousarray(trial.time[used] - trial.time[FIRST_ROW])
         steps = int(np.floor(time[-1] / part.PUBLISHED_STEP + 1e-6))
         motion = (part.exact if solver == "exact" else part.published)(
             time,
-            np.ascontiguousarray(trial.platform.v[kept]),
+            np.ascontiguousarray(trial.platform.v[used]),
             mu_s=published.MU_S,
             mu_k=published.MU_K_FITTED,
             force_per_mass=force * published.GRAVITY,
@@ -234,7 +240,7 @@ def _evaluated(trials: list[Trial], known: Sequence[Force], solver: Solver) -> T
             v0=float(trial.part.v[FIRST_ROW]),
             output=np.arange(steps + 1) * part.PUBLISHED_STEP,
         )
-        surface, moved = (x.z[kept] - x.z[FIRST_ROW] for x in (trial.platform, trial.part))
+        surface, moved = (x.z[used] - x.z[FIRST_ROW] for x in (trial.platform, trial.part))
         shown.append(Shown(trial.name, time, surface, moved, (motion.time, motion.z)))
         rows.append(
             {
@@ -257,7 +263,7 @@ def _evaluated(trials: list[Trial], known: Sequence[Force], solver: Solver) -> T
 
 
 def _cells(row: dict[str, Any]) -> dict[str, Any]:
-    """A row of the table, an interval in two cells."""
+    """A trial's row for ``fit.csv``: each interval takes two cells, ``…_from`` and ``…_to``."""
     cells: dict[str, Any] = {}
     for name, value in row.items():
         ends = {f"{name}_from": value[0], f"{name}_to": value[1]} if isinstance(value, list) else {}

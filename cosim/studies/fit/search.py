@@ -1,10 +1,10 @@
-"""The likeliest law of friction: µ_p/µ_k of all trials, µ_k F_n of each; how certain both are.
+"""The likeliest friction law: one ratio µ_p/µ_k for all trials, µ_k F_n of each; their intervals.
 
-Given the ratio the trials have nothing in common, so that each is a search in one dimension, and
-all laws on a grid are looked at: the likelihood has steps, where a part just sticks, and no slope
-to follow. Slides are judged by Student's distribution of their deviance residuals, so that a few
-may be off. How certain a number is, the slides tell by their scatter, drawn again and again (the
-bootstrap of independent blocks), and the profile of the likelihood; the wider one holds.
+For a given ratio the trials are independent, so each one is a search in one dimension. All laws on
+a grid are evaluated: the likelihood has steps where a part just sticks, and so no useful gradient.
+The deviance residuals of the slides follow Student's distribution, which tolerates a few outliers.
+The interval of a number is the wider one of two: the bootstrap over slides (resampled as
+independent blocks), and the profile likelihood.
 """
 
 from collections.abc import Sequence
@@ -23,22 +23,24 @@ Interval = tuple[float, float]
 Rows = npt.NDArray[np.intp]
 
 FRICTIONS: Interval = (0.3, 60.0)
-"""µ_k F_n that is looked at, in weights of the part."""
-COARSE, FINE, AROUND = 37, 25, 1.2  # frictions of the first grid and of the second, and its reach
-RATIOS, NEAR = np.linspace(0.0, 0.9, 7), np.linspace(-0.12, 0.12, 9)  # of µ_p/µ_k
-FREEDOM = 8.0  # degrees of, of Student's distribution
-FEWEST = 5  # slides of which an interval is told
-DRAWS = 400
-LEVEL = 0.9
+"""Range of µ_k F_n that is searched, in weights of the part."""
+COARSE, FINE, AROUND = 37, 25, 1.2  # points of the first friction grid, of the second; its factor
+RATIOS, NEAR = np.linspace(0.0, 0.9, 7), np.linspace(-0.12, 0.12, 9)  # µ_p/µ_k: grid, refinement
+FREEDOM = 8.0  # degrees of freedom of Student's distribution
+FEWEST = 5  # with fewer slides no interval is given
+DRAWS = 400  # of the bootstrap
+LEVEL = 0.9  # confidence level of the intervals
 LOSS = 1.353
-"""Half of what Χ² with one degree of freedom exceeds in 10 % of the cases."""
+"""Half of the 90 % quantile of Χ² with one degree of freedom: how far the profile's negative
+log-likelihood rises within the interval."""
 SYSTEMATIC = 0.05
-"""By which intervals are wider on either side, relative: what the model of the motion before and
-after a slide may be wrong by. On 16 trials of this bench with known friction it is 0.045 (rms)."""
+"""Relative error of the model of the motion next to a slide, by which intervals widen on either
+side. On 16 trials of this bench with known friction it is 0.045 (rms)."""
 
 
 def _laws(kinetic: Array, ratios: Array) -> tuple[Array, Array]:
-    """µ_k F_n/m and µ_p F_n/m, m/s², of all pairs of these, kinetic friction by ratio."""
+    """µ_k F_n/m and µ_p F_n/m, m/s², of all pairs of kinetic frictions and ratios µ_p/µ_k, flat;
+    the ratio varies fastest."""
     first, second = (x.ravel() for x in np.meshgrid(kinetic, ratios, indexing="ij"))
     return first * GRAVITY, first * second * GRAVITY
 
@@ -46,11 +48,11 @@ def _laws(kinetic: Array, ratios: Array) -> tuple[Array, Array]:
 def _losses(slides: Sequence[Slide], kinetic: Array, ratios: Array) -> Array:
     """Negative log-likelihood of each slide of a trial (slides by frictions by ratios).
 
-    It is that of the deviance residuals, the root of twice what each law loses to the slide's own
-    best one, and they are Student's. Source: P. McCullagh, J. A. Nelder, *Generalized Linear
-    Models*, 2nd edition 1989, section 2.4."""
+    The deviance residual is the root of twice the log-likelihood that a law loses to the slide's
+    own best law; it is taken to follow Student's distribution. Source: P. McCullagh, J. A.
+    Nelder, *Generalized Linear Models*, 2nd edition 1989, section 2.4."""
     laws = _laws(kinetic, ratios)
-    found = np.array([marginal(one.log_likelihoods(*laws)) for one in slides])
+    found = np.array([marginal(each.log_likelihoods(*laws)) for each in slides])
     found = found.reshape(len(slides), len(laws[0]))
     residuals = np.sqrt(2 * (found.max(axis=1, keepdims=True) - found))
     loss = (FREEDOM + 1) / 2 * np.log1p(residuals**2 / FREEDOM)
@@ -66,7 +68,8 @@ class Found:
     high: float
 
     def determined(self, limits: Interval) -> str:
-        """“yes”, “at least” or “at most” the one end of the interval, or “no”."""
+        """“yes”; “at least” or “at most” where the interval's other end is at the search's limit;
+        “no” where both are."""
         below, above = self.low <= limits[0] * 1.05 + 1e-9, self.high >= limits[1] * 0.95
         if below:
             return "no" if above else "at most"
@@ -75,8 +78,9 @@ class Found:
 
 @dataclass(frozen=True)
 class Fit:
-    """What was found: the ``ratio`` µ_p/µ_k, each trial's ``kinetic`` friction µ_k F_n [weights],
-    its ``slides``, and its ``profile``: frictions, and how much less likely each is."""
+    """The likeliest law: the ``ratio`` µ_p/µ_k, each trial's ``kinetic`` friction µ_k F_n
+    [weights], its ``slides``, and its ``profile``: frictions [weights], and by how much the
+    negative log-likelihood of each exceeds the least."""
 
     ratio: Found
     kinetic: list[Found]
@@ -102,10 +106,11 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
         grids = [(x * around).clip(*limit) for x, limit in zip(middles, limits, strict=True)]
         *_, row, best = _looked_at(slides, grids, ratios)
         middles = [grid[k] for grid, k in zip(grids, best, strict=True)]
+        # A grid whose best point lies at its edge is moved there and searched again.
         inside = not plate or (row < len(ratios) - 1 and (row > 0 or ratios[0] == 0.0))
-        if inside and not {0, FINE - 1} & set(best):  # none is at the edge of its grid
+        if inside and not {0, FINE - 1} & set(best):
             break
-    # What is likely may reach far beyond the fine grids.
+    # Intervals may reach far beyond the fine grids, so the coarse ones are added for them.
     grids = [np.unique([*coarse.clip(*x), *grid]) for x, grid in zip(limits, grids, strict=True)]
     if plate:
         ratios = np.unique([*RATIOS, *ratios])
@@ -114,8 +119,8 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
     count = [len(table) for table in tables]
     found, profiles = [], []
     for k, (grid, limit) in enumerate(zip(grids, limits, strict=True)):
-        # The profile of this trial's friction: at each ratio the other trials take their own best
-        # frictions, and of all ratios the likeliest counts.
+        # At each ratio the other trials take their own best friction; then the best ratio is
+        # taken for each friction of this trial. ``sums[k]`` is frictions × ratios.
         others = whole - sums[k].min(axis=0)
         profile = (sums[k] + others).min(axis=1) - whole.min()
         profiles.append((grid, profile))
@@ -134,32 +139,33 @@ def search(trials: Sequence[Trial], limits: Sequence[Interval], plate: bool) -> 
 def _looked_at(
     slides: Sequence[list[Slide]], grids: Sequence[Array], ratios: Array
 ) -> tuple[list[Array], list[Array], Array, int, list[int]]:
-    """The losses of each trial's slides by its frictions and the ratios; of its slides together; of
-    all trials by the ratios; the likeliest ratio, and with it each trial's friction, by number."""
+    """The losses of each trial (slides × frictions × ratios); their sums over slides (frictions ×
+    ratios); the sum over trials at each one's best friction (ratios); the index of the likeliest
+    ratio, and at this ratio the index of each trial's likeliest friction."""
     tables = [_losses(each, grid, ratios) for each, grid in zip(slides, grids, strict=True)]
     sums = [table.sum(axis=0) for table in tables]
-    whole: Array = np.sum([one.min(axis=0) for one in sums], axis=0)
+    whole: Array = np.sum([loss.min(axis=0) for loss in sums], axis=0)
     row = int(whole.argmin())
-    return tables, sums, whole, row, [int(one[:, row].argmin()) for one in sums]
+    return tables, sums, whole, row, [int(loss[:, row].argmin()) for loss in sums]
 
 
 def _drawn(tables: Sequence[Array]) -> tuple[Rows, Rows]:
-    """The same of slides drawn anew, ``DRAWS`` times: ratios, and frictions by trials."""
+    """Indices of the likeliest ratio (draws) and frictions (draws × trials) in bootstrap samples of
+    each trial's slides, from its losses (slides × frictions × ratios)."""
     rng = np.random.default_rng(0)
     sums = []
     for table in tables:
         n = max(1, len(table))
-        # How often each slide is drawn (draws × slides), and with that the losses of each draw
-        # (draws × frictions × ratios).
+        # How often a draw holds each slide (draws × slides; a trial without slides has none).
         weights = rng.multinomial(n, np.full(n, 1 / n), DRAWS)[:, : len(table)]
-        sums.append(np.tensordot(weights, table, 1))
-    # Of each draw: the ratio that is likeliest over all trials, then each trial's friction with it.
-    rows = np.sum([one.min(axis=1) for one in sums], axis=0).argmin(axis=1)
-    return rows, np.stack([one[np.arange(DRAWS), :, rows].argmin(axis=1) for one in sums], 1)
+        sums.append(np.tensordot(weights, table, 1))  # draws × frictions × ratios
+    rows = np.sum([loss.min(axis=1) for loss in sums], axis=0).argmin(axis=1)
+    return rows, np.stack([loss[np.arange(DRAWS), :, rows].argmin(axis=1) for loss in sums], 1)
 
 
 def _likely(grid: Array, loss: Array) -> Interval:
-    """The ends of what loses at most LOSS, between the points of the grid by straight lines."""
+    """Where the loss crosses LOSS below and above its minimum, interpolated linearly on the grid;
+    the grid's end where it does not."""
     inside = np.flatnonzero(loss <= LOSS)
     ends = []
     for at, beyond in ((inside[0], inside[0] - 1), (inside[-1], inside[-1] + 1)):
@@ -170,8 +176,9 @@ def _likely(grid: Array, loss: Array) -> Interval:
 
 
 def _interval(value: float, likely: Interval, drawn: Array, count: int, limit: Interval) -> Found:
-    """From what is likely and what was drawn; few slides scatter less than many would."""
-    # Student's quantile over the normal one.
+    """The wider one, at either end, of the profile's interval ``likely`` and of the quantiles of
+    the bootstrap's values ``drawn``, within ``limit``. ``few`` widens the latter for few slides, as
+    Student's distribution exceeds the normal one."""
     few = float(student.ppf((1 + LEVEL) / 2, max(1, count - 1)) / student.ppf((1 + LEVEL) / 2, 1e9))
     ends = []
     for end, share, side in ((likely[0], (1 - LEVEL) / 2, -1), (likely[1], (1 + LEVEL) / 2, 1)):

@@ -1,11 +1,11 @@
-"""The part's path while it slides on the tracked surface, and how likely a law makes it.
+"""The part's path while it slides on the tracked surface, and its likelihood under a friction law.
 
-While the part slides its acceleration is known but for the law: ±µ_k F_n/m − g, and µ_p F_n/m
-against its velocity over the spring-loaded plate. Before and after, it moves with the surface,
-smoothly. The tracked surface tells between which frames a slide begins and ends, and its sign; the
-instants between the frames are not known, least of all where an impact begins the slide. So all
-instants count, each by the likelihood of the part's heights about the slide (the marginal
-likelihood), and the surface's motion between the frames need not be reconstructed.
+While the part slides, the law gives its acceleration: ±µ_k F_n/m − g, and µ_p F_n/m against its
+velocity relative to the spring-loaded plate. Before and after the slide the part moves smoothly
+with the surface. The tracked surface tells the sign of a slide and between which frames it begins
+and ends, but not the exact instants. They are nuisance parameters: the likelihood of the part's
+heights is summed over a grid of pairs (begin, end), which gives the marginal likelihood of the law
+without a reconstruction of the surface's motion between the frames.
 
 Where part and surface move together the acceleration is a random walk, as in a smoothing spline;
 source: G. Wahba, *Spline Models for Observational Data*, SIAM 1990, chapter 1. Units: s, m.
@@ -24,29 +24,31 @@ from cosim.trials.tracked import Trial
 Rows = npt.NDArray[np.intp]
 
 CLEAR = 4.0
-"""Deviations by which the way from frame to frame must exceed its noise to be a slide."""
-BESIDE = 7  # frames at most on either side, in which the part does not slide
+"""Standard deviations of the noise by which the relative motion from frame to frame must exceed 0
+to count as sliding."""
+BESIDE = 7  # at most so many frames without sliding are used on either side of a slide
 INSTANTS, REACH = 12, 2.5
-"""Instants at which a slide may begin or end, and over how many intervals between frames: where it
-begins or ends slowly, its first or last interval is lost in the noise."""
-ACCELERATION = 80.0  # m/s², deviation of what the part has before and after a slide
-ROUGHNESSES = (1e4, 1e5, 1e6)  # m²/s⁵, spectral density of its change there; the likeliest is taken
-NOISES = (1.0, 10.0)  # times that of still tracks; the likeliest is taken
-LEAST_NOISE = 1e-6  # m; no camera tells less, and how a slide begins is modelled no truer
-LEAST_SIZE = 1.0  # (s/m)², of what the part's velocity makes of its path; it is some 1e6
-CHUNK = 32  # laws at once
-PASSES = 3  # until the instant is known at which the part's velocity passes the plate's
-IMPROBABLE = 12.0  # a logarithm: instants that are so much less likely with every law are left out
+"""Number of instants at which a slide may begin (or end), and the frame intervals they span: where
+a slide begins or ends slowly, its first or last interval is lost in the noise."""
+ACCELERATION = 80.0  # m/s², standard deviation of the part's acceleration next to a slide
+ROUGHNESSES = (1e4, 1e5, 1e6)  # m²/s⁵, spectral density of its random walk; the likeliest is taken
+NOISES = (1.0, 10.0)  # factors on the noise of a sticking part; the likeliest is taken
+LEAST_NOISE = 1e-6  # m; finer than a camera resolves and than the model of a slide's begin holds
+LEAST_SIZE = 1.0  # (s/m)², keeps the normal equation of the velocity regular; that is some 1e6
+CHUNK = 32  # laws evaluated in one array, which so fits the processor's cache
+PASSES = 3  # of Gauss–Newton, until the instant is settled at which part and plate are equally fast
+IMPROBABLE = 12.0  # pairs of instants whose ln L stays so far below the best for all laws go
 
 
 @dataclass(frozen=True)
 class Slide:
-    """One slide, with what of the likelihood does not depend on the law.
+    """One slide, with the terms of its likelihood that do not depend on the law.
 
-    ``time`` (since the trial's first frame) and ``z`` hold n frames about it; rows of the others
-    are pairs of instants (its ``begin`` and ``end``, g of them): the n × n factor ``whiten`` that
-    makes errors independent and of size one, what it makes of a height that is free (``level``,
-    g × n, of length one), and ``fixed``, the logarithm's constant.
+    ``time`` (since the trial's first frame, s) and ``z`` (m) hold n frames in and next to the
+    slide. The other arrays have a row for each of g pairs of instants ``begin`` and ``end`` (s).
+    ``whiten`` (g × n × n) is the inverse Cholesky factor of the covariance of the heights;
+    ``level`` (g × n) is the whitened constant 1, normalised, along which the free initial height
+    moves the residuals; ``fixed`` (g) is the constant of the log-likelihood.
     """
 
     sign: int
@@ -60,44 +62,46 @@ class Slide:
     level: Array
 
     def log_likelihoods(self, kinetic: Array, plate: Array) -> Array:
-        """Of laws (µ_k F_n/m and µ_p F_n/m, m/s²) by pairs of instants."""
-        parts = [slice(k, k + CHUNK) for k in range(0, len(kinetic), CHUNK)]
-        return np.concatenate([self._of_few(kinetic[few], plate[few])[0] for few in parts])
+        """Log-likelihoods (laws × pairs of instants) of laws (µ_k F_n/m and µ_p F_n/m, m/s²)."""
+        chunks = [slice(k, k + CHUNK) for k in range(0, len(kinetic), CHUNK)]
+        return np.concatenate([self._of_few(kinetic[few], plate[few])[0] for few in chunks])
 
     def _of_few(self, kinetic: Array, plate: Array) -> tuple[Array, Array]:
-        """The same, of laws few enough for a processor's cache, and the part's velocities over the
-        plate at the begin, m/s.
+        """Log-likelihoods (laws × pairs) of at most CHUNK laws, and the likeliest velocity of the
+        part relative to the plate at the begin (pairs × laws), m/s.
 
-        The part begins at a height and with a velocity that are free; so they are found by least
-        squares, the velocity by Gauss–Newton, since the plate's friction turns with it. Arrays are
-        pairs by laws, or pairs by laws by frames.
+        The part's initial height and velocity are free. Least squares finds both, the velocity by
+        Gauss–Newton, since the plate's friction changes its sign with it. Arrays are pairs × laws,
+        or pairs × laws × frames.
         """
         lasts = (self.end - self.begin)[:, None]
         since = (self.time - self.begin[:, None])[:, None]
+        # The first pass leaves the plate's friction out: its sign needs a first velocity.
         pull, rub = self.sign * kinetic - GRAVITY, 0.0 * plate
-        faster = np.zeros((len(lasts), len(kinetic)))  # than the plate, at the begin
+        faster = np.zeros((len(lasts), len(kinetic)))  # velocity relative to the plate, m/s
         level, turned = self.level[:, None], self.whiten.swapaxes(1, 2)
         found = faster
         for _ in range(PASSES):
             path, slope = self._path(since, lasts, faster, pull, rub)
             error, slope = (self.z - path) @ turned, slope @ turned
-            # The height is eliminated; then least squares in the velocity.
+            # Projecting ``level`` out of the whitened residuals (error) and of their derivative
+            # (slope) eliminates the height; the velocity is then a scalar least-squares problem.
             error -= (error * level).sum(axis=-1, keepdims=True) * level
             slope -= (slope * level).sum(axis=-1, keepdims=True) * level
-            size, told = (slope**2).sum(axis=-1) + LEAST_SIZE, (slope * error).sum(axis=-1)
-            found = (told**2 / size - (error**2).sum(axis=-1)) / 2
-            faster, rub = faster + told / size, plate
+            size, descent = (slope**2).sum(axis=-1) + LEAST_SIZE, (slope * error).sum(axis=-1)
+            found = (descent**2 / size - (error**2).sum(axis=-1)) / 2  # of the linearised optimum
+            faster, rub = faster + descent / size, plate
         return (self.fixed[:, None] + found).T, faster
 
     def _path(
         self, since: Array, lasts: Array, faster: Array, pull: Array, rub: Array
     ) -> tuple[Array, Array]:
-        """The way at times ``since`` the begin, and what of it a faster begin adds, s.
+        """The displacement [m] at times ``since`` the begin, and its derivative by the initial
+        velocity ``faster`` [s]; both pairs × laws × frames.
 
-        It has four pieces: with the velocity of the begin before it (``early``), slowed by friction
-        until the part has the plate's velocity (``one``), from there to the slide's end (``two``),
-        and with the velocity of the end after that (``beyond``).
-        """
+        Before the begin and after the end the velocity is constant: the covariance holds how the
+        part accelerates there. In between the acceleration is ``first`` until the part is as fast
+        as the plate (after ``turns``, s), and ``second`` from then on."""
         early, within = np.minimum(since, 0.0), since.clip(0.0, lasts[..., None])
         beyond = (since - lasts[..., None]).clip(0.0)
         v, way = self.v_plate + faster, np.where(faster >= 0.0, 1.0, -1.0)
@@ -106,45 +110,48 @@ class Slide:
         turns = np.broadcast_to(lasts, faster.shape).copy()
         np.divide(-faster, first, out=turns, where=first * faster < 0.0)
         turns = np.minimum(turns, lasts)
-        # Having stopped over the plate the part goes on the other way, or is held by it.
+        # At the plate's velocity the part reverses over the plate, or sticks to it (second = 0)
+        # where the plate's friction exceeds the pull.
         second = pull + way * rub
         second = np.where(second * way < 0.0, second, 0.0)
         left = lasts - turns
         v_turned = v + first * turns
-        # What a faster begin adds to the velocity after the turn: it turns later, too.
+        # Derivative by ``faster`` of the velocity after the turn, which itself comes later.
         share = np.divide(second, first, out=np.ones_like(first), where=left > 0.0)[..., None]
-        one = np.minimum(within, turns[..., None])
-        two = within - one
-        path = (v[..., None] + first[..., None] * one / 2) * one + v[..., None] * early
-        path += (v_turned[..., None] + second[..., None] * two / 2) * two
+        to_turn = np.minimum(within, turns[..., None])  # s, the parts of ``within``
+        from_turn = within - to_turn
+        path = (v[..., None] + first[..., None] * to_turn / 2) * to_turn + v[..., None] * early
+        path += (v_turned[..., None] + second[..., None] * from_turn / 2) * from_turn
         path += (v_turned + second * left)[..., None] * beyond
-        return path, early + one + share * (two + beyond)
+        return path, early + to_turn + share * (from_turn + beyond)
 
     def predicted(self, kinetic: float, plate: float, time: Array) -> Array:
-        """The part's heights [m] by a law, m/s², at its likeliest instants; NaN where it does not
-        slide. It begins as the tracked frames about the slide have it."""
+        """The part's heights [m] at times ``time`` by a law [m/s²], with the law's likeliest pair
+        of instants; NaN outside the slide. The initial height fits the slide's tracked frames."""
         law = np.array([kinetic]), np.array([plate])
         likeliest = self.log_likelihoods(*law)[0].argmax()
-        one = self.only(np.arange(len(self.begin)) == likeliest)
-        since = (np.concatenate([self.time, time]) - one.begin)[None, None]
-        faster, lasts = one._of_few(*law)[1], (one.end - one.begin)[:, None]
-        path = one._path(since, lasts, faster, self.sign * law[0] - GRAVITY, law[1])[0][0, 0]
+        best = self.only(np.arange(len(self.begin)) == likeliest)
+        since = (np.concatenate([self.time, time]) - best.begin)[None, None]
+        faster, lasts = best._of_few(*law)[1], (best.end - best.begin)[:, None]
+        path = best._path(since, lasts, faster, self.sign * law[0] - GRAVITY, law[1])[0][0, 0]
         frames = len(self.time)
-        weights = one.level[0] @ one.whiten[0]
+        # Generalised least squares of a constant: the weights are proportional to 1ᵀ C⁻¹.
+        weights = best.level[0] @ best.whiten[0]
         start = weights @ (self.z - path[:frames]) / weights.sum()
-        slides = (time >= one.begin) & (time <= one.end)
+        slides = (time >= best.begin) & (time <= best.end)
         return np.where(slides, start + path[frames:], np.nan)
 
     def only(self, pairs: npt.NDArray[np.bool_]) -> "Slide":
-        """The same with some of the pairs of instants."""
+        """This slide restricted to some of its pairs of instants."""
         names = ("begin", "end", "whiten", "fixed", "level")
-        kept = {name: getattr(self, name)[pairs] for name in names}
-        return Slide(self.sign, self.time, self.z, self.v_plate, **kept)
+        chosen = {name: getattr(self, name)[pairs] for name in names}
+        return Slide(self.sign, self.time, self.z, self.v_plate, **chosen)
 
 
 @dataclass(frozen=True)
 class Span:
-    """Where a slide stands: the frames in it and about it, and its possible instants, s."""
+    """Where a slide lies in a trial: ``frames`` in and next to it, those ``inside`` it alone, and
+    the instants at which it may begin and end, s."""
 
     sign: int
     frames: Rows
@@ -154,25 +161,28 @@ class Span:
 
 
 def noise_of(trial: Trial) -> float:
-    """The deviation of a tracked height, m: where the part sticks its distance from the surface
-    does not change, and elsewhere fourth differences of the path are nearly noise alone."""
+    """The standard deviation of a tracked height, m: where the part sticks, its distance from the
+    surface does not change; elsewhere fourth differences of the path are nearly noise alone."""
     apart = np.abs(np.diff(trial.platform.z - trial.part.z, 2))
     path = np.abs(np.diff(trial.part.z, 4))
+    # Independent errors of variance σ² give differences of 2 (1² + 2² + 1²) = 12 σ², for two
+    # tracks, and 1² + 4² + 6² + 4² + 1² = 70 σ². Lower quartiles are hardly moved by slides.
     found = (np.quantile(apart, 0.25) / 12**0.5, np.quantile(path, 0.25) / 70**0.5)
-    return max(LEAST_NOISE, float(min(found)) / 0.3186)  # a quarter lies within so many deviations
+    return max(LEAST_NOISE, float(min(found)) / 0.3186)  # normal quartile of |x|/σ
 
 
 def spans(trial: Trial, noise: float) -> list[Span]:
-    """The slides of a trial that tell something of its law."""
+    """The slides of a trial that hold enough frames to tell its law."""
     time = trial.time - trial.time[0]
-    moved = np.diff(trial.platform.z - trial.part.z)
+    moved = np.diff(trial.platform.z - trial.part.z)  # of four tracked heights: noise 2 σ
     signs = np.where(np.abs(moved) > CLEAR * 2 * noise, np.sign(moved), 0).astype(int)
     edges = np.flatnonzero(np.diff(signs, prepend=0, append=0))
+    # First and last interval of each slide; interval i lies between the frames i and i + 1.
     runs = [(i, j - 1) for i, j in pairwise(edges.tolist()) if signs[i]]
     steps = np.diff(time)
     usual = float(np.median(steps))
-    lost = (np.arange(INSTANTS) + 0.5) / INSTANTS * REACH * usual
-    wider = np.maximum(1.0, steps / usual)  # where frames are missing
+    lost = (np.arange(INSTANTS) + 0.5) / INSTANTS * REACH * usual  # s, before the first frame in it
+    wider = np.maximum(1.0, steps / usual)  # factor on these where frames are missing
     found = []
     for k, (i, j) in enumerate(runs):
         low = runs[k - 1][1] + 2 if k else 0
@@ -180,8 +190,8 @@ def spans(trial: Trial, noise: float) -> list[Span]:
         before = np.arange(max(low, i - BESIDE + 1), i + 1)
         inside = np.arange(i + 1, j + 1)
         after = np.arange(j + 1, min(high, j + BESIDE) + 1)
-        # Height, velocity and acceleration are free on each side: what is left over tells. Of a
-        # single frame too much depends on how smooth the motion about it is.
+        # The motion on each side takes about two frames to be known; only frames beyond these
+        # tell the law. A slide of a single frame depends too much on the assumed smoothness.
         if len(inside) < 2 or sum(max(0, len(x) - 2) for x in (before, after)) + len(inside) < 3:
             continue
         begins = time[i + 1] - wider[i] * lost if len(before) else time[[i + 1]]
@@ -192,20 +202,19 @@ def spans(trial: Trial, noise: float) -> list[Span]:
 
 
 def slide(trial: Trial, span: Span, noise: float, roughness: float) -> Slide | None:
-    """A slide, prepared; None where it has no time to last."""
+    """A slide with its covariances factorised; None where no begin lies before an end."""
     time = trial.time - trial.time[0]
     begin, end = (x.ravel() for x in np.meshgrid(span.begins, span.ends, indexing="ij"))
     begin, end = begin[begin < end], end[begin < end]
     if len(begin) == 0:
         return None
     at, z = time[span.frames], trial.part.z[span.frames]
-    # The covariance of the frames about the path (pairs × n × n): their noise, and outside the
-    # slide that of a free acceleration a, whose way is a x²/2, and of its change. The times ``x``
-    # away from the slide are 0 within it.
+    # g × n × n: noise, and on each side of the slide a free acceleration a (heights a x²/2, time x
+    # from the slide) that goes on as a random walk.
     covariance = np.repeat(noise**2 * np.eye(len(at))[None], len(begin), axis=0)
     for away in (begin[:, None] - at, at - end[:, None]):
-        x = np.clip(away, 0.0, None)
-        x, y = x[:, :, None], x[:, None, :]
+        outside = np.clip(away, 0.0, None)
+        x, y = outside[:, :, None], outside[:, None, :]
         covariance += ACCELERATION**2 * (x * y) ** 2 / 4 + roughness * _walk(x, y)
     factor = np.linalg.cholesky(covariance)
     whiten = np.linalg.inv(factor)
@@ -215,25 +224,28 @@ def slide(trial: Trial, span: Span, noise: float, roughness: float) -> Slide | N
     level = whiten.sum(axis=2)
     length = np.linalg.norm(level, axis=1, keepdims=True)
     level /= length
+    # Initial height and velocity have flat priors. Integrating over them adds to ln |C|/2 the
+    # logarithm of the area spanned by their whitened directions, here ``level`` and ``along``.
     along = ((at - begin[:, None])[:, None, :] @ whiten.swapaxes(1, 2))[:, 0]
     along -= (along * level).sum(axis=1, keepdims=True) * level
     volume = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
     volume += np.log(length[:, 0] * np.linalg.norm(along, axis=1))
-    passes = plate_velocity(trial)[span.inside].mean()
+    v_plate = plate_velocity(trial)[span.inside].mean()
     return Slide(
-        *(span.sign, at, z, float(passes), begin, end, whiten),
+        *(span.sign, at, z, float(v_plate), begin, end, whiten),
         *(-volume - np.log(len(begin)), level),
     )
 
 
 def _walk(x: Array, y: Array) -> Array:
-    """The covariance of heights after x and y of an acceleration that is a random walk from 0."""
+    """The covariance of the heights at times x and y of a body whose acceleration is a random walk
+    of unit spectral density that starts, like height and velocity, from 0."""
     less, more = np.minimum(x, y), np.abs(x - y)
     return less**5 / 20 + more * less**4 / 8 + more**2 * less**3 / 12
 
 
 def plate_velocity(trial: Trial) -> Array:
-    """Of the spring-loaded plate [m/s] at the frames, as tracked, or 0 where it was not."""
+    """Velocity of the spring-loaded plate [m/s] at the frames; 0 where it was not tracked."""
     if trial.plate is None or not np.isfinite(trial.plate.v).any():
         return np.zeros(len(trial.time))
     known = np.isfinite(trial.plate.v)
@@ -241,29 +253,28 @@ def plate_velocity(trial: Trial) -> Array:
 
 
 def marginal(log_likelihoods: Array) -> Array:
-    """The logarithm of the sum over pairs of instants (the last axis)."""
+    """The logarithm of the likelihood summed over pairs of instants (the last axis)."""
     most = log_likelihoods.max(axis=-1)
     return most + np.log(np.exp(log_likelihoods - most[..., None]).sum(axis=-1))
 
 
 def slides_of(trial: Trial, kinetic: Array, plate: Array) -> list[Slide]:
-    """All slides of a trial, with the noise and roughness that make the best of the laws likeliest,
-    and with those pairs of instants that are likely with any of the laws.
+    """All slides of a trial, with the noise and roughness for which the best of the laws is
+    likeliest, and with the pairs of instants that are likely under at least one law.
 
-    The laws must be dense enough for that: with a low noise the likelihood is a narrow ridge, and
-    where none of them is near it a high one seems better, with which the ridge's ends are lost."""
+    The grid of laws must be dense: with a low noise the likelihood is a narrow ridge, and if no law
+    is near the ridge, the high noise wins wrongly and flattens it."""
     noise, best = noise_of(trial), (-np.inf, [], [])
     places = spans(trial, noise)
     for roughness, factor in product(ROUGHNESSES, NOISES):
-        every = [slide(trial, span, factor * noise, roughness) for span in places]
-        kept = [one for one in every if one is not None]
-        told = [one.log_likelihoods(kinetic, plate) for one in kept]
-        likelihood = sum(map(marginal, told), np.zeros(1)).max()
+        prepared = [slide(trial, span, factor * noise, roughness) for span in places]
+        slides = [each for each in prepared if each is not None]
+        tables = [each.log_likelihoods(kinetic, plate) for each in slides]  # laws × pairs
+        likelihood = sum(map(marginal, tables), np.zeros(1)).max()
         if likelihood > best[0]:
-            best = float(likelihood), kept, told
+            best = float(likelihood), slides, tables
     found = []
-    for one, told in zip(*best[1:], strict=True):
-        # Of each pair of instants: how near it comes, with any law, to that law's likeliest pair.
-        likely = (told - told.max(axis=1, keepdims=True)).max(axis=0) > -IMPROBABLE
-        found.append(one.only(likely))
+    for each, table in zip(*best[1:], strict=True):
+        likely = (table - table.max(axis=1, keepdims=True)).max(axis=0) > -IMPROBABLE
+        found.append(each.only(likely))
     return found
