@@ -1,6 +1,5 @@
-"""The compiled chain: what the machine does with given numbers, how far that is from measured
-trials, and the fit of each trial's own parameters. See ``refine.h`` and
-``cosim/stepper/stepper.h``."""
+"""The compiled chain: it simulates trials of a machine, compares them with the measurement, and
+fits each trial's own parameters. See ``refine.h`` and ``cosim/stepper/stepper.h``."""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -27,11 +26,12 @@ _Trial, _Job = (structures("stepper")[name] for name in ("Trial", "Job"))
 class Target:
     """What was measured in one trial, as the compiled code takes it.
 
-    ``signals`` hold the measured values by the names of ``OUTPUTS`` at ``time`` (s, from 0 on), NaN
-    where nothing is known, and ``weights`` what a squared residual counts, 1/m² or 1/(m/s)²;
-    ``differenced`` names the velocities that are made of heights. ``low``, ``high`` and ``scale``
-    are of ``OWN``; a parameter whose scale is 0 is not fitted. ``step`` (s) is the longest of the
-    simulation; ``current`` (A, at the times) replaces the drive.
+    ``signals`` are the measured values, by the names of ``OUTPUTS``, at ``time`` (s, from 0 on),
+    NaN where unknown; ``weights`` are the factors on their squared residuals, 1/m² or 1/(m/s)²;
+    ``differenced`` names the velocities that were calculated from heights. ``low``, ``high`` and
+    ``scale`` have an element for each of ``OWN``; a parameter whose scale is 0 is not fitted. The
+    simulation's steps are at most ``step`` (s) long; a measured ``current`` (A, at the times)
+    replaces the drive.
     """
 
     time: Array
@@ -56,10 +56,10 @@ class Target:
         edges = np.interp(np.arange(at[-1] + 1), at, self.time)
         sample = np.full(len(edges), -1, dtype=np.int32)
         sample[at] = np.arange(len(self.time))
-        # A velocity made of heights is their change over two gaps; the first and last have none.
+        # A differenced velocity is the change of height over two gaps; at both ends it is unknown.
         rate = np.full(len(self.time), np.nan)
         rate[1:-1] = 1.0 / (self.time[2:] - self.time[:-2])
-        # The structure has addresses only, so the arrays are kept for as long.
+        # The structure holds bare addresses, so these references keep the arrays alive.
         self._kept = [edges, sample, rate]
         state = _Trial(samples=len(self.time), rate=rate.ctypes.data)
         state.schedule.steps = len(edges) - 1
@@ -84,7 +84,7 @@ class Target:
 
     @property
     def address(self) -> int:
-        """Of the compiled code's structure."""
+        """The address of the compiled code's structure of this trial."""
         return addressof(self._state)
 
 
@@ -107,11 +107,12 @@ def look_around(
 ) -> tuple[Array, Array]:
     """Costs (n × m) of m sets of own parameters (n × m × OWN) for each target and rig (n × RIG).
 
-    The phases are first moved to where the surface moves as it was measured. Returns the own
-    parameters with these, and the costs.
+    Each phase is first shifted to where the simulated surface fits the measured one best, if that
+    lowers the cost. Returns the own parameters with these phases, and the costs.
     """
     n, m, _ = own.shape
-    # LANES sets run side by side; the last block is filled up with the first set.
+    # A job simulates LANES sets side by side. The m sets of each target are padded with copies of
+    # the first one to whole blocks, which become rows: n blocks × LANES × OWN.
     blocks = -(-m // LANES)
     padded = np.concatenate([own, np.repeat(own[:, :1], blocks * LANES - m, axis=1)], axis=1)
     padded = np.ascontiguousarray(padded).reshape(n * blocks, LANES, len(OWN))
@@ -124,15 +125,16 @@ def look_around(
 def _work(
     targets: Sequence[Target], rigs: Array, own: Array, cost: Array, rounds: int, workers: int
 ) -> None:
-    n, done = len(targets), c_longlong(0)
+    """Do a job for each row of ``rigs``, ``own`` and ``cost``; the last two are changed in place.
+    ``next_job``, an atomic counter that all threads share, deals out the jobs."""
+    n, next_job = len(targets), c_longlong(0)
     jobs = np.zeros(n, _Job)
     jobs["trial"], jobs["rounds"] = [target.address for target in targets], rounds
-    for name, each in (("rig", rigs), ("own", own), ("cost", cost)):
-        # The address of each row: the compiled code works in place.
-        jobs[name] = each.ctypes.data + np.arange(n) * each.strides[0]
+    for name, array in (("rig", rigs), ("own", own), ("cost", cost)):
+        jobs[name] = array.ctypes.data + np.arange(n) * array.strides[0]  # the address of each row
 
     def work(_: int) -> int:
-        return library("stepper").chain_work(jobs.ctypes.data, n, byref(done))
+        return library("stepper").chain_work(jobs.ctypes.data, n, byref(next_job))
 
     threads = range(min(workers, n))
     if len(threads) == 1:
@@ -145,24 +147,25 @@ def _work(
 
 
 def simulate(target: Target, rigs: Array, own: Array) -> tuple[dict[str, Array], Array]:
-    """What each of n machines (n × RIG, n × OWN) does in a trial.
+    """Simulate a trial on each of n machines (n × RIG, n × OWN).
 
-    Returns the ``OUTPUTS`` (n × samples, m and m/s; velocities are those at the samples) and the
-    residuals (n × values), whose squares add up to the cost.
+    Returns the ``OUTPUTS`` (n × samples each, m and m/s; velocities are instantaneous, not
+    differenced) and the residuals (n × values), whose squares add up to the cost.
     """
     n, samples = len(rigs), len(target.time)
     found = np.empty((n, len(OUTPUTS), samples))
     signals = [name for name in OUTPUTS if name in target.signals and target.weights.get(name)]
     residuals = np.empty((n, len(signals) * samples))
-    out, apart = (np.empty((samples * len(OUTPUTS), LANES)) for _ in range(2))
+    out, weighted = (np.empty((samples * len(OUTPUTS), LANES)) for _ in range(2))
     for start in range(0, n, LANES):
-        # The last block is filled up with the last machine. Lanes are innermost in compiled code.
+        # The last block is padded with copies of the last machine. Lanes are the innermost index in
+        # compiled code: ``both`` is (RIG + OWN) × LANES, ``out`` samples × OUTPUTS × LANES.
         rows = np.minimum(np.arange(start, start + LANES), n - 1)
         both = np.ascontiguousarray(np.concatenate([rigs[rows], own[rows]], axis=1).T)
-        pointers = (both.ctypes.data, out.ctypes.data, apart.ctypes.data)
+        pointers = (both.ctypes.data, out.ctypes.data, weighted.ctypes.data)
         count = library("stepper").chain_look(target.address, *pointers)
         used = slice(start, min(start + LANES, n))
         k = used.stop - used.start
         found[used] = out.reshape(samples, len(OUTPUTS), LANES).transpose(2, 1, 0)[:k]
-        residuals[used] = apart[:count].T[:k]
+        residuals[used] = weighted[:count].T[:k]
     return {name: found[:, k] for k, name in enumerate(OUTPUTS)}, residuals

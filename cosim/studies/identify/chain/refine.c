@@ -4,10 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double TURN = 2e-3;     /* of a number's unit, for the derivatives */
-static const double WORTHLESS = 1e3; /* cost of what has left the numbers */
+static const double TURN = 2e-3;     /* step of finite differences, as a share of a number's scale */
+static const double WORTHLESS = 1e3; /* largest cost, also of a simulation that overflowed to NaN */
 
-/* Dampings that are tried side by side, over the largest of the normal matrix's diagonal. */
+/* Levenberg-Marquardt dampings that the lanes try side by side, relative to the diagonal of the normal
+ * matrix (plus 1e-3 of its largest element). */
 static const double DAMPINGS[LANES] = {1e-6, 1e-4, 1e-3, 1e-2, 5e-2, 0.2, 1.0, 5.0};
 
 typedef struct {
@@ -29,7 +30,8 @@ static int make_bench(Bench *b, int64_t samples)
     return b->out && b->residuals;
 }
 
-/* Signal k of all lanes. A height's zero is the camera's, so its mean goes. */
+/* Weighted residuals of signal k in all lanes, samples times LANES; 0 where nothing was measured. The
+ * camera's zero of height is arbitrary, so the mean residual of a height is subtracted. */
 static void compare(const Trial *t, int k, const double *out, double *residual)
 {
     const double *measured = t->measured[k], factor = sqrt(t->weight[k]);
@@ -43,14 +45,15 @@ static void compare(const Trial *t, int k, const double *out, double *residual)
         }
         known++;
         if (t->differenced[k]) {
+            /* From the heights a sample before and after: output k - 1 is the height of velocity k. */
             const double *before = out + ((j - 1) * N_OUTPUTS + k - 1) * LANES;
             const double *after = before + 2 * N_OUTPUTS * LANES;
             for (int l = 0; l < LANES; l++)
                 r[l] = factor * ((after[l] - before[l]) * t->rate[j] - measured[j]);
         } else {
-            const double *here = out + (j * N_OUTPUTS + k) * LANES;
+            const double *simulated = out + (j * N_OUTPUTS + k) * LANES;
             for (int l = 0; l < LANES; l++)
-                r[l] = factor * (here[l] - measured[j]);
+                r[l] = factor * (simulated[l] - measured[j]);
         }
         for (int l = 0; l < LANES; l++)
             sum[l] += r[l];
@@ -96,7 +99,8 @@ static void set_own(Bench *b, int l, const double own[N_OWN])
         b->parameters[N_RIG + k][l] = own[k];
 }
 
-/* x of A x = y, A positive definite with n rows, which it overwrites; 0 where A is not. */
+/* Solve A x = y by Cholesky's method: x replaces y, the factor replaces the lower triangle of A. Returns 0
+ * where A, of n rows, is not positive definite. */
 static int solve(int n, double a[N_OWN][N_OWN], double y[N_OWN])
 {
     for (int i = 0; i < n; i++) {
@@ -123,7 +127,10 @@ static int solve(int n, double a[N_OWN][N_OWN], double y[N_OWN])
     return 1;
 }
 
-/* Gauss-Newton with the derivatives of one batch and the dampings of a second, from *cost on. */
+/* One step of Gauss-Newton for the n fitted ones of a trial's own numbers, place[0] to place[n - 1].
+ * A first batch simulates them unchanged (lane 0) and each moved by a step (lanes 1 to n, N_OWN < LANES),
+ * which gives the finite differences; a second batch tries a damping in each lane. The cheapest numbers of
+ * both batches replace `own`, their cost `*best`. */
 static void one_round(const Trial *t, Bench *b, double own[N_OWN], double *best)
 {
     int place[N_OWN], n = 0;
@@ -142,6 +149,7 @@ static void one_round(const Trial *t, Bench *b, double own[N_OWN], double *best)
         set_own(b, l, tried[l]);
     const int64_t samples = look(t, b, cost);
 
+    /* Normal equations A x = y; only the lower triangle of A is filled. */
     double a[N_OWN][N_OWN] = {{0}}, y[N_OWN] = {0}, largest = 0.0;
     for (int64_t j = 0; j < samples; j++) {
         const double *r = b->residuals + j * LANES;
@@ -175,8 +183,8 @@ static void one_round(const Trial *t, Bench *b, double own[N_OWN], double *best)
         if (solve(n, damped, x))
             for (int i = 0; i < n; i++) {
                 const int k = place[i];
-                const double there = tried[l][k] + x[i] * t->scale[k];
-                tried[l][k] = there < t->low[k] ? t->low[k] : there > t->high[k] ? t->high[k] : there;
+                const double moved = tried[l][k] + x[i] * t->scale[k];
+                tried[l][k] = moved < t->low[k] ? t->low[k] : moved > t->high[k] ? t->high[k] : moved;
             }
         set_own(b, l, tried[l]);
     }
@@ -188,13 +196,13 @@ static void one_round(const Trial *t, Bench *b, double own[N_OWN], double *best)
         }
 }
 
-/* Share of a period by which the drive of lane l must be further, so that the surface moves as it was
- * measured: as if the motion were periodic, and to a sample. */
+/* By how much (as a share of a period) the simulated surface of lane l lags behind the measured one: the
+ * shift, in whole samples up to half a period either way, with the least mean square difference. */
 static double lag(const Trial *t, const double *out, int l, double frequency)
 {
     const double *measured = t->measured[V_SURFACE];
-    const double each = t->schedule.edges[t->schedule.steps] / (double)(t->samples - 1);
-    const int64_t half = (int64_t)(0.5 / (frequency * each));
+    const double interval = t->schedule.edges[t->schedule.steps] / (double)(t->samples - 1);
+    const int64_t half = (int64_t)(0.5 / (frequency * interval));
     double least = INFINITY;
     int64_t best = 0;
     for (int64_t shift = -half; shift <= half && 2 * half < t->samples; shift++) {
@@ -203,7 +211,7 @@ static double lag(const Trial *t, const double *out, int l, double frequency)
         for (int64_t j = from; j < to; j++) {
             const double apart =
                 out[((j + shift) * N_OUTPUTS + V_SURFACE) * LANES + l] - measured[j];
-            if (apart == apart) {
+            if (apart == apart) { /* not NaN */
                 sum += apart * apart;
                 n += 1.0;
             }
@@ -213,10 +221,11 @@ static double lag(const Trial *t, const double *out, int l, double frequency)
             best = shift;
         }
     }
-    return (double)best * each * frequency;
+    return (double)best * interval * frequency;
 }
 
-/* Costs of LANES sets of own numbers, their phases first moved to where the motion fits best. */
+/* Costs of LANES sets of own numbers. Each phase is first advanced by the lag of the surface, if that
+ * lowers the cost. */
 static void look_around(const Trial *t, Bench *b, double *own, double cost[LANES])
 {
     double tried[LANES];
@@ -255,11 +264,11 @@ int64_t chain_work(const Job *jobs, int64_t n, atomic_llong *next)
     int64_t samples = 0;
     for (int64_t i = 0; i < n; i++)
         samples = jobs[i].trial->samples > samples ? jobs[i].trial->samples : samples;
-    const int there = make_bench(&b, samples);
-    for (int64_t i; there && (i = atomic_fetch_add(next, 1)) < n;)
+    const int made = make_bench(&b, samples);
+    for (int64_t i; made && (i = atomic_fetch_add(next, 1)) < n;)
         do_job(jobs + i, &b);
     free_bench(&b);
-    return there ? 0 : -1;
+    return made ? 0 : -1;
 }
 
 int64_t chain_look(const Trial *trial, const Parameters parameters, double *out, double *residuals)
