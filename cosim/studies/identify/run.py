@@ -1,4 +1,4 @@
-"""Identifies one rig for several measured trials, as a user asks for it."""
+"""Identifies one rig from several measured trials: the function that users call."""
 
 import os
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from cosim.studies.report import Row
 from cosim.studies.study import check_seed
 
 UNSTEADY = 0.5
-"""Repeatability of a velocity (NRMSE of its cycles) beyond which no steady drive explains it."""
+"""Scatter of a velocity's cycles (NRMSE) above which no periodic drive can explain the trial."""
 
 STORE = "identify.sqlite"
 
@@ -108,12 +108,14 @@ def _identified(
 ) -> Identification:
     laws = [searched(several) for several in plans]
     best = best_of([law.best for law in laws])
+    # Stages on the best rig run in the first plan of its law.
     plan = plans[[law.best for law in laws].index(best)][0]
     effective = solved.samples(trials, best)
     meant = rigs_meant(laws, effective)
     agreed = any(law.converged for law in laws)
-    apart_by = [deviations(plan.fine, one, effective) for one in meant] if agreed else None
+    apart_by = [deviations(plan.fine, rig, effective) for rig in meant] if agreed else None
     verdicts = judge(best, meant, apart_by)
+    # Three-fold cross-validation needs a trial in each fold.
     rigs, held_out = _folds(plan, trials) if len(trials) >= 3 else ([], [])
     aside = replace(plan.fine, targets=[trial.fine for trial in apart])
     own = plan.drives("trials apart", best.point, aside).own if apart else np.empty((0, 0))
@@ -159,7 +161,8 @@ def _steady(trial: Measured) -> bool:
 
 
 def _asked(space: Space, trials: Sequence[Measured], effort: object) -> list[Any]:
-    """All that decides what a stage finds, beside the seed and the programs."""
+    """All inputs, beside seed and program, on which stages depend: the store starts anew if they
+    change."""
     entries = [repr(entry) for entry in (*space.entries.values(), *space.trial.values())]
     signals = [
         [one.label, *(crc32(x.tobytes()) for x in one.target.signals.values())] for one in trials
@@ -168,7 +171,8 @@ def _asked(space: Space, trials: Sequence[Measured], effort: object) -> list[Any
 
 
 def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[Row]]:
-    """The rig of each fold, and for each trial its errors on the rig that was found without it."""
+    """Cross-validation: the rig of each fold, found without the fold's trials, and each trial's
+    errors on the rig of its fold, its own parameters fitted to each of ``solved.KINDS``."""
     rigs, held_out = [], {}
     for number, left in enumerate(folds(len(trials)), 1):
         name, rows = f"fold {number}", [k for k in range(len(trials)) if k not in left]
@@ -186,7 +190,7 @@ def _folds(plan: Plan, trials: Sequence[Measured]) -> tuple[list[Found], list[Ro
 
 
 def _made_up(plan: Plan) -> Found:
-    """The rig of the scene keys' defaults, as far as the bounds reach it."""
+    """The rig of the scene keys' defaults, clipped to the bounds, with its best own parameters."""
     space = plan.fine.space
     defaults: dict[str, Any] = {key.full: key.default for key in keys()}
     values = [np.clip(defaults[entry.key], entry.low, entry.high) for entry in space.free]

@@ -1,7 +1,7 @@
-"""What is measured on a machine beside its trials, as numbers that a rig gives in closed form.
+"""Measurements on a machine beside its trials: what each one would show on a given rig.
 
-What each shows follows from the stepper's numbers of a rig; a file of bounds names them in its
-tables ``measured``. Accuracies are assumed, unless a source is told.
+Each value follows in closed form from the stepper's numbers of the rig. A file of bounds names such
+measurements in its tables ``measured``. Accuracies are assumed, unless a source is given.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ from cosim.mechanics.stickslip import rests_of, suspension_force
 Numbers = Mapping[str, float]
 
 LOAD = 0.05
-"""kg, hung on the flexures."""
+"""kg, hung on the platform for the gauge ``deflection``."""
 
 
 @dataclass(frozen=True)
@@ -25,18 +25,18 @@ class Gauge:
 
     how: str
     unit: str
-    """That of tables."""
+    """Unit in tables."""
     scale: float
-    """From SI to it."""
+    """Factor from SI to this unit."""
     sd: float
     """Its accuracy, a standard deviation, SI."""
     share: float
-    """The same as a share of the value, which comes besides."""
+    """A further, independent standard deviation, as a share of the value."""
     of: Callable[[Numbers], float]
 
 
 def leaves(rig: Numbers, wall: str) -> float:
-    """The current at which a ram that it holds at a wall leaves that, A: Bl i + F_m(q) = m_r g."""
+    """The current at which a ram held at a wall by it just leaves, A: Bl i + F_m(q) = m_r g."""
     q = rig["travel_up"] if wall == "up" else -rig["travel_down"]
     force = rig["ram_mass"] * rig["gravity"] - suspension_force(rig, np.array([q]))[0]
     return float(force / rig["force_factor"])
@@ -48,24 +48,26 @@ def decay(rig: Numbers) -> float:
 
 
 def ring(rig: Numbers) -> float:
-    """The frequency of that ring-down, Hz; 0 where it only creeps."""
+    """The frequency of the flexures' ring-down with the ram held at a wall, Hz; 0 if overdamped."""
     square = rig["flexure_stiffness"] / (rig["surface_mass"] + rig["ram_mass"])
     return sqrt(max(square - decay(rig) ** 2, 0.0)) / (2.0 * pi)
 
 
 BIASES = {"": 0.0, " down": -1.0}
-"""A, of the coil, at which the ram's resonance is sought, by what the gauge's name has after it."""
+"""Currents (A) of the coil at which the ram's resonance is measured, by the suffix of the gauge's
+name."""
 
 AT_WALL = 500.0
-"""Hz: shown where the current holds the ram at a wall, so that there is no peak below."""
+"""Hz, in place of a resonance where the current holds the ram at a wall: no peak lies below it."""
 
 _NUDGE = 1e-6
-"""m, for a slope."""
+"""m, the step of the finite difference that gives the suspension's stiffness."""
 
 
 def resonance(rig: Numbers, current: float) -> float:
     """The frequency at which the ram swings about its rest nearest the centre under a current (A),
     the housing held, Hz: √(k/m_r)/2π."""
+    # A constant coil force moves the rests like a smaller g.
     lighter = rig["force_factor"] * current / rig["ram_mass"]
     q = min(rests_of({**rig, "gravity": rig["gravity"] - lighter}), key=abs)
     if not -rig["travel_down"] < q < rig["travel_up"]:
@@ -112,4 +114,4 @@ GAUGES = {
         "mm", 1e3, 2e-5, 0.0, lambda rig: LOAD * rig["gravity"] / rig["flexure_stiffness"],
     ),
 }  # fmt: skip
-"""By their names in a file of bounds."""
+"""Gauges by their names in a file of bounds."""

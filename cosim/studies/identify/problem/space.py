@@ -1,7 +1,7 @@
-"""What is searched within which bounds: a file in the form of ``bounds.toml``, read and checked.
+"""The bounds of the search: a file in the form of ``bounds.toml``, read and checked.
 
-The search knows a rig by a point of the unit cube, with a coordinate for each free key; the stepper
-knows it by the numbers of ``RIG``, a scene by its keys.
+A rig has three forms: for the search a point of the unit cube, with a coordinate for each free key;
+for the stepper the numbers of ``RIG``; for a scene the values of its keys.
 """
 
 from dataclasses import dataclass, replace
@@ -26,21 +26,22 @@ _ALIASES = {
     "mechanics.contact_stiffness": ("wall_up", "wall_down"),
     "mechanics.contact_damping": ("wall_damping",),
 }
+"""The stepper's numbers of those keys whose names differ from theirs."""
 SUSPENSION = "mechanics.suspension"
 LAW_KEYS = {
     "cubic": ("k1", "k2", "k3"),
     "knee": ("k1", "knee", "hardening"),
     "repulsion": ("repulsion", "distance"),
 }
-"""What each law of the suspension takes of the keys ``mechanics.suspension_…``."""
+"""The keys ``mechanics.suspension_…`` that each law of the suspension uses."""
 OF_LAWS = {f"{SUSPENSION}_{name}" for names in LAW_KEYS.values() for name in names}
-"""Keys of a law: what they come out as holds for that law alone."""
+"""Keys of the suspension laws; their identified values are valid for one law only."""
 UNSCALED = ("friction.", "mechanics.contact_damping", f"{SUSPENSION}_knee", f"{SUSPENSION}_dist")
-"""Keys that are no forces or masses begin so."""
+"""Beginnings of the keys that are neither forces nor masses, so ``Space.scaled`` leaves them."""
 LEAST_DISTANCE = 1.1
-"""Of ``suspension_distance``, in travels."""
+"""Least ``suspension_distance``, in travels of the ram."""
 _SUPPLY = ("circuit.supply", "circuit.swing_loss_high", "circuit.swing_loss_low")
-"""Keys that together make ``output_high`` and ``output_low``; given, not searched."""
+"""Keys from which ``output_high`` and ``output_low`` follow; they are given, not searched."""
 
 OWN_KEYS = {
     "drive.amplitude": "amplitude",
@@ -51,25 +52,26 @@ OWN_KEYS = {
     "friction.normal_force": "normal_force",
     "drive.frequency": "frequency",
 }
-"""Keys of a trial. Here phase and time are those at the record's first row, the lift is a share of
-what the plate's friction can hold, and the frequency one of that at which the record repeats."""
+"""Keys of a trial, and the names of its own parameters. Phase and start time count from the
+record's first row, the lift is a share of the lift that the plate's friction can hold, and the
+bounds of the frequency are shares of the frequency of the record's motion."""
 
 _NUMBERS = ("value", "low", "high", "prior", "sigma")
 _PARTS = {"rig": {*_NUMBERS, "scale", "source"}, "trial": {"value", "low", "high", "source"}}
-"""Of an entry, by its table: the search has no prior of a trial's own numbers, nor their scale."""
+"""Allowed parts of an entry, by table: a trial's own numbers have neither prior nor scale."""
 _OTHERWISE = {
     "drive.start_time": (-1e3, 1e3, "s"),
     "mechanics.initial_lift": (-1.0, 1.0, "1"),
     "drive.frequency": (0.1, 10.0, "1"),
 }
-"""Ranges of those OWN_KEYS that are not here what they are in a scene."""
+"""Ranges and units of those OWN_KEYS that mean something else here than in a scene."""
 MOST, LEAST_SD = 1e18, 1e-12
-"""Of any number: the squares of residuals stay finite."""
+"""Limits of all numbers and standard deviations, so that squares of residuals stay finite."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One key of the file; ``low`` and ``high`` are the same for a given value."""
+    """One key of the file; where a value is given, ``low`` and ``high`` both are this value."""
 
     key: str
     low: float
@@ -84,19 +86,19 @@ class Entry:
 
 
 def _names(key: str) -> tuple[str, ...]:
-    """The stepper's numbers that a key of the rig is."""
+    """The names of the stepper's numbers that a key of the rig sets."""
     return _ALIASES.get(key, (key.partition(".")[2],))
 
 
 @dataclass(eq=False)
 class Space:
-    """The free keys of a rig with one law of the suspension, and what is given of it."""
+    """All rigs with one law of the suspension: their free keys, and the given ones."""
 
     entries: dict[str, Entry]
     """Of the rig, with the keys of all laws."""
     trial: dict[str, Entry]
     laws: list[str]
-    """Those that are tried, the first for a start."""
+    """All laws of the suspension that are searched, in this order."""
     law: str
     measured: dict[str, tuple[float, float]]
     """Value and standard deviation, SI, by the names of GAUGES."""
@@ -116,20 +118,22 @@ class Space:
         given["output_high"], given["output_low"] = supply - losses[0], losses[1] - supply
         given["suspension"] = SUSPENSIONS[self.law]
         self._given = np.array([given.get(name, 0.0) for name in RIG])
+        # Indices into RIG of the numbers that each free key sets.
         self._columns = [[RIG.index(name) for name in _names(key)] for key in self.names]
 
     def of_law(self, law: str) -> "Space":
-        """The same with another law of the suspension."""
+        """This space with another law of the suspension."""
         return replace(self, law=law)
 
     def values(self, points: Array) -> Array:
         """Values of the free keys, SI, at points (… × free)."""
         low, high = self._ends
         found = low + np.clip(points, 0.0, 1.0) * (high - low)
+        # np.where evaluates both branches: the inner one keeps exp from overflowing.
         return np.where(self.log, np.exp(np.where(self.log, found, 0.0)), found)
 
     def point(self, values: Array) -> Array:
-        """The point with these values of the free keys."""
+        """The points (… × free) with these values of the free keys, clipped to the bounds."""
         low, high = self._ends
         return np.clip((_coordinates(np.asarray(values), self.log) - low) / (high - low), 0.0, 1.0)
 
@@ -148,9 +152,9 @@ class Space:
         return found
 
     def scaled(self, points: Array, forces: Array, walls: Array) -> Array:
-        """Points (n × free) with all forces and masses times ``forces`` (n), the travel times their
-        root, and the walls' stiffness times ``walls`` besides. A motion hardly tells the scale, and
-        searches that differ end apart in it."""
+        """Points (n × free) with all forces and masses multiplied by ``forces`` (n), the travel by
+        their root, and the walls' stiffness by ``walls`` (n), too. The measured motion hardly
+        determines this scale: otherwise equal searches end at different ones."""
         values = self.values(points)
         for k, name in enumerate(self.names):
             if name == "mechanics.travel":
@@ -160,8 +164,8 @@ class Space:
         return self.point(values)
 
     def residuals(self, points: Array) -> Array:
-        """How far rigs at points (n × free) are from what was measured beside the trials, and from
-        the middles of the priors, in standard deviations (n × these)."""
+        """Residuals of rigs at points (n × free), in standard deviations: from each measurement
+        beside the trials, then from the middle of each prior (n × measurements and priors)."""
         rigs = [dict(zip(RIG, row, strict=True)) for row in self.rigs(points).tolist()]
         beside = [
             [(GAUGES[name].of(rig) - value) / sd for name, (value, sd) in self.measured.items()]
@@ -183,11 +187,12 @@ class Space:
         found["friction.mu_k"] = min(found["friction.mu_k"], found["friction.mu_s"])
         if self.law == "repulsion":
             key, least = f"{SUSPENSION}_distance", LEAST_DISTANCE * found["mechanics.travel"]
-            found[key] = max(found[key], least * (1.0 + 1e-5))  # its digits in a file
+            found[key] = max(found[key], least * (1.0 + 1e-5))  # survives the rounding of a file
         return found
 
 
 def _coordinates(values: Array, log: Array) -> Array:
+    """The logarithms of values where ``log``, else the values; linear ones may be negative."""
     return np.where(log, np.log(np.where(log, values, 1.0)), values)
 
 
@@ -221,7 +226,7 @@ def read_space(own: Path | None = None) -> Space:
         )
     space = Space(rig, trial, laws, laws[0], measured)
     scene = load("reference")
-    for law in laws:  # what no scene can have together would be told only when all is searched
+    for law in laws:  # values that a scene refuses are reported now, not after the search
         one = space.of_law(law)
         changed(scene, one.settings(np.full(len(one.free), 0.5)), path)
     return space
@@ -238,7 +243,7 @@ def _tables(path: Path) -> dict[str, dict[str, Any]]:
 
 
 def _measured(path: str, name: str, entry: Any) -> tuple[float, float]:
-    """Value and standard deviation of what was measured beside the trials."""
+    """Value and standard deviation of a measurement beside the trials."""
     where = f'{path}: [measured."{plain(name)}"]'
     if name not in GAUGES:
         raise BadInput(f"{where}: this measurement is none of {', '.join(GAUGES)}.")
@@ -258,7 +263,7 @@ def _number(where: str, name: str, value: Any) -> float:
 
 
 def _laws(path: str, entry: Any) -> list[str]:
-    """The laws of the suspension that are tried, the first for a start."""
+    """The laws of the suspension that are searched, each once, in the file's order."""
     known = isinstance(entry, dict) and not set(entry) - {"laws", "source"}
     laws = entry.get("laws") if known else None
     if not isinstance(laws, list) or not laws or not all(law in [*LAW_KEYS] for law in laws):
@@ -303,7 +308,7 @@ def _entry(path: str, table: str, key: str, entry: Any) -> Entry:
 def own_bounds(space: Space, frequency: float) -> tuple[Array, Array, Array]:
     """Low and high end of a trial's own parameters, in ``OWN``'s order, and their scales for a fit.
 
-    The phase is not bounded: it is the same again after a period.
+    The phase is cyclic, so a fitted one has no bounds; its scale is the range in the file.
     """
     entries = {OWN_KEYS[key]: entry for key, entry in space.trial.items()}
     low, high = (np.array([getattr(entries[name], end) for name in OWN]) for end in ("low", "high"))

@@ -1,7 +1,7 @@
-"""Measured trials as what a search is held against.
+"""Measured trials as targets of the search.
 
-A record is taken as it is, from its first row on: a start from rest, seen by a camera, whose zero
-of height is its own. Velocities are differences of heights on both sides, or what was measured
+A record is used unchanged, from its first row on: a start from rest, seen by a camera with an
+arbitrary zero of height. Velocities are central differences of the heights, or were measured
 directly. The cost of a trial is the weighted sum of its signals' squared NRMSE (rms error over
 standard deviation). Missing values have no residual.
 """
@@ -24,35 +24,37 @@ from cosim.trials.recording import Recording, read_recording
 from cosim.trials.tracked import number_of, trial_files
 
 WEIGHTS = {"v_surface": 0.5, "z_surface": 0.3, "v_part": 0.15, "z_part": 0.25}
-"""Of the squared NRMSE; those of the signals that a trial has are scaled to a sum of 1. Velocities
-show the fast part of a motion, heights the slow one; the part's are the transport: 0.25 halves the
-error of v_average that 0.1 left, at nearly equal velocities."""
+"""Weights of the squared NRMSE; those of the signals that a trial has are scaled to a sum of 1.
+Velocities show the fast part of a motion, heights the slow one; the part's heights show transport:
+a weight of 0.25 instead of 0.1 halves the error of v_average and hardly changes those of the
+velocities."""
 
 SURFACE = {name: WEIGHTS[name] for name in ("v_surface", "z_surface")}
-"""For a trial's own parameters on a rig found elsewhere, from the surface alone."""
+"""Weights that fit a trial's own parameters to the surface alone, on a rig from other trials."""
 
 SEARCH_STEP, FINE_STEP = 1.0 / 960 / 14, 1.0 / 960 / 40
-"""Longest steps (s) of the search, and of its finish and all that is reported."""
+"""Longest time steps (s) of the search, and of its finish and all that is reported: fractions of
+the interval between frames of a camera with 960 frames/s."""
 
 DRIVE = ("amplitude", "offset", "phase", "start", "frequency")
-"""Parameters of a trial that a measured current makes superfluous."""
+"""Own parameters of a trial that are not needed where its current was measured."""
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A trial: what was measured, and what its search is held against."""
+    """A trial: its recording, and the targets that simulations of it are compared with."""
 
     label: str
     """The last whole number in the file's name, or the name."""
     recording: Recording
     frequency: float
-    """At which it repeats, Hz."""
+    """Of the periodic motion, Hz."""
     target: Target
     """For the search."""
     fine: Target
-    """The same at the finish's step."""
+    """For the finish, with a shorter time step."""
     surface: Target
-    """The finish's, held against the surface alone."""
+    """For the finish, with the surface's signals alone."""
 
     @property
     def has_part(self) -> bool:
@@ -95,6 +97,7 @@ def measured(recording: Recording, path: Path, space: Space) -> Measured:
         raise BadInput(f"{file}: the surface's motion does not repeat, so its drive is not known.")
     low, high, scale = own_bounds(space, frequency)
     if current is not None:
+        # Not fitted and without effect: all 0, but the frequency, a divisor, 1 Hz.
         needless = [OWN.index(name) for name in DRIVE]
         low[needless] = high[needless] = [float(name == "frequency") for name in DRIVE]
         scale[needless] = 0.0
@@ -102,7 +105,7 @@ def measured(recording: Recording, path: Path, space: Space) -> Measured:
     def target(step: float, weights: Mapping[str, float]) -> Target:
         chosen = {name: signals[name] for name in weights if name in signals}
         whole = sum(weights[name] for name in chosen)
-        # So that the weighted sum of squared residuals is that of the squared NRMSE.
+        # Squared NRMSE = Σ residual² / (known values × variance).
         each = {
             name: weights[name] / whole / np.isfinite(values).sum() / np.nanvar(values)
             for name, values in chosen.items()

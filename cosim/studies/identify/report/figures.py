@@ -20,7 +20,7 @@ from cosim.waveforms.columns import COLUMNS
 MEASURED, SIMULATED, OTHER, FLOOR = "0.15", "#d1495b", "#1f6fb2", "#2a9d8f"
 
 VELOCITY = "nrmse_v_surface"
-"""By which a figure's message tells how near the rig is."""
+"""The error that the figures' titles report."""
 
 COMPARED = (
     (VELOCITY, "floor_late", "Velocity of the surface, NRMSE (black: between its own cycles)"),
@@ -31,7 +31,7 @@ COMPARED = (
         "Mean velocity of the part [mm/s] (black: measured)",
     ),
 )
-"""What the bars of a panel are, and what its black marks, by their names in ``identify.json``."""
+"""For each panel the names in ``identify.json`` of its bars and its black marks, and its title."""
 
 
 def overlays(found: Solved) -> Picture:
@@ -68,7 +68,7 @@ def overlays(found: Solved) -> Picture:
 
 
 def _legend(figure: Picture, axis: Axes, place: Any, columns: int) -> None:
-    """Names what an axis shows, each once, beside all panels."""
+    """Add one legend for all panels, with each label of ``axis`` once."""
     names = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
     figure.legend([*names.values()], [*names], loc=place, ncols=columns, frameon=False)
 
@@ -110,7 +110,8 @@ COLOURS = {"cubic": SIMULATED, "knee": OTHER, "repulsion": FLOOR}
 
 
 def rigs(found: Solved) -> Picture:
-    """The suspension's force on each rig that may be meant, and costs over keys, ranges shaded."""
+    """The suspension's force on each rig that may be the true one; a panel for each key with the
+    rigs' costs over its values, the key's range shaded."""
     units, space = {key.full: key.unit for key in keys()}, found.best.space
     verdicts = {verdict.key: verdict for verdict in found.verdicts}
     names = [name for name in space.names if name not in OF_LAWS]

@@ -1,4 +1,4 @@
-"""The files of an identification, and its words."""
+"""The files of an identification, and the text of its report."""
 
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ COLUMNS = {
     "v_average_mm_per_s": "v_average [mm/s]",
     "v_average_measured_mm_per_s": "measured [mm/s]",
 }
-"""Of the tables, by the names in ``identify.json``."""
+"""Headings of the tables' columns, by the names in ``identify.json``."""
 
 LINE = {
     "trial": "trial",
@@ -33,7 +33,7 @@ LINE = {
     "v_average_mm_per_s": "v_average [mm/s]",
     "v_average_measured_mm_per_s": "measured",
 }
-"""Of a trial's line in the summary, by the same."""
+"""Headings of the summary's columns, by the names in ``identify.json``."""
 
 MEAN = {"trial": "mean"}
 
@@ -52,7 +52,7 @@ NOTES = (
 
 
 def write(folder: Path, found: Solved) -> None:
-    """Everything that :meth:`Identification.save` names."""
+    """Write all files that :meth:`Identification.save` names."""
     numbers, rig = found.numbers, rounded(found.rig)
     rows = [*numbers["trials"], *numbers["apart"]]
     names = dict.fromkeys(name for row in rows for name in row)
@@ -79,7 +79,7 @@ def write(folder: Path, found: Solved) -> None:
 
 
 def _priors(found: Solved) -> list[str]:
-    """What took part in the cost beside the trials; a paragraph each."""
+    """Paragraphs on what enters the cost beside the trials: priors, and other measurements."""
     said, rig, space = [], found.best.numbers, found.best.space
     known = [entry for entry in space.free if entry.prior is not None and entry.sigma is not None]
     off = space.residuals(found.best.point[None])[0][len(space.measured) :].tolist()
@@ -104,7 +104,8 @@ def _priors(found: Solved) -> list[str]:
 
 
 def findings(numbers: dict[str, Any]) -> list[str]:
-    """Paragraphs: what the ranges are worth, where the ram rests, which drives are at a bound."""
+    """Paragraphs: whether the searches converged, where the ram rests, which numbers of trials are
+    at a bound."""
     laws, agreed = numbers["laws"], numbers["converged"]
     shares = [f"{one['law']} {max(one['costs']) / min(one['costs']) - 1.0:.1%}" for one in laws]
     if agreed:
@@ -162,7 +163,7 @@ def _between(row: Row, unit: str) -> str:
 
 
 def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
-    """Of ``identify.json``: the tables of the page, by heading."""
+    """The report's tables by heading, from the content of ``identify.json``."""
     agreed = "" if numbers["converged"] else " (not converged: the search's own scatter)"
     count = len(numbers["ensemble"])
     rig, whole = numbers["rig"], _told(numbers["overall"] | MEAN) | {"floor": "", "late": ""}
@@ -209,7 +210,7 @@ def tables(numbers: dict[str, Any]) -> dict[str, list[Row]]:
 
 
 def _told(row: Row) -> Row:
-    """A trial's row; with its repeatability where that is in it."""
+    """A trial's row with the tables' headings, and with its repeatability where it has one."""
     floors = {"floor": "floor", "late": "floor_late"}
     return (
         {"trial": row["trial"]}

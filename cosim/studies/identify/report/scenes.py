@@ -16,7 +16,7 @@ from cosim.trials.camera import hermite
 Settings = dict[str, float | str]
 
 RIG_DIGITS, TRIAL_DIGITS = 6, 9
-"""Of the numbers in a scene."""
+"""Significant digits of the numbers in a scene file."""
 
 
 def trial_settings(rig: Settings, trial: Measured, own: Array) -> tuple[Settings, float]:
@@ -24,17 +24,19 @@ def trial_settings(rig: Settings, trial: Measured, own: Array) -> tuple[Settings
 
     The run begins at rest, with the record or with the drive, whichever is earlier.
     """
-    told = own_parameters(own)
-    held = float(rig["friction.mu_plate"]) * told["normal_force"]
-    first = max(0.0, -told["start"])
+    values = own_parameters(own)
+    # The largest force of the plate's friction; it may hold the surface off its rest by the lift.
+    held = float(rig["friction.mu_plate"]) * values["normal_force"]
+    first = max(0.0, -values["start"])
     found: Settings = {
-        "friction.normal_force": told["normal_force"],
-        "mechanics.initial_lift": told["lift"] * held / float(rig["mechanics.flexure_stiffness"]),
+        "friction.normal_force": values["normal_force"],
+        "mechanics.initial_lift": values["lift"] * held / float(rig["mechanics.flexure_stiffness"]),
     }
     if trial.target.current is None:
-        found |= {f"drive.{name}": told[name] for name in ("amplitude", "offset", "frequency")}
-        begun = told["phase"] + told["frequency"] * told["start"]
-        found |= {"drive.start_phase": begun % 1.0, "drive.start_time": max(0.0, told["start"])}
+        found |= {f"drive.{name}": values[name] for name in ("amplitude", "offset", "frequency")}
+        # ``phase`` is that at the record's first row, a scene's that at the drive's start.
+        begun = values["phase"] + values["frequency"] * values["start"]
+        found |= {"drive.start_phase": begun % 1.0, "drive.start_time": max(0.0, values["start"])}
     lasts = float(trial.recording.time[-1])
     found |= {"run.duration": first + lasts, "run.settle": first, "run.average": "slope"}
     return rounded(found, TRIAL_DIGITS), first
@@ -46,7 +48,7 @@ def scene(settings: Settings, circuit: str) -> Scene:
 
 
 def rounded(settings: Settings, digits: int = RIG_DIGITS) -> Settings:
-    """As the scene of a rig has them, or with other digits that of a trial."""
+    """Settings with their numbers rounded to so many significant digits."""
     return {
         key: value
         if isinstance(value, str) or value == 0.0
@@ -70,12 +72,12 @@ def scene_file(description: str, settings: Settings) -> str:
 
 
 CIRCUITS = ("limited", "amplifier")
-"""Solved from event to event with the mechanics; and with ngspice."""
+"""The circuits for the check: the first is solved from event to event, the second by ngspice."""
 
 
 def exact(settings: Settings, first: float, time: np.ndarray) -> dict[str, Any]:
     """Mean velocity of the part (mm/s) on each of ``CIRCUITS`` over a record's ``time`` (s), whose
-    first row is at ``first`` in the run; None, and why, where a run fails."""
+    first row is at ``first`` (s) of the run; None, and the failure, where a run fails."""
     found: dict[str, Any] = {}
     for circuit in CIRCUITS:
         try:

@@ -1,8 +1,9 @@
-"""What an identification has found, in numbers, and trial by trial its errors beside the
-measurement's repeatability.
+"""The numbers of an identification: laws, rigs, and each trial's errors beside the measurement's
+repeatability.
 
-NRMSE is the rms error over the standard deviation of what was measured; heights without their
-means, as the camera's zero is its own. The part's mean velocity is the slope of its height's line.
+NRMSE is the rms error over the standard deviation of the measured signal; heights are compared
+without their means, since the camera's zero is arbitrary. The part's mean velocity is the slope of
+the straight line fitted to its height.
 """
 
 from collections.abc import Sequence
@@ -26,13 +27,14 @@ from cosim.studies.report import Row
 from cosim.trials.camera import velocities
 
 PLACES = np.linspace(-2e-3, 2e-3, 9)
-"""Of the ram in the actuator (q, m), at which the suspension's force is told."""
+"""Positions q (m) of the ram in the actuator at which the suspension's force is reported."""
 
 KINDS = ("surface", "surface_and_part")
-"""By what a held-out trial's own parameters are fitted: its surface alone; surface and part."""
+"""What the own parameters of a held-out trial are fitted to: its surface alone; surface and part.
+"""
 
 LATE = 5
-"""Whole cycles from which on the first ones, of the start, are left out of the repeatability."""
+"""Least number of whole cycles for the first one, the start, to be left out of ``floor_late``."""
 
 BANDS = (0.0, 15.0, 30.0, 80.0, 150.0, 300.0, 480.0)
 """Ends of the frequency bands, Hz."""
@@ -40,16 +42,16 @@ BANDS = (0.0, 15.0, 30.0, 80.0, 150.0, 300.0, 480.0)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solved:
-    """``numbers`` is what ``identify.json`` holds."""
+    """A finished identification; ``numbers`` is the content of ``identify.json``."""
 
     trials: list[Measured]
     best: Found
-    """The best solution, of the law with which it was found."""
+    """The best solution of all suspension laws."""
     apart: list[Measured]
     """Trials that were not fitted."""
     apart_own: Array
     meant: list[Found]
-    """The rigs that may be meant, the best first."""
+    """The rigs that may be the true one, the best first: ``verdicts.rigs_meant``."""
     verdicts: list[Verdict]
     numbers: dict[str, Any]
 
@@ -60,7 +62,8 @@ class Solved:
 
 
 def shown(trial: Measured, rig: Array, own: Array) -> dict[str, Array]:
-    """The simulated signals as the trial's instruments show them, heights at the measured mean."""
+    """The simulated signals, processed like the measured ones: velocities differenced where the
+    measured ones are, heights shifted to the measured mean."""
     out, found = simulate(trial.fine, rig[None], own[None])[0], {}
     for name, measured in trial.fine.signals.items():
         if name in trial.fine.differenced:
@@ -92,16 +95,17 @@ def errors(trial: Measured, rig: Array, own: Array) -> Row:
 
 
 def samples(trials: Sequence[Measured], found: Found) -> float:
-    """The effective number of the surface's measured velocities, for the likelihood: those whose
-    residuals do not follow from others a moment or whole periods ago, by their autocorrelation."""
+    """The effective number of independent samples of the surface's measured velocity, for the
+    likelihood: the known ones over 1 + 2 Σ of the residual's autocorrelation, for short lags and
+    again for lags of whole periods."""
     rig, total = found.rig, 0.0
     for trial, own in zip(trials, found.own, strict=True):
-        left = trial.fine.signals["v_surface"] - shown(trial, rig, own)["v_surface"]
-        left = np.where(np.isfinite(left), left - np.nanmean(left), 0.0)
-        n, known = len(left), int(np.isfinite(trial.fine.signals["v_surface"]).sum())
-        # The residual's correlation with itself by the lag in samples, 1 at none. ``short`` adds it
-        # up to its first zero, ``again`` at whole periods, where the next cycle errs alike.
-        like = np.correlate(left, left, "full")[n - 1 :] / max(float(left @ left), 1e-300)
+        error = trial.fine.signals["v_surface"] - shown(trial, rig, own)["v_surface"]
+        error = np.where(np.isfinite(error), error - np.nanmean(error), 0.0)
+        n, known = len(error), int(np.isfinite(trial.fine.signals["v_surface"]).sum())
+        # The autocorrelation by the lag in samples, 1 at lag 0. ``short`` sums it over lags up to
+        # its first zero, ``again`` over whole periods, after which the model errs alike.
+        like = np.correlate(error, error, "full")[n - 1 :] / max(float(error @ error), 1e-300)
         short = like[1 : 1 + int(np.argmax(np.append(like, -1.0)[1:] <= 0.0))].sum()
         period = (n - 1) / float(trial.fine.time[-1]) / trial.frequency
         again = 0.0
@@ -113,8 +117,8 @@ def samples(trials: Sequence[Measured], found: Found) -> float:
 
 
 def repeatability(trial: Measured) -> Row:
-    """How far the measured velocity's cycles are from their mean, as NRMSE: no periodic motion
-    comes closer. Over the whole cycles, and without the first, in which the machine starts."""
+    """The measured velocity's scatter from cycle to cycle, as NRMSE: no periodic motion can fit
+    better. ``floor`` is over all whole cycles, ``floor_late`` without the first, the start."""
     if not np.isfinite(trial.frequency):
         return {"floor": None, "floor_late": None}
     v, time = trial.fine.signals["v_surface"], trial.fine.time
@@ -122,7 +126,7 @@ def repeatability(trial: Measured) -> Row:
     period = 1.0 / trial.frequency
     count = int((time[known][-1] - time[known][0]) / period)
     within = np.arange(0.0, period, float(np.median(np.diff(time))))
-    # A row for each whole cycle, at equal phases.
+    # ``cycles`` is cycles × phases: the velocity of each whole cycle at equal phases.
     at = time[known][0] + np.add.outer(period * np.arange(count), within)
     cycles, found = np.interp(at, time[known], v[known]), {}
     for name, some in (("floor", cycles), ("floor_late", cycles[int(count >= LATE) :])):
@@ -132,13 +136,14 @@ def repeatability(trial: Measured) -> Row:
 
 
 def nrmse(simulated: Array, measured: Array) -> float:
-    """Rms difference over the standard deviation of what was measured, where both are known."""
+    """Rms difference over the standard deviation of the measured signal, where both are known."""
     apart = simulated - measured
     return float(np.sqrt(np.nanmean(apart**2)) / np.nanstd(measured))
 
 
 def bands(trial: Measured, rig: Array, own: Array) -> list[Row]:
-    """Share of the measured velocity's power in each band, and the residual's beside it."""
+    """Power of the measured velocity and of the residual in each band, as shares of the whole power
+    of the measured velocity."""
     v, time = trial.fine.signals["v_surface"], trial.fine.time
     residual = v - shown(trial, rig, own)["v_surface"]
     known = np.isfinite(v) & np.isfinite(residual)
@@ -180,11 +185,11 @@ def errors_on(rig: Found, trials: Sequence[Measured]) -> list[Row]:
 
 
 def told_of_trials(trials: Sequence[Measured], best: Found) -> tuple[list[Row], list[Row]]:
-    """A row for each trial that was fitted; and its mean velocity of the part by the search's steps
-    and on the bench's rungs, mm/s."""
+    """A row for each fitted trial; and for each whose scene can run, the part's mean velocity
+    (mm/s) by the compiled chain and by the circuits of ``scenes.CIRCUITS``."""
     rows, checks = [], []
-    every = zip(trials, best.own, best.costs.tolist(), errors_on(best, trials), strict=True)
-    for trial, own, cost, row in every:
+    each = zip(trials, best.own, best.costs.tolist(), errors_on(best, trials), strict=True)
+    for trial, own, cost, row in each:
         ends = at_bounds(trial.fine.low, trial.fine.high, trial.fine.scale, own)
         row |= repeatability(trial) | {"cost": cost, "at_bounds": ", ".join(ends)}
         rows.append(row | own_parameters(own))
@@ -196,7 +201,7 @@ def told_of_trials(trials: Sequence[Measured], best: Found) -> tuple[list[Row], 
 
 
 def told_of_law(trials: Sequence[Measured], found: Searched) -> Row:
-    """What one law of the suspension comes to."""
+    """The result with one law of the suspension."""
     best = found.best
     whole = overall(errors_on(best, trials))
     names = ("nrmse_v_surface", "nrmse_v_surface_worst", "v_average_error_mm_per_s")
@@ -215,9 +220,10 @@ def told_of_law(trials: Sequence[Measured], found: Searched) -> Row:
 
 
 def told_of_force(meant: Sequence[Found]) -> list[Row]:
-    """The suspension's force less that at the centre, on all rigs that may be meant."""
-    every = np.array([forces(one, PLACES) for one in meant])
-    ends = np.stack([every.min(axis=0), every.max(axis=0)], axis=1).reshape(4, -1).T
+    """The range over the rigs ``meant`` of the suspension's force less that at the centre."""
+    table = np.array([forces(rig, PLACES) for rig in meant])  # rigs × (N, A) × places
+    # (N, A) × (least, most) × places, flattened to the order of ``names`` and turned: places × 4.
+    ends = np.stack([table.min(axis=0), table.max(axis=0)], axis=1).reshape(4, -1).T
     names = ("low_N", "high_N", "low_A", "high_A")
     return [
         {"q_mm": q * 1e3} | dict(zip(names, row, strict=True))
@@ -226,7 +232,8 @@ def told_of_force(meant: Sequence[Found]) -> list[Row]:
 
 
 def told_of_rig(one: Found, best: Found | None = None) -> Row:
-    """A rig by the keys of a scene; how much larger than the best's its normal forces are."""
+    """A rig by the keys of a scene, and the ratio of its normal forces to those on the best rig
+    (geometric mean over trials)."""
     found: Row = {"cost": one.total, SUSPENSION: one.space.law}
     if best is not None:
         k = OWN.index("normal_force")

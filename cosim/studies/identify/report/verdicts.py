@@ -1,10 +1,10 @@
-"""What the trials say of each key of a rig: a value and how far to trust it, or that they do not.
+"""The verdict on each key of a rig: its value and range, or that the trials do not determine it.
 
 A local covariance alone would be far too small: the cost has many minima, and a search ends in any
-of them. So no range is told until two searches with one law of the suspension have come to the same
-cost. Then a range holds the 90 % intervals about all solutions that are as likely, whichever search
-and whichever such law they are of, and about the best of every law. What a law's own keys come out
-as holds for that law alone; what all laws tell is the suspension's force.
+of them. So no range is given until two searches with one law of the suspension reach the same cost.
+Then the range of a key covers the 90 % intervals about all solutions of such laws that are about as
+likely as these two, and about the best of every law. Keys of a law have values for this law alone;
+what the laws have in common is the suspension's force.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,42 +20,43 @@ from cosim.studies.identify.search.plan import Searched
 from cosim.studies.identify.search.search import Found
 
 LIKELY = 2.71
-"""Of -2 ln L = (effective samples) ln cost: above the least up to this, one key is in its 90 %."""
+"""Rise of -2 ln L = (effective samples) ln cost above its minimum, within which a single key lies
+in its 90 % interval (quantile of Χ² with one degree of freedom)."""
 MISFIT = 2.0
-"""Of a standard deviation, which takes residuals for noise; what a rig leaves of the trials is
-mostly what the model lacks. On twelve made rigs with such residuals, and priors of their own, the
-ranges held 95 % of the true values with it, and 82 % without."""
+"""Factor on the standard deviations, which take residuals for noise: mostly they are errors of the
+model. On twelve made rigs with such residuals, and priors of their own, the ranges covered 95 % of
+the true values with this factor, and 82 % without."""
 WITHIN = 1.645 * MISFIT
-"""Standard deviations to either side, which hold 90 %."""
+"""Standard deviations to either side of a solution that its 90 % interval covers."""
 ALONE = 1.5
-"""Of a single search, whose scatter is not known: the candidates that are told, over the best."""
+"""Ratio to the best cost up to which candidates of a single search, of unknown scatter, count."""
 TRUSTED = 0.35
-"""Half of the range of possible values over their middle, up to which a key is identified."""
+"""Half of a key's range over the range's middle, up to which the key is identified."""
 TIED = 0.4
 """Spread of a product over that of the key alone, up to which only the product is identified."""
 SCATTER, FEWEST = 0.05, 4
-"""Spread of a key's logarithm and number of solutions, from which on products are looked at."""
+"""Least spread of a key's logarithm, and least number of solutions, for products to be tried."""
 END = 0.01
-"""Of a bound's range: nearer than this a value is at the bound."""
+"""Share of a bound's range; a value nearer to the bound than this is at the bound."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """On one key; ``low`` and ``high`` bound the possible values where the searches agree."""
+    """The verdict on one key; ``low`` and ``high`` are its range, None where searches disagree."""
 
     key: str
     value: float
     low: float | None
     high: float | None
     kind: str
-    """identified, product, bounded, not; law: of one law alone; or not converged."""
+    """“identified”, “product”, “bounded”, “not”, “law” (of one law alone) or “not converged”."""
     words: str
 
 
 def rigs_meant(found: Sequence[Searched], samples: float) -> list[Found]:
-    """The rigs that may be meant, the best first: the best of each law; of the laws whose searches
-    agree, all that are as likely as the worse of the two; where none agree, of all laws, all within
-    the searches' own scatter. ``samples`` is the effective number of what was measured."""
+    """The rigs that may be the true one, the best first: the best of each law, and of each law
+    whose searches agree (of all laws where none do) all candidates within the scatter of the
+    searches and LIKELY of the best. ``samples`` is the effective number of measured samples."""
     agreed = [one for one in found if one.converged] or found
     meant = [one.best for one in found if one not in agreed]
     for one in agreed:
@@ -67,12 +68,13 @@ def rigs_meant(found: Sequence[Searched], samples: float) -> list[Found]:
 def judge(
     best: Found, meant: Sequence[Found], apart: Sequence[Array] | None = None
 ) -> list[Verdict]:
-    """A verdict for each free key of the rig that is reported. ``apart`` are the standard
-    deviations of the coordinates of each rig that may be meant; None where no searches agree."""
+    """A verdict for each free key of the reported rig ``best``. ``apart`` holds the standard
+    deviations of the coordinates of each rig in ``meant``; None where no searches agree."""
     space, found = best.space, []
-    every = [dict(zip(one.space.names, one.space.values(one.point), strict=True)) for one in meant]
-    values = {k: np.array([rig[k] for rig in every]) for k in space.names if k not in OF_LAWS}
+    rigs = [dict(zip(one.space.names, one.space.values(one.point), strict=True)) for one in meant]
+    values = {k: np.array([rig[k] for rig in rigs]) for k in space.names if k not in OF_LAWS}
     ranges = [_ends(*one) for one in zip(meant, apart, strict=True)] if apart is not None else []
+    # Logarithms of what a key may form a product with: other keys, and means over trials' numbers.
     partners = {key: np.log(x) for key, x in values.items() if (x > 0.0).all()}
     for name in ("amplitude", "normal_force"):
         own = np.array([one.own[:, OWN.index(name)] for one in meant])
@@ -90,7 +92,7 @@ def judge(
                 min(value, *(one[key][0] for one in ranges)),
                 max(value, *(one[key][1] for one in ranges)),
             )
-            # The rig that is reported with this key at either end: how near the search's bounds.
+            # The coordinates of the range's ends tell whether they are at the search's bounds.
             at = np.repeat(reported[None], 2, axis=0)
             at[:, k] = ends
             low, high = space.point(at)[:, k].tolist()
@@ -101,7 +103,7 @@ def judge(
 
 
 def _ends(found: Found, deviations: Array) -> dict[str, list[float]]:
-    """The two ends of the 90 % interval about a solution, by key."""
+    """The two ends of the 90 % interval of each key about a solution."""
     off = WITHIN * deviations
     ends = found.space.values(np.stack([found.point - off, found.point + off]))
     return dict(zip(found.space.names, ends.T.tolist(), strict=True))
@@ -110,7 +112,7 @@ def _ends(found: Found, deviations: Array) -> dict[str, list[float]]:
 def _told(
     value: float, low: float, high: float, open_low: bool, open_high: bool, tied: str
 ) -> tuple[str, str]:
-    """The kind of a verdict and its words; open is an end at which nothing but the bound is."""
+    """The kind of a verdict and its words; an end of the range is open where it is at a bound."""
     numbers = f"{low:.3g} to {high:.3g}"
     if open_low and open_high:
         return "not", f"not identified: anything from {numbers} does as well"
@@ -125,13 +127,13 @@ def _told(
 
 
 def _tie(key: str, partners: Mapping[str, Array]) -> str:
-    """The product or ratio in which the rigs agree although the key scatters; or nothing."""
+    """The product or ratio in which the rigs agree although the key scatters; "" without one."""
     if key not in partners or len(partners[key]) < FEWEST:
         return ""
     alone = partners[key]
     if np.std(alone) < SCATTER:
         return ""
-    # Logarithms: a product that all rigs share is a sum without scatter, a ratio a difference.
+    # In logarithms a product that all rigs share is a sum without scatter, a ratio a difference.
     found = [
         (float(np.std(alone + sign * other)), f"{word} {name}")
         for name, other in partners.items()
@@ -143,7 +145,7 @@ def _tie(key: str, partners: Mapping[str, Array]) -> str:
 
 
 def forces(rig: Found, places: Array) -> tuple[Array, Array]:
-    """The suspension's force at ``places`` (q, m) less that at the centre, N; over Bl, A."""
+    """The suspension's force at ``places`` (q, m) less that at the centre: in N, and over Bl in A."""
     numbers = rig.numbers
     found = suspension_force(numbers, np.append(places, 0.0))  # the last one is the centre's
     apart = found[:-1] - found[-1]
@@ -153,5 +155,5 @@ def forces(rig: Found, places: Array) -> tuple[Array, Array]:
 def at_bounds(low: Array, high: Array, scale: Array, own: Array) -> list[str]:
     """The names of a trial's own parameters that lie at a bound."""
     near = END * scale
-    there = (scale > 0.0) & ((own <= low + near) | (own >= high - near))
-    return [name for name, one in zip(OWN, there, strict=True) if one]
+    at_bound = (scale > 0.0) & ((own <= low + near) | (own >= high - near))
+    return [name for name, yes in zip(OWN, at_bound, strict=True) if yes]

@@ -1,9 +1,10 @@
 """The stages of an identification, from fits of single trials to the rig and its folds.
 
-Starts are rigs that fit one trial each, as they are and with another scale of forces and masses and
-other walls. They are tried on all trials, and the better ones of them are searched further, fewer
-and fewer for longer and longer. Each law of the suspension is searched twice, from other random
-numbers: only where both come to the same cost does a range mean the trials and not the search.
+Start points are rigs that fit one trial each, both unchanged and with another scale of forces and
+masses and other walls. Each is evaluated on all trials; then rounds of searches go on from fewer
+and fewer of the best solutions, for more and more generations. Each law of the suspension is
+searched twice with different random numbers: only if both searches reach the same cost does the
+range of a key show what the trials leave open, and not the scatter of the search.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,8 +23,8 @@ FOLDS = 3
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is searched. ``rounds`` are those of the rig for all trials, ``fold_rounds`` those
-    of a fold: how many solutions, for how many generations, with which first step of CMA-ES."""
+    """How much is searched. ``rounds`` are those for the rig of all trials, ``fold_rounds`` those
+    for the rig of a fold; each is (number of solutions, generations, first step of CMA-ES)."""
 
     singles: int
     """Fits of each single trial."""
@@ -31,62 +32,64 @@ class Effort:
     rounds: tuple[tuple[int, int, float], ...]
     fold_rounds: tuple[tuple[int, int, float], ...]
     laws: int
-    """So many laws of the suspension, of those that the bounds name, at most."""
+    """How many of the suspension laws that the bounds name are searched, at most."""
     searches: int
-    """Of each law."""
+    """Searches of each law."""
 
 
 FULL = Effort(
     3, 50, ((24, 80, 0.07), (10, 160, 0.06), (4, 330, 0.04), (1, 800, 0.02)),
     ((10, 80, 0.07), (4, 200, 0.05), (1, 330, 0.04)), 3, 2,
 )  # fmt: skip
-"""Breadth decides: from 20 and 8 starts in the first rounds a search came to 0.103 of the published
-trials, which from 10 and 4 had ended at 0.117. Small first steps do better, too: of eight starts
-with the law knee, 960 rigs each took the cost to 0.123 in the mean from 0.07 on, to 0.131 from 0.12
-on, and to 0.140 from 0.2 on."""
+"""The number of starts decides: with 20 and 8 in the first rounds a search of the published trials
+reached a cost of 0.103, with 10 and 4 only 0.117. Small first steps do better, too: from eight
+starts with the law knee, 960 rigs each reached a mean cost of 0.123 with a first step of 0.07, of
+0.131 with 0.12, and of 0.140 with 0.2."""
 QUICK = Effort(1, 25, ((3, 40, 0.07), (1, 80, 0.04)), ((1, 40, 0.07),), 1, 1)
 
 AGREED = 1.02
-"""Ratio of the costs of two searches up to which they have come to the same."""
+"""Ratio of the costs of two searches up to which they agree."""
 
 SCALE, WALLS = 0.25, 1.5
-"""Standard deviations of the logarithms by which starts are moved."""
+"""Standard deviations of the logarithms by which the starts' scale and walls are changed."""
 
 SCREENED, KEPT, SCREEN_ROUNDS = 128, 8, 4
-"""Own parameters that are drawn for a new rig, those that are refined, and the rounds for them."""
+"""Screening of a new rig: own parameters that are drawn, those that are refined, and rounds."""
 AGAIN = 256, 16, 4
-"""The same before a solution is searched further."""
+"""Screening before a solution is searched further."""
 CAREFUL = 512, 24, 5
-"""The same of a rig that is to be finished."""
+"""Screening of a rig that is to be finished."""
 DRIVES = 4096, 128, 5
-"""The same where only a trial's own parameters are sought: they must be the best there are."""
+"""Screening where only own parameters are sought, on a given rig: they must be the global best."""
 LAST = 40
-"""Generations at the finish's step."""
+"""Generations of CMA-ES with the time step of the finish."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Carries out the stages; ``fine`` is the same search at the finish's step."""
+    """One search and its stages; ``fine`` is ``coarse`` with the finish's shorter time step."""
 
     coarse: Search
     fine: Search
     effort: Effort
     once: Callable[[str, Callable[[], Any]], Any]
-    """A store's, of the stages that are done: an interrupted identification goes on there."""
+    """A store's method: it keeps finished stages, from which an interrupted identification goes on.
+    """
     seed: int
     progress: Progress
     name: str
-    """Of the search: stages of two searches draw other random numbers."""
+    """Of the search; it seeds the stages' random numbers, so two searches draw different ones."""
 
     def _stage(
         self, name: str, work: Callable[[np.random.Generator], Sequence[Found]]
     ) -> list[Found]:
-        """The solutions of a stage: those of the store, or of ``work``. A stage draws random
-        numbers of its own, so it comes out the same whichever of those before it were done."""
+        """The solutions of a stage: those of the store, or else of ``work``. Each stage has its own
+        random numbers, so its result does not depend on which earlier stages came from the store.
+        """
         name = f"{self.name}: {name}"
         rng = np.random.default_rng([self.seed, crc32(name.encode())])
 
-        def plain() -> list[Any]:
+        def plain() -> list[Any]:  # lists and numbers, which the store can hold
             arrays = [((one.point, one.own, one.costs), one.total) for one in work(rng)]
             return [[[array.tolist() for array in each], total] for each, total in arrays]
 
@@ -100,9 +103,10 @@ class Plan:
         """Rigs that fit one trial each, ``effort.singles`` of each."""
 
         def single(rng: np.random.Generator, k: int) -> list[Found]:
-            alone, told = self.coarse.part([k]), self._telling(f"trial {k + 1} alone")
+            alone, tell = self.coarse.part([k]), self._telling(f"trial {k + 1} alone")
+            # From the best of 24 random rigs, each with 64 random own parameters.
             start = best_of(alone.screen(rng.random((24, len(alone.space.free))), rng, 64, 4, 2))
-            return [alone.nested(start, rng, self.effort.single_generations, 0.15, told)]
+            return [alone.nested(start, rng, self.effort.single_generations, 0.15, tell)]
 
         return [
             self._stage(f"single {k + 1}-{n + 1}", partial(single, k=k))[0]
@@ -113,15 +117,17 @@ class Plan:
     def ensemble(
         self, name: str, rows: Sequence[int], rounds: Sequence[tuple[int, int, float]]
     ) -> list[Found]:
-        """Solutions for the trials ``rows``, from the rigs of these trials alone on, the best
-        first; each has ended its search, most of them early."""
+        """Solutions for the trials ``rows``, the best first: those of the last round, and those
+        whose search ended in an earlier one. The starts are the rigs that fit one of these trials.
+        """
         search, each = self.coarse.part(rows), self.effort.singles
+        # ``singles`` has ``each`` rigs of trial 0, then ``each`` of trial 1, and so on.
         points = np.array([one.point for i, one in enumerate(self.singles()) if i // each in rows])
 
         def starts(rng: np.random.Generator) -> list[Found]:
             scale, walls = (np.exp(s * rng.standard_normal(len(points))) for s in (SCALE, WALLS))
-            every = np.concatenate([points, search.space.scaled(points, scale, walls)])
-            return search.screen(every, rng, SCREENED, KEPT, SCREEN_ROUNDS)
+            both = np.concatenate([points, search.space.scaled(points, scale, walls)])
+            return search.screen(both, rng, SCREENED, KEPT, SCREEN_ROUNDS)
 
         def further(rng: np.random.Generator, given: Any) -> list[Found]:
             start, others, *effort = given
@@ -132,7 +138,7 @@ class Plan:
         for number, (count, generations, sigma) in enumerate(rounds, 1):
             several = sorted(several, key=lambda one: one.total)
             several, left = several[:count], several[count:]
-            ended += left if number > 1 else []
+            ended += left if number > 1 else []  # before round 1 these are only starts
             new = []
             for k, start in enumerate(several, 1):
                 title = f"{name}: round {number}, {k} of {len(several)}"
@@ -142,7 +148,7 @@ class Plan:
         return sorted([*several, *ended], key=lambda one: one.total)
 
     def finished(self, name: str, rows: Sequence[int], found: Found) -> Found:
-        """The solution at the finish's step, and by least squares."""
+        """The solution searched on with the time step of the finish, then by least squares."""
         fine = self.fine.part(rows)
 
         def work(rng: np.random.Generator) -> list[Found]:
@@ -153,7 +159,7 @@ class Plan:
         return self._stage(f"{name}: finish", work)[0]
 
     def drives(self, name: str, point: Array, targets: Search) -> Found:
-        """The best own parameters of trials on a rig, of many starts."""
+        """The solution on a given rig with the best own parameters of very many random ones."""
         return self._stage(name, lambda rng: targets.screen(point[None], rng, *DRIVES))[0]
 
     def _telling(self, title: str) -> Progress:
@@ -162,14 +168,14 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Searched:
-    """What the searches with one law of the suspension have found."""
+    """The solutions of all searches with one law of the suspension."""
 
     ends: list[Found]
-    """The best of each search, finished."""
+    """The best solution of each search, finished."""
     candidates: list[Found]
-    """All at which a search has ended, the best first, at the step of the search."""
+    """All solutions of all searches before the finish, the best first."""
     begun: Sequence[Found] = ()
-    """Those of them that the ends were finished from, and so are the same again."""
+    """The candidates from which the ends were finished, and which the ends therefore replace."""
 
     @property
     def best(self) -> Found:
@@ -178,28 +184,28 @@ class Searched:
 
     @property
     def scatter(self) -> float:
-        """The highest cost of the ends over the lowest; of one search nothing is known."""
+        """The highest cost of the ends over the lowest; 1, and no measure, for a single search."""
         return max(one.total for one in self.ends) / self.best.total
 
     @property
     def converged(self) -> bool:
-        """Whether several searches have come to the same."""
+        """Whether several searches agree in their cost."""
         return len(self.ends) > 1 and self.scatter <= AGREED
 
     def within(self, factor: float) -> list[Found]:
-        """The candidates whose cost is at most ``factor`` times the lowest; none finished."""
+        """The candidates whose cost is at most ``factor`` times the lowest, without ``begun``."""
         most = factor * self.candidates[0].total
         return [one for one in self.candidates if one.total <= most and one not in self.begun]
 
 
 def searched(plans: Sequence[Plan]) -> Searched:
-    """The searches of a law, one plan each."""
+    """Carry out the searches of a law, one plan each."""
     rows = [*range(len(plans[0].coarse.targets))]
-    every = [plan.ensemble("all trials", rows, plan.effort.rounds) for plan in plans]
-    both = zip(plans, every, strict=True)
-    ends = [plan.finished("all trials", rows, found[0]) for plan, found in both]
-    order = sorted([one for found in every for one in found], key=lambda one: one.total)
-    return Searched(ends, order, [found[0] for found in every])
+    ensembles = [plan.ensemble("all trials", rows, plan.effort.rounds) for plan in plans]
+    pairs = zip(plans, ensembles, strict=True)
+    ends = [plan.finished("all trials", rows, found[0]) for plan, found in pairs]
+    order = sorted([one for found in ensembles for one in found], key=lambda one: one.total)
+    return Searched(ends, order, [found[0] for found in ensembles])
 
 
 def folds(count: int) -> list[list[int]]:
