@@ -106,7 +106,6 @@ class Slide:
         beyond = (since - lasts[..., None]).clip(0.0)
         v, way = self.v_plate + faster, np.where(faster >= 0.0, 1.0, -1.0)
         first = pull - way * rub
-        # The part has the plate's velocity after -faster/first, if friction takes it there at all.
         turns = np.broadcast_to(lasts, faster.shape).copy()
         np.divide(-faster, first, out=turns, where=first * faster < 0.0)
         turns = np.minimum(turns, lasts)
@@ -218,9 +217,6 @@ def slide(trial: Trial, span: Span, noise: float, roughness: float) -> Slide | N
         covariance += ACCELERATION**2 * (x * y) ** 2 / 4 + roughness * _walk(x, y)
     factor = np.linalg.cholesky(covariance)
     whiten = np.linalg.inv(factor)
-    # Height and velocity at the begin are free: a flat prior, integrated out. The likelihood keeps
-    # the determinant, and the lengths of their whitened columns, the second less its share of the
-    # first.
     level = whiten.sum(axis=2)
     length = np.linalg.norm(level, axis=1, keepdims=True)
     level /= length
