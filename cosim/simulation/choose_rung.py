@@ -27,6 +27,7 @@ from cosim.simulation.elsewhere import one_run
 from cosim.simulation.fidelity import COMPLETE, JUDGES, SEARCHES, Fidelity, relative_error
 from cosim.simulation.here import few_rows
 from cosim.toolchain.processes import processors
+from cosim.waveforms.quantities import percent
 from cosim.waveforms.result import Result
 
 PART = 0.25
@@ -80,7 +81,7 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
     tolerance = Fidelity.of(scene).tolerance
     mostly = float(expected()[SEARCHES][f"against {JUDGES}: median [%]"]) / 100.0
     if mostly > tolerance:
-        return Choice(JUDGES, f"limited is mostly more than {mostly:.2%} off it", {})
+        return Choice(JUDGES, f"limited is mostly more than {percent(mostly)} off it", {})
     try:
         limited = few_rows(changed(scene, {"circuit.model": SEARCHES}, "auto"))
     except BadInput:  # too fast a coil
@@ -91,7 +92,7 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
     own, *others = _v_averages(limited, [{}, *near])
     moved = max(relative_error(other, own) for other in others)
     if moved > tolerance:
-        why = f"a ten-thousandth of the coil's force moves v_average by {moved:.2%}"
+        why = f"a ten-thousandth of the coil's force moves v_average by {percent(moved)}"
         return Choice(JUDGES, why, {"limited": moved, "ideal": moved})
     # The amplifier and "limited" over the first part, "ideal" and "limited" over the whole run.
     part = _part(limited)
@@ -103,8 +104,10 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
     errors["ideal"] = relative_error(ideal, own) + errors["limited"]
     for model in ("ideal", "limited"):
         if errors[model] <= tolerance:
-            return Choice(model, f"at most about {errors[model]:.2%} off the amplifier", errors)
-    why = f"limited may be {errors['limited']:.2%} off, ideal {errors['ideal']:.2%}"
+            return Choice(
+                model, f"at most about {percent(errors[model])} off the amplifier", errors
+            )
+    why = f"limited may be {percent(errors['limited'])} off, ideal {percent(errors['ideal'])}"
     return Choice(JUDGES, why, errors)
 
 

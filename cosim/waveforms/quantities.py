@@ -28,6 +28,12 @@ OF_SOURCES = {"power": "W", "energy": "J"}
 """What a scene with ports has of a source, in its unit."""
 
 
+def percent(share: float) -> str:
+    """A share in words, by two digits: 0.0006 is ``0.06 %``."""
+    number = 100.0 * share
+    return f"{number:.2g} %" if abs(number) < 99.5 else f"{number:.0f} %"
+
+
 def meaning(name: str, units: Mapping[str, str] | None = None) -> dict[str, str]:
     """The attributes ``units`` and ``long_name`` of an entry in a dataset; ``units`` are those of
     the signals of a scene with ports."""

@@ -56,7 +56,7 @@ def test_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out
     numbers = json.loads((tmp_path / "tune.json").read_text(encoding="utf-8"))
     assert (
-        "turning one key by 2% of its range" in said or "budget ended" in said
+        "turning one key by 2 % of its range" in said or "budget ended" in said
     ) and " Hz)" in said
     best: Any = simulate(load(tmp_path / "best.toml")).summary
     assert best["v_average"] == pytest.approx(numbers["value"], rel=1e-6)

@@ -26,6 +26,7 @@ from cosim.files.picture import Picture
 from cosim.scene import Scene, changed, load
 from cosim.studies.plots import BLUE, GREEN, ORANGE, VERMILION, panels
 from cosim.studies.report import Progress, Report, Row, silent, span
+from cosim.waveforms.quantities import percent
 
 Output = Literal["saturated", "regulated"]
 Cut = Literal["coil in circuit", "coil in mechanics"]
@@ -287,8 +288,8 @@ def report(found: Sequence[Limit]) -> Report:
         "Limits: largest macro step at which a coupling is stable, predicted from the spectral "
         "radius of the coupled linear map, and observed by running it (with the FMU as the "
         "mechanics where the coil is in the circuit). The greatest difference between the two is "
-        f"{worst:.1%}. Both are in stability.csv, over a strength of the coupling Bl²/(m R) of "
-        f"{span([x.strength for x in swept])} 1/s.",
+        f"{percent(worst)}. Both are in stability.csv, over a strength of the coupling Bl²/(m R) "
+        f"of {span([x.strength for x in swept])} 1/s.",
     ]
     tables: dict[str, Sequence[Row]] = {
         f"Predicted limits in ms, {cut}; - is none below {LONGEST * 1e3:g} ms": by_method(

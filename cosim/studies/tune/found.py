@@ -19,7 +19,7 @@ from cosim.scene.tables import COMMANDS, KNOBS
 from cosim.search.turns import TURN
 from cosim.studies.plots import headline
 from cosim.studies.report import write_csv
-from cosim.waveforms.quantities import bench_unit, label, meaning, with_unit
+from cosim.waveforms.quantities import bench_unit, label, meaning, percent, with_unit
 from cosim.waveforms.report import motion_in_words
 
 COLORS = ("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#8d99ae", "#6a4c93")
@@ -103,10 +103,10 @@ class Tuning:
             return "the budget ended before its neighbours were run: a larger one may help"
         if (lost := self.lost) is None:
             return ""
-        cost = "loses it altogether" if lost >= 1.0 else f"costs at most {max(lost, 0.0):.1%}"
+        cost = "loses it altogether" if lost >= 1.0 else f"costs at most {percent(max(lost, 0.0))}"
         if lost == inf:
             cost = "leads to a run that fails or is too hot"
-        return f"turning one key by {TURN:.0%} of its range {cost}"
+        return f"turning one key by {percent(TURN)} of its range {cost}"
 
     def plot(self) -> Picture:
         """The path of the search, which settings it ran, and what a small turn costs."""
@@ -243,8 +243,8 @@ class Tuning:
             lines.append(f"  motion: {words}")
         if self.robust:
             lines.append(
-                f"  values are medians over the keys' turns by {TURN:.0%}, or the worst of them "
-                "where their signs differ"
+                f"  values are medians over the keys' turns by {percent(TURN)}, or the worst of "
+                "them where their signs differ"
             )
         for one in (self, *self.others) if self.others else ():
             lines.append(f"  {one.waveform}: {with_unit(one.value * scale, unit, 4)}")

@@ -14,8 +14,9 @@ from cosim.studies.identify.report.solved import KINDS, Solved, shown
 from cosim.studies.identify.report.verdicts import TRUSTED, forces
 from cosim.studies.plots import headline
 from cosim.studies.report import Row
-from cosim.waveforms import quantities
 from cosim.waveforms.columns import COLUMNS
+from cosim.waveforms.quantities import label as labelled
+from cosim.waveforms.quantities import percent
 
 MEASURED, SIMULATED, OTHER, FLOOR = "0.15", "#d1495b", "#1f6fb2", "#2a9d8f"
 
@@ -62,7 +63,9 @@ def overlays(found: Solved) -> Picture:
         axis.set_xlabel("time [ms]")
     _legend(figure, axes[0], "outside upper right", 2)
     told = [1.0 - rows[trial.label][VELOCITY] ** 2 for trial in found.trials]
-    whole = f"{min(told):.0%} to {max(told):.0%}" if len(told) > 1 else f"{told[0]:.0%}"
+    whole = (
+        f"{percent(min(told))} to {percent(max(told))}" if len(told) > 1 else f"{percent(told[0])}"
+    )
     headline(figure, f"One rig explains {whole} of the variance of the surface's velocity")
     return figure
 
@@ -142,13 +145,15 @@ def rigs(found: Solved) -> Picture:
             axis.xaxis.set_minor_formatter(NullFormatter())
         else:
             axis.locator_params(axis="x", nbins=4)
-        named = quantities.label(name.partition(".")[2], units[name])
+        named = labelled(name.partition(".")[2], units[name])
         axis.set_title(f"{named}: cost", loc="left", fontsize=9)
     for axis in (first, *others):
         axis.tick_params(labelsize=7)
     _legend(figure, first, "outside upper right", 3)
     known = sum(verdict.kind == "identified" for verdict in found.verdicts)
-    message = f"The trials tell {known} of {len(names)} keys within {TRUSTED:.0%}; shaded: ranges"
+    message = (
+        f"The trials tell {known} of {len(names)} keys within {percent(TRUSTED)}; shaded: ranges"
+    )
     headline(figure, message if found.numbers["converged"] else "Not converged: no range is told")
     return figure
 
@@ -179,7 +184,7 @@ def spectrum(found: Solved) -> Picture:
         missed[band] = missed.get(band, 0.0) + row["residual"]
     most = max(missed, key=missed.__getitem__)
     share = missed[most] / sum(missed.values())
-    headline(figure, f"{share:.0%} of what the rig misses of the velocity lies at {most}")
+    headline(figure, f"{percent(share)} of what the rig misses of the velocity lies at {most}")
     figure.supylabel("share of the measured velocity's power", fontsize=10)
     figure.supxlabel("frequency [Hz]", fontsize=10)
     return figure

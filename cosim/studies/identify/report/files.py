@@ -11,7 +11,7 @@ from cosim.studies.identify.report import figures
 from cosim.studies.identify.report.scenes import rounded, scene_file, trial_settings
 from cosim.studies.identify.report.solved import Solved
 from cosim.studies.report import Report, Row, markdown
-from cosim.waveforms.quantities import label
+from cosim.waveforms.quantities import label, percent
 
 COLUMNS = {
     "nrmse_v_surface": "velocity",
@@ -107,7 +107,9 @@ def findings(numbers: dict[str, Any]) -> list[str]:
     """Paragraphs: whether the searches converged, where the ram rests, which numbers of trials are
     at a bound."""
     laws, agreed = numbers["laws"], numbers["converged"]
-    shares = [f"{one['law']} {max(one['costs']) / min(one['costs']) - 1.0:.1%}" for one in laws]
+    shares = [
+        f"{one['law']} {percent(max(one['costs']) / min(one['costs']) - 1.0)}" for one in laws
+    ]
     if agreed:
         words = (
             f"Two searches with the law {' or '.join(agreed)} have come to the same cost, within "
