@@ -1,6 +1,6 @@
-"""Speed against accuracy: every method and setting on four scenes.
+"""Speed against accuracy of every method and setting on four scenes.
 
-What the runs say: orders, errors at equal run time, the page and the figure.
+From the runs follow orders, errors at equal run time, the report and its figure.
 """
 
 import os
@@ -34,18 +34,19 @@ from cosim.studies.report import Progress, Report, Row, brief, silent, span
 EQUAL_TIME, EQUAL_ERROR = 0.5, 1e-3
 """CPU seconds, and error over range, at which methods are compared."""
 CHAOTIC = 1e4
-"""Growth of a small difference from which on single paths are not compared."""
-_HALVINGS = 4  # over which an order is fitted
+"""Growth of a small difference above which a scene is chaotic: single paths are not compared."""
+_HALVINGS = 4  # of the setting, over which an order is fitted
 STORE = "accuracy.sqlite"
 
-_ROUNDS = 3
+_ROUNDS = 3  # in which all runs are timed, for a median
 _COLORS = VERMILION, SKY, BLUE, GREEN, ORANGE, "black", PURPLE
 _STYLES = tuple(zip(_COLORS, "ovsD^PX", strict=True))
-"""Colours and markers of the strong lines, in their order."""
+"""Colours and markers of the methods that stand out (``Comparison.strong``), in their order."""
 
 
 def order(runs: Sequence[Run]) -> float:
-    """Slope of log error over log setting, fitted to the last halvings; nan where it has none."""
+    """Slope of log error over log setting, fitted to the finest settings; nan where these are too
+    few or no step lengths."""
     known = [run for run in runs if run.counts and run.error > 0.0]
     last = known[-_HALVINGS - 1 :]
     if len(last) <= _HALVINGS or not last[0].setting.endswith("[s]"):
@@ -55,36 +56,38 @@ def order(runs: Sequence[Run]) -> float:
 
 
 def _front(runs: Sequence[Run]) -> tuple[list[float], list[float]]:
-    """Logarithms of CPU time, rising, and of the least error that was reached in it."""
+    """The Pareto front: logarithms of CPU time, rising, and of the least error up to this time."""
     known = sorted((run.seconds, run.error) for run in runs if run.counts and run.error > 0.0)
     errors = accumulate((log(error) for _, error in known), min)
     return [log(seconds) for seconds, _ in known], list(errors)
 
 
 def error_in(runs: Sequence[Run], seconds: float) -> float:
-    """Least error in this CPU time, interpolated; nan where no run is as short as that."""
+    """Least error within a CPU time (s), interpolated; nan where all runs take longer."""
     times, errors = _front(runs)
     return exp(np.interp(log(seconds), times, errors, left=nan)) if times else nan
 
 
 def time_to(runs: Sequence[Run], error: float) -> float:
-    """Least CPU time (s) for this error, interpolated; nan where no run is as good as that."""
+    """Least CPU time (s) for an error, interpolated; nan where no run reaches it."""
     times, errors = _front(runs)
     if not times or errors[-1] > log(error):
         return nan
+    # Errors fall with time; np.interp needs rising abscissae, hence the signs.
     return exp(np.interp(-log(error), [-e for e in errors], times))
 
 
 class Comparison:
-    """The runs by scene and method, and which methods stand out."""
+    """The runs by scene and method. The strong methods stand out in the figure: the default, the
+    best of each order among those with macro steps, and other programs."""
 
     def __init__(self, runs: Sequence[Run], solvers: Sequence[Solver]) -> None:
         self.runs, self.solvers = runs, solvers
         self.scenes = list(dict.fromkeys(run.scene for run in runs))
         self.strong = {"step-locked\n(default)": DEFAULT}
-        """Names of the methods that are compared, by their labels."""
+        """Names of the strong methods, by their labels."""
         self._stepping = [one for one in solvers if "macro" in one.setting and one.order]
-        """Those whose setting is the length of a macro step."""
+        """Solvers whose setting is the length of a macro step."""
         for p in sorted({solver.order for solver in self._stepping if solver.order}):
             best = min((s for s in self._stepping if s.order == p), key=self._mean)
             self.strong[f"order {p}:\n{best.name}"] = best.name
@@ -97,12 +100,12 @@ class Comparison:
         return error_in(self.of(scene, method), EQUAL_TIME)
 
     def _mean(self, solver: Solver) -> float:
-        """Geometric mean over the scenes of the error at equal time."""
+        """Geometric mean over the scenes of the error at equal time; inf if one is unknown."""
         found = [self._error(scene, solver.name) for scene in self.scenes]
         return exp(sum(map(log, found)) / len(found)) if all(map(isfinite, found)) else inf
 
     def lead(self, scene: str) -> float:
-        """How many times the default is as accurate as the best macro-step method in equal time."""
+        """The error of the best macro-step method over that of the default, in equal time."""
         others = (self._error(scene, solver.name) for solver in self._stepping)
         return min(filter(isfinite, others), default=nan) / self._error(scene, DEFAULT)
 
@@ -121,7 +124,7 @@ class Comparison:
         return said
 
     def compared(self) -> list[Row]:
-        """The strong lines: error in equal time, and time for equal error."""
+        """The strong methods: error in equal time, and time for equal error."""
         rows: list[Row] = []
         for label, name in self.strong.items():
             errors = {f"{s}: error": brief(self._error(s, name)) for s in self.scenes}
@@ -132,7 +135,8 @@ class Comparison:
         return rows
 
     def methods(self) -> list[Row]:
-        """Every method: its order, and fitted on each scene; its failures; where it is no line."""
+        """Every method: its order, and that fitted on each scene; its failures; the scenes where it
+        has no line, and why."""
         return [self._method(solver) for solver in self.solvers]
 
     def _method(self, solver: Solver) -> Row:
@@ -206,7 +210,7 @@ def report(runs: Sequence[Run], solvers: Sequence[Solver] = SOLVERS) -> Report:
 
 
 def draw(runs: Sequence[Run], strong: Mapping[str, str], title: str) -> Picture:
-    """Draw error over CPU time, a panel a scene; ``strong`` are names of methods by label."""
+    """Draw error over CPU time, a panel for each scene; ``strong`` are methods' names by label."""
     scenes = list(dict.fromkeys(run.scene for run in runs))
     wide = min(len(scenes), 2)
     high = -(-len(scenes) // wide)

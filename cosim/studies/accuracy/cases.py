@@ -1,5 +1,5 @@
-"""The scenes of the studies, their reference solutions, which were calculated once
-(``reference.json``), and the participants that can go back to run them with."""
+"""The scenes of the study, their reference solutions, which were calculated once
+(``reference.json``), and participants for them that can repeat a step."""
 
 import json
 from dataclasses import dataclass, replace
@@ -16,7 +16,8 @@ from cosim.scene import Scene
 
 @dataclass(frozen=True)
 class Case:
-    """What differs from the scene ``reference``, how long it is studied, how often sampled, s."""
+    """A scene: ``overrides`` of the scene ``reference``, the duration (s) and the interval between
+    samples (s)."""
 
     name: str
     title: str
@@ -24,9 +25,10 @@ class Case:
     duration: float
     sampled: float = 2.5e-3
     judged: tuple[str, ...] = ("z_part",)
-    """What is compared; near impacts velocities would tell of nothing but the impacts' times."""
+    """Signals that are compared; near impacts errors of velocities would only show those of the
+    impacts' times."""
     netlist: bool = False
-    """Whether its reference has the leak of the netlist's pole, which tells at low bandwidth."""
+    """Whether the reference includes the leak of the netlist's pole, noticeable at low bandwidth."""
 
     @property
     def smooth(self) -> bool:
@@ -34,7 +36,7 @@ class Case:
         return self.name.startswith("smooth")
 
     def times(self) -> list[float]:
-        """When it is compared, s."""
+        """Times (s) at which signals are compared."""
         count = round(self.duration / self.sampled)
         return [self.duration * k / count for k in range(1, count + 1)]
 
@@ -83,17 +85,20 @@ class Reference:
     """A scene's reference solution and how far it can be trusted."""
 
     signals: np.ndarray
+    """Signals × times, SI."""
     other_method: float
+    """Error of another integration method against it, over the range."""
     growth: float
+    """Change of the path, over its range, per relative change of the normal force."""
 
     def error(self, found: np.ndarray) -> float:
-        """Greatest over time and signals, in units of their ranges; inf if it left the numbers."""
+        """Largest error over time and signals, over the signal's range; inf for NaN or overflow."""
         off = np.abs(found - self.signals).max(axis=1) / np.ptp(self.signals, axis=1)
         return float(off.max()) if np.isfinite(off).all() else np.inf
 
 
 def reference(name: str) -> Reference:
-    """That of a case of :data:`CASES`."""
+    """The reference solution of a case of :data:`CASES`, by name."""
     text = (files("cosim.studies.accuracy") / "reference.json").read_text(encoding="utf-8")
     entry = json.loads(text)["cases"][name]
     signals = np.array(list(entry["signals"].values()))
@@ -101,11 +106,11 @@ def reference(name: str) -> Reference:
 
 
 def participants(scene: Scene) -> tuple[LinearParticipant | Amplifier, FmuMechanics]:
-    """The circuit ``amplifier`` and the mechanics of a scene, at rest and able to go back."""
+    """The circuit ``amplifier`` and the mechanics of a scene, at rest; both can repeat a step."""
     circuit, coil, drive = scene.circuit, scene.coil, scene.drive
     mechanics = FmuMechanics(scene)
     if drive.waveform == "sine" and drive.offset == 0.0:
-        # Without limits, and exact, where the command is no straight line.
+        # ``Amplifier`` needs a command of straight lines; for a sine the linear circuit is exact.
         side = regulated_coil(
             coil.resistance,
             coil.inductance,

@@ -1,6 +1,7 @@
-"""What the accuracy study compares: each solver with its ladder of settings, and how it is run.
+"""The solvers that the accuracy study compares, their settings from coarse to fine, and their runs.
 
-The error is the greatest over time of what a scene judges, over its range; the time is CPU time.
+The error is the largest one over time of the signals that a case judges, over their range; the time
+is CPU time.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -28,16 +29,16 @@ from cosim.toolchain.processes import in_place
 
 _WORSE = 1.5
 """An error this many times that of the next coarser setting marks a run as not monotone."""
-_DIVERGED = 1.0
+_DIVERGED = 1.0  # error over range above which a run counts as diverged
 NOT_MONOTONE, FALSE_CYCLE = "not monotone", "false limit cycle"
 
 SAME_TIME = 1e-12
-"""s; a method this close before a jump has reached it."""
+"""s; communication points this close before a jump are at it."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the case judges (rows) at its times, CPU seconds, and steps of the circuit."""
+    """A run: the signals that the case judges (signals × times), CPU seconds, circuit steps."""
 
     signals: Array
     seconds: float
@@ -50,42 +51,42 @@ Solve = Callable[[Scene, Case, float], Outcome]
 
 @dataclass(frozen=True)
 class Solver:
-    """A method with its settings from coarse to fine; ``setting`` is what they are."""
+    """A method with its ``values`` of one ``setting`` from coarse to fine."""
 
     name: str
     setting: str
     run: Solve
     values: Callable[[Case], Sequence[float]]
     order: int | None = None
-    """Order in ``setting`` where all is smooth; None where it is not a step."""
+    """Order of convergence in ``setting`` on a smooth scene; None where that is no step length."""
     netlist: bool = False
-    """Whether ngspice leads, whose netlist has a leak of its own."""
+    """Whether ngspice leads: its netlist has a leak, so it needs a reference with this leak."""
     peer: bool = False
-    """Whether it is another program, whose line always stands out."""
+    """Whether it is another program; its line always stands out."""
     limits: str = ""
-    """Why some scenes have no ``values``."""
+    """Why it has no ``values`` for some scenes."""
 
 
 class Jumps:
-    """The jumps of a scene's command, which are known beforehand, in turn."""
+    """The jumps of a scene's command, whose times are known beforehand, one after another."""
 
     def __init__(self, scene: Scene) -> None:
         self._command = command(scene)
         self.next = self._command.next_jump(0.0)
 
     def meet(self, joint: Joint) -> None:
-        """The extrapolation begins anew where ``joint`` has reached a jump."""
+        """Restart the extrapolation if ``joint`` has reached the next jump."""
         if joint.time >= self.next - SAME_TIME:
             self.next = self._command.next_jump(self.next)
             joint.past.restart()
 
 
 Advance = Callable[[Joint, Jumps, Case, float], Iterator[int]]
-"""Takes both sides from each of a case's times to the next; gives the steps so far."""
+"""Takes both sides to each of a case's times in turn, and yields the number of steps so far."""
 
 
 def rewinding(make: Callable[[Any, Any], Joint], advance: Advance) -> Solve:
-    """With participants that can go back."""
+    """A solver of participants that can repeat a step: ``make`` joins them, ``advance`` steps."""
 
     def run(scene: Scene, case: Case, setting: float) -> Outcome:
         jumps = Jumps(scene)
@@ -104,7 +105,7 @@ def rewinding(make: Callable[[Any, Any], Joint], advance: Advance) -> Solve:
 
 def _equal_steps(joint: Joint, jumps: Jumps, case: Case, step: float) -> Iterator[int]:
     """Macro steps of a fixed length."""
-    each = round(case.times()[0] / step)
+    each = round(case.times()[0] / step)  # macro steps from one sample to the next
     for k in range(len(case.times())):
         for _ in range(each):
             joint.step(step)
@@ -113,12 +114,12 @@ def _equal_steps(joint: Joint, jumps: Jumps, case: Case, step: float) -> Iterato
 
 
 def of_case(case: Case, *overrides: str) -> Scene:
-    """The case's scene as long as it is studied."""
+    """The case's scene, with the case's duration and further overrides."""
     return load("reference", [*case.overrides, f"run.duration={case.duration!r}", *overrides])
 
 
 def _led(*overrides: str) -> Solve:
-    """ngspice leads; ``overrides`` contain ``{}`` where the setting goes."""
+    """A solver in which ngspice leads; ``{}`` in ``overrides`` is replaced by the setting."""
 
     def run(scene: Scene, case: Case, setting: float) -> Outcome:
         times = case.times()
@@ -137,6 +138,7 @@ def _led(*overrides: str) -> Solve:
 
 
 def _level(scene: Scene, case: Case, level: float) -> Outcome:
+    """Run the default method with the tolerance and longest step of one of LEVELS."""
     reltol, max_step = LEVELS[round(level)]
     return _led(f"circuit.reltol={reltol!r}", "circuit.max_step={}")(scene, case, max_step)
 
@@ -164,7 +166,7 @@ SOLVERS = (
     Solver(
         "step-locked (default), max_step",
         "circuit.max_step [s]",
-        # So loose that steps are as long as they may be.
+        # The tolerance is so loose that steps are as long as max_step.
         _led("circuit.max_step={}", "circuit.reltol=1e-2"),
         lambda case: _halvings(1e-4, 7),
         methods()["step-locked"]().order,
@@ -214,14 +216,14 @@ class Run:
     value: float
     error: float
     seconds: float
-    """CPU time, until it failed where it did."""
+    """CPU time, of a failed run until it failed."""
     steps: int
-    """Of the circuit; macro steps where these are the circuit's; 0 where unknown."""
+    """Steps of the circuit, which may be macro steps; 0 where unknown."""
     failure: str
 
     @property
     def counts(self) -> bool:
-        """Whether its error is one: not that of a false limit cycle, nor of a diverged run."""
+        """Whether the error is meaningful: not of a failed or diverged run or false limit cycle."""
         return self.failure in ("", NOT_MONOTONE)
 
 
@@ -246,6 +248,7 @@ def measure(case: Case, solvers: Sequence[Solver], rounds: int, store: Store) ->
     seconds: list[list[float]] = [[] for _ in plan]
     for turn in range(rounds):
         for k, (solver, value) in enumerate(plan):
+            # Failed runs, and those that took over 1 s, are not repeated for their time.
             if turn and (done[k][3] or seconds[k][0] > 1.0):
                 continue
             name = f"{case.name}, {solver.name}, {value!r}, {turn}"

@@ -1,4 +1,4 @@
-"""What the study says: gains paired rig by rig, and the sentences made of them."""
+"""The study's answer: gains of each change, paired rig by rig, and the sentences made of them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -22,10 +22,10 @@ GROUPS = {
     "heat": "limit of heat",
     "grip": "grip force",
 }
-"""In words, by what of the device is changed; in the order of the sentences."""
+"""Words for the groups of changes, in the order of the sentences."""
 
 IDEAL, TWICE_HEAT = "ideal current", "heat 7 W"
-"""Changes that the first sentence names."""
+"""Names of the changes that the first sentence reports."""
 
 LEGEND = (
     "Of each change below: the median gain over the rigs, the knobs set anew on each; in brackets "
@@ -34,32 +34,34 @@ LEGEND = (
 )
 
 NINE_IN_TEN = 0.9
+"""Quantile of the differences between repeated searches that counts as the search's noise."""
 
 NAMED, LEAST = 6, 2
-"""Changes that a sentence names at most, so many of them from the other end."""
+"""How many changes a sentence names at most, and how many of these are the worst ones."""
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What a change brings, robust settings against robust ones, on the same rig: 0.1 is 10 %."""
+    """The relative gain of a change: its robust value over that of the unchanged device on the same
+    rig, less 1."""
 
     change: Change
     goal: Goal
     own: float
-    """On the scene's own rig; NaN where nothing was found."""
+    """Gain on the scene's own rig; NaN where nothing was found."""
     every: tuple[float, ...]
-    """On each rig on which both are known."""
+    """Gain on each rig on which both values are known."""
     noise: float
     """The search's own, relative: :func:`noise`."""
 
     @property
     def middle(self) -> float:
-        """The median over all rigs; NaN where there is none."""
+        """The median gain over the rigs; NaN without any."""
         return float(np.median(self.every)) if self.every else nan
 
     @property
     def counts(self) -> bool:
-        """Whether that is more than noise."""
+        """Whether the median gain exceeds the noise."""
         return abs(self.middle) > self.noise
 
 
@@ -68,26 +70,28 @@ def gain_on(rig: Rig, change: Change, goal: Goal) -> float:
     point, own = (rig.point(one, goal, "robust") for one in (change, AS_IT_IS))
     if own is None or point is None:
         return nan
+    # A change that was only tried has its reference at the same settings: ``against``.
     return point.median / (point.against if isfinite(point.against) else own.median) - 1.0
 
 
 def gains(study: Study, goal: Goal) -> list[Gain]:
-    """Of every change, the largest median first; those that find nothing, last."""
-    apart, found = noise(study, goal), []
+    """The gain of every change, the largest median first, those without a value last."""
+    threshold, found = noise(study, goal), []
     for change in study.changes[1:]:
-        every = [gain_on(rig, change, goal) for rig in study.rigs]
-        known = tuple(one for one in every if isfinite(one))
-        found.append(Gain(change, goal, every[0], known, apart))
+        by_rig = [gain_on(rig, change, goal) for rig in study.rigs]
+        known = tuple(gain for gain in by_rig if isfinite(gain))
+        found.append(Gain(change, goal, by_rig[0], known, threshold))
     return sorted(found, key=lambda gain: -gain.middle if gain.every else np.inf)
 
 
 def noise(study: Study, goal: Goal) -> float:
-    """The relative difference that nine in ten robust values of repeated searches do not exceed."""
+    """The search's noise: nine in ten robust values of repeated searches differ by at most this."""
     return float(np.quantile(differences(study, goal), NINE_IN_TEN, method="higher"))
 
 
 def differences(study: Study, goal: Goal) -> list[float]:
-    """Relative differences of robust values of repeated searches on all rigs; 0 where none were."""
+    """Relative differences between the robust values of a repeated and the first search, on all
+    rigs; 0 where no search was repeated."""
     found = []
     for number, points in study.repeats:
         for key, point in points.items():
@@ -117,7 +121,7 @@ def sentences(study: Study) -> list[str]:
 
 
 def _in_short(every: Sequence[Gain]) -> Iterator[str]:
-    """What the amplifier, the shape of the command and the coil's heat each hold back."""
+    """How much the amplifier, the command's waveform and the coil's heat each limit the goal."""
     told = in_short(every)
     if told:
         rigs = max(len(gain.every) for gain in every)
@@ -126,7 +130,8 @@ def _in_short(every: Sequence[Gain]) -> Iterator[str]:
 
 
 def in_short(every: Sequence[Gain], ranges: bool = True) -> str:
-    """The same as a list; empty where one of them is not known."""
+    """The median gains of an ideal current source, of the best other waveform and of twice the
+    heat, as a list in words; empty where one of them is unknown."""
     known = {gain.change.name: gain for gain in every if gain.every}
     shapes = [gain for gain in every if gain.change.group == "waveform" and gain.every]
     if not (shapes and {IDEAL, TWICE_HEAT} <= known.keys()):
@@ -144,12 +149,12 @@ def in_short(every: Sequence[Gain], ranges: bool = True) -> str:
 
 
 def ends(gain: Gain) -> str:
-    """The range over the rigs, %."""
+    """The range of the gain over the rigs, %."""
     return f"{percent(min(gain.every))} to {percent(max(gain.every))}"
 
 
 def percent(share: float) -> str:
-    """With its sign, but no minus before a zero."""
+    """A share in whole %, with its sign, but no minus before a zero."""
     return f"{round(100.0 * share):+d}"
 
 
@@ -180,7 +185,7 @@ def _as_it_is(study: Study, goal: Goal) -> Iterator[str]:
 
 
 def _group(every: Sequence[Gain], group: str) -> Iterator[str]:
-    """What the changes of a group bring: those that exceed the noise most by name."""
+    """The gains of a group's changes: by name where they exceed the noise, else their range."""
     some = [gain for gain in every if gain.change.group == group and gain.every]
     if not some:
         return

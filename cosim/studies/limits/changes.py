@@ -1,4 +1,4 @@
-"""What one can change about the device, one thing at a time, and the knobs that are then turned."""
+"""The changes of the device that are studied, one at a time, and the knobs that are searched."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -19,41 +19,42 @@ Settings = dict[str, Any]
 """Values of keys, ``table.key``, SI."""
 
 RANGE = firmware.GAIN * firmware.volts(firmware.COUNTS - 1)
-"""V: the most that either knob of volts sets at V1."""
+"""V: the highest voltage of V1 that either of the two volt knobs sets."""
 
 STEPS = firmware.COUNTS - 1
-"""Of a knob's whole turn: the firmware reads each in so many, and nothing between them can be set.
-"""
+"""Steps in which the firmware reads a knob's whole turn; nothing between them can be set."""
 
 FREE: Settings = {f"drive.{knob}": None for knob in KNOBS}
-"""Lets amplitude, frequency and offset stand for themselves."""
+"""Removes the knobs from a scene, so that amplitude, frequency and offset can be set directly."""
 
 
 @dataclass(frozen=True)
 class Machine:
-    """The device with something changed, whose knobs, and levels of the command, are searched."""
+    """The device with something changed: its settings, and the ranges in which its knobs, and the
+    levels of a command of its own, are searched."""
 
     settings: Settings = field(default_factory=dict[str, Any])
     reach: float = 1.0
-    """Times the knobs' own range in volts."""
+    """Factor on the knobs' range in volts."""
     pace: float = 1.0
-    """Times the knob's own range in hertz."""
+    """Factor on the knob's range in hertz."""
     heat: float = DRIVE_RANGE_HEAT
-    """W: what the coil may make on average."""
+    """W: the most that the coil may dissipate on average."""
     levels: int = 0
-    """Of a command of its own, at phases evenly spread, that are searched, too."""
+    """Number of levels, at evenly spread phases, of a command of its own; they are searched, too.
+    """
     rung: str = "limited"
-    """The cheapest circuit that it acts in."""
+    """The cheapest circuit in which the change has an effect."""
 
     @property
     def keys(self) -> int:
-        """Dimensions of the unit cube whose points are settings: three knobs, and the levels."""
+        """Dimensions of the unit cube whose points are settings: three knobs, then the levels."""
         return len(KNOBS) + self.levels
 
     def at(self, point: Array, settle: float, span: float) -> Settings:
-        """All that differs from the scene at a point of the cube, as the firmware maps its
-        potentiometers. The third knob sets where the sawtooth's ramp ends, so the mean moves with
-        the amplitude. Whole periods are run: at least ``settle``, then about ``span`` (s)."""
+        """The settings at a point of the cube, as the firmware maps its potentiometers: amplitude,
+        frequency, and the voltage at which the sawtooth's ramp ends, so the mean moves with the
+        amplitude. Whole periods are run: at least ``settle``, then about ``span`` (s)."""
         amplitude, top = self.reach * RANGE * point[0], self.reach * RANGE * point[2]
         hertz = _typed(self.pace * firmware.knob_frequency(point[1] * STEPS / firmware.COUNTS))
         found: Settings = {
@@ -72,8 +73,9 @@ class Machine:
         return found | {"run.settle": settle, "run.duration": settle + span}
 
     def sampled(self, scene: Scene, levels: int) -> Array:
-        """The command's own shape at ``levels`` even phases, as that many further coordinates of a
-        point of the cube; in the middle between two, since a shape may jump at them."""
+        """The command's shape at ``levels`` even phases, as further coordinates of a point of the
+        cube, so that a search over levels can start from it. The shape is read half-way between
+        two phases, since it may jump at a phase."""
         unit: Settings = {"drive.frequency": 1.0, "drive.amplitude": 1.0, "drive.offset": 0.0}
         command = shape(changed(scene, unit | self.settings, "a shape"))
         return command.values((np.arange(levels) + 0.5) / levels) + 0.5
@@ -89,11 +91,11 @@ class Change:
 
     name: str
     group: str
-    """What of the device: ``waveform``, ``heat``, ``grip``, ``circuit``, ``coil`` (and magnet)."""
+    """What it changes: ``waveform``, ``heat``, ``grip``, ``circuit``, ``coil`` (and magnet)."""
     machine: Callable[[Scene], Machine]
     searched: bool = True
-    """Whether the knobs are set anew for it; else it is tried at the best settings of the device as
-    it is, for its runs need ngspice or do nothing to those."""
+    """Whether the knobs are searched for this change. If not, the change is only tried at the
+    robust settings of the unchanged device, since its runs need ngspice or hardly move these."""
 
 
 def _set(*keys: str, value: float | str | bool, **more: Any) -> Callable[[Scene], Machine]:
@@ -113,7 +115,8 @@ def _times(factor: float, *keys: str, **more: Any) -> Callable[[Scene], Machine]
 
 
 def _rewound(factor: float, scene: Scene) -> Machine:
-    """A coil of so many times the turns in the same room: the same force of the same heat."""
+    """A coil of ``factor`` times the turns in the same volume: the same heat gives the same force,
+    as Bl grows with the turns, resistance and inductance with their square."""
     found: Settings = {"coil.force_factor": factor * scene.coil.force_factor}
     for name in ("resistance", "inductance", "eddy_resistance", "eddy_inductance"):
         if (value := getattr(scene.coil, name)) is not None:
@@ -122,7 +125,7 @@ def _rewound(factor: float, scene: Scene) -> Machine:
 
 
 def _sense(value: float, scene: Scene) -> Machine:
-    """The same range of currents over another resistor."""
+    """Another sense resistor, with the knobs' range scaled to the same range of currents."""
     key = "circuit.sense_resistance"
     return Machine({key: value}, reach=value / scene.circuit.sense_resistance)
 

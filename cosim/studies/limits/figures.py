@@ -23,12 +23,12 @@ COLORS = {
     **{"": "0.15", "waveform": VERMILION, "heat": ORANGE, "grip": GREEN},
     **{"circuit": BLUE, "coil": PURPLE},
 }
-"""By what of the device is changed; the device as it is stands on top of the others."""
+"""Colour of each group of changes; the unchanged device is drawn on top of the others."""
 MARKERS = dict(zip(COLORS, "D^svoP", strict=True))
 
 
 def changes(study: Study, goal: Goal) -> Picture:
-    """A row for each change, the largest gain on top: what it brings robustly, in %."""
+    """A row for each change with its robust gain in %, the largest on top."""
     every = [gain for gain in gains(study, goal) if gain.every]
     note = (
         "Robust: the median over errors of ±2 % in the knobs, set anew for each change on each rig "
@@ -41,8 +41,8 @@ def changes(study: Study, goal: Goal) -> Picture:
     said = in_short(every, ranges=False)
     title = f"{goal.title.capitalize()}: {said}" if said else goal.title
     figure, (axis,) = panels(title, note, (10.0, 0.27 * len(every) + 1.9))
-    apart = 100.0 * noise(study, goal)
-    axis.axvspan(-apart, apart, color="0.88", zorder=0)
+    scatter = 100.0 * noise(study, goal)
+    axis.axvspan(-scatter, scatter, color="0.88", zorder=0)
     axis.axvline(0.0, color="0.15", lw=1.0)
     upwards = every[::-1]
     for row, gain in enumerate(upwards):

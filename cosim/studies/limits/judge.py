@@ -1,8 +1,8 @@
-"""Judges what a search found by longer runs of circuits with more in them.
+"""Judges the candidates of a search by longer runs and more detailed circuits.
 
-A search looks at a second of motion in fixed steps. Here the FMU finds each event, over at least
-SETTLE + SPAN; a setting whose last quarter differs from its last half is not settled. The best of
-those that are, and make no more heat than they may, stands for its machine.
+A search runs about a second of motion in fixed steps. Here the FMU locates each event, over at
+least SETTLE + SPAN. A setting whose score in the last quarter differs from that in the last half is
+not settled. The best settled candidate that is feasible represents its machine.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,12 +22,13 @@ SETTLE, SPAN = 1.5, 1.5
 """s, left out of averages and averaged over, at least."""
 
 SHORT = 0.6
-"""s, left out of averages where ngspice runs all turns of a setting."""
+"""s, left out of averages where ngspice runs all turns of a setting, which takes long."""
 
 SETTLED = 0.01
-"""Relative difference between the last quarter and the last half of a run that is settled."""
+"""Relative difference between last quarter and last half of a run up to which it is settled."""
 
 NUMBER = {goal.name: number for number, goal in enumerate(GOALS)}
+"""The index of each goal in the scores."""
 
 Key = tuple[str, str, str]
 """Names of a change, a goal and a kind."""
@@ -35,34 +36,35 @@ Key = tuple[str, str, str]
 
 @dataclass(frozen=True)
 class Point:
-    """What a setting achieves, SI: by itself, and over the turns of the knobs."""
+    """What a setting achieves, SI: its own ``value``, and ``median`` and ``worst`` over the turns
+    of the knobs."""
 
     value: float
     median: float
     worst: float
     heat: float
-    """W, of a coil."""
+    """Of one coil, W."""
     v_average: float
-    """m/s, whatever was wanted."""
+    """Mean velocity of the part upwards (m/s), whatever the goal."""
     a_camera: float
-    """m/s², downwards."""
+    """Largest downward acceleration (m/s²) as a camera reads it, whatever the goal."""
     point: list[float]
-    """Of the machine's cube."""
+    """The setting as a point of the machine's cube."""
     settings: Settings
     rung: str = ""
     """The circuit that confirms or refutes it; empty where none was asked."""
     there: float = nan
-    """Its value there."""
+    """The setting's value on that circuit."""
     against: float = nan
-    """What the device as it is achieves at the same setting on the same circuit, by the median;
-    NaN where it has settings of its own."""
+    """The median of the unchanged device at the same setting on the same circuit, if the change was
+    only tried there; NaN where the knobs were searched for it."""
 
     @property
     def confirmed(self) -> bool:
         return relative_error(self.value, self.there) <= SETTLED
 
     def rank(self, kind: str) -> float:
-        """What is to be large."""
+        """The number by which candidates of a kind are compared."""
         return self.value if kind == "best" else self.median
 
 
@@ -72,17 +74,17 @@ def judged(
     candidates: Mapping[str, Candidates],
     kinds: Sequence[str],
 ) -> dict[Key, Point]:
-    """For each machine, goal and one of ``kinds`` the best of the candidates that are settled and
-    feasible; none where there is none, or where none achieves anything."""
+    """For each machine, goal and kind of ``kinds`` the best candidate that is settled and feasible;
+    no entry where no candidate is, or where none has a positive rank."""
     asked = [
         ((name, goal.name, kind), np.array(point))
-        for name, of in candidates.items()
+        for name, by_kind in candidates.items()
         for kind in kinds
-        for goal, some in zip(GOALS, of[kind], strict=True)
-        for point in some
+        for goal, points in zip(GOALS, by_kind[kind], strict=True)
+        for point in points
     ]
     good = _settled(bench, machines, asked)
-    # A list for each candidate: the setting itself, then all turns of its knobs.
+    # The first of the points around p, and so of each group of runs, is p itself.
     runs = [[machines[key[0]].at(one, SETTLE, SPAN) for one in around(p)] for key, p in good]
     found: dict[Key, Point] = {}
     for (key, middle), settings, outcomes in zip(good, runs, bench.outcomes(runs), strict=True):
@@ -97,16 +99,16 @@ _Asked = list[tuple[Key, Array]]
 
 
 def _settled(bench: Bench, machines: Mapping[str, Machine], asked: _Asked) -> _Asked:
-    """The candidates that are settled and feasible; of the kind "best" only the best one of each
-    machine and goal, as the turns of the others would be run for nothing."""
-    # Averages over the last half and over the last quarter of the same run.
+    """The candidates that are settled and feasible; of the kind "best" only the highest score for
+    each machine and goal, since their turns need not be run."""
+    # The last half and the last quarter of the same motion, if this has settled.
     times = (SETTLE, SPAN), (SETTLE + SPAN / 2.0, SPAN / 2.0)
     runs = [[machines[key[0]].at(point, *each) for each in times] for key, point in asked]
     found: _Asked = []
     top: dict[Key, float] = {}
-    for (key, point), both in zip(asked, bench.outcomes(runs), strict=True):
-        values = [scored(one)[NUMBER[key[1]]] for one in both]
-        if not bench.feasible(machines[key[0]], both[0]) or relative_error(*values) > SETTLED:
+    for (key, point), pair in zip(asked, bench.outcomes(runs), strict=True):
+        values = [scored(outcome)[NUMBER[key[1]]] for outcome in pair]
+        if not bench.feasible(machines[key[0]], pair[0]) or relative_error(*values) > SETTLED:
             continue
         if key[2] != "best":
             found.append((key, point))
@@ -129,44 +131,44 @@ def _point(goal: str, middle: list[float], turns: Sequence[Outcome], settings: S
 def confirmed(
     bench: Bench, machines: Mapping[str, Machine], points: Mapping[Key, Point]
 ) -> dict[Key, Point]:
-    """The points with what the amplifier says of them, or the whole schematic where the current
-    limit acts, which the amplifier does not have."""
+    """The points with their value on a circuit that ngspice solves: the amplifier, or the whole
+    schematic where the current limit acts, which the amplifier lacks."""
     fidelity, own = Fidelity.of(bench.scene), bench.scene.circuit.current_limit
     asked = {key: point for key, point in points.items() if machines[key[0]].rung == SEARCHES}
     run = bench.evaluator.outcomes
-    every: list[Settings] = []
+    detailed: list[Settings] = []
     outcomes = run([point.settings for point in asked.values()])
     for point, outcome in zip(asked.values(), outcomes, strict=True):
         current = max(outcome.numbers["current_max"], -outcome.numbers["current_min"])
         limit = point.settings.get("circuit.current_limit", own)
         rung = fidelity.judge(current * bench.scene.coil.count, limit)
-        every.append(point.settings | {"circuit.model": rung})
+        detailed.append(point.settings | {"circuit.model": rung})
     found = dict(points)
-    for key, there, outcome in zip(asked, every, run(every), strict=True):
+    for key, settings, outcome in zip(asked, detailed, run(detailed), strict=True):
         value = scored(outcome)[NUMBER[key[1]]]
-        found[key] = replace(points[key], rung=there["circuit.model"], there=value)
+        found[key] = replace(points[key], rung=settings["circuit.model"], there=value)
     return found
 
 
 def tried(
     bench: Bench, machines: Mapping[str, Machine], names: Sequence[str], own: Mapping[Key, Point]
 ) -> dict[Key, Point]:
-    """The machines of ``names`` at the robust settings of the device as it is (``own``), against
-    that device on the same circuit."""
+    """The machines of ``names`` at the robust settings of the unchanged device (``own``), each
+    compared with the unchanged device at the same setting on the same circuit."""
     found: dict[Key, Point] = {}
     for (as_it_is, goal, kind), point in own.items():
         if kind != "robust":
             continue
         for name in names:
-            here = machines[name]
-            there = replace(machines[as_it_is], rung=here.rung)
-            each = [
-                [machine.at(one, SHORT, SPAN) for one in around(np.array(point.point))]
-                for machine in (here, there)
+            changed = machines[name]
+            unchanged = replace(machines[as_it_is], rung=changed.rung)
+            runs = [
+                [machine.at(turn, SHORT, SPAN) for turn in around(np.array(point.point))]
+                for machine in (changed, unchanged)
             ]
-            told, others = bench.outcomes(each)
-            if not any(one.failure for one in (*told, *others)):
-                median = _point(goal, point.point, others, each[1][0]).median
-                one = _point(goal, point.point, told, each[0][0])
-                found[name, goal, kind] = replace(one, against=median)
+            outcomes, others = bench.outcomes(runs)
+            if not any(outcome.failure for outcome in (*outcomes, *others)):
+                median = _point(goal, point.point, others, runs[1][0]).median
+                judged_point = _point(goal, point.point, outcomes, runs[0][0])
+                found[name, goal, kind] = replace(judged_point, against=median)
     return found

@@ -1,4 +1,4 @@
-"""The whole study, and limits.csv, limits.md and the figures that it leaves."""
+"""The function that users call, and its report: limits.csv, limits.md and the figures."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,11 +23,11 @@ from cosim.studies.study import check_seed
 
 STORE = "limits.sqlite"
 
-LEAST_EFFORT, MOST_EFFORT = 0.01, 100.0
+LEAST_EFFORT, MOST_EFFORT = 0.01, 100.0  # range of the factor ``effort``
 
 
 def report(found: Study, asked: str) -> Report:
-    """What the study tells; ``asked`` are the words after ``cosim run`` for its scene."""
+    """The report of a study; ``asked`` are the words that name its scene in ``cosim run``."""
     said, groups = sentences(found), {change.name: change.group for change in CHANGES}
     tables: dict[str, Sequence[Row]] = {
         f"What each change brings: {goal.title} [{goal.unit}]": [*_gains(found, goal)]
@@ -80,8 +80,8 @@ def _row(goal: Goal, point: Point) -> Row:
 
 
 def _gains(found: Study, goal: Goal) -> Iterator[Row]:
-    """A row for the device as it is and for each change, the largest median gain first."""
-    every, apart = gains(found, goal), noise(found, goal)
+    """A row for the unchanged device, then for each change, the largest median gain first."""
+    every, scatter = gains(found, goal), noise(found, goal)
     for change, gain in ((AS_IT_IS, None), *((gain.change, gain) for gain in every)):
         robust, best = (found.rigs[0].point(change, goal, kind) for kind in ("robust", "best"))
         own = rigs = "-" if gain else ""
@@ -95,7 +95,7 @@ def _gains(found: Study, goal: Goal) -> Iterator[Row]:
             "worst of its turns": robust.worst * goal.scale if robust else nan,
             "gain [%]": own,
             "over the rigs: median (range) [%]": rigs,
-            "noise [%]": f"{100.0 * apart:.1f}",
+            "noise [%]": f"{100.0 * scatter:.1f}",
             "best": best.value * goal.scale if best else nan,
             "its median": best.median * goal.scale if best else nan,
         }

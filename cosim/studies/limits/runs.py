@@ -1,4 +1,4 @@
-"""What runs of a machine tell: the quantities that are wanted large, and what the coil bears."""
+"""Runs of a machine: the goals that they score, and the limits of coil and amplifier."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,14 +27,14 @@ Numbers = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Goal:
-    """A number that is wanted large."""
+    """A number of a run's summary that is to be maximised."""
 
     name: str
     title: str
     unit: str
-    """That of tables and figures."""
+    """Unit in tables and figures."""
     scale: float
-    """From SI to it."""
+    """Factor from SI to this unit."""
     of: Callable[[Numbers], float]
 
 
@@ -48,11 +48,11 @@ GOALS = (
 )  # fmt: skip
 
 NEEDED = ("v_average", "a_camera_min", "current_max", "current_min", "coil_heat")
-"""The numbers that anything here is made of."""
+"""The numbers of a summary that goals and limits need."""
 
 
 def scored(outcome: Outcome) -> list[float]:
-    """Each of GOALS, SI; -inf where there is none."""
+    """The score of each of GOALS, SI; -inf where the run failed or has no such number."""
     if outcome.failure:
         return [-np.inf] * len(GOALS)
     found = np.array([goal.of(outcome.numbers) for goal in GOALS])
@@ -60,7 +60,7 @@ def scored(outcome: Outcome) -> list[float]:
 
 
 def around(point: Array) -> Array:
-    """A point of a machine's cube and all turns of its knobs (rows)."""
+    """A point of a machine's cube, then all turns of its knobs (rows)."""
     return turned(point, len(KNOBS))
 
 
@@ -71,21 +71,22 @@ class Bench:
     scene: Scene
     evaluator: Evaluator
     only: int | None = None
-    """Of GOALS, the one that is scored, so that nothing else is searched; all unless told."""
+    """Index of the only goal that is scored, so that no other one is searched; None: all."""
 
     @staticmethod
     def base(scene: Scene, rig: Settings, told: str) -> Scene:
-        """A scene as its knobs are searched, on a rig that is from ``told``. Raises BadInput."""
+        """A scene prepared for the search of its knobs, on a rig; ``told`` names the rig's source
+        in messages. Raises BadInput."""
         alone = {"circuit.model": "limited", "drive.pwm_ripple": False, "drive.quantised": False}
         return changed(scene, FREE | alone | rig, told)
 
     def outcomes(self, groups: Sequence[Sequence[Settings]]) -> list[list[Outcome]]:
-        """What becomes of groups of settings, all run at once."""
+        """The outcomes of groups of settings, all run at once."""
         found = dict(self.evaluator.groups(groups))
         return [found[number] for number in range(len(groups))]
 
     def feasible(self, machine: Machine, outcome: Outcome) -> bool:
-        """Whether a run keeps within what the coil and the power amplifier bear."""
+        """Whether a run stays within the machine's heat and the power amplifier's peak current."""
         if outcome.failure:
             return False
         told = outcome.numbers
@@ -97,16 +98,20 @@ class Bench:
         return self._scores(machine, lambda point: point[np.newaxis])
 
     def over_turns(self, machine: Machine) -> Evaluate:
-        """Medians of the scores over the turns of the knobs about points of the machine's cube. The
-        turns are judged by their motion, not by their heat: a hand that is off turns back."""
+        """Medians of the scores over the turns of the knobs about points of the machine's cube.
+        Only the point itself must be feasible, not its turns: a hand that is off turns back."""
         return self._scores(machine, around)
 
-    def _scores(self, machine: Machine, every: Callable[[Array], Array]) -> Evaluate:
-        scouted = self._scout(machine)
+    def _scores(self, machine: Machine, neighbours: Callable[[Array], Array]) -> Evaluate:
+        """Medians of the scores over the ``neighbours`` (rows) of a point, itself the first."""
+        settings_at = self._scout(machine)
 
         def evaluate(points: Array) -> tuple[Array, Feasible]:
-            groups = self.outcomes([[scouted(one) for one in every(point)] for point in points])
+            groups = self.outcomes(
+                [[settings_at(one) for one in neighbours(point)] for point in points]
+            )
             allowed = np.array([self.feasible(machine, group[0]) for group in groups], bool)
+            # points × neighbours × goals, reduced to points × goals.
             scores = np.median([[*map(scored, group)] for group in groups], axis=1)
             if self.only is not None:
                 scores[:, np.arange(len(GOALS)) != self.only] = -np.inf
@@ -115,7 +120,7 @@ class Bench:
         return evaluate
 
     def _scout(self, machine: Machine) -> Callable[[Array], Settings]:
-        """Makes the settings of a point, for the fast solver where that can run the machine."""
+        """A function from a point to its settings, with the fast solver if it can run them."""
         solver = "fast"
         try:
             middle = machine.at(np.full(machine.keys, 0.5), SETTLE, SPAN)
@@ -126,7 +131,7 @@ class Bench:
 
 
 def command(asked: str, settings: Settings) -> str:
-    """The one command that repeats a run of the scene that was ``asked`` for."""
+    """The `cosim run` command that repeats a run; ``asked`` are the words that name its scene."""
     rows = {"run.output_step": float(settings["run.duration"]) / 2.0}
     words = (f"--set {key}={_typed(value)}" for key, value in (settings | rows).items())
     return f"cosim run {asked} {' '.join(words)}"

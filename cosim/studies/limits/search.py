@@ -1,7 +1,8 @@
-"""The search of one machine: settings that are the best, and those that stay good when knobs turn.
+"""The search of one machine, for the best settings and for robust ones.
 
-The best is sought by single runs: a design, then climbs. What stays good is sought by the medians
-over all turns of the knobs, beginning where single runs show good surroundings.
+The best settings are found by single runs: a space-filling design, then climbs. Robust ones
+maximise the median over all turns of the knobs; their search starts from points whose neighbours
+did well in single runs.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,29 +20,29 @@ from cosim.studies.limits.runs import GOALS, Bench
 KINDS = ("best", "robust")
 
 Candidates = Mapping[str, Sequence[Sequence[Sequence[float]]]]
-"""For each of KINDS and of GOALS the points that did best, the first one first."""
+"""For each of KINDS and of GOALS the best points, the very best first."""
 
 APART, KEPT, BEST = 0.03, 4, 12
-"""How far apart the points are that a search tells, and how many for each goal: of the robust ones,
-and of the best, of which many are nothing by longer runs where motion is chaotic."""
+"""Least distance (in the cube) of the points that a search returns, and their number for each goal:
+of robust ones, and of best ones, many of which fail in longer runs where motion is chaotic."""
 
 CLOSE = 0.015
-"""The same of those whose turns are run since single runs show good surroundings."""
+"""Least distance of the points from which the search for robust settings starts."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Points that a search may ask for."""
+    """Numbers of points that a search may run."""
 
     design: int
-    """That fill the cube."""
+    """Points of the design, which fills the cube."""
     climb: int
-    """Of climbs to the best, for each goal, each one run."""
+    """Points of the climbs to best settings, for each goal; each point is one run."""
     turned: int
-    """Of climbs to what is robust, for each goal, each with all its turns."""
+    """Points of the climbs to robust settings, for each goal; each is run with all its turns."""
 
     def times(self, factor: float) -> "Effort":
-        """So many times as much."""
+        """This effort multiplied by a factor."""
         return replace(self, **{name: ceil(factor * many) for name, many in vars(self).items()})
 
 
@@ -53,17 +54,18 @@ def searched(
     own: Candidates | None = None,
     warm: Sequence[Candidates] = (),
 ) -> Candidates:
-    """The candidates of a machine, from its ``own``, as far as they are known, and from ``warm``
-    starts, those of others whose cubes have the same dimensions. What is robust there need not show
-    it here by single runs: the turns of the best of it are run in any case."""
+    """The candidates of a machine. Warm starts are its ``own`` earlier candidates, and those of
+    other machines (``warm``), as far as their cubes have the same dimensions. Single runs need not
+    show that a robust point of another machine is robust here, too: so the turns of the best of
+    these points are run in any case."""
     keys = machine.keys
     # ``once`` keeps scores of single runs, ``over_turns`` the medians over all turns of the knobs.
     once = Known(keys, len(GOALS), STEPS, bench.once(machine))
     over_turns = Known(keys, len(GOALS), STEPS, bench.over_turns(machine))
-    for one in [own, *warm] if own else warm:
+    for start in [own, *warm] if own else warm:
         for kind in KINDS:
-            once.rows(_points(one[kind], keys))
-    others = [row for one in warm for row in once.rows(_points(one["robust"], keys))]
+            once.rows(_points(start[kind], keys))
+    others = [row for start in warm for row in once.rows(_points(start["robust"], keys))]
     if effort.design:
         once.search({0: Design(keys, effort.design, [*seed, 0], ends=True)}, effort.design)
     once.search({n: Climb(keys, [*seed, 1, n]) for n in _within_reach(once)}, effort.climb)
@@ -80,16 +82,17 @@ def searched(
 
 
 def _within_reach(known: Known) -> list[int]:
-    """The goals for which there is a point to climb from."""
+    """The indices of the goals for which a feasible point with a score is known."""
     return np.flatnonzero(np.isfinite(known.tops())).tolist()
 
 
 def _points(every: Sequence[Sequence[Sequence[float]]], keys: int) -> Array:
-    """Those (rows) that have so many keys."""
+    """The points of all goals (rows) that have ``keys`` coordinates."""
     found = [point for some in every for point in some if len(point) == keys]
     return np.array(found).reshape(-1, keys)
 
 
 def _told(known: Known, count: int) -> list[list[list[float]]]:
+    """For each goal the ``count`` best points that are APART, as lists for the store."""
     found: list[Array] = [known.ranked(n, APART, count) for n in range(len(GOALS))]
     return [points.tolist() for points in found]

@@ -23,24 +23,25 @@ from cosim.studies.limits.search import KINDS, Candidates, Effort, searched
 
 @dataclass(frozen=True)
 class Efforts:
-    """What the searches may cost: of each machine by itself, then, as often as there is more, once
-    all others are known as far as they were searched before."""
+    """The efforts of the searches. Each tuple has one effort for each turn: in the first turn every
+    machine is searched by itself, in later ones from the candidates of all machines so far."""
 
     own: tuple[Effort, ...]
+    """On the scene's own rig."""
     others: tuple[Effort, ...]
-    """On the other rigs, whose searches begin with what was found on the scene's own."""
+    """On each other rig, where searches start from what was found on the scene's own."""
     again: int
-    """How often some machines are searched with other seeds on the scene's own rig, and once on
-    each other, which tells the search's noise."""
+    """How often the machines of REPEATED are searched again with other seeds on the scene's own
+    rig (once at most on each other rig), which shows the search's noise."""
 
     def times(self, factor: float) -> "Efforts":
-        """So many times as much."""
+        """These efforts multiplied by a factor."""
         own = tuple(one.times(factor) for one in self.own)
         return Efforts(own, tuple(one.times(factor) for one in self.others), self.again)
 
 
 _NONE = Effort(0, 0, 0)
-"""What is found late is tried on all others, no more."""
+"""A turn that only evaluates the best candidates of all other machines."""
 FULL = Efforts(
     own=(Effort(512, 300, 120), Effort(0, 100, 80), _NONE),
     others=(Effort(512, 80, 0), Effort(0, 40, 120), Effort(0, 0, 80)),
@@ -50,39 +51,40 @@ _FEW = Effort(32, 20, 10)
 QUICK = Efforts(own=(Effort(64, 40, 20), _FEW), others=(_FEW, Effort(0, 10, 10)), again=1)
 
 REPEATED = ("as it is", "falling sawtooth", "sine", "supply ±10 V")
-"""Changes that are searched again."""
+"""Changes whose search is repeated with other seeds."""
 
 
 @dataclass(frozen=True)
 class Rig:
-    """What was found on one rig."""
+    """The results on one rig."""
 
     settings: Settings
     points: dict[Key, Point]
 
     def point(self, change: Change, goal: Goal, kind: str) -> Point | None:
-        """What stands for a change; None where nothing was found."""
+        """The judged point of a change; None where no candidate passed."""
         return self.points.get((change.name, goal.name, kind))
 
 
 @dataclass(frozen=True)
 class Study:
-    """What was found: on the scene's own rig, first, and on others."""
+    """The results of the study: on the scene's own rig, the first, and on the others."""
 
     scene: Scene
     changes: Sequence[Change]
     rigs: list[Rig]
     repeats: Sequence[tuple[int, Mapping[Key, Point]]]
-    """Rigs, by their numbers, and what REPEATED reach there, searched with other seeds."""
+    """Repeated searches: the number of a rig, and the points of REPEATED there."""
 
     @property
     def slips(self) -> list[Mapping[str, tuple[float, float]]]:
-        """Accelerations, m/s², of the surface on each rig beyond which a part slips, up or down."""
+        """For each rig the accelerations of the surface (m/s², least and most) beyond which a part
+        slips, while it moves up or down."""
         return [budget(Bench.base(self.scene, rig.settings, "a rig")) for rig in self.rigs]
 
 
 def steps(efforts: Efforts, changes: Sequence[Change], rigs: int) -> int:
-    """How many steps :func:`study` tells."""
+    """How many steps :func:`study` reports to ``told``."""
     some = sum(change.searched for change in changes)
     repeated = sum(change.name in REPEATED for change in changes)
 
@@ -104,8 +106,8 @@ def study(
 ) -> Study:
     """Search and judge ``changes`` on the scene's own rig and on ``rigs``.
 
-    ``store`` keeps what is found, machine by machine; ``open_`` makes the evaluator of a rig.
-    ``told`` hears of each step. The same for the same seed.
+    ``store`` keeps the results, machine by machine; ``open_`` makes the evaluator of a rig.
+    ``told`` is called at each step. Equal seeds give equal results.
     """
     found: list[Rig] = []
     repeats: list[tuple[int, dict[Key, Point]]] = []
@@ -117,7 +119,8 @@ def study(
         with open_(base) as evaluator:
             work = _Work(Bench(base, evaluator), store, number, changes, told)
             cost = efforts.others if number else efforts.own
-            # What a seed has found on the scene's own rig is where its searches of others begin.
+            # Turn 0 is the study, further turns repeat REPEATED with other seeds. On other rigs a
+            # turn starts from the candidates of the same turn on the scene's own rig.
             for turn in range(1 + (min(1, efforts.again) if number else efforts.again)):
                 known, asked = own[turn] if number else {}, again if turn else first
                 both = work.searched(asked, cost, [seed, number, turn], known)
@@ -133,7 +136,7 @@ def study(
 
 @dataclass(frozen=True)
 class _Work:
-    """What is done on one rig, each piece once: ``store`` keeps it."""
+    """The searches on one rig; ``store`` keeps the result of each."""
 
     bench: Bench
     store: Store
@@ -148,9 +151,9 @@ class _Work:
         seed: list[int],
         known: Mapping[str, Candidates],
     ) -> dict[str, Candidates]:
-        """The candidates of each change by name, from those that are ``known``: first each by
-        itself, then with the best of all others, so that what helps one is tried on all, and a
-        limit that is eased never lowers what is found."""
+        """The candidates of each change by name, starting from ``known`` ones. In the first turn
+        each change is searched by itself; in later turns also from the best of all others: so what
+        helps one change is tried on all, and easing a limit never lowers what is found."""
         found = dict(known)
         for turn, effort in enumerate(efforts):
             before, found = found, dict[str, Candidates]()
@@ -165,18 +168,18 @@ class _Work:
         return found
 
     def _warm(self, change: Change, other: Change, found: Mapping[str, Candidates]) -> Candidates:
-        """The best one for each goal of another change, its shape as levels where this one's
-        command has such: the nearest that it has."""
-        machine, there = (one.machine(self.bench.scene) for one in (change, other))
+        """The best candidate for each goal of another change, as a start for ``change``. Where only
+        the latter's command consists of levels, they are sampled from the other's waveform."""
+        machine, donor = (each.machine(self.bench.scene) for each in (change, other))
         more: list[float] = []
-        if machine.levels and not there.levels:
-            more = there.sampled(self.bench.scene, machine.levels).tolist()
+        if machine.levels and not donor.levels:
+            more = donor.sampled(self.bench.scene, machine.levels).tolist()
         of = found[other.name]
         return {kind: [[[*one, *more] for one in some[:1]] for some in of[kind]] for kind in KINDS}
 
     def points(self, candidates: dict[str, Candidates], turn: int, own: bool) -> dict[Key, Point]:
-        """The judged points of machines, searched for the first time or again (``turn``); those of
-        the scene's ``own`` rig also by the amplifier, with the changes that are not searched."""
+        """The judged points of the ``candidates`` of a turn. With ``own`` (turn 0 on the scene's
+        rig) ngspice confirms them, and the changes that are not searched are tried."""
         found = self.store.once(f"judged {self.rig} {turn}", partial(self._judge, candidates, own))
         self.told(f"rig {self.rig}: judged")
         return {(change, goal, kind): Point(**of) for (change, goal, kind), of in found}
@@ -195,27 +198,25 @@ class _Work:
 
 
 ALIKE = 1.25
-"""Ratio of the values of every key up to which a rig is the scene's own, by the digits and the step
-that a search ended with."""
+"""Ratio of values up to which a rig counts as the scene's own, if all its keys keep to it: a search
+ends with a finite step, and files round."""
 
 
 MOST_BYTES = 1 << 24
-"""Of a file of rigs."""
+"""Largest size of a file of rigs."""
 
 MOST_RATIO = 1e6
-"""Of normal forces."""
+"""Largest ratio of a rig's normal force to the scene's."""
 
 _OF_A_RIG = re.compile(r"(coil|mechanics|friction|circuit)\.(?!model$|param\.).*")
 _TABLES = "these are in the tables coil, mechanics, friction and circuit, but for circuit.model"
-"""What drives the machine, and how it is run, is the study's own."""
+"""Which keys a rig may have: drive and run are set by the study itself."""
 
 
 def ensemble(path: Path, scene: Scene) -> list[Settings]:
-    """The rigs of a file, without those for which the scene stands: the tables of its list
-    ``ensemble``, each of keys ("table.key") and values, SI; of entries without a dot only
-    ``normal_force_ratio`` counts, by which a rig wants another normal force than the scene's, N.
-
-    Raises BadInput.
+    """The rigs in a file's list ``ensemble``, without those that are the scene's own: tables of
+    keys ("table.key") and values, SI. Of entries without a dot only ``normal_force_ratio`` is used:
+    the ratio of the rig's normal force to the scene's. Raises BadInput.
     """
     name = plain(path)
     content = read(path, MOST_BYTES)
@@ -249,6 +250,7 @@ def ensemble(path: Path, scene: Scene) -> list[Settings]:
 
 
 def _is_own(scene: Scene, rig: Settings) -> bool:
+    """Whether all values of a rig are those of the scene: words equal, numbers within ALIKE."""
     known = scene.as_dict()
     for key, value in rig.items():
         table, _, name = key.partition(".")

@@ -1,4 +1,4 @@
-"""What to measure next, and measure.csv, measure.md and the figure that it leaves."""
+"""The function that users call, and its report: measure.csv, measure.md and the figure."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -34,11 +34,11 @@ from cosim.studies.study import check_seed
 from cosim.waveforms.quantities import signed
 
 RIGS, QUICK, LEAST = 48, 24, 4
-"""Rigs of the sample, with ``quick``, and those that a file must name at least."""
+"""Number of rigs in the sample; with ``quick``; least number of rigs in a file."""
 
 WIDTH, LEFT = "width [mm/s]", "left [%]"
 NOTHING, USELESS = "nothing", "chance"
-"""Rows of no measurement, and of one that has nothing to do with what is wanted."""
+"""Names of two rows: no measurement, and a measurement that does not depend on the targets."""
 
 
 def measure(
@@ -85,8 +85,8 @@ def measure(
 
 
 def worths(found: Sample, seed: int) -> tuple[list[Worth], list[tuple[Candidate, list[Worth]]]]:
-    """For each of TARGETS: the worth of no measurement, and of each, that which leaves the least
-    of the first target before."""
+    """For each of TARGETS the worth of no measurement, and that of each candidate, sorted by the
+    width that it leaves of the first target."""
     nothing = np.empty((len(found.targets), 0))
     now = worth(nothing, nothing, found.targets, np.random.default_rng(seed))
     each = [
@@ -97,8 +97,8 @@ def worths(found: Sample, seed: int) -> tuple[list[Worth], list[tuple[Candidate,
 
 
 def report(found: Sample, given: int, seed: int, currents: tuple[float, float]) -> Report:
-    """What the sample tells; ``given`` of its rigs are those of the file, and the device's source
-    holds ``currents`` (A) at least and at most."""
+    """The report of a sample. ``given`` of its rigs are those of the file; the device's source can
+    hold ``currents`` (A, least and most) in its coil."""
     low, high = currents
     now, each = worths(found, seed)
     values = dict(zip(CANDIDATES, found.values, strict=True))
@@ -110,6 +110,7 @@ def report(found: Sample, given: int, seed: int, currents: tuple[float, float]) 
     ]
     rows = [_row(*one, now) for one in told]
     (first, best), (second, next_) = each[:2]
+    # By rig: the median width that the other measurements leave.
     usual = np.median([after[0].each for _, after in each[1:]], axis=0)
     often = 100.0 * np.mean(best[0].each < usual)
     other, leaves = min(each, key=lambda pair: pair[1][1].width)
@@ -151,18 +152,19 @@ def _row(
     name: str, how: str, accuracy: str, over: str, after: Sequence[Worth], now: Sequence[Worth]
 ) -> Row:
     row: Row = {"measurement": name, "accuracy": accuracy, "90 % of the rigs": over}
-    for target, here, before in zip(TARGETS, after, now, strict=True):
+    for target, left, before in zip(TARGETS, after, now, strict=True):
         row |= {
-            f"{target}: {WIDTH}": here.width * 1e3,
-            f"{target}: ± [mm/s]": here.error * 1e3,
-            f"{target}: {LEFT}": 100.0 * here.width / before.width,
-            f"{target}: holds [%]": 100.0 * here.held,
+            f"{target}: {WIDTH}": left.width * 1e3,
+            f"{target}: ± [mm/s]": left.error * 1e3,
+            f"{target}: {LEFT}": 100.0 * left.width / before.width,
+            f"{target}: holds [%]": 100.0 * left.held,
         }
     return row | {"how": how}
 
 
 def _films(values: Mapping[Candidate, Array]) -> str:
-    """What the films of three shapes show, of nine rigs in ten."""
+    """The mean velocities in the films of three waveforms, from the 5 % to the 95 % quantile over
+    the rigs, in words."""
     shapes = ("rising sawtooth", "falling sawtooth", "sine")
     ends = {one.name: np.quantile(shown[:, 0], (0.05, 0.95)) * 1e3 for one, shown in values.items()}
     told = ((shape, [signed(end, ".0f") for end in ends[f"film, {shape}"]]) for shape in shapes)
@@ -187,7 +189,7 @@ def _range(one: Candidate, values: Array) -> str:
 
 
 def draw(rows: Sequence[Row], title: str) -> Picture:
-    """The widths after each measurement."""
+    """Draw the widths that each measurement leaves, a panel for each target."""
     note = (
         "Bars: expected width of the 90 % interval of the robust v_up after one measurement, ± "
         "standard error. Solid line: now; dotted: after one that tells nothing."

@@ -1,5 +1,5 @@
-"""The rigs that may be meant, and what each one shows: on every gauge, in every film, and robustly
-at most as velocity upwards."""
+"""The sample of rigs that may be the true one, and for each rig the value that every measurement
+would show and the largest robust velocity upwards."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,16 +22,18 @@ from cosim.studies.limits.search import Candidates, Effort, searched
 UP = NUMBER["v_up"]
 BY_NAME = {change.name: change for change in CHANGES}
 TARGETS = (AS_IT_IS.name, "falling sawtooth")
-"""The machines of which the robust velocity upwards is wanted: that of all measured trials, and one
-of the shapes that are said to bring most."""
+"""Machines whose robust velocity upwards is wanted: that of all measured trials, and one with a
+waveform that promises most."""
 
 SPREAD = 0.4
-"""How far rigs are drawn about given ones, of these' own spread. Of 14 drawn so by 0.35 (and 0.5)
-the published trials, their own numbers fitted anew, have a median cost of 0.137 (0.132); of the 14
-given ones 0.126."""
+"""Standard deviation of drawn rigs about given ones, as a share of the given rigs' own. On 14 rigs
+drawn with 0.35 (0.5) the published trials, their own numbers fitted anew, have a median cost of
+0.137 (0.132); on the 14 given ones 0.126."""
 TRIES = 100
+"""Draws for each rig that is wanted, at most: a draw that no scene allows is discarded."""
 
 KEPT = (*NEEDED, "z_surface_pp")
+"""The numbers of a run's summary that films and scores need."""
 FILM = (
     Gauge("", "mm/s", 1e3, 1.5e-3, 0.0, lambda told: told["v_average"]),
     Gauge("", "mm", 1e3, 0.0, 0.1, lambda told: told["z_surface_pp"]),
@@ -46,15 +48,17 @@ FILMS = {
     "film, half the grip force": ("half the grip force", AS_IT_IS.name),
     "film, twice the grip force": ("twice the grip force", AS_IT_IS.name),
 }
-"""The change that is filmed, and that at whose best robust setting on the scene's own rig it is."""
+"""For each film the change that is filmed, and the change whose best robust setting on the scene's
+own rig drives it."""
 
 OWN, OTHERS = Effort(256, 150, 60), Effort(160, 60, 30)
-"""Of the searches on the scene's own rig, and on others, which begin with what was found there."""
+"""Effort of searches on the scene's own rig, and on others, which start from the former's results.
+"""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A measurement of one number or several; ``how`` is a sentence."""
+    """A measurement of one number or several; ``how`` describes it in a sentence."""
 
     name: str
     how: str
@@ -73,7 +77,7 @@ def _filmed(name: str, drive: str) -> str:
 
 
 IMPEDANCE = ("force factor", *(f"resonance{end}" for end in BIASES))
-"""Gauges that one measurement of the coil's impedance gives."""
+"""Gauges that a single measurement of the coil's impedance yields together."""
 
 CANDIDATES = (
     Candidate(
@@ -89,20 +93,21 @@ CANDIDATES = (
 
 @dataclass(frozen=True)
 class Sample:
-    """What rigs show."""
+    """The measurements and targets on a sample of rigs."""
 
     values: list[Array]
-    """Of each of CANDIDATES: rigs × gauges, SI."""
+    """What each of CANDIDATES would show: rigs × gauges, SI."""
     targets: Array
-    """Rigs × TARGETS, m/s."""
+    """Robust velocities upwards: rigs × TARGETS, m/s."""
 
 
 def drawn(
     scene: Scene, rigs: Sequence[Settings], count: int, rng: np.random.Generator
 ) -> list[Settings]:
-    """Rigs about those given: each is one of them, moved by random shares of the differences of all
-    that have the same law and keys, logarithms where these are above 0. So what all agree in stays,
-    products among it; mean and spread are theirs."""
+    """New rigs about the given ``rigs``: each is a given one (the parent), moved by a random linear
+    combination of the deviations of all given rigs with the same law and keys from their mean, in
+    logarithms where values are above 0. So values and products in which the given rigs agree are
+    kept, and mean and covariance are theirs (a smoothed bootstrap)."""
     found: list[Settings] = []
     for number in range(TRIES * count):
         if len(found) == count:
@@ -111,13 +116,15 @@ def drawn(
         words = {key: value for key, value in parent.items() if isinstance(value, str)}
         like = [rig for rig in rigs if rig.keys() == parent.keys() and words.items() <= rig.items()]
         names = [key for key in parent if key not in words]
-        x = np.array([[float(rig[key]) for key in names] for rig in like])
+        x = np.array([[float(rig[key]) for key in names] for rig in like])  # rigs × keys
         log = (x > 0.0).all(axis=0)
         x[:, log] = np.log(x[:, log])
         # new = mean + √(1-s²) (parent - mean) + s Σ g_k (rig_k - mean)/√(n-1) with normal g_k: the
         # second sum has the rigs' own covariance, and the two shares make that of the new rigs
         # about the same.
         apart = x - x.mean(axis=0)
+        # ``shares @ apart`` has SPREAD² times the covariance; the parent's deviation is shrunk so
+        # that both add up to the whole covariance.
         shares = SPREAD * rng.standard_normal(len(like)) / np.sqrt(max(len(like) - 1, 1))
         moved = np.sqrt(1.0 - SPREAD**2) * apart[like.index(parent)] + shares @ apart
         new = x.mean(axis=0) + moved
@@ -125,14 +132,14 @@ def drawn(
         rig = {**words, **dict(zip(names, values.tolist(), strict=True))}
         try:
             Bench.base(scene, rig, f"rig {number}")
-        except BadInput:  # beyond what a scene can have: another
+        except BadInput:  # a scene does not allow these values: draw again
             continue
         found.append(rig)
     return found
 
 
 def whole(scene: Scene, rigs: Sequence[Settings]) -> list[Settings]:
-    """The scene's own rig and the others, each with all keys of any that the scene has."""
+    """The scene's own rig, then the others, all completed to the same keys by scene values."""
     names = dict.fromkeys(key for rig in rigs for key in rig)
     split = {key: key.partition(".") for key in names}
     own = {key: scene.table(table).get(name) for key, (table, _, name) in split.items()}
@@ -141,8 +148,9 @@ def whole(scene: Scene, rigs: Sequence[Settings]) -> list[Settings]:
 
 
 def gauged_on(scene: Scene) -> list[list[float]]:
-    """What each measurement by gauges shows on the rig of a scene, SI; of a current beyond what the
-    device's own source holds in its coil nothing but that."""
+    """The values that each measurement by gauges shows on the rig of a scene, SI. A current beyond
+    the range of the device's own source is clipped: the measurement shows only that it is beyond.
+    """
     rig, ends = numbers_of(scene), held_currents(scene)
 
     def shown(gauge: Gauge) -> float:
@@ -153,14 +161,17 @@ def gauged_on(scene: Scene) -> list[list[float]]:
 
 
 def held_currents(scene: Scene) -> tuple[float, float]:
-    """The least and the most current that the device's source holds in each coil, A."""
+    """The least and the most current that the device's source can hold in each coil, A: limited by
+    its output's swing, and by its current limit."""
     coil, circuit = scene.coil, scene.circuit
+    # ``around`` is the loop's resistance: the one sense resistor carries all coils' currents.
     around, limit = coil.resistance + coil.count * circuit.sense_resistance, circuit.current_limit
     low, high = circuit.swing_loss_low - circuit.supply, circuit.supply - circuit.swing_loss_high
     return max(low / around, -limit / coil.count), min(high / around, limit / coil.count)
 
 
 _Found = tuple[Candidates, float]
+"""Candidates of a search, and the robust velocity upwards (m/s) of the best."""
 
 
 def sample(
@@ -171,9 +182,10 @@ def sample(
     seed: int,
     told: Callable[[str], object],
 ) -> Sample:
-    """What the scene's rig, the first of ``rigs``, and the others show; ``store`` keeps it rig by
-    rig, ``open_`` makes the evaluator of one. Those on which nothing goes up, or a gauge shows 0,
-    are left out. Raises BadInput where the first is one of these."""
+    """The measurements and targets on ``rigs``, of which the first is the scene's own; ``store``
+    keeps them rig by rig, ``open_`` makes the evaluator of a rig. Rigs on which no setting moves
+    the part upwards, or on which a gauge would be exact, are left out. Raises BadInput where
+    nothing moves upwards on the first."""
 
     def ask(number: int, names: Iterable[str], effort: Effort) -> dict[str, _Found]:
         base = Bench.base(scene, rigs[number], f"rig {number}")
@@ -203,13 +215,13 @@ def sample(
         speeds = store.once(f"rig {number}", speeds_of)
         gauged = gauged_on(base)
         told(f"rig {number}")
-        every = [*gauged, *shown]
-        # Where a number is 0 whose accuracy is a share of it, every measurement would be exact.
-        both = zip(CANDIDATES, every, strict=True)
+        readings = [*gauged, *shown]  # by candidate, then by gauge
+        # An accuracy that is a share of a value of 0 would make the measurement exact.
+        both = zip(CANDIDATES, readings, strict=True)
         sound = all((one.accuracy(np.array(some)) > 0.0).all() for one, some in both)
-        if sound and np.isfinite([*speeds, *(one for some in shown for one in some)]).all():
+        if sound and np.isfinite([*speeds, *(value for film in shown for value in film)]).all():
             targets.append(speeds)
-            values.append(every)
+            values.append(readings)
     columns = [np.array(column) for column in zip(*values, strict=True)]
     return Sample(columns, np.array(targets))
 
@@ -219,10 +231,11 @@ def _robust(
 ) -> _Found:
     """The candidates of a change for the robust velocity upwards, and that velocity, m/s."""
     machine = BY_NAME[name].machine(bench.scene)
-    every = searched(bench, machine, effort, seed, own)
+    candidates = searched(bench, machine, effort, seed, own)
+    # Only the goal v_up was scored; the lists of the other goals are emptied.
     found = {
-        kind: [some if n == UP else [] for n, some in enumerate(each)]
-        for kind, each in every.items()
+        kind: [best if n == UP else [] for n, best in enumerate(by_goal)]
+        for kind, by_goal in candidates.items()
     }
     points = found["robust"][UP][:1]
     speed = float(bench.over_turns(machine)(np.array(points))[0][0, UP]) if points else nan
@@ -232,7 +245,7 @@ def _robust(
 def _films(
     base: Scene, open_: Callable[[Scene], Evaluator], own: Mapping[str, Candidates]
 ) -> list[list[float]]:
-    """What each of FILMS shows on a rig, SI; NaN where it cannot be run."""
+    """The values of FILM in each of FILMS on a rig, SI; NaN where the run fails."""
     runs = [
         BY_NAME[name].machine(base).at(np.array(own[drive]["robust"][UP][0]), SETTLE, SPAN)
         | {"run.solver": "fast"}

@@ -1,4 +1,9 @@
-"""How far a measurement narrows what is wanted, over a sample of what may be true."""
+"""How far a measurement narrows the interval of a target, over a sample of possible rigs.
+
+Each rig in turn is the truth and left out of the sample: the measurement is simulated on it with
+noise, the other rigs are weighted by their likelihood, and their weighted quantiles give the
+interval that the measurement would leave (leave-one-out cross-validation of importance weights).
+"""
 
 from dataclasses import dataclass
 
@@ -7,37 +12,37 @@ import numpy as np
 from cosim.arrays import Array
 
 ENDS = (0.05, 0.95)
-"""Of an interval, as shares of the weight."""
+"""Ends of an interval, as quantiles of the weight."""
 
 FEWEST = 20.0
-"""Effective rigs that an interval stands on at least: of 19 equally likely ones the ends of a 90 %
-interval are the least and the greatest, so of fewer it would be too narrow. A measurement finer
-than the sample counts for no more than the sample can tell."""
+"""Least effective number of rigs for an interval: with 19 equally likely ones the ends of a 90 %
+interval are the least and the greatest value, with fewer the interval would be too narrow. So the
+sample's size limits how much a very accurate measurement counts."""
 
 DRAWS = 8
-"""Of the measurement's noise, on each rig."""
+"""Draws of the measurement's noise on each rig."""
 
 
 @dataclass(frozen=True, eq=False)
 class Worth:
-    """Of one measurement for one target, over rigs taken as the truth and left out."""
+    """The worth of one measurement for one target, over rigs taken as the truth and left out."""
 
     width: float
-    """The mean of the intervals' widths."""
+    """Mean width of the intervals."""
     error: float
-    """Its standard error."""
+    """Standard error of this mean."""
     held: float
-    """The share of them that holds the truth."""
+    """Share of the intervals that contain the truth."""
     each: Array
-    """The widths, rig by rig, means over the noise."""
+    """Widths for each true rig, means over the draws of the noise."""
 
 
 def likely(values: Array, shown: Array, sd: Array) -> Array:
-    """Weights of rigs with ``values`` (n × numbers) where ``shown`` was measured to ``sd``."""
-    # -2 ln L of each rig.
+    """Weights (n) of rigs with ``values`` (n × numbers) after ``shown`` (numbers) was measured with
+    standard deviations ``sd``: normal likelihoods, flattened where too few rigs would count."""
     square = (((values - shown) / sd) ** 2).sum(axis=1)
-    # Rigs are few: where next to none is as likely as the truth, the weights are made flatter until
-    # the effective number of rigs, (Σ w)² / Σ w², suffices.
+    # Tempering: the likelihood is raised to smaller and smaller powers until the effective number
+    # of rigs, (Σ w)² / Σ w², suffices.
     square = square - square.min()
     while True:
         weights = np.exp(-0.5 * square)
@@ -48,8 +53,8 @@ def likely(values: Array, shown: Array, sd: Array) -> Array:
 
 def interval(targets: Array, weights: Array) -> Array:
     """The ends of the 90 % interval of each target (n × targets), by weighted quantiles: ends ×
-    targets. The i-th of n equally likely values, n the effective number, stands at i/(n + 1): so
-    often a further one lies below it (Weibull's plotting position, 1939)."""
+    targets. Of n equally likely values, n the effective number, the i-th is the quantile i/(n + 1),
+    the expected share of further values below it (Weibull's plotting position, 1939)."""
     weights = weights / weights.sum()
     n, columns = 1.0 / (weights**2).sum(), []
     for column in targets.T:
@@ -60,9 +65,8 @@ def interval(targets: Array, weights: Array) -> Array:
 
 
 def worth(values: Array, sd: Array, targets: Array, rng: np.random.Generator) -> list[Worth]:
-    """Of a measurement whose ``values`` and ``sd`` are rigs × numbers, for each target (rigs ×
-    targets); of none where there are no numbers."""
-    # Each rig in turn is the truth, and the others are what is known before the measurement.
+    """The worth, for each target (rigs × targets), of a measurement whose ``values`` and ``sd`` are
+    rigs × numbers; without numbers, that of no measurement."""
     n = len(targets)
     widths, held = (np.empty((n, DRAWS, targets.shape[1])) for _ in range(2))
     for truth in range(n):
@@ -73,15 +77,15 @@ def worth(values: Array, sd: Array, targets: Array, rng: np.random.Generator) ->
             low, high = interval(targets[others], weights)
             widths[truth, draw] = high - low
             held[truth, draw] = (low <= targets[truth]) & (targets[truth] <= high)
-    each = widths.mean(axis=1)
+    each = widths.mean(axis=1)  # rigs × targets
     errors = each.std(axis=0, ddof=1) / np.sqrt(n)
     told = zip(each.mean(axis=0), errors, held.mean(axis=(0, 1)), each.T, strict=True)
     return [Worth(float(width), float(error), float(h), one) for width, error, h, one in told]
 
 
 def chance(targets: Array, rng: np.random.Generator) -> list[Worth]:
-    """What a fine measurement of something that has nothing to do with the targets leaves, since
-    its intervals stand on fewer rigs: of four, in turn, the means."""
+    """The worth of an accurate measurement that does not depend on the targets, the mean of four:
+    its intervals are narrower only because fewer rigs count."""
     n = len(targets)
     found = [worth(rng.random((n, 1)), np.full((n, 1), 1e-3), targets, rng) for _ in range(4)]
     rows = [[[one.width, one.error, one.held, *one.each] for one in each] for each in found]

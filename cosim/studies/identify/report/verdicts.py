@@ -145,7 +145,7 @@ def _tie(key: str, partners: Mapping[str, Array]) -> str:
 
 
 def forces(rig: Found, places: Array) -> tuple[Array, Array]:
-    """The suspension's force at ``places`` (q, m) less that at the centre: N, and over Bl A."""
+    """The suspension's force at ``places`` (q, m) less that at the centre, N; and over Bl, A."""
     numbers = rig.numbers
     found = suspension_force(numbers, np.append(places, 0.0))  # the last one is the centre's
     apart = found[:-1] - found[-1]
