@@ -1,6 +1,6 @@
-"""Settings of a scene and what becomes of them: each once, many at once, kept in a file.
+"""Runs many settings of a scene: each once, many in parallel, with outcomes kept in a file.
 
-What all studies of many runs stand on. A point that crashes or hangs costs only itself.
+All studies of many runs use it. A point that crashes or hangs does not affect the others.
 """
 
 from collections import deque
@@ -28,19 +28,20 @@ from cosim.scene import Scene
 from cosim.toolchain.processes import processors
 
 TOGETHER = 64
-"""Points that are solved side by side, at most: some lanes full of runs of like duration."""
+"""Most points in one task of the fast solver, which fills its lanes with runs of like duration."""
 
 _Keyed = tuple[str, Settings]
-"""Settings behind their hash."""
+"""The hash of settings, their key in the store, and the settings."""
 
 
 class Evaluator:
     """Runs settings on top of ``scene``; to be used in a ``with`` block.
 
-    The outcomes are kept in the file ``path``, or in memory alone, with what they follow from:
-    the scene, ``whole_periods`` and ``asked`` (what JSON can hold). Only the numbers that ``kept``
-    names, if it does. ``workers`` runs at once (default: one for each processor, and never more
-    circuits than these), or as many as the Dask cluster at the address ``dask`` has threads.
+    The outcomes are kept in the file ``path``, or in memory alone, with the inputs that they follow
+    from: the scene, ``whole_periods`` and ``asked`` (what JSON can hold). Of their numbers only
+    those that ``kept`` names are kept, if it names any. ``workers`` runs are parallel (default: one
+    for each processor, and never more circuits than these), or as many as the Dask cluster at the
+    address ``dask`` has threads.
 
     Raises BadInput where the file cannot be used or there is no such cluster.
     """
@@ -55,7 +56,7 @@ class Evaluator:
         workers: int | None = None,
         dask: str | None = None,
     ) -> None:
-        self._scene = point(scene, {}, False)  # what all points have in common is changed once
+        self._scene = point(scene, {}, False)  # changes common to all points
         self._whole_periods, self._kept = whole_periods, kept
         self._workers, self._dask = workers_asked(workers), dask
         self._far: Pool | None = None
@@ -72,19 +73,20 @@ class Evaluator:
         self._stack.close()
 
     def known(self, settings: Settings) -> Outcome | None:
-        """What has become of settings; None where they are still to be run, or to be run again
-        because the machine was the reason of their failure."""
+        """The outcome of settings; None where they have not been run, or are to be run again since
+        the machine may have caused their failure."""
         return outcome_of(self._store.get(hashed(settings)))
 
     def run(self, points: Iterable[tuple[int, Settings]]) -> Iterator[tuple[int, Outcome]]:
         """The outcome of each point (number, settings), in the order in which they are known."""
         waiting: dict[str, list[int]] = {}
-        """The points that wait for the same settings, by their key."""
+        """The numbers of the points that wait for a run, by the key of its settings."""
         known: deque[tuple[int, Outcome]] = deque()
         stored: dict[str, Any] = {}
-        """What the store has of the points at hand, and what was found meanwhile."""
+        """Outcomes of the present batch of points: from the store, and of runs that have ended."""
 
         def new() -> Iterator[_Keyed]:
+            """Settings to be run, each once; points whose outcome is known go into ``known``."""
             rest = iter(points)
             while some := list(islice(rest, TOGETHER)):
                 hashes = [hashed(settings) for _, settings in some]
@@ -113,8 +115,8 @@ class Evaluator:
     def apply(
         self, call: Callable[..., object], points: Iterable[int]
     ) -> Iterator[tuple[int, object]]:
-        """What ``call(scene, number, progress)`` gives or raises for each number, as many at once
-        as runs are, here: of what no store holds, as waveforms."""
+        """The result of ``call(scene, number, progress)``, or its exception, for each number, in
+        ``workers`` threads of this machine; for results that no store holds, such as waveforms."""
         with threads(self._scene, self._workers) as pool:
             yield from each(pool, call, points)
 
@@ -123,11 +125,12 @@ class Evaluator:
         self._store.remove()
 
     def outcomes(self, every: Sequence[Settings]) -> list[Outcome]:
-        """What becomes of each settings, in their order."""
+        """The outcome of each settings, in their order."""
         return next((found for _, found in self.groups([every])), [])
 
     def groups(self, groups: Sequence[Sequence[Settings]]) -> Iterator[tuple[int, list[Outcome]]]:
-        """Each group's number and outcomes, as soon as it is complete; all are run at once."""
+        """Each group's number and outcomes, as soon as the group is complete; the settings of all
+        groups run in parallel."""
         places = [(n, k) for n, group in enumerate(groups) for k in range(len(group))]
         known: list[dict[int, Outcome]] = [{} for _ in groups]
         for number, outcome in self.run(enumerate(one for group in groups for one in group)):
@@ -148,11 +151,11 @@ class Evaluator:
         outcome = failed(error)
         if self._dask is None:
             return outcome
-        # Its worker died with it, again and again, or something that no scene explains.
+        # The task's workers died again and again, or raised what no scene explains.
         return Outcome({}, f"The cluster gave it up: {outcome.failure}", machine=True)
 
     def _pool(self) -> AbstractContextManager[Pool]:
-        """Threads for one call; the cluster stays."""
+        """New threads for one call of ``run``, or the cluster, which stays connected."""
         if self._dask is None:
             return threads(self._scene, self._workers)
         if self._far is None:
@@ -160,7 +163,7 @@ class Evaluator:
         return nullcontext(self._far)
 
     def _tasks(self, points: Iterator[_Keyed]) -> Iterator[list[_Keyed]]:
-        """Points that the fast solver runs side by side together, all others one by one."""
+        """Tasks: consecutive points for the fast solver together, all other points one by one."""
         for fast, some in groupby(points, lambda one: is_fast(self._scene, one[1])):
             while task := list(islice(some, TOGETHER if fast else 1)):
                 yield task

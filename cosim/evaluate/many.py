@@ -1,7 +1,7 @@
-"""Many calls at once: by threads of this machine, or on a Dask cluster (the extra ``dask``).
+"""Many calls in parallel: by threads of this machine, or on a Dask cluster (the extra ``dask``).
 
-The compiled loop leaves Python to the other threads while it runs, and so does a thread that waits
-for its worker; so the numbers are those of single runs, to the last bit.
+The compiled loop releases Python's global lock while it runs, and so does a thread that waits for
+its worker process. Results equal those of single runs to the last bit.
 """
 
 import threading
@@ -15,30 +15,31 @@ from typing import Any, NamedTuple, TypeVar
 from cosim.errors import BadInput
 
 PATIENCE = 15.0
-"""s in which the cluster must answer."""
+"""s, within which the cluster must answer."""
 
 AHEAD, AHEAD_FAR = 2, 4
-"""Calls at hand for each thread: the one that runs and the next; on a cluster, to keep it busy."""
+"""Calls submitted for each thread: the one that runs and the next; on a cluster some more."""
 
 Item = TypeVar("Item")
 
 
 class Pool(NamedTuple):
-    """Where calls are made."""
+    """Threads, or a cluster."""
 
     submit: Callable[..., Any]
-    """Its future; what all calls have in common is the first argument."""
+    """Submits a call with its arguments, to which the common one is added first; its future."""
     at_hand: int
-    """How many calls it has at once, at most."""
+    """Most calls that are submitted and not ended."""
 
 
 class _Ended(Exception):
-    """Nobody wants to know any more."""
+    """Raised in calls whose result is no longer wanted."""
 
 
 @contextmanager
 def threads(common: Any, count: int) -> Iterator[Pool]:
-    """So many threads. A call's last argument is a progress, which ends it when nobody waits."""
+    """``count`` threads. Each call gets ``common`` as its first argument, and as its last one a
+    progress function, which ends the call once the ``with`` block has ended."""
     ended = threading.Event()
 
     def progress(time: float) -> None:
@@ -61,7 +62,7 @@ def cluster(common: Any, address: str) -> Iterator[Pool]:
         count = sum(client.nthreads().values())
         if not count:
             raise BadInput(f"--dask {address}: this cluster has no workers.")
-        # What a task gave is made again where the workers that had it die, scattered data is not.
+        # Dask recomputes a task's result if the workers that held it die; scattered data is lost.
         there = client.submit(lambda same: same, common, pure=False)
         yield Pool(
             lambda call, *given: client.submit(call, there, *given, pure=False), AHEAD_FAR * count

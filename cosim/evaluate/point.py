@@ -24,15 +24,15 @@ UNREPEATABLE = ("wall_time",)
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a point: the numbers of its summary (SI; NaN: it has none), or why not."""
+    """The outcome of a point: the numbers of its summary (SI; NaN: no value), or its failure."""
 
     numbers: dict[str, float]
     failure: str = ""
     machine: bool = False
-    """The failure may have been the machine's, not the point's: it is worth another try."""
+    """Whether the machine, not the point, may have caused the failure: worth another try."""
 
     def only(self, names: Collection[str]) -> "Outcome":
-        """This outcome with as few numbers."""
+        """This outcome with some of its numbers only."""
         kept = {name: value for name, value in self.numbers.items() if name in names}
         return replace(self, numbers=kept)
 
@@ -40,7 +40,7 @@ class Outcome:
 def evaluate(
     base: Scene, values: Settings, whole_periods: bool, progress: Progress = lambda _: None
 ) -> Outcome:
-    """Run ``base`` with ``values``. Whatever is wrong is an outcome.
+    """Run ``base`` with ``values``. A failure is an outcome, too.
 
     Waveforms are not made: the rows of a run are communication points too, so the numbers agree
     with those of `cosim run` within rounding, and the run is several times as fast.
@@ -65,7 +65,7 @@ def evaluate_all(
     *,
     whole_periods: bool,
 ) -> list[Outcome]:
-    """The same of several points behind their keys, side by side where the fast solver runs all."""
+    """Run several points (key, values), side by side if the fast solver runs all of them."""
     if not all(is_fast(base, values) for _, values in points):
         return [evaluate(base, values, whole_periods, progress) for _, values in points]
     from cosim.simulation.fast import LOST, summaries
@@ -97,15 +97,15 @@ def point(base: Scene, values: Settings, whole_periods: bool) -> Scene:
 
 
 def inputs(scene: Scene) -> dict[str, Any]:
-    """All that decides a run of a scene: its keys, and the hashes of the files that they name, with
-    those that a netlist names in turn."""
+    """All inputs of a run of a scene: its keys, and the hashes of the files that these name and
+    that a netlist includes."""
     files = [Path(file) for file in scene.files.values()]
     if netlist := scene.circuit.netlist:
         files += netlist_files(Path(netlist))[1:]
     every = [one for file in files for one in (file.rglob("*") if file.is_dir() else [file])]
     hashes = {}
     for path in every:
-        with suppress(OSError):  # its runs tell
+        with suppress(OSError):  # the runs report it
             if path.is_file():
                 with path.open("rb") as file:
                     hashes[str(path)] = hashlib.file_digest(file, "sha256").hexdigest()
@@ -123,8 +123,8 @@ def outcome(summary: Mapping[str, Any]) -> Outcome:
 
 
 def failed(error: Exception) -> Outcome:
-    """Why a point has no numbers."""
-    # What is no CosimError, no scene should meet: the other points go on.
+    """The outcome of a point that raised ``error``."""
+    # An exception other than CosimError is a defect: its type is named, the other points go on.
     kind = "" if isinstance(error, CosimError) else f"{type(error).__name__}: "
     met = MemoryError | OSError | ProcessLost
     machine = any(isinstance(e, met) for e in (error, error.__cause__))
@@ -132,7 +132,7 @@ def failed(error: Exception) -> Outcome:
 
 
 def outcome_of(record: Any) -> Outcome | None:
-    """The outcome with the fields of ``record``, of JSON; None if it is none, or the machine's."""
+    """The outcome from a ``record`` of JSON; None if it is invalid, or a failure of the machine."""
     try:
         numbers, failure, machine = record["numbers"], record["failure"], record["machine"]
         named = all(name.isprintable() and 0 < len(name) < 300 for name in numbers)
@@ -148,8 +148,8 @@ def outcome_of(record: Any) -> Outcome | None:
 def in_whole_periods(scene: Scene) -> Scene:
     """The scene with ``run.settle`` and ``run.duration`` at least as long and whole periods apart.
 
-    The mean over a broken period is off by per cents, which differ from frequency to frequency.
-    They stay as they are where nothing repeats.
+    The mean over a fraction of a period is wrong by per cents that vary with the frequency. Scenes
+    without a period stay as they are.
     """
     if isinf(length := scene.period):
         return scene

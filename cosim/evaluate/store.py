@@ -1,8 +1,8 @@
-"""What long work has found, in a file from which a killed one goes on.
+"""A file with the results of long work, from which a killed study resumes.
 
-The file is SQLite's, in its write-ahead mode: whatever moment a kill strikes, what was written
-stays, and others may read the file while it grows. It is written every PAUSE, since a transaction
-costs as much as a short run: a kill loses at most what came within it. One process may write.
+It is an SQLite file in write-ahead mode: a kill at any moment loses nothing that was written, and
+others may read the file while it grows. Results are written every PAUSE, since a transaction costs
+as much as a short run: a kill loses at most those of the last PAUSE. One process may write.
 """
 
 import hashlib
@@ -30,18 +30,18 @@ PAUSE = 0.1
 """s between two transactions, at least."""
 
 MOST_OWED = 64 << 20
-"""Bytes that are kept for a disk that takes them later."""
+"""Bytes of results that wait in memory, at most, while the disk refuses them."""
 
 _TABLE = "CREATE TABLE found (key TEXT PRIMARY KEY, value TEXT NOT NULL)"
 _WORK = ""
-"""The key of the hash of what the findings follow from."""
+"""The key under which the hash of the inputs of all results stands."""
 
 
 class Store:
-    """What was found (all that JSON can hold) by key, in the file ``path``, or in memory alone.
+    """Results (all that JSON can hold) by key, in the file ``path``, or in memory alone.
 
-    The findings follow from ``asked`` (what JSON can hold) and this version of all programs. To be
-    used in a ``with`` block, by one thread; a file that nothing was added to does not outlive it.
+    They follow from the inputs ``asked`` (what JSON can hold) and this version of all programs. To
+    be used in a ``with`` block, by one thread; a file that is still empty at its end is removed.
 
     Raises BadInput where the file belongs to other work, is damaged, a link or no regular file, or
     another process writes it.
@@ -50,17 +50,17 @@ class Store:
     def __init__(self, path: Path | None, *asked: Any) -> None:
         self._path, self._file = path, None if path is None else _locked(path)
         self._owed: dict[str, str] = {}
-        """What is not written yet."""
+        """Results that are not written yet, as JSON by key."""
         self._refused = False
-        """Whether the disk did not take it."""
+        """Whether the disk refused the last write."""
         self._written = -inf
-        """When it was written last, by the monotonic clock, s."""
+        """Time of the last write by the monotonic clock, s."""
         try:
             where = ":memory:" if path is None else str(path)
             self._base = sqlite3.connect(where, isolation_level=None)
             self._told(self._take_up, hashed(asked, versions(), package.token(), digest("stepper")))
             self.resumed = len(self)
-            """How much stood in the file."""
+            """Number of results that the file held at first."""
         except BaseException:
             self._close()
             raise
@@ -76,15 +76,15 @@ class Store:
         self._close()
 
     def __len__(self) -> int:
-        """How much was found and written."""
+        """Number of results that were written."""
         return self._told(self._base.execute, "SELECT count(*) - 1 FROM found").fetchone()[0]
 
     def get(self, key: str) -> Any:
-        """What was found; None for nothing."""
+        """The result under a key; None without one."""
         return self.some([key]).get(key)
 
     def some(self, keys: Sequence[str]) -> dict[str, Any]:
-        """What was found of these, at most 999."""
+        """The results under these keys, at most 999, by key."""
         places = ", ".join("?" * len(keys))
         rows = self._told(
             self._base.execute, f"SELECT key, value FROM found WHERE key IN ({places})", keys
@@ -92,14 +92,14 @@ class Store:
         owed = ((key, self._owed[key]) for key in keys if key in self._owed)
         found = {}
         for key, text in (*rows, *owed):
-            with suppress(ValueError, TypeError, RecursionError):  # somebody has changed it
+            with suppress(ValueError, TypeError, RecursionError):  # changed from outside
                 found[key] = json.loads(text)
         return found
 
     def add(self, key: str, found: Any) -> None:
-        """Keep what was found; it is written with what was found up to PAUSE before or after it.
+        """Add a result; it is written at once, or with later ones if PAUSE has not passed.
 
-        What the disk does not take is noted and tried again; BadInput where that is too much.
+        If the disk refuses, a note says so and it is tried again; BadInput beyond MOST_OWED.
         """
         self._owed[key] = json.dumps(found)
         if monotonic() - self._written >= PAUSE:
@@ -117,7 +117,7 @@ class Store:
                     )
             except sqlite3.OperationalError as error:
                 if size > 1:
-                    size //= 2  # there may be room for some of them
+                    size //= 2  # the disk may have room for a smaller transaction
                     continue
                 self._tell(f"{plain(self._path)}: cannot be written ({error})", error)
                 break
@@ -138,7 +138,7 @@ class Store:
         self._refused = True
 
     def once(self, key: str, work: Callable[[], T]) -> T:
-        """What stands under ``key``, or else what ``work`` finds, which is added."""
+        """The result under ``key``; without one that of ``work``, which is added."""
         found = self.get(key)
         if found is None:
             found = work()
@@ -146,19 +146,20 @@ class Store:
         return found
 
     def remove(self) -> None:
-        """The work is done, and the file of no more use."""
+        """Remove the file: the work is done."""
         self._close()
         if self._path is not None:
             for path in _files(self._path):
                 path.unlink(missing_ok=True)
 
     def _take_up(self, work: str) -> None:
+        """Create the table, or check that its results follow from inputs with the hash ``work``."""
         for pragma in ("trusted_schema = OFF", "journal_mode = WAL", "synchronous = NORMAL"):
             self._base.execute(f"PRAGMA {pragma}")
         tables = self._base.execute(
             "SELECT type, name, sql FROM sqlite_master WHERE sql NOT NULL"  # as the index's is
         ).fetchall()
-        if not tables:  # a kill may have left it so
+        if not tables:  # a new file, or one that a kill left empty
             with self._base:
                 self._base.execute("BEGIN")
                 self._base.execute(_TABLE)
@@ -172,7 +173,7 @@ class Store:
             )
 
     def _told(self, act: Callable[..., T], *given: Any) -> T:
-        """What ``act`` gives. Raises BadInput where the file or the disk is no good."""
+        """The result of ``act``. Raises BadInput where SQLite cannot read or write the file."""
         name = plain(self._path)
         try:
             return act(*given)
@@ -185,7 +186,7 @@ class Store:
             ) from error
 
     def _close(self) -> None:
-        """SQLite's own locks on the file would go if it were closed here first."""
+        """Close SQLite's file first: closing the other descriptor would release SQLite's locks."""
         if hasattr(self, "_base"):
             self._base.close()
         if self._file is not None:
@@ -199,12 +200,12 @@ def hashed(*said: Any) -> str:
 
 
 def _files(path: Path) -> list[Path]:
-    """All that SQLite writes."""
+    """All files that SQLite writes."""
     return [path, *(path.with_name(f"{path.name}-{more}") for more in ("wal", "shm", "journal"))]
 
 
 def _locked(path: Path) -> int:
-    """The file, this process's own until it is closed. SQLite would follow a link elsewhere."""
+    """Open and lock the file for this process. Links are refused: SQLite would follow them."""
     flags = os.O_RDWR | os.O_CREAT
     for more in ("O_NOFOLLOW", "O_CLOEXEC", "O_NONBLOCK", "O_BINARY"):
         flags |= getattr(os, more, 0)
@@ -234,8 +235,9 @@ Made = TypeVar("Made", bound=_Saves)
 def reported(
     make: Callable[[Store], Made], out: str | os.PathLike[str] | None, store: str, *asked: Any
 ) -> Made:
-    """What ``make`` reports, which follows from ``asked``; a folder ``out`` gets what its ``save``
-    writes. The file ``store`` there has what is found meanwhile, to go on from. Raises BadInput."""
+    """The report of ``make``, which follows from the inputs ``asked``, saved in the folder ``out``
+    if one is given. Until then the file ``store`` there keeps results, from which an interrupted
+    study resumes. Raises BadInput."""
     with Store(None if out is None else Path(out) / store, *asked) as kept:
         made = make(kept)
         if out is not None:

@@ -1,4 +1,5 @@
-"""The points that searches of the unit cube have run, for several quantities at once."""
+"""Points of the unit cube that were run, with a score for each of several quantities, for searches
+that share them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
@@ -12,32 +13,32 @@ from cosim.arrays import Array
 from cosim.search.turns import TURN
 
 Feasible = NDArray[np.bool_]
-"""Of points (rows): whether they are allowed."""
+"""For each point (row) whether it is feasible."""
 
 Evaluate = Callable[[Array], tuple[Array, Feasible]]
-"""The scores (a row for each point, a column for each quantity) of points (rows) that are to be
-run, and which of these are feasible."""
+"""Runs points (rows); gives their scores (points × quantities), and which points are feasible."""
 
 NEAR, FEWEST, MOST = 1.5 * TURN, 5, 100
-"""What is known of a point's surroundings: how far they reach, from how many points at least, and
-of how many of the best points they are looked at."""
+"""For ``Known.steady``: how far a point's neighbours are at most, how many it needs, and how many
+of the best points are considered."""
 
 
 class Search(Protocol):
     """A search for the largest score. The same for the same seed and scores."""
 
     def ask(self) -> Array:
-        """The next points (rows) of the unit cube; none where the search has ended."""
+        """The next points (rows) of the unit cube; no rows once the search has ended."""
         ...
 
     def tell(self, points: Array, scores: Array, feasible: Feasible) -> None:
-        """The scores of points (rows), asked for or not; -inf where there is none."""
+        """Take the scores of points (rows), whether asked for or not; -inf for no score."""
         ...
 
 
 def apart(points: Array, distance: float, count: int) -> list[int]:
-    """The first of ``points`` (rows), and those after it that are ``distance`` from all before them
-    that count, as the greatest difference: ``count`` numbers of rows at most, all for -1."""
+    """Row numbers of points chosen in order: the first one, then each whose distance (largest
+    difference of a coordinate) from all chosen ones is at least ``distance``; at most ``count``, or
+    without limit for -1."""
     kept: list[int] = []
     left = np.ones(len(points), bool)  # those that are far enough from all that are kept
     while left.any() and len(kept) != count:
@@ -47,8 +48,8 @@ def apart(points: Array, distance: float, count: int) -> list[int]:
 
 
 class Known:
-    """Runs points, each once, and keeps their scores, -inf where they are not feasible. Only
-    multiples of 1/``steps`` can be set."""
+    """Runs points, each once, and keeps their scores, -inf for infeasible ones. Coordinates are
+    rounded to multiples of 1/``steps``, since only these can be set."""
 
     def __init__(self, keys: int, quantities: int, steps: int, evaluate: Evaluate) -> None:
         self._steps, self._evaluate = steps, evaluate
@@ -58,7 +59,7 @@ class Known:
         self._tree: KDTree | None = None
 
     def rows(self, points: Array) -> list[int]:
-        """The rows here of the nearest points that can be set, which are run if not known."""
+        """The row numbers in ``self.points`` of the given points, rounded; unknown ones are run."""
         points = np.round(np.clip(points, 0.0, 1.0) * self._steps) / self._steps
         # Rounded alike, equal points have equal bytes; one that is asked for twice is run once.
         keys = [point.tobytes() for point in points]
@@ -75,8 +76,8 @@ class Known:
         return [self._rows[key] for key in keys]
 
     def search(self, searches: Mapping[int, Search], runs: int) -> None:
-        """Let searches, by the number of the quantity that each is for, ask for ``runs`` points
-        each, side by side, so that many workers have something to do."""
+        """Let searches, by the index of the quantity that each maximises, ask for ``runs`` points
+        each. The points of all searches are run together, to keep many workers busy."""
         for quantity, search in searches.items():
             search.tell(self.points, self.scores[:, quantity], self.feasible)
         left = dict.fromkeys(searches, runs)
@@ -87,33 +88,32 @@ class Known:
         }:
             rows = self.rows(np.vstack([*asked.values()]))
             for quantity, points in asked.items():
-                # The rows stand in the order in which the searches were asked.
-                mine, rows = rows[: len(points)], rows[len(points) :]
+                mine, rows = rows[: len(points)], rows[len(points) :]  # stacked in this order
                 left[quantity] -= len(points)
                 searches[quantity].tell(points, self.scores[mine, quantity], self.feasible[mine])
 
     def tops(self) -> Array:
-        """The best score of each quantity; -inf where there is none."""
+        """The best score of each quantity; -inf without any."""
         top: Array = self.scores.max(axis=0, initial=-inf)
         return top
 
     def ranked(
         self, quantity: int, distance: float, count: int, among: Sequence[int] | None = None
     ) -> Array:
-        """Feasible points with a score, the best first, each ``distance`` from those before it; of
-        all, or of the rows ``among`` them."""
+        """Feasible points with a score, the best first, each at least ``distance`` from those
+        before it: at most ``count`` of all points, or of the rows ``among``."""
         order = self._order(quantity)
         best = self.points[order if among is None else order[np.isin(order, among)]]
         return best[apart(best, distance, count)]
 
     def steady(self, quantity: int, distance: float, count: int) -> Array:
-        """The same among the best ones by the lower quartile of what is known about them, as far as
-        that tells: those that are likely to be robust."""
+        """Points that are likely to be robust: the MOST best ones, ranked by the lower quartile of
+        the known scores in their neighbourhood, chosen as in ``ranked``."""
         order = self._order(quantity)[:MOST]
         self._tree = self._tree or KDTree(self.points)
         column = self.scores[:, quantity]
-        # The cube about a point, not the ball: each key is turned by itself. The quartile is one of
-        # the scores and no mean of two, since those that are not feasible have -inf.
+        # Neighbours are those in a cube (p = inf), since each key turns by itself. The quartile is
+        # one of the scores, not an interpolation: infeasible points have -inf.
         near = self._tree.query_ball_point(self.points[order], NEAR, p=inf)
         quartile = [
             np.sort(column[rows])[(len(rows) - 1) // 4] if len(rows) >= FEWEST else -inf
@@ -123,6 +123,7 @@ class Known:
         return best[apart(best, distance, count)]
 
     def _order(self, quantity: int) -> NDArray[np.intp]:
+        """The rows that have a score, the best first."""
         column = self.scores[:, quantity]
         order = np.argsort(-column, kind="stable")
         return order[np.isfinite(column[order])]

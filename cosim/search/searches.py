@@ -1,9 +1,9 @@
-"""Searches of the unit cube: a design that fills what is feasible, and CMA-ES from the best of what
-is known, again and again.
+"""Searches of the unit cube: a design that fills its feasible part, and CMA-ES restarted from the
+best known points.
 
 The objective of a study jumps where a mode of motion ends, is ragged where motion is chaotic, and
-is missing where a scene cannot be run: no method that trusts a slope finds its way there. Its
-heights are narrow ridges aslant to the keys, which the covariance of CMA-ES learns.
+is undefined where a scene cannot be run: methods that need a gradient fail. Its maxima are narrow
+ridges oblique to the keys, which the covariance of CMA-ES learns.
 
 N. Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772 (2016), by the package cmaes.
 """
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cmaes import CMA
 
 SCREENED = 64
-"""Batches of the sequence that are screened, at most."""
+"""Most batches of the Sobol sequence that are drawn; infeasible regions may discard all of one."""
 
 POPULATION = 10
 """Points of a generation."""
@@ -30,14 +30,14 @@ NARROW = 5e-3
 """Standard deviation at which a climb ends."""
 
 APART = 0.1
-"""How far the start of a climb is from those of all before it, as the greatest difference."""
+"""Least distance (largest difference of a coordinate) of a climb's start from all earlier ones."""
 
 
 class Design:
-    """A Sobol sequence of ``count`` points. A quarter of them fills the cube; of those after it
-    only such count whose nearest point that is known is feasible.
+    """A Sobol sequence of ``count`` points. The first quarter fills the cube; of later points only
+    those whose nearest known point is feasible are asked for.
 
-    ``ends`` makes them dense where a key is near an end of its range, by the arcsine law.
+    ``ends`` makes points denser near the ends of each key's range, by the arcsine distribution.
     """
 
     def __init__(self, keys: int, count: int, seed: int | list[int], ends: bool = False) -> None:
@@ -45,7 +45,7 @@ class Design:
 
         self._sequence = qmc.Sobol(keys, rng=np.random.default_rng(seed))
         self._count, self._ends = count, ends
-        # A Sobol sequence is even over powers of two.
+        # A Sobol sequence is balanced in batches whose size is a power of two.
         self._batch = 1 << (max(count // 4, 1).bit_length() - 1)
         self._batches = SCREENED
         self._points, self._feasible = np.empty((0, keys)), np.empty(0, bool)
@@ -65,15 +65,15 @@ class Design:
         return self._points[:0]
 
     def tell(self, points: Array, scores: Array, feasible: Feasible) -> None:
-        """Which points (rows) are feasible; they count among the design's own."""
+        """Take which points (rows) are feasible; they count towards ``count``."""
         self._points = np.vstack([self._points, points])
         self._feasible = np.concatenate([self._feasible, feasible])
 
 
 class Climb:
-    """Climbs in ``keys`` dimensions, each from the best point that is ``APART`` from where those
-    before it began, with ``step`` as its first standard deviation, until that is ``NARROW``, both
-    of the cube's edge. It is to be told of a point before it is asked for any."""
+    """A sequence of climbs by CMA-ES in ``keys`` dimensions. Each starts from the best known point
+    that is APART from all earlier starts, with the standard deviation ``step``, and ends when that
+    falls below NARROW (both in edges of the cube). ``tell`` must be called before ``ask``."""
 
     def __init__(self, keys: int, seed: int | list[int], step: float = 0.06) -> None:
         self._keys, self._step = keys, step
@@ -91,7 +91,8 @@ class Climb:
         return self._asked[:, : self._keys]
 
     def tell(self, points: Array, scores: Array, feasible: Feasible) -> None:
-        """The scores of points (rows), asked for or not."""
+        """Take the scores of points (rows), whether asked for or not; those of a generation that
+        was asked for also update CMA-ES."""
         scores = np.where(feasible, scores, -inf)
         self._points = np.vstack([self._points, points])
         self._scores = np.concatenate([self._scores, scores])
@@ -99,12 +100,13 @@ class Climb:
             self._climb.tell([*zip(self._asked, (-scores).tolist(), strict=True)])
 
     def _next(self) -> "CMA":
-        """A climb from the best point that is apart from where all others began."""
+        """A climb from the best known point that is APART from all earlier starts."""
         from cmaes import CMA
 
-        every = np.vstack([self._starts, self._points[np.argsort(-self._scores, kind="stable")]])
-        self._starts = every[apart(every, APART, len(self._starts) + 1)]
-        # The package asks for two dimensions at least: scores do not depend on the second one.
+        # Earlier starts come first, so ``apart`` chooses all of them and one new point behind.
+        ranked = np.vstack([self._starts, self._points[np.argsort(-self._scores, kind="stable")]])
+        self._starts = ranked[apart(ranked, APART, len(self._starts) + 1)]
+        # The package needs two dimensions at least: a spare one has no effect on the scores.
         spare = max(2 - self._keys, 0)
         return CMA(
             mean=np.clip([*self._starts[-1], *[0.5] * spare], 1e-3, 1.0 - 1e-3),

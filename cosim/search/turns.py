@@ -1,4 +1,4 @@
-"""A turn: the one perturbation of settings by which this project judges how robust they are."""
+"""A turn: the perturbation of settings by which this project judges their robustness."""
 
 from itertools import product
 
@@ -7,8 +7,8 @@ import numpy as np
 from cosim.arrays import Array
 
 TURN = 0.02
-"""Of a knob's whole turn, or of a key's range: what a hand that sets a knob again is off by. On a
-potentiometer that turns by 270 to 300 degrees these are 5 to 6, about the width of its pointer."""
+"""Error with which a hand sets a knob again, as a share of the knob's whole turn or a key's range.
+On a potentiometer with 270 to 300 degrees it is 5 to 6 degrees, about the width of its pointer."""
 
 
 def faces(point: Array) -> Array:
@@ -18,13 +18,13 @@ def faces(point: Array) -> Array:
 
 
 def turned(point: Array, keys: int) -> Array:
-    """A point and all turns of its first ``keys``, one by one and together (rows)."""
+    """A point (row 0) and all turns of its first ``keys`` coordinates, one by one and together."""
     if not keys:
         return point[np.newaxis]
     # 1 + 2 n + 2^n rows: the point, its turns one by one, and all together; the other keys stay.
     first = point[:keys]
-    every = np.vstack([first, faces(first), corners(first)])
-    return np.hstack([every, np.tile(point[keys:], (len(every), 1))])
+    moved = np.vstack([first, faces(first), corners(first)])
+    return np.hstack([moved, np.tile(point[keys:], (len(moved), 1))])
 
 
 def corners(point: Array) -> Array:
