@@ -119,9 +119,6 @@ def drawn(
         x = np.array([[float(rig[key]) for key in names] for rig in like])  # rigs × keys
         log = (x > 0.0).all(axis=0)
         x[:, log] = np.log(x[:, log])
-        # new = mean + √(1-s²) (parent - mean) + s Σ g_k (rig_k - mean)/√(n-1) with normal g_k: the
-        # second sum has the rigs' own covariance, and the two shares make that of the new rigs
-        # about the same.
         apart = x - x.mean(axis=0)
         # ``shares @ apart`` has SPREAD² times the covariance; the parent's deviation is shrunk so
         # that both add up to the whole covariance.
