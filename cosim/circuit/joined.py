@@ -134,6 +134,17 @@ def own_step(dropped: Sequence[Line]) -> float | None:
     return None
 
 
+def _edges(step: float, sources: Iterable[Sequence[str]]) -> float:
+    """The length, s, of edges that have none: a step, but at most 1 % of a PULSE's on-time and
+    period, as simulators each take another one."""
+    lengths = [step]
+    for words in sources:
+        if "pulse" in words:
+            values = [number(word) for word in words[words.index("pulse") + 1 :]]
+            lengths += [0.01 * value for value in values[5:7] if value]
+    return min(lengths)
+
+
 def text_of(
     title: Line,
     top: Scope,
@@ -146,7 +157,7 @@ def text_of(
 ) -> str:
     """What ngspice gets of a netlist: other lines for ``external`` sources, ``values`` for the top
     level's parameters, and the analysis. The netlist's ``own`` step, s, is what the edges of its
-    PULSE and EXP sources take that are given no time."""
+    PULSE and EXP sources take that are given no time, as far as it is short enough for an edge."""
     text = [title.text]
     for line, element, holder in top.order:
         if holder is top and line in external:
@@ -154,8 +165,9 @@ def text_of(
         elif all(each.used for each in holder.chain()):  # something calls the subcircuit
             free = (f" {key}=0" for key in sorted(holder.free) if line is holder.line)
             text.append("".join([written(line, element, values if holder is top else {}), *free]))
-    edges = any(set(element.words) & {"pulse", "exp"} for _, element, _ in top.order if element)
-    step = min(own, duration) if own and edges else max_step
+    sources = [element.words for _, element, _ in top.order if element and element.kind in "vi"]
+    edges = any({"pulse", "exp"} & {*words} for words in sources)
+    step = min(_edges(own or max_step, sources), duration) if edges else max_step
     one = max(_ONE_BREAK * max_step, _ONE_TIME * duration)
     text += [
         # Without norefvalue it asks for the CPU time at each step, to print how far it is.

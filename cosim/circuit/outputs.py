@@ -84,10 +84,10 @@ def without_effect(dropped: Sequence[Line]) -> Iterator[str]:
         elif word in _SAVING:
             yield f"{line.place}: {word} has no effect; circuit.save keeps vectors."
         elif word == ".step":
-            yield (
-                f"{line.place}: .step has no effect: a run takes the values of .param, else the "
-                "first ones; cosim sweep --over circuit.param.NAME=START:STOP:COUNT takes several."
-            )
+            takes = "the values of .param, else the first ones"
+            takes = takes if " param " in text else "the netlist's own values; make one a .param"
+            several = "cosim sweep --over circuit.param.NAME=START:STOP:COUNT takes several"
+            yield f"{line.place}: .step has no effect: a run takes {takes}; {several}."
         elif word in _ANALYSES or without or (match and match[1] not in (None, "tran")):
             what = f"{word} {without[0]}" if without else word
             yield (
