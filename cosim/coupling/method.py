@@ -1,13 +1,13 @@
 """A coupling method, written once for both masters.
 
-A master is whoever moves the two sides: :mod:`cosim.coupling.loop.macro_steps` where ngspice leads
-and cannot go back, :mod:`cosim.coupling.rewind.joint` between participants that can. Both
+A master advances the two sides: :mod:`cosim.coupling.loop.macro_steps` where ngspice leads, which
+cannot repeat a step, :mod:`cosim.coupling.rewind.joint` between participants that can. Both
 guarantee this order of calls::
 
     emf -> the circuit steps to the next communication point -> current -> the mechanics step there
 
-and tell ``Past`` of each communication point, of jumps of the command, and of events where they
-look for them.
+and report to ``Past`` each communication point, jumps of the command, and events where they detect
+them.
 """
 
 from abc import ABC, abstractmethod
@@ -18,44 +18,44 @@ from cosim.coupling.polynomials import History, Polynomial
 
 
 class Past:
-    """What a method knows, at a communication point and after the circuit's step from there.
+    """The data that a method may use, at a communication point and after the circuit's next step.
 
     Signals are numbers or arrays, SI; polynomials are about the communication point.
     """
 
     def __init__(self, method: "Method") -> None:
         self.time = 0.0
-        """s; of the communication point."""
+        """Time of the communication point, s."""
         self.current = History(2, False)
-        """Of the circuit's output, A."""
+        """The circuit's output, A."""
         self.emf = History(method.degree, method.slopes)
-        """Of the mechanics' output, V."""
+        """The mechanics' output, V."""
         self.h = 0.0
-        """s; length of the circuit's step."""
+        """Length of the circuit's step, s."""
         self.end: Any = 0.0
-        """The current (A) that it ended with."""
+        """Current (A) at the end of the circuit's step."""
         self.mean: Any = 0.0
-        """Mean current (A) over it, which carries its exact charge."""
+        """Mean current (A) over the circuit's step: its charge over ``h``."""
         self.gain: Any = 0.0
         """Bl²/m_eff at the communication point, V/(A s)."""
         self.carried: Any = 0.0
-        """Share of the back-EMF (V) that the circuit carries itself there."""
+        """Share of the back-EMF (V) at the communication point that the circuit solves itself."""
         self.carried_slope: Any = 0.0
-        """The slope that this share has by itself, V/s."""
+        """Time derivative of this share without any extrapolation, V/s."""
 
     def met(self, time: float, current: Any, current_slope: Any, emf: Any, emf_slope: Any) -> None:
-        """A communication point at ``time`` (s), with both outputs and their slopes; the slope is
-        None where it is not known."""
+        """Add a communication point at ``time`` (s), with both outputs and their slopes; an unknown
+        slope is None."""
         self.time = time
         self.current.add(time, current, current_slope)
         self.emf.add(time, emf, emf_slope)
 
     def stepped(self, time: float, end: Any, mean: Any) -> None:
-        """The circuit has stepped to ``time`` (s)."""
+        """Take the circuit's step to ``time`` (s): its current at the end and mean current, A."""
         self.h, self.end, self.mean = time - self.time, end, mean
 
     def restart(self) -> None:
-        """Forget what lies before the last communication point: something jumped there."""
+        """Forget all points before the last one, at which a signal or its slope jumped."""
         self.current.restart()
         self.emf.restart()
 
@@ -71,16 +71,16 @@ class Past:
 class Method(ABC):
     """How each side of a coupling sees the other between two communication points.
 
-    Subclasses cite their source. ``slopes``: the back-EMF's true slope counts as a known value of
-    its extrapolation, of degree ``degree``, instead of a value one step older.
+    Subclasses cite their source. The back-EMF is extrapolated with ``degree``; with ``slopes`` its
+    true slope is used in place of the oldest value.
     """
 
     name: ClassVar[str]
-    """As ``coupling.method`` has it."""
+    """The method's name in ``coupling.method``."""
     variants: ClassVar[dict[str, Callable[[], "Method"]]] = {}
-    """What the studies compare, by the name that they show."""
+    """Variants that the studies compare, by the names that they show."""
     carries_inertia = False
-    """The circuit carries a share of the back-EMF itself: ``Past.gain`` times its charge."""
+    """Whether the circuit solves a share of the back-EMF itself: ``Past.gain`` times its charge."""
 
     def __init__(self, degree: int = 1, slopes: bool = True) -> None:
         self.degree, self.slopes = degree, slopes

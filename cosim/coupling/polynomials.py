@@ -1,8 +1,9 @@
-"""What one side of a coupling is told of the other: polynomials in time over a macro step.
+"""The inputs of each side of a coupling over a macro step: polynomials in time.
 
-A polynomial is a tuple of coefficients about the start of the step: ``c[k]``, a number or an array
-of the signal's own shape, belongs to (t - t_n)^k. Plain arithmetic serves both: the compiled loop
-asks for a polynomial at each of its macro points, where arrays would cost more than the step.
+A polynomial is a tuple of coefficients about the start t_n of the step: ``c[k]``, a number or an
+array of the signal's own shape, is the factor of (t - t_n)^k. Code for numbers and arrays is the
+same plain arithmetic: the compiled loop asks for a polynomial at each macro point, where arrays
+would cost more than the step.
 """
 
 from typing import Any
@@ -27,14 +28,15 @@ def value(coefficients: Any, s: float) -> Any:
 
 
 def slope(coefficients: Any, s: float) -> Any:
-    """Its time derivative there, per second."""
+    """The time derivative of the polynomial at ``s`` seconds after its origin."""
     if len(coefficients) == 1:
         return 0.0 * coefficients[0]
     return value([k * c for k, c in enumerate(coefficients)][1:], s)
 
 
 def shifted(coefficients: Array, s: float) -> Array:
-    """The same polynomial about an origin ``s`` seconds later."""
+    """The coefficients of the same polynomial about an origin ``s`` seconds later (Taylor shift by
+    repeated Horner steps)."""
     c = np.array(coefficients)
     for first in range(len(c) - 1):
         for k in range(len(c) - 2, first - 1, -1):
@@ -45,9 +47,8 @@ def shifted(coefficients: Array, s: float) -> Array:
 def projected(coefficients: Any, h: float, degree: int) -> Polynomial:
     """The polynomial of at most ``degree`` 0 or 1 that is nearest in the mean square over [0, h].
 
-    Its integral, and for degree 1 its first moment, are those of the original: what a force or a
-    voltage does to an integrator is kept. So a participant that takes linear inputs only loses
-    nothing up to the order of H^4.
+    It keeps the integral, for degree 1 also the first moment: so an integrator driven by it ends at
+    the same value. A participant that takes only linear inputs loses nothing up to order h^4.
     """
     c = coefficients
     if len(c) <= degree + 1:
@@ -55,6 +56,7 @@ def projected(coefficients: Any, h: float, degree: int) -> Polynomial:
     mean = sum(c[k] * (h**k / (k + 1)) for k in range(len(c)))
     if degree == 0:
         return (mean,)
+    # mean = 1/h ∫ p dt, moment = 1/h² ∫ t p dt; of a line: mean = a + b h/2, moment = a/2 + b h/3.
     moment = sum(c[k] * (h**k / (k + 2)) for k in range(len(c)))
     rise = (12.0 * moment - 6.0 * mean) / h
     return (mean - 0.5 * h * rise, rise)
@@ -64,10 +66,10 @@ class History:
     """The last values of a signal at communication points, the newest first, and its slope."""
 
     def __init__(self, degree: int, slopes: bool) -> None:
-        """Polynomials up to ``degree``; with ``slopes`` the newest slope counts as a known value.
+        """For polynomials up to ``degree``, which with ``slopes`` use the newest slope.
 
-        Without it older values are used instead, and the slope only fills in while there are not
-        yet enough of them, so that a method begins with its own order.
+        Without ``slopes`` they use one more old value instead, and the slope only while there are
+        too few old values, so that a method starts with its full order.
         """
         self._points: tuple[tuple[float, Any], ...] = ()
         self._older = max(degree, 1)
@@ -86,12 +88,12 @@ class History:
         self.slope = slope
 
     def restart(self) -> None:
-        """Forget all but the newest point: what is older lies before an event."""
+        """Forget all but the newest point: older ones lie before an event."""
         self._points = self._points[:1]
 
     def polynomial(self, degree: int) -> Polynomial:
-        """The polynomial of ``degree`` 0, 1 or 2 through the newest points, about the newest; of a
-        lower degree while there are too few."""
+        """The polynomial of ``degree`` 0, 1 or 2 through the newest points, with its origin at the
+        newest; of a lower degree while there are too few points."""
         if degree == 0:
             return (self.value,)
         # Newton's divided differences; a known slope counts as a second point at the newest time.
@@ -105,13 +107,14 @@ class History:
         rise = (older[0][1] - newest) / back
         if points == 1:
             return (newest, slope, (rise - slope) / back) if slopes else (newest, rise)
+        # Newton's divided differences through three points.
         further = older[1][0] - time
         bend = ((older[1][1] - newest) / further - rise) / (further - back)
         return (newest, rise - bend * back, bend)
 
     def polynomial_to(self, h: float, end: Any, degree: int) -> Polynomial:
-        """The polynomial of ``degree`` 0, 1 or 2 through ``end``, ``h`` (s) after the newest point,
-        and the newest points, about the newest."""
+        """The polynomial of ``degree`` 0, 1 or 2 through the value ``end``, ``h`` (s) after the
+        newest point, and the newest points, with its origin at the newest."""
         if degree == 0:
             return (end,)
         (time, newest), *older = self._points

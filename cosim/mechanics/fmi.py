@@ -1,6 +1,6 @@
-"""The FMU's calls under FMI 2.0 and FMI 3.0, alike for the caller, without copies of their arrays.
+"""The FMU's calls, the same for FMI 2.0 and FMI 3.0, without copies of arrays.
 
-Both go through fmpy's own functions, which check every return code.
+They go through fmpy's functions, which check every return code.
 """
 
 from collections import deque
@@ -32,7 +32,7 @@ _FUNCTIONS = {
     "free_instance": ("fmi2FreeInstance", "fmi3FreeInstance"),
     "free_state": ("fmi2FreeFMUstate", "fmi3FreeFMUState"),
 }
-"""Their names here, in FMI 2.0 and in FMI 3.0."""
+"""Names of functions in this module, in FMI 2.0 and in FMI 3.0."""
 
 _COMPILED = ("set_reals", "do_step", "get_reals", "get_integers")
 
@@ -51,7 +51,7 @@ def _places(version: int, names: tuple[str, ...]) -> Any:
 
 
 def unit(variable: Any) -> str:
-    """What fmpy says of a variable's unit: its own, or that of its type, or 1."""
+    """The unit of one of fmpy's variables: its own, or else that of its type, or else 1."""
     return variable.unit or (variable.declaredType and variable.declaredType.unit) or "1"
 
 
@@ -62,7 +62,7 @@ _STEP_ENDS: dict[int, tuple[Any, ...]] = {
     2: (1,),
     3: (True, *(byref(fmi3.fmi3Boolean()) for _ in range(3)), byref(c_double())),
 }
-"""What a call of do_step ends with."""
+"""The last arguments of do_step: FMI 3.0 returns four further values, which are not used."""
 
 
 class Interface:
@@ -71,12 +71,12 @@ class Interface:
     def __init__(
         self, version: int, loaded: Any = None, messages: deque[str] | None = None
     ) -> None:
-        """Of an FMU that fmpy has ``loaded``; by default the project's own. What it says goes into
-        ``messages``, also where it cannot be made."""
+        """Instantiate an FMU that fmpy has ``loaded``, by default the project's own. Its messages
+        go into ``messages``, also if the instantiation fails."""
         self.version = version
-        """Of FMI."""
+        """Of FMI, 2 or 3."""
         self.messages: deque[str] = deque(maxlen=100) if messages is None else messages
-        """What the FMU has said, the newest last."""
+        """The FMU's messages, the newest last."""
         self._running = False
         self.raw = copy(load(version) if loaded is None else loaded)
         """fmpy's own object."""
@@ -98,13 +98,13 @@ class Interface:
         self._begin()
 
     def _begin(self) -> None:
-        """Enter the initialisation."""
+        """Enter the initialisation mode."""
         if self.version == 2:
             self.raw.setupExperiment()
         self.raw.enterInitializationMode()
 
     def _call(self, name: str, *arguments: Any) -> None:
-        """One of _FUNCTIONS, which a stranger may lack if it does not need it."""
+        """Call one of _FUNCTIONS; a foreign FMU may lack functions that are never called."""
         function = getattr(self.raw, _FUNCTIONS[name][self.version - 2])
         function(self.raw.component, *arguments)
 
@@ -123,7 +123,7 @@ class Interface:
         return _places(self.version, tuple(names))
 
     def restart(self) -> None:
-        """Back to the state after the making: parameters can be set again."""
+        """Return to the state after the instantiation: parameters can be set again."""
         self.raw.reset()
         self._running = False
         self.messages.clear()
@@ -164,14 +164,14 @@ class Interface:
 
     @cached_property
     def addresses(self) -> dict[str, int]:
-        """Where compiled code finds the instance and four functions, by their names here."""
+        """Addresses of the instance and of four functions, for compiled code, by name."""
         names = {name: _FUNCTIONS[name][self.version - 2] for name in _COMPILED}
         found = {name: getattr(self.raw.dll, function) for name, function in names.items()}
         where = {name: cast(function, c_void_p).value or 0 for name, function in found.items()}
         return {"instance": self.raw.component, **where}
 
     def close(self) -> None:
-        """Free the instance; fmpy's own way to do so unloads the library, too."""
+        """Free the instance, but not by fmpy's own function, which also unloads the library."""
         if self._running:
             self.raw.terminate()
         self._call("free_instance")
@@ -180,7 +180,7 @@ class Interface:
 _ONE = (c_double * 1)(1.0)
 _number = count(1)
 _said: WeakValueDictionary[int, deque[str]] = WeakValueDictionary()
-"""The messages of each instance of FMI 2.0, by what it was given as its environment."""
+"""The messages of each instance of FMI 2.0, by the number it was given as its environment."""
 
 
 def _text(message: bytes | None) -> str:
@@ -189,9 +189,10 @@ def _text(message: bytes | None) -> str:
 
 @fmi2.fmi2CallbackLoggerTYPE
 def _logger_2(environment: int | None, *said: Any) -> None:
-    """FMI 2.0's logger without its variable arguments, which fmpy's C function before it puts into
-    the message. That function has one logger behind it in a process, and so has this module."""
-    newest = max(_said, default=0)  # some FMUs lose their environment
+    """FMI 2.0's logger without variable arguments: fmpy's C function, which calls it, has already
+    put these into the message. That function calls the same logger for all instances of a process,
+    so the environment tells which instance it is."""
+    newest = max(_said, default=0)  # for FMUs that do not pass their environment on
     with suppress(KeyError):
         _said[environment or newest].append(_text(said[-1]))
 
@@ -203,8 +204,8 @@ _loaded: dict[int, Any] = {}
 def load(version: int) -> Any:
     """fmpy's object of the FMU, which each instance copies. Raises BadInput.
 
-    fmpy changes the process's folder while it loads a library, which other threads would meet: so
-    it does so once, and a caller with threads loads it before they start.
+    fmpy changes the working directory of the process while it loads a library, which would affect
+    other threads: so it is loaded once, and a caller with threads loads it before they start.
     """
     with _loading:
         if version not in _loaded:
@@ -223,15 +224,15 @@ _idle: dict[int, list[Interface]] = {version: [] for version in SLAVES}
 def borrow(version: int) -> Interface:
     """An instance whose parameters can be set: one that was given back, or a new one.
 
-    Making one takes as long as a tenth of a short run.
+    A new one takes as long as a tenth of a short run.
     """
     if not _idle[version]:
         return Interface(version)
-    kept = _idle[version].pop()
-    kept.restart()
-    return kept
+    instance = _idle[version].pop()
+    instance.restart()
+    return instance
 
 
 def give_back(instance: Interface) -> None:
-    """Keep a borrowed instance for the next run: so many stay as ran at once."""
+    """Keep a borrowed instance for later runs; as many are kept as ever ran at the same time."""
     _idle[instance.version].append(instance)

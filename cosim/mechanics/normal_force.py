@@ -8,14 +8,13 @@ from cosim.errors import BadInput, plain
 from cosim.files.cells import read_timetable
 from cosim.scene import Scene
 
-_SAME_TIME = 1e-12  # s; times closer than this are one, as in the recorder
+_SAME_TIME = 1e-12  # s; times closer than this count as one, as in the recorder
 
 
 @dataclass(frozen=True)
 class NormalForce:
-    """Normal force of one surface, N, linear between its ``corners`` (s), where it may jump.
-
-    Before the first corner and after the last it keeps their value.
+    """Normal force of one surface: ``forces`` (N) at the ``corners`` (s), linear in between; a
+    corner given twice is a jump. Before the first corner and after the last it is constant.
     """
 
     corners: list[float]
@@ -38,7 +37,7 @@ class NormalForce:
         return self.forces[at] if on_corner else self.value(time)
 
     def least(self, duration: float) -> tuple[float, float]:
-        """The least force, N, from 0 to ``duration`` (s), and when, s."""
+        """The least force (N) from 0 to ``duration`` (s), and its time (s)."""
         ends = [(self.value(time), time) for time in (0.0, duration)]
         pairs = zip(self.forces, self.corners, strict=True)
         return min([*ends, *(pair for pair in pairs if 0.0 <= pair[1] <= duration)])

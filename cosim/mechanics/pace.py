@@ -1,7 +1,7 @@
-"""Whether the mechanics of a run can be solved to its end, judged by what its beginning took.
+"""Stops a run whose mechanics would take too many internal steps, judged by its beginning.
 
-What acts at every moment is checked with the scene. How stiff a wall, a hardening suspension or a
-changing force factor gets depends on the motion, and so shows only when it is solved.
+Constant stiffness is checked with the scene. How stiff a wall, a hardening suspension or a varying
+force factor becomes depends on the motion, and so shows only during the run.
 """
 
 import math
@@ -11,16 +11,16 @@ from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, keys
 
 BUDGET = 3e8
-"""Internal steps of the FMU that a run may take, beyond one for each step that it is asked for:
-some minutes."""
+"""Internal steps of the FMU that a run may take beside one for each communication step: some
+minutes."""
 
 ORDINARY = 1e6
-"""Internal steps per simulated second that no budget forbids: a run may be long. The built-in
-scenes take some 1e4."""
+"""Internal steps per simulated second that are always allowed, since a run may be long. The
+built-in scenes take some 1e4."""
 
 ENOUGH, BEGINNING = 3e6, 3e7
-"""Internal steps after which a run can be judged, some seconds, and after which it no longer is:
-what has gone well for so long is not stopped."""
+"""Internal steps from which on a run is judged (some seconds), and from which on it no longer is:
+a run that has gone well for so long is not stopped."""
 
 
 class Pace:
@@ -31,10 +31,10 @@ class Pace:
         self._spent = 0.0
 
     def judge(self, time: float, steps: int) -> None:
-        """At ``time`` (s), after ``steps`` of the FMU.
+        """Judge at ``time`` (s), after ``steps`` communication steps of the FMU.
 
-        Raises SimulationFailed where the run is only at its beginning, and the rest, at the pace
-        so far, would exceed the budget.
+        Raises SimulationFailed if the run is still at its beginning, and would exceed the budget at
+        the pace so far.
         """
         if self._spent > BEGINNING:
             return

@@ -1,14 +1,14 @@
 """Motion of a part that is pressed against a surface whose velocity is prescribed.
 
 The part of mass m is pressed with a constant normal force F_n; the surface's velocity is linear
-between knots (time, v), and a time given twice is a jump of it. Coulomb's law is set-valued: the
-part sticks while that needs no more friction than µ_s F_n, |a_surface + g| ≤ µ_s F_n/m, else it
-slips and the surface pulls it with µ_k F_n. So a part that meets the surface and needs between µ_k
-F_n and µ_s F_n sticks, although to slip on would agree with the law too. The spring-loaded plate
+between knots (time, v), and a time given twice is a jump. Coulomb's law is set-valued: the part
+sticks while this needs at most the friction µ_s F_n, |a_surface + g| ≤ µ_s F_n/m; else it slips and
+the surface pulls it with µ_k F_n. A part that reaches the surface's velocity and needs between
+µ_k F_n and µ_s F_n sticks, although slipping on would also satisfy the law. The spring-loaded plate
 behind it may rub with µ_p F_n against the part's own velocity, set-valued at rest. Units: s, m,
 m/s, m/s².
 
-`exact` goes from event to event in closed form. `threshold` and `moreau` step through the time, for
+`exact` goes from event to event in closed form. `threshold` and `moreau` take fixed time steps, for
 comparison; `published` is `threshold` as in the simulation of Yako, Nowak, Yuan and Salisbury.
 """
 
@@ -27,9 +27,9 @@ from cosim.toolchain.libraries import library
 
 Real = npt.ArrayLike
 
-PUBLISHED_STEP = 1e-4  # s
-PUBLISHED_V_MIN = 1e-5  # m/s
-MOST_STEPS = 100_000_000
+PUBLISHED_STEP = 1e-4  # s, the authors' time step
+PUBLISHED_V_MIN = 1e-5  # m/s, their velocity threshold
+MOST_STEPS = 100_000_000  # of a method with fixed steps
 EPSILON, LARGEST = sys.float_info.epsilon, sys.float_info.max
 
 
@@ -55,15 +55,16 @@ class PartMotion:
         return float(self.sticking @ np.diff(self.time) / span) if span > 0 else 0.0
 
 
+# Columns of the second output of ``part_exact``: see ``account``.
 _TOLD = ("sticks", "z_surface", "v_surface", "a_surface", "friction", "work", "heat", "events")
 
 
 class Case(TypedDict, total=False):
-    """What the part is in and how it starts.
+    """Friction, forces and initial state of the part.
 
     ``force_per_mass`` is F_n/m [m/s²]; ``gravity`` [m/s²] acts along the motion, downwards. The
     part starts at ``z0`` [m] with the velocity ``v0`` [m/s], by default the surface's. The knots
-    are run through ``periods`` times, each following on the last.
+    are repeated ``periods`` times, each period following on the last.
     """
 
     mu_s: Required[float]
@@ -121,8 +122,9 @@ def account(surface: Surface, output: Real, **given: Unpack[Case]) -> dict[str, 
 def bounds(
     mu_s: float, force_per_mass: float, gravity: float = 9.81, mu_plate: float = 0.0
 ) -> Array:
-    """The accelerations of the surface, m/s², at which a part that sticks to it may slip: more of
-    them than there are, as the way of the part decides which side the plate's friction is on."""
+    """Candidates for the accelerations of the surface, m/s², at which a sticking part begins to
+    slip: the upper and the lower one (friction ±µ_s F_n), each for a part that moves up, rests or
+    moves down, which decides the sign of the plate's friction."""
     static, _, plate, g = friction_law(mu_s, 0.0, force_per_mass, gravity, mu_plate)
     return np.array([side * static - way * plate - g for side in (1, -1) for way in (1, 0, -1)])
 
@@ -130,11 +132,11 @@ def bounds(
 def slip_budget(
     mu_s: float, force_per_mass: float, gravity: float = 9.81, mu_plate: float = 0.0
 ) -> dict[str, tuple[float, float]]:
-    """Between which accelerations of the surface, m/s², a part goes with it that sticks and goes
-    "up" or "down". The spring-loaded plate, which rubs against the part's way, helps one side and
-    costs the other: (µ_s ± µ_p) F_n/m -+ g."""
-    every = bounds(mu_s, force_per_mass, gravity, mu_plate).reshape(2, 3).tolist()
-    return {way: (every[1][k], every[0][k]) for way, k in (("up", 0), ("down", 2))}
+    """The least and greatest acceleration of the surface, m/s², between which a part that moves
+    "up" or "down" with it sticks. The spring-loaded plate, which rubs against the part's motion,
+    extends one bound and narrows the other: (µ_s ± µ_p) F_n/m -+ g."""
+    ends = bounds(mu_s, force_per_mass, gravity, mu_plate).reshape(2, 3).tolist()
+    return {way: (ends[1][k], ends[0][k]) for way, k in (("up", 0), ("down", 2))}
 
 
 def threshold(
@@ -200,7 +202,7 @@ def friction_law(
 
 
 class _Case:
-    """Arguments that have been checked, as the compiled routines take them."""
+    """Checked arguments for the compiled routines."""
 
     def __init__(
         self,
@@ -223,6 +225,7 @@ class _Case:
             raise BadInput("The surface's times and velocities must be finite.")
         if (self.time[1:] < self.time[:-1]).any() or not self.time[-1] > self.time[0]:
             raise BadInput("The times of the surface's knots must not decrease.")
+        # Knots closer than this rounding are a jump; over longer pieces Δv/Δt must be finite.
         least = EPSILON * float(np.abs(self.time[[0, -1]]).max())
         if float(self.v.max()) - float(self.v.min()) > LARGEST * least:
             raise BadInput("The surface's accelerations must be finite.")
@@ -259,7 +262,8 @@ class _Case:
     def stepped(
         self, solve: Callable[..., int], own: tuple[float, ...], output: Real | None
     ) -> PartMotion:
-        """By a compiled routine with fixed steps and its ``own`` numbers, the step (s) first."""
+        """The motion by a compiled routine with fixed steps and its ``own`` arguments, of which the
+        first is the step (s)."""
         step, span = own[0], self.end - self.time[0]
         if not step > 0 or span / step > MOST_STEPS:
             raise BadInput(f"The step must be positive, and no less than {span / MOST_STEPS:g} s.")
@@ -277,6 +281,7 @@ class _Case:
 
 
 def _shares(times: Array, stuck: Array) -> Array:
+    """Shares of intervals spent sticking, from the time ``stuck`` (s) until each of ``times``."""
     lengths = np.diff(times)
     shares = np.divide(np.diff(stuck), lengths, out=np.zeros_like(lengths), where=lengths > 0)
     return np.clip(shares, 0.0, 1.0)

@@ -32,25 +32,25 @@ STEP_OUTPUTS = (
     ),
     *("v_surface_max", "v_surface_min", "z_surface_max", "z_surface_min"),
 )
-"""What is read after every interval of the inputs: back-EMF of one coil (V, V/s) and its integral
-over time (Wb), extremes since the inputs were set last."""
+"""Outputs that are read after every interval of the inputs: back-EMF of one coil (V, V/s) and its
+integral over time (Wb), and extremes since the inputs were set last."""
 
 SAMPLE_OUTPUTS = (
     *("back_emf", "z_surface", "v_surface", "a_surface", "z_ram", "v_ram"),
     *("z_part", "v_part", "friction_force"),
 )
-"""What a row of the waveforms takes, SI; ``sticking`` follows them. Where a second surface moves by
-itself, its own follow, named with ``_2``; the part is one."""
+"""Outputs in a row of the waveforms, SI, followed by ``sticking``. Where a second surface moves
+independently, its own outputs follow, named with ``_2``; there is one part only."""
 
 TOTALS = (
     *("z_part", "stick_time", "energy_in", "energy_friction", "energy_impact", "energy_damping"),
     "energy_stored",
 )
 SOURCE_STEP_OUTPUTS = ("coil_current_max", "coil_current_min")
-"""What is read besides where the source is in the FMU: one coil's, A."""
+"""Further outputs after an interval where the source is in the FMU: current of one coil, A."""
 
 SOURCE_SAMPLE_OUTPUTS = ("coil_current", "coil_voltage")
-"""What a row takes besides then: current of one coil (A) and voltage across the coils (V)."""
+"""Further outputs in a row then: current of one coil (A) and voltage across the coils (V)."""
 
 SOURCE_TOTALS = (
     *("output_high_time", "output_low_time", "current_limit_time"),
@@ -64,21 +64,23 @@ _KEYS = [[key for key in keys() if key.variable and key.kind is kind] for kind i
 _VARIABLES = [
     ([key.variable for key in group], attrgetter(*(key.full for key in group))) for group in _KEYS
 ]
-"""The FMU's variables that are keys of a scene, real and whole ones; what finds their values."""
+"""For real and for integer parameters: the FMU's variables that are keys of a scene, and a getter
+of their values from a scene."""
 
 FMI = 3
-"""The version by which the FMU is called; by the other it gives the same bits."""
+"""The FMI version by which the FMU is called; by version 2 it gives the same bits."""
 
 CONTACT_LAWS = {"compliant": 1, "rigid": 2}
 SUSPENSIONS = {"cubic": 1, "knee": 2, "repulsion": 3}
-"""Choices of a scene, as the FMU numbers them."""
+"""The FMU's numbers of a scene's choices."""
 
 
 @cache
 def _names(
     has_source: bool, two_surfaces: bool, changing_force: bool
 ) -> tuple[tuple[str, ...], dict[str, tuple[str, ...]]]:
-    """Names of variables: of the inputs that are led from outside, and of all by their roles."""
+    """Names of the FMU's variables: of the inputs that come from outside (ports), and of all
+    variables by role."""
     given = "command" if has_source else "current"
     step_outputs, sampled, totals = STEP_OUTPUTS, SAMPLE_OUTPUTS, TOTALS
     if has_source:
@@ -108,19 +110,19 @@ def _names(
 class Mechanics:
     """One instance of the FMU, initialised in static equilibrium at time 0 without current.
 
-    It tells which variables have which role; who steps it knows them by these alone.
+    Callers know its variables by their roles: keys of ``places``.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.normal_force = normal_force(scene)
-        """The normal force where it changes in time: an input that follows the time alone."""
+        """The normal force where it changes in time: an input that is a given function of time."""
         self.has_source = scene.rung.source_in_fmu
         """Whether the input is the command of the FMU's own source, V, and not a current, A."""
         two, changing = scene.drive.phase_deg is not None, self.normal_force is not None
         self.ports, names = _names(self.has_source, two, changing)
         self.columns, self.total_names = names["reals"] + names["wholes"], names["totals"]
-        """Names of the inputs that are led from outside; of what a row holds: reals, then whole
-        numbers; and of the totals."""
+        """``ports`` are the names of the inputs from outside, ``columns`` those of a row (reals,
+        then whole numbers), ``total_names`` those of the totals."""
         self.instance = borrow(FMI)
         places = self.instance.places
         self.places: dict[str, Any] = {role: places(of) for role, of in names.items()}
@@ -156,7 +158,7 @@ class Mechanics:
         return dict(zip(names, self._read("totals", "counters"), strict=True))
 
     def internal_steps(self) -> int:
-        """Those taken and rejected so far."""
+        """Internal steps of the FMU so far, taken and rejected."""
         return sum(self._wholes("internal"))
 
     def _read(self, reals: str, wholes: str) -> list[float]:
@@ -187,7 +189,7 @@ class Mechanics:
         FMU's words."""
         said = self.instance.messages[-1] if self.instance.messages else str(error)
         current, beyond, _ = said.partition(": current = ")[2].partition(" is outside")
-        if beyond:  # the mechanics refuse it; the circuit, or the steps, drove it there
+        if beyond:  # the FMU refuses the current, to which circuit or coupling steps drove it
             return SimulationFailed(
                 f"The run diverges: the coil's current has grown to {current} by t = {time:.6g} s; "
                 "look for signs and positive feedback in the netlist, if it is your own, or take "
@@ -224,14 +226,15 @@ def numbers_of(scene: Scene) -> dict[str, float]:
 
 
 def suspension_force(known: Mapping[str, float], places: Array) -> Array:
-    """Of the suspension on a ram at rest at ``places`` (q, m), N; of the stepper's numbers."""
+    """The suspension's force (N) on a ram at rest at ``places`` (q, m), for the stepper's numbers
+    of a rig."""
     rig, force_at = _rig(known), library("stepper").stepper_suspension
     return np.array([force_at(rig, q) for q in places.tolist()])
 
 
 def rests_of(known: Mapping[str, float]) -> list[float]:
-    """The places (q, m), rising, at which the ram rests without a current; in a wall that yields,
-    too."""
+    """The positions (q, m), rising, at which the ram rests without a current; also inside a
+    compliant wall."""
     found = (c_double * 4)()
     count = library("stepper").stepper_rests(_rig(known), found)
     return [*found][:count]

@@ -1,4 +1,4 @@
-"""A surface whose velocity is given."""
+"""A surface whose velocity is a given function of time."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -10,9 +10,9 @@ from cosim.arrays import Array
 
 @dataclass(frozen=True)
 class Surface:
-    """Its velocity is linear between knots, ``times`` (s, not falling; one given twice is a jump)
-    and ``velocities`` (m/s), which are run through ``periods`` times. With ``turn`` (rad/s) it is
-    ``half`` (m/s) times sin(``turn`` t), and the knots lie at each quarter turn at least.
+    """A velocity that is linear between knots: ``times`` (s, not falling; a time given twice is a
+    jump) and ``velocities`` (m/s), repeated ``periods`` times. With ``turn`` (rad/s) not 0 it is
+    ``half`` (m/s) times sin(``turn`` t), with knots at each quarter turn at least.
     """
 
     times: Array
@@ -36,7 +36,7 @@ class Surface:
 
     @property
     def period(self) -> float:
-        """How long the knots take, s."""
+        """Time from the first knot to the last, s."""
         return float(self.times[-1] - self.times[0])
 
     def extremes(self, start: float, end: float) -> dict[str, float]:
@@ -49,15 +49,18 @@ class Surface:
         first = min(max(first, 0.0), self.periods - 1.0)
         end = min(end, start + self.period)
         shifts = (first + np.arange(2 if self.periods > 1 else 1)) * self.period
+        # One or two periods of pieces, flat: their begins, times from the first knot and lengths
+        # (s), and velocities at both ends.
         begins = (shifts[:, None] + self.times[:-1]).ravel()
         local, lengths = (np.tile(t, len(shifts)) for t in (self.times[:-1], np.diff(self.times)))
         v0, v1 = (np.tile(v, len(shifts)) for v in (self.velocities[:-1], self.velocities[1:]))
-        # What only touches an end does not count; of a jump at both, of a period, one does.
+        # A piece that only touches ``start`` or ``end`` does not count; of a periodic surface a
+        # jump at ``end`` does, since the one at ``start``, a period earlier, does not.
         closed = (lengths == 0.0) & (self.periods > 1)
         before = np.where(closed, begins <= end * (1.0 + 1e-12), begins < end)
-        here = before & (begins + lengths > start)
-        begins, local, lengths, v0, v1 = (x[here] for x in (begins, local, lengths, v0, v1))
-        # The part of each piece that counts.
+        counts = before & (begins + lengths > start)
+        begins, local, lengths, v0, v1 = (x[counts] for x in (begins, local, lengths, v0, v1))
+        # From ``low`` to ``high``, s after a piece's begin, it lies between ``start`` and ``end``.
         low = np.clip(start - begins, 0.0, lengths)
         high = np.clip(end - begins, 0.0, lengths)
         jump = lengths == 0.0
@@ -72,9 +75,10 @@ class Surface:
             v = np.stack([v0 + slopes * low, np.where(high < lengths, v0 + slopes * high, v1)])
             a = np.where(jump, np.copysign(np.inf, v1 - v0), slopes)
             risen = 0.5 * (v[0] + v[1]) * (high - low)
-            # How far it goes on from the piece's begin until it turns round.
+            # Rise from ``low`` to the turning point, where the velocity is 0, within a piece.
             turns = (v[0] * v[1] < 0.0) & ~jump
             rest = np.divide(-0.5 * v[0] ** 2, slopes, out=np.zeros_like(risen), where=turns)
+        # Heights at the ends of pieces, then at the turning points within them.
         z = np.concatenate([[0.0], np.cumsum(risen)])
         z = np.concatenate([z, z[:-1] + rest])
         ranges = {"a_surface": a, "v_surface": v, "z_surface": z}

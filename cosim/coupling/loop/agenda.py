@@ -1,5 +1,5 @@
-"""When something is to be written down: rows, frames of the camera, the end of settling, the part's
-heights of which v_average is the slope."""
+"""The times of a run at which values are recorded: rows, frames of the camera, the end of settling,
+and the part's heights of which v_average is the slope."""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -12,14 +12,14 @@ from cosim.arrays import Array
 from cosim.trials.camera import FRAME_RATE, frame_times, instants, instants_a_frame
 
 ENTRIES = 1 << 14
-"""Rows and frames of the camera that are planned, and taken, at a time."""
+"""Rows and frames of the camera in one part of the agenda, at most."""
 
 KEPT = 1 << 17
-"""Rows of a run whose agenda is kept for others, such as those of a sweep: 2 MB."""
+"""Most rows of a run (2 MB) whose agenda is cached for other runs, such as those of a sweep."""
 
 SAME_TIME = 1e-12  # s; communication points closer than this are one
-_ROW, _FRAME, _SETTLED, _PART = 1, 2, 4, 8
-_NEVER = 1 << 80  # multiples of SAME_TIME
+_ROW, _FRAME, _SETTLED, _PART = 1, 2, 4, 8  # bits: what is recorded at a time
+_NEVER = 1 << 80  # in multiples of SAME_TIME, behind the end of any run
 
 
 def grid(step: float, end: float) -> Array:
@@ -28,17 +28,17 @@ def grid(step: float, end: float) -> Array:
 
 
 def count(step: float, end: float) -> int:
-    """How many times :func:`grid` has."""
+    """The number of times in :func:`grid`."""
     return int(end / step * (1 + 1e-12)) + 1
 
 
 class Agenda:
-    """Times, s, and what is to be written down at each."""
+    """Times, s, and the kinds of values to be recorded at each, as bits."""
 
     def __init__(self, times: Array, what: npt.NDArray[np.int32]) -> None:
         self.times, self.what = times, what
         times.flags.writeable = what.flags.writeable = False
-        # Asked for once, since many runs have the same agenda.
+        # Calculated once, since many runs share an agenda.
         self.addresses = times.ctypes.data, what.ctypes.data
         """Where compiled code finds both arrays."""
 
@@ -49,7 +49,7 @@ def _all(*given: Any) -> tuple[Agenda, ...]:
 
 
 def kept(row_step: float, duration: float, *more: Any) -> Iterator[Agenda]:
-    """What :func:`agendas` gives; that of a run which is not long is kept, as others have it."""
+    """The parts of :func:`agendas`; those of a run with at most KEPT rows are cached."""
     make = _all if count(row_step, duration) <= KEPT else agendas
     return iter(make(row_step, duration, *more))
 
@@ -62,37 +62,37 @@ def agendas(
     shutter: float,
     slope: bool = False,
 ) -> Iterator[Agenda]:
-    """When something is to be written down, part after part; not more than ENTRIES rows and frames
-    in one. The last time of all is endless.
+    """The agenda in parts, each with at most ENTRIES rows and frames; the very last time is inf.
 
-    Of frames, which are exposed for a share ``shutter`` of their interval, the instants. With
-    ``slope`` also the part's heights at :func:`part_times`.
+    A frame is exposed for a share ``shutter`` of the frames' interval, and read at several instants
+    of it. With ``slope`` the part's heights are recorded at :func:`part_times`, too; at ``stops``
+    (s) steps end without a record.
     """
     frame_step = 1.0 / FRAME_RATE
     parts = part_times(duration, settle) if slope else np.empty(0)
     extra = np.concatenate([[settle, *stops], parts])
     kinds = np.repeat(np.array([_SETTLED, 0, _PART], np.int32), [1, len(stops), len(parts)])
     places = np.rint(extra / SAME_TIME)
-    # Whole numbers of SAME_TIME, so that no part ends between times that are one.
+    # Parts end at whole multiples of SAME_TIME, never between two times that count as one.
     shortest = min(row_step, frame_step / instants_a_frame(shutter * frame_step))
     length = max(1, int(ENTRIES / 3 * shortest / SAME_TIME))
     last = int(np.rint(duration / SAME_TIME)) + 1
     for begin in range(0, last, length):
-        # To the last one belongs what rounding puts behind the end.
+        # The last part also takes times that rounding puts behind the run's end.
         end = begin + length if begin + length < last else _NEVER
         rows = _within(row_step, duration, begin, end)
         frames = exposures(duration, settle, shutter, begin, end)
-        here = (places >= begin) & (places < end)
-        times = np.concatenate([rows, frames, extra[here]])
+        within = (places >= begin) & (places < end)
+        times = np.concatenate([rows, frames, extra[within]])
         what = np.concatenate(
-            [np.repeat(np.array([_ROW, _FRAME], np.int32), [len(rows), len(frames)]), kinds[here]]
+            [np.repeat(np.array([_ROW, _FRAME], np.int32), [len(rows), len(frames)]), kinds[within]]
         )
         if not len(times):
             continue
         place = np.rint(times / SAME_TIME)
         order = place.argsort(kind="stable")
         place = place[order]
-        # Of times that are one the first is taken.
+        # Times that count as one are merged: the first of them, with the bits of all.
         first = np.flatnonzero(np.append(True, place[1:] != place[:-1]))
         times, joined = times[order[first]], np.bitwise_or.reduceat(what[order], first)
         if end == _NEVER:
@@ -102,8 +102,9 @@ def agendas(
 
 
 def part_times(duration: float, settle: float) -> Array:
-    """When the camera reads the part's heights for ``run.average = "slope"``, s. A record's length
-    in a scene is rounded, to less than a hundredth of a frame: the last may be the run's end."""
+    """Times (s) of the frames that show the part's heights for ``run.average = "slope"``. A scene
+    holds a record's length rounded to less than 0.01 frames, so the last frame may lie just behind
+    the run's end and is moved to it."""
     times = frame_times(settle, int((duration - settle) * FRAME_RATE + 0.01) + 1)
     return np.minimum(times, duration)
 
@@ -111,8 +112,8 @@ def part_times(duration: float, settle: float) -> Array:
 def exposures(
     duration: float, settle: float, shutter: float, begin: int = 0, end: int = _NEVER
 ) -> Array:
-    """The instants (s), from ``begin`` until before ``end`` (multiples of SAME_TIME), of the
-    frames that are exposed wholly after ``settle`` and before ``duration`` (s).
+    """The instants (s), from ``begin`` until before ``end`` (in multiples of SAME_TIME), of all
+    frames whose exposure lies wholly between ``settle`` and ``duration`` (s).
     """
     exposure = shutter / FRAME_RATE
     reach = int(exposure / SAME_TIME) + 1
@@ -125,8 +126,8 @@ def exposures(
 
 
 def _within(step: float, duration: float, begin: int, end: int) -> Array:
-    """What :func:`grid` has from ``begin`` until before ``end``, multiples of SAME_TIME."""
-    # One more at either side, and then those that rounding puts there.
+    """The times of :func:`grid` from ``begin`` until before ``end``, in multiples of SAME_TIME."""
+    # One time more at either side, then those are selected that rounding puts inside.
     low = max(0, int(begin * SAME_TIME / step) - 1)
     high = min(count(step, duration), int(end * SAME_TIME / step) + 2)
     times = step * np.arange(low, high, dtype=np.float64)

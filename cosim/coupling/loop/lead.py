@@ -1,7 +1,7 @@
-"""One run of a circuit that ngspice leads: its steps are those of ``lead.c``.
+"""One run in which ngspice leads; ``lead.c`` controls its steps.
 
-Steps end on the jumps of the command and on macro points, and begin small after a jump. Python
-prepares the command and takes the log away in blocks.
+Steps end on jumps of the command and on macro points, and are short after a jump. Python prepares
+the command and takes the log away in blocks.
 """
 
 import ctypes
@@ -31,32 +31,30 @@ from cosim.scene import Scene
 from cosim.scene.firmware import GAIN
 
 _AFTER_JUMP, _SHARE_AFTER_JUMP = 1e-7, 1e-2
-"""Longest step after a jump of the command, in s and in ``circuit.max_step``: what ngspice
-remembers of the slopes before it misleads its choice of the step. The start is one too: V1 leaves 0
-at once. This step is of first order and nothing judges it, so finer runs must shorten it too."""
+"""Longest step after a jump of the command, in s and as a share of ``circuit.max_step``: ngspice
+chooses its step from slopes before the jump, which mislead it. The start of a run is a jump, too.
+The step after a jump is of first order without error control, so finer runs must shorten it."""
 
 ROUNDING = 1e-13
-"""s, by which ngspice may end before the time that it was asked for."""
+"""s, by which ngspice may end before the requested time."""
 
 _COARSEST = 1e-4
-"""``circuit.reltol`` at which the lengths of steps in ``lead.c`` are used as they stand. Another
-divides them by the cube root of the ratio, with which the steps that ngspice chooses by their
-truncation error, of second order, go too."""
+"""``circuit.reltol`` at which the step lengths in ``lead.c`` hold. For another one they scale with
+its cube root, like the steps that ngspice chooses by a truncation error of second order."""
 
 _EMF_CHANGE = 3e-3
-"""What the back-EMF may change in a step where the output is at its limits, too, in units of the
-supply."""
+"""Most change of the back-EMF in a step while the output is at its limits, over the supply."""
 
 LOG = ("time", "emf", "owed")
-"""Time, s; the back-EMF that the circuit was given, V; by how much the integral of that lagged the
-flux of the mechanics at the last macro point, V s."""
+"""Columns of the log: time, s; the back-EMF given to the circuit, V; by how much its integral
+lagged behind the flux of the mechanics at the last macro point, V s."""
 
 _POINTS = 4096
-"""Places for accepted points between two emptyings of the log."""
+"""Accepted points that the log's block holds before it is emptied."""
 
 
 class Lead:
-    """ngspice leads; the mechanics follow each of its accepted steps, or as ``use`` says."""
+    """ngspice leads; the mechanics follow each accepted step, or at macro points set by ``use``."""
 
     def __init__(
         self,
@@ -141,12 +139,12 @@ class Lead:
         return dict(zip((*LOG, *self._saved), self._log.array().T, strict=True))
 
     def use(self, macro_point: Callable[[], None]) -> None:
-        """Ask ``macro_point`` at each macro point from now on."""
+        """Call ``macro_point`` at each macro point from now on."""
         called = callback(macro_point, engine().fail)
-        self._macro_point = macro_point, called  # which the structure does not keep
+        self._macro_point = macro_point, called  # keeps both alive; the structure does not
         self.state.macro_point = ctypes.cast(called, ctypes.c_void_p).value
 
-    # What ngspice's engine asks for (see cosim.circuit.ngspice.Leader).
+    # The functions that ngspice's engine calls (see cosim.circuit.ngspice.Leader).
 
     def begin(self) -> None:
         loop().lead_begin(ctypes.byref(self.state))
@@ -176,6 +174,7 @@ def after_jump(scene: Scene) -> float:
 
 
 def _fineness(scene: Scene) -> float:
+    """The factor by which steps are shorter than at the tolerance _COARSEST."""
     return (_COARSEST / scene.circuit.reltol) ** (1.0 / 3.0)
 
 
@@ -185,8 +184,8 @@ def engine() -> ngspice.Engine:
 
 
 def finished(state: Any, reached: float, duration: float) -> None:
-    """Raise SimulationFailed where ngspice has only ``reached`` that time (s), or the ``state`` of
-    the loop tells what is wrong with the circuit."""
+    """Raise SimulationFailed where ngspice has only ``reached`` a time (s) before ``duration``, or
+    the loop's ``state`` reports an error of the circuit."""
     if state.status == NOT_FINITE:
         raise SimulationFailed(f"The circuit left the range of numbers at t = {state.told:.6g} s.")
     if state.status == UNKNOWN_SOURCE:

@@ -1,10 +1,10 @@
-"""Macro steps with a circuit that leads and cannot go back: ngspice.
+"""Macro steps with a circuit that leads and cannot repeat a step: ngspice.
 
-The circuit's steps are cut to end on the macro points, each ``macro_step`` after the last or at a
-jump of the command, where the extrapolation restarts. Between macro points the circuit sees the
-method's back-EMF and the mechanics wait; at a macro point they take the whole macro step, with the
-method's current. Since the FMU takes a linear current, a parabola is replaced by the line with the
-same integral and first moment, and methods are at most of order 2.
+The circuit's steps end on the macro points, each ``macro_step`` after the last or at a jump of the
+command, where the extrapolation restarts. Between macro points the circuit sees the method's
+back-EMF and the mechanics wait; at a macro point the mechanics take the whole macro step with the
+method's current. The FMU takes a linear current: a parabola is replaced by the line with the same
+integral and first moment, so methods are at most of order 2.
 """
 
 from cosim.circuit.netlist import LEAK_TIME
@@ -19,11 +19,11 @@ from cosim.scene import Scene
 from cosim.scene.rungs import METHODS
 
 _ON_TIME = 1e-13
-"""s; times of the circuit this close to a macro point are on it."""
+"""s; times of the circuit closer than this to a macro point are at the macro point."""
 
 
 def coupled(scene: Scene, recorder: Recorder) -> Lead:
-    """Ready to run; ``coupling.method`` must not be "auto" any more."""
+    """A run ready to start; "auto" must be resolved to a ``coupling.method`` before."""
     lead = Lead(scene, command(scene), recorder)
     chosen = scene.coupling
     if chosen.method != "step-locked":
@@ -34,7 +34,7 @@ def coupled(scene: Scene, recorder: Recorder) -> Lead:
 
 
 class MacroSteps:
-    """Asks a method at each macro point of a run."""
+    """Exchanges the signals by a method at each macro point of a run."""
 
     def __init__(self, scene: Scene, lead: Lead, recorder: Recorder, method: Method) -> None:
         self._method, self._mechanics = method, recorder.mechanics
@@ -48,6 +48,7 @@ class MacroSteps:
         self._begin(0.0, 0.0)
 
     def _macro_point(self) -> None:
+        """End a macro step: advance the mechanics by the method's current; begin the next step."""
         state, past = self._state, self._past
         time, current = state.time, state.current
         past.stepped(time, current, self._segment.charge / (time - past.time))
@@ -67,7 +68,7 @@ class MacroSteps:
             past.restart()
         if self._method.carries_inertia:
             past.gain = self._mechanics.inertial_gain(time)
-            # The circuit's share starts from what it stands at, and leaks away.
+            # The circuit's capacitor keeps its voltage from before, and leaks with LEAK_TIME.
             past.carried = state.carried
             past.carried_slope = past.gain * current - state.carried / LEAK_TIME
             segment.gain = past.gain

@@ -1,4 +1,4 @@
-"""Moves the mechanics and writes down what was asked for; the steps are those of ``recorder.c``."""
+"""Advances the mechanics and records what the agenda asks for; the loop is in ``recorder.c``."""
 
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -17,16 +17,16 @@ from cosim.scene import Scene
 from cosim.toolchain.interrupts import caught_signals
 
 STEPS = 1 << 15
-"""Steps between two looks at what Python has to do, about ten milliseconds; fewer at first, since
-nobody knows yet how long a step takes."""
+"""Steps of the compiled loop between two returns to Python, about 10 ms; fewer at first, when the
+time of a step is still unknown."""
 
 _CALLS = ("set_reals", "do_step", "get_reals", "get_integers")
 
 
 class Recorder:
-    """The waveforms of the mechanics, filled as ``follow`` or ``advance`` is called.
+    """The waveforms of the mechanics, filled by calls of ``follow`` or ``exchange``.
 
-    ``progress`` is told the time (s) of what was written down last, now and then.
+    ``progress`` is called now and then with the time (s) of the last record.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class Recorder:
         rows = agenda.count(run.output_step, run.duration)
         self._rows, self._time = Tape(width, rows), Tape(1, rows)
         self._frames, self._parts = Tape(1), Tape(1)
-        # What is not on the tapes yet.
+        # Buffers that the compiled loop fills, and that are then appended to the tapes.
         self._new_rows = np.empty((0, width))
         self._new_frames, self._new_parts = np.empty(0), np.empty(0)
         self._totals = (c_double * len(mechanics.total_names))()
@@ -105,15 +105,15 @@ class Recorder:
         and then set the last argument, which the step need not have ended with; 0 where it failed:
         see ``failure``."""
         self._plan()
-        # Python is called, and so a signal may come in between, only if more is to be planned.
+        # The loop calls Python, where a signal can interrupt it, only to plan a further part.
         with caught_signals(self._stop) if self.state.n_times == 1 else nullcontext():
             if not self._library.recorder_begin(self._state) or self._fault:
                 raise self.failure()
         self._tell_time()
 
     def follow(self, edges: Array, start: Array, end: Array) -> None:
-        """Advance through intervals that end at ``edges`` (s); in each the inputs (A or V, a column
-        for each of the mechanics' ports) go linearly from ``start`` to ``end``.
+        """Advance through intervals that end at ``edges`` (n, s); in each the inputs (A or V) go
+        linearly from ``start`` to ``end`` (both n × ports).
 
         Raises SimulationFailed with the FMU's sentence.
         """
@@ -140,10 +140,7 @@ class Recorder:
                     raise self._fault
 
     def tell(self) -> None:
-        """Tell how far the agenda has been worked off, where that is news.
-
-        Raises SimulationFailed where it goes too slowly to be worked off at all.
-        """
+        """Report progress. Raises SimulationFailed where the run is too slow ever to end."""
         self.pace.judge(self._fmu.time, self.steps)
         self._tell_time()
 
@@ -154,7 +151,7 @@ class Recorder:
         self._progress(self._told)
 
     def failure(self) -> BaseException:
-        """What to raise for the call of the FMU that has failed, or what failed in Python."""
+        """The exception to raise: that from Python, if any, else for the FMU's failed call."""
         if self._fault is not None:
             return self._fault
         fmu = self._fmu
@@ -167,7 +164,7 @@ class Recorder:
         self.state.stopped = 1
 
     def _plan(self) -> None:
-        """Put what was written down on the tapes, and look up the next times."""
+        """Append the buffers to the tapes, and take up the next part of the agenda."""
         self._take()
         state = self.state
         if state.next:
@@ -202,7 +199,7 @@ class Recorder:
 
     @cached_property
     def at_end(self) -> dict[str, float]:
-        """The same when it is asked for first: at the end of the run."""
+        """Totals of the mechanics at the first access, which must be the end of the run."""
         return self.mechanics.totals()
 
     @property

@@ -24,11 +24,11 @@ GOOD, FMU_FAILED, NOT_FINITE, UNKNOWN_SOURCE, NO_AGREEMENT = range(5)
 
 
 def callback(act: Callable[[], None], fail: Callable[[BaseException], None]) -> Any:
-    """The method ``act`` as C can call it; the method ``fail`` is told what it raises, since an
-    exception cannot pass through C.
+    """The bound method ``act`` as a C callback. Its exceptions go to the bound method ``fail``,
+    since they cannot pass through C.
 
-    Neither's object is kept alive: what holds the structure that holds this would hold itself, and
-    its blocks, until Python looks for circles.
+    References to both are weak: an object that holds the structure with this callback would else
+    be in a reference cycle, and keep its memory until Python's collector runs.
     """
     weak_act, weak_fail = WeakMethod(act), WeakMethod(fail)
 

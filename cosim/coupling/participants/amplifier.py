@@ -2,8 +2,9 @@
 
 The same equations as ``circuits/amplifier.cir``: one pole whose output v_a obeys
 dv_a/dt = clip(2π GBW (V1 - R_s i) - 2π GBW v_a / A_ol, ±slew) and stays within its swing, then coil
-and sense resistor. While no limit begins or ceases to act it is linear and advanced by a matrix
-exponential; where one does is found by checks a fraction of the loop's ringing apart.
+and sense resistor. Between the instants at which a limit begins or ceases to act the circuit is
+linear and advanced by a matrix exponential; these instants are found by checks whose spacing is a
+fraction of the loop's ringing.
 Input: back-EMF of one coil (V); output: its current (A). Commands of straight pieces only.
 """
 
@@ -21,14 +22,16 @@ from cosim.errors import SimulationFailed
 from cosim.scene import Scene
 
 _SAME_TIME = 1e-13  # s
-_CHECKS_PER_RADIAN = 4.0
-_MOST_PIECES = 10_000  # in one step
-_REMEMBERED = 64  # stacks of propagators
+_CHECKS_PER_RADIAN = 4.0  # of the loop's ringing
+_MOST_PIECES = 10_000  # linear pieces in one step
+_REMEMBERED = 64  # stacks of propagators in the cache
 _SIZE = 9
 _I, _VA, _Q, _E, _DE, _DDE, _V1, _DV1, _ONE = range(_SIZE)
+"""States: current, output voltage, charge of the step, back-EMF with two derivatives, command with
+its slope, and the constant 1. Inputs are states, so that one matrix exponential advances all."""
 
 Mode = tuple[Literal["linear", "slew", "clamp"], int]
-"""What acts, and with which sign."""
+"""No limit, the slew rate or the swing acts; the sign is that of the slewing or the limit."""
 
 
 class Amplifier:
@@ -61,6 +64,7 @@ class Amplifier:
         self._x[_Q] = 0.0
         polynomial = inputs.reshape(len(inputs))
         for _ in range(_MOST_PIECES):
+            # The back-EMF's derivatives at the present time: coefficient k times k!.
             now = shifted(polynomial, self.time - start)
             self._x[_E:_V1] = 0.0
             self._x[_E : _E + len(now)] = now
@@ -86,7 +90,7 @@ class Amplifier:
         self._choose()
 
     def _choose(self) -> None:
-        """The mode after a jump of the command, or on leaving a limit."""
+        """Choose the mode from the state, at each new straight piece of the command."""
         rate = self._rate(self._x)
         side = 1 if rate > 0.0 else -1
         if side * self._x[_VA] >= side * self._limits[side]:
@@ -95,11 +99,11 @@ class Amplifier:
             self._mode = ("slew", side) if abs(rate) > self._slew else ("linear", 0)
 
     def _rate(self, x: Array) -> Any:
-        """Slope that is asked of v_a, V/s; of each row of ``x``."""
+        """Slope that v_a would have without limits, V/s, for each state (row) of ``x``."""
         return self._pole * (x[..., _V1] - self._sense * x[..., _I] - self._leak * x[..., _VA])
 
     def _margins(self, x: Array) -> list[Array]:
-        """What is positive, in each row of ``x``, as long as the mode lasts."""
+        """Functions that are positive as long as the mode lasts, for each state (row) of ``x``."""
         kind, side = self._mode
         rate = self._rate(x)
         if kind == "clamp":
@@ -110,13 +114,15 @@ class Amplifier:
         return [self._slew - np.abs(rate), *swing]
 
     def _piece(self, length: float, gain: float) -> float:
-        """Go on by at most ``length`` s in one mode, and change it where it ends; time used, s."""
+        """Advance by at most ``length`` s in one mode, and change the mode if it ends before; gives
+        the time used, s."""
         stack = self._propagators(length, self._mode, gain)
-        states = stack @ self._x
+        states = stack @ self._x  # checks × states: the state at each check
         ended = np.min(self._margins(states), axis=0) < 0.0
         if not ended.any():
             self._x = states[-1]
             return length
+        # The mode ends within step k of the checks; bisect for the zero of the least margin there.
         k = int(np.argmax(ended))
         step = length / len(stack)
         before = self._x if k == 0 else states[k - 1]
@@ -128,7 +134,8 @@ class Amplifier:
         def least(s: float) -> float:
             return float(np.min(self._margins(then(s))))
 
-        # A margin that begins at zero, as where a limit was just left, may dip by rounding.
+        # A margin that starts at zero, where a limit was just left, may be negative by rounding:
+        # then the whole step is taken.
         rest = step
         if least(0.0) > 0.0:
             rest = float(brentq(least, 0.0, step, xtol=1e-16))  # pyright: ignore[reportArgumentType]
@@ -138,7 +145,7 @@ class Amplifier:
         return k * step + rest
 
     def _turn(self, ended: int) -> None:
-        """Change the mode, in which margin ``ended`` has reached zero."""
+        """Change the mode after its margin number ``ended`` (see ``_margins``) has reached zero."""
         kind, _ = self._mode
         if ended:
             side = 1 if ended == 1 else -1
@@ -151,6 +158,7 @@ class Amplifier:
             self._mode = ("linear", 0)
 
     def _matrix(self, mode: Mode, gain: float) -> Array:
+        """A of dx/dt = A x; with ``gain`` the charge adds ``gain`` q to the back-EMF."""
         kind, side = mode
         a = np.zeros((_SIZE, _SIZE))
         a[_I, [_I, _VA, _E, _Q]] = np.array([-self._loop, 1.0, -1.0, -gain]) / self._inductance

@@ -1,8 +1,8 @@
 """A linear participant, solved exactly by the matrix exponential.
 
-Its states may have a further axis: columns that are advanced together, from which a method's linear
-map is read (see :mod:`cosim.coupling.rewind.stability`). Sources are states of their own: a
-constant, or the two states of a sine.
+Its state may be a matrix, whose columns are advanced together: so the linear map of a method is
+read (see :mod:`cosim.coupling.rewind.stability`). Sources are states, too: a constant, or the two
+states of a sine.
 """
 
 from functools import lru_cache
@@ -14,7 +14,7 @@ from scipy.linalg import expm
 
 from cosim.coupling.polynomials import Array, Signal, slope, value
 
-_REMEMBERED = 64  # propagators; a variable macro step uses each but a few times
+_REMEMBERED = 64  # propagators in the cache; variable macro steps use each only a few times
 
 
 class LinearParticipant:
@@ -35,7 +35,7 @@ class LinearParticipant:
         self._propagator = lru_cache(_REMEMBERED)(self._new_propagator)
 
     def advance(self, h: float, inputs: Array, gain: float = 0.0) -> None:
-        # The integral of the output starts from 0; the input and its derivatives are states.
+        # The augmented state: x, the integral of the output (from 0), u and its derivatives.
         derivatives = [factorial(k) * c for k, c in enumerate(inputs)]
         start = np.concatenate([self.state, np.zeros_like(self.mean), *derivatives])
         end = self._propagator(h, len(inputs) - 1, gain) @ start
@@ -72,15 +72,16 @@ class LinearParticipant:
     def _new_propagator(self, h: float, degree: int, gain: float) -> Array:
         n, outputs, inputs = len(self._a), len(self._c), self._b.shape[1]
         size = n + outputs + inputs * (degree + 1)
-        # d/dt of (x, integral of y, u, u', ...) is m times the same: the exponential moves all of
-        # them by h, the integral exactly (Van Loan, IEEE Trans. Autom. Control 23 (1978) 395).
+        # d/dt (x, ∫y dt, u, u', ...) = m (x, ∫y dt, u, u', ...): exp(m h) advances all of them by
+        # h, the integral exactly, too (Van Loan, IEEE Trans. Autom. Control 23 (1978) 395). With
+        # ``gain`` the input is u + gain ∫y dt. Only the rows of x and ∫y dt are returned.
         m = np.zeros((size, size))
-        here, there = slice(0, n), slice(n, n + outputs)
+        state, integral = slice(0, n), slice(n, n + outputs)
         first = slice(n + outputs, n + outputs + inputs)
-        m[here, here], m[here, first] = self._a, self._b
-        m[there, here], m[there, first] = self._c, self._d
+        m[state, state], m[state, first] = self._a, self._b
+        m[integral, state], m[integral, first] = self._c, self._d
         if gain:
-            m[here, there], m[there, there] = gain * self._b, gain * self._d
+            m[state, integral], m[integral, integral] = gain * self._b, gain * self._d
         for k in range(degree):
             low = n + outputs + k * inputs
             m[low : low + inputs, low + inputs : low + 2 * inputs] = np.eye(inputs)
@@ -88,8 +89,8 @@ class LinearParticipant:
 
 
 def coil(resistance: float, inductance: float, current: float = 0.0) -> LinearParticipant:
-    """A coil (Ω, H) on a voltage that stands still: the input is its back-EMF, V, the output the
-    current, A. A clamped output is such a circuit, with the sense resistor in ``resistance``."""
+    """A coil (Ω, H) at a constant voltage: the input is its back-EMF (V), the output its current
+    (A). A clamped amplifier is such a circuit, with the sense resistor in ``resistance``."""
     a, b = [[-resistance / inductance]], [[-1.0 / inductance]]
     return LinearParticipant(a, b, [[1.0]], state=[current])
 
@@ -105,8 +106,10 @@ def regulated_coil(
 ) -> LinearParticipant:
     """A coil in the feedback of an amplifier with one pole; input back-EMF, output current.
 
-    ``gain_bandwidth`` in Hz, ``open_loop_gain`` a plain number. The command stands still, or is
-    A sin(2π f t) with ``sine`` = (A, f) in V and Hz.
+    ``gain_bandwidth`` in Hz, ``open_loop_gain`` a plain number. The states are the current and the
+    amplifier's output voltage. The command is constant (then states are deviations from the
+    equilibrium), or A sin(2π f t) with ``sine`` = (A, f) in V and Hz, whose A sin and A cos are two
+    more states.
     """
     rate = 2.0 * np.pi * gain_bandwidth
     loop = resistance + sense_resistance

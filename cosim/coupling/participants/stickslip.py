@@ -15,7 +15,7 @@ _EMF, _SLOPE, _FLUX = map(STEP_OUTPUTS.index, ("back_emf", "back_emf_slope", "mo
 
 
 class FmuMechanics(Mechanics):
-    """The mechanics of a scene, from rest, that can go back to a state saved before.
+    """The mechanics of a scene, from rest, which can go back to a saved state.
 
     The FMU takes linear inputs; a parabola is replaced by the line with the same integral and first
     moment (:func:`cosim.coupling.polynomials.projected`).
@@ -32,7 +32,7 @@ class FmuMechanics(Mechanics):
         self._touches = 0
         self._free: list[c_void_p] = []
         self.mean: Array = np.zeros(1)
-        """Mean back-EMF of the last step, V: the coil's flux linkage changed so much by time."""
+        """Mean back-EMF of the last step, V: the change of the coil's flux linkage over time."""
 
     def advance(self, h: float, inputs: Array, gain: float = 0.0) -> None:
         if gain:
@@ -41,7 +41,7 @@ class FmuMechanics(Mechanics):
         first, *rise = projected(tuple(inputs), h, 1)
         self._exchange(first[0], rise[0][0] if rise else 0.0, h)
         if len(inputs) > 2:
-            # The slope of the output answers to the current itself, not to the line in its stead.
+            # The output's slope must answer to the true current at the end, not to the line's.
             self._exchange(value(inputs, h)[0], slope(inputs, h)[0])
         self.mean = np.array([(self.step_outputs[_FLUX] - before) / h])
         self._touches += self._read_events() != was
@@ -98,7 +98,7 @@ class FmuMechanics(Mechanics):
 
 
 class _Saved:
-    """A saved state, whose memory is used again once nobody knows it any more."""
+    """A saved state; its memory returns to the pool when the last reference to it is gone."""
 
     def __init__(self, handle: c_void_p, pool: list[c_void_p], rest: tuple[Any, ...]) -> None:
         self.handle, self.rest = handle, rest

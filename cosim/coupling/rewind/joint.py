@@ -1,12 +1,12 @@
-"""Masters between two participants that can both go back to a moment before.
+"""Masters between two participants that can both go back to a saved state.
 
-:class:`EventAware` ends a macro step at a stick-slip or impact event, and begins its extrapolation
-anew. A step in which the second side has met an event is put back and repeated, shortened by
-bisection, until it ends just behind the event. Where nothing jumps the method keeps its own order;
-without this, events leave first order or less (measured 0.5 to 1.6 at stick-slip: extrapolating
-across an event does harm). Handling of events by step localisation: Gomes et al., "Co-simulation:
-a survey", ACM Comput. Surv. 51 (2018) 49, section on hybrid co-simulation. Known limits: ngspice
-cannot take part, since it cannot repeat a step; costs some 20 repeated steps an event.
+:class:`EventAware` ends a macro step at a stick-slip or impact event and restarts the
+extrapolation there. A step in which the mechanics met an event is undone and repeated, shortened by
+bisection, until it ends just behind the event. So the method keeps its order across events; without
+this the order falls to one or less (measured 0.5 to 1.6 at stick-slip), since extrapolating across
+an event is wrong. Handling of events by step localisation: Gomes et al., "Co-simulation: a survey",
+ACM Comput. Surv. 51 (2018) 49, section on hybrid co-simulation. Known limits: ngspice cannot take
+part, since it cannot repeat a step; an event costs some 20 repeated steps.
 
 A side may be a linear system solved exactly, the FMU, or a behavioural circuit.
 """
@@ -20,13 +20,13 @@ from cosim.coupling.polynomials import Array, Polynomial, Signal
 
 
 class Participant(Protocol):
-    """One side of a coupling, at a time of its own; signals are arrays, SI."""
+    """One side of a coupling, with its own present time; signals are arrays, SI."""
 
     mean: Array
     """Mean of the output over the last advance."""
 
     def advance(self, h: float, inputs: Array, gain: float = 0.0) -> None:
-        """Go on by ``h`` (s) with an input polynomial about the present time.
+        """Advance by ``h`` (s) with an input polynomial whose origin is the present time.
 
         With ``gain`` the input is the polynomial plus ``gain`` times the integral of the own output
         since the start of the step: a capacitor 1/gain in series with a circuit whose output is its
@@ -37,8 +37,8 @@ class Participant(Protocol):
     def outputs(self, inputs: Signal | None = None) -> Signal:
         """Value and slope of the output now.
 
-        With ``inputs`` they are *refreshed*: calculated after that input is set. Without, they are
-        *stale*: those of the input that the last step ended with.
+        With ``inputs`` (value and slope) they are *refreshed*: calculated for this input. Without,
+        they are *stale*: those for the input at the end of the last step.
         """
         ...
 
@@ -52,7 +52,7 @@ class Participant(Protocol):
 
 
 class Follower(Participant, Protocol):
-    """The mechanical side, with what only some methods ask for."""
+    """The mechanical side, with two functions that only some methods need."""
 
     def gain(self) -> float:
         """Derivative of the output's slope with respect to the input, now: Bl²/m_eff in V/(A s)."""
@@ -67,7 +67,7 @@ class Joint:
     """Takes macro steps of a method with a circuit (``first``) and mechanics (``second``)."""
 
     cuts = 0
-    """Macro steps that were cut short so far."""
+    """Number of macro steps that were cut short at an event so far."""
 
     def __init__(self, first: Participant, second: Follower, method: Method) -> None:
         self.first, self.second, self.method = first, second, method
@@ -76,7 +76,7 @@ class Joint:
         self.past = Past(method)
         self.meet()
         self.for_first: Array = np.array([self.past.emf.value])
-        """The input polynomial of the last step, about its start."""
+        """The input polynomial of the circuit in the last step, with its origin at the start."""
         self.for_second: Array = np.array([self.past.current.value])
 
     def step(self, h: float) -> None:
@@ -90,7 +90,8 @@ class Joint:
         self.meet()
 
     def advance(self, h: float, emf: Polynomial, gain: float = 0.0) -> None:
-        """Both sides go on by ``h`` (s), the circuit with this back-EMF (V)."""
+        """Advance both sides by ``h`` (s): the circuit with this back-EMF (V), then the mechanics
+        with the method's current."""
         self.for_first = np.array(emf)
         self.first.advance(h, self.for_first, gain)
         self.past.stepped(self.time + h, self.first.outputs()[0], self.first.mean)
@@ -100,8 +101,8 @@ class Joint:
     def meet(self) -> None:
         """Exchange the outputs at a communication point.
 
-        The second side answers to the first one's new output, and the first to that answer: where
-        a side has direct feedthrough, an output not calculated anew is one of the step before.
+        The mechanics' output is refreshed with the circuit's, then the circuit's with that of the
+        mechanics: with direct feedthrough a stale output would belong to the input before.
         """
         answer = self.second.outputs(self.first.outputs())
         self.past.met(self.time, *self.first.outputs(answer), *answer)
@@ -119,19 +120,19 @@ class Joint:
 
 
 class EventAware(Joint):
-    """Cuts macro steps at the events of its second side, which it meets to ``within`` seconds."""
+    """Cuts macro steps at the mechanics' events, which it locates to ``within`` seconds."""
 
     within = 1e-8
 
     def step(self, h: float) -> None:
-        """Go on by ``h`` seconds, in as many macro steps as there are events in it, and one."""
+        """Advance by ``h`` seconds, in one macro step more than there are events in them."""
         end = self.time + h
         while (left := end - self.time) > 1e-12 * max(end, h):
             saved, count = self.save(), self.second.events()
             super().step(left)
             if self.second.events() == count:
                 return
-            # The step that ends before the first event, and the one that ends behind it.
+            # Bisection between a step length without an event and one with at least one.
             before, behind = 0.0, left
             while behind - before > self.within:
                 middle = 0.5 * (before + behind)

@@ -1,21 +1,21 @@
-"""Iterated (implicit): a macro step is repeated until both sides agree on its end.
+"""Iterated (implicit): a macro step is repeated until both sides agree on the values at its end.
 
-Both participants are put back to the step's start each time. The back-EMF is linear over the step
-from its known start to an end that is sought; the second side is fed the line between the first
-one's ends. Accelerations of the fixed point: ``"plain"``; ``"Aitken"`` (Küttler and
-Wall, "Fixed-point fluid-structure interaction solvers with dynamic relaxation", Comput. Mech. 43
-(2008) 61); ``"Anderson"`` (Walker and Ni, SIAM J. Numer. Anal. 49 (2011) 1715); ``"Newton"`` with
-the interface's Jacobian, by differences (Busch and Schweizer, ECCOMAS Multibody Dynamics 2011).
+Both participants return to the step's start each time. The circuit's back-EMF is linear over the
+step, from its known start to an unknown end x; the mechanics are fed the current as the line
+between its two ends, and give a new x. The fixed point in x is found by: ``"plain"`` iteration;
+``"Aitken"`` (Küttler and Wall, "Fixed-point fluid-structure interaction solvers with dynamic
+relaxation", Comput. Mech. 43 (2008) 61); ``"Anderson"`` (Walker and Ni, SIAM J. Numer. Anal. 49
+(2011) 1715); ``"Newton"`` with the interface's Jacobian, by differences (Busch and Schweizer,
+ECCOMAS Multibody Dynamics 2011).
 
 Order 2 where smooth. Known limits: needs participants that can repeat a step, so ngspice cannot
-take part; plain iteration converges only up to about the step at which Gauss-Seidel is stable, some
-two of Jacobi's; the accelerated ones have no such limit.
+take part; plain iteration converges only up to about the macro step at which Gauss-Seidel is stable
+(about twice Jacobi's); the accelerated iterations have no such limit.
 
-:class:`PredictorCorrector` takes a macro step once more with the end that it found: one turn of the
-plain iteration, at a fixed cost of two tries, and conditionally stable like every method without
-iteration.
+:class:`PredictorCorrector` repeats a macro step once, with the end of the first try: one plain
+iteration at the fixed cost of two tries, conditionally stable like every method without iteration.
 
-:func:`variants` are all methods between participants that can go back, as the studies compare them.
+:func:`variants` are all methods between participants that can repeat a step, for the studies.
 """
 
 from collections.abc import Callable
@@ -33,8 +33,8 @@ from cosim.coupling.rewind.joint import EventAware, Follower, Joint, Participant
 from cosim.errors import SimulationFailed
 
 Acceleration = Literal["plain", "Aitken", "Anderson", "Newton"]
-_DEPTH = 3  # differences that Anderson's method looks back on
-_MOST_TRIES = 60
+_DEPTH = 3  # differences of former iterates that Anderson's method combines
+_MOST_TRIES = 60  # iterations in one macro step
 
 
 class Iterated(Joint):
@@ -61,7 +61,7 @@ class Iterated(Joint):
         self.meet()
 
     def _answer(self, h: float, start: tuple[Any, Any], end: Array) -> Array:
-        """The second side's output at the end, if the first one is given ``end`` there."""
+        """The mechanics' back-EMF at the step's end, if the circuit assumed ``end`` there, V."""
         self.first.restore(start[0])
         self.second.restore(start[1])
         begin = self.past.emf.value
@@ -69,7 +69,8 @@ class Iterated(Joint):
         return self.second.outputs()[0]
 
     def solve(self, answer: Callable[[Array], Array], x: Array) -> None:
-        """Find the fixed point of ``answer`` from ``x`` on; the last try is what counts."""
+        """Find the fixed point of ``answer`` from ``x`` on. Both sides stay where the last call of
+        ``answer`` has left them."""
         guesses: list[Array] = []
         residuals: list[Array] = []
         relaxation, jacobian = 1.0, None
@@ -103,14 +104,16 @@ class Iterated(Joint):
 
 
 class PredictorCorrector(Iterated):
-    """The first try extrapolates the back-EMF with its slope; the second is kept."""
+    """The first try extrapolates the back-EMF with its slope; the second one, which assumes the end
+    of the first, counts."""
 
     def solve(self, answer: Callable[[Array], Array], x: Array) -> None:
         answer(answer(x))
 
 
 def _jacobian(answer: Callable[[Array], Array], x: Array, residual: Array, off: float) -> Array:
-    """Of the residual, with respect to the sought end; the same for all columns of ``x``."""
+    """The Jacobian (n × n) of the residual by the unknown end ``x`` (n, or n × columns), by finite
+    differences of size ``off``; averaged over columns, since they share one linear system."""
     n = len(x)
     jacobian = np.empty((n, n))
     for k in range(n):
@@ -122,24 +125,26 @@ def _jacobian(answer: Callable[[Array], Array], x: Array, residual: Array, off: 
 
 
 def _mixed(guesses: list[Array], residuals: list[Array]) -> Array:
-    """Anderson's next guess: the combination of the last ones whose residual is least, moved on."""
+    """Anderson's next guess: the combination of the last guesses with the least (linearised)
+    residual, plus this residual."""
+    # Values × differences of successive iterates.
     steps = np.array([(b - a).ravel() for a, b in pairwise(guesses)]).T
-    turns = np.array([(b - a).ravel() for a, b in pairwise(residuals)]).T
-    weights, *_ = np.linalg.lstsq(turns, residuals[-1].ravel(), rcond=1e-12)
-    moved = (steps + turns) @ weights
+    changes = np.array([(b - a).ravel() for a, b in pairwise(residuals)]).T
+    weights, *_ = np.linalg.lstsq(changes, residuals[-1].ravel(), rcond=1e-12)
+    moved = (steps + changes) @ weights
     return guesses[-1] + residuals[-1] - moved.reshape(guesses[-1].shape)
 
 
 @dataclass(frozen=True)
 class Variant:
-    """``make`` joins circuit and mechanics; ``order`` is that of the error where nothing jumps."""
+    """``make`` joins circuit and mechanics; ``order`` is the order of convergence where smooth."""
 
     make: Callable[[Any, Any], Joint]
     order: int
 
 
 def variants(tolerance: float = 1e-9) -> dict[str, Variant]:
-    """Each by its name; ``tolerance`` is that of iterations, relative."""
+    """All variants by name; ``tolerance`` is the relative one of iterated methods."""
     found: dict[str, Variant] = {}
     for kind in methods().values():
         for name, method in kind.variants.items():

@@ -1,12 +1,12 @@
 """The largest macro step at which a coupling is stable: predicted, and observed.
 
-Predicted: a fixed-step method between linear participants is a linear map of everything that it
-keeps from one macro step to the next (the states of both sides and the histories of what they
-exchanged). The map is read from the method itself, by giving it a basis; it is stable while its
-spectral radius is at most 1.
+Predicted: a fixed-step method between linear participants is a linear map of all that is kept from
+one macro step to the next (the states of both sides and the histories of exchanged signals). The
+matrix of this map is obtained by one step of the method from a basis of unit vectors; the method is
+stable while the spectral radius is at most 1.
 
-Observed: the method runs, with any participants (the FMU among them), from a small disturbance, and
-it is seen whether what is exchanged grows.
+Observed: the method runs, with any participants (also the FMU), from a small disturbance; it is
+stable if the exchanged signals do not grow.
 """
 
 from collections.abc import Callable
@@ -20,17 +20,21 @@ from cosim.coupling.rewind.joint import Joint
 from cosim.errors import SimulationFailed
 
 _MARGIN = 1e-9
-"""A spectral radius this much above 1 is rounding."""
-_WARM_UP = 4  # steps until all histories are full
+"""Rounding error of the spectral radius."""
+_WARM_UP = 4  # macro steps until all histories are full
 _UNBOUNDED, _NOISE = 1e7, 1e-4
-"""Multiples of the first size: beyond the one nothing is bounded, below the other all is noise."""
-_SILENT = 10  # steps of noise alone, after which all has died away
+"""Multiples of the initial size of the signals: above the first they grow without bound, below the
+second they are noise."""
+_SILENT = 10  # steps of noise alone before a failure, which then counts as stable
 
 
 def _linear_map(method: Joint, h: float) -> Array:
-    """The matrix by which one macro step of ``h`` (s) takes what the method keeps to the next."""
+    """The matrix of one macro step of ``h`` (s): from all that the method keeps to the same after
+    the step."""
     for _ in range(_WARM_UP):
         method.step(h)
+    # Each array (leaf) of the saved state is replaced by its rows of the unit matrix, so that the
+    # columns of all states advance together and form the matrix.
     shape = method.save()
     size = sum(leaf.size for leaf in _leaves(shape))
     basis = iter(np.split(np.eye(size), np.cumsum([leaf.size for leaf in _leaves(shape)])[:-1]))
@@ -40,7 +44,7 @@ def _linear_map(method: Joint, h: float) -> Array:
 
 
 def _is_stable(make: Callable[[], Joint], h: float) -> bool:
-    """Whether no eigenvalue of the map is larger than 1; not where a step cannot be done at all."""
+    """Whether no eigenvalue exceeds 1 in magnitude; False where the step itself fails."""
     try:
         m = _linear_map(make(), h)
     except SimulationFailed:
@@ -53,9 +57,9 @@ def largest_stable_step(
 ) -> float:
     """The macro step (s) between ``low`` and ``high`` up to which the coupling is predicted stable.
 
-    The first limit from below, within a thousandth; ``high`` where there is none, 0 where ``low``
-    is already unstable. An unstable interval within a ``leap`` (a ratio) may be missed. ``make``
-    gives the method between two homogeneous linear participants.
+    The first limit from below, to a relative error of 0.001; ``high`` where all steps are stable,
+    0 where ``low`` is not. Unstable intervals shorter than a ``leap`` (a ratio) may be missed.
+    ``make`` gives the method between two homogeneous linear participants.
     """
     return _first_limit(lambda h: _is_stable(make, h), low, high, 1e-3, leap)
 
@@ -63,22 +67,21 @@ def largest_stable_step(
 def observed_limit(
     make: Callable[[], Joint], low: float, high: float, steps: int = 600, leap: float = 1.15
 ) -> float:
-    """The same within a fiftieth by running the method itself; ``make`` gives it disturbed from
-    its equilibrium."""
+    """As ``largest_stable_step``, to a relative error of 0.02, by running the method; ``make``
+    gives it disturbed from its equilibrium."""
     return _first_limit(lambda h: _remains_bounded(make, h, steps), low, high, 0.02, leap)
 
 
 def _remains_bounded(make: Callable[[], Joint], h: float, steps: int) -> bool:
-    """Whether what is exchanged has stopped growing after ``steps`` macro steps of ``h`` (s).
-
-    It is compared in the last quarter of the steps with the second quarter.
+    """Whether the exchanged signals do not grow over ``steps`` macro steps of ``h`` (s): their
+    largest size in the last quarter is compared with that in the second quarter.
     """
     method = make()
     quarter = steps // 4
     sizes = np.zeros(steps)
     begun = _size(method)
-    # What has died away leaves the noise of the participants' own solvers, in which an iteration
-    # may end, or two bodies stick and slip without end.
+    # A motion that has died away leaves the noise of the participants' solvers. There iterations
+    # may fail, and bodies may stick and slip for ever; neither counts as unstable.
     floor = lambda: _NOISE * max(begun, sizes[:quarter].max())  # noqa: E731
     for k in range(steps):
         try:
@@ -94,6 +97,7 @@ def _remains_bounded(make: Callable[[], Joint], h: float, steps: int) -> bool:
 
 
 def _size(method: Joint) -> float:
+    """The largest magnitude of the exchanged current (A) and back-EMF (V)."""
     past = method.past
     return float(max(np.abs(past.current.value).max(), np.abs(past.emf.value).max()))
 
@@ -101,6 +105,7 @@ def _size(method: Joint) -> float:
 def _first_limit(
     stable: Callable[[float], bool], low: float, high: float, tolerance: float, leap: float
 ) -> float:
+    """Leaps up to the first unstable step, then bisects (geometrically) between the last two."""
     if not stable(low):
         return 0.0
     inside, outside = low, low
@@ -121,7 +126,7 @@ def _first_limit(
 
 
 def _leaves(saved: Any) -> list[Array]:
-    """The arrays in a nested tuple; all else in it (times) does not belong to the linear state."""
+    """The arrays in a nested tuple, which are the linear state; times and other items are not."""
     if isinstance(saved, np.ndarray):
         return [saved]
     if isinstance(saved, tuple):
@@ -130,6 +135,7 @@ def _leaves(saved: Any) -> list[Array]:
 
 
 def _replaced(saved: Any, leaves: Any) -> Any:
+    """The nested tuple with its arrays replaced by the next ``leaves``."""
     if isinstance(saved, np.ndarray):
         return next(leaves)
     if isinstance(saved, tuple):

@@ -28,7 +28,7 @@ class Case:
     """Signals that are compared; near impacts errors of velocities would only show those of the
     impacts' times."""
     netlist: bool = False
-    """Whether the reference includes the leak of the netlist's pole, seen at low bandwidth."""
+    """Whether the reference includes the leak of the netlist's pole, which low bandwidth shows."""
 
     @property
     def smooth(self) -> bool:
