@@ -16,15 +16,15 @@ from cosim.mechanics.stickslip import parameters
 from cosim.scene import Scene
 from cosim.scene.tables import MACHINE, MACHINE_ENDS, Fmu, Port
 
-_HELD, _DIFFERENCE, _KNOWN = range(3)
+_HELD, _DIFFERENCE, _KNOWN = range(3)  # slope of an output between communication points
 _FEEDS = {"mean": 0, "line": 1, "end": 2}
 
 _Of = tuple[str, str]
-"""The names of an FMU and of a variable of it."""
+"""Names of an FMU and of one of its variables."""
 
 
 class Plan:
-    """What is joined to what. Raises BadInput, naming file, key and value."""
+    """The connections of circuit and FMUs. Raises BadInput, naming file, key and value."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -36,54 +36,56 @@ class Plan:
                     f"[[fmu]] {', '.join(same)} cannot all be of it: it says of itself "
                     "canBeInstantiatedOnlyOncePerProcess = true"
                 )
-        # As an FMU like others the machine asks for no voltage of its coil.
+        # The machine, treated like any FMU, has no input for its coil's voltage.
         ports = [port for port in scene.port if port.to not in MACHINE_ENDS[3:]]
         ends = [port.origin or port.to or "" for port in ports]
         self._has_machine = any(end.startswith(f"{MACHINE}.") for end in ends)
         if self._has_machine:
             sides[MACHINE] = Side(_machine(scene), stranger(str(unpacked(2))))
         self.sides = _in_order(scene, sides)
-        """In the order in which they step: after those that feed them, as far as that can be."""
+        """FMUs in the order in which they step: each after those that feed it, where possible."""
         self.probes = tuple(dict.fromkeys(p.probe for p in ports if p.probe is not None))
         self.words = tuple(dict.fromkeys([*self.probes, *(scene.circuit.save or ())]))
-        """What is read of the circuit, first what leads to FMUs."""
+        """Quantities that are read from the circuit, first those that lead to FMUs."""
         self.sources: list[Any] = []
         self.names: list[str] = []
-        """Of the sources that ports feed, as the scene spells them."""
+        """Names of the sources that ports feed, as the scene spells them."""
         self._from: list[tuple[Side, Any]] = []
         self.told: list[tuple[Side, str, Any]] = []
-        """Outputs whose slopes the FMU tells by itself, their names, and the ports' origins."""
-        self._fed: list[tuple[int, Side, Variable]] = []  # sources that FMUs feed
+        """Outputs whose slopes the FMU reports: FMU, port's ``from``, and the port's origin."""
+        self._fed: list[tuple[int, Side, Variable]] = []  # index of a source, and what feeds it
         self._needs: dict[_Of, set[_Of]] = {}
-        """What each variable of an FMU depends on at once: as the FMUs say, and as ports lead."""
+        """Variables on which each variable depends without delay: by the FMUs' own declaration of
+        feedthrough, and by ports from output to input."""
         for side in sides.values():
             for output, inputs in side.of.feedthrough.items():
                 self._needs[side.name, output] = {(side.name, name) for name in inputs}
         for port in ports:
             self._join(port, sides)
-        # Slopes of outputs make rows longer, so places in the row of all are known only now.
+        # Each FMU's outputs are a part of one row. Reported slopes lengthen the parts, so the
+        # places in the whole row are known only now.
         firsts = [0, *accumulate(side.width for side in self.sides)]
         for side, first in zip(self.sides, firsts, strict=False):
             for origin in (origin for of, origin in self._from if of is side):
                 origin.place += first
                 origin.slope_place += first
         self.width = firsts[-1]
-        """Of the row of all outputs."""
+        """Length of the row of all outputs."""
         self.backs = {
             origin.place
             for side, first in zip(self.sides, firsts, strict=False)
             for origin in side.origins()
             if origin.kind == OUTPUT and origin.place >= first
         }
-        """Outputs that lead to an FMU which steps before their own does."""
+        """Places of outputs that feed an FMU which steps before their own FMU."""
         through, circle = self._feedthrough(), _circle(self._needs)
         self.method = _method(scene, self.sides, through, circle)
         self.notes = [*_notes(scene, self.sides, self.method, through, circle)]
         self.throughs = [*self._throughs()] if self.method == "redo" else []
-        """What the circuit itself carries of the FMUs' feedthrough, and what leads to it."""
+        """Feedthrough from a probe to a source, which the circuit solves itself, and its feed."""
 
     def deck(self) -> Deck:
-        """Of the circuit."""
+        """The circuit's netlist."""
         circuit, run = self.scene.circuit, self.scene.run
         assert circuit.netlist is not None
         return deck(
@@ -94,7 +96,7 @@ class Plan:
         )
 
     def outputs(self) -> Iterator[tuple[Side, str, int, bool]]:
-        """Each output's FMU, name, place in the row of all, and whether a port leads it on."""
+        """Each output's FMU, name, place in the row of all, and whether a port reads it."""
         places, first = {origin.place for _, origin in self._from}, 0
         for side in self.sides:
             for k, (name, *_) in enumerate(side.columns):
@@ -103,12 +105,12 @@ class Plan:
 
     @property
     def driven(self) -> bool:
-        """Whether the command of ``[drive]`` leads to something."""
+        """Whether a port reads the command of ``[drive]``."""
         return any(port.origin == "drive" for port in self.scene.port)
 
     def _feedthrough(self) -> str:
-        """An input from the circuit that an output to it depends on at once, also by way of other
-        FMUs, as these say; or nothing."""
+        """An input from the circuit on which an output to the circuit depends without delay, also
+        through other FMUs, as they declare it: in words, or ""."""
         probed = {(side.name, into.name) for side in self.sides for into, _ in side.probed()}
         for _, side, output in self._fed:
             for name, variable in sorted(_behind(self._needs, (side.name, output.name)) & probed):
@@ -116,12 +118,13 @@ class Plan:
         return ""
 
     def _throughs(self) -> Iterator[tuple[Any, Any]]:
-        """Also of what no FMU says: an output may depend on all inputs where none are told."""
+        """All possible feedthrough from probes to sources; an output for which the FMU declares no
+        dependencies may depend on all inputs."""
         needs = dict(self._needs)
         for side in self.sides:
-            every = {(side.name, into.name) for into in side.inputs}
+            inputs = {(side.name, into.name) for into in side.inputs}
             for output in side.outputs:
-                needs.setdefault((side.name, output.name), every)
+                needs.setdefault((side.name, output.name), inputs)
         for at, last, output in self._fed:
             origin, behind = self.sources[at].origin, _behind(needs, (last.name, output.name))
             end = self.sides.index(last)
@@ -133,6 +136,7 @@ class Plan:
                         yield Through(*places, scale=scale), feed
 
     def _join(self, port: Port, sides: dict[str, Side]) -> None:
+        """Add a port: its origin (probe, drive or output), and what it feeds (source or input)."""
         origin = Origin(scale=port.scale, offset=port.offset)
         side, output = None, None
         if port.probe is not None:
@@ -148,7 +152,7 @@ class Plan:
             self.sources.append(Source(name=port.source.lower().encode(), origin=origin))
             if side is not None and output is not None and output.real:
                 self._fed.append((len(self.sources) - 1, side, output))
-            kept = self.sources[-1].origin  # the structure holds a copy
+            kept = self.sources[-1].origin  # a copy of ``origin``, which is adjusted later
         else:
             into, variable, place = _end(port, "to", str(port.to), sides, "input")
             able = into.of.version == 2 and into.of.abilities.canInterpolateInputs
@@ -159,7 +163,7 @@ class Plan:
                     '2.0 with canInterpolateInputs; take "mean" or "end"'
                 )
             kind = port.feed if port.feed != "auto" else "line" if able else "mean"
-            # A mean of truth values is none.
+            # Integers and truth values have no mean, so they are taken at the end.
             feed = Feed(origin=origin, feed=_FEEDS[kind if variable.real else "end"])
             into.feed(variable, place, feed)
             kept = feed.origin
@@ -173,7 +177,7 @@ class Plan:
 
 
 def _machine(scene: Scene) -> Fmu:
-    """The built-in machine as an FMU like others, with the parameters of the scene's tables."""
+    """The built-in machine as a foreign FMU, with the parameters of the scene's tables."""
     reals, wholes = parameters(scene)
     given = {**reals, **wholes, "normal_force": scene.friction.normal_force}
     return Fmu(name=MACHINE, file=str(unpacked(2)), parameters=given)
@@ -182,13 +186,15 @@ def _machine(scene: Scene) -> Fmu:
 def _end(
     port: Port, key: str, name: str, sides: dict[str, Side], causality: str
 ) -> tuple[Side, Variable, int]:
+    """The FMU and variable that a port's ``key`` names, and the place of an array's element."""
     of, _, variable = name.partition(".")
     found, place = sides[of].of.find(variable, causality, f'[[port]] {key} = "{name}"')
     return sides[of], found, place
 
 
 def _set_slope(origin: Any, port: Port, side: Side, output: Variable, place: int) -> None:
-    """How an output goes on between communication points."""
+    """Set how an output is extrapolated between communication points: held, by the difference of
+    the last values, or by a known slope (reported by the FMU, or another output)."""
     kind, one = port.slope, output.size == 1
     if kind == "auto":
         tells = output.continuous and one and (side.of.abilities.maxOutputDerivativeOrder or 0) >= 1
@@ -207,7 +213,7 @@ def _set_slope(origin: Any, port: Port, side: Side, output: Variable, place: int
 
 
 def _in_order(scene: Scene, sides: dict[str, Side]) -> list[Side]:
-    """Each after those that feed it; of a circle, the first in the scene first."""
+    """FMUs, each after those that feed it; a cycle is broken at its first FMU in the scene."""
     feeding: dict[str, set[str]] = {name: set() for name in sides}
     for port in scene.port:
         if port.origin not in (None, "drive") and port.to is not None:
@@ -221,12 +227,12 @@ def _in_order(scene: Scene, sides: dict[str, Side]) -> list[Side]:
 
 
 def _fixed(side: Side) -> bool:
-    """Whether its steps are to be of one length."""
+    """Whether an FMU needs steps of one length."""
     return not side.varies or bool(side.of.abilities.fixedInternalStepSize)
 
 
 def _able(sides: list[Side]) -> bool:
-    """Whether their steps can be repeated, of any length."""
+    """Whether all FMUs can repeat steps, and take steps of any length."""
     return all(side.of.abilities.canGetAndSetFMUstate and not _fixed(side) for side in sides)
 
 
@@ -252,7 +258,7 @@ def _method(scene: Scene, sides: list[Side], through: str, circle: str) -> str:
 def _notes(
     scene: Scene, sides: list[Side], method: str, through: str, circle: str
 ) -> Iterator[str]:
-    """What the coupling errs in."""
+    """Sentences on the errors that the chosen method leaves."""
     cure = f"{'FMUs with ' * any(map(_fixed, sides))}smaller steps err less"
     if _able(sides):
         cure = 'coupling.method = "redo" is as exact as one netlist'
@@ -280,7 +286,7 @@ def _notes(
 
 
 def _circle(needs: dict[_Of, set[_Of]]) -> str:
-    """Of variables of FMUs that depend on each other at once, or nothing."""
+    """The variables of an algebraic loop (mutual dependence without delay), or ""."""
     try:
         TopologicalSorter(needs).prepare()
     except CycleError as error:
@@ -289,7 +295,7 @@ def _circle(needs: dict[_Of, set[_Of]]) -> str:
 
 
 def _behind(needs: dict[_Of, set[_Of]], start: _Of) -> set[_Of]:
-    """All that a variable depends on at once."""
+    """All variables on which ``start`` depends without delay, directly or not."""
     found: set[_Of] = set()
     rest = [start]
     while rest:

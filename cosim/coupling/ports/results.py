@@ -1,4 +1,4 @@
-"""What a run of a scene with ports gives: its waveforms and its numbers."""
+"""The results of a run of a scene with ports: its waveforms and its summary."""
 
 import re
 import time
@@ -29,11 +29,11 @@ def joined(
     run.run()
     signals: list[Signal] = []
     odd: list[str] = []
-    for each in _signals(run):
-        if (beyond := ~np.isfinite(each[3])).any():
-            odd.append(f"{plain(each[0])} (first at t = {each[2][beyond.argmax()]:.6g} s)")
+    for signal in _signals(run):
+        if (beyond := ~np.isfinite(signal[3])).any():
+            odd.append(f"{plain(signal[0])} (first at t = {signal[2][beyond.argmax()]:.6g} s)")
         else:
-            signals.append(each)
+            signals.append(signal)
     _refuse_divergence(scene, signals)
     waves = Tape(1 + len(signals))
     step, rows = scene.run.output_step, count(scene.run.output_step, scene.run.duration)
@@ -70,15 +70,16 @@ def joined(
 
 
 Signal = tuple[str, str, Array, Array, bool]
-"""Name, unit, times (s), values, and whether it is continuous."""
+"""Name, unit, times (s), values, and whether it is continuous (else piecewise constant)."""
 
 
 DIVERGED, BEYOND = 1e15, 1e150
-"""Magnitudes, SI, that nothing joined has, and whose squares no number holds."""
+"""Magnitudes, SI, above which a signal has diverged: one of a port, and any other (the square of
+which would overflow)."""
 
 
 def _refuse_divergence(scene: Scene, signals: list[Signal]) -> None:
-    """Raises SimulationFailed for what first grew without bound."""
+    """Raise SimulationFailed, naming the signal that was the first to grow without bound."""
     ends = {end for port in scene.port for end in (port.origin, port.source, port.probe)}
     grown: list[tuple[float, str]] = []
     for name, _, times, values, _ in signals:
@@ -98,6 +99,8 @@ def _refuse_divergence(scene: Scene, signals: list[Signal]) -> None:
 
 
 def _signals(run: Run) -> Iterator[Signal]:
+    """Outputs of FMUs from the log ``points`` (time, then the row of all outputs); sources and
+    probed values from ``log`` (time, sources, probed values)."""
     points, log = run.points.array(), run.log.array()
     place = 1
     for side in run.plan.sides:
@@ -112,8 +115,8 @@ def _signals(run: Run) -> Iterator[Signal]:
 
 
 def _powers(scene: Scene, signals: list[Signal]) -> Iterator[tuple[str, Array, Array]]:
-    """Where an FMU gives a voltage source its value and takes its current: the source, times (s)
-    and the power (W) that the circuit gives to the FMU there."""
+    """For each voltage source that an FMU feeds and whose current it reads: its name, times (s) and
+    the power (W) that the circuit delivers to the FMU."""
     known = {name: (times, values) for name, _, times, values, _ in signals}
     currents = {
         ("".join(port.probe.lower().split()), str(port.to).partition(".")[0]): port.probe
@@ -129,7 +132,7 @@ def _powers(scene: Scene, signals: list[Signal]) -> Iterator[tuple[str, Array, A
 
 
 def _at(signal: Signal, at: Array) -> Array:
-    """At these times; what is not continuous stays as it was last."""
+    """Values at times ``at`` (s): linear between points, or held where not continuous."""
     _, _, times, values, continuous = signal
     if continuous:
         return np.interp(at, times, values)
@@ -138,7 +141,8 @@ def _at(signal: Signal, at: Array) -> Array:
 
 
 def _numbers(settle: float, times: Array, values: Array, continuous: bool) -> dict[str, float]:
-    """Mean, rms, least and greatest after settling, of straight lines between the points."""
+    """Mean, rms, least and greatest value after settling, with straight lines between the points,
+    or held values where not continuous."""
     length = total = squares = 0.0
     least, greatest = np.inf, -np.inf
     for part in blocks(len(times) - 1):
@@ -152,6 +156,7 @@ def _numbers(settle: float, times: Array, values: Array, continuous: bool) -> di
         h, a = np.diff(t), y[:-1]
         b = y[1:] if continuous else a
         length += float(h.sum())
+        # Integrals of a line from a to b over h, and of its square.
         total += float((h * (a + b)).sum()) / 2.0
         squares += float((h * (a * a + a * b + b * b)).sum()) / 3.0
         least, greatest = min(least, float(y.min())), max(greatest, float(y.max()))
@@ -160,13 +165,17 @@ def _numbers(settle: float, times: Array, values: Array, continuous: bool) -> di
 
 
 _OFTEN, _LONG, _WITHIN = 10, 10_000, 20
-"""How many times as many steps as ``circuit.max_step`` asks for tell of ringing; of so many; by how
-much more a node within a subcircuit has to ring to be named."""
+"""Ringing is reported if the steps are so many times those that ``circuit.max_step`` asks for, and
+their number is above the second; a node within a subcircuit must ring the third times as much as
+a named one to be named."""
 _SELDOM, _MANY = 2, 10
-"""Every how manieth step at most an FMU's outputs are to change; after so many changes."""
+"""An FMU has steps of its own if its outputs change only every so manieth step or less often,
+judged from so many changes on."""
 
 
 def _notes(run: Run, odd: list[str]) -> Iterator[str]:
+    """Sentences on ignored parameters, ringing, values that are no numbers, outputs that repeated
+    steps change, and FMUs with steps of their own; ``odd`` names signals that were left out."""
     if ignored := engine().ignored():
         yield f"ngspice knows no {', '.join(ignored)} of a model, and ignored it."
     often = run.steps * run.plan.scene.circuit.max_step / run.state.duration
@@ -176,7 +185,7 @@ def _notes(run: Run, odd: list[str]) -> Iterator[str]:
             for k, name in enumerate(engine().sent)
             if not re.search("#|cosim_", name)
         }
-        # A node that the user has named tells more than one within a model, if it rings at all.
+        # A node that the user has named is clearer than one within a model, if it rings at all.
         node = max(turns, key=lambda n: turns[n] if "." not in n else turns[n] / _WITHIN)
         yield (
             f"the circuit took {run.steps} steps, {often:.0f} times as many as circuit.max_step "
@@ -189,13 +198,13 @@ def _notes(run: Run, odd: list[str]) -> Iterator[str]:
         yield f"repeated steps change {names}, which the FMU does not restore, so they are off."
     points, place = run.points.array(), 1
     for side in run.plan.sides:
-        told = run.plan.method == "macro-steps" and side.of.step > 0.0  # by the plan, if it errs
+        told = run.plan.method == "macro-steps" and side.of.step > 0.0  # the plan's notes have it
         own = np.nan_to_num(
             points[:, [place + k for k, (*_, goes_on) in enumerate(side.columns) if goes_on]]
         )
         place += side.width
         changed = np.flatnonzero((own[1:] != own[:-1]).any(axis=1)) + 1
-        # What has settled, or has not begun yet, does not move in steps.
+        # The median interval between changes: an output at rest for long says nothing.
         if not told and len(changed) > _MANY and np.median(np.diff(changed)) >= _SELDOM:
             yield (
                 f"the outputs of {side.name} changed in only {len(changed)} of {len(points) - 1} "

@@ -32,19 +32,21 @@ from cosim.scene import Scene
 from cosim.toolchain.processes import end_used, used
 
 _POINTS = 2048
-"""Places of the logs between two emptyings."""
+"""Points that the blocks of the logs hold before they are emptied."""
 
 ENOUGH, BEGINNING, BUDGET = 1_000_000, 10_000_000, 1e9
-"""Steps after which a run is judged, after which it no longer is, and that it may take (hours)."""
+"""Steps from which on a run is judged, from which on it no longer is, and that it may take in all
+(hours)."""
 
 ORDINARY = 1000
-"""Steps, over what ``circuit.max_step`` asks for, that no budget forbids: a run may be long."""
+"""Ratio of steps to those that ``circuit.max_step`` asks for which is always allowed."""
 
 _AGREEMENT = 2.0
-"""Of ``circuit.reltol``: how far an FMU and ngspice may be apart where steps are repeated."""
+"""Largest difference between FMU and ngspice where steps are repeated, over ``circuit.reltol``."""
 
 _WRONG = 12
-"""As in ports.c: of so many changes that are not by the slopes that an FMU tells."""
+"""As in ports.c: number of changes not explained by the reported slope from which on it is
+wrong."""
 
 _STATUSES = {
     2: "it discards the step, or asks to end the run",
@@ -52,7 +54,7 @@ _STATUSES = {
     4: "it has a fatal error, and does not say which",
     5: "it goes on with the step in the background, for which nobody waits",
 }
-"""What an FMU tells by the status of a call alone."""
+"""Words for the status of an FMU's call, used where the FMU gives no message."""
 
 
 class Run:
@@ -60,7 +62,7 @@ class Run:
 
     def __init__(self, scene: Scene, progress: Callable[[float], None]) -> None:
         self._scene, self._progress = scene, progress
-        end_used()  # of a run before: an FMU may be for one instance at a time
+        end_used()  # ends instances of earlier runs: an FMU may allow one instance at a time
         self.plan = plan = Plan(scene)
         self.deck = plan.deck()
         self._failure: BaseException | None = None
@@ -90,7 +92,7 @@ class Run:
         count_through = len(plan.throughs)
         self._throughs = (Through * max(count_through, 1))(*(t for t, _ in plan.throughs))
         self.odd = (c_double * max(2 * width, 1))()
-        """Not 0 where a repeated step gave another output; then room for the first ones."""
+        """For each output: not 0 if a repeated step gave another value; then working space."""
         self._backs = (Back * max(width, 1))()
         for place in plan.backs:
             self._backs[place].is_one = 1
@@ -136,7 +138,7 @@ class Run:
     def run(self) -> None:
         """Run to ``run.duration``. Raises SimulationFailed with the reason and the time reached."""
         state, duration = self.state, self._scene.run.duration
-        self._progress(0.0)  # the FMUs are there
+        self._progress(0.0)  # the FMUs are instantiated
         try:
             engine().transient(self.deck.text, self.deck.vectors, self)
         finally:
@@ -161,11 +163,12 @@ class Run:
 
     @property
     def versions(self) -> dict[str, str]:
-        """Of ngspice."""
+        """Version of ngspice."""
         return {"ngspice": str(engine().ngspice_version)}
 
     def _refuse_what_is_no_number(self) -> None:
-        """ngspice would end at it, and tell of its own steps. Raises SimulationFailed."""
+        """Raise SimulationFailed for an output that is not finite: ngspice stops at it, too, but
+        would only report its own steps."""
         for _, name, place, read in self.plan.outputs():
             if read and not np.isfinite(self._rows[0][place]):
                 raise SimulationFailed(
@@ -173,7 +176,7 @@ class Run:
                 )
 
     def _refuse_what_is_said_wrongly(self) -> None:
-        """Raises BadInput for an FMU that does not do what it says of itself."""
+        """Raise BadInput for an FMU that does not behave as it declares."""
         for side, name, place, read in self.plan.outputs():
             if read and self.odd[place]:
                 raise side.of.bad(
@@ -193,13 +196,13 @@ class Run:
             f"The FMU {side.name} failed at t = {self.state.told:.6g} s: {plain(said[-1], 400)}"
         )
 
-    # What ngspice's engine asks for (see cosim.circuit.ngspice.Leader).
+    # The functions that ngspice's engine calls (see cosim.circuit.ngspice.Leader).
 
     def begin(self) -> None:
         loop().ports_begin(ctypes.byref(self.state))
 
     def loaded(self, engine: ngspice.Engine) -> None:
-        """Take the addresses of what is called during the run, and the edges of PULSE sources."""
+        """Pass on the addresses of ngspice's functions, and the corners of PULSE sources."""
         state, run = self.state, self._scene.run
         state.command = engine.address("ngSpice_Command")
         state.ask = engine.address("ngGet_Vec_Info")
@@ -229,8 +232,8 @@ class Run:
         self._progress(state.time)
 
     def _attend_and_judge(self) -> None:
-        """Also end a run whose steps have become so short that it has no end, as those of `redo` do
-        about an FMU whose outputs never come to rest."""
+        """Take the logs away, and end a run whose steps have become too short ever to reach its
+        end, as with `redo` at an FMU whose outputs jump again and again."""
         self._attend()
         self._refuse_what_is_said_wrongly()
         steps, time, duration = self.steps, self.state.time, self._scene.run.duration
@@ -244,7 +247,8 @@ class Run:
 
 
 def _pulse(values: list[float], duration: float, step: float) -> Any:
-    """Of ngspice's values (low, high, delay, rise, fall, width, period), as it completes them."""
+    """A PULSE source's corners in a period (s), from ngspice's values (low, high, delay, rise,
+    fall, width, period) with ngspice's defaults for those not given."""
     given = dict(enumerate(values))
     delay, rise, fall = (given.get(k, 0.0) for k in (2, 3, 4))
     rise, fall = rise or step, fall or step

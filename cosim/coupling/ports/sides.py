@@ -13,16 +13,16 @@ from cosim.coupling.ports.strangers import FUNCTIONS, Stranger, Variable
 from cosim.scene import tables
 
 _ERROR = 3
-"""The status of a call, in both versions, from which on an instance is not to be used."""
+"""Status of a call, in both FMI versions, from which on the instance must not be used."""
 
 
 class Side:
-    """An FMU with room for its inputs and outputs; the outputs of all lie in one row."""
+    """An FMU with buffers for its inputs; its outputs are a part of the one row of all outputs."""
 
     def __init__(self, about: tables.Fmu, of: Stranger) -> None:
         self.name, self.of = about.name, of
         self.outputs = _grouped([v for v in of.variables.values() if v.causality == "output"])
-        """Those with numbers, in the order of the row."""
+        """Outputs that are numbers, in the order of the row."""
         self.columns = [
             (f"{self.name}.{v.name}" + (f"[{k}]" if v.size > 1 else ""), v.unit, v.continuous)
             for v in self.outputs
@@ -32,7 +32,7 @@ class Side:
             raise of.bad("two of its outputs have one name")
         """Name, unit, and whether it is continuous, of each number of the row."""
         self.slopes: list[Variable] = []
-        """Outputs whose derivative the FMU itself tells; they follow in the row."""
+        """Outputs whose derivative the FMU reports; these derivatives follow in the row."""
         self.places = _places(self.outputs)
         self.inputs: list[Variable] = []
         self._feeds: list[tuple[Variable, int, Any]] = []
@@ -41,7 +41,7 @@ class Side:
 
     @property
     def varies(self) -> bool:
-        """Whether its steps may have other lengths."""
+        """Whether its steps may differ in length."""
         return bool(self.of.abilities.canHandleVariableCommunicationStepSize)
 
     @property
@@ -49,13 +49,13 @@ class Side:
         return len(self.columns) + len(self.slopes)
 
     def slope_place(self, output: Variable) -> int:
-        """Where in the row the derivative stands that the FMU tells of an output."""
+        """The place in the row of an output's derivative, which the FMU reports."""
         if output not in self.slopes:
             self.slopes.append(output)
         return len(self.columns) + self.slopes.index(output)
 
     def feed(self, into: Variable, place: int, feed: Any) -> None:
-        """Lead ``feed`` into an input, or an element of it."""
+        """Connect ``feed`` to an input, or to the element ``place`` of it."""
         for other in self.inputs:
             if into is not other and into.one == other.one:
                 raise self.of.bad(f"{into.name} and {other.name} are one input, and have two ports")
@@ -66,18 +66,19 @@ class Side:
         self._feeds.append((into, place, feed))
 
     def origins(self) -> Iterator[Any]:
-        """Of what leads into it."""
+        """The origins of all feeds of this FMU."""
         for *_, feed in self._feeds:
             yield feed.origin
 
     def probed(self) -> Iterator[tuple[Variable, Any]]:
-        """What leads from the circuit into real inputs."""
+        """The feeds from the circuit into real inputs."""
         for into, _, feed in self._feeds:
             if into.real and feed.origin.kind == PROBE:
                 yield into, feed
 
     def state(self, row: int, repeats: bool) -> Any:
-        """Ready to run: a new instance, with its part of the row at that address."""
+        """A new instance, ready to run, as ``ports.c`` takes it; its part of the row is at the
+        address ``row``. With ``repeats`` it can save and restore its state."""
         self.instance = self.of.instance(self._parameters)
         names = {"set_reals": "SetReal", "get_reals": "GetReal", "do_step": "DoStep"}
         if self.of.version == 3:
@@ -128,27 +129,30 @@ class Side:
         return state
 
     def _keep(self, array: Any) -> Any:
+        """Keep an array alive of which the structures hold only the address."""
         self._kept.append(array)
         return array
 
     def _references(self, variables: Sequence[Variable]) -> int:
+        """The address of an array with the variables' value references."""
         numbers = self._keep((c_uint32 * len(variables))(*(v.reference for v in variables)))
         return ctypes.addressof(numbers)
 
     def _groups(self, do: str, variables: Sequence[Variable], values: int) -> Any:
-        """One group for each type; their values lie one after another."""
+        """An array with a group for each type, set or read by one call each; the values of all
+        groups lie one after another from the address ``values`` on."""
         groups: list[Any] = []
         types: dict[str, list[Variable]] = defaultdict(list)
         for each in variables:
             types[each.type].append(each)
-        for kind, those in types.items():
-            size = sum(each.size for each in those)
-            raw = self._keep((c_double * size)())  # no type is longer
+        for kind, members in types.items():
+            size = sum(each.size for each in members)
+            raw = self._keep((c_double * size)())  # large enough: no type has more bytes
             groups.append(
                 Group(
                     call=self.of.address(do + FUNCTIONS[self.of.version].get(kind, kind)),
-                    places=self._references(those),
-                    **{"n": len(those), "size": size, "kind": those[0].kind},
+                    places=self._references(members),
+                    **{"n": len(members), "size": size, "kind": members[0].kind},
                     **{"values": values, "raw": ctypes.addressof(raw)},
                 )
             )
@@ -158,8 +162,8 @@ class Side:
         return array
 
     def close(self, state: int | None) -> None:
-        """End the use of the instance, and of the state that it has saved. One that has failed is
-        left alone, since nothing may be asked of it any more."""
+        """Free the instance and its saved state. After an error FMI allows no further calls, so the
+        instance is then left as it is."""
         if self.fmu.status < _ERROR:
             with suppress(Exception):
                 if state:
@@ -168,12 +172,12 @@ class Side:
 
 
 def _places(variables: Sequence[Variable]) -> dict[str, int]:
-    """Of the first value of each, which lie one after another."""
+    """The place of each variable's first value, where all values lie one after another."""
     names, sizes = [each.name for each in variables], [each.size for each in variables]
     return dict(zip(names, accumulate(sizes, initial=0), strict=False))
 
 
 def _grouped(variables: Sequence[Variable]) -> list[Variable]:
-    """Those of a type one after another."""
+    """The variables sorted by type, so that those of a type are neighbours."""
     order = list(dict.fromkeys(each.type for each in variables))
     return sorted(variables, key=lambda each: order.index(each.type))

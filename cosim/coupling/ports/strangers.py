@@ -1,6 +1,4 @@
-"""FMUs of others: unpacked, described, loaded; nothing that they say of themselves is trusted
-before it is checked.
-"""
+"""Foreign FMUs: unpacked, described, loaded. Nothing in their description is trusted unchecked."""
 
 import math
 import re
@@ -25,23 +23,23 @@ from cosim.mechanics.fmi import SLAVES, Interface, unit
 from cosim.scene.messages import PLAIN_NUMBER, ended, shown, suggestion
 
 MOST_FILES, LARGEST = 10_000, 1 << 30
-"""Of an FMU: files in it, and bytes once unpacked."""
+"""Limits of an FMU: number of files, and bytes once unpacked."""
 
 MOST_VALUES, MOST_ELEMENTS = 4096, 1 << 20
-"""Numbers in the outputs of an FMU, where arrays count with all of theirs; and in one array."""
+"""Limits: values of all outputs of an FMU, each element of arrays counted; values of one array."""
 
 _JOINED = ("input", "output", "parameter")
-"""What a scene can join or set; any other array may have any size."""
+"""Variables that a scene can connect or set; arrays of other causalities may have any size."""
 
 _KINDS_2 = {"Real": 0, "Integer": 6, "Enumeration": 6, "Boolean": 11}
 _KINDS_3 = {
     **{"Float64": 0, "Float32": 1, "Int8": 2, "UInt8": 3, "Int16": 4, "UInt16": 5, "Int32": 6},
     **{"UInt32": 7, "Int64": 8, "Enumeration": 8, "UInt64": 9, "Boolean": 10},
 }
-"""Types of values as ``loop.h`` numbers them."""
+"""Numbers of the types of values in ``loop.h``."""
 
 FUNCTIONS = {2: {"Enumeration": "Integer"}, 3: {"Enumeration": "Int64"}}
-"""What sets and reads a type, where it is not of the same name."""
+"""The type whose functions set and read a type, where the names differ."""
 
 _LONGEST = 600  # characters of a message
 
@@ -50,7 +48,7 @@ _ELEMENT = re.compile(r"(.*)\[(\d+)\]")
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of an FMU that has numbers."""
+    """A variable of an FMU whose values are numbers."""
 
     name: str
     reference: int
@@ -62,7 +60,7 @@ class Variable:
     variability: str
     start: tuple[float, ...]
     slope: str
-    """The output that is its derivative; empty where there is none."""
+    """Name of the output that is its derivative; empty without one."""
     low: float
     high: float
     items: tuple[int, ...]
@@ -70,7 +68,7 @@ class Variable:
 
     @property
     def one(self) -> tuple[int, int]:
-        """What it is, whatever it is called: a variable may have several names."""
+        """Identity of the variable, which may have several names (aliases)."""
         return self.kind, self.reference
 
     @property
@@ -79,7 +77,7 @@ class Variable:
 
     @property
     def continuous(self) -> bool:
-        """Whether it goes on between communication points."""
+        """Whether it may change continuously between communication points."""
         return self.real and self.variability == "continuous"
 
 
@@ -107,7 +105,7 @@ class Stranger:
         varies = self.abilities.canHandleVariableCommunicationStepSize
         usual = found.defaultExperiment and not varies and found.defaultExperiment.stepSize
         self.step = 0.0
-        """Of its own, s, of which others are to be multiples; 0 where it tells none."""
+        """Its own step, s, of which communication steps must be multiples; 0 if not declared."""
         with suppress(ValueError):
             self.step = float(self.abilities.fixedInternalStepSize or usual or 0.0)
         self.token = found.instantiationToken
@@ -117,17 +115,17 @@ class Stranger:
             for each in found.modelVariables
             if each.type == "String" and each.causality in ("input", "parameter") and not each.shape
         }
-        """References of parameters and inputs that are texts."""
+        """Value references of parameters and inputs that are strings."""
         self.feedthrough = {
             each.variable.name: {v.name for v in each.dependencies}
             for each in found.outputs
             if each.variable is not None and each.dependencies is not None
         }
-        """The variables that each output depends on at once, where the FMU says so."""
+        """The variables on which each output depends without delay, where the FMU declares it."""
         self.loaded = self._load(folder)
 
     def bad(self, reason: str) -> BadInput:
-        """The error that tells what is wrong with it, in a line; an FMU's words are in it."""
+        """The error for this FMU: one printable line, since ``reason`` may hold the FMU's words."""
         line = "".join(each if each.isprintable() else " " for each in reason)[:_LONGEST]
         return BadInput(ended(f"{self.name}: {line}"))
 
@@ -253,7 +251,7 @@ class Stranger:
         getattr(made.raw, f"set{kind}")([found.reference], values)
 
     def address(self, name: str) -> Any:
-        """Of one of its functions, by its name in FMI 2.0 or 3.0 without the ``fmi``."""
+        """The address of a function of its library, by its FMI name without the prefix ``fmi2``."""
         function = f"fmi{self.version}{name}"
         try:
             return cast(getattr(self.loaded.dll, function), c_void_p).value or 0
@@ -262,12 +260,13 @@ class Stranger:
 
 
 _WHOLE = {f"{'' if s else 'U'}Int{n}": (n, s) for n in (8, 16, 32, 64) for s in (True, False)}
-"""Bits of a type, and whether it has a sign; FMI 2.0's has 32."""
+"""Bits of each integer type, and whether it has a sign; FMI 2.0's has 32 with sign."""
 
 
 def _allowed(found: Variable, value: Any, where: str, of: Stranger) -> Any:
+    """A value that type, range and items of a variable allow. Raises BadInput for others."""
     if found.type == "Boolean":
-        if value not in (0, 1):  # a sweep has numbers alone
+        if value not in (0, 1):  # sweeps give numbers only
             raise of.bad(f"{where} must be true or false")
         value = bool(value)
     elif isinstance(value, bool):
@@ -288,8 +287,8 @@ def _allowed(found: Variable, value: Any, where: str, of: Stranger) -> Any:
 
 
 def _why(folder: str) -> str:
-    """What is wrong with a model description: rather what its schema tells than words of Python's
-    that tell a user nothing."""
+    """What is wrong with a model description: the validation's words, since those of a Python
+    exception mean nothing to a user."""
     try:
         fmpy.read_model_description(folder)
     except Exception as error:
@@ -305,6 +304,7 @@ def _number(text: str) -> float:
 
 
 def _unpack(path: Path, folder: str, name: str) -> None:
+    """Unpack an FMU, within the limits and without files outside of ``folder``."""
     try:
         with reader.opened(path, LARGEST) as file, zipfile.ZipFile(file) as archive:
             files = archive.infolist()
@@ -323,7 +323,7 @@ def _unpack(path: Path, folder: str, name: str) -> None:
 
 
 def _link(folder: str, names: list[str]) -> None:
-    """Make links of what zipfile has unpacked as texts that say where they lead."""
+    """Turn files into symbolic links: zipfile unpacks a link as a text with its target."""
     for path in [Path(folder, name) for name in names]:
         place = path.read_text("utf-8")
         path.unlink()
@@ -334,7 +334,8 @@ def _link(folder: str, names: list[str]) -> None:
 
 
 def stranger(path: str) -> Stranger:
-    """That of a file, unpacked and loaded once in a process as long as the file stays the same."""
+    """The foreign FMU in a file, unpacked and loaded once per process while the file is
+    unchanged."""
     try:
         about = Path(path).stat()
     except OSError as error:
