@@ -1,19 +1,19 @@
-"""What a run tells of its own numbers: how far its steps may be off, and what kind of motion it is.
+"""The error that a run's steps leave, and the kind of its motion.
 
 Both come from other runs of the same scene, on other processors while the scene itself runs.
 
-The error of v_average is the difference to a run with all steps COARSER times as long. It is not
-the run's own history that tells it, since that obeys the solver's own equations; nor a run with
-less tolerance alone, since both would then err alike in whatever has a fixed length.
+The error of v_average is the difference to a run with all steps COARSER times as long. The run's
+own history cannot show it, since it satisfies the solver's equations; nor can a run with a looser
+tolerance alone, since errors of steps of fixed length would be the same in both.
 
-The kind is that of the scene on the circuit "limited", which is much cheaper: as it is, from a
-height 1e-9 m aside, and with the drive begun 1/4, 1/2 and 3/4 of a period later in its course.
-Where the first two part and neither repeats, motion is chaotic, and no path and no mean over a
-given time is right by itself. Where the others come to another motion, the start decides between
-several. Motion that repeats within short runs needs no longer ones.
+The kind of motion is found with the circuit "limited", which is much cheaper, from several starts:
+the scene's own, one with a height 1e-9 m aside, and those with the drive's phase 1/4, 1/2 and 3/4
+of a period later. If the first two diverge and neither repeats, the motion is chaotic: no path and
+no mean over a given time is right by itself. If others reach another motion, the start decides
+between several. Motion that repeats within short runs needs no longer ones.
 
-Not seen: several answers that these starts do not part; a kind that the simpler circuit does
-not have, near a border between two of them; and chaos that dies out before the averages begin.
+Not detected: several motions that these starts do not separate; a kind of motion that differs on
+the simpler circuit, near a border between two kinds; chaos that dies out before the averages begin.
 """
 
 from collections.abc import Callable, Iterator
@@ -38,52 +38,55 @@ from cosim.toolchain.processes import Progress
 from cosim.waveforms.result import Result
 
 COARSER = 3.5
-"""How much longer the steps are of the run that tells the error of another one."""
+"""Ratio of the steps of the run that shows the error to the scene's own steps."""
 
 LOOSER = 1e-6
-"""``mechanics.tolerance`` of that run where no steps of ngspice are made."""
+"""``mechanics.tolerance`` of that run where the scene has no steps of ngspice."""
 
 LEAST_TOLD = 5e-5
-"""Of v_average, with ngspice: two runs may err alike by chance, and this much was seen."""
+"""Least relative error of v_average with ngspice: two runs may err alike by chance, so far as seen.
+"""
 
 STRICT = 2.4
-"""How much shorter they are for an error in the strict sense, of both runs."""
+"""Factor by which steps are shorter in the first of two finer runs of a strict check (squared in
+the second)."""
 
 PERIODS, LONG = 60, 2.0
-"""Of the drive, and s: how long a run is at least that tells of chaos; its second half counts."""
+"""Least length of a run that can show chaos, in periods of the drive and in s; averages are over
+its second half."""
 
 SHARES = (0.5, 1.0, 4.0)
-"""Of that: how long the runs are, until the motion is periodic or chaotic."""
+"""Lengths of the runs in units of that, tried in turn until the motion is periodic or chaotic."""
 
 AHEAD = (0.25, 0.5, 0.75)
-"""Of a period, by which the drive begins later in its course in the other runs."""
+"""Shifts of the drive's phase in the other starts, as shares of a period."""
 
 LONGEST = 10.0
-"""Times the scene's own duration: a run of LONG is shorter where it would be longer, and none is
-made where PERIODS would be."""
+"""Limit of the runs' length, over the scene's own duration: LONG is shortened to it, and where even
+PERIODS exceed it, no run is made."""
 
 ASIDE = 1e-9
-"""m; far above rounding, and far below what regular motion makes of it."""
+"""m, shift of the initial height: far above rounding, far below any effect on regular motion."""
 
 PARTED = 1e-5
-"""Relative difference of v_average from ASIDE that regular motion does not have."""
+"""Relative difference of v_average by the shift ASIDE above which motion is not regular."""
 
 SAME = 1e-3
-"""Relative difference below which two values of v_average, or of the part's way in a period, are
-one."""
+"""Relative difference below which two values of v_average, or of the part's displacement in a
+period, count as equal."""
 
 MOST_PERIODS = 8
-"""Of the drive after which motion may repeat."""
+"""Most periods of the drive after which motion is recognised to repeat."""
 
 
 class _Stopped(CosimError):
-    """Nobody waits for this run any more."""
+    """Raised in runs whose result is no longer wanted."""
 
 
 @contextmanager
 def _beside(count: int) -> Iterator[tuple[ThreadPoolExecutor, Progress]]:
-    """Threads for ``count`` other runs at once, and their progress, which ends them where the block
-    does not end well, also while only they run."""
+    """Threads for ``count`` other runs, and a progress function for them, which ends these runs if
+    the block raises an exception."""
     stopped = Event()
 
     def going(_: float) -> None:
@@ -99,11 +102,12 @@ def _beside(count: int) -> Iterator[tuple[ThreadPoolExecutor, Progress]]:
 
 
 def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Result:
-    """The result of ``run``, which runs ``scene``, with what is told of its numbers: the error of
+    """The result of ``run``, which runs ``scene``, with two additions to its summary: the error of
     v_average, m/s, and the kind of motion.
 
-    ``strict`` tells the error by two finer runs and three more starts, on the scene's own circuit,
-    which costs ten times as much. Raises what ``run`` raises.
+    With ``strict`` the error comes from two finer runs, and v_average of three more starts is
+    added, all on the scene's own circuit, which costs ten times as much. Raises what ``run``
+    raises.
     """
     load(3)
     with _beside(2) as (threads, going):
@@ -136,9 +140,9 @@ def checked(scene: Scene, run: Callable[[], Result], strict: bool = False) -> Re
 
 
 def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
-    """The result of ``run``, which runs a scene with ports, and as ``NAME.mean_error`` how far each
-    mean is from that of a run with all steps COARSER times as long, or as short where a scene may
-    not have such long ones; nothing where that one fails. Raises what ``run`` raises.
+    """The result of ``run``, which runs a scene with ports, with an error ``NAME.mean_error`` of
+    each mean: the difference to a run with all steps COARSER times as long, or as short where a
+    scene does not allow such long ones. No error where that run fails. Raises what ``run`` raises.
     """
     told: dict[str, Any] = {}
     with _beside(1) as (threads, going):
@@ -155,22 +159,23 @@ def checked_ports(scene: Scene, run: Callable[[], Result]) -> Result:
 
 
 def motion(scene: Scene, progress: Progress) -> dict[str, Any]:
-    """The kind of motion of a scene, by the keys of a summary; empty where it is not known: nothing
-    repeats, there is no simpler circuit, or too few periods are run.
+    """The kind of motion of a scene, by the keys of a summary; empty where it cannot be found: the
+    drive is not periodic, there is no simpler circuit, or too few periods are run.
 
     ``motion`` is "regular", "no transport" (below LEAST), "several answers", "chaotic" or
-    "unsettled": not periodic by then. ``motion_periods`` are those of the drive after which it
-    repeats, ``motion_settled`` is from when on it does so, s, and ``v_average_settled`` the mean
-    velocity, m/s, that it then has, of the same simple circuit. ``v_average_answers`` are the
-    mean velocities, m/s, that several starts come to; ``v_average_range`` holds the least and the
-    greatest one of chaotic motion in stretches as long as the average.
+    "unsettled" (not periodic within the runs). ``motion_periods`` is the number of the drive's
+    periods after which motion repeats, ``motion_settled`` the time, s, from which on it does, and
+    ``v_average_settled`` the mean velocity, m/s, from then on, all on the simple circuit.
+    ``v_average_answers`` are the mean velocities, m/s, reached from several starts;
+    ``v_average_range`` holds the least and the greatest mean velocity of chaotic motion over
+    intervals as long as the scene averages.
     """
     length = scene.period
     simple = Fidelity.of(scene).simple
     solvable = not scene.rung.ngspice or simple is not None
     steady = scene.rung.driven and normal_force(scene) is None
     longest = LONGEST * scene.run.duration
-    # Where nothing drives the scene its period is infinite.
+    # A scene without a drive has an infinite period.
     if not (solvable and steady) or PERIODS * length > longest:
         return {}
     periods = max(PERIODS, round(min(LONG, longest) / length))
@@ -178,6 +183,7 @@ def motion(scene: Scene, progress: Progress) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for share in SHARES:
         end = round(share * periods) * length
+        # With a row for each period, differences of z_part are displacements in a period.
         times = {"duration": end, "settle": end / 2.0, "output_step": length}
         base = _looser(changed(scene, simple or {}, "limited")).having(run=times)
         aside = base.having(mechanics={"initial_lift": base.mechanics.initial_lift + ASIDE})
@@ -194,19 +200,19 @@ def motion(scene: Scene, progress: Progress) -> dict[str, Any]:
 
 
 def _kind(ways: Iterator[Array], length: float, averaged: int, chaos: bool) -> dict[str, Any]:
-    """The kind of a motion whose part goes ``ways`` (m) in the periods of ``length`` (s): from the
-    scene's own start, from one ASIDE, and from others, which are not asked for where these two
-    tell it. The average is over ``averaged`` periods; ``chaos``: it would be seen by now."""
-    # The own start and that aside alone may tell chaos; only else are the others run.
+    """The kind of a motion from ``ways``: for each start the part's displacements (m) in the
+    periods of ``length`` (s). The first start is the scene's own, the second one ASIDE; further
+    ones are only run if these two do not decide. v_average is over ``averaged`` periods; ``chaos``
+    tells whether the runs are long enough to show it."""
     two = next(ways), next(ways)
     repeats = [_repeats(way) for way in two]
     own, aside = (_mean(way) / length for way in two)
     if None in repeats and max(abs(own), abs(aside)) >= LEAST:
         if not chaos or any(repeats) or relative_error(aside, own) <= PARTED:
             return {"motion": "unsettled"}
-        every = np.concatenate([_stretches(way, averaged) for way in (*two, *ways)]) / length
-        return {"motion": "chaotic", "v_average_range": [float(every.min()), float(every.max())]}
-    answers: list[float] = []  # those that differ
+        means = np.concatenate([_stretches(way, averaged) for way in (*two, *ways)]) / length
+        return {"motion": "chaotic", "v_average_range": [float(means.min()), float(means.max())]}
+    answers: list[float] = []
     for way in (*two, *ways):
         answer = _answer(way, length)
         if answer is None:
@@ -226,7 +232,8 @@ def _kind(ways: Iterator[Array], length: float, averaged: int, chaos: bool) -> d
 
 
 def _answer(way: Array, length: float) -> float | None:
-    """The mean velocity (m/s) that a way comes to; 0 below LEAST, None where it does not repeat."""
+    """The mean velocity (m/s) of the repeating motion; 0 below LEAST, None if it does not
+    repeat."""
     if abs(_mean(way)) < LEAST * length:
         return 0.0
     count = _repeats(way)
@@ -234,19 +241,20 @@ def _answer(way: Array, length: float) -> float | None:
 
 
 def _mean(way: Array) -> float:
-    """Of its second half."""
+    """Mean displacement in a period over the second half of the run, m."""
     return float(way[len(way) // 2 :].mean())
 
 
 def _stretches(way: Array, count: int) -> Array:
-    """The mean way over each ``count`` periods in a row of its second half, at most over all."""
+    """Moving averages of the displacements over ``count`` periods, in the second half of the
+    run."""
     way = way[len(way) // 2 :]
     count = min(count, len(way))
     return np.convolve(way, np.ones(count) / count, "valid")
 
 
 def _repeats(way: Array) -> int | None:
-    """After how many periods the last ways repeat."""
+    """After how many periods the last displacements repeat; None if they do not."""
     for count in range(1, MOST_PERIODS + 1):
         if _apart(way, count)[-2 * MOST_PERIODS :].max() < SAME:
             return count
@@ -254,19 +262,20 @@ def _repeats(way: Array) -> int | None:
 
 
 def _settled(way: Array, count: int) -> int:
-    """The period from which on the ways repeat after ``count`` of them."""
+    """The number of the period from which on displacements repeat every ``count`` periods."""
     apart = np.flatnonzero(_apart(way, count) >= SAME)
     return int(apart[-1]) + 1 if len(apart) else 0
 
 
 def _apart(way: Array, count: int) -> Array:
-    """How far each way is from the one ``count`` periods later, relative to the largest of late."""
-    least = 1e-9  # m; the part stands still
+    """The difference of each displacement to the one ``count`` periods later, relative to the
+    largest in the second half of the run."""
+    least = 1e-9  # m; below it the part stands still
     return np.abs(way[count:] - way[:-count]) / max(np.abs(way[len(way) // 2 :]).max(), least)
 
 
 def _steps(scene: Scene, longer: float) -> Scene | None:
-    """The scene with steps so many times as long; None where no such run would tell anything."""
+    """The scene with steps ``longer`` times as long; None where such a run shows no error."""
     if scene.surface_is_given:
         return None  # its motion is exact
     if not scene.rung.ngspice:
@@ -277,15 +286,15 @@ def _steps(scene: Scene, longer: float) -> Scene | None:
 
 
 def _longer(scene: Scene, longer: float) -> Scene:
-    """With as much shorter ones where longer ones would be beyond what a scene may have: two runs
-    with the longest steps err alike."""
+    """The scene with steps ``longer`` times as long, or as short where a scene does not allow such
+    long ones: a run at the limit would err like the scene itself."""
     circuit = scene.circuit
     tables = {
         "circuit": {"reltol": circuit.reltol * longer**3, "max_step": circuit.max_step * longer},
         "coupling": {"macro_step": scene.coupling.macro_step * longer},
     }
-    every = ((KEYS[f"{table}.{name}"], x) for table in tables for name, x in tables[table].items())
-    if longer > 1.0 and not all(key.holds(x) for key, x in every):
+    pairs = ((KEYS[f"{table}.{name}"], x) for table in tables for name, x in tables[table].items())
+    if longer > 1.0 and not all(key.holds(x) for key, x in pairs):
         return _longer(scene, 1.0 / longer)
     return scene.having(**tables)
 
@@ -295,7 +304,7 @@ def _looser(scene: Scene) -> Scene:
 
 
 def _started(scene: Scene, ahead: float) -> Scene | None:
-    """The scene with its drive switched on so much of a period later in its course."""
+    """The scene with its drive's start phase shifted by the share ``ahead`` of a period."""
     try:
         return changed(scene, {"drive.start_phase": (scene.drive.start_phase + ahead) % 1.0}, "it")
     except BadInput:

@@ -1,17 +1,16 @@
-"""``circuit.model = "auto"``: the cheapest circuit that a scene can do with.
+"""``circuit.model = "auto"``: the cheapest circuit (rung) that is accurate enough for a scene.
 
-``choice.csv``, as ``benchmarks.choice`` has measured it, tells what to expect: where "limited" is
-mostly further off than the tolerance, nothing is tried. Else the scene itself decides.
+``choice.csv``, measured by ``benchmarks.choice``, has the errors to be expected: if the median
+error of "limited" exceeds the tolerance, nothing is tried. Else the scene itself decides.
 
-The rungs without ngspice run the whole scene; the behavioural amplifier, which they simplify, runs
-only the first part of it, beside the rung "limited". What separates "limited" from the amplifier is
-small and always there, so a part shows it; what separates "ideal" from "limited" shows in the whole
-runs. "limited" leaves out the amplifier's ringing: its loop has a phase margin of a few degrees, so
-each return from a limit is followed by some 0.2 ms of ringing, which matters where a slip begins or
-ends in it and nowhere else. Whether it does is seen in the trial alone, roughly: its difference
-counts MARGIN times. What the rungs differ in acts on the current: where a ten-thousandth more or
-less of it moves v_average much, the motion being chaotic or near another one, no simpler rung can
-be relied on.
+Rungs without ngspice run the whole scene; the behavioural amplifier, which they simplify, runs only
+the first part of it (the trial), and so does "limited" for comparison. The difference between these
+two is small but always present, so a part shows it; the difference between "ideal" and "limited" is
+taken from the whole runs. "limited" lacks the amplifier's ringing: its loop has a phase margin of a
+few degrees, so each return from a limit is followed by some 0.2 ms of ringing, which matters only
+if a slip begins or ends within it. The trial shows this only roughly, so its difference counts
+MARGIN times. All rungs differ in the current: where 0.01 % more or less force moves v_average much,
+the motion being chaotic or near another motion, no simpler rung can be relied on.
 """
 
 import csv
@@ -31,17 +30,17 @@ from cosim.waveforms.quantities import percent
 from cosim.waveforms.result import Result
 
 PART = 0.25
-"""Share of the run that the amplifier is tried for; averages leave out its first half."""
+"""Length of the trial, as a share of the run; averages leave out its first half."""
 
 FEWEST_PERIODS = 4
-"""That the trial averages over."""
+"""Least number of periods over which the trial averages."""
 
 MARGIN = 2.0
-"""By how much the whole run may differ more than the trial."""
+"""Factor by which the whole run may differ more than the trial."""
 
 TREMBLE = 1e-4
-"""Relative perturbation of the coil's force in the test of sensitivity: regular motion answers with
-no more than its like."""
+"""Relative perturbation of the coil's force in the test of sensitivity; v_average of regular motion
+changes by about as much."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ def expected() -> dict[str, dict[str, str]]:
 
 
 def advice(model: str) -> str:
-    """What the table tells of a rung, in words."""
+    """The errors of a rung in ``choice.csv``, in words."""
     row = expected()[model]
     half, most = (
         " and ".join(
@@ -76,7 +75,8 @@ def advice(model: str) -> str:
 def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
     """The cheapest rung of a scene whose v_average is within ``run.tolerance`` of the amplifier's.
 
-    ``run`` runs a scene with ngspice; the others are run at once. Raises what a run raises.
+    ``run`` runs a scene with ngspice; runs of the other rungs are parallel. Raises what a run
+    raises.
     """
     tolerance = Fidelity.of(scene).tolerance
     mostly = float(expected()[SEARCHES][f"against {JUDGES}: median [%]"]) / 100.0
@@ -112,7 +112,7 @@ def choose(scene: Scene, run: Callable[[Scene], Result]) -> Choice:
 
 
 def _v_averages(scene: Scene, settings: Sequence[Mapping[str, float | str]]) -> list[float]:
-    """Of a scene without ngspice with each of some settings, m/s."""
+    """v_average (m/s) of a scene without ngspice with each of ``settings``, in parallel."""
     scenes = [partial(changed, scene, values, "auto") for values in settings]
     with ThreadPoolExecutor(processors()) as threads:
         found = threads.map(lambda make: one_run(make(), lambda _: None, alone=True), scenes)
@@ -120,7 +120,7 @@ def _v_averages(scene: Scene, settings: Sequence[Mapping[str, float | str]]) -> 
 
 
 def _part(scene: Scene) -> dict[str, float | str]:
-    """Settings for the first whole periods of a run alone."""
+    """Settings that shorten a run to the whole periods of the trial; none if it is as short."""
     length = scene.period
     count = max(FEWEST_PERIODS, round(0.5 * PART * scene.run.duration / length))
     if 2 * count * length >= scene.run.duration:

@@ -1,11 +1,11 @@
 """``coupling.method = "auto"``: the cheapest method and steps that keep a scene's tolerance.
 
-The error of a run is the greatest over time of the part's height, in units of its range. Runs of
-the whole scene become finer until one differs from the next but one by no more than
-``coupling.tolerance``; that difference is its error, measured and not guessed. (The very next would
-not do: where both are limited alike, by their tolerance or by their longest step, they err alike.)
-Then macro steps are tried with the same steps of ngspice, and kept where they are clearly cheaper
-and meet the tolerance too.
+The error of a run is the greatest error of the part's height over time, over the height's range.
+The whole scene is run with finer and finer LEVELS until a run differs from that two levels finer by
+at most ``coupling.tolerance``; this difference is the run's error. (One level finer is not enough:
+two neighbours may share the tolerance or the longest step that limits them, and so their error.)
+Then macro steps are tried at the same level, and taken if they are clearly cheaper and meet the
+tolerance, too.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ LEVELS = (
 )
 """circuit.reltol and circuit.max_step (s), from coarse to fine."""
 
-_APART = 2  # levels between a run and the one that judges it
+_APART = 2  # levels between a run and the finer one that shows its error
 
 OTHERS: tuple[dict[str, Any], ...] = (
     {"method": "mean-current", "macro_step": 1e-3},
@@ -45,9 +45,8 @@ CLEARLY = 0.8
 def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> Result:
     """The cheapest run that meets ``coupling.tolerance``, with the scene as it was then run.
 
-    Its summary also has ``error_estimate`` and ``coupling_taken``, and as ``wall_time``
-    that of all runs, s. ``run`` runs a scene. Raises SimulationFailed where no level meets the
-    tolerance.
+    Its summary also has ``error_estimate`` and ``coupling_taken``; its ``wall_time`` (s) is that of
+    all runs. ``run`` runs a scene. Raises SimulationFailed where no level meets the tolerance.
     """
     seconds = 0.0
 
@@ -81,7 +80,7 @@ def simulate_within_tolerance(scene: Scene, run: Callable[[Scene], Result]) -> R
 def _meeting(
     tolerance: float, run: Callable[..., Result]
 ) -> tuple[tuple[float, float], Result, Result]:
-    """The first level that meets the tolerance, its result and that of the next but one."""
+    """The first level that meets the tolerance, its result, and the result two levels finer."""
     done: list[tuple[tuple[float, float], Result]] = []
     reached, failure = float("inf"), None
     for level in LEVELS:
@@ -107,7 +106,7 @@ def _meeting(
 
 
 def difference(result: Result, truth: Result) -> float:
-    """Greatest over time of the part's height, in units of the range of ``truth``."""
+    """Greatest difference of the part's height over time, over the range of ``truth``."""
     path, true = result.columns["z_part"], truth.columns["z_part"]
     off, span = float(np.abs(path - true).max()), float(np.ptp(true))
     return off / span if span else (0.0 if off == 0.0 else np.inf)

@@ -1,6 +1,6 @@
-"""Runs a scene where it may run: in a worker process behind a fence if ngspice has a part in it.
+"""Runs a scene in this process, or, if it needs ngspice, in a worker process behind a fence.
 
-What only the worker needs is not imported here, since it takes a while.
+Modules that only the worker needs are imported there, since their import takes a while.
 """
 
 from collections.abc import Iterator, Mapping
@@ -21,8 +21,8 @@ from cosim.waveforms.result import Result
 
 
 def one_run(scene: Scene, progress: Progress, alone: bool = False) -> Result:
-    """What :func:`cosim.simulation.here.simulate_here` gives, from where it may run. Raises also
-    SimulationFailed where the process dies or hangs."""
+    """The result of :func:`cosim.simulation.here.simulate_here`, in this process or a worker.
+    Raises SimulationFailed also where the worker dies or hangs."""
     if in_a_worker() or not scene.rung.ngspice:
         from cosim.simulation.here import simulate_here
 
@@ -48,8 +48,8 @@ def one_run(scene: Scene, progress: Progress, alone: bool = False) -> Result:
 
 @contextmanager
 def on_disk_in(folder: Path) -> Iterator[None]:
-    """What :func:`cosim.files.spill.on_disk_in` does, for runs in workers too, whose folders are
-    gone at its end."""
+    """As :func:`cosim.files.spill.on_disk_in`, also for runs in workers, which are ended with
+    it."""
     with spill.on_disk_in(folder):
         try:
             yield
@@ -58,8 +58,8 @@ def on_disk_in(folder: Path) -> Iterator[None]:
 
 
 def bounds(scene: Scene) -> Bounds:
-    """Of a worker for the scene, and for others with the same files. Raises BadInput where ngspice
-    is missing."""
+    """The files that a worker for the scene may read, and its libraries; scenes with the same files
+    can share a worker. Raises BadInput where ngspice is missing."""
     files = scene.files
     netlist = files.pop("netlist", None)
     circuit = named(Path(netlist)) if netlist else [circuits()]
@@ -68,12 +68,13 @@ def bounds(scene: Scene) -> Bounds:
 
 
 def _is_meant(path: str) -> bool:
-    """A file, or the folder of an FMU: what lies below another is nobody's business."""
+    """Whether a path is a file or the folder of an FMU; other folders must not be readable."""
     return Path(path).is_file() or Path(path, "modelDescription.xml").is_file()
 
 
 def _load() -> None:
-    """Load what the run will: ngspice looks up whose process this is, which the fence forbids."""
+    """Load libraries before the fence closes: ngspice looks up the process's user, which the fence
+    forbids."""
     from cosim.circuit import false_cycles  # noqa: F401
     from cosim.coupling.loop.lead import engine
     from cosim.simulation import here  # noqa: F401

@@ -1,8 +1,8 @@
-"""``run.solver = "fast"``: scenes in fixed steps, as many side by side as the processor has lanes.
+"""``run.solver = "fast"``: scenes in fixed steps, LANES of them side by side (SIMD).
 
-The stepper of ``cosim/stepper`` solves source, coil and mechanics in steps of ``run.step``; the FMU
-finds each event. Forces and accelerations are means over a step, so a peak within an impact, the
-number of impacts and that of slips are not known.
+The stepper of ``cosim/stepper`` solves source, coil and mechanics in steps of ``run.step``, without
+locating events as the FMU does. Forces and accelerations are means over a step: the peak of an
+impact and the numbers of impacts and slips are unknown.
 """
 
 import math
@@ -34,16 +34,16 @@ from cosim.waveforms.columns import COLUMNS
 from cosim.waveforms.result import Result
 
 AT_ONCE = 1 << 16
-"""Steps between two looks at what Python has to do, some ten milliseconds."""
+"""Steps of the compiled loop between two returns to Python, some 10 ms."""
 
 LOST = (
     "The motion left the numbers: run.step is too long for this machine; take a shorter one, or "
     'run.solver = "fmu".'
 )
-"""Of a scene whose v_average is not finite."""
+"""The failure of a scene whose v_average is not finite."""
 
 UNLIMITED = 1e9
-"""V and A: the limits of a source that has none."""
+"""V and A, for a source without limits."""
 
 _COLUMNS = tuple(name for name in COLUMNS if name not in ("time", "command"))[:12]
 _SUMS = (
@@ -51,7 +51,7 @@ _SUMS = (
     *("v_max", "v_min", "z_max", "z_min", "i_max", "i_min"),
     *("coil", "copper", "friction", "impact", "damping"),
 )
-"""As ``Sums`` of ``lanes.h`` has them."""
+"""Rows of ``Kept.sums``, in the order of ``Sums`` in ``lanes.h``."""
 
 
 _Kept, _Stretch, _Drive = (structures("stepper")[name] for name in ("Kept", "Stretch", "Drive"))
@@ -60,7 +60,7 @@ _Kept, _Stretch, _Drive = (structures("stepper")[name] for name in ("Kept", "Str
 def simulate_fast(scene: Scene, progress: Progress) -> Result:
     """The run of a scene, with its rows. Raises SimulationFailed.
 
-    ``v_average_error`` is how far v_average is from that of steps half as long.
+    ``v_average_error`` is the difference of v_average to a run with steps half as long.
     """
     began = time.perf_counter()
     summary = summary_fast(scene, progress)
@@ -82,9 +82,10 @@ def summary_fast(scene: Scene, progress: Progress = lambda _: None) -> dict[str,
 def summaries(
     scenes: Sequence[Scene], share: float = 1.0, progress: Progress = lambda _: None
 ) -> list[dict[str, Any]]:
-    """The summaries of scenes, without notes, LANES of them side by side, in steps of this share of
-    ``run.step``; v_average is not finite where the motion left the numbers."""
+    """The summaries of scenes, without notes, LANES of them side by side, in steps of ``share``
+    times ``run.step``; v_average is not finite where the motion overflowed."""
     found: list[dict[str, Any]] = [{}] * len(scenes)
+    # Lanes share the step and the camera's instants; like durations keep all lanes busy.
     alike: dict[tuple[float, float], list[int]] = {}
     for place, scene in enumerate(scenes):
         alike.setdefault((scene.run.step, scene.run.shutter), []).append(place)
@@ -92,38 +93,42 @@ def summaries(
         all_places.sort(key=lambda k: scenes[k].run.duration)
         for first in range(0, len(all_places), LANES):
             places = all_places[first : first + LANES]
-            told = _batch([scenes[k] for k in places], share * step, progress)
-            for place, one in zip(places, told, strict=True):
-                found[place] = one
+            batch = _batch([scenes[k] for k in places], share * step, progress)
+            for place, summary in zip(places, batch, strict=True):
+                found[place] = summary
     return found
 
 
 def _batch(scenes: Sequence[Scene], step: float, progress: Progress) -> list[dict[str, Any]]:
+    """The summaries of at most LANES scenes with one step and one shutter. The surface's height is
+    read at the instants of the camera's frames piece by piece; ``left`` (instants × lanes) and
+    ``at`` (instants) hold those that the next frames' accelerations still need."""
     began, runs = time.perf_counter(), _Runs(scenes, step)
     settle, until, n = runs.settle, runs.until, len(scenes)
     exposure = scenes[0].run.shutter / FRAME_RATE
     each = instants_a_frame(exposure)
     instants = exposures(until.max(), settle.min(), scenes[0].run.shutter)
     left, at = np.empty((0, LANES)), np.empty(0)
-    seen = np.full((2, n), -np.inf)  # largest acceleration, and largest against it
+    seen = np.full((2, n), -np.inf)  # by scene: largest acceleration upwards, and downwards
     for times, heights in runs.go(lambda low, high: instants[_between(instants, low, high)]):
         left, at = np.concatenate([left, heights]), np.concatenate([at, times])
         whole = len(at) // each * each
         frames = at[:whole].reshape(-1, each).mean(axis=1)[:, np.newaxis]
-        # The first and last two frames have no acceleration: those of a run, and of what is left.
+        # An acceleration is a five-point difference: the two frames before and after must lie after
+        # settling and before the end, and within what is left here.
         lost = exposure / 2.0 + 2.0 / FRAME_RATE - 1e-9
         counts = (frames - lost >= settle) & (frames + lost <= until)
         read = accelerations(shown(left[:whole, :n], exposure))[2:-2]
         for row, side in zip(seen, (read, -read), strict=True):
             most = np.where(counts[2:-2], side, -np.inf).max(axis=0, initial=-np.inf)
             np.maximum(row, most, out=row)
-        kept = max(0, whole - 4 * each)
-        left, at = left[kept:], at[kept:]
+        first = max(0, whole - 4 * each)
+        left, at = left[first:], at[first:]
         progress(min(runs.reached, float(until.max())))
-    told = time.perf_counter() - began
+    took = time.perf_counter() - began
     sums = dict(zip(_SUMS, runs.sums, strict=True))
     return [
-        _numbers(scene, {name: row[k] for name, row in sums.items()}, seen[:, k].tolist(), told / n)
+        _numbers(scene, {name: row[k] for name, row in sums.items()}, seen[:, k].tolist(), took / n)
         for k, scene in enumerate(scenes)
     ]
 
@@ -131,12 +136,13 @@ def _batch(scenes: Sequence[Scene], step: float, progress: Progress) -> list[dic
 def _numbers(
     scene: Scene, sums: dict[str, float], seen: Sequence[float], wall_time: float
 ) -> dict[str, Any]:
+    """The summary of a scene from its lane's ``sums`` and the camera's largest accelerations."""
     run, coils = scene.run, scene.coil.count
     span, length = run.duration - run.settle, scene.period
     whole = all(map(math.isfinite, sums.values()))
     v_average = (sums["x_end"] - sums["x_settle"]) / span if whole else math.nan
     limits = ("swing_high", "swing_low", "current_limit") if scene.rung.has_limits else ()
-    # Rounding leaves something where a limit is touched.
+    # A limit that is only touched leaves a share of rounding errors, which becomes 0.
     share = {name: part if (part := sums[name] / span) > 1e-9 else 0.0 for name in limits}
     held = 0.5 * scene.coil.inductance * sums["i_end"] ** 2
     lost = {name: coils * sums[name] for name in ("copper", "friction", "impact", "damping")}
@@ -165,6 +171,7 @@ def _numbers(
 
 
 def _waveforms(scene: Scene, progress: Progress) -> dict[str, Array]:
+    """The waveforms of a scene by a run of its own, in lane 0."""
     step, runs = scene.run.output_step, _Runs([scene], scene.run.step)
     total = count(step, scene.run.duration)
     rows, at = Tape(len(_COLUMNS), total), Tape(1, total)
@@ -183,7 +190,8 @@ def _waveforms(scene: Scene, progress: Progress) -> dict[str, Array]:
 
 
 class _Runs:
-    """At most LANES scenes at time 0, at rest, in steps of ``step`` (s)."""
+    """Runs of at most LANES scenes, in steps of ``step`` (s), from rest at time 0. Arrays for
+    compiled code have the lane as their last index; free lanes repeat the last scene."""
 
     def __init__(self, scenes: Sequence[Scene], step: float) -> None:
         filled = [*scenes, *[scenes[-1]] * (LANES - len(scenes))]
@@ -191,28 +199,29 @@ class _Runs:
         self._parameters = np.array([_row(scene) for scene in filled]).T.copy()
         self._span = np.array([(scene.run.settle, scene.run.duration) for scene in filled]).T.copy()
         self.settle, self.until = self._span[:, : len(scenes)]
-        """When settling and the runs end, s."""
-        self._lines = [_lines(scene) for scene in filled]  # which the drives point into
+        """End of settling and of the run of each scene, s."""
+        self._lines = [_lines(scene) for scene in filled]  # kept alive: the drives point into them
         self._drives = (_Drive * LANES)(
             *((lines.shape[1], *(row.ctypes.data for row in lines)) for lines in self._lines)
         )
         self._row_step = scenes[0].run.output_step
         self.reached = 0.0
-        """s."""
+        """Time that the runs have reached, s."""
         library("stepper").stepper_begin(
             self._parameters.ctypes.data, self._drives, step, byref(self._kept)
         )
 
     @property
     def sums(self) -> list[list[float]]:
-        """The values of _SUMS (rows) in each lane."""
+        """The values of _SUMS (rows) in each lane (columns)."""
         return np.ctypeslib.as_array(self._kept.sums).tolist()
 
     def go(
         self, when: Callable[[float, float], Array], rows: bool = False
     ) -> Iterator[tuple[Array, Array]]:
-        """Step all runs to their ends; the times (s) that ``when`` gives within each piece, and the
-        heights of the surface then (a column for each lane), or rows of the first scene."""
+        """Step all runs to their ends in pieces. For each piece yields the times (s) that ``when``
+        gives between its begin and end (s), and the surface's heights at these times (times ×
+        lanes), or with ``rows`` the rows of the first scene (times × _COLUMNS)."""
         steps = int(np.ceil(self._span[1].max() / self._step)) + 1
         at_once = AT_ONCE
         if rows:
@@ -234,13 +243,13 @@ class _Runs:
 
 
 def _between(times: Array, low: float, high: float) -> slice:
-    """Those after ``low`` until ``high``; at 0, too."""
+    """The times after ``low`` up to ``high``; with ``low`` = 0 also a time of 0."""
     ends = times.searchsorted((low, high), "right")
     return slice(ends[0] if low else 0, ends[1])
 
 
 def known_numbers(scene: Scene) -> dict[str, float]:
-    """The FMU's variables of a scene, with the limits of a source that has none."""
+    """The FMU's variables of a scene; UNLIMITED for the limits of a source without any."""
     reals, integers = parameters(scene)
     return {"output_high": UNLIMITED, "output_low": -UNLIMITED} | reals | integers
 
@@ -251,8 +260,9 @@ def _row(scene: Scene) -> list[float]:
     drive, coils = scene.drive, scene.coil.count
     found = numbers(known)
     found["part_mass"] /= scene.mechanics.n_surfaces
-    found["sense_resistance"] *= coils  # of the current of all coils
+    found["sense_resistance"] *= coils  # it carries the current of all coils
     found["current_limit"] = found["current_limit"] / coils if scene.rung.has_limits else UNLIMITED
+    # The stepper's phase is that at time 0, a scene's that at the drive's start.
     phase = drive.start_phase - drive.frequency * drive.start_time
     found |= {"frequency": drive.frequency, "phase": phase, "start": drive.start_time}
     if lift := scene.mechanics.initial_lift:
@@ -262,12 +272,12 @@ def _row(scene: Scene) -> list[float]:
 
 
 _LINES_OF_SINE = 1024
-"""Most straight lines that a period of a sine becomes: each lasts two steps at least."""
+"""Most straight lines for a period of a sine; each lasts two steps at least."""
 
 
 def _lines(scene: Scene) -> Array:
-    """A period of the scene's command as straight lines: where each begins, as a share of the
-    period, and V1 (V) where it begins and ends. Lines of less than half a step become jumps."""
+    """A period of the scene's command as straight lines (3 × lines): the begin of each as a share
+    of the period, and V1 (V) at its begin and end. Lines shorter than half a step become jumps."""
     made, step = shape(scene), scene.run.step
     chords = max(8, min(_LINES_OF_SINE, int(made.period / step / 2.0)))
     times, first, last = next(straights([made], made.period, chords))

@@ -1,4 +1,5 @@
-"""The one policy of fidelity: a simple circuit model searches, a more complete one judges."""
+"""The policy of fidelity: searches use a simple circuit model, a more complete one judges
+results."""
 
 from dataclasses import dataclass
 
@@ -6,18 +7,18 @@ from cosim.errors import BadInput
 from cosim.scene import Scene, changed
 
 SEARCHES, JUDGES, COMPLETE = "limited", "amplifier", "full"
-"""The model that searches, with the mechanics and without ngspice; the one that judges it; and the
-one that judges where the current limit acts, which the amplifier does not have."""
+"""The model for searches, which needs no ngspice; the model that judges its results; and the model
+that judges where the current limit acts, which the amplifier lacks."""
 
 AT_LIMIT = 0.999
-"""Of the current limit: where the current reaches so far, it acts."""
+"""Share of the current limit from which on the limit counts as acting."""
 
 LEAST = 1e-4
-"""SI: errors are relative to no less than this; it is meant for mean velocities, m/s."""
+"""Least reference of a relative error, SI; meant for mean velocities, m/s."""
 
 
 def relative_error(value: float, reference: float) -> float:
-    """Of a number relative to ``reference``, or to LEAST."""
+    """The error of a number relative to ``reference``, or to LEAST if that is larger."""
     return abs(value - reference) / max(abs(reference), LEAST)
 
 
@@ -26,10 +27,9 @@ class Fidelity:
     """Which circuit models search and judge a scene, and how near they must agree."""
 
     tolerance: float
-    """Relative difference up to which the judge confirms."""
+    """Relative difference up to which the judging model confirms a value."""
     simple: dict[str, str | bool] | None
-    """What makes the scene one that ngspice need not run; None where it does not anyway, or where
-    it must."""
+    """Settings with which the scene needs no ngspice; None if it needs none anyway, or always."""
 
     @classmethod
     def of(cls, scene: Scene) -> "Fidelity":
@@ -44,11 +44,11 @@ class Fidelity:
         return cls(scene.run.tolerance, simple)
 
     def agrees(self, value: float | None, judged: float | None) -> bool:
-        """Whether a value is near enough to that of the judge; none is near to nothing."""
+        """Whether a value is within the tolerance of the judging model's; False if one is None."""
         if value is None or judged is None:
             return False
         return relative_error(value, judged) <= self.tolerance
 
     def judge(self, current: float, limit: float) -> str:
-        """The model that judges a run whose current reached ``current``, A, of ``limit``."""
+        """The model that judges a run with the largest current ``current`` and a ``limit``, A."""
         return COMPLETE if current > AT_LIMIT * limit else JUDGES

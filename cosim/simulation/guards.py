@@ -1,6 +1,6 @@
-"""Where a scene or its run leaves the physics that the model holds for: one sentence each.
+"""Notes where a scene or its run leaves the range in which the model's physics is valid.
 
-Only what is published or follows from the model's own laws has a limit here.
+Only limits that are published or follow from the model's own laws are checked.
 """
 
 from collections.abc import Iterator, Mapping
@@ -34,11 +34,11 @@ def remarks(
     summary: Mapping[str, Any],
     force: NormalForce | None = None,
 ) -> dict[str, Any]:
-    """``notes``: a sentence for each limit that scene or run leave: quantity, value, limit.
-    ``rests``: the places (q, m) at which a free ram rests without a current.
+    """``notes``: a sentence for each limit that scene or run exceed: quantity, value, limit.
+    ``rests``: the positions (q, m) at which a free ram rests without a current.
 
     ``columns`` are the run's waveforms, ``summary`` its numbers, SI, and ``force`` the normal force
-    where it changes in time. What moves is judged by the rows of the waveforms.
+    where it changes in time. Motion is judged by the rows of the waveforms.
     """
     found = [*_grip(scene, force), *_supply(scene)]
     if scene.rung.driven:
@@ -122,7 +122,7 @@ def _coil(scene: Scene, summary: Mapping[str, Any]) -> Iterator[str]:
 def _ram(scene: Scene, columns: Mapping[str, Array], surface: str) -> Iterator[str]:
     mechanics, coil = scene.mechanics, scene.coil
     body = columns[f"z_surface{surface}"]
-    # In direct drive the reaction body stands where the surface is at rest.
+    # In direct drive the reaction body is fixed at the surface's position of rest.
     ram = columns.get(f"z_ram{surface}")
     low, high = _range(body, ram, body[0] - mechanics.initial_lift)
     moving = "surface" if ram is None else "second ram" if surface else "ram"
@@ -136,7 +136,7 @@ def _ram(scene: Scene, columns: Mapping[str, Array], surface: str) -> Iterator[s
     if not scene.rung.driven:
         return
     places = [low, high]
-    if coil.b2:
+    if coil.b2:  # the extremum of the parabola Bl(q), if it is reached
         places += [q for q in [-coil.b1 / (2.0 * coil.b2)] if low < q < high]
     shape, q = min((1.0 + coil.b1 * q + coil.b2 * q**2, q) for q in places)
     if shape <= 0.0:
@@ -160,7 +160,7 @@ def _part(scene: Scene, columns: Mapping[str, Array]) -> Iterator[str]:
 
 
 def _range(below: Array, above: Array | None, still: float) -> tuple[float, float]:
-    """Least and greatest of ``above - below``; where None is above, that is ``still``."""
+    """Least and greatest of ``above - below``; ``still`` stands for ``above`` if that is None."""
     low, high = float("inf"), -float("inf")
     for part in blocks(len(below)):
         apart = (still if above is None else above[part]) - below[part]

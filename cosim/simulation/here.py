@@ -1,4 +1,4 @@
-"""Runs a scene in this process: gives the mechanics to its rung and gathers the result."""
+"""Runs a scene in this process: its rung drives the mechanics, and the result is gathered."""
 
 import time
 from contextlib import closing
@@ -19,11 +19,11 @@ from cosim.waveforms.columns import COLUMNS, UNITS
 from cosim.waveforms.result import Result
 
 _MORE = 100.0
-"""Times ``circuit.reltol``, for a netlist that ngspice cannot run with less."""
+"""Factor on ``circuit.reltol`` for a netlist that ngspice cannot run with the scene's own."""
 
 
 def simulate_here(scene: Scene, progress: Progress, alone: bool = False) -> Result:
-    """The run of a scene whose circuit and coupling are chosen; ``alone``: its summary alone,
+    """The run of a scene without "auto" in circuit or coupling; with ``alone`` only its summary,
     without waveforms and notes. Raises as :func:`cosim.simulation.simulate.simulate` does."""
     try:
         return _simulated(scene, progress, alone)
@@ -80,7 +80,7 @@ def _simulated(scene: Scene, progress: Progress, alone: bool) -> Result:
 
 
 def few_rows(scene: Scene) -> Scene:
-    """The scene with as few rows as its summary needs."""
+    """The scene with only as many rows as its summary needs."""
     return scene.having(run={"output_step": scene.run.duration / 2.0})
 
 

@@ -1,4 +1,4 @@
-"""Runs a scene where it is to run, once its circuit and its coupling are chosen."""
+"""Runs a scene: chooses circuit and coupling where they are "auto", and adds the checks."""
 
 import os
 import time
@@ -99,7 +99,7 @@ def summary(scene: Scene, progress: Progress = lambda _: None) -> dict[str, Any]
 
 
 def _cheapest(scene: Scene, run: Callable[[Scene], Result]) -> Result:
-    """The run of the cheapest rung that suffices; what it took to find it is part of its time."""
+    """The run with the cheapest rung that suffices; ``wall_time`` includes the choice."""
     from cosim.simulation.choose_rung import advice, choose
 
     began = time.perf_counter()

@@ -1,4 +1,4 @@
-"""The numbers of a run: what ``summary.json`` holds and the table that is printed."""
+"""The numbers of a run, for ``summary.json`` and the printed table."""
 
 import math
 import time
@@ -18,22 +18,22 @@ from cosim.toolchain.versions import versions
 from cosim.trials.camera import FRAME_RATE, accelerations, instants_a_frame, shown
 
 _RESOLVED = 1e-15
-"""J: below this the account of a rig at rest is what the solver's tolerances leave."""
+"""J: smaller energies of a rig at rest are errors within the solver's tolerances."""
 
 
 def numbers(
     scene: Scene, motion: Motion, driven: Driven, steps: int, began: float
 ) -> dict[str, Any]:
-    """The summary but for its notes: averages, extremes and counts after ``run.settle``; energies
-    over the whole run. SI. ``steps`` are those of the FMU; the run began at ``began`` on the clock.
+    """The summary without notes: averages, extremes and counts after ``run.settle``; energies over
+    the whole run. SI. ``steps`` are those of the FMU; the run began at ``began`` on the clock.
 
-    Where two surfaces move by themselves, extremes and limits are those of the first, counts and
+    Where two surfaces move independently, extremes and limits are those of the first, counts and
     energies those of both.
 
     Where the surface's velocity jumps, by a rigid impact or as it is given, ``a_surface_max`` and
-    ``a_surface_min`` are None. The camera's reading is of the true surface while each frame is
-    exposed, through Tracker's five-point differences. ``at_wall`` is 1 where the ram touches a wall
-    in the last row: with no ``impacts`` besides, it tells a ram that rests there from a free one.
+    ``a_surface_min`` are None. The camera reads the true surface's height while each frame is
+    exposed; accelerations are Tracker's five-point differences of these. ``at_wall`` is 1 if the
+    ram touches a wall in the last row; without ``impacts`` it then rests there.
     """
     run, totals, before, extremes = scene.run, motion.totals, motion.at_settle, motion.extremes
     electric = driven.electric
@@ -89,9 +89,9 @@ def budget(scene: Scene) -> dict[str, tuple[float, float]]:
 
 
 def slips(scene: Scene, read: Mapping[str, Any]) -> dict[str, Any]:
-    """Beyond which accelerations of the surface a part that sticks to it slips, m/s², as the part
-    goes up or down, and which a run with these numbers reached: by the camera's reading, a mean,
-    and by instants where these are known. Nothing where the normal force changes in time."""
+    """The accelerations of the surface, m/s², beyond which a sticking part slips while it moves up
+    or down, and which of them the run exceeded: by its instantaneous accelerations, if known, and
+    by the camera's, which are means. Empty where the normal force changes in time."""
     if scene.friction.normal_force_file is not None:
         return {}
     # By way of the part: the surface's accelerations, downwards and upwards, at which it slips.
@@ -102,7 +102,7 @@ def slips(scene: Scene, read: Mapping[str, Any]) -> dict[str, Any]:
         if low is None or high is None:
             continue
         found[f"slip_by_{by[2:]}"] = {
-            way: [what for what, there in (("fall", low < fall), ("rise", high > rise)) if there]
+            way: [what for what, over in (("fall", low < fall), ("rise", high > rise)) if over]
             for way, (fall, rise) in ways.items()
         }
     return found
@@ -111,8 +111,8 @@ def slips(scene: Scene, read: Mapping[str, Any]) -> dict[str, Any]:
 def _seen(
     heights: npt.NDArray[np.float64], exposure: float
 ) -> tuple[float, float] | tuple[None, None]:
-    """The largest and smallest acceleration (m/s²) that a camera reads from heights (m) at the
-    instants of its frames.
+    """The largest and smallest acceleration (m/s²) that a camera reads from ``heights`` (m) at the
+    instants of its frames, n for each frame; None for fewer than five frames.
     """
     n, most, least = instants_a_frame(exposure), -np.inf, np.inf
     frames = len(heights) // n
@@ -125,7 +125,8 @@ def _seen(
 def _energies(
     scene: Scene, totals: Mapping[str, float], electric: Electrics | None
 ) -> dict[str, float]:
-    """The account of the whole run, J, of all ``coil.count`` actuators."""
+    """The energy balance of the whole run, J, of all ``coil.count`` actuators; its residual is over
+    the largest energy involved."""
     count = scene.coil.count
     lost = {
         f"energy_{kind}": count * totals[f"energy_{kind}"]
@@ -137,7 +138,7 @@ def _energies(
         energy_in, copper = electric.energy_in, electric.energy_copper
         stored += electric.energy_magnetic
     missing = energy_in - copper - sum(lost.values()) - stored
-    # What a part that falls has lost in height it has won in speed: the sum is rounding.
+    # A falling part turns height into speed: their sum is a small difference of large numbers.
     fallen = count * scene.mechanics.part_mass * scene.mechanics.gravity * abs(totals["z_part"])
     moved = max(abs(energy_in), copper + sum(lost.values()), abs(stored), fallen)
     scale = max(moved, _hanging(scene), _RESOLVED)
@@ -151,7 +152,8 @@ def _energies(
 
 
 def _hanging(scene: Scene) -> float:
-    """In the flexures from the start, J: what a scene without a drive is measured against."""
+    """Energy in the flexures at the start, J: the scale of the balance of a scene without a
+    drive."""
     if scene.surface_is_given:
         return 0.0
     mechanics = scene.mechanics
@@ -162,7 +164,7 @@ def _hanging(scene: Scene) -> float:
 
 
 def motion(scene: Scene, recorder: Recorder) -> Motion:
-    """What surface and part did, at the end of a run."""
+    """The motion of surface and part, at the end of a run."""
     ram = None
     if scene.mechanics.free_ram:
         last = dict(zip(recorder.mechanics.columns, recorder.rows[-1].tolist(), strict=True))
