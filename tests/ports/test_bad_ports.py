@@ -42,11 +42,6 @@ WRONG = {
     "no such current": ('"i(Vemf)"', '"i(Rlost)"', r"bridge\.cir: .*no element of two ends rlost"),
     "a command as probe": ('"v(gp)"', '"v(gp)\\n.control"', r"cannot stand in a netlist"),
     "a parameter": ("J = 2e-4", "K = 2e-4", r"Rotor\.fmu: .*parameters K = 0\.0002"),
-    "a value of an input with a port": (
-        "J = 2e-4",
-        "u = 1.0",
-        r"a \[\[port\]\] leads to this input",
-    ),
     "a parameter's type": ("J = 2e-4", 'J = "x"', r"Rotor\.fmu: .*must be a number"),
     "a .param": ("max_step", "param = { R9 = 1.0 }\nmax_step", r"bridge\.cir: circuit\.param\.R9"),
     "a line": ('to = "rotor.u"', 'to = "rotor.u"\nfeed = "line"', r"canInterpolateInputs"),

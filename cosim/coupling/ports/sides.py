@@ -59,8 +59,6 @@ class Side:
         for other in self.inputs:
             if into is not other and into.one == other.one:
                 raise self.of.bad(f"{into.name} and {other.name} are one input, and have two ports")
-        if into.name in self._parameters:
-            raise self.of.bad(f"[[fmu]] parameters {into.name}: a [[port]] leads to this input")
         if into not in self.inputs:
             self.inputs.append(into)
         self._feeds.append((into, place, feed))
