@@ -192,18 +192,20 @@ RLoad p 0 1k
 V3 low 0 0.2
 R3 low N/C_01 1k
 B1 high 0 V={if(V(low),5,unit)}
+B2 both 0 V=5*(V(high)&V(low)) + (V(low) | V(high)) + 10*~V(low)
 .step param unit list 1 2
 .meas tran most MAX V(p)*I(RLoad)
 .tran 5u 3m
 .end
 """
-    result = found(tmp_path, "", text, "v(p)", "i(RLoad)", "v(high)")
+    result = found(tmp_path, "", text, "v(p)", "i(RLoad)", "v(high)", "v(both)")
     time, pulse = result.columns["time"], result.columns["v(p)"]
     phase = time % 0.5e-3
     rising = (phase > 0.1e-6) & (phase < 2.4e-6)
     assert pulse[rising] == pytest.approx(phase[rising] * 2e6, abs=1e-6)  # 5 V in 2.5 us
     assert result.columns["i(RLoad)"] == pytest.approx(pulse / 1e3, abs=1e-9)
     assert np.all(result.columns["v(high)"] == 1.0)
+    assert np.all(result.columns["v(both)"] == 11.0)
     assert result.summary["meas.most"] == pytest.approx(25e-3, rel=1e-6)
 
 

@@ -127,6 +127,12 @@ _POWER = re.compile(r"(\s*(?:\*\*|\^)\s*)([+-]?)(?:(\d*[02468])(?![\w.])|[\w.]*)
 _LOGIC = re.compile(r"(?<!&)&(?!&)|(?<!\|)\|(?!\|)|~")
 _LOGICAL = {"&": "&&", "|": "||", "~": "!"}
 """LTspice's and, or, not."""
+_TRUTH = re.compile(
+    r"(?:(?<=[(,{~&|])|(?<=\w=))\s*(v\([^()]*\))(?=\s*(?:&(?!&)|\|(?!\|)))"  # left
+    r"|(?:(?<=~)|(?<=(?<!&)&)|(?<=(?<!\|)\|))\s*(v\([^()]*\))(?=\s*(?:[&|)?},;]|$))",  # right
+    re.IGNORECASE,
+)
+"""A bare voltage as their operand: true above 0.5 to LTspice; to ngspice all but 0 is true."""
 
 
 def _pointed(expression: str) -> str:
@@ -143,6 +149,8 @@ def in_ngspice(line: Line) -> list[Line]:
         if len(parts := [*without_laplace(text)]) > 1:
             return [each for part in parts for each in in_ngspice(replace(line, text=part))]
     if word not in (".inc", ".lib"):  # names of files
+        if kind in "beg":
+            text = _TRUTH.sub(lambda truth: f"({truth[1] or truth[2]}>0.5)", text)
         text = _LOGIC.sub(lambda match: _LOGICAL[match[0]], text)
         text = text if word == ".mea" else _powers(text)
     text = _GLUED.sub(r"\1.\3\2", text) if kind in "rclx" or _MODEL.match(text) else text
