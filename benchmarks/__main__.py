@@ -1,8 +1,8 @@
-"""What measures this project itself: what coupling costs, and other programs beside it.
+"""Measures this project itself: the cost of coupling, and other programs for comparison.
 
     python -m benchmarks [NAME ...] [--quick] [--trials DIR] [--out DIR]
 
-measures all, or what is named, together with what ``cosim bench`` measures, and writes
+measures all, or the named ones, together with the numbers of ``cosim bench``, and writes
 ``bench.json``. Run it from the top of a checkout. ``python -m benchmarks.charts`` draws the charts
 that have other programs in them.
 """
@@ -42,7 +42,7 @@ TARGETS: bench.Targets = bench.TARGETS | {
 }
 
 Measure = Callable[[bool, Path | None], Any]
-"""Gives its part of the numbers; asked are whether it is to be quick, and the trials' folder."""
+"""Gives its part of the numbers; its arguments: whether it is quick, and the trials' folder."""
 
 MEASURES: dict[str, Measure] = {
     "parts": lambda quick, _: {"coupled_over_parts": parts.measure(3 if quick else 11)},

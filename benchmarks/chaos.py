@@ -24,27 +24,27 @@ from cosim.studies.report import Report, Row
 from cosim.waveforms.result import Result
 
 NUDGE, APART = 1e-9, 1e-6
-"""Relative changes of the normal force: of the run that tells of chaos, and between the ensemble's
-members."""
-MEMBERS, DURATION, SETTLE = 12, 1.0, 0.5
+"""Relative changes of the normal force: in the run that shows chaos, and from one member of the
+ensemble to the next."""
+MEMBERS, DURATION, SETTLE = 12, 1.0, 0.5  # runs of an ensemble; s
 STATISTICS = ("v_average", "stick_fraction", "impacts", "stick_slip_events")
 SCENE = ("drive.pot_max=0.508", "drive.pot_frequency=0.5452", "drive.pot_offset=0.5565")
-"""What differs from the scene ``reference``: three knobs of its signal generator."""
+"""Overrides of the scene ``reference``: three knobs of its signal generator."""
 METHODS = {
     "step-locked, fine steps": ("circuit.reltol=1e-6", "circuit.max_step=2e-5"),
     "step-locked (default)": (),
     "Gauss-Seidel, 0.1 ms": ("coupling.method=gauss-seidel", "coupling.macro_step=1e-4"),
     "mean current, 0.2 ms": ("coupling.method=mean-current", "coupling.macro_step=2e-4"),
 }
-"""What is compared with the first of them."""
+"""Methods and their overrides; each is compared with the first one."""
 
 
 Ensemble = dict[str, list[float]]
-"""Values of each statistic, one a member."""
+"""Values of each statistic, one for each member."""
 
 
 def average(values: Sequence[float]) -> tuple[float, float]:
-    """Mean and its standard error."""
+    """The mean of values, and its standard error."""
     return mean(values), stdev(values) / sqrt(len(values))
 
 
@@ -62,13 +62,13 @@ def solved(scene: Sequence[str], more: Sequence[str], change: float = 0.0) -> Re
 
 
 def growth(scene: Sequence[str], more: Sequence[str] = ()) -> float:
-    """How many times a small relative change of the normal force is found again in the path."""
+    """The change of the path (over its range) per relative change of the normal force."""
     path, nudged = (solved(scene, more, c).columns["z_part"] for c in (0.0, NUDGE))
     return float(np.abs(nudged - path).max() / np.ptp(path)) / NUDGE
 
 
 def ensemble(scene: Sequence[str], more: Sequence[str], members: int) -> Ensemble:
-    """The statistics of runs with normal forces apart by :data:`APART`."""
+    """The statistics of runs whose normal forces differ by :data:`APART` from one to the next."""
 
     def member(k: int) -> dict[str, float]:
         summary: Any = solved(scene, more, APART * k).summary
@@ -123,11 +123,11 @@ _STATISTICS = {
     "impacts": ("impacts", 1.0),
     "stick_slip_events": ("changes of stick and slip", 1.0),
 }
-"""Labels, and factors to their units."""
+"""Labels of the statistics, and factors from SI to the labels' units."""
 
 
 def draw(ensembles: Mapping[str, Ensemble], title: str) -> Picture:
-    """Draw each method's values of each statistic: a tick a run, and their average."""
+    """Draw each method's values of each statistic: a tick for each run, and their mean."""
     note = "One tick a run; dot and bar: their mean with two standard errors."
     figure, axes = panels(title, note, (11.0, 3.4), 1, len(_STATISTICS), sharey=True)
     for axis, (statistic, (label, scale)) in zip(axes, _STATISTICS.items(), strict=True):

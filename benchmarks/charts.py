@@ -71,7 +71,7 @@ method = "redo"
 
 
 def _redone(scene: Scene, case: Case, reltol: float) -> Outcome:
-    """The machine as an FMU like others, whose time to impact nobody knows."""
+    """The machine as a foreign FMU: the coupling then does not know its time to the next impact."""
     times = case.times()
     given = f"run.duration={case.duration!r}", f"run.output_step={times[0]!r}"
     with TemporaryDirectory() as name:
@@ -89,16 +89,17 @@ def _redone(scene: Scene, case: Case, reltol: float) -> Outcome:
 
 
 def _values(first: int, last: int, case: Case) -> list[float]:
+    """Settings on the scenes that the peers can run."""
     return tenths(first, last) if case.name in ("stick-slip", "reference") else []
 
 
 def _controlled(
     joint: Joint, jumps: Jumps, case: Case, tolerance: float, audited: bool
 ) -> Iterator[int]:
-    """With Richardson's estimate, cut at jumps of the command and at samples.
+    """Error-controlled macro steps that end at jumps of the command and at samples.
 
-    An audit lets half of the tolerance's power of 2/3 be lost of the power: a residual is of order
-    2 in a step that goes with the cube root of the tolerance.
+    With an audit the power residual may be half of tolerance^(2/3) of the power: the residual is of
+    order 2 in the step, which scales with the cube root of the tolerance.
     """
     share = 0.5 * tolerance ** (2.0 / 3.0) if audited else None
     control = ErrorControlled(joint, 1e-5, tolerance, tolerance, shortest=1e-9, energy_share=share)
@@ -106,7 +107,7 @@ def _controlled(
         while joint.time < time - SAME_TIME:
             control.run(min(time, jumps.next))
             jumps.meet(joint)
-        yield 3 * (control.accepted // 2 + control.rejected)
+        yield 3 * (control.accepted // 2 + control.rejected)  # each try takes h, h and 2 h
 
 
 def _with_control(name: str, audited: bool) -> Solver:
@@ -129,7 +130,7 @@ SOLVERS = (
     _peer("all in ngspice", "circuit.reltol", _all_in_ngspice, partial(_values, 4, 9)),
     _peer("SciPy's LSODA with events", "tolerance", _solve_ivp, partial(_values, 3, 6)),
 )
-"""The further lines."""
+"""Solvers that the chart ``accuracy`` shows beside those of the study."""
 
 
 CHARTS: dict[str, Callable[[bool, Path], Report]] = {
@@ -138,7 +139,7 @@ CHARTS: dict[str, Callable[[bool, Path], Report]] = {
     "chaos": lambda *_: chaos.report(),
     "choice": lambda quick, out: choice.choice(quick, out),
 }
-"""Each asks whether it is to be quick, and where an interrupted one has left what it found."""
+"""Each takes whether it is quick, and the folder from which an interrupted one resumes."""
 
 
 def main() -> None:

@@ -1,8 +1,8 @@
 """Which circuit model and tolerance to take: error and CPU time over settings of the knobs.
 
-The truth of the solver's error is the same model with much shorter steps; that of the model's own
-is the schematic ("full") with such steps. Only regular settings have errors: elsewhere the start,
-or the ninth digit, decides.
+The solver's error is measured against the same model with much shorter steps; the whole error
+against the schematic ("full") with such steps. Only settings with regular motion count: elsewhere
+the start, or the ninth digit, decides.
 """
 
 from collections import Counter
@@ -31,25 +31,26 @@ from cosim.toolchain.processes import in_place
 from cosim.version import __version__
 
 SETTINGS, QUICK, TIMED = 18, 2, 2
-"""Of each machine, in all and with ``quick``; those that are timed."""
+"""Settings of each machine: in all, with ``quick``, and those that are timed."""
 
 KNOBS = ("drive.frequency", "drive.amplitude", "drive.offset")
 LOW, HIGH = np.array([10.0, 3.0, -3.0]), np.array([90.0, 10.0, 3.0])
-"""Hz and V; larger offsets mostly hold the part."""
+"""Ranges of the knobs, Hz and V; with larger offsets the part mostly sticks."""
 
 BASE = changed(load("reference"), {"run.duration": 1.0, "run.settle": 0.5}, "choice")
-"""What all settings are on top of, at least so long."""
+"""The scene that settings change; runs are at least as long, in whole periods."""
 
 OWN, COST, ALL = "own model", "CPU time over amplifier's", "all"
 SHARES = {"median": 0.5, "90 %": 0.9, "worst": 1.0}
-"""Of the regular settings, whose errors are at most what is told."""
+"""Quantiles of the error over the regular settings, by their words in the tables."""
 
 LEAST, MOST = 1e-5, 1e3
-"""%; smaller errors are drawn at the first, larger ones than the second are not."""
+"""Range of the errors in the figure, %; smaller ones are drawn at its lower end."""
 
 
 def of(line: str, *every: Settings) -> dict[str, Settings]:
-    """Runs of a line of the figure, by it and their steps in words; ``{}`` has the default ones."""
+    """The settings of a line of the figure, a circuit model with or without a solver, for each of
+    several step settings, by the line's name and these in words; ``{}`` is "default"."""
     model, _, solver = line.partition(", ")
     own: Settings = {"circuit.model": model, **({"run.solver": solver} if solver else {})}
     words = [", ".join(f"{key} = {value:.2g}" for key, value in one.items()) for one in every]
@@ -59,7 +60,8 @@ def of(line: str, *every: Settings) -> dict[str, Settings]:
 
 
 def steps(longer: float) -> Settings:
-    """Those of ngspice so many times as long; the tolerance goes with their cube."""
+    """Settings with steps of ngspice ``longer`` times as long; the tolerance scales with the
+    cube."""
     reltol, max_step = BASE.circuit.reltol, BASE.circuit.max_step
     return {"circuit.reltol": reltol * longer**3, "circuit.max_step": max_step * longer}
 
@@ -73,18 +75,18 @@ CHOICES = {
     **of(JUDGES, steps(3.0), steps(1.7), {}, steps(0.5)),
     **of(COMPLETE, steps(3.0), steps(1.7), {}),
 }
-"""What is compared, each line from coarse to fine."""
+"""All settings that are compared, each line from coarse to fine."""
 DEFAULT = f"{JUDGES}: default"
 
 FINEST = {"ideal": {"mechanics.tolerance": 1e-12}, SEARCHES: {"mechanics.tolerance": 1e-12}}
 FINEST |= {JUDGES: steps(1.0 / 4.0), COMPLETE: steps(1.0 / 3.0)}
 TRUTHS: dict[str, Settings] = {m: {"circuit.model": m, **one} for m, one in FINEST.items()}
-"""What the errors of each model are taken against."""
+"""Settings of each model that give the reference values for errors."""
 
 
 def machines() -> dict[str, Settings]:
-    """What differs from BASE, whose amplifier gets the data sheet's swing losses, as that of the
-    scene `paper` has them: else its error would be that of a parameter."""
+    """Settings of each machine on top of BASE. The amplifier of `reference` gets the data sheet's
+    swing losses, as `paper` has them: else its error would be that of a parameter."""
     base, paper = BASE.as_dict(), load("paper").as_dict()
     tables = ("circuit", "coil", "mechanics", "friction")
     every = [(table, key, value) for table in tables for key, value in paper[table].items()]
@@ -112,18 +114,18 @@ def choice(quick: bool, out: Path) -> Report:
 
 
 def measure(bench: Evaluator, draws: int) -> Report:
-    """Measure all on so many settings of each machine; ``bench`` runs them."""
+    """Measure all choices on ``draws`` settings of each machine; ``bench`` runs them."""
     cube = qmc.Sobol(len(KNOBS), rng=np.random.default_rng(0)).random_base2(5)[:draws]
     drawn = [
         (machine, {**own, **dict(zip(KNOBS, row, strict=True))})
         for machine, own in machines().items()
         for row in (LOW + (HIGH - LOW) * cube).round(3).tolist()
     ]
-    told = [_kind(own) for _, own in drawn]
+    motions = [_kind(own) for _, own in drawn]
     kinds: dict[str, Counter[str]] = {machine: Counter() for machine in machines()}
-    for (machine, _), kind in zip(drawn, told, strict=True):
+    for (machine, _), kind in zip(drawn, motions, strict=True):
         kinds[machine][kind] += 1
-    regular = [one for one, kind in zip(drawn, told, strict=True) if kind == "regular"]
+    regular = [one for one, kind in zip(drawn, motions, strict=True) if kind == "regular"]
     every = CHOICES | TRUTHS
     asked = [
         (what, n, settings)
@@ -132,6 +134,7 @@ def measure(bench: Evaluator, draws: int) -> Report:
         if _able(settings := {**own, **one})
     ]
     timed = [s for m in kinds for s in [own for name, own in regular if name == m][:TIMED]]
+    # v_average by choice: NaN where it cannot run, inf where the run failed.
     found = {what: np.full(len(regular), nan) for what in every}
     for k, outcome in bench.run((k, settings) for k, (*_, settings) in enumerate(asked)):
         what, n, _ = asked[k]
@@ -144,13 +147,13 @@ def measure(bench: Evaluator, draws: int) -> Report:
             costs[what].append(second / taken[DEFAULT])
     rows: list[Row] = []
     for machine in (*kinds, ALL):
-        there = np.array([machine in (ALL, name) for name, _ in regular], bool)
+        chosen = np.array([machine in (ALL, name) for name, _ in regular], bool)
         for what, own in CHOICES.items():
             model = str(own["circuit.model"])
             row = {"machine": machine, "circuit.model": model, "steps": what.partition(": ")[2]}
             row |= {"line": what.partition(":")[0], COST: float(np.median(costs[what]))}
             for against, truth in {OWN: model, JUDGES: JUDGES, COMPLETE: COMPLETE}.items():
-                pairs = zip(found[what][there], found[truth][there], strict=True)
+                pairs = zip(found[what][chosen], found[truth][chosen], strict=True)
                 errors = np.sort([100.0 * relative_error(v, true) for v, true in pairs])
                 errors = errors[~np.isnan(errors)]  # where the fast solver cannot run
                 row["regular settings"] = len(errors)
@@ -162,11 +165,12 @@ def measure(bench: Evaluator, draws: int) -> Report:
 
 
 def _able(settings: Settings) -> bool:
-    """The fast solver has no rigid walls."""
+    """Whether the solver of settings can run them: the fast one has no rigid walls."""
     return "run.solver" not in settings or settings["mechanics.contact"] == "compliant"
 
 
 def _kind(settings: Settings) -> str:
+    """The kind of motion, or why it is unknown."""
     try:
         point(BASE, {**settings, **TRUTHS[COMPLETE]}, True)
     except BadInput:
@@ -175,8 +179,8 @@ def _kind(settings: Settings) -> str:
 
 
 def _time(own: Settings) -> dict[str, float]:
-    """CPU time of each choice for a simulated second, s, one after the other in this process; the
-    fast ones run as many settings at once as they can."""
+    """CPU time (s) of each choice for a simulated second, one after the other in this process; the
+    fast solver's is that of a full batch over its LANES runs."""
     calls: dict[str, Callable[[], object]] = {}
     for what, one in CHOICES.items():
         if _able({**own, **one}):
@@ -205,8 +209,8 @@ def advice(rows: Sequence[Row], wanted: float) -> Row:
 
 
 def report(rows: Sequence[Row], kinds: Mapping[str, Counter[str]], second: float) -> Report:
-    """What was found: the rows of each machine and of ALL, how many settings have which kind of
-    motion, and the CPU time of DEFAULT for a simulated second, s."""
+    """The report of the rows of each machine and of ALL, of the number of settings with each kind
+    of motion, and of the CPU time (s) of DEFAULT for a simulated second."""
     every = [row for row in rows if row["machine"] == ALL]
     told = [advice(every, wanted) for wanted in (10.0, 1.0, 0.1)]
     default = {row["line"]: row for row in every if row["steps"] == "default"}
@@ -239,7 +243,7 @@ def report(rows: Sequence[Row], kinds: Mapping[str, Counter[str]], second: float
 
 
 def draw(rows: Sequence[Row], title: str) -> Picture:
-    """Error over cost: of the solver alone, and in all."""
+    """Draw error over cost, in two panels: the solver's error alone, and the whole error."""
     note = (
         "A line from coarse to fine steps; ring: default. Solid: the median; dotted: the worst. "
         f"What is less stands at {LEAST:g} %."

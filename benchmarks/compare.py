@@ -1,6 +1,7 @@
-"""The time of what users would write, over ours, on the scenes `reference` and `dc-motor`.
+"""CPU time of what users would write themselves (peers), over ours, on `reference` and `dc-motor`.
 
-Each peer runs at its coarsest setting whose error is no larger than ours, or where it errs least.
+Each peer runs at its coarsest setting whose error is no larger than ours, or else at the setting
+with its least error.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,14 +18,14 @@ from cosim.simulation.simulate import simulate
 from cosim.studies.speed.bench import cpu, ratios
 
 Peer = Callable[[], tuple[float, Array]]
-"""Gives the CPU seconds of a run and the part's heights, m."""
+"""Runs a peer; gives its CPU seconds and the part's heights, m (or a speed)."""
 
 LSODA_ERROR = 5e-4
-"""The error at which LSODA is compared: a smaller one only costs more."""
+"""The error at which LSODA is compared, larger than ours: a smaller one only costs more."""
 
 
 def compare(rounds: int) -> dict[str, Any]:
-    """Spread of each peer's time over ours, with the errors of both."""
+    """For each peer the spread of its time over ours, with the errors of both."""
     ours, wanted = brief(), own_error("amplifier", "amplifier")
 
     in_ngspice = (brief(f"circuit.reltol={x}", "circuit.max_step=1e-4") for x in (1e-7, 1e-8, 3e-9))
@@ -47,8 +48,8 @@ def compare(rounds: int) -> dict[str, Any]:
 
 
 def _motor(rounds: int) -> dict[str, Any]:
-    """The scene `dc-motor` until its bridge changes the duty; errors of the speed, over its range,
-    against our own run with steps 50 times shorter."""
+    """The peer `naive` on the scene `dc-motor` until its bridge changes the duty; errors are of the
+    speed, over its range, against our own run with steps 50 times shorter."""
 
     def scene(step: float, reltol: float = 1e-7) -> Scene:
         steps = {"circuit.max_step": step, "circuit.reltol": reltol}
@@ -74,8 +75,8 @@ def _over(
     target: float,
     rounds: int,
 ) -> dict[str, Any]:
-    """The spread of a peer's time over ours, and its error: with the first of its settings whose
-    error is at most ``target``, or else the one that errs least."""
+    """The spread of a peer's time over ours, and its error, at the first of its ``settings`` whose
+    error is at most ``target``, or else at that with the least error."""
     reached = []
     for peer in settings:
         reached.append(error(peer()[1]))

@@ -6,12 +6,13 @@ are compared with one of 2H from the same start: for a method whose inputs are e
 degree k, their difference over 2^(k+1) - 1 is the local error of the two (Richardson).
 
 The next step is H (tolerance / error)^(1 / (k + 2)), within bounds. The audit compares the power
-that one side believes to have given with what the other took (Sadjina et al., "Energy conservation
-and power bonds in co-simulations", Eng. Comput. 33 (2017) 607, doi 10.1007/s00366-016-0492-8) and
-rejects a step whose residual is too large a share of the greatest power so far.
+that one side assumes to have delivered with the power that the other received (Sadjina et al.,
+"Energy conservation and power bonds in co-simulations", Eng. Comput. 33 (2017) 607, doi
+10.1007/s00366-016-0492-8) and rejects a step whose residual is too large a share of the greatest
+power so far.
 
 Known limits: needs participants that can repeat a step, so ngspice cannot take part; at an event
-the step shrinks to what the jump allows, so wrap no more than is smooth, or cut at events first.
+the step shrinks very much, so use it where the solution is smooth, or cut steps at events first.
 """
 
 import numpy as np
@@ -36,10 +37,11 @@ class ErrorControlled:
         safety: float = 0.8,
         shortest: float = 1e-12,
     ) -> None:
-        """``step`` (s) is the first to try.
+        """``step`` (s) is the first one that is tried.
 
-        The error of each output counts against ``absolute + relative |y|``; an infinite entry of an
-        array ``absolute`` leaves that output out. With ``energy_share`` the audit is on.
+        The error of each output y is scaled by ``absolute + relative |y|``; an infinite entry of an
+        array ``absolute`` leaves that output out. With ``energy_share`` the audit is on: the power
+        residual may be this share of the greatest power so far.
         """
         self.method = method
         self._order = method.method.degree + 1
@@ -49,18 +51,19 @@ class ErrorControlled:
         self._safety, self._shortest = safety, shortest
         self._power = 0.0
         self.accepted = 0
-        """Macro steps that were kept."""
+        """Accepted macro steps."""
         self.rejected = 0
-        """Attempts that were put back, for the error or the audit."""
+        """Tries of two macro steps that were undone, for the error or the audit."""
         self.rejected_by_audit = 0
 
     def run(self, end: float) -> None:
-        """Go on to ``end`` (s, the method's own time)."""
+        """Advance to ``end`` (s, the method's own time)."""
         while (left := end - self.method.time) > 1e-12 * end:
             self._try(min(self._h, left / 2.0))
 
     def _try(self, h: float) -> None:
-        """Try to go on by ``h`` twice."""
+        """Try two macro steps of ``h`` (s), compare them with one of 2 ``h``, and adapt the
+        step."""
         method, known = self.method, self._power
         saved = method.save()
         method.step(2.0 * h)
@@ -74,7 +77,7 @@ class ErrorControlled:
         off = (twice - once) / (2.0**self._order - 1.0)
         share = off / (self._absolute + self._relative * np.abs(twice))
         error = float(np.sqrt(np.mean(share**2)))
-        # The first step from rest has nothing to be compared with: all of its power is residual.
+        # In the first step from rest all power is residual, so the audit leaves it out.
         honest = not self._energy_share or not known or residual <= self._energy_share * self._power
         factor = self._safety * error ** (-1.0 / (self._order + 1)) if error else _MOST_CHANGE
         self._h = h * min(_MOST_CHANGE, max(_LEAST_CHANGE, factor))
@@ -96,7 +99,8 @@ class ErrorControlled:
         return np.concatenate([self.method.past.current.value, self.method.past.emf.value]).ravel()
 
     def _residual(self, h: float) -> float:
-        """Power (W) that one side gave and the other did not take, in the mean over the step."""
+        """Magnitude of the mean power (W) over the step that the circuit delivered by its own input
+        and the mechanics did not receive by theirs."""
         first, second = self.method.first.mean, self.method.second.mean
         if first.shape != second.shape:
             return 0.0

@@ -1,9 +1,9 @@
-"""Errors of our runs at the settings at which they are timed, and how the cost grows.
+"""Errors of our runs at the settings at which they are timed, and the growth of the cost.
 
-Those of ``amplifier``, ``ideal`` and ``limited`` are of the part's path in the scene `reference`,
-against the monolithic reference solution (``reference.json``; for ``limited`` that of the
-amplifier). ``full`` is compared with finer steps, since there is no reference of the schematic, and
-the part alone with the closed form of its mean velocity.
+The errors of ``amplifier``, ``ideal`` and ``limited`` are those of the part's path in the scene
+`reference`, against the monolithic reference solution (``reference.json``; for ``limited`` that of
+the amplifier). ``full`` is compared with finer steps, since the schematic has no reference, and the
+part alone with the closed form of its mean velocity.
 """
 
 import json
@@ -22,7 +22,7 @@ from cosim.simulation.simulate import simulate
 from cosim.studies.speed.bench import BRIEF_FULL, LONG_PART, spread, take_turns
 
 BRIEF = ("run.duration=0.2", "run.settle=0.1")
-"""Settings that make the scene `reference` as short as the path known of it."""
+"""Settings that shorten the scene `reference` to the length of its reference solution."""
 
 _FINER = ("circuit.reltol=1e-6", "circuit.max_step=5e-6")
 
@@ -39,7 +39,8 @@ def of_rungs() -> dict[str, float]:
 
 
 def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
-    """Exponent with which the CPU time of `reference` grows with its duration, by least squares."""
+    """Exponent of the growth of the CPU time of `reference` with its duration, by least squares in
+    logarithms, for each round."""
     calls = {
         str(n): partial(simulate, load("reference", [f"run.duration={n / 20}"])) for n in periods
     }
@@ -54,12 +55,12 @@ def _reference() -> dict[str, Any]:
 
 
 def times() -> list[float]:
-    """Times of the reference, s."""
+    """Times of the reference solution, s."""
     return _reference()["time"]
 
 
 def brief(*overrides: str) -> Scene:
-    """The scene `reference` over the time of its known path, with a row at each of its times."""
+    """The scene `reference` over the time of its reference solution, with a row at each time."""
     return load("reference", [*BRIEF, "run.output_step=1e-3", *overrides])
 
 

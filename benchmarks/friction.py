@@ -32,16 +32,16 @@ from cosim.studies.plots import BLUE, GREEN, VERMILION, panels
 from cosim.studies.report import Report, Row, span
 
 CREEP, ERROR = "creep of a held part [µm/s]", "error in the machine / range"
-"""Columns, and the labels of the figure's axes."""
+"""Columns of the table, and labels of the figure's axes."""
 
 FREQUENCY, ACCELERATION, SLIP = 40.0, 15.0, 0.02
-"""Of the surface, Hz and m/s²; of the surface against the part at first, m/s."""
-SETTLED, DURATION = 0.5, 1.0
-_RTOL = 1e-8
+"""Of the surface, Hz and m/s²; initial velocity of the surface relative to the part, m/s."""
+SETTLED, DURATION = 0.5, 1.0  # s; creep is measured between these times
+_RTOL = 1e-8  # relative tolerance of LSODA
 
 Law = Callable[[float, float, float], tuple[float, float]]
-"""Friction (N) and the bristle's rate (m/s), from slip velocity u, bristle z, and the load (N) that
-would keep the part on the surface."""
+"""Friction (N) and the rate (m/s) of the bristle's deflection, from the slip velocity u (m/s), the
+deflection z (m), and the friction (N) that would make the part follow the surface."""
 
 
 LAWS = {"tanh": (1e-3, 1e-4, 1e-5), "Karnopp": (1e-3, 1e-4, 1e-5), "LuGre": (1e4, 1e5, 1e6)}
@@ -51,7 +51,7 @@ _RTOL_IN_THE_MACHINE = 1e-6
 
 
 def report() -> Report:
-    """What smoothed laws of friction do to a held part, and to the machine."""
+    """The errors of smoothed friction laws, on a held part and in the machine."""
     moved = {(row["law"], row["width"]): row for row in in_the_machine()}
     nothing = {ERROR: nan, "CPU time [s]": nan}
     rows = [row | moved.get((row["law"], row["width"]), nothing) for row in creep()]
@@ -82,7 +82,7 @@ def report() -> Report:
 def law_of(name: str, width: float, scene: Scene) -> Law:
     """A smoothed law with a scene's coefficients; ``width`` as in :data:`LAWS`."""
     f, mu_s, mu_k = scene.friction.normal_force, scene.friction.mu_s, scene.friction.mu_k
-    damping = 2.0 * sqrt(width * scene.mechanics.part_mass)
+    damping = 2.0 * sqrt(width * scene.mechanics.part_mass)  # critical, for a bristle's stiffness
 
     def falling(u: float, over: float) -> float:
         """Coefficient of friction: static at 0, kinetic beyond the slip velocity ``over``, m/s."""
@@ -105,7 +105,8 @@ def law_of(name: str, width: float, scene: Scene) -> Law:
 
 
 class _Smoothed(Machine):
-    """The whole machine with a law in the place of sticking and slipping; a bristle besides."""
+    """The whole machine with a smoothed law in place of sticking and slipping; the last state is
+    the bristle's deflection."""
 
     scales = np.append(Machine.scales, 1e-6)
 
@@ -125,7 +126,8 @@ class _Smoothed(Machine):
 
 
 def in_the_machine() -> Iterator[Row]:
-    """Of each law: error of the part's path on the scene ``stick-slip`` over its range, CPU s."""
+    """For each law the error of the part's path on the scene ``stick-slip``, over its range, and
+    the CPU time, s."""
     case = CASES["stick-slip"]
     scene = load("reference", [*case.overrides, f"run.duration={case.duration!r}"])
 
@@ -146,7 +148,8 @@ def _width(name: str, width: float) -> str:
 
 
 def creep() -> Iterator[Row]:
-    """Of each law: creep (µm/s), error in where the part comes to rest (µm), evaluations."""
+    """For each law the creep (µm/s), the error of the position of rest (µm), and the number of
+    evaluations."""
     rig = load("reference")
     truth = _stops(rig)
 
@@ -163,9 +166,10 @@ def creep() -> Iterator[Row]:
 
 
 def _stops(scene: Scene) -> float:
-    """Slip (m) until a part with set-valued friction is at rest, in closed form but for its time.
+    """Slip (m) until a part with set-valued friction is at rest: a closed form in the time of rest.
 
-    With Ω the surface's angular frequency u = u0 + (A/Ω) sin Ωt - (force/m - g) t.
+    With Ω the surface's angular frequency, the slip velocity is
+    u = u0 + (A/Ω) sin Ωt - (force/m - g) t.
     """
     friction, mechanics, omega = scene.friction, scene.mechanics, 2.0 * pi * FREQUENCY
     rate = friction.mu_k * friction.normal_force / mechanics.part_mass - mechanics.gravity
@@ -173,7 +177,7 @@ def _stops(scene: Scene) -> float:
     def u(t: float) -> float:
         return SLIP + ACCELERATION / omega * np.sin(omega * t) - rate * t
 
-    # Friction is stronger than the load throughout the slip, so the first zero is its end.
+    # The slip ends at the first zero of u, since friction then exceeds the load.
     t: Any = next(t for t in np.arange(1e-4, 0.1, 1e-5) if u(t) < 0.0)
     stop: Any = brentq(u, t - 1e-5, t, xtol=1e-15)  # pyright: ignore[reportArgumentType]
     return float(
@@ -182,11 +186,11 @@ def _stops(scene: Scene) -> float:
 
 
 def _solved(law: Law, scene: Scene) -> tuple[float, float, int]:
-    """Slip (m) once settled and at the end, and the number of evaluations."""
+    """Slip (m) at SETTLED and at DURATION, and the number of evaluations."""
     m, g = scene.mechanics.part_mass, scene.mechanics.gravity
 
     def rates(t: float, y: Any) -> list[float]:
-        _, u, z = y
+        _, u, z = y  # slip (m), slip velocity (m/s), bristle (m)
         surface = ACCELERATION * cos(2.0 * pi * FREQUENCY * t)
         force, rate = law(u, z, m * (surface + g))
         return [u, surface - force / m + g, rate]
@@ -205,7 +209,7 @@ def _solved(law: Law, scene: Scene) -> tuple[float, float, int]:
 
 
 def draw(rows: Sequence[Row], title: str) -> Picture:
-    """Draw what a held part creeps with each law, and the error in the whole machine."""
+    """Draw the creep of a held part with each law, and the error in the whole machine."""
     note = "µm/s: width of the smoothed law; kN/m: stiffness of its bristle."
     figure, axes = panels(title, note, (11.0, 4.2), 1, 2, sharey=True)
     places = range(len(rows))

@@ -1,7 +1,7 @@
 """Instructions that the FMU executes, counted by callgrind: a measure without noise.
 
 The mechanics of the scene `reference` get its command as a current, in fixed steps about as long as
-ngspice's; ``replay.c`` drives them.
+those of ngspice; ``replay.c`` calls the FMU.
 """
 
 import re

@@ -29,17 +29,18 @@ MORE = {"best": 1.05, "robust": 1.08}
 POPULATION = {"best": 60, "robust": 24}
 GENERATIONS = {"best": 60, "robust": 30}
 APART, JUDGED, NOTHING = 0.03, 4, -1e3
-"""How far those that are judged are from each other, of the cube's edge; how many; the score of
-what cannot be run."""
+"""Least distance (in the cube) and number of the points that are judged; the score of a point that
+cannot be run."""
 
 
 def searched(bench: Bench, change: Change, number: int, kind: str, seed: int) -> float:
-    """The best that is found of a change for a goal, in the goal's unit; 0 for nothing."""
+    """The best judged value of a change for goal ``number``, in the goal's unit; 0 without any."""
     machine, goal = change.machine(bench.scene), GOALS[number]
     scores_of = bench.once(machine) if kind == "best" else bench.over_turns(machine)
     seen: list[tuple[float, list[float]]] = []
 
     def cost(columns: Array) -> Array:
+        """Negative scores of points (keys × points), rounded to the knobs' steps."""
         points = np.round(columns.T * STEPS) / STEPS
         scores, feasible = scores_of(points)
         found = scores[:, number]

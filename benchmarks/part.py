@@ -17,18 +17,18 @@ from cosim.trials.camera import frame_times, heights, velocities
 from cosim.trials.tracked import Track, Trial, read_folder
 
 FRAMES = 312
-"""Of a made-up trial: as many as the published ones have."""
+"""Frames of a made-up trial: as many as the published ones have."""
 OTHER_FORCE = 14.0
-"""Weights of the part; its normal force on a trial that is not among the published."""
+"""Normal force, in weights of the part, on a trial that is not among the published ones."""
 
 
 def solvers(folder: Path | None, rounds: int) -> dict[str, Any]:
     """CPU seconds (medians) of the exact solution and of the authors' scheme for all trials, and
     the spread of their ratio.
 
-    Both are called straight, with buffers made beforehand, on the trials of ``folder`` or, without
-    one, on trials that the camera makes of a simulated run. The exact solution is asked for the
-    heights at the tracked times; the published scheme gives them at its steps.
+    The compiled routines are called directly, with buffers made beforehand, on the trials of
+    ``folder`` or, without one, on simulated trials as a camera sees them. The exact solution gives
+    heights at the tracked times, the published scheme at its own steps.
     """
     trials = [_made_up(k) for k in range(10)] if folder is None else read_folder(folder)
     calls = {name: [_call(trial, name == "exact") for trial in trials] for name in _SOLVERS}
@@ -46,7 +46,8 @@ _SOLVERS = ("exact", "published")
 
 
 def _call(trial: Trial, exact: bool) -> Callable[[], int]:
-    """A call of a compiled solver on a trial, whose first rows and last ones are left out."""
+    """A function that calls a compiled solver on a trial, without the trial's first three and last
+    two rows, as the authors do."""
     rows = slice(3, len(trial.time) - 2)
     time = np.ascontiguousarray(trial.time[rows] - trial.time[3])
     surface = np.ascontiguousarray(trial.platform.v[rows])
@@ -65,7 +66,7 @@ def _call(trial: Trial, exact: bool) -> Callable[[], int]:
         solve = library("part").part_threshold
         asked = (part.PUBLISHED_STEP, part.PUBLISHED_V_MIN, steps)
 
-    def call(_: object = (time, surface, law, motion)) -> int:  # they live as long as the call
+    def call(_: object = (time, surface, law, motion)) -> int:  # the default keeps them alive
         return solve(*given, *asked, *found)
 
     return call

@@ -1,7 +1,7 @@
-"""The cost of the coupling itself: a coupled run over the circuit alone plus the mechanics alone.
+"""The cost of the coupling: CPU time of a coupled run over that of circuit and mechanics alone.
 
 The circuit alone gets the back-EMF of the coupled run from a table, so that ngspice takes the same
-steps; the mechanics alone get its current.
+steps; the mechanics alone get the coupled run's current.
 """
 
 from contextlib import closing
@@ -33,9 +33,9 @@ def measure(rounds: int) -> dict[str, Any]:
 
 
 def coupled_over_parts(scene: Scene, rounds: int) -> dict[str, Any]:
-    """Spread of the ratio, and how many steps both circuits took."""
+    """Spread of the ratio, and the numbers of steps of the coupled and of the replayed circuit."""
     log = _coupled(scene).log()
-    told = _replay(scene)
+    told = _replay(scene)  # must outlive all runs of the circuit
     # Each call makes its own instance, as both sides of the ratio need one.
     calls = {
         "coupled": lambda: _coupled(scene),
@@ -62,8 +62,8 @@ def _coupled(scene: Scene, told: Array | None = None) -> Lead:
 
 
 def replay(circuit: Lead, told: Array) -> None:
-    """Run a circuit without mechanics: with back-EMF (V), slope (V/s) and next impact (s) after
-    each of its steps, a row each, which must outlive the run."""
+    """Make a circuit run without mechanics: ``told`` has a row for each of its steps with back-EMF
+    (V), its slope (V/s) and the time of the next impact (s), and must outlive the run."""
     circuit.state.macro_point = address("macro_point_replayed")
     circuit.state.replay = told.ctypes.data
 
@@ -76,8 +76,8 @@ def _mechanics(scene: Scene, log: Log) -> None:
 
 
 def _replay(scene: Scene) -> Array:
-    """Back-EMF, slope and next impact that the circuit was told of after each step, the last ones
-    twice."""
+    """Back-EMF (V), slope (V/s) and next impact (s) after each step of a coupled run; the last row
+    is given twice."""
     with closing(Mechanics(scene)) as mechanics:
         lead = Lead(scene, command(scene), Recorder(scene, mechanics, lambda _: None))
         listener = _Listener(lead.state)
@@ -87,7 +87,7 @@ def _replay(scene: Scene) -> Array:
 
 
 class _Listener:
-    """Writes down what the method step-locked tells the circuit."""
+    """Records the values that the method step-locked gives to the circuit."""
 
     def __init__(self, state: Structure) -> None:
         self._state = state

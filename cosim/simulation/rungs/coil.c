@@ -11,10 +11,10 @@
 
 static const double SAME_TIME = 1e-12; /* s; as in the recorder */
 
-/* `waves` receives the current (A) and the voltage (V) but for the back-EMF at each of the times
-   `step` k (s), k from `first` to before `beyond`. They lie within the `n` intervals between `edges`
-   (s), in which the current goes linearly from `start` to `end` (A); a row on an edge belongs to what is
-   before it. `branch` has the current of the LR2 branch at the begin of each interval, or is NULL;
+/* Write the current (A) and the voltage without back-EMF (V) to `waves`, at the times `step` k (s), k from
+   `first` to before `beyond`. These lie within the `n` intervals between `edges` (s), in which the current
+   goes linearly from `start` to `end` (A); a time on an edge belongs to the interval before it.
+   `branch` has the current of the LR2 branch at the begin of each interval, or is NULL;
    resistances in Ohm, inductance in H, the branch's time constant `tau` in s. */
 EXPORT void coil_rows(int64_t n, const double *edges, const double *start, const double *end,
                       const double *branch, double resistance, double inductance,

@@ -19,15 +19,15 @@ from cosim.mechanics.surface import Surface
 from cosim.scene import Scene
 from cosim.simulation.rungs.rung import Motion, average_slope
 
-NO_GRAVITY = 1e-9  # m/s²; the theory divides by it
+NO_GRAVITY = 1e-9  # m/s², in place of 0, since the theory divides by g
 
 LONGEST_STEP = 1.7
-"""Of a tracked surface, in units of the usual one: what is longer lacks a frame."""
+"""Longest interval between frames of a tracked surface without a missing frame, over the median."""
 
 
 def surface(scene: Scene) -> Surface:
-    """The surface of a scene that gives its velocity, as often as it takes to reach
-    ``run.duration``. Raises BadInput for a file that cannot be used.
+    """The surface of a scene that gives its velocity, with as many periods as ``run.duration``
+    needs. Raises BadInput for a file that cannot be used.
     """
     drive, friction = scene.drive, scene.friction
     if drive.waveform == "file":
@@ -46,7 +46,7 @@ def surface(scene: Scene) -> Surface:
 
 
 def _cycle(scene: Scene) -> tuple[Array, Array]:
-    """Knots of a period of the theory's waveforms, s and m/s."""
+    """Knots (times, s, and velocities, m/s) of a period of one of the theory's waveforms."""
     from cosim.drive.surface import waveforms as theory
     from cosim.drive.surface.formulas import Transport
 
@@ -56,6 +56,7 @@ def _cycle(scene: Scene) -> tuple[Array, Array]:
     ratio = force_per_mass(scene) / gravity
     direction = "down" if drive.optimum == "down" else "up"
     if drive.waveform == "quaid":
+        # A little below the limit, so that rounding does not make the part slip.
         stick = theory.quaid_limit(friction.mu_s, ratio, direction, gravity) * (1 - 1e-9)
         return theory.quaid_cycle(stick, drive.acceleration_max, period, direction).knots()
     case = Transport(
@@ -88,6 +89,7 @@ def read_surface(path: Path) -> tuple[Array, Array]:
 
 
 def _trial(path: Path) -> tuple[Array, Array]:
+    """Time from 0 (s) and velocity (m/s) of a tracked surface; a Note where frames are missing."""
     from cosim.trials.tracked import read_platform
 
     times, platform = read_platform(path)
@@ -114,8 +116,7 @@ def move_part(scene: Scene) -> tuple[dict[str, Array], Motion]:
     rows = grid(run.output_step, run.duration)
     frames = exposures(run.duration, run.settle, run.shutter)
     parts = part_times(run.duration, run.settle) if run.average == "slope" else rows[:0]
-    # The motion is asked for once, at all times that rows, camera and averages need; the rows, the
-    # frames and the averages are taken out of it by their places.
+    # All times at which the motion is needed; rows, frames and parts are then looked up in them.
     wanted = np.unique(np.concatenate([rows, frames, parts, [run.settle, run.duration]]))
     friction, gravity = scene.friction, scene.mechanics.gravity
     found = part.account(
@@ -136,6 +137,7 @@ def move_part(scene: Scene) -> tuple[dict[str, Array], Motion]:
         "friction_force": mass * found["friction"],
         "sticking": found["sticks"],
     }
+    # Kinetic and potential energy of the part; it starts with the surface's velocity, at height 0.
     held = mass * (0.5 * found["v"] ** 2 + gravity * found["z"])
     start = 0.5 * mass * float(moved.velocities[0]) ** 2
     totals = {

@@ -28,7 +28,7 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
     motion = recorder.at_end["energy_in"]
     electric = coils[0].electrics(motion)
     if len(drives) > 1:
-        # The work that both coils did is in the first one's account.
+        # ``motion``, the work of both coils, is already in the first coil's balance.
         other = coils[1].electrics(0.0)
         energies = ("energy_in", "energy_copper", "energy_magnetic")
         sums = {name: getattr(electric, name) + getattr(other, name) for name in energies}
@@ -42,11 +42,11 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
 
 
 class _Coil:
-    """The account of one coil whose current is prescribed, linear on intervals."""
+    """Waveforms and energies of one coil whose current is prescribed, linear on intervals."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._squares, self._eddy = 0.0, Eddy(scene)
+        self._squares, self._eddy = 0.0, Eddy(scene)  # 3 ∫ i² dt, A² s; the eddy branch
         self._most, self._least = -np.inf, np.inf
         self._last = 0.0
         self._waves = Tape(2, count(scene.run.output_step, scene.run.duration))
@@ -54,13 +54,14 @@ class _Coil:
         self._rows = count(scene.run.output_step, scene.run.duration)
 
     def follow(self, edges: Array, start: Array, end: Array) -> None:
-        """Go on through the intervals between ``edges`` (s), with the current (A) at the start and
-        the end of each."""
+        """Advance through the n intervals between ``edges`` (n + 1, s), with the current (n, A) at
+        the start and the end of each."""
         scene, eddy = self._scene, self._eddy
         h = np.diff(edges)
         slope = (end - start) / h
         self._squares += total(h, start**2 + start * end + end**2)
         self._last = float(end[-1])
+        # Extremes after settling: at both ends of each interval, the first one cut at ``settle``.
         late = edges[1:] > scene.run.settle
         if late.any():
             first = start[late] + slope[late] * np.maximum(scene.run.settle - edges[:-1][late], 0.0)
@@ -70,6 +71,7 @@ class _Coil:
         step, first = scene.run.output_step, len(self._waves)
         stop = min(count(step, edges[-1] + SAME_TIME), self._rows)
         edges, start, end = (np.ascontiguousarray(values) for values in (edges, start, end))
+        # Rows of current and voltage without back-EMF, which is added in ``waves``.
         for few in blocks(stop - first):
             rows = np.empty((few.stop - few.start, 2))
             library("loop").coil_rows(
@@ -81,15 +83,15 @@ class _Coil:
             self._waves.append(rows)
 
     def waves(self, back_emf: Array) -> tuple[Array, Array]:
-        """Current (A) and voltage (V) in the rows, in which the back-EMF (V) is known."""
+        """Current (A) and voltage (V) in the rows, for the back-EMF (V) in the rows."""
         waves, voltage = self._waves.array(), Tape(1, self._rows)
         for few in blocks(len(waves)):
             voltage.append(waves[few, 1] + back_emf[few])
         return self._waves.column(0), voltage.column()
 
     def electrics(self, motion: float) -> Electrics:
-        """At the end of the run; ``motion`` is the work (J) that one coil did. The source gives
-        whatever voltage the current takes, so what it delivers is the sum of where it goes.
+        """The balance at the end of the run; ``motion`` is the mechanical work (J) of one coil. The
+        source has no limits, so the energy that it delivers is the sum of all other terms.
         """
         scene, coil = self._scene, self._scene.coil
         heat = (coil.resistance + coil.count * scene.circuit.sense_resistance) * self._squares / 3.0

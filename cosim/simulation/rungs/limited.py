@@ -30,7 +30,7 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
 
 
 def _electrics(scene: Scene, recorder: Recorder) -> Electrics:
-    """From the mechanics' own current source, at the end of its run."""
+    """The electrical results of the current source in the FMU, at the end of the run."""
     count, run = scene.coil.count, scene.run
     totals, before = recorder.at_end, recorder.at_settle
     share = {
@@ -45,7 +45,7 @@ def _electrics(scene: Scene, recorder: Recorder) -> Electrics:
         energy_in=count * totals["energy_output"],
         energy_copper=count * totals["energy_copper"],
         energy_magnetic=count * totals["energy_magnetic"],
-        current_max=recorder.extremes[6],
+        current_max=recorder.extremes[6],  # behind those of the surface
         current_min=recorder.extremes[7],
         limited=share | {"output": sum(share.values())},
     )

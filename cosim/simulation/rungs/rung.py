@@ -1,6 +1,6 @@
-"""What each rung with mechanics makes of them, and what they share; one rung a file.
+"""The common part of the rungs with mechanics; each rung has a file of its own.
 
-A rung's file has the function ``drive``, which moves the recorder's mechanics from 0 to
+A rung's file has the function ``drive``, which advances the recorder's mechanics from 0 to
 ``run.duration`` and raises BadInput and SimulationFailed; ``cosim/scene/rungs.py`` declares the
 rungs and the keys that each uses. Energies are those of all ``coil.count`` coils, J; currents and
 voltages those of one coil.
@@ -25,7 +25,7 @@ from cosim.trials.camera import frame_times
 
 @dataclass(frozen=True)
 class Electrics:
-    """What the electrical side did, in numbers."""
+    """Energies, extremes and limits of the electrical side."""
 
     energy_in: float
     """Delivered to coils and sense resistor, J."""
@@ -38,16 +38,16 @@ class Electrics:
     current_min: float
     """Smallest current of one coil after settling, A."""
     limited: dict[str, float]
-    """Share of the time after settling in which each limit of the amplifier acted, by name, and
-    ``output`` for its output being at any."""
+    """Share of the time after settling in which each limit of the amplifier acted, by name;
+    ``output``: in which any limit of its output did."""
 
 
 @dataclass(frozen=True)
 class Driven:
-    """What a rung has done to the mechanics by the end of the run."""
+    """The results of a rung beside the mechanics', at the end of the run."""
 
     electric: Electrics | None
-    """The account of the coil; None where there is none."""
+    """Results of the electrical side; None without a coil."""
     method: str = "uncoupled"
     """How circuit and mechanics were joined."""
     circuit_steps: int = 0
@@ -57,31 +57,31 @@ class Driven:
     """Numbers for the summary that the netlist itself asks for."""
     notes: Sequence[str] = ()
     waves: Callable[[], Mapping[str, Array]] = dict
-    """Makes the columns of the coils: a value for each row of the waveforms. In a row at a jump
-    stands what is before it, as in the mechanics' columns, whose state a row is: the first row is
-    the machine at rest, without command and current."""
+    """Makes the columns of the coils: a value for each row of the waveforms. A row at a jump holds
+    the value before it, as in the mechanics' columns; so the first row is the machine at rest,
+    without command and current."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What surface and part did in a run; SI."""
+    """The motion of surface and part in a run; SI."""
 
     totals: Mapping[str, float]
-    """At the end, counted from the start, of one actuator: the part's height, times, counts and
-    energies by the names of the mechanics' outputs; ``energy_in`` is what the coil's force, or the
-    surface that is given its velocity, has done."""
+    """Totals of one actuator from the start to the end: the part's height, times, counts and
+    energies by the names of the mechanics' outputs; ``energy_in`` is the work of the coil's force,
+    or of the surface whose velocity is given."""
     at_settle: Mapping[str, float]
-    """The same when settling ended."""
+    """Totals at the end of settling."""
     extremes: Mapping[str, float]
     """After settling, largest and smallest ``a_surface``, ``v_surface`` and ``z_surface``; infinite
-    where there is none."""
+    where an acceleration is not bounded."""
     frames: npt.NDArray[np.float64]
     """The surface's height at each instant of the camera's frames after settling."""
     slope: float | None
-    """Of the straight line through the part's heights after settling, m/s; None where
+    """Slope of the straight line through the part's heights after settling, m/s; None where
     ``run.average`` does not ask for it."""
     ram: float | None = None
-    """Where the ram is in its actuator in the last row, m; None where there is no ram."""
+    """Position of the ram in its actuator in the last row, m; None without a ram."""
 
 
 def average_slope(run: Run, heights: Array) -> float | None:
@@ -92,7 +92,7 @@ def average_slope(run: Run, heights: Array) -> float | None:
 
 
 def drive(scene: Scene, recorder: Recorder) -> Driven:
-    """What the scene's rung does; without a coil the mechanics move by themselves."""
+    """Drive the mechanics by the scene's rung; without a coil they move by themselves."""
     if not scene.rung.driven:
         nothing = np.zeros((1, 1))
         recorder.follow(np.array([scene.run.duration]), nothing, nothing)
@@ -102,8 +102,7 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
 
 
 def commanded(command: Command, rows: Array) -> Array:
-    """V1 (V) at the times of the rows (s), at a jump the value before it; 0 in the first row, where
-    the command has not begun."""
+    """V1 (V) at the times of the rows (s): at a jump the value before it, so 0 in the first row."""
     made = Tape(1, len(rows))
     for part in blocks(len(rows)):
         at = rows[part]
@@ -116,8 +115,8 @@ def coil_waves(
     recorder: Recorder,
     waves: Callable[[int, str], tuple[Array, Array]],
 ) -> dict[str, Array]:
-    """Columns of each surface's coil: the command, and what ``waves`` makes of its number and the
-    end of its columns' names: current (A) and voltage (V)."""
+    """Columns of each surface's coil: its command (V), current (A) and voltage (V). The last two
+    come from ``waves(k, end)`` for coil number k and the end of its columns' names."""
     found: dict[str, Array] = {}
     for k, (drive, surface) in enumerate(zip(drives, ("", "_2"), strict=False)):
         found[f"command{surface}"] = commanded(drive, recorder.time)
@@ -131,31 +130,36 @@ def total(shares: Array, values: npt.NDArray[Any]) -> float:
 
 
 def magnetic(scene: Scene, current: float, eddy_current: float) -> float:
-    """Energy in the inductances of all coils, J, at these currents of one (A)."""
+    """Energy in the inductances of all coils, J, for the currents (A) of one coil and its eddy
+    branch."""
     coil = scene.coil
     own = 0.5 * coil.inductance * current**2
     return coil.count * (own + 0.5 * (coil.eddy_inductance or 0.0) * eddy_current**2)
 
 
 class Eddy:
-    """The LR2 branch of one coil, whose current is linear on intervals; solved exactly."""
+    """The eddy-current branch of one coil (inductance L2 parallel to R2, in series with the coil),
+    solved exactly for a coil current that is linear on intervals."""
 
     def __init__(self, scene: Scene) -> None:
         inductance = scene.coil.eddy_inductance or 0.0
         self.resistance = scene.coil.eddy_resistance or 0.0
         self.tau = inductance / self.resistance if self.resistance else 0.0
-        """Its time constant, s; 0 where the coil has no such branch."""
+        """Time constant of the branch, s; 0 where the coil has none."""
         self.heat = 0.0
-        """In its resistance so far, J."""
+        """Heat in the branch's resistance so far, J."""
         self.current = 0.0
-        """In its inductance at the end, A."""
+        """Present current in the branch's inductance, A."""
 
     def follow(self, h: Array, start: Array, end: Array) -> Array | None:
-        """Go on through intervals of lengths ``h`` (s), the coil's current (A) between ``start``
-        and ``end``; gives the branch's current at the beginning of each.
+        """Advance through intervals of lengths ``h`` (s), in each the coil's current (A) going from
+        ``start`` to ``end``; gives the inductance's current (A) at the start of each interval.
         """
         if not self.tau:
             return None
+        # tau di_L/dt = i - i_L with i a ramp: the resistance's current i - i_L tends to ``lag``,
+        # and the difference ``rest`` decays with exp(-t/tau). The heat is R2 times the integral of
+        # (lag + rest exp(-t/tau))².
         tau, own, heat = self.tau, self.current, self.heat
         branch = np.empty(len(h))
         for k in range(len(h)):

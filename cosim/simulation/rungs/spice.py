@@ -19,7 +19,7 @@ from cosim.simulation.rungs.rung import Driven, Eddy, Electrics, commanded, magn
 
 def drive(scene: Scene, recorder: Recorder) -> Driven:
     """The coupling method of the scene joins ngspice and the mechanics."""
-    # Only those who run a circuit load PySpice, which takes a while.
+    # Imported here, since only runs of a circuit need PySpice, which takes a while to load.
     from cosim.circuit.false_cycles import refuse_false
     from cosim.circuit.netlist import asked_for
     from cosim.circuit.outputs import measured
@@ -50,7 +50,7 @@ def drive(scene: Scene, recorder: Recorder) -> Driven:
 
 
 def _log_alone(scene: Scene) -> dict[str, Array]:
-    """The circuit's waveforms of a run of which nothing else is wanted."""
+    """The log of the circuit of a run without any other result."""
     from cosim.coupling.loop.macro_steps import coupled
 
     with closing(Mechanics(scene)) as mechanics:
@@ -62,16 +62,17 @@ def _log_alone(scene: Scene) -> dict[str, Array]:
 def _electrics(
     scene: Scene, command: Command, log: dict[str, Array], rows: Array
 ) -> tuple[Electrics, dict[str, Array]]:
-    """From the vectors at the accepted points of the circuit: the account, and the columns.
+    """The electrical results and the coil's columns, from the log at the circuit's accepted points.
 
-    Energies are sums of step times means over the step: for them the trapezoidal companion of an
-    inductance, which ngspice integrates with, balances exactly.
+    Energies are sums over steps of length times product of means: with these the energy of an
+    inductance balances exactly under ngspice's trapezoidal rule.
     """
     coil, circuit, settle = scene.coil, scene.circuit, scene.run.settle
     copper = coil.resistance / coil.count
     if circuit.netlist is None:
         copper += circuit.sense_resistance
-    made = "v(v1)" in log and circuit.model != "amplifier"  # by the circuit, not given to it
+    # Whether the circuit itself makes the command V1; else V1 is its input.
+    made = "v(v1)" in log and circuit.model != "amplifier"
     delivered, squares, eddy = 0.0, 0.0, Eddy(scene)
     # A netlist's operating point may have a current.
     first = eddy.current = float(log["i(vemf)"][0] / coil.count)
@@ -84,7 +85,7 @@ def _electrics(
         current = coils / coil.count
         h = np.diff(time)
         mean = 0.5 * (coils[1:] + coils[:-1])
-        # What lies beyond the coil's ends is the netlist's own affair.
+        # In a netlist of the user's own, only the coil between ``out`` and ``sense`` is counted.
         lost = out if circuit.netlist is None else out - sense
         delivered += total(h, mean * (0.5 * (lost[1:] + lost[:-1])))
         squares += total(h, mean**2)
@@ -94,8 +95,8 @@ def _electrics(
         stop = len(rows) if time[-1] == end else int(np.searchsorted(rows, time[-1]))
         known = [current, out - sense, *(part[name] for name in saved)]
         known += [part["v(v1)"]] if made else []
-        for here in blocks(stop - done):
-            at = rows[done:stop][here]
+        for few in blocks(stop - done):
+            at = rows[done:stop][few]
             waves.append(np.stack([np.interp(at, time, values) for values in known], axis=1))
         done = stop
     electric = Electrics(
@@ -116,11 +117,13 @@ def _electrics(
 
 
 FOLDED = 0.2
-"""Share of a waveform, rms, that its rows may miss before that is told."""
+"""Rms difference between a waveform and the interpolation of its rows, over its rms, above which a
+note is given."""
 
 
 def _folded(scene: Scene, log: dict[str, Array], rows: Array) -> Iterator[str]:
-    """Tell of what is faster than the rows, as a PWM is: a carrier of their rate looks constant."""
+    """A note on waveforms that change faster than their rows, such as a PWM: a carrier at the rate
+    of the rows looks constant."""
     names = {"coil_voltage": ("v(out)", "v(sense)")} | {v: (v,) for v in scene.circuit.save or []}
     missed, whole = np.zeros((2, len(names)))
     for part in _points({x: log[x] for x in {"time", *chain(*names.values())}}):
@@ -129,8 +132,8 @@ def _folded(scene: Scene, log: dict[str, Array], rows: Array) -> Iterator[str]:
         if len(inside) < 2:
             continue
         h = np.where(time[1:] > scene.run.settle, np.diff(time), 0.0)
-        for k, (one, *less) in enumerate(names.values()):
-            y = part[one] - sum(part[other] for other in less)
+        for k, (vector, *less) in enumerate(names.values()):
+            y = part[vector] - sum(part[other] for other in less)
             back = np.interp(time, inside, np.interp(inside, time, y))
             missed[k] += total(h, (y - back)[1:] ** 2)
             whole[k] += total(h, y[1:] ** 2)
@@ -143,7 +146,7 @@ def _folded(scene: Scene, log: dict[str, Array], rows: Array) -> Iterator[str]:
 
 
 def _limited(scene: Scene, log: dict[str, Array]) -> dict[str, float]:
-    """The share of the time after settling in which each limit acted, of those known."""
+    """The share of the time after settling in which each known limit acted."""
     from cosim.circuit.limits import shares_of_steps
     from cosim.circuit.netlist import AT_WORK, AT_WORK_HERE
 
@@ -157,13 +160,13 @@ def _limited(scene: Scene, log: dict[str, Array]) -> dict[str, float]:
         whole += float(h.sum())
         for name, shares in shares_of_steps(part, least).items():
             spent[name] = spent.get(name, 0.0) + total(h, shares[lead:])
-        lead = 1  # what leads to the first step of a part is a step of the last one
+        lead = 1  # later parts begin a step early, so their first step is not counted again
     return {name: time / whole for name, time in spent.items()}
 
 
 def _points(log: dict[str, Array], lead: int = 0) -> Iterator[dict[str, Array]]:
-    """The log in parts, each with the first point of the next one as its last, and so many points
-    of the one before as its first."""
+    """The log in parts, so that each step lies in one part: a part's last point is the next one's
+    first. With ``lead`` each part begins so many points earlier."""
     for part in blocks(len(log["time"]) - 1):
         reach = slice(max(part.start - lead, 0), part.stop + 1)
         yield {name: np.ascontiguousarray(values[reach]) for name, values in log.items()}
@@ -177,26 +180,28 @@ the length is rounded and with it the current that ngspice finds."""
 def _refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
     """Refuse a netlist whose voltage between ``out`` and ``sense`` is not that of the scene's coil.
 
-    v = R i + L di/dt + e must hold in its integral over each step, with an R and L, which least
-    squares find, and these must be the scene's; a coil with an eddy branch is not checked. Raises
-    BadInput: a source the wrong way round, not in series with the coil, or values of the netlist's
-    own would make a result without meaning.
+    The integral of v = R i + L di/dt + e over each step is a linear equation in R and L. Least
+    squares find them; the equations must hold, and R and L must be the scene's. Raises BadInput,
+    since a reversed back-EMF source, one not in series with the coil, or a netlist's own R and L
+    would give meaningless results. A coil with an eddy branch is not checked.
     """
     coil = scene.coil
     if coil.eddy_inductance:
         return
     normal, right = np.zeros((2, 2)), np.zeros(2)
+    # Normal equations of flux = (R, L) @ slopes, summed over steps k.
     for slopes, flux, _ in _fluxes(scene, log):
         normal += np.einsum("ik,jk->ij", slopes, slopes)
         right += np.einsum("ik,k->i", slopes, flux)
     own = np.array([coil.resistance, coil.inductance])
-    # Both are told by a current that flows and changes.
+    # R and L are determined only if the current both flows and changes.
     known = np.linalg.det(normal) > 1e-9 * normal[0, 0] * normal[1, 1]
     found = np.linalg.solve(normal, right) if known else own
     missing, worst, swept, moved = 0.0, 0.0, 0.0, np.zeros(2)
     for slopes, flux, whole in _fluxes(scene, log):
         moved += np.abs(slopes).sum(axis=1)
-        # Running sums: single steps of a stiff circuit need not obey to the digit.
+        # Residuals are summed up: in single steps of a stiff circuit the equation holds only
+        # roughly.
         sums = missing + np.cumsum(flux - found @ slopes)
         missing, worst = float(sums[-1]), max(worst, float(np.abs(sums).max()))
         swept += float(whole.sum())
@@ -208,7 +213,7 @@ def _refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
             f"i({emf}): {emf} must be in series with the coil, + towards {out}."
         )
     off = abs(found - own)
-    # Of a share that hardly counts in the voltage, ngspice's own errors tell nothing.
+    # A deviation that hardly changes the voltage may be an error of ngspice within its tolerance.
     if ((off > 0.01 * own) & (off * moved > 3.0 * scene.circuit.reltol * swept)).any():
         (resistance, inductance), count = found.tolist(), coil.count
         raise BadInput(
@@ -221,9 +226,9 @@ def _refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
 
 
 def _fluxes(scene: Scene, log: dict[str, Array]) -> Iterator[tuple[Array, Array, Array]]:
-    """Of each step whose length is known, part by part: the integral of one coil's current (A s)
-    and its change (A), as rows; the integral of its voltage less the back-EMF (V s); and those of
-    both without signs."""
+    """For the steps of each part of the log: the integral of one coil's current (A s) and its
+    change (A) as two rows; the integral of its voltage less the back-EMF (V s); the sum of the
+    magnitudes of these two integrals (V s)."""
     for part in _points(log):
         current, h = part["i(vemf)"] / scene.coil.count, np.diff(part["time"])
         voltage, emf = part["v(out)"] - part["v(sense)"], part["emf"]
