@@ -60,8 +60,7 @@ def of(line: str, *every: Settings) -> dict[str, Settings]:
 
 
 def steps(longer: float) -> Settings:
-    """Settings with steps of ngspice ``longer`` times as long; the tolerance scales with the
-    cube."""
+    """Settings with steps of ngspice ``longer`` times as long, reltol scaled with the cube."""
     reltol, max_step = BASE.circuit.reltol, BASE.circuit.max_step
     return {"circuit.reltol": reltol * longer**3, "circuit.max_step": max_step * longer}
 

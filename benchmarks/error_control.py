@@ -62,8 +62,7 @@ class ErrorControlled:
             self._try(min(self._h, left / 2.0))
 
     def _try(self, h: float) -> None:
-        """Try two macro steps of ``h`` (s), compare them with one of 2 ``h``, and adapt the
-        step."""
+        """Try two macro steps of ``h`` (s), compare with one of 2 ``h``, and adapt the step."""
         method, known = self.method, self._power
         saved = method.save()
         method.step(2.0 * h)

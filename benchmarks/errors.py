@@ -39,8 +39,7 @@ def of_rungs() -> dict[str, float]:
 
 
 def cost_exponent(rounds: int, periods: Sequence[int]) -> dict[str, Any]:
-    """Exponent of the growth of the CPU time of `reference` with its duration, by least squares in
-    logarithms, for each round."""
+    """Exponent of the CPU time of `reference` over its duration, by least squares in logarithms."""
     calls = {
         str(n): partial(simulate, load("reference", [f"run.duration={n / 20}"])) for n in periods
     }

@@ -105,8 +105,7 @@ def law_of(name: str, width: float, scene: Scene) -> Law:
 
 
 class _Smoothed(Machine):
-    """The whole machine with a smoothed law in place of sticking and slipping; the last state is
-    the bristle's deflection."""
+    """The machine with a smoothed law of friction; the last state is the bristle's deflection."""
 
     scales = np.append(Machine.scales, 1e-6)
 
@@ -148,8 +147,7 @@ def _width(name: str, width: float) -> str:
 
 
 def creep() -> Iterator[Row]:
-    """For each law the creep (µm/s), the error of the position of rest (µm), and the number of
-    evaluations."""
+    """For each law creep (µm/s), error of the position of rest (µm), number of evaluations."""
     rig = load("reference")
     truth = _stops(rig)
 

@@ -46,8 +46,7 @@ _SOLVERS = ("exact", "published")
 
 
 def _call(trial: Trial, exact: bool) -> Callable[[], int]:
-    """A function that calls a compiled solver on a trial, without the trial's first three and last
-    two rows, as the authors do."""
+    """A call of a compiled solver on a trial without first and last rows, as the authors do."""
     rows = slice(3, len(trial.time) - 2)
     time = np.ascontiguousarray(trial.time[rows] - trial.time[3])
     surface = np.ascontiguousarray(trial.platform.v[rows])

@@ -76,8 +76,7 @@ def _mechanics(scene: Scene, log: Log) -> None:
 
 
 def _replay(scene: Scene) -> Array:
-    """Back-EMF (V), slope (V/s) and next impact (s) after each step of a coupled run; the last row
-    is given twice."""
+    """Back-EMF (V), slope (V/s), next impact (s) after each step of a run; the last row twice."""
     with closing(Mechanics(scene)) as mechanics:
         lead = Lead(scene, command(scene), Recorder(scene, mechanics, lambda _: None))
         listener = _Listener(lead.state)

@@ -44,8 +44,7 @@ class Past:
         """Time derivative of this share without any extrapolation, V/s."""
 
     def met(self, time: float, current: Any, current_slope: Any, emf: Any, emf_slope: Any) -> None:
-        """Add a communication point at ``time`` (s), with both outputs and their slopes; an unknown
-        slope is None."""
+        """Add a communication point at ``time`` (s): both outputs and slopes, None if unknown."""
         self.time = time
         self.current.add(time, current, current_slope)
         self.emf.add(time, emf, emf_slope)

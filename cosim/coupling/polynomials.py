@@ -35,8 +35,7 @@ def slope(coefficients: Any, s: float) -> Any:
 
 
 def shifted(coefficients: Array, s: float) -> Array:
-    """The coefficients of the same polynomial about an origin ``s`` seconds later (Taylor shift by
-    repeated Horner steps)."""
+    """The coefficients of the polynomial about an origin ``s`` seconds later (Taylor shift)."""
     c = np.array(coefficients)
     for first in range(len(c) - 1):
         for k in range(len(c) - 2, first - 1, -1):

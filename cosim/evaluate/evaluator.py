@@ -129,8 +129,7 @@ class Evaluator:
         return next((found for _, found in self.groups([every])), [])
 
     def groups(self, groups: Sequence[Sequence[Settings]]) -> Iterator[tuple[int, list[Outcome]]]:
-        """Each group's number and outcomes, as soon as the group is complete; the settings of all
-        groups run in parallel."""
+        """Each group's number and outcomes, once complete; all groups run in parallel."""
         places = [(n, k) for n, group in enumerate(groups) for k in range(len(group))]
         known: list[dict[int, Outcome]] = [{} for _ in groups]
         for number, outcome in self.run(enumerate(one for group in groups for one in group)):

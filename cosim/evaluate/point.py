@@ -97,8 +97,7 @@ def point(base: Scene, values: Settings, whole_periods: bool) -> Scene:
 
 
 def inputs(scene: Scene) -> dict[str, Any]:
-    """All inputs of a run of a scene: its keys, and the hashes of the files that these name and
-    that a netlist includes."""
+    """All inputs of a run: the scene's keys, hashes of the files that keys and netlist name."""
     files = [Path(file) for file in scene.files.values()]
     if netlist := scene.circuit.netlist:
         files += netlist_files(Path(netlist))[1:]

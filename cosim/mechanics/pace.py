@@ -11,8 +11,7 @@ from cosim.mechanics.stickslip import Mechanics
 from cosim.scene import Scene, keys
 
 BUDGET = 3e8
-"""Internal steps of the FMU that a run may take beside one for each communication step: some
-minutes."""
+"""Internal steps of the FMU that a run may take beside communication steps: some minutes."""
 
 ORDINARY = 1e6
 """Internal steps per simulated second that are always allowed, since a run may be long. The

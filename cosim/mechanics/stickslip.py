@@ -64,8 +64,7 @@ _KEYS = [[key for key in keys() if key.variable and key.kind is kind] for kind i
 _VARIABLES = [
     ([key.variable for key in group], attrgetter(*(key.full for key in group))) for group in _KEYS
 ]
-"""For real and for integer parameters: the FMU's variables that are keys of a scene, and a getter
-of their values from a scene."""
+"""For real and integer parameters: the FMU's variables that are keys, and their getter."""
 
 FMI = 3
 """The FMI version by which the FMU is called; by version 2 it gives the same bits."""
@@ -79,8 +78,7 @@ SUSPENSIONS = {"cubic": 1, "knee": 2, "repulsion": 3}
 def _names(
     has_source: bool, two_surfaces: bool, changing_force: bool
 ) -> tuple[tuple[str, ...], dict[str, tuple[str, ...]]]:
-    """Names of the FMU's variables: of the inputs that come from outside (ports), and of all
-    variables by role."""
+    """Names of the inputs from outside (ports), and of all the FMU's variables by role."""
     given = "command" if has_source else "current"
     step_outputs, sampled, totals = STEP_OUTPUTS, SAMPLE_OUTPUTS, TOTALS
     if has_source:
@@ -226,15 +224,13 @@ def numbers_of(scene: Scene) -> dict[str, float]:
 
 
 def suspension_force(known: Mapping[str, float], places: Array) -> Array:
-    """The suspension's force (N) on a ram at rest at ``places`` (q, m), for the stepper's numbers
-    of a rig."""
+    """Force (N) of a rig's suspension on a ram at rest at ``places`` (q, m)."""
     rig, force_at = _rig(known), library("stepper").stepper_suspension
     return np.array([force_at(rig, q) for q in places.tolist()])
 
 
 def rests_of(known: Mapping[str, float]) -> list[float]:
-    """The positions (q, m), rising, at which the ram rests without a current; also inside a
-    compliant wall."""
+    """Positions (q, m), rising, of a ram at rest without current; also in a compliant wall."""
     found = (c_double * 4)()
     count = library("stepper").stepper_rests(_rig(known), found)
     return [*found][:count]

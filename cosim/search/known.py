@@ -1,5 +1,4 @@
-"""Points of the unit cube that were run, with a score for each of several quantities, for searches
-that share them."""
+"""Points of the unit cube that were run, with their scores for several quantities."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import inf

@@ -44,16 +44,13 @@ LOOSER = 1e-6
 """``mechanics.tolerance`` of that run where the scene has no steps of ngspice."""
 
 LEAST_TOLD = 5e-5
-"""Least relative error of v_average with ngspice: two runs may err alike by chance, so far as seen.
-"""
+"""Least relative error of v_average with ngspice, as seen: two runs may err alike by chance."""
 
 STRICT = 2.4
-"""Factor by which steps are shorter in the first of two finer runs of a strict check (squared in
-the second)."""
+"""Factor by which steps of the first finer run of a strict check are shorter; squared: second."""
 
 PERIODS, LONG = 60, 2.0
-"""Least length of a run that can show chaos, in periods of the drive and in s; averages are over
-its second half."""
+"""Least length of a run that shows chaos, periods and s; averages are over its second half."""
 
 SHARES = (0.5, 1.0, 4.0)
 """Lengths of the runs in units of that, tried in turn until the motion is periodic or chaotic."""
@@ -72,8 +69,7 @@ PARTED = 1e-5
 """Relative difference of v_average by the shift ASIDE above which motion is not regular."""
 
 SAME = 1e-3
-"""Relative difference below which two values of v_average, or of the part's displacement in a
-period, count as equal."""
+"""Relative difference below which mean velocities, or displacements in a period, are equal."""
 
 MOST_PERIODS = 8
 """Most periods of the drive after which motion is recognised to repeat."""
@@ -85,8 +81,7 @@ class _Stopped(CosimError):
 
 @contextmanager
 def _beside(count: int) -> Iterator[tuple[ThreadPoolExecutor, Progress]]:
-    """Threads for ``count`` other runs, and a progress function for them, which ends these runs if
-    the block raises an exception."""
+    """Threads for ``count`` runs, and their progress, which ends them if the block raises."""
     stopped = Event()
 
     def going(_: float) -> None:
@@ -232,8 +227,7 @@ def _kind(ways: Iterator[Array], length: float, averaged: int, chaos: bool) -> d
 
 
 def _answer(way: Array, length: float) -> float | None:
-    """The mean velocity (m/s) of the repeating motion; 0 below LEAST, None if it does not
-    repeat."""
+    """The mean velocity (m/s) of repeating motion; 0 below LEAST, None without repetition."""
     if abs(_mean(way)) < LEAST * length:
         return 0.0
     count = _repeats(way)
@@ -246,8 +240,7 @@ def _mean(way: Array) -> float:
 
 
 def _stretches(way: Array, count: int) -> Array:
-    """Moving averages of the displacements over ``count`` periods, in the second half of the
-    run."""
+    """Moving averages of displacements over ``count`` periods, in the run's second half."""
     way = way[len(way) // 2 :]
     count = min(count, len(way))
     return np.convolve(way, np.ones(count) / count, "valid")

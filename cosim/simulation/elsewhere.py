@@ -48,8 +48,7 @@ def one_run(scene: Scene, progress: Progress, alone: bool = False) -> Result:
 
 @contextmanager
 def on_disk_in(folder: Path) -> Iterator[None]:
-    """As :func:`cosim.files.spill.on_disk_in`, also for runs in workers, which are ended with
-    it."""
+    """As :func:`cosim.files.spill.on_disk_in`, also for workers, which end with the block."""
     with spill.on_disk_in(folder):
         try:
             yield
@@ -73,8 +72,7 @@ def _is_meant(path: str) -> bool:
 
 
 def _load() -> None:
-    """Load libraries before the fence closes: ngspice looks up the process's user, which the fence
-    forbids."""
+    """Load libraries before the fence closes: ngspice looks up the user, which it forbids."""
     from cosim.circuit import false_cycles  # noqa: F401
     from cosim.coupling.loop.lead import engine
     from cosim.simulation import here  # noqa: F401

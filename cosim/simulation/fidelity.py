@@ -1,5 +1,4 @@
-"""The policy of fidelity: searches use a simple circuit model, a more complete one judges
-results."""
+"""The policy of fidelity: a simple circuit model searches, a more complete one judges."""
 
 from dataclasses import dataclass
 

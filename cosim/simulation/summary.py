@@ -125,8 +125,7 @@ def _seen(
 def _energies(
     scene: Scene, totals: Mapping[str, float], electric: Electrics | None
 ) -> dict[str, float]:
-    """The energy balance of the whole run, J, of all ``coil.count`` actuators; its residual is over
-    the largest energy involved."""
+    """The energy balance of the run, J, of all actuators; residual over the largest energy."""
     count = scene.coil.count
     lost = {
         f"energy_{kind}": count * totals[f"energy_{kind}"]
@@ -152,8 +151,7 @@ def _energies(
 
 
 def _hanging(scene: Scene) -> float:
-    """Energy in the flexures at the start, J: the scale of the balance of a scene without a
-    drive."""
+    """Energy in the flexures at the start, J: the scale of a balance without a drive."""
     if scene.surface_is_given:
         return 0.0
     mechanics = scene.mechanics

@@ -114,8 +114,7 @@ class Amplifier:
         return [self._slew - np.abs(rate), *swing]
 
     def _piece(self, length: float, gain: float) -> float:
-        """Advance by at most ``length`` s in one mode, and change the mode if it ends before; gives
-        the time used, s."""
+        """Advance by at most ``length`` s, up to the end of the mode; gives the time used, s."""
         stack = self._propagators(length, self._mode, gain)
         states = stack @ self._x  # checks × states: the state at each check
         ended = np.min(self._margins(states), axis=0) < 0.0
@@ -134,8 +133,7 @@ class Amplifier:
         def least(s: float) -> float:
             return float(np.min(self._margins(then(s))))
 
-        # A margin that starts at zero, where a limit was just left, may be negative by rounding:
-        # then the whole step is taken.
+        # A margin of 0 at the start may be negative by rounding: then the whole step is taken.
         rest = step
         if least(0.0) > 0.0:
             rest = float(brentq(least, 0.0, step, xtol=1e-16))  # pyright: ignore[reportArgumentType]

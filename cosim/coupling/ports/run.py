@@ -45,8 +45,7 @@ _AGREEMENT = 2.0
 """Largest difference between FMU and ngspice where steps are repeated, over ``circuit.reltol``."""
 
 _WRONG = 12
-"""As in ports.c: number of changes not explained by the reported slope from which on it is
-wrong."""
+"""As in ports.c: so many changes that disagree with the reported slope make it wrong."""
 
 _STATUSES = {
     2: "it discards the step, or asks to end the run",

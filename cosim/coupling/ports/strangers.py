@@ -334,8 +334,7 @@ def _link(folder: str, names: list[str]) -> None:
 
 
 def stranger(path: str) -> Stranger:
-    """The foreign FMU in a file, unpacked and loaded once per process while the file is
-    unchanged."""
+    """The FMU in a file, unpacked and loaded once per process while the file is unchanged."""
     try:
         about = Path(path).stat()
     except OSError as error:

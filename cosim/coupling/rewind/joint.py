@@ -90,8 +90,7 @@ class Joint:
         self.meet()
 
     def advance(self, h: float, emf: Polynomial, gain: float = 0.0) -> None:
-        """Advance both sides by ``h`` (s): the circuit with this back-EMF (V), then the mechanics
-        with the method's current."""
+        """Advance the circuit by ``h`` (s) with this back-EMF (V), then the mechanics."""
         self.for_first = np.array(emf)
         self.first.advance(h, self.for_first, gain)
         self.past.stepped(self.time + h, self.first.outputs()[0], self.first.mean)

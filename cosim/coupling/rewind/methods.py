@@ -104,8 +104,7 @@ class Iterated(Joint):
 
 
 class PredictorCorrector(Iterated):
-    """The first try extrapolates the back-EMF with its slope; the second one, which assumes the end
-    of the first, counts."""
+    """The first try extrapolates the back-EMF with its slope; the second assumes its end."""
 
     def solve(self, answer: Callable[[Array], Array], x: Array) -> None:
         answer(answer(x))
@@ -125,8 +124,7 @@ def _jacobian(answer: Callable[[Array], Array], x: Array, residual: Array, off: 
 
 
 def _mixed(guesses: list[Array], residuals: list[Array]) -> Array:
-    """Anderson's next guess: the combination of the last guesses with the least (linearised)
-    residual, plus this residual."""
+    """Anderson's next guess: the combination of guesses with the least residual, plus this."""
     # Values × differences of successive iterates.
     steps = np.array([(b - a).ravel() for a, b in pairwise(guesses)]).T
     changes = np.array([(b - a).ravel() for a, b in pairwise(residuals)]).T

@@ -29,8 +29,7 @@ _SILENT = 10  # steps of noise alone before a failure, which then counts as stab
 
 
 def _linear_map(method: Joint, h: float) -> Array:
-    """The matrix of one macro step of ``h`` (s): from all that the method keeps to the same after
-    the step."""
+    """The matrix of one macro step of ``h`` (s), from all that the method keeps to the same."""
     for _ in range(_WARM_UP):
         method.step(h)
     # Each array (leaf) of the saved state is replaced by its rows of the unit matrix, so that the

@@ -130,8 +130,7 @@ def total(shares: Array, values: npt.NDArray[Any]) -> float:
 
 
 def magnetic(scene: Scene, current: float, eddy_current: float) -> float:
-    """Energy in the inductances of all coils, J, for the currents (A) of one coil and its eddy
-    branch."""
+    """Energy (J) in the inductances of all coils, at these currents (A) of one coil."""
     coil = scene.coil
     own = 0.5 * coil.inductance * current**2
     return coil.count * (own + 0.5 * (coil.eddy_inductance or 0.0) * eddy_current**2)

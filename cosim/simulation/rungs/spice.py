@@ -117,13 +117,11 @@ def _electrics(
 
 
 FOLDED = 0.2
-"""Rms difference between a waveform and the interpolation of its rows, over its rms, above which a
-note is given."""
+"""Rms error of interpolated rows, over the waveform's rms, above which a note is given."""
 
 
 def _folded(scene: Scene, log: dict[str, Array], rows: Array) -> Iterator[str]:
-    """A note on waveforms that change faster than their rows, such as a PWM: a carrier at the rate
-    of the rows looks constant."""
+    """A note on waveforms faster than their rows: a carrier at the rows' rate looks constant."""
     names = {"coil_voltage": ("v(out)", "v(sense)")} | {v: (v,) for v in scene.circuit.save or []}
     missed, whole = np.zeros((2, len(names)))
     for part in _points({x: log[x] for x in {"time", *chain(*names.values())}}):
@@ -200,8 +198,7 @@ def _refuse_foreign_coil(scene: Scene, log: dict[str, Array]) -> None:
     missing, worst, swept, moved = 0.0, 0.0, 0.0, np.zeros(2)
     for slopes, flux, whole in _fluxes(scene, log):
         moved += np.abs(slopes).sum(axis=1)
-        # Residuals are summed up: in single steps of a stiff circuit the equation holds only
-        # roughly.
+        # Residuals are summed: in single steps of a stiff circuit the equation is inexact.
         sums = missing + np.cumsum(flux - found @ slopes)
         missing, worst = float(sums[-1]), max(worst, float(np.abs(sums).max()))
         swept += float(whole.sum())

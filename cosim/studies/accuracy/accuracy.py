@@ -45,8 +45,7 @@ _STYLES = tuple(zip(_COLORS, "ovsD^PX", strict=True))
 
 
 def order(runs: Sequence[Run]) -> float:
-    """Slope of log error over log setting, fitted to the finest settings; nan where these are too
-    few or no step lengths."""
+    """Slope of log error over log step, fitted to the finest settings; nan if too few."""
     known = [run for run in runs if run.counts and run.error > 0.0]
     last = known[-_HALVINGS - 1 :]
     if len(last) <= _HALVINGS or not last[0].setting.endswith("[s]"):
@@ -135,8 +134,7 @@ class Comparison:
         return rows
 
     def methods(self) -> list[Row]:
-        """Every method: its order, and that fitted on each scene; its failures; the scenes where it
-        has no line, and why."""
+        """Every method: its order, that fitted on each scene, failures, and missing lines."""
         return [self._method(solver) for solver in self.solvers]
 
     def _method(self, solver: Solver) -> Row:

@@ -16,8 +16,7 @@ from cosim.scene import Scene
 
 @dataclass(frozen=True)
 class Case:
-    """A scene: ``overrides`` of the scene ``reference``, the duration (s) and the interval between
-    samples (s)."""
+    """Overrides of the scene ``reference``, its duration (s) and time between samples (s)."""
 
     name: str
     title: str
@@ -25,8 +24,7 @@ class Case:
     duration: float
     sampled: float = 2.5e-3
     judged: tuple[str, ...] = ("z_part",)
-    """Signals that are compared; near impacts errors of velocities would only show those of the
-    impacts' times."""
+    """Signals that are compared; near impacts velocities would show only the impacts' times."""
     netlist: bool = False
     """Whether the reference includes the leak of the netlist's pole, which low bandwidth shows."""
 

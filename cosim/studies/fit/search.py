@@ -39,8 +39,7 @@ side. On 16 trials of this bench with known friction it is 0.045 (rms)."""
 
 
 def _laws(kinetic: Array, ratios: Array) -> tuple[Array, Array]:
-    """µ_k F_n/m and µ_p F_n/m, m/s², of all pairs of kinetic frictions and ratios µ_p/µ_k, flat;
-    the ratio varies fastest."""
+    """µ_k F_n/m and µ_p F_n/m, m/s², of all pairs, flat; the ratio µ_p/µ_k varies fastest."""
     first, second = (x.ravel() for x in np.meshgrid(kinetic, ratios, indexing="ij"))
     return first * GRAVITY, first * second * GRAVITY
 

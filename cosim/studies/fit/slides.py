@@ -24,8 +24,7 @@ from cosim.trials.tracked import Trial
 Rows = npt.NDArray[np.intp]
 
 CLEAR = 4.0
-"""Standard deviations of the noise by which the relative motion from frame to frame must exceed 0
-to count as sliding."""
+"""Relative motion between two frames counts as sliding above so many deviations of its noise."""
 BESIDE = 7  # at most so many frames without sliding are used on either side of a slide
 INSTANTS, REACH = 12, 2.5
 """Number of instants at which a slide may begin (or end), and the frame intervals they span: where

@@ -161,8 +161,7 @@ def _steady(trial: Measured) -> bool:
 
 
 def _asked(space: Space, trials: Sequence[Measured], effort: object) -> list[Any]:
-    """All inputs, beside seed and program, on which stages depend: a store made of other ones is
-    refused."""
+    """All inputs, beside seed and program, on which stages depend; the store checks them."""
     entries = [repr(entry) for entry in (*space.entries.values(), *space.trial.values())]
     signals = [
         [one.label, *(crc32(x.tobytes()) for x in one.target.signals.values())] for one in trials

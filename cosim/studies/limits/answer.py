@@ -42,8 +42,7 @@ NAMED, LEAST = 6, 2
 
 @dataclass(frozen=True)
 class Gain:
-    """The relative gain of a change: its robust value over that of the unchanged device on the same
-    rig, less 1."""
+    """The gain of a change: its robust value over the unchanged device's on the rig, less 1."""
 
     change: Change
     goal: Goal

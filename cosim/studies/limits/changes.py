@@ -41,8 +41,7 @@ class Machine:
     heat: float = DRIVE_RANGE_HEAT
     """W: the most that the coil may dissipate on average."""
     levels: int = 0
-    """Number of levels, at evenly spread phases, of a command of its own; they are searched, too.
-    """
+    """Number of levels, evenly spread in phase, of a command of its own, to be searched, too."""
     rung: str = "limited"
     """The cheapest circuit in which the change has an effect."""
 

@@ -36,8 +36,7 @@ Key = tuple[str, str, str]
 
 @dataclass(frozen=True)
 class Point:
-    """What a setting achieves, SI: its own ``value``, and ``median`` and ``worst`` over the turns
-    of the knobs."""
+    """What a setting achieves, SI: itself, and its median and worst over the knobs' turns."""
 
     value: float
     median: float

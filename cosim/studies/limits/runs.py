@@ -75,8 +75,7 @@ class Bench:
 
     @staticmethod
     def base(scene: Scene, rig: Settings, told: str) -> Scene:
-        """A scene prepared for the search of its knobs, on a rig; ``told`` names the rig's source
-        in messages. Raises BadInput."""
+        """A scene with its knobs free, on a rig; messages name it ``told``. Raises BadInput."""
         alone = {"circuit.model": "limited", "drive.pwm_ripple": False, "drive.quantised": False}
         return changed(scene, FREE | alone | rig, told)
 

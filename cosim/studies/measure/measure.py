@@ -163,8 +163,7 @@ def _row(
 
 
 def _films(values: Mapping[Candidate, Array]) -> str:
-    """The mean velocities in the films of three waveforms, from the 5 % to the 95 % quantile over
-    the rigs, in words."""
+    """The 5 and 95 % quantiles over the rigs of the mean velocity in three films, in words."""
     shapes = ("rising sawtooth", "falling sawtooth", "sine")
     ends = {one.name: np.quantile(shown[:, 0], (0.05, 0.95)) * 1e3 for one, shown in values.items()}
     told = ((shape, [signed(end, ".0f") for end in ends[f"film, {shape}"]]) for shape in shapes)

@@ -22,8 +22,7 @@ from cosim.studies.limits.search import Candidates, Effort, searched
 UP = NUMBER["v_up"]
 BY_NAME = {change.name: change for change in CHANGES}
 TARGETS = (AS_IT_IS.name, "falling sawtooth")
-"""Machines whose robust velocity upwards is wanted: that of all measured trials, and one with a
-waveform that promises most."""
+"""Machines of the targets: as in all measured trials, and with a most promising waveform."""
 
 SPREAD = 0.4
 """Standard deviation of drawn rigs about given ones, as a share of the given rigs' own. On 14 rigs
@@ -48,12 +47,10 @@ FILMS = {
     "film, half the grip force": ("half the grip force", AS_IT_IS.name),
     "film, twice the grip force": ("twice the grip force", AS_IT_IS.name),
 }
-"""For each film the change that is filmed, and the change whose best robust setting on the scene's
-own rig drives it."""
+"""For each film the change on film, and that whose best robust setting drives it."""
 
 OWN, OTHERS = Effort(256, 150, 60), Effort(160, 60, 30)
-"""Effort of searches on the scene's own rig, and on others, which start from the former's results.
-"""
+"""Effort of searches on the scene's rig, and on others, which start from its results."""
 
 
 @dataclass(frozen=True)

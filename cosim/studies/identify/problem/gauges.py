@@ -54,8 +54,7 @@ def ring(rig: Numbers) -> float:
 
 
 BIASES = {"": 0.0, " down": -1.0}
-"""Currents (A) of the coil at which the ram's resonance is measured, by the suffix of the gauge's
-name."""
+"""Coil currents (A) at which the ram's resonance is measured, by suffix of the gauge."""
 
 AT_WALL = 500.0
 """Hz, in place of a resonance where the current holds the ram at a wall: no peak lies below it."""

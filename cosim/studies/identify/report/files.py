@@ -104,8 +104,7 @@ def _priors(found: Solved) -> list[str]:
 
 
 def findings(numbers: dict[str, Any]) -> list[str]:
-    """Paragraphs: whether the searches converged, where the ram rests, which numbers of trials are
-    at a bound."""
+    """Paragraphs on convergence, on where the ram rests, and on trials' numbers at bounds."""
     laws, agreed = numbers["laws"], numbers["converged"]
     shares = [
         f"{one['law']} {percent(max(one['costs']) / min(one['costs']) - 1.0)}" for one in laws

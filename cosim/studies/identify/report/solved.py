@@ -30,8 +30,7 @@ PLACES = np.linspace(-2e-3, 2e-3, 9)
 """Positions q (m) of the ram in the actuator at which the suspension's force is reported."""
 
 KINDS = ("surface", "surface_and_part")
-"""What the own parameters of a held-out trial are fitted to: its surface alone; surface and part.
-"""
+"""Whether a held-out trial's own parameters are fitted to its surface, or to the part, too."""
 
 LATE = 5
 """Least number of whole cycles for the first one, the start, to be left out of ``floor_late``."""
@@ -232,8 +231,7 @@ def told_of_force(meant: Sequence[Found]) -> list[Row]:
 
 
 def told_of_rig(one: Found, best: Found | None = None) -> Row:
-    """A rig by the keys of a scene, and the ratio of its normal forces to those on the best rig
-    (geometric mean over trials)."""
+    """A rig by the keys of a scene; geometric mean of its normal forces over the best rig's."""
     found: Row = {"cost": one.total, SUSPENSION: one.space.law}
     if best is not None:
         k = OWN.index("normal_force")

@@ -73,8 +73,7 @@ class Plan:
     fine: Search
     effort: Effort
     once: Callable[[str, Callable[[], Any]], Any]
-    """A store's method: it keeps finished stages, from which an interrupted identification goes on.
-    """
+    """A store's method, which keeps finished stages for an interrupted identification."""
     seed: int
     progress: Progress
     name: str

@@ -25,8 +25,7 @@ from cosim.studies.identify.problem.space import Space
 from cosim.studies.identify.problem.targets import draws
 
 STEP = 2e-3
-"""Step of finite differences, as a share of a bound's range: over shorter ones impacts make the
-cost rough."""
+"""Step of finite differences, over a bound's range: below it impacts make the cost rough."""
 SOFT = 0.03
 """Damping of the sensitivities, relative to the diagonal of the normal matrix."""
 POPULATION = 12  # rigs in a generation of CMA-ES
@@ -166,8 +165,7 @@ class Search:
     def _refined_each(
         self, targets: Sequence[Target], rigs: Array, own: Array, rounds: int
     ) -> tuple[Array, Array]:
-        """Own parameters (n × m × OWN), m for each of n pairs of target and rig, fitted, and their
-        costs (n × m)."""
+        """Own parameters (n × m × OWN) fitted, m for each of n targets and rigs; costs (n × m)."""
         n, m, _ = own.shape
         each = [target for target in targets for _ in range(m)]
         wide = np.repeat(rigs, m, axis=0)
@@ -177,8 +175,7 @@ class Search:
     def rescreened(
         self, found: Found, rng: np.random.Generator, count: int, kept: int, rounds: int
     ) -> Found:
-        """The solution on the same rig, with the own parameters of a new screening for each trial
-        whose cost they lower clearly."""
+        """The solution with the own parameters of a new screening where they cost clearly less."""
         (drawn,) = self.screen(found.point[None], rng, count, kept, rounds)
         refined = self.refined(found.point, found.own, rounds)
         take = drawn.costs < BETTER * refined.costs
