@@ -28,25 +28,26 @@ FAILURE = "failure"
 """The variable that says why a point failed; empty where it did not."""
 
 JUDGED = "v_average_fmu"
-"""The variable with v_average as the FMU has it, at the points of a fast sweep that it judged."""
+"""The variable with the FMU's v_average, at those points of a fast sweep that it ran again."""
 _JUDGED = {"units": "m/s", "long_name": "v_average by the FMU, where it judged the fast solver"}
 
 POINT = "point"
-"""The dimension of a sample."""
+"""The dataset's dimension where the points are a sample, not a grid."""
 
 
 class Numbers:
-    """The numbers of ``count`` points, by name and number of the point, and why some failed."""
+    """The summaries of ``count`` points, an array over the points for each name of a number, and
+    why some points failed."""
 
     def __init__(self, count: int) -> None:
         self._count = count
         self._values: dict[str, Array] = {}
-        self._first: dict[tuple[str, ...], int] = {}  # points with these names
+        self._first: dict[tuple[str, ...], int] = {}  # least index of a point with these names
         self.failures = np.full(count, "", dtype=object)
         self.failed = 0
 
     def add(self, index: int, outcome: Outcome) -> None:
-        """Take up a point that has been run, or run again."""
+        """Enter the outcome of a point that has been run, or run again."""
         self.failed += bool(outcome.failure) - bool(self.failures[index])
         self.failures[index] = outcome.failure
         values, names = self._values, tuple(outcome.numbers)
@@ -58,12 +59,13 @@ class Numbers:
             values[name][index] = value
 
     def judge(self, index: int, outcome: Outcome) -> None:
-        """Take up what the FMU makes of a point that the fast solver has run."""
+        """Enter the FMU's v_average of a point that the fast solver has run."""
         values = self._values.setdefault(JUDGED, np.full(self._count, np.nan))
         values[index] = outcome.numbers.get("v_average", np.nan)
 
     def by_name(self) -> dict[str, Array]:
-        """NaN where a point has none. The order is that of the points, in whichever they ran."""
+        """For each name an array over the points, NaN where a point lacks the number. The order of
+        names follows the points' indices, whatever the order in which they ran."""
         order = sorted(self._first, key=lambda names: self._first[names])
         found = {name: self._values[name] for names in order for name in names}
         return found | {name: self._values[name] for name in (JUDGED,) if name in self._values}
@@ -75,8 +77,9 @@ def dataset(
     """The numbers of each point's summary over the keys of the sweep, with their units.
 
     A key's coordinate (:func:`_names`) has its unit, its meaning and, as ``key``, its
-    ``table.key``. Beside a knob stands what it stands for. NaN stands for a point that failed, is
-    still to be run, or has no such number. SI units; ``units`` are :func:`units_of` the scene.
+    ``table.key``; a swept knob has a second one, of the amplitude, frequency or offset that it
+    sets. NaN stands for a point that failed, is still to be run, or has no such number. SI units;
+    ``units`` are :func:`units_of` the scene.
     """
     numbers = found.by_name()
     axes = _names(design, {*numbers, FAILURE, POINT})
@@ -104,7 +107,8 @@ def dataset(
 
 
 def units_of(scene: Scene) -> dict[str, str]:
-    """Of the signals of a scene with ports, by name; none where a file does not tell."""
+    """The units of the signals of a scene with ports, by the signals' names; signals of an FMU
+    whose description cannot be read are left out."""
     files = {each.name: each.file for each in scene.fmu}
     ends = [str(end) for port in scene.port for end in (port.origin, port.to)]
     if any(end.startswith(f"{MACHINE}.") for end in ends):
@@ -112,7 +116,7 @@ def units_of(scene: Scene) -> dict[str, str]:
     sources = [port.source for port in scene.port if port.source is not None]
     found = {name: {"v": "V", "i": "A"}.get(name[:1].lower(), "?") for name in sources}
     for name, file in files.items():
-        with suppress(Exception):  # whatever is wrong with it, its runs tell
+        with suppress(Exception):  # a broken FMU is reported by its runs
             for each in read_model_description(file, validate=False).modelVariables:
                 found[f"{name}.{each.name}"] = fmi.unit(each)
     words = [port.probe for port in scene.port if port.probe is not None]
@@ -121,7 +125,7 @@ def units_of(scene: Scene) -> dict[str, str]:
 
 
 def _names(design: Design, taken: set[str]) -> list[str]:
-    """A name for each axis that can be typed: ``key``, or ``table_key`` where that is taken."""
+    """A name for each axis: ``key``, or ``table_key`` where that is taken, as by an attribute."""
     keys = [axis.key for axis in design.axes]
     bare = Counter(key.name for key in keys)
     return [
@@ -135,7 +139,7 @@ def _names(design: Design, taken: set[str]) -> list[str]:
 
 
 def _meant(scene: Scene, data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """What the knobs that are swept stand for: ``amplitude``, ``frequency``, ``offset``."""
+    """Coordinates ``amplitude``, ``frequency``, ``offset``: what the swept knobs set."""
     axes = {data[name].attrs["key"].removeprefix("drive."): data[name] for name in swept(data)}
     found: dict[str, xr.DataArray] = {}
 
@@ -154,7 +158,8 @@ def _meant(scene: Scene, data: xr.Dataset) -> dict[str, xr.DataArray]:
 
 
 def write(path: Path, data: xr.Dataset, figure: Path) -> None:
-    """NetCDF (classic format): equal data give equal bytes. The ``figure`` of older ones goes."""
+    """NetCDF (classic format): equal data give equal bytes. Removes the outdated ``figure``."""
+    # The writer encodes names as Latin-1; names decoded so from UTF-8 arrive as UTF-8 in the file.
     written = renamed(data, lambda name: name.encode().decode("latin-1"))
     content = written.to_netcdf(engine="scipy")
     with together([path], outdated=[figure]) as (temporary,):

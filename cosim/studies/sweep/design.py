@@ -15,12 +15,12 @@ from cosim.scene.messages import shown
 from cosim.studies.study import check_seed
 
 MOST_POINTS = 1_000_000
-"""Their numbers take 2.3 GB when the dataset is written."""
+"""Of a sweep; writing the dataset of so many takes 2.3 GB of memory."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A key and the values that it takes, SI; a sample spans them from least to greatest."""
+    """A key and the values that it takes, SI; a sample ranges from the least to the greatest."""
 
     key: Key
     values: tuple[Number, ...]
@@ -28,9 +28,9 @@ class Axis:
 
 @dataclass(frozen=True)
 class Design:
-    """The points of a sweep, in order: of a grid the last axis runs fastest.
+    """The points of a sweep, in order; in a grid the last axis runs fastest.
 
-    ``sample`` are the rows of a sample, one column an axis, or None for a grid.
+    ``sample`` holds the points of a sample (points × axes), or is None for a grid.
     """
 
     axes: tuple[Axis, ...]
@@ -56,8 +56,8 @@ class Design:
         return {axis.key.full: value for axis, value in zip(self.axes, row, strict=True)}
 
     def alike(self, points: Iterable[int]) -> list[int]:
-        """The points, those of one frequency together: what the fast solver runs side by side then
-        jumps and turns together, which takes fewer steps."""
+        """The indices ``points`` sorted by frequency: lanes of the fast solver whose waveforms have
+        their jumps and corners at equal times share time steps, so that it takes fewer of them."""
         frequencies = [key for axis in self.axes if (key := axis.key.full) in FREQUENCIES]
         return sorted(points, key=lambda n: [self.point(n)[key] for key in frequencies])
 
@@ -89,7 +89,7 @@ def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: 
     """``count`` settings spread over the ranges of the axes, the same for the same ``seed``.
 
     A Latin hypercube (McKay, Beckman, Conover, Technometrics 21 (1979)): each axis, cut into
-    ``count`` equal parts, has a point in every part. With ``random`` each point is independent.
+    ``count`` equal parts, has one point in each. With ``random`` the points are independent.
     """
     from scipy.stats import qmc
 
@@ -107,11 +107,11 @@ def sample(over: Mapping[str, Sequence[Number]], count: int, seed: int, random: 
         unit = generator.random((count, len(axes)))
     else:
         unit = qmc.LatinHypercube(len(axes), rng=generator).random(count)
-    columns = []
+    columns = []  # of each axis, its values at all points, scaled from the unit cube
     for axis, column in zip(axes, unit.T, strict=True):
         low, high = min(axis.values), max(axis.values)
         if axis.key.choices:
-            chosen = sorted(one for one in map(int, axis.key.choices) if low <= one <= high)
+            chosen = sorted(x for x in map(int, axis.key.choices) if low <= x <= high)
             columns.append([chosen[int(u * len(chosen))] for u in column])
         elif axis.key.kind is int:
             columns.append([low + int(u * (high - low + 1)) for u in column])

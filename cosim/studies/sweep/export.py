@@ -1,4 +1,4 @@
-"""A finished sweep in the forms of other programs: a row for each point, SI."""
+"""A finished sweep in file formats of other programs: a row for each point, SI."""
 
 from io import BytesIO
 from pathlib import Path
@@ -13,8 +13,8 @@ FORMS = ("csv", "parquet", "mat")
 
 
 def export(folder: Path, lists: list[str], out: Path) -> dict[str, str]:
-    """Write the points of a sweep as ``sweep.csv``, ``.parquet`` or ``.mat``; the name of each file
-    with a line on what it holds. Raises BadInput."""
+    """Write the points of a sweep as ``sweep.csv``, ``.parquet`` or ``.mat``. Returns a line on the
+    content of each file, by its name. Raises BadInput."""
     names = [name.strip() for text in lists for name in text.split(",")]
     for name in names:
         if name not in FORMS or names.count(name) > 1:
@@ -24,7 +24,7 @@ def export(folder: Path, lists: list[str], out: Path) -> dict[str, str]:
     data = read_sweep(folder)
     units = {str(name): str(data[name].attrs.get("units", "")) for name in data.variables}
     frame = data.to_dataframe().reset_index()
-    if data.failure.ndim == 0:
+    if data.failure.ndim == 0:  # a single point: its row number is no coordinate
         frame = frame.drop(columns="index")
     files, note = {name: BytesIO() for name in names}, f"{len(frame)} points, SI"
     for name, file in files.items():

@@ -23,13 +23,13 @@ STAYS = 0.05e-3
 """m/s; a part that moves more slowly than this counts as not transported."""
 
 MOST = 6
-"""Panels of a figure."""
+"""Most panels of a figure."""
 
 FAILED: dict[str, Any] = {"color": "#d1495b", "ls": "", "marker": "x", "ms": 6}
 
 
 class Quantity(NamedTuple):
-    """What a panel shows: a number of the summary, in the units of the bench."""
+    """What a panel shows: a number of the summary, times ``scale`` to be in ``unit``."""
 
     name: str
     title: str
@@ -82,9 +82,9 @@ def draw(data: xr.Dataset, title: str) -> Picture:
 
 
 def _quantities(data: xr.Dataset) -> list[Quantity]:
-    """The velocity, and what there is beside it: rigid walls have no peak, and the fast solver
-    knows none."""
-    return [V_AVERAGE, *(one for one in OTHERS if np.isfinite(_values(data, one).values).any())]
+    """The velocity, and each other quantity that some point has: with rigid walls and with the fast
+    solver there are no peaks of the acceleration."""
+    return [V_AVERAGE, *(x for x in OTHERS if np.isfinite(_values(data, x).values).any())]
 
 
 def _values(data: xr.Dataset, quantity: Quantity) -> xr.DataArray:
@@ -94,7 +94,7 @@ def _values(data: xr.Dataset, quantity: Quantity) -> xr.DataArray:
 
 
 def _greatest_change(data: xr.Dataset, quantities: Sequence[Quantity]) -> str:
-    """In words, the number that changes most for its size."""
+    """In words, the number with the greatest change relative to its largest magnitude."""
     changes: list[tuple[float, str]] = []
     for name, _, unit, _ in quantities[:MOST]:
         known = data[name].values[np.isfinite(data[name].values)]
@@ -134,7 +134,7 @@ def _over_keys(data: xr.Dataset, panels: Sequence[tuple[str, Quantity]], style: 
 
 
 def _at_the_fastest(data: xr.Dataset, y: str, x: str) -> xr.Dataset:
-    """The plane of two keys through the point that is fastest upwards."""
+    """The points over two keys, all others being as at the point that is fastest upwards."""
     known = _values(data, V_AVERAGE).fillna(-np.inf)
     best: Any = known.argmax(known.dims)
     others = {name: int(best[name]) for name in data.dims if name not in (x, y)}
@@ -164,7 +164,7 @@ def _maps(data: xr.Dataset, y: str, x: str) -> Picture:
 
 
 def _boundary(axis: Axes, xs: Array, ys: Array, v: Array) -> None:
-    """Where transport ends; a dash at each point where the part stays."""
+    """Draw the contours ±STAYS of ``v`` (m/s), and a dash at each point where the part stays."""
     known = v[np.isfinite(v)]
     low, high = known.min(initial=np.inf), known.max(initial=-np.inf)
     if levels := [level for level in (-STAYS, STAYS) if low < level < high]:
@@ -177,7 +177,7 @@ _MEANT = {
     "drive.pot_frequency": (firmware.knob_frequency, "Hz"),
     "drive.pot_max": (firmware.knob_amplitude, "V"),
 }
-"""What a knob stands for."""
+"""The quantity that a knob sets as a function of the knob, and its unit."""
 
 
 def _setting(value: xr.DataArray) -> str:
@@ -187,7 +187,7 @@ def _setting(value: xr.DataArray) -> str:
 
 
 def _name(axis: Axis, key: xr.DataArray) -> None:
-    """Label an axis; below the numbers of a knob stands what they stand for."""
+    """Label an axis; below each tick of a knob stands the frequency or amplitude that it sets."""
     axis.set_label_text(label(key.key, key.units))
     meaning, unit = _MEANT.get(key.key, (None, ""))
     if meaning:

@@ -1,4 +1,4 @@
-"""A sweep for a reader: the table that is printed."""
+"""The printed summary of a sweep."""
 
 from collections import Counter
 
@@ -12,17 +12,18 @@ from cosim.waveforms.quantities import with_unit
 from cosim.waveforms.storage import swept
 
 MOST_REASONS = 5
+"""Different reasons of failures that are printed, the most frequent ones."""
 
 MOTION = "motion_fastest_{}"
 """Attribute of a sweep's dataset with the kind of motion at the fastest point "up" or "down"."""
 MOTIONS = "motion_at_random"
-"""That with how often each kind is met."""
+"""Attribute of a sweep's dataset with how often each kind of motion occurs."""
 
 LEAST = 1e-3
-"""m/s: errors of v_average are relative to no less than this."""
+"""m/s; the least reference of a relative error of v_average."""
 
 BEYOND = 0.02
-"""Error of v_average that is told of a fast sweep by the share of points beyond it."""
+"""Relative error of v_average: of a fast sweep the share of points above it is printed."""
 
 
 def table(data: xr.Dataset) -> str:
@@ -50,7 +51,7 @@ def table(data: xr.Dataset) -> str:
 
 
 def fastest(data: xr.Dataset) -> list[tuple[str, np.intp]]:
-    """The points at which the part is fastest "up" and "down", where it goes that way."""
+    """Flat indices of the points that transport fastest "up" and "down", if any does so."""
     v = data["v_average"].values if "v_average" in data else np.array(np.nan)
     if not np.isfinite(v).any():
         return []
@@ -66,7 +67,7 @@ def check(data: xr.Dataset) -> None:
 
 
 def _judgement(data: xr.Dataset) -> list[str]:
-    """How far the fast solver is from the FMU at the points that this has judged."""
+    """Lines on the error of the fast solver at the points that the FMU ran again."""
     fast, fmu = (data[name].values.ravel() for name in ("v_average", JUDGED))
     known = np.flatnonzero(np.isfinite(fmu))
     if not len(known):
@@ -84,11 +85,11 @@ def _judgement(data: xr.Dataset) -> list[str]:
 
 
 def at(data: xr.Dataset, place: np.intp, digits: int = 6) -> str:
-    """The settings of a point by its number; of knobs also what they stand for."""
+    """The settings of the point with the flat index ``place``, with what knobs set."""
     v = data["v_average"]
     point = v[dict(zip(v.dims, np.unravel_index(place, v.shape), strict=True))]
     found = [setting(point[name], digits) for name in swept(data)]
-    meant = [
+    meant = [  # only the axes of the sweep have an attribute "key"
         f"{name} {with_unit(float(value), value.units, 4)}"
         for name, value in point.coords.items()
         if str(name) in KNOBS.values() and "key" not in value.attrs

@@ -1,4 +1,4 @@
-"""Runs a sweep: takes up what its store holds, runs the rest, keeps the dataset up to date."""
+"""Runs a sweep: takes known outcomes from its store, runs the rest, keeps the dataset current."""
 
 import os
 import time
@@ -37,11 +37,12 @@ JUDGED = 50
 """Random points of a sweep with the fast solver that the FMU runs again."""
 
 LOOKED_AT = {"fmu": 20, "fast": 5}
-"""Random points at most, by the solver of the scene, and a quarter of all, of which the kind of
-motion is told: each costs as much as a hundred points of the fast one."""
+"""By the scene's solver: at most how many random points, and no more than a quarter of all, have
+their kind of motion determined; each costs as much as a hundred points of the fast solver."""
 
 _REFRESH = 10.0
-"""s between two writings of the dataset, and at least _RARELY times as long as one takes."""
+"""Least time between two writings of the dataset, s; it is also at least _RARELY times the duration
+of one writing."""
 _RARELY = 20.0
 
 
@@ -111,6 +112,7 @@ def _sweep(
         raise BadInput(f"{plain(family)}: this is no directory of the sweep's own; remove it.")
     made_by, units = {**versions(), "fmu": fmu.token()}, dataset.units_of(scene)
     total, numbers = len(design), dataset.Numbers(len(design))
+    # What identifies this sweep in its store: the axes' values, and the sample.
     asked = [(axis.key.full, axis.values) for axis in design.axes], design.sample
     whole_periods = design.changes_frequency
 
@@ -123,7 +125,7 @@ def _sweep(
     with Evaluator(
         scene, folder / STORE, *asked, whole_periods=whole_periods, workers=workers, dask=dask
     ) as bench:
-        if not bench.resumed:  # what was kept there is another sweep's
+        if not bench.resumed:  # the waveforms there are those of another sweep
             for old in family.glob("*.nc"):
                 if old.stem.isdecimal():
                     old.unlink()
@@ -165,22 +167,23 @@ def _keep(
     points: Sequence[int],
     bench: Evaluator,
 ) -> None:
-    """Run ``points`` once more, here, and write their waveforms ``names`` from ``run.settle`` on,
-    each point's as ``NUMBER.nc``. Raises CosimError."""
+    """Run ``points`` again in threads of this process, and write the waveforms ``names`` of each,
+    from ``run.settle`` on, as ``NUMBER.nc``. Raises CosimError."""
     from cosim.simulation.simulate import simulate
 
     def kept(_: Scene, number: int, progress: Progress) -> None:
-        of = changed(scene, design.point(number), "--over")  # the bench's own has no rows
+        # The scene that the evaluator passes records no waveforms.
+        point = changed(scene, design.point(number), "--over")
         if design.changes_frequency:
-            of = in_whole_periods(of)
-        result = simulate(of, progress)
+            point = in_whole_periods(point)
+        result = simulate(point, progress)
         if unknown := [name for name in names if name not in result.columns]:
             known = ", ".join(result.columns)
             raise BadInput(f'--keep: the runs have no "{plain(unknown[0])}" (they have {known}).')
-        later = result.columns["time"] >= of.run.settle
+        later = result.columns["time"] >= point.run.settle
         columns = {name: result.columns[name][later] for name in ("time", *names)}
         with whole(folder / f"{number}.nc") as temporary, temporary.open("wb") as file:
-            netcdf(file, columns, result.units, {"frequency": repr(1.0 / of.period)})
+            netcdf(file, columns, result.units, {"frequency": repr(1.0 / point.period)})
 
     for _, failed in bench.apply(kept, points):
         if isinstance(failed, Exception):
@@ -188,25 +191,25 @@ def _keep(
 
 
 def _motions(scene: Scene, design: Design, data: xr.Dataset) -> dict[str, str]:
-    """The kind of motion at the fastest points, and how often each kind is met at random ones, in
-    words, by names of attributes; nothing where it is not known."""
+    """Attributes of the dataset, in words: the kind of motion at the fastest points, and how often
+    each kind occurs at random points; left out where no kind could be determined."""
 
     def at(number: int) -> tuple[str, str, str]:
-        """The kind of a point, what it means, and whether the mean reads the start."""
-        of = changed(scene, {**design.point(number), "run.solver": "fmu"}, "--over")
-        of = in_whole_periods(of) if design.changes_frequency else of
-        summary = motion(of, lambda _: None)
+        """The kind of motion at a point; its description; a warning if the mean holds the start."""
+        point = changed(scene, {**design.point(number), "run.solver": "fmu"}, "--over")
+        point = in_whole_periods(point) if design.changes_frequency else point
+        summary = motion(point, lambda _: None)
         summary["v_average"] = float(v[number])
-        return summary.get("motion", ""), motion_in_words(summary), of_the_start(of, summary)
+        return summary.get("motion", ""), motion_in_words(summary), of_the_start(point, summary)
 
     found, v = {}, data["v_average"].values.ravel() if "v_average" in data else np.empty(0)
     for way, place in fastest(data):
         words = "; ".join(filter(None, at(int(place))[1:]))
         found |= {MOTION.format(way): words} if words else {}
     known = np.random.default_rng(1).permutation(np.flatnonzero(np.isfinite(v)))
-    some = known[: min(LOOKED_AT[scene.run.solver], len(v) // 4)].tolist()
-    if found and some:
-        kinds, _, early = zip(*map(at, some), strict=True)
+    drawn = known[: min(LOOKED_AT[scene.run.solver], len(v) // 4)].tolist()
+    if found and drawn:
+        kinds, _, early = zip(*map(at, drawn), strict=True)
         met = ", ".join(f"{kind or 'not known'} {count}" for kind, count in Counter(kinds).items())
         late = sum(map(bool, early))
         found[MOTIONS] = f"{met}; the mean reads the start at {late} of them"
@@ -214,8 +217,8 @@ def _motions(scene: Scene, design: Design, data: xr.Dataset) -> dict[str, str]:
 
 
 def _judged(design: Design, numbers: dataset.Numbers) -> Iterator[tuple[int, Settings]]:
-    """The points of a fast sweep that the FMU runs again: the fastest both ways, and a random few
-    by which its error is told."""
+    """The points of a fast sweep that the FMU runs again: the fastest upwards and downwards, and
+    JUDGED random ones, which estimate the fast solver's error."""
     v = numbers.by_name().get("v_average", np.full(len(design), np.nan))
     known = np.flatnonzero(np.isfinite(v))
     few = np.random.default_rng(0).permutation(known)[:JUDGED].tolist()

@@ -1,5 +1,5 @@
-"""Finds the settings that transport best, as the operator does by ear; and what a small turn of a
-knob makes of a run, which ``cosim run --spread`` tells with it."""
+"""Finds the settings that transport best, as the operator does by ear; and how a small turn of
+each knob changes a run's mean velocity, for ``cosim run --spread``."""
 
 from cosim.studies.study import DASK, OVERRIDES, SCENE, SEED, WORKERS, Option, Study
 

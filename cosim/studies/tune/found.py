@@ -1,4 +1,4 @@
-"""What a search leaves: every run, the best settings, and a sentence on how safe they are."""
+"""The result of a search: every run, the best settings, and a sentence on their robustness."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ from cosim.waveforms.report import motion_in_words
 
 COLORS = ("#1f6fb2", "#d1495b", "#2a9d8f", "#e9a03b", "#8d99ae", "#6a4c93")
 MOST_KEYS = 4
-"""Whose settings the figure shows."""
+"""The figure shows the settings of at most so many keys."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class Run:
 class Tuning:
     """A finished search.
 
-    ``neighbours`` gives for each key the value where it is turned by TURN of its range, down and
-    up, None beyond the end of the range or where the run failed; empty where turning led on to this
-    best run and the budget ended there.
+    ``neighbours`` gives for each key the values with this key turned by TURN of its range down and
+    up from the best run, None beyond the end of the range or where the run failed. It is empty
+    where such a turn became the best run itself and the budget had no runs left for its turns.
     """
 
     quantity: str
@@ -54,21 +54,21 @@ class Tuning:
     scene: Scene
     """The scene at the best settings."""
     scouts: int
-    """Runs on the rung "limited", or with the fast solver, that went ahead."""
+    """Number of preceding, cheaper runs on the rung "limited" or with the fast solver."""
     seed: int
     by_fast: float | None = None
-    """The value at the best run by the fast solver, where that searched: the FMU has judged."""
+    """The fast solver's value at the best run, where it searched; ``value`` is then the FMU's."""
     waveform: str = ""
     """The family that was searched; empty for the scene's own waveform."""
     robust: bool = False
-    """Whether values are medians over the turns of the keys, or the worst where signs differ."""
+    """Whether values are medians over the turns of the keys, or the worst if their signs differ."""
     heat: float = inf
-    """W: the most in a coil."""
+    """Limit of the heat in a coil, W."""
     motion: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    """The kind of motion at the best settings, by the keys of a summary. Where it is chaotic, the
-    value is one of many."""
+    """The summary's numbers on the kind of motion at the best settings. Where it is chaotic, the
+    value is one sample of many."""
     others: tuple["Tuning", ...] = ()
-    """What was found for other waveforms."""
+    """The searches of the other waveforms, the best one first."""
 
     @property
     def failed(self) -> int:
@@ -85,6 +85,7 @@ class Tuning:
         for key, values in self.neighbours.items():
             low, high = self.ranges[key]
             for turn, value in zip((-TURN, TURN), values, strict=True):
+                # Beyond the end of the range nothing was run, and None is no failure.
                 if low <= self.best.values[key] + turn * (high - low) <= high:
                     change = inf if value is None else self.value - value
                     losses.append(change if self.largest or value is None else -change)
@@ -92,13 +93,13 @@ class Tuning:
 
     @property
     def value(self) -> float:
-        """That of the best run."""
+        """The value of the best run."""
         assert self.best.value is not None
         return self.best.value
 
     @property
     def robustness(self) -> str:
-        """What it costs to turn a key a little, in words."""
+        """In words, the greatest loss of value when one key is turned by TURN of its range."""
         if not self.neighbours:
             return "the budget ended before its neighbours were run: a larger one may help"
         if (lost := self.lost) is None:
@@ -123,7 +124,7 @@ class Tuning:
         path_axis, turn_axis = top.subplots(1, 2)
         path_axis.scatter(number, values, c=number, cmap="viridis", s=14)
         ranked = values if self.largest else -values
-        so_far = np.fmax.accumulate(ranked)
+        so_far = np.fmax.accumulate(ranked)  # of the runs up to each, ignoring failed ones (NaN)
         path_axis.step(number, so_far if self.largest else -so_far, where="post", color="#d1495b")
         failed = number[~np.isfinite(values)]
         path_axis.plot(
@@ -195,9 +196,9 @@ class Tuning:
             "scouts": self.scouts,
             "value_by_fast_solver": self.by_fast,
             "waveforms": {
-                one.waveform: {"value": one.value, "settings": one.best.values}
-                for one in (self, *self.others)
-                if one.waveform
+                each.waveform: {"value": each.value, "settings": each.best.values}
+                for each in (self, *self.others)
+                if each.waveform
             },
             "robust": self.robust,
             "heat_limit": self.heat if isfinite(self.heat) else None,
@@ -214,9 +215,9 @@ class Tuning:
         for path in out.glob("best-*.toml"):
             if path.stem.split("-")[1] in COMMANDS:  # of an earlier search
                 path.unlink()
-        for one in (self, *self.others):
-            name = "best" if one is self else f"best-{one.waveform.replace(':', '-')}"
-            write_text(out / f"{name}.toml", to_toml(one.scene.model_copy(update=found)))
+        for each in (self, *self.others):
+            name = "best" if each is self else f"best-{each.waveform.replace(':', '-')}"
+            write_text(out / f"{name}.toml", to_toml(each.scene.model_copy(update=found)))
         self.plot().write(out / "figure.png")
 
     def __repr__(self) -> str:
@@ -229,13 +230,13 @@ class Tuning:
             "or too hot, at"
         ]
         if self.by_fast is not None:
-            told = with_unit(self.by_fast * scale, unit, 5)
-            lines.append(f"  by the FMU; the fast solver, which searched, has {told}")
+            by_fast = with_unit(self.by_fast * scale, unit, 5)
+            lines.append(f"  by the FMU; the fast solver, which searched, has {by_fast}")
         for name, setting in self.best.values.items():
             line = f"  {name} = {with_unit(setting, numeric_key(name).unit)}"
             if key := KNOBS.get(name.removeprefix("drive.")):
-                meant, unit_of_it = getattr(self.scene.drive, key), numeric_key(f"drive.{key}").unit
-                line += f" ({key} {with_unit(meant, unit_of_it, 4)})"
+                meant, meant_unit = getattr(self.scene.drive, key), numeric_key(f"drive.{key}").unit
+                line += f" ({key} {with_unit(meant, meant_unit, 4)})"
             lines.append(line)
         if words := self.robustness:
             lines.append(f"  {words}")
@@ -246,8 +247,8 @@ class Tuning:
                 f"  values are medians over the keys' turns by {percent(TURN)}, or the worst of "
                 "them where their signs differ"
             )
-        for one in (self, *self.others) if self.others else ():
-            lines.append(f"  {one.waveform}: {with_unit(one.value * scale, unit, 4)}")
+        for each in (self, *self.others) if self.others else ():
+            lines.append(f"  {each.waveform}: {with_unit(each.value * scale, unit, 4)}")
         return "\n".join(lines)
 
 

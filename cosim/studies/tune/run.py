@@ -1,4 +1,4 @@
-"""Tunes a scene: searches its settings, then turns each key a little about the best."""
+"""Tunes a scene: searches its settings, then turns each key a little from the best ones."""
 
 import os
 import warnings
@@ -32,30 +32,31 @@ from cosim.studies.tune.found import Run, Tuning, write_runs
 KNOBS: dict[str, tuple[float, float]] = {
     f"drive.{knob}": (0.0, 1.0) for knob in ("pot_max", "pot_frequency", "pot_offset")
 }
-"""What is tuned unless told otherwise: the three potentiometers, from end to end."""
+"""The keys that are tuned by default: the three potentiometers, from end to end."""
 
 SEARCHED = 0.93
-"""Most that the search has of the runs; the rest turns one key after another about its best."""
+"""Largest share of the budget for the search; the rest turns the keys of its best point."""
 
 EXPLORED = 0.4
-"""Share of the search's runs that fills the whole range, before it climbs."""
+"""Share of the search's runs that a Sobol sequence takes before CMA-ES starts."""
 
 STORE = "tune.sqlite"
 
 FEWEST_RUNS, MOST_RUNS = 20, 1_000_000
-"""Of the search, and of all."""
+"""Bounds of the budget; for each key two more are needed than FEWEST_RUNS."""
 
 SCOUTS = 5
-"""Runs without ngspice that go ahead of each run with it: some ten times cheaper each."""
+"""Preceding runs without ngspice for each run of the search with it; about ten times cheaper."""
 
 WARM, WARM_APART = 25, 0.02
-"""Best scouts that are run again with ngspice, and how far apart, as a share of the ranges."""
+"""Number of the best preceding points that are run again on the judging model, and their least
+distance as a share of the ranges."""
 
 TABLES = ("steps", "pieces")
 """Waveforms with a table of levels."""
 
 FINE = 10**9
-"""Steps of a key's range that are told apart."""
+"""Steps to which a key's range is rounded: points that round alike are run once."""
 
 
 def tune(
@@ -80,23 +81,25 @@ def tune(
     """Search a scene for the largest, or the least, of a number of its summary in ``budget`` runs.
 
     ``maximise`` or ``minimise`` names the number; ``over`` gives the range of each ``table.key``,
-    SI; by default the three knobs. Where the scene needs ngspice, SCOUTS times as many runs on the
-    rung "limited" look first where it is worth while. Where its solver is the fast one, that one
-    searches, and the FMU judges the best WARM and what follows. After the search each key is turned
-    a little about the best, which moves on while that helps and the budget lasts. The same for the
-    same ``seed``, whatever the number of ``workers``, local ones or those of the cluster at the
-    address ``dask``. ``progress`` is told each run and the best so far, as they finish,
-    ``scouting`` each one ahead. Where the frequency is tuned, each run lasts whole periods.
+    SI; by default the three knobs. Where the scene needs ngspice, a search with SCOUTS times as
+    many runs on the rung "limited" precedes and gives the start points. Where its solver is the
+    fast one, that one searches, and the FMU runs the best WARM points and all later ones. After the
+    search each key of the best point is turned a little; a turn that is better becomes the best
+    point, as long as the budget lasts. Results depend on ``seed``, not on the number of
+    ``workers``, local ones or those of the cluster at the address ``dask``. ``progress`` is given
+    each run and the best so far, as they finish, ``scouting`` each run of the preceding search.
+    Where the frequency is tuned, each run lasts whole periods.
 
-    Each ``waveform``, as :func:`family` names them, is searched by itself with the numbers of its
-    shape beside the keys, and with both polarities of the coil where ``polarity`` is asked for; the
-    best one is given, with the ``others``. A ``robust`` search makes of each setting the median
-    over all turns of the keys of ``over``, or the worst of them where their signs differ. No
-    setting counts that makes more ``heat`` in a coil than :func:`most_heat` has.
+    Each ``waveform``, named as for :func:`family`, is searched by itself over the keys, the numbers
+    of its shape, and both polarities of the coil if ``polarity``. The best waveform's search is
+    returned; its ``others`` are the rest. The value of a setting in a ``robust`` search is the
+    median over all turns of the keys of ``over``, or the worst of them where their signs differ.
+    Settings that make more ``heat`` in a coil than :func:`most_heat` gives count as failed.
 
-    In the folder ``out`` it leaves what ``Tuning.save`` writes, and takes up an interrupted search.
+    In the folder ``out`` it leaves what ``Tuning.save`` writes, and resumes an interrupted search.
 
-    Raises BadInput for keys, ranges, quantities that are none; SimulationFailed if all runs failed.
+    Raises BadInput for unknown keys or quantities and ranges outside a key's limits;
+    SimulationFailed if all runs failed.
     """
     quantity, largest = maximise or minimise, minimise is None
     if quantity is None or (maximise and minimise):
@@ -125,7 +128,7 @@ def tune(
         )
     tunings, benches, made = [], [], list[Run]()
 
-    def told(run: Run, best: Run | None) -> None:
+    def report(run: Run, best: Run | None) -> None:
         made.append(run)
         progress(run, best)
 
@@ -137,9 +140,9 @@ def tune(
             bench = Evaluator(base, path, whole_periods=whole, workers=workers, dask=dask)
             benches.append(stack.enter_context(bench))
             judge = {"run.solver": "fmu"} if base.run.solver == "fast" else {}
-            made = [run for one in tunings for run in one.runs]
+            made = [run for tuning in tunings for run in tuning.runs]
             aim = bench, base, quantity, largest, ranges, len(keys) if robust else 0, most
-            trial = _Trial(*aim, judge, told)
+            trial = _Trial(*aim, judge, report)
             try:
                 best, neighbours, ahead = _searched(trial, budget, seed, scouting)
             except SimulationFailed as error:
@@ -153,10 +156,11 @@ def tune(
                 raise
             except BadInput:
                 if not bench.resumed:
-                    bench.forget()  # there is nothing to go on with
+                    bench.forget()  # a refused call leaves nothing to resume
                 raise
             tuned = changed(base, {**best.values, **judge}, "tune")
             tuned = in_whole_periods(tuned) if whole else tuned
+            # The value by the fast solver of the same point, if its search had that.
             ran_ahead = (run.value for run in ahead if judge and run.values == best.values)
             tunings.append(
                 Tuning(
@@ -164,7 +168,7 @@ def tune(
                     *(seed, next(ran_ahead, None), name, robust, most),
                 )
             )
-        tunings.sort(key=lambda one: one.best.value or 0.0, reverse=largest)
+        tunings.sort(key=lambda tuning: tuning.best.value or 0.0, reverse=largest)
         kind = motion(tunings[0].scene, lambda time: None)
         found = replace(tunings[0], motion=kind, others=tuple(tunings[1:]))
         if out is not None:
@@ -175,8 +179,9 @@ def tune(
 
 
 def family(name: str) -> tuple[dict[str, Any], dict[str, tuple[float, float]]]:
-    """Values of keys that give a scene the waveform ``name``, and the ranges of its shape's
-    numbers: of "steps:N" and "pieces:N" N levels at even phases, of "square" its duty. BadInput."""
+    """Values of keys that give a scene the waveform ``name``, and the ranges of the numbers of its
+    shape: the N levels, at even phases, of "steps:N" and "pieces:N", the duty of "square". Raises
+    BadInput."""
     shape, _, count = name.partition(":")
     sharp = {"drive.waveform": shape, "drive.reset_time": 0.0, "drive.duty": 0.5}
     few = count.isdecimal() and len(count) < 4
@@ -185,7 +190,7 @@ def family(name: str) -> tuple[dict[str, Any], dict[str, tuple[float, float]]]:
         levels = {f"drive.table.{k + 1}": (-0.5, 0.5) for k in range(len(phases))}
         return sharp | {"drive.table": [[phase, 0.5 - phase] for phase in phases]}, levels
     if name not in COMMANDS or name in TABLES:
-        alone = ", ".join(one for one in COMMANDS if one not in TABLES)
+        alone = ", ".join(shape for shape in COMMANDS if shape not in TABLES)
         raise BadInput(
             f"--waveform {plain(name)}: must be one of {alone}, steps:N and pieces:N with N from "
             f"2 to {MOST_CORNERS}."
@@ -194,8 +199,9 @@ def family(name: str) -> tuple[dict[str, Any], dict[str, tuple[float, float]]]:
 
 
 def most_heat(scene: Scene, limit: float | str | None) -> float:
-    """W of a coil, of a limit in W or as "RISE:DUTY" or "RISE:DUTY:SECONDS" (K, 1, s); of None that
-    of the Carlton's range of drives, in a scene with such an actuator. Raises BadInput."""
+    """The limit of the heat in a coil, W, from a number in W, "RISE:DUTY" or "RISE:DUTY:SECONDS"
+    (K, 1, s). None means that of the Carlton's range of drives in a scene with such an actuator, else no
+    limit. Raises BadInput."""
     if limit is None:
         return DRIVE_RANGE_HEAT if scene.mechanics.free_ram else float("inf")
     try:
@@ -227,7 +233,7 @@ Progress = Callable[[Run, Run | None], None]
 
 @dataclass(eq=False)
 class _Trial:
-    """A search for what is wanted, on one circuit model."""
+    """A search for the largest or least ``quantity``, on one circuit model."""
 
     bench: Evaluator
     scene: Scene
@@ -235,16 +241,16 @@ class _Trial:
     largest: bool
     ranges: dict[str, tuple[float, float]]
     turned: int
-    """How many keys, the first ones, are turned about each setting."""
+    """How many of the keys, from the first on, are turned at each setting of a robust search."""
     heat: float
-    """W: the most in a coil."""
+    """Limit of the heat in a coil, W."""
     circuit: Settings
-    """Makes that model of the scene; of a fast one whose numbers count, the FMU."""
+    """Settings that select the circuit model, or the FMU as the solver; empty: the scene's own."""
     progress: Progress
 
     def __post_init__(self) -> None:
         self.runs: list[Run] = []
-        """In the order of the points that are known."""
+        """The run of each row of ``known.points``."""
         self.known = Known(len(self.ranges), 1, FINE, self._run)
 
     @property
@@ -254,7 +260,7 @@ class _Trial:
         return self.runs[int(found.argmax())] if len(found) and found.max() > -inf else None
 
     def search(self, runs: int, seed: int, warm: Array | None = None) -> None:
-        """Run at most ``runs`` points; ``warm`` ones (rows) first, in place of most exploration."""
+        """Run at most ``runs`` points; ``warm`` (rows) come first and replace most exploration."""
         keys, explored = len(self.ranges), round(EXPLORED * runs)
         if warm is not None:
             self.known.rows(warm[:explored])
@@ -264,17 +270,19 @@ class _Trial:
         self.known.search({0: Climb(keys, seed)}, runs - len(self.runs))
 
     def neighbours(self) -> dict[str, list[float | None]]:
-        """The value asked for with each key turned down and up from the best."""
+        """The values with each key turned down and up from the best point; None if out of range."""
         keys = list(self.ranges)
         best = self.known.points[int(self.known.scores[:, 0].argmax())]
-        every = faces(best)
-        off = np.abs(every - best).max(axis=1)
-        inside = np.isclose(off, TURN)
-        rows = iter(self.known.rows(every[inside]))
-        values = [self.runs[next(rows)].value if there else None for there in inside]
+        # 2 n rows: all keys turned up one by one, then down; those beyond an end are clipped to it.
+        turns = faces(best)
+        inside = np.isclose(np.abs(turns - best).max(axis=1), TURN)
+        rows = iter(self.known.rows(turns[inside]))
+        values = [self.runs[next(rows)].value if known else None for known in inside]
         return {key: [values[len(keys) + k], values[k]] for k, key in enumerate(keys)}
 
     def _run(self, points: Array) -> tuple[Array, Feasible]:
+        """Scores (points × 1) and feasibility of points (rows). Each point is a group of settings:
+        its own, then its turns; groups are judged as they complete, and kept in order."""
         each = [
             [self._settings(near.tolist()) for near in turned(point, self.turned)]
             for point in points
@@ -290,13 +298,13 @@ class _Trial:
         return scores, np.isfinite(scores[:, 0])
 
     def _judged(self, settings: dict[str, Number], outcomes: Sequence[Outcome]) -> Run:
-        """A setting with its own outcome, the first, and those of its turns, which are judged by
-        their motion alone: a hand that is off turns back."""
+        """The run of a setting, from its own outcome (the first) and those of its turns. The heat
+        limit applies to its own only, as an operator who is off turns the knob back."""
         own, most = outcomes[0], self.heat
         if (heat := own.numbers.get("coil_heat", 0.0)) > most:
             own = replace(own, failure=f"the heat of {heat:.3g} W in a coil is above {most:.3g} W")
             return Run(settings, own, None)
-        values = [value for one in outcomes if (value := self._value(one)) is not None]
+        values = [value for each in outcomes if (value := self._value(each)) is not None]
         if len(values) < len(outcomes):
             return Run(settings, own, None)
         alike = min(values) > 0.0 or max(values) < 0.0
@@ -310,7 +318,7 @@ class _Trial:
             value = min(max(low + share * (high - low), low), high)
             key = numeric_key(name)
             if key.choices:
-                value = min(map(int, key.choices), key=lambda one: abs(one - value))
+                value = min(map(int, key.choices), key=lambda choice: abs(choice - value))
             settings[name] = round(value) if key.kind is int else value
         return settings
 
@@ -333,7 +341,7 @@ class _Trial:
 def _searched(
     trial: _Trial, budget: int, seed: int, scouting: Progress
 ) -> tuple[Run, dict[str, list[float | None]], list[Run]]:
-    """The best run, its neighbours, and the runs of the scouts that went ahead."""
+    """The best run, the values of its turns, and the runs of the preceding, cheaper search."""
     faces_each = 2 * len(trial.ranges)
     searched = min(round(SEARCHED * budget), budget - faces_each)
     ahead: list[Run] = []
@@ -341,19 +349,20 @@ def _searched(
     fast = trial.scene.run.solver == "fast"
     circuit = {} if fast else Fidelity.of(trial.scene).simple
     if circuit is not None:
-        # Quantities that only the scene's own rung has find no scouts.
+        # BadInput: the simple model's summary lacks the quantity, so no search precedes.
         with nullcontext() if fast else suppress(BadInput):
             scouts = replace(trial, circuit=circuit, progress=scouting)
             scouts.search((1 if fast else SCOUTS) * searched, seed)
             ahead, warm = scouts.runs, scouts.known.ranked(0, WARM_APART, WARM)
     if fast:
-        trial.known.rows(warm)  # the search is over
+        trial.known.rows(warm)  # with the FMU; the fast solver has used the search's runs
     else:
         trial.search(searched, seed, warm)
     if trial.best is None:
         first = (trial.runs or ahead)[0]
         raise SimulationFailed(f"No setting could be run; the first one: {first.outcome.failure}")
     best, neighbours = trial.best, trial.neighbours()
+    # A turn that is better becomes the best run; its own turns are run while the budget lasts.
     while trial.best is not best and len(trial.runs) + faces_each <= budget:
         best, neighbours = trial.best, trial.neighbours()
     return trial.best, neighbours if trial.best is best else {}, ahead

@@ -1,4 +1,4 @@
-"""Runs a scene with each knob turned a little, on the cheapest circuit that suffices."""
+"""Runs a scene with each knob turned a little, on the simplest circuit model that suffices."""
 
 import os
 from collections.abc import Callable, Iterable, Mapping
@@ -22,11 +22,11 @@ Settings = dict[str, float]
 
 @dataclass(frozen=True)
 class Turned:
-    """A run with ``settings`` on top of the scene's own; without any, the scene as it is."""
+    """A run of the scene with the changed ``settings``; none for the scene as it is."""
 
     settings: Settings
     circuit_model: str
-    """Which circuit was run."""
+    """The circuit model of the run."""
     v_average: float | None
     """m/s; None where the run failed."""
     failure: str = ""
@@ -39,7 +39,7 @@ class Turned:
 
 @dataclass(frozen=True)
 class Spread:
-    """What a small turn of each knob makes of v_average; ``runs`` begin with the scene itself."""
+    """How a small turn of each knob changes v_average; the first run is the scene as it is."""
 
     runs: list[Turned]
 
@@ -91,9 +91,10 @@ def spread(
     """Run a scene as it is and with each of the three knobs turned by TURN either way.
 
     The runs last whole periods, at least as long as the scene's own. Where ngspice solves its
-    circuit, all are made without it first; the scene itself and the two ends are then run as they
-    are, and all others where one of these differs by more than ``run.tolerance``. ``workers`` runs
-    at once, by default one for each processor; ``progress`` is told the runs done.
+    circuit, all are first made on a circuit model that needs no ngspice. The scene itself, the
+    slowest and the fastest turn are then run on the scene's own model, and where one of the three
+    differs by more than ``run.tolerance``, all others too. ``workers`` runs at once, by default one
+    for each processor; ``progress`` is given the number of runs done.
 
     Raises BadInput for a scene without knobs, SimulationFailed where every run failed.
 
@@ -102,26 +103,26 @@ def spread(
     True
     """
     scene = load(scene, overrides)
-    every: list[Settings] = [{}, *turns(scene)]
+    settings: list[Settings] = [{}, *turns(scene)]
     fidelity, steps, found = Fidelity.of(scene), count(1), dict[int, Turned]()
 
     def run(numbers: Iterable[int], circuit: Mapping[str, str | bool]) -> None:
-        points = {n: {**every[n], **circuit} for n in numbers}
+        points = {n: {**settings[n], **circuit} for n in numbers}
         model = str(circuit.get("circuit.model", scene.circuit.model))
         for n, outcome in bench.run(points.items()):
             value = None if outcome.failure else outcome.numbers["v_average"]
-            found[n] = Turned(every[n], model, value, outcome.failure)
+            found[n] = Turned(settings[n], model, value, outcome.failure)
             progress(next(steps))
 
     with Evaluator(scene, whole_periods=True, workers=workers) as bench:
-        run(range(len(every)), fidelity.simple or {})
+        run(range(len(settings)), fidelity.simple or {})
         if fidelity.simple is not None:
-            simple, known = dict(found), [n for n, one in found.items() if not one.failure]
+            simple, known = dict(found), [n for n, turn in found.items() if not turn.failure]
             ends = (end(known, key=lambda n: _speed(simple[n])) for end in (min, max) if known)
             first = {0, *ends}
             run(first, {})
             if not all(fidelity.agrees(simple[n].v_average, found[n].v_average) for n in first):
-                run([n for n in range(len(every)) if n not in first], {})
+                run([n for n in range(len(settings)) if n not in first], {})
     made = Spread([found[n] for n in sorted(found)])
     if not made.known:
         raise SimulationFailed(f"No setting could be run; the first one: {made.runs[0].failure}")
@@ -134,10 +135,10 @@ def _speed(run: Turned) -> float:
 
 
 def turns(scene: Scene) -> list[Settings]:
-    """The settings with one knob turned either way, not beyond the end of its range.
+    """The settings with one knob turned either way, without those beyond the end of its range.
 
-    A knob that the scene gives as ``pot_…`` is turned by TURN of its whole turn; amplitude,
-    frequency and offset by TURN of themselves, an offset of 0 by that of the amplitude.
+    A knob that the scene gives as ``pot_…`` is turned by TURN of its whole turn. Amplitude,
+    frequency and offset change by TURN of their values, an offset of 0 by TURN of the amplitude.
     Raises BadInput for a scene whose knobs move nothing.
     """
     if scene.has_ports:
